@@ -1,0 +1,85 @@
+"""`results.json`: what a run found, for machines; anything prettier shows the same data."""
+
+import json
+import math
+import secrets
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.results import Case, Tier
+
+SCHEMA = 1
+"""Raised whenever a reader of the former layout would misread the new one."""
+
+
+def write_results(path: Path, cases: Sequence[Case], provenance: Mapping[str, Any]) -> None:
+    """Write `results.json`, at once or not at all.
+
+        {"schema": 1, "provenance": {...},
+         "cases": [{"scene", "verdict", "reason",
+                    "tiers": {name: {"status", "reason", and the numbers of the tier}},
+                    "metrics": {"ssim", "psnr", "rmse", "relmse", "mean_bias", "nonfinite"} or null,
+                    "seconds": {"ours": {...}, "mitsuba": {...}}, "notes": [...]}]}
+
+    Strict JSON (RFC 8259): NaN and the infinities become null, so a null number says "undefined or
+    unbounded" (the PSNR of equal pictures, say), never zero. Raises ValueError if two tiers of a
+    case have one name or a number of a tier is called status or reason.
+    """
+    document = {
+        "schema": SCHEMA,
+        "provenance": _plain(provenance),
+        "cases": [_case(case) for case in cases],
+    }
+    write_atomically(path, json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write a UTF-8 file so that a reader sees the old one or the whole new one, never a part."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # In the same folder, since a rename is atomic within one file system only.
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    try:
+        with temporary.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _case(case: Case) -> dict[str, Any]:
+    tiers = {tier.name: _tier(tier) for tier in case.tiers}
+    if len(tiers) < len(case.tiers):
+        raise ValueError(f"{case.scene}: two tiers have the same name")
+    return {
+        "scene": case.scene,
+        "verdict": case.verdict,
+        "reason": case.reason,
+        "tiers": tiers,
+        "metrics": _plain(asdict(case.metrics)) if case.metrics else None,
+        "seconds": _plain(case.seconds),
+        "notes": list(case.notes),
+    }
+
+
+def _tier(tier: Tier) -> dict[str, Any]:
+    numbers: dict[str, Any] = _plain(tier.numbers)
+    if clash := {"status", "reason"} & numbers.keys():
+        raise ValueError(f"{tier.name}: a number may not be called {', '.join(sorted(clash))}")
+    return {"status": tier.status, "reason": tier.reason, **numbers}
+
+
+def _plain(value: Any) -> Any:
+    """`value` in the types of JSON: NumPy's become Python's, numbers not finite become None."""
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,52 @@
+"""The errors that a person can cause, each with the exit code that the command line gives it."""
+
+from collections.abc import Sequence
+
+
+class ReferenceRtError(Exception):
+    """An error with one clear line for people; `exit_code` is what `reference-rt` returns."""
+
+    exit_code = 5
+
+
+class UsageError(ReferenceRtError):
+    """A command was asked for something that it does not do."""
+
+    exit_code = 2
+
+
+class SceneError(ReferenceRtError):
+    """A scene, or a file that it names, is not what it must be.
+
+    `path` is the way through the scene's keys to the culprit, e.g. ``("shapes", 2, "radius")``;
+    `file` and `line` (1-based) are added where the scene was read from a file.
+    """
+
+    exit_code = 3
+
+    def __init__(
+        self,
+        message: str,
+        path: Sequence[str | int] = (),
+        file: str | None = None,
+        line: int | None = None,
+    ) -> None:
+        self.message, self.path, self.file, self.line = message, tuple(path), file, line
+        super().__init__(self._text())
+
+    def _text(self) -> str:
+        where = "" if self.file is None else self.file + (f":{self.line}" if self.line else "")
+        keys = "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in self.path).lstrip(".")
+        return ": ".join(part for part in (where, keys, self.message) if part)
+
+
+class ImageError(ReferenceRtError):
+    """An image cannot be read, written or used."""
+
+    exit_code = 3
+
+
+class ReferenceUnavailableError(ReferenceRtError):
+    """The reference renderer is missing or could not run."""
+
+    exit_code = 4

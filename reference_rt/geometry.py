@@ -1,0 +1,112 @@
+"""What a ray can hit: the closest-hit and the any-hit query over all shapes of a scene."""
+
+import math
+from typing import NamedTuple
+
+from reference_rt import shapes as any_shape
+from reference_rt.bvh import FAR_SLACK, STACK_SIZE, Bvh
+from reference_rt.kernel import kernel, local_floats, local_integers, reciprocal
+from reference_rt.ray import Hit, Ray, no_hit
+from reference_rt.shapes import Shapes, box, rectangle, sphere, triangle
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.shapes.triangle import shear_of
+from reference_rt.vec3 import Vec3
+
+
+class Geometry(NamedTuple):
+    """All shapes, and the hierarchy over them where they are many enough to need one."""
+
+    shapes: Shapes
+    bvh: Bvh | None
+
+
+Columns = tuple[int, int, int]
+
+
+@kernel
+def closest_hit(geometry: Geometry, ray: Ray) -> Hit:
+    """The intersection with the smallest t in (0, t_max); `kind` is -1 for none."""
+    return _trace(geometry.bvh, geometry.shapes, ray, False)
+
+
+@kernel
+def occluded(geometry: Geometry, ray: Ray) -> bool:
+    """Whether anything lies in (0, t_max): stops at the first thing found."""
+    return _trace(geometry.bvh, geometry.shapes, ray, True).kind >= 0
+
+
+@kernel
+def _trace(bvh: Bvh | None, shapes: Shapes, ray: Ray, any_hit: bool) -> Hit:
+    closest = no_hit(ray)
+    if bvh is not None:
+        return _traverse(bvh, shapes, ray, any_hit, closest)
+    closest = sphere.intersect_all(shapes.spheres, ray, any_hit, closest)
+    if any_hit and closest.kind >= 0:
+        return closest
+    closest = rectangle.intersect_all(shapes.rectangles, ray, any_hit, closest)
+    if any_hit and closest.kind >= 0:
+        return closest
+    closest = box.intersect_all(shapes.boxes, ray, any_hit, closest)
+    if any_hit and closest.kind >= 0:
+        return closest
+    return triangle.intersect_all(shapes.triangles, ray, any_hit, closest)
+
+
+@kernel
+def _entry(boxes: FloatArray, node: int, o: Vec3, inverse: Vec3, near: Columns, t_max: float) -> float:
+    """Where the ray enters a node's box, inf where it misses.
+
+    `near` holds the columns of the near planes: chosen by the sign of d, the 0 * inf of a ray in
+    a plane can only be NaN, which max and min pass over: such a plane does not limit the ray.
+    """
+    x, y, z = near
+    t_in = max(0.0, (boxes[node, x] - o.x) * inverse.x)
+    t_in = max(t_in, (boxes[node, y] - o.y) * inverse.y)
+    t_in = max(t_in, (boxes[node, z] - o.z) * inverse.z)
+    t_out = min(math.inf, (boxes[node, 3 - x] - o.x) * inverse.x)
+    t_out = min(t_out, (boxes[node, 5 - y] - o.y) * inverse.y)
+    t_out = min(t_out, (boxes[node, 7 - z] - o.z) * inverse.z)
+    if t_in <= t_out * FAR_SLACK and t_in <= t_max * FAR_SLACK:
+        return t_in
+    return math.inf
+
+
+@kernel
+def _traverse(bvh: Bvh, shapes: Shapes, ray: Ray, any_hit: bool, closest: Hit) -> Hit:
+    """Nearer child first; the other waits on a stack with the distance of its box."""
+    stack, distance = local_integers(STACK_SIZE), local_floats(STACK_SIZE)
+    inverse = Vec3(reciprocal(ray.d.x), reciprocal(ray.d.y), reciprocal(ray.d.z))
+    near = (
+        0 if inverse.x > 0.0 else 3,
+        1 if inverse.y > 0.0 else 4,
+        2 if inverse.z > 0.0 else 5,
+    )
+    shear = shear_of(ray)
+    node, top = 0, 0
+    while True:
+        if bvh.count[node] > 0:
+            begin = bvh.first[node]
+            for k in range(begin, begin + bvh.count[node]):
+                closest = any_shape.intersect(
+                    shapes, bvh.kind[k], bvh.row[k], ray, shear, closest
+                )
+                if any_hit and closest.kind >= 0:
+                    return closest
+        else:
+            left = bvh.first[node]
+            t_left = _entry(bvh.boxes, left, ray.o, inverse, near, closest.t)
+            t_right = _entry(bvh.boxes, left + 1, ray.o, inverse, near, closest.t)
+            if t_left < math.inf or t_right < math.inf:
+                node = left if t_left <= t_right else left + 1
+                if t_left < math.inf and t_right < math.inf:
+                    stack[top] = left + 1 if t_left <= t_right else left
+                    distance[top] = max(t_left, t_right)
+                    top += 1
+                continue
+        while True:
+            if top == 0:
+                return closest
+            top -= 1
+            if distance[top] <= closest.t * FAR_SLACK:
+                break
+        node = stack[top]

@@ -1,0 +1,45 @@
+"""What integrators share: direct light from one light, and the heuristic that joins estimators."""
+
+from typing import NamedTuple
+
+from reference_rt import lights as any_light
+from reference_rt import materials as any_material
+from reference_rt.geometry import occluded
+from reference_rt.kernel import kernel
+from reference_rt.lights import LightSample, shadow_ray
+from reference_rt.ray import SurfacePoint
+from reference_rt.tables import SceneTables
+from reference_rt.vec3 import Frame, Vec3, is_black, to_local
+
+
+class Direct(NamedTuple):
+    """What one light sample sends to the viewer: f cos L, 0 in shadow, not yet divided by a pdf."""
+
+    light: LightSample
+    wi: Vec3
+    contribution: Vec3
+
+
+@kernel
+def direct(
+    scene: SceneTables, point: SurfacePoint, frame: Frame, wo: Vec3, k: int, u0: float, u1: float
+) -> Direct:
+    """Light k of the scene's choice at a surface; `wo` and the result's `wi` are local."""
+    light = any_light.sample_one(scene.lights, k, scene.geometry.shapes, point.p, u0, u1)
+    black = Vec3(0.0, 0.0, 0.0)
+    if light.pdf == 0.0:
+        return Direct(light, black, black)
+    wi = to_local(frame, light.wi)
+    f_cos = any_material.evaluate(scene.materials, point.material, wo, wi)
+    # Most shadow rays to the wrong side of a surface are spared here.
+    if is_black(f_cos) or occluded(scene.geometry, shadow_ray(point, light)):
+        return Direct(light, wi, black)
+    return Direct(light, wi, f_cos * light.radiance)
+
+
+@kernel
+def power_heuristic(pdf: float, other: float) -> float:
+    """The weight of a sample of density `pdf` that `other` could have found too: p² / (p² + q²)
+    (Veach 1997, eq. 9.13), as a ratio, which cannot overflow."""
+    ratio = other / pdf
+    return 1.0 / (1.0 + ratio * ratio)

@@ -1,0 +1,110 @@
+"""Whitted: recursive ray tracing (Whitted 1980), deterministic."""
+
+import math
+from typing import Annotated, ClassVar, Literal, NamedTuple
+
+from pydantic import Field
+
+from reference_rt import materials as any_material
+from reference_rt import sampling
+from reference_rt import shapes as any_shape
+from reference_rt.description import Description
+from reference_rt.geometry import closest_hit
+from reference_rt.integrators.integrator import direct
+from reference_rt.kernel import kernel, local_floats
+from reference_rt.lights import CONSTANT, Choice, area, constant
+from reference_rt.ray import Ray, SurfacePoint, ray_from
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.tables import SceneTables
+from reference_rt.vec3 import Frame, Vec3, frame_from_normal, max_component, to_local, to_world
+
+
+class Whitted(Description):
+    """Direct light with shadows; mirrored and refracted rays, recursively; the background.
+
+    Every area light is one point, the middle of its parameters; an environment is seen, but lights
+    nothing but through mirrors and glass.
+    """
+
+    deterministic: ClassVar[bool] = True
+    type: Literal["whitted"] = "whitted"
+    max_depth: Annotated[int, Field(ge=0, le=4096)] = 8
+    """Most mirrorings and refractions of a ray."""
+    min_contribution: Annotated[float, Field(ge=0, lt=1)] = 1e-4
+    """Rays that count for less than this fraction of the pixel are not followed."""
+
+    def setup(self) -> "WhittedSetup":
+        return WhittedSetup(self.max_depth, self.min_contribution)
+
+
+class WhittedSetup(NamedTuple):
+    max_depth: int
+    min_contribution: float
+
+
+@kernel
+def _push(stack: FloatArray, top: int, ray: Ray, weight: Vec3, depth: int) -> None:
+    k = 10 * top
+    stack[k], stack[k + 1], stack[k + 2] = ray.o
+    stack[k + 3], stack[k + 4], stack[k + 5] = ray.d
+    stack[k + 6], stack[k + 7], stack[k + 8] = weight
+    stack[k + 9] = depth
+
+
+@kernel
+def _vector(stack: FloatArray, k: int) -> Vec3:
+    return Vec3(stack[k], stack[k + 1], stack[k + 2])
+
+
+@kernel
+def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
+    """The radiance along `ray`.  The tree of rays is walked depth first on a stack of its own:
+    each level leaves one ray waiting at most."""
+    stack = local_floats(10 * (whitted.max_depth + 2))
+    _push(stack, 0, ray, Vec3(1.0, 1.0, 1.0), 0)
+    top = 1
+    total = Vec3(0.0, 0.0, 0.0)
+    while top > 0:
+        top -= 1
+        k = 10 * top
+        ray = Ray(_vector(stack, k), _vector(stack, k + 3), math.inf)
+        weight, depth = _vector(stack, k + 6), int(stack[k + 9])
+        hit = closest_hit(scene.geometry, ray)
+        if hit.kind < 0:
+            total = total + weight * constant.background(scene.lights.environment)
+            continue
+        point = any_shape.surface(scene.geometry.shapes, ray, hit)
+        frame = frame_from_normal(point.ns)
+        wo = to_local(frame, -ray.d)
+        total = total + weight * area.emitted(scene.lights.areas, point, -ray.d)
+        if any_material.is_smooth(scene.materials, point.material):
+            total = total + weight * _direct_light(scene, scene.lights.choice, point, frame, wo)
+        elif depth < whitted.max_depth:
+            branch = any_material.branches(scene.materials, point.material, wo)
+            mirrored = weight * branch.reflectance
+            if max_component(mirrored) > whitted.min_contribution:
+                next_ray = ray_from(point, to_world(frame, branch.reflected))
+                _push(stack, top, next_ray, mirrored, depth + 1)
+                top += 1
+            refracted = weight * branch.transmittance
+            if max_component(refracted) > whitted.min_contribution:
+                next_ray = ray_from(point, to_world(frame, branch.refracted))
+                _push(stack, top, next_ray, refracted, depth + 1)
+                top += 1
+    return total
+
+
+@kernel
+def _direct_light(
+    scene: SceneTables, choice: Choice | None, point: SurfacePoint, frame: Frame, wo: Vec3
+) -> Vec3:
+    """Every point light, and the middle of every area light."""
+    total = Vec3(0.0, 0.0, 0.0)
+    if choice is None:
+        return total
+    for k in range(len(choice.kind)):
+        if choice.kind[k] != CONSTANT:
+            sample = direct(scene, point, frame, wo, k, 0.5, 0.5)
+            if max_component(sample.contribution) > 0.0:
+                total = total + sample.contribution * (1.0 / sample.light.pdf)
+    return total

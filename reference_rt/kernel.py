@@ -1,0 +1,193 @@
+"""`@kernel`: the one way to compile, with an exact cache on disk; `@overload_by_class` for choice.
+
+A kernel is plain scalar code on floats, integers, arrays and NamedTuples of these.  With
+``NUMBA_DISABLE_JIT=1`` the same text runs as plain Python with bit-identical results; the rules
+that this asks for are few:
+
+- IEEE arithmetic only: no fastmath, no ``**`` (Python's ``pow`` and LLVM's differ in the last bit);
+- no allocation: arrays come from outside, scratch from `local_floats` and `local_integers`;
+- integers that wrap are ``np.uint64`` throughout, constants included;
+- ``math.sqrt`` of what may be negative, and division of two Python floats by what may be zero,
+  are guarded (`reciprocal`): Python raises where the machine returns NaN or infinity.
+"""
+
+import hashlib
+import math
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import llvmlite
+import numba
+import platformdirs
+import numpy as np
+import numpy.typing as npt
+from numba import njit, types
+from numba.extending import intrinsic, overload
+from numba.np import arrayobj
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_UNUSED_FOR = 14 * 24 * 3600.0
+"""Seconds after which another version's kernels are deleted (a compile costs ten seconds at most)."""
+
+
+def _sources_digest() -> str:
+    """Numba's own key misses an edit in a callee's file and the bounds-check flag (numba#1833)."""
+    digest = hashlib.sha256()
+    for version in (sys.version, numba.__version__, llvmlite.__version__):
+        digest.update(version.encode())
+    digest.update(str(numba.config.BOUNDSCHECK).encode())
+    package = Path(__file__).parent
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:20]
+
+
+def _prepare_cache() -> str | None:
+    """The folder for this exact version's kernels; None where none can be written."""
+    root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
+    folder = Path(root) / "kernels" / _sources_digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        if not os.access(folder, os.W_OK):
+            return None
+        for other in folder.parent.iterdir():
+            if time.time() - other.stat().st_mtime > _UNUSED_FOR:
+                shutil.rmtree(other, ignore_errors=True)
+    except OSError:
+        return None
+    return str(folder)
+
+
+CACHE_FOLDER = _prepare_cache()
+
+
+def kernel(function: F) -> F:
+    """Compile `function` on first call for each set of argument types; keep the result on disk.
+
+    Releases the GIL; divides as IEEE says; never reorders arithmetic.
+    """
+    previous = numba.config.CACHE_DIR
+    if CACHE_FOLDER is not None:
+        numba.config.CACHE_DIR = CACHE_FOLDER
+    try:
+        # Without _nrt=False, each call that is not inlined counts references of every array of the
+        # scene, atomically: measured 15 times slower on the Cornell box, and threads contend.
+        compiled: F = njit(
+            nogil=True, error_model="numpy", cache=CACHE_FOLDER is not None, _nrt=False, forceinline=True
+        )(function)
+    finally:
+        numba.config.CACHE_DIR = previous
+    return compiled
+
+
+def precompile(compiled: Callable[..., Any], *args: Any) -> None:
+    """Compile `compiled` for these arguments, or load it from the cache, without running it."""
+    if not numba.config.DISABLE_JIT:
+        compiled.compile(tuple(numba.typeof(a) for a in args))  # type: ignore[attr-defined]
+
+
+def is_named_tuple(numba_type: Any, cls: type) -> bool:
+    """Whether a Numba type is that of instances of the NamedTuple `cls`."""
+    return (
+        isinstance(numba_type, types.BaseNamedTuple)
+        and numba_type.instance_class is cls
+    )
+
+
+class ByClass:
+    """A function that runs the kernel registered for the class of its first argument.
+
+    For choices made once per render (camera, sampler, filter, integrator): the first argument is a
+    NamedTuple, its class is known when the caller compiles, and the choice costs nothing at run
+    time.  Register kernels with `register`; see `reference_rt.cameras`.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._kernels: dict[type, Callable[..., Any]] = {}
+
+        def choose(first: Any, *rest: Any) -> Any:
+            return self._kernels[type(first)](first, *rest)
+
+        choose.__name__ = name
+        self.function: Callable[..., Any] = choose
+
+        @overload(choose, strict=False)
+        def _compiled(first: Any, *rest: Any) -> Callable[..., Any] | None:
+            for cls, function in self._kernels.items():
+                if is_named_tuple(first, cls):
+                    return getattr(function, "py_func", function)
+            return None
+
+    def register(self, cls: type, function: Callable[..., Any]) -> None:
+        """Run `function` where the first argument is a `cls`."""
+        self._kernels[cls] = function
+
+
+def _local_array(dtype: Any) -> Any:
+    """An intrinsic that makes an uninitialised 1-D array on the machine's stack.
+
+    It lives as long as the kernel that asks for it, once per call: not inside loops.
+    """
+
+    @intrinsic
+    def allocate(typing_context: Any, n: Any) -> Any:
+        array_type = types.Array(dtype, 1, "C")
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            item = context.get_data_type(dtype)
+            data = builder.alloca(item, size=arguments[0])
+            data.align = 8
+            item_size = context.get_constant(types.intp, context.get_abi_sizeof(item))
+            array = context.make_array(array_type)(context, builder)
+            arrayobj.populate_array(
+                array,
+                data=data,
+                shape=[arguments[0]],
+                strides=[item_size],
+                itemsize=item_size,
+                meminfo=None,
+            )
+            return array._getvalue()
+
+        return array_type(types.intp), generate
+
+    return allocate
+
+
+_floats, _integers = _local_array(types.float64), _local_array(types.int64)
+
+
+def local_floats(n: int) -> npt.NDArray[np.float64]:
+    """Scratch for `n` floats that lives as long as the calling kernel; not for use in loops."""
+    return np.empty(n)
+
+
+def local_integers(n: int) -> npt.NDArray[np.int64]:
+    """Scratch for `n` integers, likewise."""
+    return np.empty(n, np.int64)
+
+
+@overload(local_floats, inline="always")
+def _local_floats(n: Any) -> Any:
+    return lambda n: _floats(n)
+
+
+@overload(local_integers, inline="always")
+def _local_integers(n: Any) -> Any:
+    return lambda n: _integers(n)
+
+
+@kernel
+def reciprocal(x: float) -> float:
+    """1/x as IEEE says, 1/±0 = ±inf, also in plain Python."""
+    if x == 0.0:
+        return math.copysign(math.inf, x)
+    return 1.0 / x

@@ -1,0 +1,42 @@
+"""What all lights share: the codes of their tables and the sample that their kernels return."""
+
+import math
+from typing import NamedTuple
+
+from reference_rt.kernel import kernel
+from reference_rt.ray import Ray, SurfacePoint, ray_from, segment_to
+from reference_rt.vec3 import Vec3
+
+# Codes of `Lights.kind`.
+POINT, AREA, CONSTANT = 0, 1, 2
+
+
+class LightSample(NamedTuple):
+    """Light that could arrive at a point, before asking whether something is in the way.
+
+    wi: unit direction towards the light;  radiance: what arrives from there (for a point light its
+    irradiance across wi, intensity / distance²);  pdf: per solid angle, or 1 for a point light; 0
+    means that nothing arrives;  target: the point on the light, moved off its surface, or far away;
+    distance: infinite for an environment;  is_delta: whether no other sampling could find it.
+    """
+
+    wi: Vec3
+    radiance: Vec3
+    pdf: float
+    target: Vec3
+    distance: float
+    is_delta: bool
+
+
+@kernel
+def no_light() -> LightSample:
+    zero = Vec3(0.0, 0.0, 0.0)
+    return LightSample(zero, zero, 0.0, zero, 0.0, False)
+
+
+@kernel
+def shadow_ray(point: SurfacePoint, light: LightSample) -> Ray:
+    """The part of space between a surface and a light sample."""
+    if light.distance < math.inf:
+        return segment_to(point, light.target)
+    return ray_from(point, light.wi)

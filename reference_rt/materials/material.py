@@ -1,0 +1,88 @@
+"""What all materials share: the codes of their tables and the contract of their kernels.
+
+Directions are in the shading frame (z is the shading normal) and point away from the surface: `wo`
+towards where the radiance goes, `wi` towards where it comes from.  A value of zero everywhere means
+"no contribution": black, or a direction that this material never scatters to.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from reference_rt.description import Description
+from reference_rt.kernel import kernel
+from reference_rt.vec3 import Vec3, is_black
+
+# Codes of `Materials.kind`.
+DIFFUSE, MIRROR, DIELECTRIC, BLACK = 0, 1, 2, 3
+
+
+class Material(Description):
+    """How a surface scatters light."""
+
+    @property
+    def colour(self) -> tuple[float, float, float]:
+        """What ray casting shows of it, linear sRGB."""
+        raise NotImplementedError
+
+    def tabulate(self) -> Any:
+        """This material as one row of its table."""
+        raise NotImplementedError
+
+
+class BsdfSample(NamedTuple):
+    """A direction drawn by a material.
+
+    wi: the direction;  weight: f(wo, wi) |cos wi| / pdf;  pdf: per solid angle, 0 for "nothing";
+    eta: index of refraction of wi's side over wo's, 1 unless it went through;  is_delta: whether
+    the direction is one of a few, which no light sample could find (then pdf is a probability).
+    """
+
+    wi: Vec3
+    weight: Vec3
+    pdf: float
+    eta: float
+    is_delta: bool
+
+
+@kernel
+def no_sample() -> BsdfSample:
+    zero = Vec3(0.0, 0.0, 0.0)
+    return BsdfSample(zero, zero, 0.0, 1.0, False)
+
+
+class Branches(NamedTuple):
+    """The mirrored and the refracted direction of a perfectly smooth surface.
+
+    Each has the factor on the radiance that arrives from it; a black factor stands for "no such
+    branch".  share: the fraction of power that is mirrored;  eta: index of refraction on the
+    refracted side over that on wo's.
+    """
+
+    reflected: Vec3
+    reflectance: Vec3
+    refracted: Vec3
+    transmittance: Vec3
+    share: float
+    eta: float
+
+
+@kernel
+def no_branches() -> Branches:
+    zero = Vec3(0.0, 0.0, 0.0)
+    return Branches(zero, zero, zero, zero, 1.0, 1.0)
+
+
+@kernel
+def sample_branch(branches: Branches, u: float) -> BsdfSample:
+    """One of the two branches, with the probability of its share of the power."""
+    if u < branches.share:
+        if is_black(branches.reflectance):
+            return no_sample()
+        weight = branches.reflectance * (1.0 / branches.share)
+        return BsdfSample(branches.reflected, weight, branches.share, 1.0, True)
+    probability = 1.0 - branches.share
+    weight = branches.transmittance * (1.0 / probability)
+    return BsdfSample(branches.refracted, weight, probability, branches.eta, True)
+
+
+INV_PI = 1.0 / math.pi

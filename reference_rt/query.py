@@ -1,0 +1,176 @@
+"""The tracer as an oracle on arrays of rays: intersections, occlusion, light, radiance.
+
+All arrays are float64 or int64; origins and directions are (n, 3) in world coordinates and scene
+units; directions need not have unit length: t counts in units of |d|.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt import shapes as any_shape
+from reference_rt.geometry import closest_hit
+from reference_rt.geometry import occluded as is_occluded
+from reference_rt.integrators import radiance as radiance_along
+from reference_rt.integrators.integrator import direct
+from reference_rt.kernel import kernel
+from reference_rt.ray import Ray
+from reference_rt.sampling.grid import GridSample
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.tables import SceneTables
+from reference_rt.vec3 import Vec3, frame_from_normal, row, to_local
+
+
+@dataclass(frozen=True)
+class Intersections:
+    """What n rays hit first.
+
+    t (n,): inf for a miss;  shape (n,): index in the scene's shapes, -1 for a miss;  face (n,):
+    number of the triangle in its mesh, or of the box's face (axis, + 3 on the positive side);
+    p, n, ns (n, 3): point, unit geometric and shading normal, 0 for a miss;  uv (n, 2).
+    """
+
+    t: FloatArray
+    shape: IntArray
+    face: IntArray
+    p: FloatArray
+    n: FloatArray
+    ns: FloatArray
+    uv: FloatArray
+
+
+@dataclass(frozen=True)
+class DirectLight:
+    """Direct light of one light at what n rays hit first.
+
+    target (n, 3): the point on the light, or the direction towards an environment;  pdf (n,): its
+    density per solid angle, 1 for a point light, 0 where no light can arrive or nothing was hit;
+    contribution (n, 3): f cos L (for a point light f cos I / r²), 0 in shadow.
+    """
+
+    target: FloatArray
+    pdf: FloatArray
+    contribution: FloatArray
+
+
+@kernel
+def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        hit = closest_hit(scene.geometry, ray)
+        if hit.kind < 0:
+            out[i, 0], out[i, 1], out[i, 2] = math.inf, -1.0, -1.0
+            continue
+        point = any_shape.surface(scene.geometry.shapes, ray, hit)
+        owner = any_shape.owner(scene.geometry.shapes, ray, hit)
+        out[i, 0], out[i, 1], out[i, 2] = hit.t, owner.shape, owner.face
+        out[i, 3], out[i, 4], out[i, 5] = point.p
+        out[i, 6], out[i, 7], out[i, 8] = point.n
+        out[i, 9], out[i, 10], out[i, 11] = point.ns
+        out[i, 12], out[i, 13] = owner.u, owner.v
+
+
+@kernel
+def _occluded(
+    scene: SceneTables, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
+) -> None:
+    for i in range(len(o)):
+        out[i] = is_occluded(scene.geometry, Ray(row(o, i), row(d, i), t_max[i]))
+
+
+@kernel
+def _direct(
+    scene: SceneTables, o: FloatArray, d: FloatArray, k: int, u: float, v: float, out: FloatArray
+) -> None:
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        hit = closest_hit(scene.geometry, ray)
+        if hit.kind < 0:
+            continue
+        point = any_shape.surface(scene.geometry.shapes, ray, hit)
+        frame = frame_from_normal(point.ns)
+        wo = to_local(frame, -ray.d)
+        found = direct(scene, point, frame, wo, k, u, v)
+        out[i, 0], out[i, 1], out[i, 2] = found.light.target
+        out[i, 3] = found.light.pdf
+        out[i, 4], out[i, 5], out[i, 6] = found.contribution
+
+
+@kernel
+def _radiance(
+    scene: SceneTables, integrator: Any, o: FloatArray, d: FloatArray, out: FloatArray
+) -> None:
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        arriving: Vec3 = radiance_along(integrator, scene, ray, GridSample(0.5, 0.5))
+        out[i, 0], out[i, 1], out[i, 2] = arriving
+
+
+def _rays(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    o, d = (np.array(a, dtype=np.float64, order="C") for a in (origins, directions))
+    if o.shape != d.shape or o.ndim != 2 or o.shape[1] != 3:
+        raise ValueError(f"expected two (n, 3) arrays, got {o.shape} and {d.shape}")
+    return o, d
+
+
+def intersect(
+    scene: SceneTables, origins: npt.ArrayLike, directions: npt.ArrayLike
+) -> Intersections:
+    """The closest hit of each ray."""
+    o, d = _rays(origins, directions)
+    out = np.zeros((len(o), 14))
+    with np.errstate(all="ignore"):
+        _intersect(scene, o, d, out)
+    integers = out[:, 1:3].astype(np.int64)
+    return Intersections(
+        t=out[:, 0],
+        shape=integers[:, 0],
+        face=integers[:, 1],
+        p=out[:, 3:6],
+        n=out[:, 6:9],
+        ns=out[:, 9:12],
+        uv=out[:, 12:14],
+    )
+
+
+def occluded(
+    scene: SceneTables,
+    origins: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    t_max: npt.ArrayLike = math.inf,
+) -> npt.NDArray[np.bool_]:
+    """Whether anything lies on each ray at 0 < t < t_max (a number, or one for each ray)."""
+    o, d = _rays(origins, directions)
+    out = np.zeros(len(o), np.bool_)
+    with np.errstate(all="ignore"):
+        _occluded(scene, o, d, np.full(len(o), t_max, dtype=np.float64), out)
+    return out
+
+
+def direct_light(
+    scene: SceneTables,
+    origins: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    light: int,
+    u: tuple[float, float] = (0.5, 0.5),
+) -> DirectLight:
+    """Light from entry `light` of `scene.lights.choice`, at its point that `u` picks."""
+    o, d = _rays(origins, directions)
+    out = np.zeros((len(o), 7))
+    with np.errstate(all="ignore"):
+        _direct(scene, o, d, light, u[0], u[1], out)
+    return DirectLight(target=out[:, 0:3], pdf=out[:, 3], contribution=out[:, 4:7])
+
+
+def whitted_radiance(
+    scene: SceneTables, integrator: Any, origins: npt.ArrayLike, directions: npt.ArrayLike
+) -> FloatArray:
+    """Radiance (n, 3) along unit rays by a deterministic integrator's `setup()`."""
+    o, d = _rays(origins, directions)
+    out = np.zeros((len(o), 3))
+    with np.errstate(all="ignore"):
+        _radiance(scene, integrator, o, d, out)
+    return out

@@ -1,0 +1,53 @@
+"""Samplers: random and low-discrepancy numbers as pure functions of (seed, pixel, sample, dimension).
+
+No state: any pixel's numbers can be had in any order, so that an image is bit-identical for any
+number of threads.  To add a sampler: its file with description, NamedTuples and kernels; the lines
+below.
+"""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from reference_rt.kernel import ByClass
+from reference_rt.sampling import grid, independent, sobol
+from reference_rt.sampling.grid import Grid, GridSample, GridSetup
+from reference_rt.sampling.independent import Independent, IndependentSample, IndependentSetup
+from reference_rt.sampling.sobol import Sobol, SobolSample, SobolSetup
+
+AnySampler = Annotated[Sobol | Independent | Grid, Field(discriminator="type")]
+
+Sample = SobolSample | IndependentSample | GridSample
+"""The numbers of one sample of one pixel."""
+
+# Dimensions are fixed, so that what one decision draws never shifts another's numbers. A pair
+# takes one number: (u0, u1) of dimension k are stratified in the unit square.
+FILM = 0
+LENS = 1
+FIRST_BOUNCE = 2
+PER_BOUNCE = 4
+LIGHT_PICK, LIGHT_POINT, BSDF_LOBE_AND_ROULETTE, BSDF_DIRECTION = 0, 1, 2, 3
+
+_start = ByClass("start_sample")
+_start.register(SobolSetup, sobol.start)
+_start.register(IndependentSetup, independent.start)
+_start.register(GridSetup, grid.start)
+start_sample = _start.function
+"""start_sample(setup, pixel, sample) -> the sampler of one sample of one pixel."""
+
+_draw = ByClass("draw_pair")
+_draw.register(SobolSample, sobol.draw)
+_draw.register(IndependentSample, independent.draw)
+_draw.register(GridSample, grid.draw)
+draw_pair = _draw.function
+"""draw_pair(sampler, dimension) -> (u0, u1), each in [0, 1)."""
+
+__all__ = [
+    "AnySampler",
+    "Grid",
+    "Independent",
+    "Sample",
+    "Sobol",
+    "draw_pair",
+    "start_sample",
+]

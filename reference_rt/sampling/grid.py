@@ -1,0 +1,53 @@
+"""Grid: n x n fixed points of the pixel, for integrators that draw no random numbers."""
+
+import math
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import AfterValidator, Field
+
+from reference_rt.description import Description
+from reference_rt.kernel import kernel
+
+
+def _square(n: int) -> int:
+    if math.isqrt(n) ** 2 != n:
+        raise ValueError(f"expected a square number of samples (1, 4, 9, ...), got {n}")
+    return n
+
+
+class Grid(Description):
+    """The centres of n x n equal cells of the pixel; every other number is 1/2."""
+
+    type: Literal["grid"] = "grid"
+    spp: Annotated[int, Field(ge=1, le=2**31), AfterValidator(_square)] = 1
+    """Samples per pixel: a square number."""
+
+    def setup(self) -> "GridSetup":
+        return GridSetup(math.isqrt(self.spp))
+
+
+class GridSetup(NamedTuple):
+    """n: the points along each side of the pixel."""
+
+    n: int
+
+
+class GridSample(NamedTuple):
+    """x, y: the sample's place in its pixel."""
+
+    x: float
+    y: float
+
+
+@kernel
+def start(setup: GridSetup, pixel: int, sample: int) -> GridSample:
+    row, column = sample // setup.n, sample % setup.n
+    return GridSample((column + 0.5) / setup.n, (row + 0.5) / setup.n)
+
+
+@kernel
+def draw(sampler: GridSample, dimension: int) -> tuple[float, float]:
+    """The place in the pixel for the film (dimension 0), the middle of everything else."""
+    if dimension == 0:
+        return sampler.x, sampler.y
+    return 0.5, 0.5

@@ -1,0 +1,97 @@
+"""Sobol': padded two-dimensional (0, 2)-sequences with hashed Owen scrambling.
+
+Each pair of dimensions is the first two of Sobol's sequence, its order and its digits scrambled by
+hashes (Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4)): the first 2^k samples of a
+pixel are stratified in every pair, pairs and pixels are independent, and every number is uniform.
+"""
+
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from reference_rt.description import Description
+from reference_rt.kernel import kernel
+from reference_rt.sampling.hashing import LOW32, combine, mix
+
+_1, _2, _4, _8, _16, _32 = (np.uint64(n) for n in (1, 2, 4, 8, 16, 32))
+_ODD = np.uint64(1)
+_EVEN_1, _ODD_1 = np.uint64(0x55555555), np.uint64(0xAAAAAAAA)
+_EVEN_2, _ODD_2 = np.uint64(0x33333333), np.uint64(0xCCCCCCCC)
+_EVEN_4, _ODD_4 = np.uint64(0x0F0F0F0F), np.uint64(0xF0F0F0F0)
+_EVEN_8, _ODD_8 = np.uint64(0x00FF00FF), np.uint64(0xFF00FF00)
+_K0, _K1, _K2 = np.uint64(0x3D20ADEA), np.uint64(0x05526C56), np.uint64(0x53A22864)
+_STEP = np.uint64(0x9E3779B97F4A7C15)
+
+
+class Sobol(Description):
+    """Owen-scrambled Sobol' points: stratified, unbiased, best in powers of two."""
+
+    type: Literal["sobol"] = "sobol"
+    spp: Annotated[int, Field(ge=1, le=2**31)] = 16
+    """Samples per pixel."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+
+    def setup(self) -> "SobolSetup":
+        return SobolSetup(np.uint64(self.seed))
+
+
+class SobolSetup(NamedTuple):
+    seed: np.uint64
+
+
+class SobolSample(NamedTuple):
+    """key: a hash of seed and pixel;  reversed_index: the sample's number, bits reversed."""
+
+    key: np.uint64
+    reversed_index: np.uint64
+
+
+@kernel
+def reverse_bits(x: np.uint64) -> np.uint64:
+    """The low 32 bits in reverse order."""
+    x = ((x & _EVEN_1) << _1) | ((x & _ODD_1) >> _1)
+    x = ((x & _EVEN_2) << _2) | ((x & _ODD_2) >> _2)
+    x = ((x & _EVEN_4) << _4) | ((x & _ODD_4) >> _4)
+    x = ((x & _EVEN_8) << _8) | ((x & _ODD_8) >> _8)
+    return ((x << _16) | (x >> _16)) & LOW32
+
+
+@kernel
+def scramble_low_to_high(x: np.uint64, seed: np.uint64) -> np.uint64:
+    """A hash of 32 bits in which each bit depends on those below it alone (Laine & Karras 2011,
+    with Vegdahl's constants): Owen scrambling of the bit-reversed number."""
+    x ^= x * _K0 & LOW32
+    x = (x + seed) & LOW32
+    x = x * ((seed >> _16) | _ODD) & LOW32
+    x ^= x * _K1 & LOW32
+    x ^= x * _K2 & LOW32
+    return x
+
+
+@kernel
+def pascal(x: np.uint64) -> np.uint64:
+    """The second generator matrix of Sobol's sequence, bit-reversed: Pascal's triangle modulo 2,
+    as a butterfly (Ahmed 2024, "An Implementation Algorithm of 2D Sobol Sequence")."""
+    x ^= x >> _16
+    x ^= (x & _ODD_8) >> _8
+    x ^= (x & _ODD_4) >> _4
+    x ^= (x & _ODD_2) >> _2
+    return x ^ ((x & _ODD_1) >> _1)
+
+
+@kernel
+def start(setup: SobolSetup, pixel: int, sample: int) -> SobolSample:
+    return SobolSample(combine(setup.seed, np.uint64(pixel)), reverse_bits(np.uint64(sample)))
+
+
+@kernel
+def draw(sampler: SobolSample, dimension: int) -> tuple[float, float]:
+    """Two numbers of 32 bits, in the middle of their cells: never 0, never 1."""
+    h = mix(sampler.key + np.uint64(dimension + 1) * _STEP)
+    order_seed, seed0 = h & LOW32, h >> _32
+    seed1 = mix(h) & LOW32
+    index = reverse_bits(scramble_low_to_high(sampler.reversed_index, order_seed))
+    x = reverse_bits(scramble_low_to_high(index, seed0))
+    y = reverse_bits(scramble_low_to_high(pascal(index), seed1))
+    return (float(x) + 0.5) * 2.0**-32, (float(y) + 0.5) * 2.0**-32

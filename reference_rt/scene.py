@@ -1,0 +1,238 @@
+"""`Scene`: the frozen description of what is rendered; YAML and JSON in and out; JSON Schema."""
+
+import hashlib
+import io
+import json
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
+
+from reference_rt.cameras import AnyCamera
+from reference_rt.cameras.perspective import Perspective
+from reference_rt.description import Description
+from reference_rt.errors import SceneError
+from reference_rt.film import Film
+from reference_rt.integrators import AnyIntegrator, Path as PathTracing
+from reference_rt.lights import AnyLight, Constant
+from reference_rt.materials import AnyMaterial, Emissive
+from reference_rt.sampling import AnySampler, Grid, Sobol
+from reference_rt.shapes import AnyShape
+
+Keys = tuple[str | int, ...]
+
+
+class Scene(Description):
+    """Everything that determines a picture.  Right-handed world; linear sRGB; scene units."""
+
+    description: str = ""
+    """A line for people."""
+    camera: AnyCamera = Perspective()
+    film: Film = Film()
+    sampler: AnySampler | None = None
+    """Where samples lie; none: Sobol' points for path tracing, pixel centres otherwise."""
+    integrator: AnyIntegrator = PathTracing()
+    materials: dict[str, AnyMaterial] = Field(default_factory=dict)
+    """Materials by name."""
+    shapes: tuple[AnyShape, ...] = Field(default=(), strict=False)
+    lights: tuple[AnyLight, ...] = Field(default=(), strict=False)
+    """Lights that are not shapes; a shape with an emissive material is a light too."""
+
+    _folder: Path = PrivateAttr(default_factory=Path)
+    _source: "tuple[str, str] | None" = PrivateAttr(default=None)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for i, shape in enumerate(self.shapes):
+            self._check_material(shape.material, "shapes", i, "material")
+        for name, material in self.materials.items():
+            if isinstance(material, Emissive) and material.base is not None:
+                self._check_material(material.base, "materials", name, "base")
+                if isinstance(self.materials[material.base], Emissive):
+                    raise SceneError(
+                        f"'{material.base}' is emissive itself; expected what it scatters like",
+                        ("materials", name, "base"),
+                    )
+        if sum(isinstance(light, Constant) for light in self.lights) > 1:
+            raise SceneError("more than one environment; expected at most one", ("lights",))
+        if isinstance(self.sampler, Grid) and not self.integrator.deterministic:
+            raise SceneError(
+                f"'{self.integrator.type}' needs random numbers, which 'grid' does not have; "
+                "expected 'sobol' or 'independent'",
+                ("sampler", "type"),
+            )
+        return self
+
+    def _check_material(self, name: str | None, *path: str | int) -> None:
+        if name is not None and name not in self.materials:
+            known = ", ".join(f"'{m}'" for m in self.materials) or "none"
+            raise SceneError(f"there is no material '{name}'; expected one of: {known}", path)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal descriptions; where they were read from does not count."""
+        return isinstance(other, Scene) and self.to_json() == other.to_json()
+
+    def __hash__(self) -> int:
+        return hash(self.to_json())
+
+    # ---- where it comes from --------------------------------------------------------------------
+
+    @property
+    def folder(self) -> Path:
+        """What file names in the scene are relative to."""
+        return self._folder
+
+    def error(self, message: str, *path: str | int) -> SceneError:
+        """An error about the part at `path`, with file and line where the scene has them."""
+        if self._source is None:
+            return SceneError(message, path)
+        name, text = self._source
+        return SceneError(message, path, name, _line_of(text, path))
+
+    @property
+    def resolved_sampler(self) -> AnySampler:
+        """The sampler, or what stands in for none."""
+        if self.sampler is not None:
+            return self.sampler
+        return Grid() if self.integrator.deterministic else Sobol()
+
+    def digest(self) -> str:
+        """SHA-256 of the description: what pictures name as their source."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+    # ---- in -------------------------------------------------------------------------------------
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Scene":
+        """Read a .yaml, .yml or .json file.  Raises SceneError (file, line, keys, what and why)."""
+        path = Path(path)
+        if path.suffix.lower() not in (".yaml", ".yml", ".json"):
+            raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))
+        try:
+            text = path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise SceneError(
+                f"cannot be read: {error.strerror}; expected a scene file", file=str(path)
+            ) from None
+        except UnicodeDecodeError:
+            raise SceneError("is not text; expected UTF-8", file=str(path)) from None
+        return cls.parse(text, str(path), path.parent)
+
+    @classmethod
+    def parse(cls, text: str, name: str = "<scene>", folder: Path | None = None) -> "Scene":
+        """A scene from YAML or JSON text; `name` stands in errors, `folder` holds its files."""
+        try:
+            data = _load_data(text)
+        except MarkedYAMLError as error:
+            line = None if error.problem_mark is None else error.problem_mark.line + 1
+            problem = " ".join(str(error.problem or error.context).split())
+            raise SceneError(f"malformed: {problem}", file=name, line=line) from None
+        except YAMLError as error:
+            problem = " ".join(str(error).split())
+            raise SceneError(f"malformed: {problem}", file=name) from None
+        except RecursionError:
+            raise SceneError("malformed: nested too deeply", file=name) from None
+        if not isinstance(data, dict):
+            raise SceneError("expected keys such as camera, shapes, lights", file=name, line=1)
+        try:
+            scene = cls.model_validate(data)
+        except SceneError as error:
+            line = _line_of(text, error.path)
+            raise SceneError(error.message, error.path, name, line) from None
+        except ValidationError as error:
+            message, keys = _first_problem(error, data)
+            raise SceneError(message, keys, name, _line_of(text, keys)) from None
+        scene._folder = Path() if folder is None else folder
+        scene._source = (name, text)
+        return scene
+
+    def changed(self, **parts: Any) -> "Scene":
+        """The same scene with other parts (film=..., sampler=...), checked again."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields} | parts
+        scene = type(self)(**fields)
+        scene._folder, scene._source = self._folder, self._source
+        return scene
+
+    # ---- out ------------------------------------------------------------------------------------
+
+    def to_json(self) -> str:
+        """The scene as JSON text, which `parse` takes."""
+        return self.model_dump_json(exclude_defaults=False, exclude_none=True, indent=1)
+
+    def to_yaml(self) -> str:
+        """The scene as YAML text, which `parse` takes."""
+        yaml = YAML()
+        yaml.default_flow_style = None
+        stream = io.StringIO()
+        yaml.dump(json.loads(self.to_json()), stream)
+        return stream.getvalue()
+
+
+def _load_data(text: str) -> Any:
+    """Data from YAML 1.2, of which JSON is a part.  Data only: no tags make objects."""
+    return YAML(typ="safe", pure=True).load(text)
+
+
+def _first_problem(error: ValidationError, data: Any) -> tuple[str, Keys]:
+    """One clear line and the keys of the culprit, from pydantic's first complaint."""
+    first = error.errors()[0]
+    keys, allowed = _keys_in(data, first["loc"])
+    message = first["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
+    if first["type"] == "extra_forbidden":
+        message = f"unknown key; expected one of: {allowed}" if allowed else "unknown key"
+    elif first["type"] == "missing":
+        message = "missing; expected a value"
+    elif first["type"] == "union_tag_not_found":
+        message = f"missing 'type'; expected one of: {_tags(first)}"
+    elif first["type"] == "union_tag_invalid":
+        message = f"unknown type '{first['ctx']['tag']}'; expected one of: {_tags(first)}"
+    elif first["type"] != "value_error" and not isinstance(first["input"], dict | list):
+        message += f", got {first['input']!r}"
+    return message, keys
+
+
+def _tags(problem: Any) -> str:
+    return str(problem.get("ctx", {}).get("expected_tags", "a known type"))
+
+
+def _keys_in(data: Any, location: tuple[int | str, ...]) -> tuple[Keys, str]:
+    """pydantic's location without the names of union members, which are not keys of the data."""
+    keys: list[int | str] = []
+    for position, key in enumerate(location):
+        last = position == len(location) - 1
+        if isinstance(data, dict) and (key in data or last):
+            keys.append(key)
+            data = data.get(key)
+        elif isinstance(data, list) and isinstance(key, int) and key < len(data):
+            keys.append(key)
+            data = data[key]
+    return tuple(keys), ""
+
+
+def _line_of(text: str, keys: Keys | tuple[str | int, ...]) -> int | None:
+    """The line, from 1, of the part at `keys`, or of the closest part around it."""
+    try:
+        node: Node | None = YAML(typ="safe", pure=True).compose(text)
+    except YAMLError:
+        return None
+    line = 1
+    for key in keys:
+        if isinstance(node, MappingNode):
+            found = [(k, v) for k, v in node.value if k.value == str(key)]
+            if not found:
+                break
+            line, node = found[0][0].start_mark.line + 1, found[0][1]
+        elif isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.value):
+            node = node.value[key]
+            line = node.start_mark.line + 1
+        else:
+            break
+    return line
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of scene files."""
+    return Scene.model_json_schema(by_alias=True)

@@ -1,0 +1,73 @@
+"""What all shapes share: the base description, the codes of their tables, points as lights."""
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.description import Description
+from reference_rt.kernel import kernel
+from reference_rt.transform import Transform
+from reference_rt.vec3 import Vec3, dot
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Bounds = tuple[FloatArray, FloatArray]
+
+# Codes of `Hit.kind`: which table a primitive is a row of.
+SPHERE, RECTANGLE, BOX, TRIANGLE = 0, 1, 2, 3
+
+
+class Shape(Description):
+    """A shape of the scene: what it is made of and where it stands."""
+
+    material: str | None = None
+    """A key of the scene's materials; none means diffuse grey of reflectance 0.5."""
+    transform: Transform = ()
+    """Steps from the shape's own coordinates to the world's, the first one first."""
+
+    def tabulate(self, shape: int, material: int, folder: Path) -> Any:
+        """This shape as rows of its table.
+
+        `shape` is its index in the scene, `material` the row of its material, `folder` what file
+        names are relative to.  Raises ValueError (what is wrong, what was expected).
+        """
+        raise NotImplementedError
+
+
+class LightPoint(NamedTuple):
+    """A point of a shape picked as a light: position, unit normal, the error bound of the position
+    (see `SurfacePoint.error`) and the density per solid angle at the receiver; pdf = 0 means that
+    nothing can arrive from there."""
+
+    p: Vec3
+    n: Vec3
+    error: float
+    pdf: float
+
+
+@kernel
+def no_light_point() -> LightPoint:
+    zero = Vec3(0.0, 0.0, 0.0)
+    return LightPoint(zero, zero, 0.0, 0.0)
+
+
+@kernel
+def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float) -> float:
+    """A uniform density over `area`, at its point `q` with unit normal `n`, per solid angle at `p`.
+
+    distance² / (cos area) (e.g. Veach 1997, eq. 8.2); 0 from behind.
+    """
+    w = p - q
+    cos_times_length = dot(w, n)
+    distance2 = dot(w, w)
+    if cos_times_length <= 0.0:
+        return 0.0
+    return distance2 * math.sqrt(distance2) / (cos_times_length * area)
+
+
+def outward(lower: FloatArray, upper: FloatArray) -> Bounds:
+    """Bounds moved outwards by one float: their own rounding cannot cut the shape."""
+    return np.nextafter(lower, -np.inf), np.nextafter(upper, np.inf)

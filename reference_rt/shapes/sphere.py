@@ -1,0 +1,183 @@
+"""Sphere: |p - c| = r."""
+
+import math
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt import transform
+from reference_rt.description import Positive, Vector
+from reference_rt.kernel import kernel
+from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.shapes.shape import (
+    SPHERE,
+    Bounds,
+    FloatArray,
+    IntArray,
+    LightPoint,
+    Shape,
+    no_light_point,
+    outward,
+)
+from reference_rt.vec3 import Vec3, dot, frame_from_normal, normalize, row, to_world
+
+
+class Sphere(Shape):
+    """A sphere; its outward normal is the front.  Transforms must keep it round."""
+
+    type: Literal["sphere"] = "sphere"
+    center: Vector = (0.0, 0.0, 0.0)
+    radius: Positive = 1.0
+
+    def tabulate(self, shape: int, material: int, folder: Path) -> "Spheres":
+        m = transform.affine(self.transform)
+        linear = m[:, :3]
+        factor = math.sqrt(max(0.0, float(np.trace(linear.T @ linear))) / 3.0)
+        transform.invert(m)  # refuses singular maps
+        # A similarity has A^T A = s² 1; each entry of the product rounds at most 8 times.
+        if np.max(np.abs(linear.T @ linear - factor**2 * np.eye(3))) > 8e-16 * 4 * factor**2:
+            raise ValueError(
+                "the transform makes this sphere an ellipsoid; expected rotation, translation and "
+                "one scale factor for all axes"
+            )
+        return Spheres(
+            center=transform.apply_points(m, np.array([self.center])),
+            radius=np.array([self.radius * factor]),
+            to_local=np.linalg.inv(linear / factor).reshape(1, 9),
+            owner=np.array([shape]),
+            material=np.array([material]),
+            light=np.array([-1]),
+            face=np.array([0]),
+        )
+
+
+class Spheres(NamedTuple):
+    """n spheres: center (n, 3), radius (n,), world-to-local rotation (n, 9) for uv; owner, the shape's index
+    in the scene; material, light: rows of those tables; face (n,)."""
+
+    center: FloatArray
+    radius: FloatArray
+    to_local: FloatArray
+    owner: IntArray
+    material: IntArray
+    light: IntArray
+    face: IntArray
+
+
+def bounds(spheres: Spheres) -> Bounds:
+    """Boxes (n, 3), (n, 3) that contain the spheres, rounded outwards."""
+    r = spheres.radius[:, None]
+    return outward(spheres.center - r, spheres.center + r)
+
+
+def areas(spheres: Spheres) -> FloatArray:
+    return 4.0 * math.pi * np.square(spheres.radius)
+
+
+@kernel
+def intersect(spheres: Spheres, i: int, ray: Ray, closest: Hit) -> Hit:
+    """The nearer of `closest` and sphere i.
+
+    The quadratic in a form without cancellation for far or small spheres (Haines et al. 2019, "Ray
+    Tracing Gems", ch. 7): the discriminant from the closest approach, the second root from c/q.
+    """
+    f = ray.o - row(spheres.center, i)
+    r = spheres.radius[i]
+    a = dot(ray.d, ray.d)
+    b = -dot(f, ray.d)
+    approach = f + ray.d * (b / a)
+    discriminant = r * r - dot(approach, approach)
+    if discriminant < 0.0:
+        return closest
+    q = b + math.copysign(math.sqrt(a * discriminant), b)
+    t0 = (dot(f, f) - r * r) / q
+    t1 = q / a
+    if t0 > t1:
+        t0, t1 = t1, t0
+    t = t0 if t0 > 0.0 else t1
+    if t > 0.0 and t < closest.t:
+        return Hit(t, SPHERE, i, 0.0, 0.0)
+    return closest
+
+
+@kernel
+def intersect_all(spheres: Spheres | None, ray: Ray, any_hit: bool, closest: Hit) -> Hit:
+    """The nearest of `closest` and all spheres; with `any_hit`, the first that is found."""
+    if spheres is None:
+        return closest
+    for i in range(len(spheres.owner)):
+        closest = intersect(spheres, i, ray, closest)
+    return closest
+
+
+@kernel
+def surface(spheres: Spheres, ray: Ray, hit: Hit) -> SurfacePoint:
+    """The point, put back on the sphere: that leaves the rounding of c + r n alone."""
+    i = hit.row
+    center = row(spheres.center, i)
+    r = spheres.radius[i]
+    n = normalize(at(ray, hit.t) - center)
+    p = center + n * r
+    error = surface_error(p, center, 2.0 * r)
+    return SurfacePoint(p, n, n, error, spheres.material[i], spheres.light[i])
+
+
+@kernel
+def uv(spheres: Spheres, ray: Ray, hit: Hit) -> tuple[float, float]:
+    """(phi / 2 pi from local +x, theta / pi from local +z), each in [0, 1]."""
+    n = normalize(at(ray, hit.t) - row(spheres.center, hit.row))
+    m = spheres.to_local[hit.row]
+    x = m[0] * n.x + m[1] * n.y + m[2] * n.z
+    y = m[3] * n.x + m[4] * n.y + m[5] * n.z
+    z = m[6] * n.x + m[7] * n.y + m[8] * n.z
+    phi = math.atan2(y, x)
+    if phi < 0.0:
+        phi += 2.0 * math.pi
+    return phi / (2.0 * math.pi), math.atan2(math.sqrt(x * x + y * y), z) / math.pi
+
+
+@kernel
+def cone_of_sight(distance2: float, r: float) -> float:
+    """1 - cos(theta_max) of the cone in which a sphere is seen, without cancellation."""
+    sin2 = r * r / distance2
+    return sin2 / (1.0 + math.sqrt(1.0 - sin2))
+
+
+@kernel
+def sample(spheres: Spheres, i: int, p: Vec3, u0: float, u1: float) -> LightPoint:
+    """A point of the sphere seen from `p` outside, uniform in the cone of sight.
+
+    pdf per solid angle: 1 / (2 pi (1 - cos theta_max)) (Shirley, Wang & Zimmerman 1996).
+    """
+    center = row(spheres.center, i)
+    r = spheres.radius[i]
+    to_center = center - p
+    distance2 = dot(to_center, to_center)
+    if distance2 <= r * r:
+        return no_light_point()
+    one_minus_cos_max = cone_of_sight(distance2, r)
+    one_minus_cos = u0 * one_minus_cos_max
+    cos_theta = 1.0 - one_minus_cos
+    sin2 = one_minus_cos * (1.0 + cos_theta)
+    sin_theta = math.sqrt(sin2)
+    phi = 2.0 * math.pi * u1
+    frame = frame_from_normal(to_center * (1.0 / math.sqrt(distance2)))
+    wi = to_world(frame, Vec3(sin_theta * math.cos(phi), sin_theta * math.sin(phi), cos_theta))
+    # The nearer root of the quadratic; at the rim rounding may leave it a hair below zero.
+    half_chord2 = max(0.0, r * r - distance2 * sin2)
+    along = math.sqrt(distance2) * cos_theta - math.sqrt(half_chord2)
+    n = normalize(p + wi * along - center)
+    q = center + n * r
+    return LightPoint(q, n, surface_error(q, center, 2.0 * r), 0.5 / (math.pi * one_minus_cos_max))
+
+
+@kernel
+def pdf(spheres: Spheres, i: int, p: Vec3) -> float:
+    """The density of `sample` per solid angle, for directions from `p` that meet the sphere."""
+    to_center = row(spheres.center, i) - p
+    distance2 = dot(to_center, to_center)
+    r = spheres.radius[i]
+    if distance2 <= r * r:
+        return 0.0
+    return 0.5 / (math.pi * cone_of_sight(distance2, r))
