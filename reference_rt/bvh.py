@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_rt.kernel import kernel, local_floats
+from reference_rt.kernel import entry_kernel, kernel, local_floats
 from reference_rt.ray import UNIT_ROUNDOFF
 from reference_rt.shapes.shape import FloatArray, IntArray
 
@@ -139,7 +139,7 @@ def _partition(
     return i
 
 
-@kernel
+@entry_kernel
 def _build(
     lower: FloatArray,
     upper: FloatArray,

@@ -13,10 +13,19 @@ from reference_rt.shapes.triangle import shear_of
 from reference_rt.vec3 import Vec3
 
 
+class Packets(NamedTuple):
+    """Shapes as `intersect_all` takes them, where no hierarchy leads to them; else None."""
+
+    spheres: FloatArray | None
+    rectangles: FloatArray | None
+    boxes: FloatArray | None
+
+
 class Geometry(NamedTuple):
     """All shapes, and the hierarchy over them where they are many enough to need one."""
 
     shapes: Shapes
+    packets: Packets
     bvh: Bvh | None
 
 
@@ -26,30 +35,25 @@ Columns = tuple[int, int, int]
 @kernel
 def closest_hit(geometry: Geometry, ray: Ray) -> Hit:
     """The intersection with the smallest t in (0, t_max); `kind` is -1 for none."""
-    return _trace(geometry.bvh, geometry.shapes, ray, False)
+    return _trace(geometry.bvh, geometry.shapes, geometry.packets, ray, False)
 
 
 @kernel
 def occluded(geometry: Geometry, ray: Ray) -> bool:
-    """Whether anything lies in (0, t_max): stops at the first thing found."""
-    return _trace(geometry.bvh, geometry.shapes, ray, True).kind >= 0
+    """Whether anything lies in (0, t_max): a hierarchy is left at the first thing found."""
+    return _trace(geometry.bvh, geometry.shapes, geometry.packets, ray, True).kind >= 0
 
 
 @kernel
-def _trace(bvh: Bvh | None, shapes: Shapes, ray: Ray, any_hit: bool) -> Hit:
+def _trace(bvh: Bvh | None, shapes: Shapes, packets: Packets, ray: Ray, any_hit: bool) -> Hit:
     closest = no_hit(ray)
     if bvh is not None:
         return _traverse(bvh, shapes, ray, any_hit, closest)
-    closest = sphere.intersect_all(shapes.spheres, ray, any_hit, closest)
-    if any_hit and closest.kind >= 0:
-        return closest
-    closest = rectangle.intersect_all(shapes.rectangles, ray, any_hit, closest)
-    if any_hit and closest.kind >= 0:
-        return closest
-    closest = box.intersect_all(shapes.boxes, ray, any_hit, closest)
-    if any_hit and closest.kind >= 0:
-        return closest
-    return triangle.intersect_all(shapes.triangles, ray, any_hit, closest)
+    # For a few shapes, asking after each whether the ray is done costs more than testing the rest.
+    closest = sphere.intersect_all(shapes.spheres, packets.spheres, ray, closest)
+    closest = rectangle.intersect_all(shapes.rectangles, packets.rectangles, ray, closest)
+    closest = box.intersect_all(shapes.boxes, packets.boxes, ray, closest)
+    return triangle.intersect_all(shapes.triangles, ray, closest)
 
 
 @kernel

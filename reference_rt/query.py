@@ -16,7 +16,7 @@ from reference_rt.geometry import closest_hit
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
-from reference_rt.kernel import kernel
+from reference_rt.kernel import entry_kernel
 from reference_rt.ray import Ray
 from reference_rt.sampling.grid import GridSample
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -56,7 +56,7 @@ class DirectLight:
     contribution: FloatArray
 
 
-@kernel
+@entry_kernel
 def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
@@ -73,7 +73,7 @@ def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray
         out[i, 12], out[i, 13] = owner.u, owner.v
 
 
-@kernel
+@entry_kernel
 def _occluded(
     scene: SceneTables, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
 ) -> None:
@@ -81,7 +81,7 @@ def _occluded(
         out[i] = is_occluded(scene.geometry, Ray(row(o, i), row(d, i), t_max[i]))
 
 
-@kernel
+@entry_kernel
 def _direct(
     scene: SceneTables, o: FloatArray, d: FloatArray, k: int, u: float, v: float, out: FloatArray
 ) -> None:
@@ -99,7 +99,7 @@ def _direct(
         out[i, 4], out[i, 5], out[i, 6] = found.contribution
 
 
-@kernel
+@entry_kernel
 def _radiance(
     scene: SceneTables, integrator: Any, o: FloatArray, d: FloatArray, out: FloatArray
 ) -> None:

@@ -16,7 +16,7 @@ from reference_rt.errors import SceneError
 from reference_rt.film import film_offset
 from reference_rt.integrators import RayCast, radiance
 from reference_rt.integrators.ray_cast import cast
-from reference_rt.kernel import kernel, precompile
+from reference_rt.kernel import entry_kernel, precompile
 from reference_rt.sampling import draw_pair, start_sample
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray
@@ -56,7 +56,7 @@ class Picture:
         return int(np.count_nonzero(~np.isfinite(self.colour).all(axis=-1)))
 
 
-@kernel
+@entry_kernel
 def _render_band(
     integrator: Any,
     scene: SceneTables,
@@ -87,7 +87,7 @@ def _render_band(
         out[pixel, 2] = total.z / spp
 
 
-@kernel
+@entry_kernel
 def _cast_band(
     scene: SceneTables,
     material_colours: FloatArray,

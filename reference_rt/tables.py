@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from reference_rt import bvh
-from reference_rt.geometry import Geometry
+from reference_rt.geometry import Geometry, Packets
 from reference_rt.lights import AREA, CONSTANT, POINT, Areas, Choice, Constant, Lights, Point
 from reference_rt.lights.constant import Environment
 from reference_rt.lights.point import Points
@@ -44,7 +44,7 @@ def build_tables(scene: "Scene") -> SceneTables:
     tables = _shape_tables(scene, numbers)
     hierarchy = _build_bvh(tables)
     return SceneTables(
-        geometry=Geometry(Shapes(**tables), hierarchy),
+        geometry=Geometry(Shapes(**tables), _packets(tables, hierarchy), hierarchy),
         materials=_material_tables(scene, names),
         lights=_light_tables(scene, tables),
     )
@@ -121,6 +121,19 @@ def _build_bvh(tables: dict[str, Any]) -> bvh.Bvh | None:
         )
         row[mine] = np.arange(len(table.owner))
     return bvh.Bvh(boxes, first, count, kind, row)
+
+
+def _packets(tables: dict[str, Any], hierarchy: bvh.Bvh | None) -> Packets:
+    """The tables side by side, where nothing else leads to their rows."""
+    if hierarchy is not None:
+        return Packets(None, None, None)
+    modules = {field: module for _, field, _, module in _present(tables)}
+    return Packets(
+        *(
+            modules[field].pack_all(tables[field]) if field in modules else None
+            for field in Packets._fields
+        )
+    )
 
 
 # ---- materials ----------------------------------------------------------------------------------

@@ -76,10 +76,13 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sa
         frame = frame_from_normal(point.ns)
         wo = to_local(frame, -ray.d)
         dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * depth
-        if any_material.is_smooth(scene.materials, point.material):
+        smooth = any_material.is_smooth(scene.materials, point.material)
+        if smooth:
             light = _next_event(scene, lights.choice, point, frame, wo, sampler, dimension)
             total = total + throughput * light
-        u_lobe, u_roulette = draw_pair(sampler, dimension + sampling.BSDF_LOBE_AND_ROULETTE)
+        u_lobe, u_roulette = 0.5, 0.5
+        if not smooth or depth + 1 >= path.rr_depth:
+            u_lobe, u_roulette = draw_pair(sampler, dimension + sampling.LOBE_AND_ROULETTE)
         u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
         scattered = any_material.sample(scene.materials, point.material, wo, u_lobe, u0, u1)
         if scattered.pdf == 0.0:

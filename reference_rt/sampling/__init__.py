@@ -26,7 +26,7 @@ FILM = 0
 LENS = 1
 FIRST_BOUNCE = 2
 PER_BOUNCE = 4
-LIGHT_PICK, LIGHT_POINT, BSDF_LOBE_AND_ROULETTE, BSDF_DIRECTION = 0, 1, 2, 3
+LIGHT_PICK, LIGHT_POINT, LOBE_AND_ROULETTE, BSDF_DIRECTION = 0, 1, 2, 3
 
 _start = ByClass("start_sample")
 _start.register(SobolSetup, sobol.start)

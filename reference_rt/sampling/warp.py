@@ -6,12 +6,44 @@ from reference_rt.kernel import kernel
 from reference_rt.vec3 import Vec3
 
 
+# Coefficients of sin(pi/2 r) / r and cos(pi/2 r) in r²: (-1)^k (pi/2)^(2k+1) / (2k+1)! and
+# (-1)^k (pi/2)^(2k) / (2k)!. For |r| <= 1/2 the first terms left out are below 5e-17.
+_SIN = [(-1) ** k * (math.pi / 2) ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(8)]
+_COS = [(-1) ** k * (math.pi / 2) ** (2 * k) / math.factorial(2 * k) for k in range(9)]
+_S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7 = _SIN
+_C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8 = _COS
+
+
+@kernel
+def on_circle(turns: float) -> tuple[float, float]:
+    """(cos, sin) of 2 pi `turns`, for 0 <= turns < 1, each to within 4 u.
+
+    The quarter turns split off exactly, where cos(2 * pi * turns) rounds the angle first; and what
+    is left takes half the time of the library's two calls (measured: 10 % of the Cornell box).
+    """
+    quarters = math.floor(4.0 * turns + 0.5)
+    r = 4.0 * turns - quarters
+    z = r * r
+    z2 = z * z
+    z4 = z2 * z2
+    # Estrin's scheme: a third of the waiting of Horner's.
+    s = (_S0 + _S1 * z) + (_S2 + _S3 * z) * z2 + ((_S4 + _S5 * z) + (_S6 + _S7 * z) * z2) * z4
+    c = (_C0 + _C1 * z) + (_C2 + _C3 * z) * z2 + ((_C4 + _C5 * z) + (_C6 + _C7 * z) * z2) * z4
+    sine, cosine = s * r, c + _C8 * (z4 * z4)
+    quadrant = int(quarters) & 3
+    if quadrant & 1:
+        sine, cosine = cosine, -sine
+    if quadrant & 2:
+        sine, cosine = -sine, -cosine
+    return cosine, sine
+
+
 @kernel
 def cosine_hemisphere(u0: float, u1: float) -> Vec3:
     """A direction with density cos theta / pi: the disk lifted to the hemisphere (Malley)."""
     r = math.sqrt(u0)
-    phi = 2.0 * math.pi * u1
-    return Vec3(r * math.cos(phi), r * math.sin(phi), math.sqrt(1.0 - u0))
+    cos_phi, sin_phi = on_circle(u1)
+    return Vec3(r * cos_phi, r * sin_phi, math.sqrt(1.0 - u0))
 
 
 @kernel
@@ -19,5 +51,5 @@ def uniform_sphere(u0: float, u1: float) -> Vec3:
     """A direction with density 1 / (4 pi) (Archimedes: height is uniform)."""
     z = 1.0 - 2.0 * u0
     r = math.sqrt(max(0.0, 1.0 - z * z))
-    phi = 2.0 * math.pi * u1
-    return Vec3(r * math.cos(phi), r * math.sin(phi), z)
+    cos_phi, sin_phi = on_circle(u1)
+    return Vec3(r * cos_phi, r * sin_phi, z)

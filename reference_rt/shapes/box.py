@@ -7,16 +7,20 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt import transform
-from reference_rt.kernel import kernel, reciprocal
+from reference_rt.kernel import kernel, local_floats
 from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.shapes.shape import (
     BOX,
+    LANES,
     Bounds,
     FloatArray,
     IntArray,
     LightPoint,
     Shape,
+    lane_vector,
+    nearest_lane,
     outward,
+    pack,
     solid_angle_pdf,
 )
 from reference_rt.vec3 import Vec3, component, dot, max_abs, normalize, row
@@ -86,54 +90,125 @@ def local_direction(boxes: Boxes, i: int, v: Vec3) -> Vec3:
     )
 
 
+def pack_all(boxes: Boxes) -> FloatArray:
+    """What `distance` takes, as packets."""
+    return pack(boxes.center, boxes.to_local)
+
+
+class Slabs(NamedTuple):
+    """Where a ray enters and leaves the space between the planes -1 and 1 of each axis (t), and
+    whether it runs in the axis's positive direction."""
+
+    x_in: float
+    x_out: float
+    y_in: float
+    y_out: float
+    z_in: float
+    z_out: float
+    x_up: bool
+    y_up: bool
+    z_up: bool
+
+
+@kernel
+def slabs(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> Slabs:
+    """In the box's coordinates, by reciprocals (Kay & Kajiya 1986).
+
+    A ray along a face meets its plane at ±inf, as IEEE says, or, running in the plane, at 0 * inf:
+    NaN, which `distance` passes over.
+    """
+    from_center = ray.o - center
+    ox, oy, oz = dot(x_of, from_center), dot(y_of, from_center), dot(z_of, from_center)
+    ix, iy, iz = 1.0 / dot(x_of, ray.d), 1.0 / dot(y_of, ray.d), 1.0 / dot(z_of, ray.d)
+    x0, x1 = (-1.0 - ox) * ix, (1.0 - ox) * ix
+    y0, y1 = (-1.0 - oy) * iy, (1.0 - oy) * iy
+    z0, z1 = (-1.0 - oz) * iz, (1.0 - oz) * iz
+    x_up, y_up, z_up = ix > 0.0, iy > 0.0, iz > 0.0
+    return Slabs(
+        x0 if x_up else x1,
+        x1 if x_up else x0,
+        y0 if y_up else y1,
+        y1 if y_up else y0,
+        z0 if z_up else z1,
+        z1 if z_up else z0,
+        x_up,
+        y_up,
+        z_up,
+    )
+
+
+@kernel
+def distance(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> float:
+    """The smallest t > 0 at which a ray meets a box's surface, inf where it does not: from inside,
+    where it leaves."""
+    s = slabs(ray, center, x_of, y_of, z_of)
+    # max(a, NaN) is a: begun with a number, neither bound can become NaN.
+    t_in = max(max(max(-math.inf, s.x_in), s.y_in), s.z_in)
+    t_out = min(min(min(math.inf, s.x_out), s.y_out), s.z_out)
+    t = t_in if t_in > 0.0 else t_out
+    return t if (t_in <= t_out) & (t > 0.0) else math.inf
+
+
+@kernel
+def found(boxes: Boxes, i: int, ray: Ray, t: float) -> Hit:
+    """The hit of box i at t; its u is the face: axis, + 3 on the positive side."""
+    s = slabs(
+        ray,
+        row(boxes.center, i),
+        axis_row(boxes.to_local, i, 0),
+        axis_row(boxes.to_local, i, 1),
+        axis_row(boxes.to_local, i, 2),
+    )
+    if t == s.x_in:
+        face = 0 if s.x_up else 3
+    elif t == s.y_in:
+        face = 1 if s.y_up else 4
+    elif t == s.z_in:
+        face = 2 if s.z_up else 5
+    elif t == s.x_out:
+        face = 3 if s.x_up else 0
+    elif t == s.y_out:
+        face = 4 if s.y_up else 1
+    else:
+        face = 5 if s.z_up else 2
+    return Hit(t, BOX, i, float(face), 0.0)
+
+
 @kernel
 def intersect(boxes: Boxes, i: int, ray: Ray, closest: Hit) -> Hit:
-    """The nearer of `closest` and box i by slabs (Kay & Kajiya 1986) in the box's coordinates.
-
-    From inside the hit is where the ray leaves.  The hit's u is the face: axis, + 3 on the positive
-    side.  IEEE infinities settle rays along a face, and rays *in* its plane: see `slab`.
-    """
-    o = local_direction(boxes, i, ray.o - row(boxes.center, i))
-    d = local_direction(boxes, i, ray.d)
-    inverse = Vec3(reciprocal(d.x), reciprocal(d.y), reciprocal(d.z))
-    x0, x1 = (-1.0 - o.x) * inverse.x, (1.0 - o.x) * inverse.x
-    y0, y1 = (-1.0 - o.y) * inverse.y, (1.0 - o.y) * inverse.y
-    z0, z1 = (-1.0 - o.z) * inverse.z, (1.0 - o.z) * inverse.z
-    # No branches until the end: which slab is entered last is not to be predicted (measured).
-    t_near = max(max(min(x0, x1), min(y0, y1)), min(z0, z1))
-    t_far = min(min(max(x0, x1), max(y0, y1)), max(z0, z1))
-    t = t_near if t_near > 0.0 else t_far
-    if (t_near <= t_far) & (t > 0.0) & (t < closest.t):
-        return Hit(t, BOX, i, _face_at(t, x0, x1, y0, y1, z0, z1), 0.0)
-    return closest
+    """The nearer of `closest` and box i."""
+    t = distance(
+        ray,
+        row(boxes.center, i),
+        axis_row(boxes.to_local, i, 0),
+        axis_row(boxes.to_local, i, 1),
+        axis_row(boxes.to_local, i, 2),
+    )
+    return found(boxes, i, ray, t) if t < closest.t else closest
 
 
 @kernel
-def _face_at(
-    t: float, x0: float, x1: float, y0: float, y1: float, z0: float, z1: float
-) -> float:
-    """Which of the six plane distances `t` is: axis, + 3 on the positive side."""
-    if t == x0:
-        return 0.0
-    if t == x1:
-        return 3.0
-    if t == y0:
-        return 1.0
-    if t == y1:
-        return 4.0
-    if t == z0:
-        return 2.0
-    return 5.0
-
-
-@kernel
-def intersect_all(boxes: Boxes | None, ray: Ray, any_hit: bool, closest: Hit) -> Hit:
-    """The nearest of `closest` and all boxes; with `any_hit`, the first that is found."""
+def intersect_all(boxes: Boxes | None, packets: FloatArray | None, ray: Ray, closest: Hit) -> Hit:
+    """The nearest of `closest` and all boxes, from their packets (see `pack_all`)."""
     if boxes is None:
         return closest
-    for i in range(len(boxes.owner)):
-        closest = intersect(boxes, i, ray, closest)
-    return closest
+    if packets is None:
+        return closest
+    distances = local_floats(LANES)
+    best, t = -1, closest.t
+    for k in range(len(packets)):
+        for lane in range(LANES):
+            distances[lane] = distance(
+                ray,
+                lane_vector(packets, k, 0, lane),
+                lane_vector(packets, k, 3, lane),
+                lane_vector(packets, k, 6, lane),
+                lane_vector(packets, k, 9, lane),
+            )
+        best, t = nearest_lane(distances, k, best, t)
+    if best < 0:
+        return closest
+    return found(boxes, best, ray, t)
 
 
 @kernel

@@ -1,21 +1,26 @@
 """Rectangle: the square [-1, 1]² in the plane z = 0, normal +z, under an affine map."""
 
+import math
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt import transform
-from reference_rt.kernel import kernel
-from reference_rt.ray import Hit, Ray, SurfacePoint, surface_error
+from reference_rt.kernel import kernel, local_floats
+from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.shapes.shape import (
     RECTANGLE,
+    LANES,
     Bounds,
     FloatArray,
     IntArray,
     LightPoint,
     Shape,
+    lane_vector,
+    nearest_lane,
     outward,
+    pack,
     solid_angle_pdf,
 )
 from reference_rt.vec3 import Vec3, dot, max_abs, row
@@ -71,30 +76,67 @@ def areas(rectangles: Rectangles) -> FloatArray:
     return np.asarray(4.0 * np.linalg.norm(cross, axis=1))
 
 
+def pack_all(rectangles: Rectangles) -> FloatArray:
+    """What `distance` takes, as packets."""
+    return pack(rectangles.center, rectangles.normal, rectangles.x_of, rectangles.y_of)
+
+
+@kernel
+def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> float:
+    """The t > 0 at which a ray meets a rectangle, inf where it does not."""
+    from_center = ray.o - center
+    # For a parallel ray this is ±inf or NaN: both fail the comparisons.
+    t = -dot(from_center, normal) / dot(ray.d, normal)
+    q = from_center + ray.d * t
+    if (t > 0.0) & (abs(dot(q, x_of)) <= 1.0) & (abs(dot(q, y_of)) <= 1.0):
+        return t
+    return math.inf
+
+
+@kernel
+def found(rectangles: Rectangles, i: int, ray: Ray, t: float) -> Hit:
+    """The hit of rectangle i at t; its u, v are the local x, y in [-1, 1]."""
+    q = at(ray, t) - row(rectangles.center, i)
+    return Hit(
+        t, RECTANGLE, i, dot(q, row(rectangles.x_of, i)), dot(q, row(rectangles.y_of, i))
+    )
+
+
 @kernel
 def intersect(rectangles: Rectangles, i: int, ray: Ray, closest: Hit) -> Hit:
-    """The nearer of `closest` and rectangle i; the hit's u, v are the local x, y in [-1, 1]."""
-    n = row(rectangles.normal, i)
-    from_center = ray.o - row(rectangles.center, i)
-    # For a parallel ray this is ±inf or NaN: both fail the comparisons.
-    t = -dot(from_center, n) / dot(ray.d, n)
-    q = from_center + ray.d * t
-    x = dot(q, row(rectangles.x_of, i))
-    y = dot(q, row(rectangles.y_of, i))
-    # One branch for all conditions: which of them fails is not to be predicted (measured).
-    if (t > 0.0) & (t < closest.t) & (abs(x) <= 1.0) & (abs(y) <= 1.0):
-        return Hit(t, RECTANGLE, i, x, y)
-    return closest
+    """The nearer of `closest` and rectangle i."""
+    t = distance(
+        ray,
+        row(rectangles.center, i),
+        row(rectangles.normal, i),
+        row(rectangles.x_of, i),
+        row(rectangles.y_of, i),
+    )
+    return found(rectangles, i, ray, t) if t < closest.t else closest
 
 
 @kernel
-def intersect_all(rectangles: Rectangles | None, ray: Ray, any_hit: bool, closest: Hit) -> Hit:
-    """The nearest of `closest` and all rectangles; with `any_hit`, the first that is found."""
+def intersect_all(rectangles: Rectangles | None, packets: FloatArray | None, ray: Ray, closest: Hit) -> Hit:
+    """The nearest of `closest` and all rectangles, from their packets (see `pack_all`)."""
     if rectangles is None:
         return closest
-    for i in range(len(rectangles.owner)):
-        closest = intersect(rectangles, i, ray, closest)
-    return closest
+    if packets is None:
+        return closest
+    distances = local_floats(LANES)
+    best, t = -1, closest.t
+    for k in range(len(packets)):
+        for lane in range(LANES):
+            distances[lane] = distance(
+                ray,
+                lane_vector(packets, k, 0, lane),
+                lane_vector(packets, k, 3, lane),
+                lane_vector(packets, k, 6, lane),
+                lane_vector(packets, k, 9, lane),
+            )
+        best, t = nearest_lane(distances, k, best, t)
+    if best < 0:
+        return closest
+    return found(rectangles, best, ray, t)
 
 
 @kernel

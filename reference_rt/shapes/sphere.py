@@ -8,17 +8,22 @@ import numpy as np
 
 from reference_rt import transform
 from reference_rt.description import Positive, Vector
-from reference_rt.kernel import kernel
+from reference_rt.kernel import kernel, local_floats
 from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.sampling.warp import on_circle
 from reference_rt.shapes.shape import (
     SPHERE,
+    LANES,
     Bounds,
     FloatArray,
     IntArray,
     LightPoint,
     Shape,
+    lane_vector,
+    nearest_lane,
     no_light_point,
     outward,
+    pack,
 )
 from reference_rt.vec3 import Vec3, dot, frame_from_normal, normalize, row, to_world
 
@@ -75,40 +80,63 @@ def areas(spheres: Spheres) -> FloatArray:
     return 4.0 * math.pi * np.square(spheres.radius)
 
 
+def pack_all(spheres: Spheres) -> FloatArray:
+    """What `distance` takes, as packets."""
+    return pack(spheres.center, spheres.radius)
+
+
 @kernel
-def intersect(spheres: Spheres, i: int, ray: Ray, closest: Hit) -> Hit:
-    """The nearer of `closest` and sphere i.
+def distance(ray: Ray, center: Vec3, r: float) -> float:
+    """The smallest t > 0 at which a ray meets a sphere, inf where it does not.
 
     The quadratic in a form without cancellation for far or small spheres (Haines et al. 2019, "Ray
-    Tracing Gems", ch. 7): the discriminant from the closest approach, the second root from c/q.
+    Tracing Gems", ch. 7): the discriminant from the closest approach, the second root from c / q.
     """
-    f = ray.o - row(spheres.center, i)
-    r = spheres.radius[i]
+    f = ray.o - center
     a = dot(ray.d, ray.d)
     b = -dot(f, ray.d)
     approach = f + ray.d * (b / a)
     discriminant = r * r - dot(approach, approach)
-    if discriminant < 0.0:
-        return closest
-    q = b + math.copysign(math.sqrt(a * discriminant), b)
+    q = b + math.copysign(math.sqrt(a * max(discriminant, 0.0)), b)
     t0 = (dot(f, f) - r * r) / q
     t1 = q / a
-    if t0 > t1:
-        t0, t1 = t1, t0
-    t = t0 if t0 > 0.0 else t1
-    if t > 0.0 and t < closest.t:
-        return Hit(t, SPHERE, i, 0.0, 0.0)
-    return closest
+    near, far = min(t0, t1), max(t0, t1)
+    t = near if near > 0.0 else far
+    return t if (discriminant >= 0.0) & (t > 0.0) else math.inf
 
 
 @kernel
-def intersect_all(spheres: Spheres | None, ray: Ray, any_hit: bool, closest: Hit) -> Hit:
-    """The nearest of `closest` and all spheres; with `any_hit`, the first that is found."""
+def found(spheres: Spheres, i: int, ray: Ray, t: float) -> Hit:
+    return Hit(t, SPHERE, i, 0.0, 0.0)
+
+
+@kernel
+def intersect(spheres: Spheres, i: int, ray: Ray, closest: Hit) -> Hit:
+    """The nearer of `closest` and sphere i."""
+    t = distance(ray, row(spheres.center, i), spheres.radius[i])
+    return found(spheres, i, ray, t) if t < closest.t else closest
+
+
+@kernel
+def intersect_all(spheres: Spheres | None, packets: FloatArray | None, ray: Ray, closest: Hit) -> Hit:
+    """The nearest of `closest` and all spheres, from their packets (see `pack_all`)."""
     if spheres is None:
         return closest
-    for i in range(len(spheres.owner)):
-        closest = intersect(spheres, i, ray, closest)
-    return closest
+    if packets is None:
+        return closest
+    distances = local_floats(LANES)
+    best, t = -1, closest.t
+    for k in range(len(packets)):
+        for lane in range(LANES):
+            distances[lane] = distance(
+                ray,
+                lane_vector(packets, k, 0, lane),
+                packets[k, 3, lane],
+            )
+        best, t = nearest_lane(distances, k, best, t)
+    if best < 0:
+        return closest
+    return found(spheres, best, ray, t)
 
 
 @kernel
@@ -161,9 +189,9 @@ def sample(spheres: Spheres, i: int, p: Vec3, u0: float, u1: float) -> LightPoin
     cos_theta = 1.0 - one_minus_cos
     sin2 = one_minus_cos * (1.0 + cos_theta)
     sin_theta = math.sqrt(sin2)
-    phi = 2.0 * math.pi * u1
+    cos_phi, sin_phi = on_circle(u1)
     frame = frame_from_normal(to_center * (1.0 / math.sqrt(distance2)))
-    wi = to_world(frame, Vec3(sin_theta * math.cos(phi), sin_theta * math.sin(phi), cos_theta))
+    wi = to_world(frame, Vec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta))
     # The nearer root of the quadratic; at the rim rounding may leave it a hair below zero.
     half_chord2 = max(0.0, r * r - distance2 * sin2)
     along = math.sqrt(distance2) * cos_theta - math.sqrt(half_chord2)

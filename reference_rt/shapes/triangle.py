@@ -155,15 +155,13 @@ def intersect(triangles: Triangles, i: int, shear: Shear, closest: Hit) -> Hit:
 
 
 @kernel
-def intersect_all(triangles: Triangles | None, ray: Ray, any_hit: bool, closest: Hit) -> Hit:
-    """The nearest of `closest` and all triangles; with `any_hit`, the first that is found."""
+def intersect_all(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hit:
+    """The nearest of `closest` and all triangles."""
     if triangles is None:
         return closest
     shear = shear_of(ray)
     for i in range(len(triangles.owner)):
         closest = intersect(triangles, i, shear, closest)
-        if any_hit and closest.kind >= 0:
-            break
     return closest
 
 

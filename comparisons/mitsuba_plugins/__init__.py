@@ -1,0 +1,13 @@
+"""What Mitsuba lacks, written with its own parts.
+
+The classes derive from classes of a variant, so they are made and registered after `set_variant`.
+"""
+
+from typing import Any
+
+from comparisons.mitsuba_plugins import whitted
+
+
+def register(mi: Any) -> None:
+    """Make the plugins of this folder known to `mi.load_dict`, for the variant that is set."""
+    whitted.register(mi)

@@ -1,0 +1,158 @@
+"""Whitted's ray tracing as a Mitsuba integrator: `{"type": "whitted"}`.
+
+Twin of `reference_rt.integrators.whitted`: direct light from every point light and from one point
+of every area light, mirrored and refracted rays, the background.  Intersections, visibility, BSDFs,
+Fresnel terms and emission are Mitsuba's own.
+
+One thing differs from Mitsuba's integrators.  They start the next ray off the surface, moved along
+the normal by 1e-4 of the scene's coordinates, which moves what it meets by as much or more: a
+hundred times float32's own error, and enough to hide a wrong direction.  Here the start is moved
+along the ray, as far from the surface: the ray stays on its line.
+"""
+
+from typing import Any
+
+from comparisons.mitsuba_plugins.light_points import light_points
+
+
+def leave(mi: Any, si: Any, d: Any) -> Any:
+    """A ray from a surface along the unit `d`, begun as far off it as Mitsuba begins its own."""
+    import drjit as dr
+
+    height = (1.0 + dr.max(dr.abs(si.p))) * mi.math.RayEpsilon
+    # Below this cosine the start would lie more than a thousand heights away.
+    cosine = dr.maximum(dr.abs(dr.dot(d, si.n)), 1e-3)
+    return mi.Ray3f(si.p + d * (height / cosine), d, si.time, si.wavelengths)
+
+
+def segment(mi: Any, si: Any, target: Any) -> Any:
+    """The ray of `leave` towards `target`, ended as far before it as Mitsuba ends its own."""
+    import drjit as dr
+
+    ray = leave(mi, si, dr.normalize(target - si.p))
+    ray.maxt = dr.norm(target - ray.o) * (1.0 - mi.math.ShadowEpsilon)
+    return ray
+
+
+def emitted(mi: Any, scene: Any, si: Any, active: Any) -> Any:
+    """The radiance that arrives from what a ray hit, the environment where it hit nothing."""
+    emitter = si.emitter(scene, active)
+    if emitter is None:  # scalar variants
+        return mi.Color3f(0.0)
+    return emitter.eval(si, active) & active if _is_wide(mi) else emitter.eval(si, active)
+
+
+def without(mask: Any, other: Any) -> Any:
+    """mask and not other; `~` would make numbers of the plain bools of scalar variants."""
+    import drjit as dr
+
+    return dr.select(other, False, mask)
+
+
+def _is_wide(mi: Any) -> bool:
+    return not str(mi.variant()).startswith("scalar")
+
+
+def register(mi: Any) -> None:
+    """Define the integrator for the variant that is set, and register it."""
+    import drjit as dr
+
+    delta_reflection, delta_transmission = mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission
+
+    class Whitted(mi.SamplingIntegrator):  # type: ignore[misc]
+        """Parameters: max_depth, most mirrorings and refractions of a ray; min_contribution, the
+        fraction of the pixel below which a ray is not followed."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.max_depth = properties.get("max_depth", 8)
+            self.min_contribution = properties.get("min_contribution", 1e-4)
+            self.scene: Any = None
+            self.lights: list[Any] = []
+            self.points: list[Any] = []
+
+        def prepare(self, scene: Any) -> None:
+            """Look the lights up once per scene."""
+            if self.scene is not scene:
+                self.scene, self.lights = scene, light_points(mi, scene)
+                delta = mi.EmitterFlags.DeltaPosition
+                self.points = [e for e in scene.emitters() if mi.has_flag(e.flags(), delta)]
+
+        def sample(
+            self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
+        ) -> tuple[Any, Any, list[Any]]:
+            """The radiance along `ray`, whether it hit anything, no further channels.
+
+            The tree is walked depth first with all rays at once, each level masked to those that
+            have it.
+            """
+            self.prepare(scene)
+            total, valid = mi.Color3f(0.0), None
+            stack = [(mi.Ray3f(ray), mi.Color3f(1.0), mi.Mask(active), 0)]
+            while stack:
+                ray, weight, active, depth = stack.pop()
+                # Opaque: otherwise the first level, whose weight is a constant, is a kernel of its
+                # own, and every level compiles again.
+                dr.make_opaque(ray, weight, active)
+                si = scene.ray_intersect(ray, active)
+                total += weight * emitted(mi, scene, si, active)
+                active &= si.is_valid()
+                valid = active if valid is None else valid
+                if not dr.any(active):
+                    continue
+                smooth = active & mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Smooth)
+                if dr.any(smooth):
+                    total += weight * self.direct_light(scene, si, smooth)
+                dr.eval(total)
+                if depth < self.max_depth:
+                    for lobe in (delta_reflection, delta_transmission):
+                        stack += self.branch(si, weight, without(active, smooth), lobe, depth)
+            return total, valid, []
+
+        def branch(self, si: Any, weight: Any, active: Any, lobe: Any, depth: int) -> list[Any]:
+            """The rays of one lobe that are worth following: a stack's entry, or nothing."""
+            bsdf = si.bsdf()
+            active = active & mi.has_flag(bsdf.flags(), lobe)
+            if not dr.any(active):
+                return []
+            context = mi.BSDFContext()
+            context.type_mask = lobe
+            # With one lobe allowed nothing is left to chance.
+            sample, value = bsdf.sample(context, si, 0.5, mi.Point2f(0.5, 0.5), active)
+            weight = weight * value
+            active &= dr.max(weight) > self.min_contribution
+            if not dr.any(active):
+                return []
+            ray = leave(mi, si, dr.normalize(si.to_world(sample.wo)))
+            dr.eval(ray, weight, active)
+            return [(ray, weight, active, depth + 1)]
+
+        def direct_light(self, scene: Any, si: Any, active: Any) -> Any:
+            """Every point light, and one point of every area light."""
+            total = mi.Color3f(0.0)
+            context = mi.BSDFContext()
+            bsdf = si.bsdf()
+            for light in self.points:
+                ds, radiance = light.sample_direction(si, mi.Point2f(0.5, 0.5), active)
+                value = bsdf.eval(context, si, si.to_local(ds.d), active)
+                visible = without(active, scene.ray_test(segment(mi, si, ds.p), active))
+                total += dr.select(visible, value * radiance, 0.0)
+            for light in self.lights:
+                target, solid_angle = light.seen_from(mi, dr, si.p)
+                ray = segment(mi, si, target)
+                value = bsdf.eval(context, si, si.to_local(ray.d), active)
+                visible = without(active, scene.ray_test(ray, active))
+                ray.maxt = dr.inf
+                found = scene.ray_intersect(ray, visible)
+                radiance = emitted(mi, scene, found, visible & found.is_valid())
+                total += dr.select(visible, value * radiance * solid_angle, 0.0)
+                dr.eval(total)
+            return total
+
+        def aov_names(self) -> list[str]:
+            return []
+
+        def to_string(self) -> str:
+            return f"Whitted[max_depth={self.max_depth}]"
+
+    mi.register_integrator("whitted", Whitted)

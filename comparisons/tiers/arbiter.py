@@ -1,0 +1,69 @@
+"""The arbiter: what our float64 tracer says of rays next to one on which the two disagree.
+
+Mitsuba answers for a ray somewhere within its error bound of the one asked for.  If ours gives
+Mitsuba's answer there too, the ray is one that the reference cannot resolve: an edge, a silhouette.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.shapes.shape import FloatArray, IntArray
+
+BoolArray = npt.NDArray[np.bool_]
+
+NEIGHBOURS = 48
+"""Moved rays for each radius: on a sphere of so many points none is farther than 0.3 radii from a
+neighbour, so that an edge through more than a twentieth of the ball's radius from its rim is met."""
+
+MOST = 2000
+"""Rays that are arbitrated; the rest count as they are, against agreement."""
+
+RADII = (1.0, 0.5)
+
+LIMIT = 0.01
+"""The fraction of rays that may need the arbiter.  Edges and silhouettes, a float32 bound wide,
+take 1e-4 of a picture or less; past a hundredth it is the reference's precision that is compared."""
+
+
+def directions(n: int) -> FloatArray:
+    """n unit vectors (n, 3) spread evenly over the sphere (the golden spiral)."""
+    k = np.arange(n) + 0.5
+    z = 1.0 - 2.0 * k / n
+    phi = np.pi * (1.0 + np.sqrt(5.0)) * k
+    r = np.sqrt(1.0 - z * z)
+    return np.column_stack([r * np.cos(phi), r * np.sin(phi), z])
+
+
+def explained(
+    rays: IntArray, radius: FloatArray, like_theirs: Callable[[IntArray, FloatArray], BoolArray]
+) -> BoolArray:
+    """Which of `rays` (m,), numbers of rays, a move by up to `radius` (m,) explains.
+
+    `like_theirs(rays, offsets)` traces the rays (k,) moved by offsets (k, 3) and tells which now
+    agree with Mitsuba.  False for all beyond the first MOST.
+    """
+    found = np.zeros(len(rays), bool)
+    for factor in RADII:
+        for move in directions(NEIGHBOURS):
+            open_ = np.flatnonzero(~found)[:MOST]
+            open_ = open_[open_ < MOST]
+            if len(open_) == 0:
+                return found
+            offsets = move * (factor * radius[open_])[:, None]
+            found[open_] = like_theirs(rays[open_], offsets)
+    return found
+
+
+def values_around(
+    radius: FloatArray, value: Callable[[FloatArray], FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """The least and the greatest of `value(offsets)` (m, 3) over moves of up to `radius` (m,)."""
+    zero = np.zeros((len(radius), 3))
+    low = high = value(zero)
+    for factor in RADII:
+        for move in directions(NEIGHBOURS):
+            found = value(zero + move * (factor * radius)[:, None])
+            low, high = np.minimum(low, found), np.maximum(high, found)
+    return low, high

@@ -1,0 +1,256 @@
+"""The second rung: direct light, one light at a time."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from comparisons.mitsuba_backend import mitsuba
+from comparisons.mitsuba_plugins.whitted import emitted, without
+from comparisons.mitsuba_scene import for_rays, light_id
+from comparisons.results import Tier
+from comparisons.tiers import arbiter
+from comparisons.tiers.bounds import UNIT_ROUNDOFF, ShapeSizes, delta, largest, shape_sizes, slide
+from comparisons.tiers.rays import RAY_EPSILON, SHADOW_EPSILON, Rays, mixed_rays
+from reference_rt import query
+from reference_rt.lights import CONSTANT, POINT, Point
+from reference_rt.query import DirectLight, Intersections
+from reference_rt.scene import Scene
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.tables import SceneTables
+
+PIXELS = 1024
+"""Camera rays at most; as many random and secondary rays join them."""
+
+LIGHTS = 8
+"""Lights that are tested at most, evenly spread over the scene's."""
+
+POINTS = ((0.5, 0.4), (0.13, 0.71), (0.83, 0.22), (0.37, 0.93))
+"""(u, v) that pick a point on a light: none on the edge of a face of any shape."""
+
+
+class Setting(NamedTuple):
+    """What all lights of a scene share: the rays, what they hit, the sizes behind the bounds."""
+
+    scene: Scene
+    tables: SceneTables
+    mi_scene: Any
+    rays: Rays
+    hits: Intersections
+    sizes: ShapeSizes
+
+
+class Outcome(NamedTuple):
+    """One light point: rays compared, the rays that differ unexplained, how many are explained, the
+    largest error and the largest error over its bound of the rest."""
+
+    rays: int
+    unexplained: IntArray
+    explained: int
+    max_error: float
+    max_ratio: float
+
+
+def direct(
+    scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXELS, seed: int = 0
+) -> Tier:
+    """Compare f cos L of single lights at what camera, random and secondary rays hit.
+
+    At most LIGHTS of the scene's lights, at POINTS each.  Where ours is lit and Mitsuba's is not,
+    or the reverse, the arbiter repeats Mitsuba's shadow ray, with its epsilons, in our tracer.
+    """
+    choice = tables.lights.choice
+    if choice is None:
+        return Tier("direct", "not-applicable", "the scene has no light")
+    if tables.materials.diffuses is None:
+        return Tier("direct", "not-applicable", "no material scatters light that a light sends")
+    sizes = shape_sizes(tables, len(scene.shapes))
+    rays = mixed_rays(scene, tables, sizes, pixels, seed)
+    hits = query.intersect(tables, rays.o, rays.d)
+    setting = Setting(scene, tables, mi_scene, rays, hits, sizes)
+    count = len(choice.kind)
+    tested = np.unique(np.linspace(0, count - 1, min(count, LIGHTS)).round().astype(int))
+    outcomes: dict[tuple[int, tuple[float, float]], Outcome] = {}
+    for light in tested.tolist():
+        points = POINTS[:1] if choice.kind[light] == POINT else POINTS
+        for u in points:
+            outcomes[light, u] = _compare(setting, light, u)
+    total = sum(o.rays for o in outcomes.values())
+    explained = sum(o.explained for o in outcomes.values())
+    unexplained = sum(len(o.unexplained) for o in outcomes.values())
+    numbers: dict[str, Any] = {
+        "rays": total,
+        "lights": count,
+        "lights_tested": len(tested),
+        "explained": explained,
+        "unexplained": unexplained,
+        "max_error": max(o.max_error for o in outcomes.values()),
+        "max_error_over_bound": max(o.max_ratio for o in outcomes.values()),
+    }
+    for (light, u), outcome in outcomes.items():
+        if len(outcome.unexplained):
+            k = int(outcome.unexplained[0])
+            reason = (
+                f"{unexplained} of {total} differ; the first: light {light} at u = {u}, the ray "
+                f"from {rays.o[k].tolist()} along {rays.d[k].tolist()}"
+            )
+            return Tier("direct", "differ", reason, numbers)
+    shadows = f"{explained} of {total} lie on edges or in reach of Mitsuba's shadow epsilon"
+    if explained > arbiter.LIMIT * total:
+        return Tier("direct", "reference-limited", shadows, numbers)
+    reason = f"{len(tested)} of {count} lights agree to {numbers['max_error_over_bound']:.2g} of "
+    return Tier("direct", "agree", f"{reason}float32's bound; {shadows}", numbers)
+
+
+def _compare(setting: Setting, light: int, u: tuple[float, float]) -> Outcome:
+    """One point of one light at all hits."""
+    rays, hits, tables = setting.rays, setting.hits, setting.tables
+    ours = query.direct_light(tables, rays.o, rays.d, light, u)
+    target = _targets(ours)
+    known = np.flatnonzero((hits.shape >= 0) & np.isfinite(target).all(axis=1))
+    if len(known) == 0:
+        return Outcome(0, known, 0, 0.0, 0.0)
+    rays, hits, target = Rays(rays.o[known], rays.d[known]), _rows(hits, known), target[known]
+    value = ours.contribution[known]
+    theirs, their_cosine = _mitsuba_direct(setting, light, rays, target)
+    bound = _bounds(setting, light, rays, hits, target, (value, theirs, their_cosine))
+    error = np.abs(theirs - value).max(axis=1)
+    wrong = np.flatnonzero(~(error <= bound))
+
+    def like_theirs(numbers: IntArray, offsets: FloatArray) -> arbiter.BoolArray:
+        moved = query.direct_light(
+            tables, rays.o[numbers] + offsets, rays.d[numbers], light, u
+        ).contribution
+        # The move itself shifts the value by as much as the bound: twice is allowed.
+        apart = np.abs(moved - theirs[numbers]).max(axis=1)
+        dark = ~theirs[numbers].any(axis=1)
+        lit_differs = value[numbers].any(axis=1) == dark
+        shadowed = _shadowed(setting, light, _rows(hits, numbers), target[numbers], offsets)
+        return np.asarray((apart <= 2.0 * bound[numbers]) | (lit_differs & (shadowed == dark)))
+
+    radius = delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
+    settled = arbiter.explained(wrong, radius[wrong], like_theirs)
+    right = error <= bound
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.nan_to_num(error[right] / bound[right])
+    return Outcome(
+        rays=len(known),
+        unexplained=known[wrong[~settled]],
+        explained=int(np.count_nonzero(settled)),
+        max_error=float(error[right].max(initial=0.0)),
+        max_ratio=float(ratio.max(initial=0.0)),
+    )
+
+
+def _targets(ours: DirectLight) -> FloatArray:
+    """(n, 3) the point on the light for each ray; NaN where it is not known.
+
+    Ours tells none where nothing can arrive.  A light whose point is the same for all rays is
+    asked about there too: Mitsuba's has to be dark as well.
+    """
+    seen = ours.pdf > 0.0
+    target = np.full_like(ours.target, np.nan)
+    target[seen] = ours.target[seen]
+    if seen.any() and np.ptp(ours.target[seen], axis=0).max() == 0.0:
+        target[:] = ours.target[seen][0]
+    return target
+
+
+def _bounds(
+    setting: Setting,
+    light: int,
+    rays: Rays,
+    hits: Intersections,
+    target: FloatArray,
+    values: tuple[FloatArray, FloatArray, FloatArray],
+) -> FloatArray:
+    """(n,): how far float32 may move f cos L.
+
+    With E = f L, e the slide of the shaded point and r the light's distance: the cosine is off by
+    the turn of the normal, 2 e over the shape's feature, and of the direction, e / r; the inverse
+    square by 2 e / r; and the products round some 16 times.
+    """
+    value, theirs, their_cosine = values
+    e = slide(setting.sizes, rays.o, rays.d, hits.p, hits.n, hits.shape)
+    if _kind(setting, light) == CONSTANT:
+        w, distance = target, np.full(len(target), np.inf)
+    else:
+        w = target - hits.p
+        distance = np.linalg.norm(w, axis=1)
+    cosine = np.sum(w * hits.ns, axis=1) / np.linalg.norm(w, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ours_full = np.where(cosine > 0.0, value.max(axis=1) / cosine, 0.0)
+        theirs_full = np.where(their_cosine > 0.0, theirs.max(axis=1) / their_cosine, 0.0)
+    turn = 2.0 * e / setting.sizes.feature_of(hits.shape, hits.face)
+    relative = turn + 4.0 * e / distance + 16.0 * UNIT_ROUNDOFF
+    return np.asarray(np.maximum(ours_full, theirs_full) * relative)
+
+
+def _kind(setting: Setting, light: int) -> int:
+    choice = setting.tables.lights.choice
+    return -1 if choice is None else int(choice.kind[light])
+
+
+def _rows(hits: Intersections, rows: IntArray) -> Intersections:
+    return Intersections(**{name: array[rows] for name, array in vars(hits).items()})
+
+
+# ---- Mitsuba's side -----------------------------------------------------------------------------
+
+
+def _mitsuba_direct(
+    setting: Setting, light: int, rays: Rays, target: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """f cos L (n, 3) and the cosine at the surface (n,): Mitsuba's hit, BSDF, visibility, light."""
+    import drjit as dr
+
+    mi, scene, kind = mitsuba(), setting.mi_scene, _kind(setting, light)
+    emitter = _point_emitter(setting, light) if kind == POINT else None
+
+    def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
+        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(o), d))
+        active = si.is_valid()
+        if not dr.any(active):
+            return mi.Color3f(0.0), mi.Float(0.0)
+        wi = at if kind == CONSTANT else dr.normalize(at - si.p)
+        ray = si.spawn_ray(wi) if kind == CONSTANT else si.spawn_ray_to(mi.Point3f(at))
+        visible = without(active, scene.ray_test(ray, active))
+        if emitter is not None:
+            sample, radiance = emitter.sample_direction(si, mi.Point2f(0.5, 0.5), active)
+            wi = sample.d
+        else:
+            ray.maxt = dr.inf
+            # Behind the shadow test's end there must be the light itself, its front towards us.
+            found = scene.ray_intersect(ray, visible)
+            radiance = emitted(mi, scene, found, visible)
+        local = si.to_local(wi)
+        f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
+        return dr.select(visible, f_cos * radiance, 0.0), local.z
+
+    contribution, cosine = for_rays(value, rays.o, rays.d, target)
+    return contribution, cosine
+
+
+def _point_emitter(setting: Setting, light: int) -> Any:
+    """Mitsuba's emitter of a point light: rows of our table count the scene's point lights."""
+    choice = setting.tables.lights.choice
+    row = 0 if choice is None else int(choice.row[light])
+    lights = setting.scene.lights
+    index = [i for i, described in enumerate(lights) if isinstance(described, Point)][row]
+    for emitter in setting.mi_scene.emitters():
+        if emitter.id() == light_id(index):
+            return emitter
+    raise LookupError(f"Mitsuba's scene has no emitter {light_id(index)}")
+
+
+def _shadowed(
+    setting: Setting, light: int, hits: Intersections, target: FloatArray, offsets: FloatArray
+) -> arbiter.BoolArray:
+    """Whether ours finds Mitsuba's shadow ray blocked: begun and ended as Mitsuba does it."""
+    far = _kind(setting, light) == CONSTANT
+    w = target if far else target - hits.p
+    side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
+    height = side * (1.0 + largest(hits.p)) * RAY_EPSILON
+    o = hits.p + hits.n * height[:, None] + offsets
+    if far:
+        return query.occluded(setting.tables, o, w)
+    return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)

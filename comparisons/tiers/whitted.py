@@ -1,0 +1,130 @@
+"""The third rung: the Whitted tree, ray for ray."""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba_backend import mitsuba
+from comparisons.mitsuba_scene import for_rays
+from comparisons.results import Tier
+from comparisons.tiers import arbiter
+from comparisons.tiers.bounds import delta, largest, shape_sizes
+from comparisons.tiers.rays import RAY_EPSILON, Rays, pixel_rays
+from reference_rt import query
+from reference_rt.integrators import Whitted
+from reference_rt.lights import CONSTANT
+from reference_rt.scene import Scene
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.tables import SceneTables
+
+PIXELS = 128 * 128
+"""Pixels that are compared at most, evenly strided."""
+
+MOST_LIGHTS = 256
+"""Each light is a shadow ray at every surface: with more the rung would take minutes."""
+
+MOST_OUTLIERS = 500
+"""Pixels that are arbitrated: each takes 192 more trees.  The rest count against agreement."""
+
+TOLERANCE = 1e-5
+"""Of a pixel, or of the lit pixels' mean where it is darker.  A light's contribution rounds by some
+2e-6 (32 roundings of 2^-24: see `bounds`), and a tree is deep enough to matter through five hits at
+most before its weights fall; rays that curved mirrors fan out go to the arbiter."""
+
+
+def whitted(scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXELS) -> Tier:
+    """Compare the radiance through pixel centres with that of our Whitted plugin in Mitsuba.
+
+    With the scene's own depth where its integrator is Whitted, else the default's.  Outliers are
+    put to the arbiter: ours along rays moved by float32's bound, then by Mitsuba's epsilon.
+    """
+    choice = tables.lights.choice
+    if choice is None:
+        return Tier("whitted", "not-applicable", "the scene has no light")
+    lights = int(np.count_nonzero(choice.kind != CONSTANT))
+    if lights > MOST_LIGHTS:
+        reason = f"{lights} lights, each a shadow ray at every surface: more than {MOST_LIGHTS}"
+        return Tier("whitted", "not-applicable", reason)
+    integrator = scene.integrator if isinstance(scene.integrator, Whitted) else Whitted()
+    rays = pixel_rays(scene, pixels)
+    setup = integrator.setup()
+    ours = query.whitted_radiance(tables, setup, rays.o, rays.d)
+    theirs = plugin_radiance(mi_scene, integrator, rays)
+    size = np.maximum(np.abs(ours), np.abs(theirs)).max(axis=1)
+    lit = size[np.isfinite(size) & (size > 0.0)]
+    bound = TOLERANCE * np.maximum(size, lit.mean() if len(lit) else 0.0)
+    error = np.abs(theirs - ours).max(axis=1)
+    outliers = np.flatnonzero(~(error <= bound))
+    settled = _explained(scene, tables, setup, rays, theirs, bound, outliers)
+    unexplained = outliers[~settled]
+    right = error <= bound
+    numbers: dict[str, Any] = {
+        "pixels": len(rays.o),
+        "max_depth": integrator.max_depth,
+        "max_error": float(error[right].max(initial=0.0)),
+        "max_error_over_bound": float((error[right & (bound > 0)] / bound[right & (bound > 0)]).max(initial=0.0)),
+        "explained": int(np.count_nonzero(settled)),
+        "unexplained": len(unexplained),
+    }
+    if len(unexplained):
+        k = int(unexplained[np.argmax(np.nan_to_num(error[unexplained], nan=np.inf))])
+        reason = (
+            f"{len(unexplained)} of {len(rays.o)} pixels differ; the most, from "
+            f"{rays.o[k].tolist()} along {rays.d[k].tolist()}: ours {ours[k]}, Mitsuba's {theirs[k]}"
+        )
+        return Tier("whitted", "differ", reason, numbers)
+    edges = f"{numbers['explained']} of {len(rays.o)} lie on edges within float32 or its epsilons"
+    if numbers["explained"] > arbiter.LIMIT * len(rays.o):
+        return Tier("whitted", "reference-limited", edges, numbers)
+    reason = f"pixels agree to {numbers['max_error']:.2g} W/sr/m²; {edges}"
+    return Tier("whitted", "agree", reason, numbers)
+
+
+def plugin_radiance(mi_scene: Any, integrator: Whitted, rays: Rays) -> FloatArray:
+    """(n, 3): Mitsuba's side of the tree, along our rays."""
+    mi = mitsuba()
+    plugin = mi.load_dict(
+        {
+            "type": "whitted",
+            "max_depth": integrator.max_depth,
+            "min_contribution": integrator.min_contribution,
+        }
+    )
+
+    def radiance(o: Any, d: Any) -> tuple[Any, ...]:
+        return (plugin.sample(mi_scene, None, mi.Ray3f(mi.Point3f(o), d))[0],)
+
+    return for_rays(radiance, rays.o, rays.d)[0]
+
+
+def _explained(
+    scene: Scene,
+    tables: SceneTables,
+    setup: Any,
+    rays: Rays,
+    theirs: FloatArray,
+    bound: FloatArray,
+    outliers: np.ndarray[Any, np.dtype[np.int64]],
+) -> arbiter.BoolArray:
+    """Which outliers' values lie in the range of ours along moved rays, to the tolerance."""
+    settled = np.zeros(len(outliers), bool)
+    sizes = shape_sizes(tables, len(scene.shapes))
+    hits = query.intersect(tables, rays.o[outliers], rays.d[outliers])
+    reach = sizes.reach.max(initial=0.0)  # later hits of the tree are anywhere
+    radii = (
+        delta(rays.o[outliers], hits.p, np.full(len(outliers), reach)),
+        (1.0 + largest(hits.p)) * RAY_EPSILON,
+    )
+    for radius in radii:
+        open_ = np.flatnonzero(~settled[:MOST_OUTLIERS])
+        if len(open_) == 0:
+            break
+        rows = outliers[open_]
+
+        def value(offsets: FloatArray, rows: Any = rows) -> FloatArray:
+            return query.whitted_radiance(tables, setup, rays.o[rows] + offsets, rays.d[rows])
+
+        low, high = arbiter.values_around(radius[open_], value)
+        slack = bound[rows][:, None]
+        settled[open_] = ((theirs[rows] >= low - slack) & (theirs[rows] <= high + slack)).all(axis=1)
+    return settled

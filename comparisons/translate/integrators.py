@@ -1,0 +1,41 @@
+"""Integrators."""
+
+from functools import singledispatch
+from typing import Any
+
+from comparisons.translate.errors import UntranslatableError
+from reference_rt.integrators import Path, RayCast, Whitted
+
+
+@singledispatch
+def translate_integrator(integrator: Any) -> dict[str, Any] | None:
+    """An integrator's dict; None where there is no picture to compare.
+
+    Raises UntranslatableError.
+    """
+    raise UntranslatableError(integrator, "integrator")
+
+
+@translate_integrator.register
+def _(integrator: Path) -> dict[str, Any]:
+    return {
+        "type": "path",
+        "max_depth": -1 if integrator.max_depth is None else integrator.max_depth,
+        "rr_depth": integrator.rr_depth,
+    }
+
+
+@translate_integrator.register
+def _(integrator: Whitted) -> dict[str, Any]:
+    """Our plugin: `comparisons.mitsuba_plugins.whitted`."""
+    return {
+        "type": "whitted",
+        "max_depth": integrator.max_depth,
+        "min_contribution": integrator.min_contribution,
+    }
+
+
+@translate_integrator.register
+def _(integrator: RayCast) -> None:
+    """Everything that ray casting shows is compared ray by ray: the rung of geometry."""
+    return
