@@ -187,12 +187,15 @@ def _candidates() -> list[str]:
 
 
 def _llvm_version(path: str) -> tuple[int, ...]:
-    """(19, 1) of .../libLLVM.so.19.1 or .../libLLVM-19.so.1; from the folder's name for macOS."""
+    """(19, 1) of .../libLLVM.so.19.1 or .../libLLVM-19.so.1; from the folder's name on macOS, (0,)
+    where that has none; () for a file that is not all of LLVM."""
+    if not re.match(r"libLLVM[-.]\w", Path(path).name):
+        return ()
     for part in reversed(Path(path).parts):
-        match = re.search(r"(?:libLLVM(?:-|\.so\.|-C\.so\.)|llvm[-@]?)(\d+(?:\.\d+)*)", part)
+        match = re.match(r"(?:libLLVM(?:-|\.so\.)|llvm[-@]?)(\d+(?:\.\d+)*)", part)
         if match:
             return tuple(int(n) for n in match.group(1).split("."))
-    return (0,) if path.endswith(".dylib") else ()
+    return (0,)
 
 
 # ---- what was proven before ---------------------------------------------------------------------

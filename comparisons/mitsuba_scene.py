@@ -154,19 +154,21 @@ def _decode_shapes(mi_scene: Any, numbers: npt.NDArray[Any]) -> IntArray:
     ours = np.full(int(max(registered, default=0)) + 1, -1)  # 0 is Mitsuba's "no shape"
     for registry_id, shape in zip(registered, mi_scene.shapes(), strict=True):
         ours[registry_id] = shape_index(shape.id())
-    return ours[numbers]
+    return np.asarray(ours[numbers])
 
 
 def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicates:
     """Pictures with the seeds seed, seed + 1, ...
 
-    A first picture of the same kind is thrown away: it compiles the kernels, which a run time must
+    A small picture goes before and is thrown away: it compiles the kernels, which a run time must
     not count.
     """
     mi = mitsuba()
     pictures, seconds = [], []
     if not mi.variant().startswith("scalar"):
-        np.array(mi.render(mi_scene, spp=spp, seed=seed + replicates))
+        # Dr.Jit divides by powers of two in another way: those are kernels of their own.
+        alike = 1 if spp & (spp - 1) == 0 else 3
+        np.array(mi.render(mi_scene, spp=alike, seed=seed + replicates))
     for k in range(replicates):
         start = time.perf_counter()
         # The array is what forces the lazy rendering to happen.

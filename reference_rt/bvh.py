@@ -23,12 +23,12 @@ ray miss a box that it meets (Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2))."
 
 class Bvh(NamedTuple):
     """boxes (n, 6): lower and upper corners;  first (n,): left child, its sibling follows, or the
-    leaf's first reference;  count (n,): references of a leaf, 0 for an inner node;  kind, row
+    leaf's first reference;  size (n,): references of a leaf, 0 for an inner node;  kind, row
     (m,): the references, leaf after leaf.  Node 0 is the root."""
 
     boxes: FloatArray
     first: IntArray
-    count: IntArray
+    size: IntArray
     kind: IntArray
     row: IntArray
 
@@ -60,7 +60,7 @@ def half_area(box: FloatArray) -> float:
     x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
     if x < 0.0:
         return 0.0
-    return x * y + y * z + z * x
+    return float(x * y + y * z + z * x)
 
 
 @kernel
@@ -146,7 +146,7 @@ def _build(
     order: IntArray,
     boxes: FloatArray,
     first: IntArray,
-    count: IntArray,
+    size: IntArray,
     stack: IntArray,
     bins: FloatArray,
     counts: IntArray,
@@ -176,12 +176,12 @@ def _build(
         # One box test costs about what one primitive does.
         area = half_area(boxes[node])
         if n <= LEAF_SIZE and (axis < 0 or cost + area >= n * area):
-            first[node], count[node] = begin, n
+            first[node], size[node] = begin, n
             continue
         middle = (begin + end) // 2
         if axis >= 0:
             middle = _partition(lower, upper, order, begin, end, centers, axis, split)
-        first[node], count[node] = nodes, 0
+        first[node], size[node] = nodes, 0
         stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3] = nodes, begin, middle, depth + 1
         top += 1
         stack[top, 0], stack[top, 1] = nodes + 1, middle
@@ -192,13 +192,13 @@ def _build(
 
 
 def build(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """Boxes, first and count of the nodes (see `Bvh`), and the primitives' leaf order, from the
+    """Boxes, first and size of the nodes (see `Bvh`), and the primitives' leaf order, from the
     bounds (n, 3), (n, 3) of n >= 1 primitives.  Binned surface area heuristic (Wald 2007)."""
     n = len(lower)
     order = np.arange(n)
     boxes = np.empty((2 * n, 6))
-    first, count = np.empty(2 * n, np.int64), np.zeros(2 * n, np.int64)
+    first, size = np.empty(2 * n, np.int64), np.zeros(2 * n, np.int64)
     stack = np.empty((STACK_SIZE, 4), np.int64)
     bins, counts = np.empty((BINS, 6)), np.empty(BINS, np.int64)
-    nodes = _build(lower, upper, order, boxes, first, count, stack, bins, counts)
-    return boxes[:nodes].copy(), first[:nodes].copy(), count[:nodes].copy(), order
+    nodes = _build(lower, upper, order, boxes, first, size, stack, bins, counts)
+    return boxes[:nodes].copy(), first[:nodes].copy(), size[:nodes].copy(), order

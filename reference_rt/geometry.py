@@ -57,7 +57,9 @@ def _trace(bvh: Bvh | None, shapes: Shapes, packets: Packets, ray: Ray, any_hit:
 
 
 @kernel
-def _entry(boxes: FloatArray, node: int, o: Vec3, inverse: Vec3, near: Columns, t_max: float) -> float:
+def _entry(
+    boxes: FloatArray, node: int, o: Vec3, inverse: Vec3, near: Columns, t_max: float
+) -> float:
     """Where the ray enters a node's box, inf where it misses.
 
     `near` holds the columns of the near planes: chosen by the sign of d, the 0 * inf of a ray in
@@ -71,7 +73,7 @@ def _entry(boxes: FloatArray, node: int, o: Vec3, inverse: Vec3, near: Columns, 
     t_out = min(t_out, (boxes[node, 5 - y] - o.y) * inverse.y)
     t_out = min(t_out, (boxes[node, 7 - z] - o.z) * inverse.z)
     if t_in <= t_out * FAR_SLACK and t_in <= t_max * FAR_SLACK:
-        return t_in
+        return float(t_in)
     return math.inf
 
 
@@ -88,12 +90,10 @@ def _traverse(bvh: Bvh, shapes: Shapes, ray: Ray, any_hit: bool, closest: Hit) -
     shear = shear_of(ray)
     node, top = 0, 0
     while True:
-        if bvh.count[node] > 0:
+        if bvh.size[node] > 0:
             begin = bvh.first[node]
-            for k in range(begin, begin + bvh.count[node]):
-                closest = any_shape.intersect(
-                    shapes, bvh.kind[k], bvh.row[k], ray, shear, closest
-                )
+            for k in range(begin, begin + bvh.size[node]):
+                closest = any_shape.intersect(shapes, bvh.kind[k], bvh.row[k], ray, shear, closest)
                 if any_hit and closest.kind >= 0:
                     return closest
         else:

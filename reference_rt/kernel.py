@@ -1,4 +1,4 @@
-"""`@kernel`: the one way to compile, with an exact cache on disk; `@overload_by_class` for choice.
+"""`@kernel` and `@entry_kernel`: the one way to compile, with an exact cache; `ByClass` for choice.
 
 A kernel is plain scalar code on floats, integers, arrays and NamedTuples of these.  With
 ``NUMBA_DISABLE_JIT=1`` the same text runs as plain Python with bit-identical results; the rules
@@ -23,9 +23,9 @@ from typing import Any, TypeVar
 
 import llvmlite
 import numba
-import platformdirs
 import numpy as np
 import numpy.typing as npt
+import platformdirs
 from numba import njit, types
 from numba.extending import intrinsic, overload, register_jitable
 from numba.np import arrayobj
@@ -33,7 +33,7 @@ from numba.np import arrayobj
 F = TypeVar("F", bound=Callable[..., Any])
 
 _UNUSED_FOR = 14 * 24 * 3600.0
-"""Seconds after which another version's kernels are deleted (a compile costs ten seconds at most)."""
+"""Seconds after which another version's kernels are deleted: compiling them again takes ten."""
 
 
 def _sources_digest() -> str:
@@ -68,8 +68,8 @@ def _prepare_cache() -> str | None:
 
 CACHE_FOLDER = _prepare_cache()
 
-# Without _nrt=False, calls count references of every array of the scene, atomically: measured 5 times
-# slower on the Cornell box, with threads that contend.
+# Without _nrt=False, calls count references of every array of the scene, atomically: measured 5
+# times slower on the Cornell box, with threads that contend.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 
 
@@ -80,7 +80,8 @@ def kernel(function: F) -> F:
     tables field by field, some 400 words a call: hence the inlining (measured: 1.5 times faster).
     Not giving each kernel a Python wrapper and a cache file of its own halves the compile time.
     """
-    return register_jitable(**_OPTIONS, forceinline=True)(function)
+    inlined: F = register_jitable(**_OPTIONS, forceinline=True)(function)
+    return inlined
 
 
 def entry_kernel(function: F) -> F:
@@ -104,10 +105,7 @@ def precompile(compiled: Callable[..., Any], *args: Any) -> None:
 
 def is_named_tuple(numba_type: Any, cls: type) -> bool:
     """Whether a Numba type is that of instances of the NamedTuple `cls`."""
-    return (
-        isinstance(numba_type, types.BaseNamedTuple)
-        and numba_type.instance_class is cls
-    )
+    return isinstance(numba_type, types.BaseNamedTuple) and numba_type.instance_class is cls
 
 
 class ByClass:
@@ -127,7 +125,7 @@ class ByClass:
         choose.__name__ = name
         self.function: Callable[..., Any] = choose
 
-        @overload(choose, strict=False)
+        @overload(choose, strict=False)  # type: ignore[untyped-decorator]
         def _compiled(first: Any, *rest: Any) -> Callable[..., Any] | None:
             for cls, function in self._kernels.items():
                 if is_named_tuple(first, cls):
@@ -145,7 +143,7 @@ def _local_array(dtype: Any) -> Any:
     It lives as long as the kernel that asks for it, once per call: not inside loops.
     """
 
-    @intrinsic
+    @intrinsic  # type: ignore[untyped-decorator]
     def allocate(typing_context: Any, n: Any) -> Any:
         array_type = types.Array(dtype, 1, "C")
 

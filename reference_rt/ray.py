@@ -11,7 +11,7 @@ UNIT_ROUNDOFF = 2.0**-53
 
 
 class Ray(NamedTuple):
-    """p(t) = o + t d for 0 < t < t_max.  `d` need not have unit length; t counts in units of |d|."""
+    """p(t) = o + t d for 0 < t < t_max.  `d` may have any length: t counts in units of |d|."""
 
     o: Vec3
     d: Vec3

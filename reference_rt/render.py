@@ -12,7 +12,6 @@ import numpy as np
 
 from reference_rt import sampling
 from reference_rt.cameras import camera_ray
-from reference_rt.errors import SceneError
 from reference_rt.film import film_offset
 from reference_rt.integrators import RayCast, radiance
 from reference_rt.integrators.ray_cast import cast
@@ -131,6 +130,7 @@ def render(
     shape = (film.width, film.height)
     pixels = film.width * film.height
     band: Any
+    arguments: tuple[Any, ...]
     if isinstance(integrator, RayCast):
         out, spp = np.zeros((pixels, 8)), 1
         band, arguments = _cast_band, (tables, colours(scene), view, shape, out)

@@ -16,7 +16,8 @@ from reference_rt.cameras.perspective import Perspective
 from reference_rt.description import Description
 from reference_rt.errors import SceneError
 from reference_rt.film import Film
-from reference_rt.integrators import AnyIntegrator, Path as PathTracing
+from reference_rt.integrators import AnyIntegrator
+from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import AnyLight, Constant
 from reference_rt.materials import AnyMaterial, Emissive
 from reference_rt.sampling import AnySampler, Grid, Sobol
@@ -84,6 +85,11 @@ class Scene(Description):
     def folder(self) -> Path:
         """What file names in the scene are relative to."""
         return self._folder
+
+    @property
+    def name(self) -> str:
+        """The scene file's name without its suffix."""
+        return Path(self._source[0]).stem if self._source else "scene"
 
     def error(self, message: str, *path: str | int) -> SceneError:
         """An error about the part at `path`, with file and line where the scene has them."""

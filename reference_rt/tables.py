@@ -15,8 +15,9 @@ from reference_rt.geometry import Geometry, Packets
 from reference_rt.lights import AREA, CONSTANT, POINT, Areas, Choice, Constant, Lights, Point
 from reference_rt.lights.constant import Environment
 from reference_rt.lights.point import Points
-from reference_rt.materials import BLACK, TABLES as MATERIAL_TABLES
-from reference_rt.materials import Diffuse, Emissive, Materials
+from reference_rt.materials import BLACK, Diffuse, Emissive, Materials
+from reference_rt.materials import TABLES as MATERIAL_TABLES
+from reference_rt.materials.material import Material
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -111,7 +112,7 @@ def _build_bvh(tables: dict[str, Any]) -> bvh.Bvh | None:
         return None
     bounds = [module.bounds(table) for _, _, table, module in _present(tables)]
     lower, upper = (np.concatenate(side) for side in zip(*bounds, strict=True))
-    boxes, first, count, order = bvh.build(lower, upper)
+    boxes, first, size, order = bvh.build(lower, upper)
     row = np.concatenate([np.arange(len(c)) for c in codes])[order]
     kind = kind[order]
     for code, field, table, _ in list(_present(tables)):
@@ -120,7 +121,7 @@ def _build_bvh(tables: dict[str, Any]) -> bvh.Bvh | None:
             *(None if a is None else np.ascontiguousarray(a[row[mine]]) for a in table)
         )
         row[mine] = np.arange(len(table.owner))
-    return bvh.Bvh(boxes, first, count, kind, row)
+    return bvh.Bvh(boxes, first, size, kind, row)
 
 
 def _packets(tables: dict[str, Any], hierarchy: bvh.Bvh | None) -> Packets:
@@ -144,9 +145,11 @@ def _material_tables(scene: "Scene", names: Sequence[str | None]) -> Materials:
     parts: dict[int, list[Any]] = {}
     kinds, rows = [], []
     for name in names:
-        material = Diffuse() if name is None else scene.materials[name]
-        if name is None and all(shape.material is not None for shape in scene.shapes):
-            material = None
+        material: Material | None = None
+        if name is not None:
+            material = scene.materials[name]
+        elif any(shape.material is None for shape in scene.shapes):
+            material = Diffuse()
         while isinstance(material, Emissive):
             material = None if material.base is None else scene.materials[material.base]
         code = BLACK
@@ -186,11 +189,11 @@ def _light_tables(scene: "Scene", tables: dict[str, Any]) -> Lights:
 def _area_lights(scene: "Scene", tables: dict[str, Any]) -> tuple[Areas | None, FloatArray]:
     """The emissive primitives and their weights, which sum to 1 for each shape; writes the
     primitives' `light` columns."""
-    radiance = {
-        i: scene.materials[shape.material].radiance
-        for i, shape in enumerate(scene.shapes)
-        if shape.material is not None and isinstance(scene.materials[shape.material], Emissive)
-    }
+    radiance = {}
+    for i, shape in enumerate(scene.shapes):
+        material = None if shape.material is None else scene.materials[shape.material]
+        if isinstance(material, Emissive):
+            radiance[i] = material.radiance
     kinds: list[IntArray] = []
     rows: list[IntArray] = []
     owners: list[IntArray] = []

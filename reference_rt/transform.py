@@ -29,7 +29,7 @@ def scale(factors: Vector) -> Affine:
 
 
 def rotate(axis: Direction, degrees: float) -> Affine:
-    """Rotation about `axis` through the origin, counter-clockwise seen against the axis (Rodrigues).
+    """Rotation about `axis` through the origin, counter-clockwise seen against it (Rodrigues).
 
     Quarter turns are exact: their sines and cosines are integers.
     """
@@ -88,13 +88,13 @@ def invert(m: Affine) -> Affine:
 
 def apply_points(m: Affine, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """(n, 3) points, mapped."""
-    return points @ m[:, :3].T + m[:, 3]
+    return np.asarray(points @ m[:, :3].T + m[:, 3])
 
 
 def apply_normals(m: Affine, normals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """(n, 3) unit normals, mapped by the inverse transpose and made unit again."""
     mapped = normals @ invert(m)[:, :3]
-    return mapped / np.linalg.norm(mapped, axis=1, keepdims=True)
+    return np.asarray(mapped / np.linalg.norm(mapped, axis=1, keepdims=True))
 
 
 # ---- the YAML form ------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ class Vec3(NamedTuple):
     def __neg__(self) -> "Vec3":
         return Vec3(-self.x, -self.y, -self.z)
 
-    def __mul__(self, other: Any) -> "Vec3":  # type: ignore[override]
+    def __mul__(self, other: Any) -> "Vec3":
         if isinstance(other, Vec3):
             return _times_vec3(self, other)
         return _times_scalar(self, other)
@@ -44,13 +44,11 @@ def _times_scalar(self: Vec3, other: float) -> Vec3:
     return Vec3(self.x * other, self.y * other, self.z * other)
 
 
-def _compile_operator(
-    symbols: tuple[Callable[..., Any], ...], scalar: Any, vector: Any
-) -> None:
+def _compile_operator(symbols: tuple[Callable[..., Any], ...], scalar: Any, vector: Any) -> None:
     """Let compiled code use `symbols` on Vec3 with the very text that Python runs."""
     for symbol in symbols:
 
-        @overload(symbol, strict=False)
+        @overload(symbol, strict=False)  # type: ignore[untyped-decorator]
         def _implementation(self: Any, other: Any) -> Any:
             if not is_named_tuple(self, Vec3):
                 return None
@@ -65,7 +63,7 @@ _compile_operator((operator.mul, operator.imul), _times_scalar, _times_vec3)
 _compile_operator((operator.truediv, operator.itruediv), Vec3.__truediv__, None)
 
 
-@overload(operator.neg, strict=False)
+@overload(operator.neg, strict=False)  # type: ignore[untyped-decorator]
 def _negative(self: Any) -> Any:
     return Vec3.__neg__ if is_named_tuple(self, Vec3) else None
 
@@ -139,7 +137,8 @@ class Frame(NamedTuple):
 
 @kernel
 def frame_from_normal(n: Vec3) -> Frame:
-    """A basis around a unit normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited")."""
+    """A basis around a unit normal (Duff et al. 2017, "Building an Orthonormal Basis,
+    Revisited")."""
     sign = math.copysign(1.0, n.z)
     a = -1.0 / (sign + n.z)
     b = n.x * n.y * a

@@ -37,13 +37,14 @@ class SphereLight(NamedTuple):
         """The point in the middle of the cone of sight's cosines, and the cone's solid angle.
 
         1 - cos = (1 - cos theta_max) / 2 and phi = pi, in the basis of Duff et al. (2017), which is
-        Mitsuba's too.  Nothing from inside.
+        Mitsuba's too.  Nothing from inside, nor from the sphere's own surface, where rounding decides
+        what is inside: what is nearer than Mitsuba starts its rays counts as on it.
         """
         to_center = self.center - p
         distance2 = dr.squared_norm(to_center)
         distance = dr.sqrt(distance2)
         r2 = self.radius * self.radius
-        outside = distance2 > r2
+        outside = distance - self.radius > (1.0 + dr.max(dr.abs(p))) * mi.math.RayEpsilon
         sin2_max = dr.select(outside, r2 / distance2, 0.0)
         one_minus_cos_max = sin2_max / (1.0 + dr.sqrt(1.0 - sin2_max))
         one_minus_cos = 0.5 * one_minus_cos_max
@@ -73,7 +74,9 @@ def _points_of(mi: Any, shape: Any) -> list[LightPoint]:
     kind = shape.class_name()
     if kind == "Sphere":
         m = _to_world(mi, shape)
-        return [SphereLight(mi.Point3f(m[:3, 3].tolist()), mi.Float(float(np.linalg.norm(m[:3, 0]))))]
+        return [
+            SphereLight(mi.Point3f(m[:3, 3].tolist()), mi.Float(float(np.linalg.norm(m[:3, 0]))))
+        ]
     if kind == "Rectangle":
         m = _to_world(mi, shape)
         return [_fixed(mi, m[:3, 3], 4.0 * np.cross(m[:3, 0], m[:3, 1]))]
@@ -131,7 +134,7 @@ def _box_point(mi: Any, vertices: FloatArray) -> FixedPoint:
 def _half_edges(vertices: FloatArray) -> FloatArray:
     """The half edges x, y, z (3, 3) of a cube plugin, whose 24 vertices are four for each face."""
     middle = vertices.reshape(6, 4, 3).mean(axis=1)
-    return 0.5 * (middle[list(_CUBE_FRONT)] - middle[list(_CUBE_BACK)])
+    return np.asarray(0.5 * (middle[list(_CUBE_FRONT)] - middle[list(_CUBE_BACK)]))
 
 
 _CUBE_FRONT, _CUBE_BACK = (2, 1, 3), (4, 0, 5)

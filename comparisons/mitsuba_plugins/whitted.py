@@ -57,7 +57,10 @@ def register(mi: Any) -> None:
     """Define the integrator for the variant that is set, and register it."""
     import drjit as dr
 
-    delta_reflection, delta_transmission = mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission
+    delta_reflection, delta_transmission = (
+        mi.BSDFFlags.DeltaReflection,
+        mi.BSDFFlags.DeltaTransmission,
+    )
 
     class Whitted(mi.SamplingIntegrator):  # type: ignore[misc]
         """Parameters: max_depth, most mirrorings and refractions of a ray; min_contribution, the

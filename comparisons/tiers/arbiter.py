@@ -14,8 +14,8 @@ from reference_rt.shapes.shape import FloatArray, IntArray
 BoolArray = npt.NDArray[np.bool_]
 
 NEIGHBOURS = 48
-"""Moved rays for each radius: on a sphere of so many points none is farther than 0.3 radii from a
-neighbour, so that an edge through more than a twentieth of the ball's radius from its rim is met."""
+"""Moved rays for each radius.  So many points on a sphere leave no cap empty that is higher than a
+twelfth of the radius: an edge that cuts off more than that has a moved ray beyond it."""
 
 MOST = 2000
 """Rays that are arbitrated; the rest count as they are, against agreement."""
@@ -24,7 +24,7 @@ RADII = (1.0, 0.5)
 
 LIMIT = 0.01
 """The fraction of rays that may need the arbiter.  Edges and silhouettes, a float32 bound wide,
-take 1e-4 of a picture or less; past a hundredth it is the reference's precision that is compared."""
+take 1e-4 of a picture or less; past a hundredth the reference's precision is what is compared."""
 
 
 def directions(n: int) -> FloatArray:
@@ -47,8 +47,7 @@ def explained(
     found = np.zeros(len(rays), bool)
     for factor in RADII:
         for move in directions(NEIGHBOURS):
-            open_ = np.flatnonzero(~found)[:MOST]
-            open_ = open_[open_ < MOST]
+            open_ = np.flatnonzero(~found[:MOST])
             if len(open_) == 0:
                 return found
             offsets = move * (factor * radius[open_])[:, None]

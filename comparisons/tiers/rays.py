@@ -31,9 +31,7 @@ def pixel_rays(scene: Scene, most: int) -> Rays:
     return Rays(round32(o), round32(d))
 
 
-def mixed_rays(
-    scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, seed: int
-) -> Rays:
+def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, seed: int) -> Rays:
     """At most `most` camera rays, as many random ones through the scene's bounds, and one in a
     random direction from each camera ray's hit."""
     camera = pixel_rays(scene, most)

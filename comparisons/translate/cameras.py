@@ -12,9 +12,9 @@ from reference_rt.cameras import Orthographic, Perspective
 from reference_rt.cameras.camera import Camera
 
 NEAR, FAR = 1e-10, 1e10
-"""Mitsuba's rays begin at the near plane and end at the far one, ours do neither.  These are as good
-as 0 and infinity for scenes from 1e-3 to 1e8 across, and the directions that come out are as exact
-as with Mitsuba's own 1e-2 and 1e4 (measured: 1.5e-7 at 45 degrees for both)."""
+"""Mitsuba's rays begin at the near plane and end at the far one, ours do neither.  These are as
+good as 0 and infinity for scenes from 1e-3 to 1e8 across, and the directions that come out are as
+exact as with Mitsuba's own 1e-2 and 1e4 (measured: 1.5e-7 at 45 degrees for both)."""
 
 
 @singledispatch

@@ -30,7 +30,8 @@ class Path(Description):
     deterministic: ClassVar[bool] = False
     type: Literal["path"] = "path"
     max_depth: Annotated[int, Field(ge=0)] | None = None
-    """Most edges of a path from the eye: 1 shows lights alone, 2 adds direct light; none: no end."""
+    """Most edges of a path from the eye: 1 shows lights alone, 2 adds direct light; none: no end.
+    """
     rr_depth: Annotated[int, Field(ge=1)] = 5
     """Edges after which Russian roulette begins."""
 
@@ -122,7 +123,7 @@ def _next_event(
     sample = direct(scene, point, frame, wo, k, u0, u1)
     if max_component(sample.contribution) == 0.0:
         return sample.contribution
-    pdf = sample.light.pdf * choice.probability[k]
+    pdf: float = sample.light.pdf * choice.probability[k]
     if sample.light.is_delta:
         return sample.contribution * (1.0 / pdf)
     bsdf_pdf = any_material.pdf(scene.materials, point.material, wo, sample.wi)

@@ -44,7 +44,7 @@ class Choice(NamedTuple):
 class Lights(NamedTuple):
     """The tables of each kind, None for absent ones; `choice` is None without any light.
 
-    The choice lists all areas, then all points, then the environment: row i of the areas is entry i.
+    The choice lists all areas, then all points, then the environment: area light i is entry i.
     """
 
     points: Points | None
@@ -100,14 +100,15 @@ def _sample_one(
 def area_pdf(
     areas: Areas | None, choice: Choice | None, shapes: Shapes, p: Vec3, q: SurfacePoint
 ) -> float:
-    """The density per solid angle, choice included, with which a light sample from `p` finds `q`."""
+    """The density per solid angle, choice included, with which a light sample at `p` finds `q`."""
     if areas is None:
         return 0.0
     if choice is None:
         return 0.0
     if q.light < 0:
         return 0.0
-    return area.pdf(areas, q.light, shapes, p, q) * choice.probability[q.light]
+    probability: float = choice.probability[q.light]
+    return area.pdf(areas, q.light, shapes, p, q) * probability
 
 
 @kernel
@@ -117,7 +118,8 @@ def environment_pdf(environment: Environment | None, choice: Choice | None) -> f
         return 0.0
     if choice is None:
         return 0.0
-    return constant.PDF * choice.probability[len(choice.kind) - 1]
+    probability: float = choice.probability[len(choice.kind) - 1]
+    return constant.PDF * probability
 
 
 __all__ = [

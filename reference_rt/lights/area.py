@@ -22,9 +22,7 @@ class Areas(NamedTuple):
 
 
 @kernel
-def sample(
-    areas: Areas, i: int, shapes: Shapes, p: Vec3, u0: float, u1: float
-) -> LightSample:
+def sample(areas: Areas, i: int, shapes: Shapes, p: Vec3, u0: float, u1: float) -> LightSample:
     """A point of the light's surface; only its front shines."""
     q = any_shape.sample(shapes, areas.kind[i], areas.row[i], areas.area[i], p, u0, u1)
     if q.pdf == 0.0:

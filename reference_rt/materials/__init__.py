@@ -54,7 +54,7 @@ TABLES: tuple[tuple[int, str, type[Material], type], ...] = (
 @kernel
 def is_smooth(materials: Materials, m: int) -> bool:
     """Whether the material scatters to a continuum of directions, so that lights can be sampled."""
-    return materials.kind[m] == DIFFUSE
+    return bool(materials.kind[m] == DIFFUSE)
 
 
 @kernel

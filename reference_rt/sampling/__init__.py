@@ -1,4 +1,4 @@
-"""Samplers: random and low-discrepancy numbers as pure functions of (seed, pixel, sample, dimension).
+"""Samplers: numbers that are pure functions of (seed, pixel, sample, dimension).
 
 No state: any pixel's numbers can be had in any order, so that an image is bit-identical for any
 number of threads.  To add a sampler: its file with description, NamedTuples and kernels; the lines

@@ -5,7 +5,6 @@ import math
 from reference_rt.kernel import kernel
 from reference_rt.vec3 import Vec3
 
-
 # Coefficients of sin(pi/2 r) / r and cos(pi/2 r) in r²: (-1)^k (pi/2)^(2k+1) / (2k+1)! and
 # (-1)^k (pi/2)^(2k) / (2k)!. For |r| <= 1/2 the first terms left out are below 5e-17.
 _SIN = [(-1) ** k * (math.pi / 2) ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(8)]

@@ -29,9 +29,7 @@ from reference_rt.shapes.sphere import Sphere, Spheres
 from reference_rt.shapes.triangle import Shear, Triangle, Triangles
 from reference_rt.vec3 import Vec3
 
-AnyShape = Annotated[
-    Sphere | Rectangle | Triangle | Box | Mesh, Field(discriminator="type")
-]
+AnyShape = Annotated[Sphere | Rectangle | Triangle | Box | Mesh, Field(discriminator="type")]
 
 
 class Shapes(NamedTuple):
@@ -166,9 +164,7 @@ def _owner(
             return Owner(boxes.owner[hit.row], int(hit.u), u, v)
     if triangles is not None:
         if hit.kind == TRIANGLE:
-            return Owner(
-                triangles.owner[hit.row], triangles.face[hit.row], hit.u, hit.v
-            )
+            return Owner(triangles.owner[hit.row], triangles.face[hit.row], hit.u, hit.v)
     return Owner(-1, -1, 0.0, 0.0)
 
 

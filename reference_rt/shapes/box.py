@@ -23,7 +23,7 @@ from reference_rt.shapes.shape import (
     pack,
     solid_angle_pdf,
 )
-from reference_rt.vec3 import Vec3, component, dot, max_abs, normalize, row
+from reference_rt.vec3 import Vec3, dot, max_abs, normalize, row
 
 
 class Box(Shape):
@@ -261,7 +261,7 @@ def surface(boxes: Boxes, ray: Ray, hit: Hit) -> SurfacePoint:
 
 @kernel
 def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
-    """A point uniform over the six faces, as a light for `p`; u0 picks the face and is used again."""
+    """A point uniform over the faces, as a light for `p`; u0 picks the face and is used again."""
     v = u0 * area
     axis = 0
     while axis < 2 and v >= 2.0 * boxes.face_areas[i, axis]:

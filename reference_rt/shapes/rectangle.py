@@ -10,8 +10,8 @@ from reference_rt import transform
 from reference_rt.kernel import kernel, local_floats
 from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.shapes.shape import (
-    RECTANGLE,
     LANES,
+    RECTANGLE,
     Bounds,
     FloatArray,
     IntArray,
@@ -97,9 +97,7 @@ def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> fl
 def found(rectangles: Rectangles, i: int, ray: Ray, t: float) -> Hit:
     """The hit of rectangle i at t; its u, v are the local x, y in [-1, 1]."""
     q = at(ray, t) - row(rectangles.center, i)
-    return Hit(
-        t, RECTANGLE, i, dot(q, row(rectangles.x_of, i)), dot(q, row(rectangles.y_of, i))
-    )
+    return Hit(t, RECTANGLE, i, dot(q, row(rectangles.x_of, i)), dot(q, row(rectangles.y_of, i)))
 
 
 @kernel
@@ -116,7 +114,9 @@ def intersect(rectangles: Rectangles, i: int, ray: Ray, closest: Hit) -> Hit:
 
 
 @kernel
-def intersect_all(rectangles: Rectangles | None, packets: FloatArray | None, ray: Ray, closest: Hit) -> Hit:
+def intersect_all(
+    rectangles: Rectangles | None, packets: FloatArray | None, ray: Ray, closest: Hit
+) -> Hit:
     """The nearest of `closest` and all rectangles, from their packets (see `pack_all`)."""
     if rectangles is None:
         return closest
@@ -142,11 +142,7 @@ def intersect_all(rectangles: Rectangles | None, packets: FloatArray | None, ray
 @kernel
 def place(rectangles: Rectangles, i: int, x: float, y: float) -> Vec3:
     """The point at local (x, y): in the plane by construction."""
-    return (
-        row(rectangles.center, i)
-        + row(rectangles.x_edge, i) * x
-        + row(rectangles.y_edge, i) * y
-    )
+    return row(rectangles.center, i) + row(rectangles.x_edge, i) * x + row(rectangles.y_edge, i) * y
 
 
 @kernel

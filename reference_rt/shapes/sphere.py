@@ -12,8 +12,8 @@ from reference_rt.kernel import kernel, local_floats
 from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.sampling.warp import on_circle
 from reference_rt.shapes.shape import (
-    SPHERE,
     LANES,
+    SPHERE,
     Bounds,
     FloatArray,
     IntArray,
@@ -49,7 +49,7 @@ class Sphere(Shape):
         return Spheres(
             center=transform.apply_points(m, np.array([self.center])),
             radius=np.array([self.radius * factor]),
-            to_local=np.linalg.inv(linear / factor).reshape(1, 9),
+            to_local=np.asarray(np.linalg.inv(linear / factor), np.float64).reshape(1, 9),
             owner=np.array([shape]),
             material=np.array([material]),
             light=np.array([-1]),
@@ -58,8 +58,8 @@ class Sphere(Shape):
 
 
 class Spheres(NamedTuple):
-    """n spheres: center (n, 3), radius (n,), world-to-local rotation (n, 9) for uv; owner, the shape's index
-    in the scene; material, light: rows of those tables; face (n,)."""
+    """n spheres: center (n, 3), radius (n,), world-to-local rotation (n, 9) for uv; owner, the
+    shape's index in the scene; material, light: rows of those tables; face (n,)."""
 
     center: FloatArray
     radius: FloatArray
@@ -118,7 +118,9 @@ def intersect(spheres: Spheres, i: int, ray: Ray, closest: Hit) -> Hit:
 
 
 @kernel
-def intersect_all(spheres: Spheres | None, packets: FloatArray | None, ray: Ray, closest: Hit) -> Hit:
+def intersect_all(
+    spheres: Spheres | None, packets: FloatArray | None, ray: Ray, closest: Hit
+) -> Hit:
     """The nearest of `closest` and all spheres, from their packets (see `pack_all`)."""
     if spheres is None:
         return closest

@@ -174,9 +174,7 @@ def vertex(array: FloatArray, i: int, k: int) -> Vec3:
 @kernel
 def interpolate(array: FloatArray, i: int, u: float, v: float) -> Vec3:
     """(1 - u - v) a0 + u a1 + v a2 of the three vectors in row i."""
-    return (
-        vertex(array, i, 0) * (1.0 - u - v) + vertex(array, i, 1) * u + vertex(array, i, 2) * v
-    )
+    return vertex(array, i, 0) * (1.0 - u - v) + vertex(array, i, 1) * u + vertex(array, i, 2) * v
 
 
 @kernel

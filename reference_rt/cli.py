@@ -1,0 +1,196 @@
+"""`reference-rt`: render, explain, schema; other packages add commands through an entry point."""
+
+import functools
+import importlib.metadata
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+from pydantic import ValidationError
+from rich.console import Console
+from rich.table import Table
+
+from reference_rt.console import ProgressLine
+from reference_rt.errors import ImageError, ReferenceRtError, UsageError
+from reference_rt.integrators import Path as PathTracing
+from reference_rt.integrators import RayCast, Whitted
+from reference_rt.scene import Scene
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="An independent float64 reference ray tracer.\n\nExit codes: 0 success or agreement, "
+    "1 difference, 2 usage, 3 invalid scene or image, 4 reference missing or could not run, "
+    "5 internal error, 130 interrupted.",
+)
+
+SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
+
+
+def guarded(command: F) -> F:
+    """Every error of a command as one line on standard error and its exit code; no traceback."""
+
+    @functools.wraps(command)
+    def run(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return command(*args, **kwargs)
+        except ReferenceRtError as error:
+            _fail(str(error), error.exit_code)
+        except typer.Exit:
+            raise
+        except KeyboardInterrupt:
+            _fail("interrupted; nothing unfinished was written", 130)
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            message = " ".join(str(error).split())
+            _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
+
+    return run  # type: ignore[return-value]
+
+
+def _fail(message: str, code: int) -> None:
+    typer.echo(f"error: {message}", err=True)
+    raise typer.Exit(code)
+
+
+@app.command()
+@guarded
+def render(
+    scene: SceneArgument,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="An .exr (all layers) or .png file.")
+    ],
+    spp: Annotated[int | None, typer.Option(help="Samples per pixel.")] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    integrator: Annotated[str | None, typer.Option(help="ray_cast, whitted or path.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+) -> None:
+    """Render a scene to a file."""
+    from reference_rt import image
+    from reference_rt.files import check_writable
+    from reference_rt.render import render as render_scene
+
+    image.check_suffix(output)
+    description = adjusted(Scene.load(scene), spp, size, integrator, seed)
+    check_writable(output)
+    with ProgressLine() as progress:
+        picture = render_scene(description, threads=threads, progress=progress)
+    image.write(output, picture, provenance(description))
+    seconds = picture.seconds
+    typer.echo(
+        f"{output}: {description.film.width} x {description.film.height}, "
+        f"{seconds['tables']:.2f} s to build, {seconds['compile']:.2f} s to compile or load "
+        f"kernels, {seconds['render']:.2f} s to render",
+        err=True,
+    )
+    if picture.nonfinite:
+        raise ImageError(f"{output}: {picture.nonfinite} pixels are not finite")
+
+
+@app.command()
+@guarded
+def explain(scene: SceneArgument) -> None:
+    """Print what a scene needs, what is left out, and why."""
+    from reference_rt.explain import explain as explain_scene
+    from reference_rt.tables import build_tables
+
+    description = Scene.load(scene)
+    used, left_out = explain_scene(description, build_tables(description))
+    console = Console()
+    for title, lines in (("used", used), ("left out", left_out)):
+        table = Table(title=title, title_justify="left", show_header=False, box=None)
+        for what, why in lines:
+            table.add_row(what, why)
+        console.print(table)
+        console.print()
+
+
+@app.command()
+@guarded
+def schema() -> None:
+    """Print the JSON Schema of scene files."""
+    from reference_rt.scene import json_schema
+
+    typer.echo(json.dumps(json_schema(), indent=2))
+
+
+def adjusted(
+    scene: Scene,
+    spp: int | None = None,
+    size: str | None = None,
+    integrator: str | None = None,
+    seed: int | None = None,
+) -> Scene:
+    """The scene with the command line's changes.  Raises UsageError."""
+    parts: dict[str, Any] = {}
+    if size is not None:
+        width, _, height = size.lower().partition("x")
+        if not (width.isdecimal() and height.isdecimal()):
+            raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{size}'")
+        parts["film"] = _changed(scene.film, "--size", width=int(width), height=int(height))
+    if integrator is not None and integrator != scene.integrator.type:
+        known = {"ray_cast": RayCast, "whitted": Whitted, "path": PathTracing}
+        if integrator not in known:
+            raise UsageError(
+                f"--integrator: expected one of {', '.join(known)}, got '{integrator}'"
+            )
+        parts["integrator"] = known[integrator]()
+        if parts["integrator"].deterministic != scene.integrator.deterministic:
+            parts["sampler"] = None
+    scene = scene.changed(**parts)
+    sampler = scene.resolved_sampler
+    if spp is not None:
+        sampler = _changed(sampler, "--spp", spp=spp)
+    if seed is not None and hasattr(sampler, "seed"):
+        sampler = _changed(sampler, "--seed", seed=seed)
+    return scene.changed(sampler=sampler)
+
+
+def _changed(part: Any, option: str, **fields: Any) -> Any:
+    """`part` with other fields, checked."""
+    try:
+        return type(part)(
+            **{name: getattr(part, name) for name in type(part).model_fields} | fields
+        )
+    except ValidationError as error:
+        message = error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise UsageError(f"{option}: {message.replace('Input should be', 'expected')}") from None
+
+
+def provenance(scene: Scene) -> dict[str, str]:
+    """What made a picture, for its header: the same scene gives the same bytes."""
+    sampler = scene.resolved_sampler
+    return {
+        "software": f"reference_rt {importlib.metadata.version('reference-rt')}",
+        "scene": scene.name,
+        "sceneSha256": scene.digest(),
+        "integrator": scene.integrator.model_dump_json(),
+        "sampler": sampler.model_dump_json(),
+        "filter": scene.film.filter.model_dump_json(),
+    }
+
+
+def _add_commands() -> None:
+    """Let installed packages add their commands; one that is broken must not take the others."""
+    for entry in importlib.metadata.entry_points(group="reference_rt.commands"):
+        try:
+            entry.load()(app)
+        except ImportError as error:
+            typer.echo(f"warning: command '{entry.name}' is not available: {error}", err=True)
+
+
+def main() -> None:
+    """The `reference-rt` program."""
+    _add_commands()
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""Progress for people: a bar on a terminal, a line per step without one; standard error only."""
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+_WORDS = {
+    "compile": "compiling kernels (once for each kind of scene; kept for later)",
+    "render": "rendering",
+}
+_PATIENCE = 0.4
+"""Seconds before compiling is mentioned: kernels from the cache load faster than that."""
+
+
+class ProgressLine:
+    """A `render.Progress`: call it with what is being done and the fraction that is done."""
+
+    def __init__(self) -> None:
+        self._console = Console(stderr=True)
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f}%"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=self._console,
+            transient=True,
+            disable=not self._console.is_terminal,
+        )
+        self._tasks: dict[str, TaskID] = {}
+        self._started: dict[str, float] = {}
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._bar.stop()
+
+    def __call__(self, what: str, fraction: float) -> None:
+        words = _WORDS.get(what, what)
+        if what not in self._tasks:
+            # A bar without a total pulses: nobody knows how far a compiler is.
+            total = None if what == "compile" else 1.0
+            self._tasks[what] = self._bar.add_task(words, total=total)
+            self._started[what] = time.perf_counter()
+            return
+        task = self._tasks[what]
+        self._bar.update(task, completed=fraction)
+        if fraction >= 1.0:
+            self._bar.update(task, visible=False)
+            seconds = time.perf_counter() - self._started[what]
+            if not self._console.is_terminal and seconds > _PATIENCE:
+                self._console.print(f"{words}: {seconds:.1f} s", highlight=False)

@@ -1,0 +1,63 @@
+"""Writes the meshes that the scenes use: `python scenes/make_meshes.py` gives the same bytes always."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+FOLDER = Path(__file__).parent / "meshes"
+Array = npt.NDArray[np.float64]
+
+
+def torus_knot(p: int, q: int, around: int, along: int, tube: float) -> tuple[Array, Array, Array]:
+    """A tube along the (p, q) torus knot of radii 1 and 0.4.
+
+    Returns vertices (along * around, 3), unit normals of the same shape and triangles
+    (2 * along * around, 3), counter-clockwise seen from outside; closed.
+    """
+    s = np.linspace(0.0, 2.0 * math.pi, along, endpoint=False)
+    r = 1.0 + 0.4 * np.cos(q * s)
+    center = np.stack([r * np.cos(p * s), r * np.sin(p * s), 0.4 * np.sin(q * s)], axis=1)
+    dr = -0.4 * q * np.sin(q * s)
+    tangent = np.stack(
+        [
+            dr * np.cos(p * s) - p * r * np.sin(p * s),
+            dr * np.sin(p * s) + p * r * np.cos(p * s),
+            0.4 * q * np.cos(q * s),
+        ],
+        axis=1,
+    )
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    # The torus' own outward direction, made perpendicular to the knot: a frame that closes.
+    outward = np.stack(
+        [np.cos(p * s) * np.cos(q * s), np.sin(p * s) * np.cos(q * s), np.sin(q * s)], axis=1
+    )
+    outward -= np.sum(outward * tangent, axis=1, keepdims=True) * tangent
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    side = np.cross(tangent, outward)
+    a = np.linspace(0.0, 2.0 * math.pi, around, endpoint=False)[None, :, None]
+    normals = np.cos(a) * outward[:, None] + np.sin(a) * side[:, None]
+    vertices = center[:, None] + tube * normals
+    i, j = np.meshgrid(np.arange(along), np.arange(around), indexing="ij")
+    i2, j2 = (i + 1) % along, (j + 1) % around
+    c00, c10, c01, c11 = i * around + j, i2 * around + j, i * around + j2, i2 * around + j2
+    faces = np.stack([c00, c10, c11, c00, c11, c01], axis=-1).reshape(-1, 3)
+    return vertices.reshape(-1, 3), normals.reshape(-1, 3), faces
+
+
+def obj(vertices: Array, normals: Array, faces: Array) -> str:
+    """Wavefront text with vertex normals."""
+    lines = ["v {:.6f} {:.6f} {:.6f}".format(*v) for v in vertices]
+    lines += ["vn {:.5f} {:.5f} {:.5f}".format(*n) for n in normals]
+    lines += ["f {0}//{0} {1}//{1} {2}//{2}".format(*(f + 1)) for f in faces]
+    return "\n".join(lines).replace("-0.000000", "0.000000").replace("-0.00000 ", "0.00000 ") + "\n"
+
+
+def main() -> None:
+    FOLDER.mkdir(exist_ok=True)
+    (FOLDER / "knot.obj").write_text(obj(*torus_knot(2, 3, around=24, along=440, tube=0.22)))
+
+
+if __name__ == "__main__":
+    main()
