@@ -126,7 +126,7 @@ def trace(mi_scene: Any, o: FloatArray, d: FloatArray) -> Intersections:
     return Intersections(
         t=np.where(missed, np.inf, t),
         shape=shape,
-        face=np.where(missed, -1, face).astype(np.int64),
+        face=np.where(missed, -1, face.astype(np.int64)),
         p=p,
         n=n,
         ns=ns,

@@ -94,8 +94,9 @@ def _traverse(bvh: Bvh, shapes: Shapes, ray: Ray, any_hit: bool, closest: Hit) -
             begin = bvh.first[node]
             for k in range(begin, begin + bvh.size[node]):
                 closest = any_shape.intersect(shapes, bvh.kind[k], bvh.row[k], ray, shear, closest)
-                if any_hit and closest.kind >= 0:
-                    return closest
+            # Asked once a leaf: asked for each primitive it costs a quarter of the speed (measured).
+            if any_hit and closest.kind >= 0:
+                return closest
         else:
             left = bvh.first[node]
             t_left = _entry(bvh.boxes, left, ray.o, inverse, near, closest.t)
