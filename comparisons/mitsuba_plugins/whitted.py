@@ -4,34 +4,36 @@ Twin of `reference_rt.integrators.whitted`: direct light from every point light 
 of every area light, mirrored and refracted rays, the background.  Intersections, visibility, BSDFs,
 Fresnel terms and emission are Mitsuba's own.
 
-One thing differs from Mitsuba's integrators.  They start the next ray off the surface, moved along
-the normal by 1e-4 of the scene's coordinates, which moves what it meets by as much or more: a
-hundred times float32's own error, and enough to hide a wrong direction.  Here the start is moved
-along the ray, as far from the surface: the ray stays on its line.
+Where a ray starts differs from Mitsuba's integrators.  They move it off the surface by 1e-4 of the
+scene's coordinates, which moves what it meets by as much or more: a hundred times float32's own
+error, and enough to hide a wrong direction.  Here it is moved by float32's error alone.
 """
 
 from typing import Any
 
+import numpy as np
+
 from comparisons.mitsuba_plugins.light_points import light_points
 
+_ROUNDINGS = 8.0 * 2.0**-24
+"""How far a point lies off its surface, over the scene's largest coordinate: as the bound in
+`comparisons.tiers.bounds`, of which a third was measured."""
 
-def leave(mi: Any, si: Any, d: Any) -> Any:
-    """A ray from a surface along the unit `d`, begun as far off it as Mitsuba begins its own."""
+
+def clearance(mi: Any, si: Any, reach: float) -> Any:
+    """How far off its surface a ray begins; `reach` is the scene's largest coordinate.  Never
+    farther than Mitsuba begins its own."""
     import drjit as dr
 
-    height = (1.0 + dr.max(dr.abs(si.p))) * mi.math.RayEpsilon
-    # Below this cosine the start would lie more than a thousand heights away.
-    cosine = dr.maximum(dr.abs(dr.dot(d, si.n)), 1e-3)
-    return mi.Ray3f(si.p + d * (height / cosine), d, si.time, si.wavelengths)
+    return dr.minimum((1.0 + dr.max(dr.abs(si.p))) * mi.math.RayEpsilon, _ROUNDINGS * reach)
 
 
-def segment(mi: Any, si: Any, target: Any) -> Any:
-    """The ray of `leave` towards `target`, ended as far before it as Mitsuba ends its own."""
+def leave(mi: Any, si: Any, d: Any, height: Any) -> Any:
+    """A ray from a surface along the unit `d`, begun at `height` over it."""
     import drjit as dr
 
-    ray = leave(mi, si, dr.normalize(target - si.p))
-    ray.maxt = dr.norm(target - ray.o) * (1.0 - mi.math.ShadowEpsilon)
-    return ray
+    o = si.p + si.n * dr.copysign(height, dr.dot(d, si.n))
+    return mi.Ray3f(o, d, si.time, si.wavelengths)
 
 
 def emitted(mi: Any, scene: Any, si: Any, active: Any) -> Any:
@@ -73,6 +75,7 @@ def register(mi: Any) -> None:
             self.scene: Any = None
             self.lights: list[Any] = []
             self.points: list[Any] = []
+            self.reach = 0.0
 
         def prepare(self, scene: Any) -> None:
             """Look the lights up once per scene."""
@@ -80,6 +83,8 @@ def register(mi: Any) -> None:
                 self.scene, self.lights = scene, light_points(mi, scene)
                 delta = mi.EmitterFlags.DeltaPosition
                 self.points = [e for e in scene.emitters() if mi.has_flag(e.flags(), delta)]
+                bounds = np.abs([scene.bbox().min, scene.bbox().max])
+                self.reach = float(np.max(bounds[np.isfinite(bounds)], initial=0.0))
 
         def sample(
             self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
@@ -126,7 +131,8 @@ def register(mi: Any) -> None:
             active &= dr.max(weight) > self.min_contribution
             if not dr.any(active):
                 return []
-            ray = leave(mi, si, dr.normalize(si.to_world(sample.wo)))
+            d = dr.normalize(si.to_world(sample.wo))
+            ray = leave(mi, si, d, clearance(mi, si, self.reach))
             dr.eval(ray, weight, active)
             return [(ray, weight, active, depth + 1)]
 
@@ -135,19 +141,25 @@ def register(mi: Any) -> None:
             total = mi.Color3f(0.0)
             context = mi.BSDFContext()
             bsdf = si.bsdf()
+            height = clearance(mi, si, self.reach)
             for light in self.points:
                 ds, radiance = light.sample_direction(si, mi.Point2f(0.5, 0.5), active)
                 value = bsdf.eval(context, si, si.to_local(ds.d), active)
-                visible = without(active, scene.ray_test(segment(mi, si, ds.p), active))
+                ray = leave(mi, si, ds.d, height)
+                ray.maxt = ds.dist
+                visible = without(active, scene.ray_test(ray, active))
                 total += dr.select(visible, value * radiance, 0.0)
             for light in self.lights:
                 target, solid_angle = light.seen_from(mi, dr, si.p)
-                ray = segment(mi, si, target)
+                ray = leave(mi, si, dr.normalize(target - si.p), height)
                 value = bsdf.eval(context, si, si.to_local(ray.d), active)
-                visible = without(active, scene.ray_test(ray, active))
-                ray.maxt = dr.inf
-                found = scene.ray_intersect(ray, visible)
-                radiance = emitted(mi, scene, found, visible & found.is_valid())
+                found = scene.ray_intersect(ray, active)
+                # What the ray meets is the light itself if it is as far away, as Mitsuba sees it;
+                # begun off its line, the ray meets a surface seen edge-on somewhere else.
+                along = 2.0 * height / dr.abs(dr.dot(ray.d, found.n))
+                far = dr.norm(target - si.p) * (1.0 - mi.math.ShadowEpsilon) - along
+                visible = active & found.is_valid() & (found.t >= far)
+                radiance = emitted(mi, scene, found, visible)
                 total += dr.select(visible, value * radiance * solid_angle, 0.0)
                 dr.eval(total)
             return total

@@ -9,7 +9,7 @@ from comparisons.mitsuba_scene import sensor_rays
 from comparisons.tiers.bounds import ROUNDINGS, UNIT_ROUNDOFF, largest
 from reference_rt.cameras import camera_ray
 from reference_rt.film import Film
-from reference_rt.kernel import kernel
+from reference_rt.kernel import entry_kernel
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray
 
@@ -34,7 +34,7 @@ def pixel_centres(film: Film, most: int) -> tuple[FloatArray, FloatArray]:
     return x.ravel() + 0.5, y.ravel() + 0.5
 
 
-@kernel
+@entry_kernel
 def _camera_rays(view: Any, x: FloatArray, y: FloatArray, out: FloatArray) -> None:
     for i in range(len(x)):
         ray = camera_ray(view, x[i], y[i])

@@ -124,8 +124,8 @@ def _compare(setting: Setting, light: int, u: tuple[float, float]) -> Outcome:
         apart = np.abs(moved - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
         lit_differs = value[numbers].any(axis=1) == dark
-        shadowed = _shadowed(setting, light, _rows(hits, numbers), target[numbers], offsets)
-        return np.asarray((apart <= 2.0 * bound[numbers]) | (lit_differs & (shadowed == dark)))
+        now_dark = _dark(setting, light, _rows(hits, numbers), target[numbers], offsets)
+        return np.asarray((apart <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
     radius = delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
     settled = arbiter.explained(wrong, radius[wrong], like_theirs)
@@ -242,15 +242,20 @@ def _point_emitter(setting: Setting, light: int) -> Any:
     raise LookupError(f"Mitsuba's scene has no emitter {light_id(index)}")
 
 
-def _shadowed(
+def _dark(
     setting: Setting, light: int, hits: Intersections, target: FloatArray, offsets: FloatArray
 ) -> arbiter.BoolArray:
-    """Whether ours finds Mitsuba's shadow ray blocked: begun and ended as Mitsuba does it."""
-    far = _kind(setting, light) == CONSTANT
-    w = target if far else target - hits.p
+    """Whether ours finds Mitsuba's shadow ray dark: begun and ended as Mitsuba does it."""
+    kind = _kind(setting, light)
+    w = target if kind == CONSTANT else target - hits.p
     side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
     height = side * (1.0 + largest(hits.p)) * RAY_EPSILON
     o = hits.p + hits.n * height[:, None] + offsets
-    if far:
+    if kind == CONSTANT:
         return query.occluded(setting.tables, o, w)
-    return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)
+    if kind == POINT:
+        return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)
+    # Seen from the moved origin a light may turn its back, or its rim be missed.
+    met = query.intersect(setting.tables, o, target - o)
+    facing = np.sum(met.n * (target - o), axis=1) < 0.0
+    return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | ~facing)

@@ -61,7 +61,10 @@ def _(shape: Box, folder: Path, parts: dict[str, Any]) -> dict[str, Any]:
     m = transform.affine(shape.transform)
     edges = m[:, :3].copy()
     if np.linalg.det(edges) < 0.0:
-        edges[:, 0] *= -1.0  # the same box
+        # The same box.  Where it is a light of Whitted's, the point that stands for it lies in the
+        # middle along this axis, and stays (see comparisons.mitsuba_plugins.light_points).
+        areas = np.linalg.norm(np.cross(edges.T[[1, 2, 0]], edges.T[[2, 0, 1]]), axis=1)
+        edges[:, 1 if areas[2] >= areas[0] + areas[1] else 2] *= -1.0
     return {"type": "cube", "to_world": _map(edges, m[:, 3]), **parts}
 
 

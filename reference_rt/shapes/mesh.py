@@ -29,9 +29,16 @@ class Mesh(Shape):
         normals = None
         if data.normals is not None and not self.face_normals:
             normals = transform.apply_normals(m, data.normals)[data.faces].reshape(-1, 9)
-        return triangle.soup(
+        triangles = triangle.soup(
             np.ascontiguousarray(vertices.reshape(-1, 9)), normals, shape, material
         )
+        # Without area there is no normal, but rounding alone makes rays hit: left out, where the
+        # others keep their numbers.
+        has_area = triangle.areas(triangles) > 0.0
+        if not has_area.any():
+            raise ValueError(f"mesh {folder / self.file}: no triangle has any area")
+        columns: list[Any] = [None if a is None else a[has_area] for a in triangles]
+        return triangle.Triangles(*columns)
 
 
 class MeshData:

@@ -19,7 +19,7 @@ from reference_rt.shapes.shape import (
     Shape,
     solid_angle_pdf,
 )
-from reference_rt.vec3 import Vec3, component, cross, dot, max_abs, normalize
+from reference_rt.vec3 import Vec3, component, cross, dot, length, max_abs, normalize
 
 
 class Triangle(Shape):
@@ -188,8 +188,13 @@ def normal(triangles: Triangles, i: int) -> Vec3:
 @kernel
 def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
     v = triangles.vertices
-    size = max(max_abs(vertex(v, i, 1)), max_abs(vertex(v, i, 2)))
-    return surface_error(p, vertex(v, i, 0), size)
+    v0, v1, v2 = vertex(v, i, 0), vertex(v, i, 1), vertex(v, i, 2)
+    a, b, c = v1 - v0, v2 - v0, v2 - v1
+    longest2 = max(dot(a, a), max(dot(b, b), dot(c, c)))
+    # `intersect` rounds edge functions relative to longest², divides by twice the area and gets t
+    # in units of the longest edge: on a sliver that is a large error, and rays hit it again.
+    sliver = longest2 * math.sqrt(longest2) / length(cross(a, b))
+    return surface_error(p, v0, max(max_abs(v1), max_abs(v2)) + sliver)
 
 
 @kernel

@@ -1,0 +1,181 @@
+"""The two pictures of a scene, ours and Mitsuba's, as each integrator makes them."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from comparisons import mitsuba_scene
+from comparisons.results import Images, Metrics, Tier
+from comparisons.tiers.camera import camera_rays
+from comparisons.tiers.rays import Rays
+from comparisons.tiers.whitted import plugin_radiance
+from reference_rt import query
+from reference_rt.image import display
+from reference_rt.integrators import RayCast, Whitted
+from reference_rt.render import Picture, render
+from reference_rt.scene import Scene
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.tables import SceneTables, colours
+
+DETERMINISTIC_SSIM = 0.9999
+"""Pictures without noise differ where float32 moves an edge across a sample: a pixel here and there
+(measured: 0.99999 and better); a shift of a tenth of a pixel already gives 0.997."""
+
+NOISE_LIMIT = 1.25
+"""How much more than their noise two noisy pictures may differ, as a ratio of squares: Mitsuba's own
+systematic error (float32, its ray epsilon) may reach half the standard deviation of a pixel."""
+
+TILE = 16
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """images: the two pictures;  seconds: wall clock by side and step;  replicates: the noisy
+    pictures (replicates, height, width, 3) of each side that they are the means of, else None."""
+
+    images: Images
+    seconds: dict[str, dict[str, float]]
+    replicates: tuple[FloatArray, FloatArray] | None = None
+    notes: tuple[str, ...] = field(default=())
+
+
+def cast(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
+    """Ray casting: the shown layer as its picture, Mitsuba's from its own hits of the same rays."""
+    assert isinstance(scene.integrator, RayCast)
+    ours = render(scene, tables=tables)
+    film = scene.film
+    y, x = np.mgrid[0 : film.height, 0 : film.width]
+    o, d = camera_rays(scene, x.ravel() + 0.5, y.ravel() + 0.5)
+    start = time.perf_counter()
+    hits = mitsuba_scene.trace(mi_scene, o, d)
+    seconds = time.perf_counter() - start
+    names = [*scene.materials, None]
+    material = np.array([names.index(shape.material) for shape in scene.shapes])
+    hit = hits.shape >= 0
+    layers = {
+        "colour": np.where(hit[:, None], colours(scene)[material[hits.shape]], 0.0),
+        "distance": hits.t,
+        "normal": hits.n,
+        "id": hits.shape.astype(np.float64),
+    }
+    shaped = {k: v.reshape(film.height, film.width, *v.shape[1:]) for k, v in layers.items()}
+    theirs = Picture(shaped, ours.shown)
+    return Rendered(
+        Images(display(ours), display(theirs)),
+        {"ours": ours.seconds, "mitsuba": {"render": seconds}},
+        notes=(f"the pictures show the layer '{ours.shown}' as displayed, not radiance",),
+    )
+
+
+def whitted(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
+    """Recursive ray tracing: Mitsuba's plugin along the rays of our grid of samples."""
+    assert isinstance(scene.integrator, Whitted)
+    ours = render(scene, tables=tables)
+    n = round(scene.resolved_sampler.spp ** 0.5)
+    film = scene.film
+    total = np.zeros((film.height * film.width, 3))
+    y, x = np.mgrid[0 : film.height, 0 : film.width]
+    start = time.perf_counter()
+    for row in range(n):
+        for column in range(n):
+            film_x = x.ravel() + (column + 0.5) / n
+            film_y = y.ravel() + (row + 0.5) / n
+            rays = Rays(*camera_rays(scene, film_x, film_y))
+            total += plugin_radiance(mi_scene, scene.integrator, rays)
+    seconds = time.perf_counter() - start
+    theirs = (total / n**2).reshape(film.height, film.width, 3)
+    return Rendered(
+        Images(ours.colour, theirs), {"ours": ours.seconds, "mitsuba": {"render": seconds}}
+    )
+
+
+def replicates(
+    scene: Scene,
+    tables: SceneTables,
+    mi_scene: Any,
+    count: int,
+    threads: int | None,
+    say: Callable[[str], None],
+) -> Rendered:
+    """Path tracing: `count` pictures on each side with independent seeds; the images are their
+    means.  "render" is the median time of one picture."""
+    sampler = scene.resolved_sampler
+    first = getattr(sampler, "seed", 0)
+    ours, times = [], []
+    for k in range(count):
+        say(f"ours, replicate {k + 1} of {count}")
+        seeded = scene.changed(sampler=sampler.model_copy(update={"seed": first + k}))
+        picture = render(seeded, tables=tables, threads=threads)
+        ours.append(picture.colour)
+        times.append(picture.seconds)
+    say(f"Mitsuba's {count} replicates")
+    theirs = mitsuba_scene.render(mi_scene, count, sampler.spp, first)
+    pair = (np.stack(ours), theirs.pictures)
+    return Rendered(
+        Images(pair[0].mean(axis=0), pair[1].mean(axis=0)),
+        {
+            "ours": {
+                "compile": times[0]["compile"],
+                "render": float(np.median([t["render"] for t in times])),
+            },
+            "mitsuba": {"render": float(np.median(theirs.seconds))},
+        },
+        replicates=pair,
+    )
+
+
+def images_tier(rendered: Rendered, metrics: Metrics) -> Tier:
+    """The pictures as wholes: what the rungs below cannot see, an error that averages out."""
+    if metrics.nonfinite:
+        return Tier("images", "invalid", f"{metrics.nonfinite} pixels are not finite")
+    if rendered.replicates is None:
+        return _noiseless(metrics)
+    ratio, standard_error = noise_ratio(*rendered.replicates)
+    numbers = {"difference_over_noise": ratio, "standard_error": standard_error}
+    if not ratio > 0.0:
+        return Tier("images", "agree", "the pictures are equal", numbers)
+    told = f"the squared difference is {ratio:.3g} ± {standard_error:.2g} times that of the noise"
+    # Five standard errors: the sum over tiles is near normal, and one false alarm in a million
+    # scenes leaves the family's level to the statistics rung.
+    if ratio - 5.0 * standard_error > NOISE_LIMIT:
+        return Tier("images", "differ", f"{told}: pixels differ by more than noise", numbers)
+    return Tier("images", "agree", f"{told}; SSIM {metrics.ssim:.4f}", numbers)
+
+
+def _noiseless(metrics: Metrics) -> Tier:
+    numbers = {"ssim": metrics.ssim}
+    if metrics.rmse == 0.0:
+        return Tier("images", "agree", "the pictures are equal", numbers)
+    told = f"SSIM {metrics.ssim:.6f}, RMSE {metrics.rmse:.2g}"
+    if not metrics.ssim >= DETERMINISTIC_SSIM:
+        return Tier("images", "differ", f"{told}: expected {DETERMINISTIC_SSIM}", numbers)
+    return Tier("images", "agree", told, numbers)
+
+
+def noise_ratio(ours: FloatArray, mitsuba: FloatArray) -> tuple[float, float]:
+    """The squared difference of the mean pictures over its expectation from the replicates' own
+    variances, as the mean over tiles (1 where only noise differs), and its standard error.
+
+    (replicates, height, width, 3) on both sides.  Tiles count alike: the edge of a lamp has most
+    of a picture's variance, and would drown the rest.  0, 0 where nothing differs nor is noisy.
+    """
+    difference2 = (ours.mean(axis=0) - mitsuba.mean(axis=0)) ** 2
+    variance = ours.var(axis=0, ddof=1) / len(ours) + mitsuba.var(axis=0, ddof=1) / len(mitsuba)
+    observed, expected = _tile_sums(difference2), _tile_sums(variance)
+    alive = (observed > 0.0) | (expected > 0.0)
+    if not alive.any():
+        return 0.0, 0.0
+    with np.errstate(divide="ignore"):
+        ratios = observed[alive] / expected[alive]
+    if not np.all(np.isfinite(ratios)):
+        return np.inf, 0.0
+    return float(ratios.mean()), float(ratios.std() / np.sqrt(max(len(ratios) - 1, 1)))
+
+
+def _tile_sums(picture: FloatArray) -> FloatArray:
+    """Sums over TILE x TILE tiles; those at the right and the bottom may be smaller."""
+    rows = np.add.reduceat(picture.sum(axis=-1), np.arange(0, picture.shape[0], TILE), axis=0)
+    return np.asarray(np.add.reduceat(rows, np.arange(0, picture.shape[1], TILE), axis=1).ravel())

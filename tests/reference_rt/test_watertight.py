@@ -1,0 +1,83 @@
+"""Rays inside a closed mesh never leave it, and rays through it cross it an even number of times."""
+
+import numpy as np
+import pytest
+from builders import cube, icosphere, placed, unit_vectors, write_obj
+from numba import njit
+
+import reference_rt as rt
+from reference_rt import query, tables, transform
+
+MESHES = {"ball": icosphere(3), "cube": cube(7), "coarse cube": cube(1), "coarse ball": icosphere(1)}
+RAYS = 100_000
+
+
+def _placement(name):
+    if name == "as is":
+        return ()
+    return placed(np.random.default_rng(5), 1.0, {"turned": 0.0, "far away": 100.0}[name])
+
+
+@pytest.mark.parametrize("placement", ["as is", "turned", "far away"])
+@pytest.mark.parametrize(
+    ("mesh", "bvh_from"),
+    [("ball", 1), ("cube", 1), ("coarse cube", 1), ("coarse ball", 1000), ("coarse cube", 1000)],
+)
+def test_no_ray_leaks(mesh, bvh_from, placement, tmp_path, monkeypatch):
+    """Aimed at vertices, at middles of edges, at points along edges, and anywhere."""
+    vertices, faces = MESHES[mesh]
+    monkeypatch.setattr(tables, "BVH_FROM", bvh_from)
+    steps = _placement(placement)
+    file = write_obj(tmp_path / "mesh.obj", vertices, faces)
+    scene = rt.build_tables(rt.Scene(shapes=(rt.Mesh(file=str(file), transform=steps),)))
+    m = transform.affine(steps)
+    rng = np.random.default_rng(11)
+    corners = transform.apply_points(m, vertices)[faces][rng.integers(0, len(faces), RAYS)]
+    a, b = corners[:, 0], corners[:, 1]
+    along = rng.uniform(0, 1, (RAYS, 1))
+    # The meshes contain the ball of radius 0.55 about their middle.
+    o = transform.apply_points(m, rng.uniform(-0.31, 0.31, (RAYS, 3)))
+    d = [a - o, (a + b) / 2 - o, a * along + b * (1 - along) - o, unit_vectors(rng, RAYS)]
+    aim = rng.integers(0, 4, RAYS)
+    d = np.choose(aim[:, None], d)
+    assert np.isfinite(query.intersect(scene, o, d).t).all()
+
+
+@njit
+def _crossings(v, o, d):
+    """How many triangles (n, 3, 3) each ray crosses, by signs of volumes: no code in common."""
+    count = np.zeros(len(o), np.int64)
+    for i in range(len(o)):
+        for k in range(len(v)):
+            sides = np.empty(3)
+            for j in range(3):
+                a, b = v[k, j] - o[i], v[k, (j + 1) % 3] - o[i]
+                sides[j] = np.dot(np.cross(a, b), d[i])
+            if (sides > 0).all() or (sides < 0).all():
+                n = np.cross(v[k, 1] - v[k, 0], v[k, 2] - v[k, 0])
+                if np.dot(v[k, 0] - o[i], n) * np.dot(d[i], n) > 0:
+                    count[i] += 1
+    return count
+
+
+def test_parity(tmp_path):
+    """A ray from outside, restarted behind each hit, hits as often as an independent count says,
+    which is an even number of times."""
+    vertices, faces = icosphere(1)
+    file = write_obj(tmp_path / "mesh.obj", vertices, faces)
+    scene = rt.build_tables(rt.Scene(shapes=(rt.Mesh(file=str(file)),)))
+    rng = np.random.default_rng(12)
+    o = 3.0 * unit_vectors(rng, 500)
+    d = unit_vectors(rng, 500) - o
+    expected = _crossings(vertices[faces], o, d)
+    counted = np.zeros(500, int)
+    origin, alive = o.copy(), np.ones(500, bool)
+    for _ in range(4):
+        found = query.intersect(scene, origin, d)
+        alive &= np.isfinite(found.t)
+        counted += alive
+        # 1e-9 of the ball: far above rounding, far below the length of any chord met here.
+        step = np.where(alive, found.t, 0.0)[:, None]
+        origin = origin + d * (step + 1e-9)
+    assert np.array_equal(counted, expected)
+    assert set(np.unique(expected)) == {0, 2}
