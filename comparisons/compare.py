@@ -68,7 +68,7 @@ def compare_scenes(scenes: Sequence[Scene], out: Path, options: Options) -> list
 
 
 def compare_scene(
-    scene: Scene, tables: SceneTables, table_seconds: float, options: Options, console: Console
+    scene: Scene, tables: SceneTables, load_seconds: float, options: Options, console: Console
 ) -> Case:
     """One scene, rung by rung."""
     # A filter wider than the pixel shares samples between pixels on Mitsuba's side, and their
@@ -80,10 +80,10 @@ def compare_scene(
         mi_scene = load(scene)
     except UntranslatableError as error:
         tier = Tier("geometry", "not-comparable", str(error))
-        seconds = {"ours": {"tables": table_seconds}, "mitsuba": {}}
+        seconds = {"ours": {"load": load_seconds}, "mitsuba": {}}
         return Case(scene.name, "not-comparable", str(error), (tier,), None, seconds)
     seconds = {
-        "ours": {"tables": table_seconds},
+        "ours": {"load": load_seconds},
         "mitsuba": {"load": time.perf_counter() - clock},
     }
     rungs = _deterministic_rungs(scene, tables, mi_scene, console)

@@ -12,7 +12,6 @@ from comparisons.results import Images, Metrics, Tier
 from comparisons.tiers.camera import camera_rays
 from comparisons.tiers.rays import Rays
 from comparisons.tiers.whitted import plugin_radiance
-from reference_rt import query
 from reference_rt.image import display
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.render import Picture, render
@@ -25,7 +24,7 @@ DETERMINISTIC_SSIM = 0.9999
 (measured: 0.99999 and better); a shift of a tenth of a pixel already gives 0.997."""
 
 NOISE_LIMIT = 1.25
-"""How much more than their noise two noisy pictures may differ, as a ratio of squares: Mitsuba's own
+"""How much more than their noise noisy pictures may differ, as a ratio of squares: Mitsuba's own
 systematic error (float32, its ray epsilon) may reach half the standard deviation of a pixel."""
 
 TILE = 16
@@ -65,16 +64,21 @@ def cast(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
     theirs = Picture(shaped, ours.shown)
     return Rendered(
         Images(display(ours), display(theirs)),
-        {"ours": ours.seconds, "mitsuba": {"render": seconds}},
+        _seconds(ours, seconds),
         notes=(f"the pictures show the layer '{ours.shown}' as displayed, not radiance",),
     )
+
+
+def _seconds(ours: Picture, mitsuba: float) -> dict[str, dict[str, float]]:
+    times = {step: ours.seconds[step] for step in ("compile", "render")}
+    return {"ours": times, "mitsuba": {"render": mitsuba}}
 
 
 def whitted(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
     """Recursive ray tracing: Mitsuba's plugin along the rays of our grid of samples."""
     assert isinstance(scene.integrator, Whitted)
     ours = render(scene, tables=tables)
-    n = round(scene.resolved_sampler.spp ** 0.5)
+    n = round(scene.resolved_sampler.spp**0.5)
     film = scene.film
     total = np.zeros((film.height * film.width, 3))
     y, x = np.mgrid[0 : film.height, 0 : film.width]
@@ -87,9 +91,7 @@ def whitted(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
             total += plugin_radiance(mi_scene, scene.integrator, rays)
     seconds = time.perf_counter() - start
     theirs = (total / n**2).reshape(film.height, film.width, 3)
-    return Rendered(
-        Images(ours.colour, theirs), {"ours": ours.seconds, "mitsuba": {"render": seconds}}
-    )
+    return Rendered(Images(ours.colour, theirs), _seconds(ours, seconds))
 
 
 def replicates(

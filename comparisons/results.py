@@ -1,4 +1,4 @@
-"""What a comparison found, as data: the contract that `results.json` and the report are made from."""
+"""What a comparison found, as data: what `results.json` and the report are made from."""
 
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -34,7 +34,7 @@ class Tier:
 
 @dataclass(frozen=True)
 class Metrics:
-    """Image metrics of ours against Mitsuba's converged pictures; None of a field = undefined."""
+    """Image metrics of ours against Mitsuba's picture; NaN where undefined (null in JSON)."""
 
     ssim: float
     psnr: float
@@ -64,7 +64,7 @@ class Case:
     tiers: tuple[Tier, ...]
     metrics: Metrics | None
     seconds: dict[str, dict[str, float]]
-    """{"ours": {"load", "compile", "build", "render"}, "mitsuba": {"load", "render"}}, wall clock."""
+    """Wall clock by side and step: "load" (files, arrays, hierarchy), "compile", "render"."""
     images: Images | None = None
     notes: tuple[str, ...] = ()
     """What a reader should know besides: translations that are approximate, what was left out."""

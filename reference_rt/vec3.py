@@ -75,6 +75,12 @@ def row(array: Any, i: int) -> Vec3:
 
 
 @kernel
+def triple(array: Any, i: int, k: int) -> Vec3:
+    """Vector k of the three in row `i` of an (n, 9) array."""
+    return Vec3(array[i, 3 * k], array[i, 3 * k + 1], array[i, 3 * k + 2])
+
+
+@kernel
 def component(a: Vec3, axis: int) -> float:
     """The x, y or z of `a` for axis 0, 1 or 2."""
     if axis == 0:

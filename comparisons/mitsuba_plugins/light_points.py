@@ -37,7 +37,7 @@ class SphereLight(NamedTuple):
         """The point in the middle of the cone of sight's cosines, and the cone's solid angle.
 
         1 - cos = (1 - cos theta_max) / 2 and phi = pi, in the basis of Duff et al. (2017), which is
-        Mitsuba's too.  Nothing from inside, nor from the sphere's own surface, where rounding decides
+        Mitsuba's too.  Nothing from inside, nor from the sphere's surface, where rounding decides
         what is inside: what is nearer than Mitsuba starts its rays counts as on it.
         """
         to_center = self.center - p

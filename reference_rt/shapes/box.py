@@ -23,7 +23,7 @@ from reference_rt.shapes.shape import (
     pack,
     solid_angle_pdf,
 )
-from reference_rt.vec3 import Vec3, dot, max_abs, normalize, row
+from reference_rt.vec3 import Vec3, dot, max_abs, normalize, row, triple
 
 
 class Box(Shape):
@@ -76,17 +76,11 @@ def areas(boxes: Boxes) -> FloatArray:
 
 
 @kernel
-def axis_row(array: FloatArray, i: int, axis: int) -> Vec3:
-    """Vector `axis` of the three in row i of an (n, 9) array."""
-    return Vec3(array[i, 3 * axis], array[i, 3 * axis + 1], array[i, 3 * axis + 2])
-
-
-@kernel
 def local_direction(boxes: Boxes, i: int, v: Vec3) -> Vec3:
     return Vec3(
-        dot(axis_row(boxes.to_local, i, 0), v),
-        dot(axis_row(boxes.to_local, i, 1), v),
-        dot(axis_row(boxes.to_local, i, 2), v),
+        dot(triple(boxes.to_local, i, 0), v),
+        dot(triple(boxes.to_local, i, 1), v),
+        dot(triple(boxes.to_local, i, 2), v),
     )
 
 
@@ -155,9 +149,9 @@ def found(boxes: Boxes, i: int, ray: Ray, t: float) -> Hit:
     s = slabs(
         ray,
         row(boxes.center, i),
-        axis_row(boxes.to_local, i, 0),
-        axis_row(boxes.to_local, i, 1),
-        axis_row(boxes.to_local, i, 2),
+        triple(boxes.to_local, i, 0),
+        triple(boxes.to_local, i, 1),
+        triple(boxes.to_local, i, 2),
     )
     if t == s.x_in:
         face = 0 if s.x_up else 3
@@ -180,9 +174,9 @@ def intersect(boxes: Boxes, i: int, ray: Ray, closest: Hit) -> Hit:
     t = distance(
         ray,
         row(boxes.center, i),
-        axis_row(boxes.to_local, i, 0),
-        axis_row(boxes.to_local, i, 1),
-        axis_row(boxes.to_local, i, 2),
+        triple(boxes.to_local, i, 0),
+        triple(boxes.to_local, i, 1),
+        triple(boxes.to_local, i, 2),
     )
     return found(boxes, i, ray, t) if t < closest.t else closest
 
@@ -214,16 +208,16 @@ def intersect_all(boxes: Boxes | None, packets: FloatArray | None, ray: Ray, clo
 @kernel
 def face_normal(boxes: Boxes, i: int, axis: int, sign: float) -> Vec3:
     """The covector of the face's own coordinate, made unit: the inverse transpose at work."""
-    return normalize(axis_row(boxes.to_local, i, axis)) * sign
+    return normalize(triple(boxes.to_local, i, axis)) * sign
 
 
 @kernel
 def place(boxes: Boxes, i: int, local: Vec3) -> Vec3:
     return (
         row(boxes.center, i)
-        + axis_row(boxes.edges, i, 0) * local.x
-        + axis_row(boxes.edges, i, 1) * local.y
-        + axis_row(boxes.edges, i, 2) * local.z
+        + triple(boxes.edges, i, 0) * local.x
+        + triple(boxes.edges, i, 1) * local.y
+        + triple(boxes.edges, i, 2) * local.z
     )
 
 
@@ -240,9 +234,9 @@ def on_face(local: Vec3, axis: int, sign: float) -> Vec3:
 @kernel
 def error_at(boxes: Boxes, i: int, p: Vec3) -> float:
     size = (
-        max_abs(axis_row(boxes.edges, i, 0))
-        + max_abs(axis_row(boxes.edges, i, 1))
-        + max_abs(axis_row(boxes.edges, i, 2))
+        max_abs(triple(boxes.edges, i, 0))
+        + max_abs(triple(boxes.edges, i, 1))
+        + max_abs(triple(boxes.edges, i, 2))
     )
     return surface_error(p, row(boxes.center, i), size)
 

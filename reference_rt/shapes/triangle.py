@@ -19,7 +19,7 @@ from reference_rt.shapes.shape import (
     Shape,
     solid_angle_pdf,
 )
-from reference_rt.vec3 import Vec3, component, cross, dot, length, max_abs, normalize
+from reference_rt.vec3 import Vec3, component, cross, dot, length, max_abs, normalize, triple
 
 
 class Triangle(Shape):
@@ -166,29 +166,23 @@ def intersect_all(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hit:
 
 
 @kernel
-def vertex(array: FloatArray, i: int, k: int) -> Vec3:
-    """Vector k of the three in row i of an (n, 9) array."""
-    return Vec3(array[i, 3 * k], array[i, 3 * k + 1], array[i, 3 * k + 2])
-
-
-@kernel
 def interpolate(array: FloatArray, i: int, u: float, v: float) -> Vec3:
     """(1 - u - v) a0 + u a1 + v a2 of the three vectors in row i."""
-    return vertex(array, i, 0) * (1.0 - u - v) + vertex(array, i, 1) * u + vertex(array, i, 2) * v
+    return triple(array, i, 0) * (1.0 - u - v) + triple(array, i, 1) * u + triple(array, i, 2) * v
 
 
 @kernel
 def normal(triangles: Triangles, i: int) -> Vec3:
-    v0 = vertex(triangles.vertices, i, 0)
+    v0 = triple(triangles.vertices, i, 0)
     return normalize(
-        cross(vertex(triangles.vertices, i, 1) - v0, vertex(triangles.vertices, i, 2) - v0)
+        cross(triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0)
     )
 
 
 @kernel
 def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
     v = triangles.vertices
-    v0, v1, v2 = vertex(v, i, 0), vertex(v, i, 1), vertex(v, i, 2)
+    v0, v1, v2 = triple(v, i, 0), triple(v, i, 1), triple(v, i, 2)
     a, b, c = v1 - v0, v2 - v0, v2 - v1
     longest2 = max(dot(a, a), max(dot(b, b), dot(c, c)))
     # `intersect` rounds edge functions relative to longest², divides by twice the area and gets t
