@@ -27,6 +27,10 @@ NOISE_LIMIT = 1.25
 """How much more than their noise noisy pictures may differ, as a ratio of squares: Mitsuba's own
 systematic error (float32, its ray epsilon) may reach half the standard deviation of a pixel."""
 
+FLOAT32 = 1e-5
+"""Of a pixel: what float32 may do to Mitsuba's where there is no noise, a background say; the bound
+that the Whitted rung holds pixels to."""
+
 TILE = 16
 
 
@@ -162,18 +166,19 @@ def noise_ratio(ours: FloatArray, mitsuba: FloatArray) -> tuple[float, float]:
     variances, as the mean over tiles (1 where only noise differs), and its standard error.
 
     (replicates, height, width, 3) on both sides.  Tiles count alike: the edge of a lamp has most
-    of a picture's variance, and would drown the rest.  0, 0 where nothing differs nor is noisy.
+    of a picture's variance, and would drown the rest.  0, 0 where nothing differs or is noisy.
     """
     difference2 = (ours.mean(axis=0) - mitsuba.mean(axis=0)) ** 2
     variance = ours.var(axis=0, ddof=1) / len(ours) + mitsuba.var(axis=0, ddof=1) / len(mitsuba)
-    observed, expected = _tile_sums(difference2), _tile_sums(variance)
-    alive = (observed > 0.0) | (expected > 0.0)
-    if not alive.any():
-        return 0.0, 0.0
-    with np.errstate(divide="ignore"):
-        ratios = observed[alive] / expected[alive]
-    if not np.all(np.isfinite(ratios)):
+    observed, noise = _tile_sums(difference2), _tile_sums(variance)
+    rounding = _tile_sums((FLOAT32 * mitsuba.mean(axis=0)) ** 2)
+    # A background has no noise to measure by: there the bound is float32's, twice over.
+    noisy = noise > rounding
+    if np.any(observed[~noisy] > 4.0 * (noise + rounding)[~noisy]):
         return np.inf, 0.0
+    if not noisy.any():
+        return 0.0, 0.0
+    ratios = observed[noisy] / noise[noisy]
     return float(ratios.mean()), float(ratios.std() / np.sqrt(max(len(ratios) - 1, 1)))
 
 

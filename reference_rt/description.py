@@ -18,7 +18,10 @@ def _three_numbers(value: Any) -> Any:
     is_number = [isinstance(x, int | float) and not isinstance(x, bool) for x in _items(value)]
     if len(is_number) != 3 or not all(is_number):
         raise ValueError("expected three numbers [x, y, z]")
-    return tuple(float(x) for x in value)
+    try:
+        return tuple(float(x) for x in value)
+    except OverflowError:
+        raise ValueError("expected finite numbers") from None
 
 
 def _colour(value: Any) -> Any:

@@ -135,8 +135,11 @@ class Scene(Description):
         except MarkedYAMLError as error:
             line = None if error.problem_mark is None else error.problem_mark.line + 1
             problem = " ".join(str(error.problem or error.context).split())
+            problem = problem.partition(" with value ")[0]  # of a duplicate key: says nothing
+            if problem.startswith("but ") and error.context:
+                problem = f"{error.context}, {problem}"
             raise SceneError(f"malformed: {problem}", file=name, line=line) from None
-        except YAMLError as error:
+        except (YAMLError, ValueError) as error:  # ValueError: numbers and dates that are none
             problem = " ".join(str(error).split())
             raise SceneError(f"malformed: {problem}", file=name) from None
         except RecursionError:
@@ -192,16 +195,24 @@ def _first_problem(error: ValidationError, data: Any) -> tuple[str, Keys]:
     elif first["type"] == "missing":
         message = "missing; expected a value"
     elif first["type"] == "union_tag_not_found":
-        message = f"missing 'type'; expected one of: {_tags(first)}"
+        message = "missing 'type'; expected the name of a kind"
     elif first["type"] == "union_tag_invalid":
-        message = f"unknown type '{first['ctx']['tag']}'; expected one of: {_tags(first)}"
+        ctx = first["ctx"]
+        message = f"unknown type '{ctx['tag']}'; expected one of: {ctx['expected_tags']}"
+    elif first["type"] in _PLAIN:
+        message = f"expected {_PLAIN[first['type']]}"
     elif first["type"] != "value_error" and not isinstance(first["input"], dict | list):
         message += f", got {first['input']!r}"
     return message, keys
 
 
-def _tags(problem: Any) -> str:
-    return str(problem.get("ctx", {}).get("expected_tags", "a known type"))
+_PLAIN = {
+    "model_type": "keys with values",
+    "model_attributes_type": "keys with values",
+    "dict_type": "keys with values",
+    "tuple_type": "a list",
+}
+"""What pydantic calls by the names of Python's types."""
 
 
 def _keys_in(data: Any, location: tuple[int | str, ...]) -> tuple[Keys, str]:
@@ -209,7 +220,7 @@ def _keys_in(data: Any, location: tuple[int | str, ...]) -> tuple[Keys, str]:
     keys: list[int | str] = []
     for position, key in enumerate(location):
         last = position == len(location) - 1
-        if isinstance(data, dict) and (key in data or last):
+        if isinstance(data, dict) and (key in data or (last and key != data.get("type"))):
             keys.append(key)
             data = data.get(key)
         elif isinstance(data, list) and isinstance(key, int) and key < len(data):

@@ -164,7 +164,7 @@ class Matrix(Description):
 
 
 def _kind_of_step(step: Any) -> str | None:
-    keys = list(step) if isinstance(step, dict) else list(type(step).model_fields)
+    keys = list(step if isinstance(step, dict) else getattr(type(step), "model_fields", ()))
     return str(keys[0]) if len(keys) == 1 else None
 
 

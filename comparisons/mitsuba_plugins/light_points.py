@@ -13,6 +13,9 @@ import numpy as np
 from reference_rt.shapes.shape import FloatArray
 
 
+_SMALLEST = float(np.finfo(np.float32).tiny)
+
+
 class FixedPoint(NamedTuple):
     """A primitive that is seen as its point p, with unit normal n and an area: (3,), (3,), 1."""
 
@@ -24,7 +27,9 @@ class FixedPoint(NamedTuple):
         """The point, and the solid angle that it stands for: area cos / distance²."""
         w = p - self.p
         distance2 = dr.squared_norm(w)
-        return self.p, self.area * dr.abs(dr.dot(w, self.n)) / (distance2 * dr.sqrt(distance2))
+        # Seen from itself the point stands for nothing: 0 over the smallest float.
+        distance3 = dr.maximum(distance2 * dr.sqrt(distance2), _SMALLEST)
+        return self.p, self.area * dr.abs(dr.dot(w, self.n)) / distance3
 
 
 class SphereLight(NamedTuple):

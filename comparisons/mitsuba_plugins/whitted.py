@@ -156,9 +156,9 @@ def register(mi: Any) -> None:
                 found = scene.ray_intersect(ray, active)
                 # What the ray meets is the light itself if it is as far away, as Mitsuba sees it;
                 # begun off its line, the ray meets a surface seen edge-on somewhere else.
-                along = 2.0 * height / dr.abs(dr.dot(ray.d, found.n))
-                far = dr.norm(target - si.p) * (1.0 - mi.math.ShadowEpsilon) - along
-                visible = active & found.is_valid() & (found.t >= far)
+                missing = dr.norm(target - si.p) * (1.0 - mi.math.ShadowEpsilon) - found.t
+                near = missing * dr.abs(dr.dot(ray.d, found.n)) <= 2.0 * height
+                visible = active & found.is_valid() & near
                 radiance = emitted(mi, scene, found, visible)
                 total += dr.select(visible, value * radiance * solid_angle, 0.0)
                 dr.eval(total)

@@ -56,13 +56,19 @@ def explained(
 
 
 def values_around(
-    radius: FloatArray, value: Callable[[FloatArray], FloatArray]
+    radius: FloatArray, turn: float, value: Callable[[FloatArray, FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """The least and the greatest of `value(offsets)` (m, 3) over moves of up to `radius` (m,)."""
-    zero = np.zeros((len(radius), 3))
-    low = high = value(zero)
+    """The least and the greatest of `value(offsets, turns)` (m, 3), over origins moved by up to
+    `radius` (m,) and unit directions by up to `turn`.
+
+    Each move goes with a turn the opposite way round the sphere and with none.
+    """
+    still = np.zeros((len(radius), 3))
+    low = high = value(still, still)
+    moves = directions(NEIGHBOURS)
     for factor in RADII:
-        for move in directions(NEIGHBOURS):
-            found = value(zero + move * (factor * radius)[:, None])
-            low, high = np.minimum(low, found), np.maximum(high, found)
+        for move, way in zip(moves, np.roll(moves, NEIGHBOURS // 2, axis=0), strict=True):
+            for size in (0.0, turn):
+                found = value(still + move * (factor * radius)[:, None], still + way * size)
+                low, high = np.minimum(low, found), np.maximum(high, found)
     return low, high

@@ -8,7 +8,7 @@ from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_scene import for_rays
 from comparisons.results import Tier
 from comparisons.tiers import arbiter
-from comparisons.tiers.bounds import delta, largest, shape_sizes
+from comparisons.tiers.bounds import ROUNDINGS, UNIT_ROUNDOFF, delta, largest, shape_sizes
 from comparisons.tiers.rays import RAY_EPSILON, Rays, pixel_rays
 from reference_rt import query
 from reference_rt.integrators import Whitted
@@ -24,7 +24,7 @@ MOST_LIGHTS = 256
 """Each light is a shadow ray at every surface: with more the rung would take minutes."""
 
 MOST_OUTLIERS = 500
-"""Pixels that are arbitrated: each takes 192 more trees.  The rest count against agreement."""
+"""Pixels that are arbitrated: each takes 384 more trees.  The rest count against agreement."""
 
 TOLERANCE = 3e-5
 """Of a pixel, or of the lit pixels' mean where it is darker.  What a light sends to a point is off
@@ -124,10 +124,12 @@ def _explained(
             break
         rows = outliers[open_]
 
-        def value(offsets: FloatArray, rows: Any = rows) -> FloatArray:
-            return query.whitted_radiance(tables, setup, rays.o[rows] + offsets, rays.d[rows])
+        def value(offsets: FloatArray, turns: FloatArray, rows: Any = rows) -> FloatArray:
+            d = rays.d[rows] + turns
+            d /= np.linalg.norm(d, axis=1)[:, None]
+            return query.whitted_radiance(tables, setup, rays.o[rows] + offsets, d)
 
-        low, high = arbiter.values_around(radius[open_], value)
+        low, high = arbiter.values_around(radius[open_], ROUNDINGS * UNIT_ROUNDOFF, value)
         slack = bound[rows][:, None]
         within = (theirs[rows] >= low - slack) & (theirs[rows] <= high + slack)
         settled[open_] = within.all(axis=1)

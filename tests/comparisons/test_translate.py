@@ -160,7 +160,9 @@ def test_filters_load_and_wide_ones_sample_beyond_the_border(film_filter: Descri
 
 
 def test_replicates_differ_by_seed_alone() -> None:
-    scene = Scene(film=Film(width=8, height=8), shapes=(Sphere(),), lights=(Constant(radiance=(1.0,) * 3),))
+    scene = Scene(
+        film=Film(width=8, height=8), shapes=(Sphere(),), lights=(Constant(radiance=(1.0,) * 3),)
+    )
     mi_scene = load(scene)
     first, again = render(mi_scene, 2, 2, seed=5), render(mi_scene, 2, 2, seed=5)
     np.testing.assert_array_equal(first.pictures, again.pictures)

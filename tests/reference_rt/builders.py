@@ -90,3 +90,36 @@ def icosphere(subdivisions: int) -> tuple[FloatArray, IntArray]:
 
     mesh = make(subdivisions=subdivisions)
     return np.array(mesh.vertices), np.array(mesh.faces)
+
+
+EVERYTHING = """\
+camera: {type: perspective, eye: [0, 1, 5], target: [0, 0.3, 0], fov: 50}
+film: {width: 6, height: 4, filter: {type: gaussian}}
+sampler: {type: sobol, spp: 2, seed: 3}
+integrator: {type: path, rr_depth: 2}
+materials:
+  grey: {type: diffuse, reflectance: 0.6}
+  glass: {type: dielectric}
+  silver: {type: mirror, reflectance: 0.9}
+  lamp: {type: emissive, radiance: [5, 4, 3], base: grey}
+shapes:
+  - {type: mesh, file: ball.obj, material: glass}
+  - {type: sphere, center: [-1.5, 0, 0], radius: 0.7, material: silver}
+  - {type: sphere, center: [1.5, 2, 1], radius: 0.3, material: lamp}
+  - type: rectangle
+    transform: [{scale: 5}, {rotate: {axis: [1, 0, 0], degrees: -90}}, {translate: [0, -1, 0]}]
+  - {type: box, material: lamp, transform: [{scale: 0.2}, {translate: [1, -0.5, 1.5]}]}
+  - {type: triangle, v0: [-2, 2, -1], v1: [-1, 2, -1], v2: [-2, 3, -1], material: lamp}
+lights:
+  - {type: point, position: [0, 4, 2], intensity: 9}
+  - {type: constant, radiance: [0.2, 0.3, 0.4]}
+"""
+"""Every kind of shape, material and light; a hierarchy; beside it must lie `ball.obj`."""
+
+
+def everything(folder: Path) -> Path:
+    """A scene file with every feature there is."""
+    vertices, faces = icosphere(0)
+    write_obj(folder / "ball.obj", vertices, faces)
+    (folder / "everything.yaml").write_text(EVERYTHING)
+    return folder / "everything.yaml"

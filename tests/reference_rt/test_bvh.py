@@ -5,9 +5,10 @@ import pytest
 from builders import cube, random_shape, unit_vectors, write_obj
 
 import reference_rt as rt
-from reference_rt import bvh, query, tables
+from reference_rt import bvh, query, tables, transform
 
 RAYS = 20_000
+KINDS = ("sphere", "rectangle", "box", "triangle")
 
 
 def hits(shapes, bvh_from, o, d, monkeypatch):
@@ -31,22 +32,20 @@ def assert_same(shapes, o, d, monkeypatch):
 @pytest.mark.parametrize("offset", [2.0, 1e3])
 def test_mixed_shapes(offset, monkeypatch):
     rng = np.random.default_rng(31)
-    kinds = ("sphere", "rectangle", "box", "triangle")
-    shapes = [random_shape(kinds[i % 4], rng, 0.3 * 10 ** rng.uniform(-1, 0.3), offset)
-              for i in range(120)]  # fmt: skip
+    sizes = 0.15 * offset * 10 ** rng.uniform(-1, 0.3, 120)
+    shapes = [random_shape(KINDS[i % 4], rng, size, offset) for i, size in enumerate(sizes)]
     o = offset * rng.uniform(-2, 2, (RAYS, 3))
     d = offset * rng.uniform(-1, 1, (RAYS, 3)) - o
     one, tree = assert_same(shapes, o, d, monkeypatch)
     assert np.array_equal(one.shape, tree.shape)
     for name in ("face", "p", "n", "ns", "uv"):
         assert np.array_equal(getattr(one, name), getattr(tree, name)), name
-    assert np.isfinite(one.t).sum() > 20
+    assert np.isfinite(one.t).mean() > 0.2
 
 
 def test_rays_that_start_inside_and_on_things(monkeypatch):
     rng = np.random.default_rng(32)
-    shapes = [random_shape("box", rng, 1.0, 1.0) for _ in range(20)]
-    shapes += [random_shape("sphere", rng, 1.0, 1.0) for _ in range(20)]
+    shapes = [random_shape(kind, rng, 1.0, 1.0) for kind in KINDS for _ in range(10)]
     first, _ = assert_same(
         shapes, rng.uniform(-1, 1, (RAYS, 3)), unit_vectors(rng, RAYS), monkeypatch
     )
@@ -69,17 +68,21 @@ def test_rays_in_the_planes_of_nodes(tmp_path, monkeypatch):
                     direction[axis] = way
                     o.append(origins)
                     d.append(np.tile(direction, (len(grid), 1)))
-    one, _ = assert_same([mesh], np.concatenate(o), np.concatenate(d), monkeypatch)
+    elsewhere = [random_shape(kind, np.random.default_rng(0), 1.0, 1.0) for kind in KINDS]
+    away = (transform.Translate(translate=(1e3, 1e3, 1e3)),)
+    elsewhere = [s.model_copy(update={"transform": (*s.transform, *away)}) for s in elsewhere]
+    one, _ = assert_same([mesh, *elsewhere], np.concatenate(o), np.concatenate(d), monkeypatch)
     # Through the inner vertices of a face, from inside and from outside: one third each.
     assert np.isfinite(one.t).mean() > 0.5
 
 
 def test_coincident_primitives(monkeypatch):
-    shapes = [rt.Sphere()] * 100
-    o = np.array([[0, 0, 3.0], [0, 0, 0.0], [3, 3, 3.0]])
-    d = np.array([[0, 0, -1.0], [1.0, 0, 0], [0, 0, 1.0]])
+    triangle = rt.Triangle(v0=(-1, -1, 0), v1=(3, -1, 0), v2=(-1, 3, 0))
+    shapes = [rt.Sphere(radius=2.0), rt.Box(), rt.Rectangle(), triangle] * 30
+    o = np.array([[0, 0, 3.0], [0, 0, 0.5], [0.25, 0.25, 0.5], [3, 3, 3.0]])
+    d = np.array([[0, 0, -1.0], [1.0, 0, 0], [0, 0, -1.0], [0, 0, 1.0]])
     one, _ = assert_same(shapes, o, d, monkeypatch)
-    assert one.t.tolist() == [2.0, 1.0, np.inf]
+    assert one.t.tolist() == [1.0, 1.0, 0.5, np.inf]
 
 
 def depth_of(tree_first, tree_size):
