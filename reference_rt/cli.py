@@ -132,7 +132,7 @@ def adjusted(
     parts: dict[str, Any] = {}
     if size is not None:
         width, _, height = size.lower().partition("x")
-        if not (width.isdecimal() and height.isdecimal()):
+        if not all(n.isdecimal() and len(n) < 11 for n in (width, height)):
             raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{size}'")
         parts["film"] = _changed(scene.film, "--size", width=int(width), height=int(height))
     if integrator is not None and integrator != scene.integrator.type:

@@ -45,8 +45,8 @@ def _reflectance(value: Any) -> Any:
 
 def _unit_free_direction(value: Any) -> Any:
     v = _three_numbers(value)
-    if math.hypot(*v) == 0.0:
-        raise ValueError("expected a direction, which is not zero")
+    if not 0.0 < math.hypot(*v) < math.inf:
+        raise ValueError("expected a direction, which is not zero and of a finite length")
     return v
 
 

@@ -36,10 +36,10 @@ def replacing(path: Path) -> Iterator[Path]:
 
 def check_writable(path: Path) -> None:
     """Raise ImageError now, rather than after a long render, where `path` could not be written."""
-    if path.is_dir():
-        raise ImageError(f"{path}: is a folder; expected the name of a file")
     probe = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
     try:
+        if path.is_dir():
+            raise ImageError(f"{path}: is a folder; expected the name of a file")
         path.parent.mkdir(parents=True, exist_ok=True)
         probe.touch()
     except OSError as error:

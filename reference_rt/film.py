@@ -56,8 +56,8 @@ AnyFilter = Annotated[BoxFilter | TentFilter | GaussianFilter, Field(discriminat
 class Film(Description):
     """The picture: its size in pixels and its reconstruction filter."""
 
-    width: Annotated[int, Field(ge=1)] = 256
-    height: Annotated[int, Field(ge=1)] = 256
+    width: Annotated[int, Field(ge=1, lt=2**31)] = 256
+    height: Annotated[int, Field(ge=1, lt=2**31)] = 256
     filter: AnyFilter = BoxFilter()
 
 

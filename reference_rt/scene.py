@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -181,8 +182,19 @@ class Scene(Description):
 
 
 def _load_data(text: str) -> Any:
-    """Data from YAML 1.2, of which JSON is a part.  Data only: no tags make objects."""
+    """Data from JSON or YAML 1.2.  Data only: no tags make objects."""
+    if text.lstrip().startswith("{"):
+        # What is wrong, and in which line, YAML's reader says for both. It lacks some of JSON:
+        # pairs of surrogates, and control characters.
+        with suppress(ValueError):
+            return json.loads(text, object_pairs_hook=_distinct)
     return YAML(typ="safe", pure=True).load(text)
+
+
+def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError("the same key twice")
+    return dict(pairs)
 
 
 def _first_problem(error: ValidationError, data: Any) -> tuple[str, Keys]:

@@ -42,13 +42,14 @@ def build_tables(scene: "Scene") -> SceneTables:
     """The tables of a scene.  Raises SceneError, with the place in the scene file."""
     names = [*scene.materials, None]
     numbers = {name: i for i, name in enumerate(names)}
-    tables = _shape_tables(scene, numbers)
-    hierarchy = _build_bvh(tables)
-    return SceneTables(
-        geometry=Geometry(Shapes(**tables), _packets(tables, hierarchy), hierarchy),
-        materials=_material_tables(scene, names),
-        lights=_light_tables(scene, tables),
-    )
+    with np.errstate(over="ignore", invalid="ignore"):  # found as what is not finite
+        tables = _shape_tables(scene, numbers)
+        hierarchy = _build_bvh(tables)
+        return SceneTables(
+            geometry=Geometry(Shapes(**tables), _packets(tables, hierarchy), hierarchy),
+            materials=_material_tables(scene, names),
+            lights=_light_tables(scene, tables),
+        )
 
 
 def colours(scene: "Scene") -> FloatArray:

@@ -50,10 +50,12 @@ def look_at(eye: Vector, target: Vector, up: Direction) -> Affine:
     w = -(target - eye) normalised, u = up x w normalised, v = w x u.  Raises ValueError where
     these are not defined.
     """
-    w = np.subtract(eye, target)
+    w = np.array([e - t for e, t in zip(eye, target, strict=True)], np.float64)
     distance = math.hypot(*w)
     if distance == 0.0:
         raise ValueError("eye and target are the same point; expected two")
+    if distance == math.inf:
+        raise ValueError("eye and target are too far apart; expected a finite distance")
     w /= distance
     u = np.cross(np.asarray(up) / math.hypot(*up), w)
     # The sine of the angle between up and w: below this its direction is rounding error alone.

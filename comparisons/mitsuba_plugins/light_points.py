@@ -12,7 +12,6 @@ import numpy as np
 
 from reference_rt.shapes.shape import FloatArray
 
-
 _SMALLEST = float(np.finfo(np.float32).tiny)
 
 

@@ -29,11 +29,17 @@ def clearance(mi: Any, si: Any, reach: float) -> Any:
 
 
 def leave(mi: Any, si: Any, d: Any, height: Any) -> Any:
-    """A ray from a surface along the unit `d`, begun at `height` over it."""
+    """A ray from a surface along the unit `d`, begun at `height` over it.
+
+    It is moved along itself, which keeps it on its line; at grazing angles, where this would carry
+    it past what stands near, by ten heights at most, and for the rest along the normal.
+    """
     import drjit as dr
 
-    o = si.p + si.n * dr.copysign(height, dr.dot(d, si.n))
-    return mi.Ray3f(o, d, si.time, si.wavelengths)
+    cosine = dr.dot(d, si.n)
+    along = height / dr.maximum(dr.abs(cosine), 0.1)
+    rest = dr.copysign(height, cosine) - along * cosine
+    return mi.Ray3f(si.p + d * along + si.n * rest, d, si.time, si.wavelengths)
 
 
 def emitted(mi: Any, scene: Any, si: Any, active: Any) -> Any:

@@ -56,19 +56,24 @@ def explained(
 
 
 def values_around(
-    radius: FloatArray, turn: float, value: Callable[[FloatArray, FloatArray], FloatArray]
+    o: FloatArray,
+    d: FloatArray,
+    radius: FloatArray,
+    turn: float,
+    value: Callable[[FloatArray, FloatArray], FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """The least and the greatest of `value(offsets, turns)` (m, 3), over origins moved by up to
-    `radius` (m,) and unit directions by up to `turn`.
+    """The least and the greatest, (m, 3), of `value(origins, directions)` around m rays.
 
-    Each move goes with a turn the opposite way round the sphere and with none.
+    Origins move by up to `radius` (m,); unit directions turn by `turn`, the opposite way round the
+    sphere, or stay.  All moves of all rays are asked for at once.
     """
-    still = np.zeros((len(radius), 3))
-    low = high = value(still, still)
     moves = directions(NEIGHBOURS)
-    for factor in RADII:
-        for move, way in zip(moves, np.roll(moves, NEIGHBOURS // 2, axis=0), strict=True):
-            for size in (0.0, turn):
-                found = value(still + move * (factor * radius)[:, None], still + way * size)
-                low, high = np.minimum(low, found), np.maximum(high, found)
-    return low, high
+    ways = np.roll(moves, NEIGHBOURS // 2, axis=0)
+    still = np.zeros((1, 3))
+    move = np.concatenate([still, *(factor * moves for factor in RADII for _ in (0, 1))])
+    way = np.concatenate([still, *(size * ways for _ in RADII for size in (0.0, turn))])
+    origins = o[:, None] + move * radius[:, None, None]
+    turned = d[:, None] + way
+    turned /= np.linalg.norm(turned, axis=2, keepdims=True)
+    found = value(origins.reshape(-1, 3), turned.reshape(-1, 3)).reshape(len(o), -1, 3)
+    return found.min(axis=1), found.max(axis=1)

@@ -53,21 +53,24 @@ def camera_rays(scene: Scene, x: FloatArray, y: FloatArray) -> tuple[FloatArray,
 def compare_camera(scene: Scene, mi_scene: Any, most: int) -> CameraComparison:
     """Directions, and how far Mitsuba's origins lie off our rays, at pixel centres.
 
-    Bounds: a direction passes two matrices whose entries reach 1 + tan of half the angle of view,
-    an origin one whose entries reach the eye's coordinates and half the picture's width.
+    Bounds: a direction passes matrices whose entries reach the tan of half the angle of view, an
+    origin one whose entries reach the eye's coordinates and half the picture's width.
     """
     x, y = pixel_centres(scene.film, most)
     o, d = camera_rays(scene, x, y)
     theirs = sensor_rays(mi_scene, x, y)
-    # The cosine to the view direction is 1 / sqrt(1 + tan²) on the picture's rim.
+    # Before it is made unit a direction is 1 long along the view and tan across: rounded numbers as
+    # large as on the picture's rim, 1 / cos there, and then shortened by its own cosine.
     forward = np.subtract(scene.camera.target, scene.camera.eye)
     cosine = d @ (forward / np.linalg.norm(forward))
     direction = np.linalg.norm(theirs.d - d, axis=1)
-    direction_bound = ROUNDINGS * UNIT_ROUNDOFF / cosine
+    direction_bound = ROUNDINGS * UNIT_ROUNDOFF * (1.0 + cosine / cosine.min())
     apart = theirs.o - o
     off_line = np.linalg.norm(apart - np.sum(apart * d, axis=1)[:, None] * d, axis=1)
     reach = largest(o).max() + np.abs(scene.camera.eye).max()
-    origin_bound = ROUNDINGS * UNIT_ROUNDOFF * (reach + np.linalg.norm(apart, axis=1))
+    # Mitsuba's origin lies on the near plane, along its own direction.
+    near = np.linalg.norm(apart, axis=1) * direction_bound
+    origin_bound = ROUNDINGS * UNIT_ROUNDOFF * reach + near
     numbers = {
         "max_camera_direction_error": float(direction.max()),
         "max_camera_direction_error_over_bound": float((direction / direction_bound).max()),

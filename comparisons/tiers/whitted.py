@@ -1,5 +1,6 @@
 """The third rung: the Whitted tree, ray for ray."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,13 +9,21 @@ from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_scene import for_rays
 from comparisons.results import Tier
 from comparisons.tiers import arbiter
-from comparisons.tiers.bounds import ROUNDINGS, UNIT_ROUNDOFF, delta, largest, shape_sizes
+from comparisons.tiers.bounds import (
+    ROUNDINGS,
+    UNIT_ROUNDOFF,
+    ShapeSizes,
+    delta,
+    largest,
+    round32,
+    shape_sizes,
+)
 from comparisons.tiers.rays import RAY_EPSILON, Rays, pixel_rays
 from reference_rt import query
 from reference_rt.integrators import Whitted
 from reference_rt.lights import CONSTANT
 from reference_rt.scene import Scene
-from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.shapes.shape import FloatArray
 from reference_rt.tables import SceneTables
 
 PIXELS = 128 * 128
@@ -23,8 +32,9 @@ PIXELS = 128 * 128
 MOST_LIGHTS = 256
 """Each light is a shadow ray at every surface: with more the rung would take minutes."""
 
-MOST_OUTLIERS = 500
-"""Pixels that are arbitrated: each takes 384 more trees.  The rest count against agreement."""
+MOST_OUTLIERS = (200, 32)
+"""Pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 trees for each radius,
+which in scalar variants of Mitsuba are 30 ms.  The rest count against agreement."""
 
 TOLERANCE = 3e-5
 """Of a pixel, or of the lit pixels' mean where it is darker.  What a light sends to a point is off
@@ -37,7 +47,7 @@ def whitted(scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXE
     """Compare the radiance through pixel centres with that of our Whitted plugin in Mitsuba.
 
     With the scene's own depth where its integrator is Whitted, else the default's.  Outliers are
-    put to the arbiter: ours along rays moved by float32's bound, then by Mitsuba's epsilon.
+    put to the arbiter: both along rays moved by float32's bound, then by Mitsuba's epsilon.
     """
     choice = tables.lights.choice
     if choice is None:
@@ -56,7 +66,20 @@ def whitted(scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXE
     bound = TOLERANCE * np.maximum(size, lit.mean() if len(lit) else 0.0)
     error = np.abs(theirs - ours).max(axis=1)
     outliers = np.flatnonzero(~(error <= bound))
-    settled = _explained(scene, tables, setup, rays, theirs, bound, outliers)
+
+    def ours_along(o: FloatArray, d: FloatArray) -> FloatArray:
+        return query.whitted_radiance(tables, setup, o, d)
+
+    def theirs_along(o: FloatArray, d: FloatArray) -> FloatArray:
+        return plugin_radiance(mi_scene, integrator, Rays(round32(o), round32(d)))
+
+    some = Rays(rays.o[outliers], rays.d[outliers])
+    settled = _explained(
+        some,
+        ((ours[outliers], ours_along), (theirs[outliers], theirs_along)),
+        _radii(tables, shape_sizes(tables, len(scene.shapes)), some),
+        bound[outliers],
+    )
     unexplained = outliers[~settled]
     right = error <= bound
     ratio = np.divide(error, bound, out=np.zeros_like(error), where=bound > 0.0)[right]
@@ -83,6 +106,13 @@ def whitted(scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXE
     return Tier("whitted", "agree", reason, numbers)
 
 
+def _radii(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> tuple[FloatArray, FloatArray]:
+    """How far rays are moved: float32's bound, then Mitsuba's epsilon."""
+    p = query.intersect(tables, rays.o, rays.d).p
+    reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
+    return delta(rays.o, p, reach), (1.0 + largest(p)) * RAY_EPSILON
+
+
 def plugin_radiance(mi_scene: Any, integrator: Whitted, rays: Rays) -> FloatArray:
     """(n, 3): Mitsuba's side of the tree, along our rays."""
     mi = mitsuba()
@@ -100,37 +130,31 @@ def plugin_radiance(mi_scene: Any, integrator: Whitted, rays: Rays) -> FloatArra
     return for_rays(radiance, rays.o, rays.d)[0]
 
 
+Radiance = Callable[[FloatArray, FloatArray], FloatArray]
+"""(origins, unit directions) -> radiance, all (n, 3)."""
+
+
 def _explained(
-    scene: Scene,
-    tables: SceneTables,
-    setup: Any,
     rays: Rays,
-    theirs: FloatArray,
+    sides: tuple[tuple[FloatArray, Radiance], tuple[FloatArray, Radiance]],
+    radii: tuple[FloatArray, ...],
     bound: FloatArray,
-    outliers: IntArray,
 ) -> arbiter.BoolArray:
-    """Which outliers' values lie in the range of ours along moved rays, to the tolerance."""
-    settled = np.zeros(len(outliers), bool)
-    sizes = shape_sizes(tables, len(scene.shapes))
-    hits = query.intersect(tables, rays.o[outliers], rays.d[outliers])
-    reach = sizes.reach.max(initial=0.0)  # later hits of the tree are anywhere
-    radii = (
-        delta(rays.o[outliers], hits.p, np.full(len(outliers), reach)),
-        (1.0 + largest(hits.p)) * RAY_EPSILON,
-    )
+    """Which of the outliers (m,) are rays next to which one side takes on the other's value.
+
+    `sides` are ours and Mitsuba's: the value along each ray, and how to have others.  Where it is
+    Mitsuba's that changes within its own rounding, it is not sure of its value.
+    """
+    settled = np.zeros(len(bound), bool)
     for radius in radii:
-        open_ = np.flatnonzero(~settled[:MOST_OUTLIERS])
-        if len(open_) == 0:
-            break
-        rows = outliers[open_]
-
-        def value(offsets: FloatArray, turns: FloatArray, rows: Any = rows) -> FloatArray:
-            d = rays.d[rows] + turns
-            d /= np.linalg.norm(d, axis=1)[:, None]
-            return query.whitted_radiance(tables, setup, rays.o[rows] + offsets, d)
-
-        low, high = arbiter.values_around(radius[open_], ROUNDINGS * UNIT_ROUNDOFF, value)
-        slack = bound[rows][:, None]
-        within = (theirs[rows] >= low - slack) & (theirs[rows] <= high + slack)
-        settled[open_] = within.all(axis=1)
+        for k in (0, 1):
+            radiance, wanted = sides[k][1], sides[1 - k][0]
+            rows = np.flatnonzero(~settled)[: MOST_OUTLIERS[k]]
+            if len(rows) == 0:
+                return settled
+            low, high = arbiter.values_around(
+                rays.o[rows], rays.d[rows], radius[rows], ROUNDINGS * UNIT_ROUNDOFF, radiance
+            )
+            slack, wanted = bound[rows][:, None], wanted[rows]
+            settled[rows] = ((wanted >= low - slack) & (wanted <= high + slack)).all(axis=1)
     return settled

@@ -1,6 +1,8 @@
 """Mesh: triangles from an .obj or .ply file."""
 
 import io
+import itertools
+import math
 from pathlib import Path
 from typing import Any, Literal
 
@@ -74,54 +76,61 @@ def read_mesh(path: Path) -> MeshData:
 
 
 def _load_obj(content: bytes) -> dict[str, Any]:
-    from trimesh.exchange import obj  # costs 0.3 s to import, and few scenes have meshes
+    """Vertices, their normals and faces of an .obj file; polygons become fans of triangles.
 
-    _check_obj_indices(content)
-    return _only_geometry(
-        obj.load_obj(io.BytesIO(content), skip_materials=True, maintain_order=True)
-    )
+    Not by trimesh: it gives a vertex one normal for all of its faces, counts negative indices from
+    the end of the file and leaves out faces whose indices are out of range, all silently.
+    """
+    rows: dict[bytes, list[tuple[float, ...]]] = {b"v": [], b"vn": [], b"vt": []}
+    numbers: dict[tuple[int, int], int] = {}  # of each pair of a position and a normal
+    faces: list[tuple[int, int, int]] = []
+    for line, text in enumerate(content.splitlines(), start=1):
+        words = text.partition(b"#")[0].split()
+        try:
+            if words and words[0] in rows:
+                rows[words[0]].append(_obj_numbers(words))
+            elif words and words[0] == b"f":
+                ring = [numbers.setdefault(_obj_corner(w, rows), len(numbers)) for w in words[1:]]
+                if len(ring) < 3:
+                    raise ValueError("a face has fewer than three corners")
+                faces += [(ring[0], b, c) for b, c in itertools.pairwise(ring[1:])]
+        except ValueError as error:
+            raise ValueError(f"line {line}: {error}") from None
+    positions = [rows[b"v"][v] for v, _ in numbers]
+    arrays: dict[str, Any] = {"vertices": np.array(positions), "faces": np.array(faces)}
+    if all(n >= 0 for _, n in numbers):
+        arrays["vertex_normals"] = np.array([rows[b"vn"][n] for _, n in numbers])
+    return arrays
 
 
-def _check_obj_indices(content: bytes) -> None:
-    """trimesh drops faces whose indices are out of range; a reference renderer must not."""
-    counts = {b"v": 0, b"vt": 0, b"vn": 0}
-    for number, line in enumerate(content.splitlines(), start=1):
-        words = line.split()
-        if not words:
-            continue
-        if words[0] in counts:
-            counts[words[0]] += 1
-        elif words[0] == b"f":
-            for corner in words[1:]:
-                for kind, text in zip((b"v", b"vt", b"vn"), corner.split(b"/"), strict=False):
-                    if text:
-                        _check_index(number, kind.decode(), int(text), counts[kind])
+def _obj_numbers(words: list[bytes]) -> tuple[float, ...]:
+    numbers = tuple(float(w) for w in words[1:4])
+    if words[0] != b"vt" and not (len(numbers) == 3 and all(map(math.isfinite, numbers))):
+        raise ValueError(f"'{words[0].decode()}' needs three finite numbers")
+    return numbers
 
 
-def _check_index(line: int, kind: str, index: int, count: int) -> None:
-    if index == 0 or abs(index) > count:
-        raise ValueError(f"line {line}: index {index} of {count} '{kind}' lines is out of range")
+def _obj_corner(word: bytes, rows: dict[bytes, list[tuple[float, ...]]]) -> tuple[int, int]:
+    """Indices, from 0, of the position and the normal of "v", "v/vt", "v//vn" or "v/vt/vn"; -1 for
+    no normal.  A negative index counts back from the latest row before it."""
+    found = {b"v": -1, b"vt": -1, b"vn": -1}
+    for kind, text in zip((b"v", b"vt", b"vn"), word.split(b"/"), strict=False):
+        if text or kind == b"v":
+            count = len(rows[kind])
+            index = int(text)
+            if index == 0 or abs(index) > count:
+                raise ValueError(
+                    f"index {index} of {count} '{kind.decode()}' lines is out of range"
+                )
+            found[kind] = index - 1 if index > 0 else count + index
+    return found[b"v"], found[b"vn"]
 
 
 def _load_ply(content: bytes) -> dict[str, Any]:
-    from trimesh.exchange import ply
+    from trimesh.exchange import ply  # costs 0.3 s to import, and few scenes have meshes
 
-    return _only_geometry(ply.load_ply(io.BytesIO(content), skip_materials=True))
-
-
-def _only_geometry(loaded: dict[str, Any]) -> dict[str, Any]:
-    """The arrays of one mesh from those of the groups that a file has."""
-    parts = list(loaded["geometry"].values()) if "geometry" in loaded else [loaded]
-    if not parts:
-        return {}
-    keys = [k for k in ("vertices", "vertex_normals") if all(k in p for p in parts)]
-    joined = {k: np.concatenate([p[k] for p in parts]) for k in keys}
-    starts = np.cumsum([0, *(len(p["vertices"]) for p in parts[:-1])])
-    if all(p.get("faces") is not None for p in parts):
-        joined["faces"] = np.concatenate(
-            [p["faces"] + start for p, start in zip(parts, starts, strict=True)]
-        )
-    return joined
+    loaded: dict[str, Any] = ply.load_ply(io.BytesIO(content), skip_materials=True)
+    return loaded
 
 
 def _checked(path: Path, arrays: dict[str, Any]) -> MeshData:
@@ -129,7 +138,9 @@ def _checked(path: Path, arrays: dict[str, Any]) -> MeshData:
     if vertices is None or faces is None or len(vertices) == 0 or len(faces) == 0:
         raise ValueError(f"mesh {path} is empty; expected vertices and faces")
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-    faces = np.ascontiguousarray(faces, dtype=np.int64)
+    corners = np.shape(faces)[1]
+    fans = [(0, k, k + 1) for k in range(1, corners - 1)]
+    faces = np.ascontiguousarray(np.asarray(faces, np.int64)[:, fans].reshape(-1, 3))
     if not np.all(np.isfinite(vertices)):
         bad = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
         raise ValueError(f"mesh {path}: vertex {bad} is not finite")
@@ -144,6 +155,6 @@ def _checked(path: Path, arrays: dict[str, Any]) -> MeshData:
     if normals is None or len(normals) != len(vertices):
         return MeshData(vertices, faces, None)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    if not np.all(lengths > 0.0):
+    if not np.all((lengths > 0.0) & np.isfinite(lengths)):
         raise ValueError(f"mesh {path}: a vertex normal is zero or not finite")
     return MeshData(vertices, faces, np.asarray(normals / lengths, dtype=np.float64))

@@ -1,5 +1,6 @@
 """Which Mitsuba runs is found out in child processes, and told."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -51,8 +52,6 @@ def test_what_was_proven_is_remembered_until_the_file_changes(
     assert proofs == [("llvm_ad_rgb", bogus)]
     Path(bogus).write_text("another file of another size")
     stat = Path(bogus).stat()
-    import os
-
     os.utime(bogus, ns=(stat.st_atime_ns, stat.st_mtime_ns + 10**9))
     backend.choose()
     assert len(proofs) == 2
@@ -102,7 +101,7 @@ def test_forced_variants(monkeypatch: pytest.MonkeyPatch, bogus: str) -> None:
 
 
 def test_without_mitsuba_the_error_says_how_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(backend.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(ReferenceUnavailableError, match=r"reference-rt\[compare\]") as caught:
         backend.choose()
     assert caught.value.exit_code == 4

@@ -37,7 +37,9 @@ def leave(kind, shapes, rng):
     w = unit_vectors(rng, n)
     first = probe(tables, KINDS[kind], rows, o, center - o)
     in_plane = w - first.n * np.sum(w * first.n, axis=1, keepdims=True)
-    grazing = in_plane + first.n * rng.choice([-1, 1], (n, 1)) * 10.0 ** rng.uniform(-16, -1, (n, 1))
+    grazing = in_plane + first.n * rng.choice([-1, 1], (n, 1)) * 10.0 ** rng.uniform(
+        -16, -1, (n, 1)
+    )
     w[::2] = grazing[::2]
     found = probe(tables, KINDS[kind], rows, o, center - o, w)
     hit = np.isfinite(found.t)
@@ -65,8 +67,8 @@ def test_leaving(kind, scale, offset):
         assert np.isfinite(found.again[inwards]).all()
         if kind == "box":
             assert (found.again * np.linalg.norm(w, axis=1) > step)[inwards].all()
-    # The policy's 16 sqrt(3) u for anchor, point and size, and the rounding of the sum; a random triangle's is more where it is
-    # thin: longest edge over height, which stays below a thousand for these.
+    # The policy's 16 sqrt(3) u for anchor, point and size, and the rounding of the sum; for a
+    # triangle times longest edge over height, which stays below a thousand for these.
     thin = 1000.0 if kind == "triangle" else 1.0
     largest = np.abs(center).max(axis=1) + np.abs(found.p).max(axis=1) + 4 * size
     moved = np.linalg.norm(found.start - found.p, axis=1)

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def pictures(folder):
 def both(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plain")
     file = folder / "plain.npz"
-    arguments = [os.path.dirname(__file__), str(folder), str(file)]
+    arguments = [str(Path(__file__).parent), str(folder), str(file)]
     subprocess.run(
         [sys.executable, "-W", "error", "-c", _RENDER, *arguments],
         check=True,

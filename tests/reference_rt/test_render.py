@@ -24,9 +24,7 @@ def cornell():
 @pytest.mark.parametrize("band", [1, 7, 64, 10**9])
 def test_same_bits_for_any_threads_and_tiling(cornell, band, monkeypatch):
     expected = render(cornell, threads=1).colour
-    monkeypatch.setattr(
-        importlib.import_module("reference_rt.render"), "SAMPLES_PER_BAND", band
-    )
+    monkeypatch.setattr(importlib.import_module("reference_rt.render"), "SAMPLES_PER_BAND", band)
     for threads in (1, 2, 3):
         assert np.array_equal(render(cornell, threads=threads).colour, expected)
 

@@ -244,9 +244,7 @@ def test_box_from_outside_and_inside():
 
 ORIGINS = np.array(list(itertools.product((-3, -2, -1, 0, 1, 2, 3), repeat=3)), float)
 ZEROS = [0.0, -0.0]
-DIRECTIONS = np.array(
-    [d for d in itertools.product((-1.0, 0.0, -0.0, 1.0), repeat=3) if any(d)]
-)
+DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, -0.0, 1.0), repeat=3) if any(d)])
 
 
 def lattice():

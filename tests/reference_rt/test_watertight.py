@@ -1,14 +1,18 @@
-"""Rays inside a closed mesh never leave it, and rays through it cross it an even number of times."""
+"""Rays inside a closed mesh never leave it; rays through it cross it as often as they must."""
 
 import numpy as np
 import pytest
 from builders import cube, icosphere, placed, unit_vectors, write_obj
-from numba import njit
 
 import reference_rt as rt
 from reference_rt import query, tables, transform
 
-MESHES = {"ball": icosphere(3), "cube": cube(7), "coarse cube": cube(1), "coarse ball": icosphere(1)}
+MESHES = {
+    "ball": icosphere(3),
+    "cube": cube(7),
+    "coarse cube": cube(1),
+    "coarse ball": icosphere(1),
+}
 RAYS = 100_000
 
 
@@ -43,21 +47,16 @@ def test_no_ray_leaks(mesh, bvh_from, placement, tmp_path, monkeypatch):
     assert np.isfinite(query.intersect(scene, o, d).t).all()
 
 
-@njit
 def _crossings(v, o, d):
     """How many triangles (n, 3, 3) each ray crosses, by signs of volumes: no code in common."""
-    count = np.zeros(len(o), np.int64)
-    for i in range(len(o)):
-        for k in range(len(v)):
-            sides = np.empty(3)
-            for j in range(3):
-                a, b = v[k, j] - o[i], v[k, (j + 1) % 3] - o[i]
-                sides[j] = np.dot(np.cross(a, b), d[i])
-            if (sides > 0).all() or (sides < 0).all():
-                n = np.cross(v[k, 1] - v[k, 0], v[k, 2] - v[k, 0])
-                if np.dot(v[k, 0] - o[i], n) * np.dot(d[i], n) > 0:
-                    count[i] += 1
-    return count
+    to = v[None] - o[:, None, None]
+    sides = [
+        np.einsum("nmi,ni->nm", np.cross(to[:, :, k], to[:, :, (k + 1) % 3]), d) for k in range(3)
+    ]
+    inside = (np.min(sides, axis=0) > 0) | (np.max(sides, axis=0) < 0)
+    n = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
+    ahead = np.einsum("nmi,mi->nm", to[:, :, 0], n) * (d @ n.T) > 0
+    return np.sum(inside & ahead, axis=1)
 
 
 def test_parity(tmp_path):

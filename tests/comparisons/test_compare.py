@@ -1,0 +1,115 @@
+"""`reference-rt compare` as a whole: exit codes, results.json, the page, planted faults."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import comparisons.cli
+import comparisons.compare
+import comparisons.translate
+from comparisons.translate import UntranslatableError
+from reference_rt.cli import app
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+if not any(command.name == "compare" for command in app.registered_commands):
+    comparisons.cli.register(app)
+
+
+def compare(out: Path, *arguments: str) -> tuple[Result, Any]:
+    result = CliRunner().invoke(app, ["compare", *arguments, "--out", str(out)])
+    path = out / "results.json"
+    return result, json.loads(path.read_text()) if path.exists() else None
+
+
+def test_scenes_agree(tmp_path: Path) -> None:
+    scenes = [str(SCENES / f"{name}.yaml") for name in ("spheres_whitted", "display_modes")]
+    result, found = compare(tmp_path, *scenes, "--size", "48x32")
+    assert result.exit_code == 0, result.output
+    assert found["schema"] == 1
+    assert [case["verdict"] for case in found["cases"]] == ["agree", "agree"]
+    case = found["cases"][0]
+    assert set(case) >= {"scene", "verdict", "reason", "tiers", "metrics", "seconds"}
+    assert list(case["tiers"]) == ["geometry", "direct", "whitted", "statistics", "images"]
+    assert set(case["metrics"]) >= {"ssim", "psnr", "rmse", "relmse", "mean_bias"}
+    assert case["tiers"]["geometry"]["mismatches"] == 0
+    assert case["seconds"]["ours"]["render"] > 0.0
+    assert case["seconds"]["mitsuba"]["render"] > 0.0
+    assert "spheres_whitted" in (tmp_path / "report.html").read_text()
+
+
+def test_path_tracing_is_compared_by_replicates(tmp_path: Path) -> None:
+    scene = str(SCENES / "cornell_box.yaml")
+    result, found = compare(tmp_path, scene, "--size", "32x32", "--spp", "16", "--replicates", "4")
+    statistics = found["cases"][0]["tiers"]["statistics"]
+    # 4 x 16 samples of 32 x 32 pixels are too few to tell half a percent: it must say so.
+    assert found["cases"][0]["verdict"] == "inconclusive"
+    assert statistics["status"] == "inconclusive"
+    assert "detectable bias" in statistics["reason"]
+    assert result.exit_code == 1
+
+
+def test_wrong_light_differs_at_its_rung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    translate = comparisons.translate.translate_light
+
+    def brighter(light: Any) -> dict[str, Any]:
+        emitter = translate(light)
+        if emitter["type"] == "point":
+            emitter["intensity"]["value"] = [1.01 * x for x in emitter["intensity"]["value"]]
+        return emitter
+
+    monkeypatch.setattr(comparisons.translate, "translate_light", brighter)
+    result, found = compare(tmp_path, str(SCENES / "spheres_whitted.yaml"), "--size", "48x32")
+    case = found["cases"][0]
+    assert case["verdict"] == "differ"
+    assert case["reason"].startswith("direct:")
+    assert case["tiers"]["geometry"]["status"] == "agree"
+    assert case["tiers"]["whitted"]["status"] == "not-applicable"
+    assert result.exit_code == 1
+
+
+def test_type_without_translation_is_not_comparable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(light: Any) -> dict[str, Any]:
+        raise UntranslatableError(light, "light")
+
+    monkeypatch.setattr(comparisons.translate, "translate_light", refuse)
+    result, found = compare(tmp_path, str(SCENES / "spheres_whitted.yaml"))
+    assert found["cases"][0]["verdict"] == "not-comparable"
+    assert "light Point" in found["cases"][0]["reason"]
+    assert result.exit_code == 1
+
+
+def test_invalid_scene_stops_before_anything_runs(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("shapes:\n  - {type: sphere, radius: -1}\n")
+    good = str(SCENES / "spheres_whitted.yaml")
+    result, found = compare(tmp_path / "out", good, str(bad))
+    assert result.exit_code == 3
+    assert "bad.yaml:2" in result.output
+    assert found is None
+
+
+def test_without_mitsuba_exit_code_4(tmp_path: Path) -> None:
+    code = (
+        "import sys; sys.modules['mitsuba'] = None; import importlib.metadata as m;"
+        "version = m.version;"
+        "m.version = lambda n: version('no-such-package' if n == 'mitsuba' else n);"
+        "from reference_rt.cli import main; main()"
+    )
+    scene = str(SCENES / "spheres_whitted.yaml")
+    run = subprocess.run(
+        [sys.executable, "-c", code, "compare", scene, "--out", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 4, run.stderr
+    assert "pip install" in run.stderr
+    assert "Traceback" not in run.stderr

@@ -1,0 +1,49 @@
+"""reference_rt stands alone: no Mitsuba, no Dr.Jit, nothing of the comparisons."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import reference_rt
+
+PACKAGE = Path(reference_rt.__file__).parent
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+FOREIGN = {"mitsuba", "drjit", "comparisons"}
+ALLOWED = {
+    *("numpy", "numba", "llvmlite", "pydantic", "ruamel", "OpenEXR", "PIL", "trimesh"),
+    *("typer", "rich", "platformdirs", "reference_rt"),
+    *sys.stdlib_module_names,
+}
+
+
+def imports(source):
+    for node in ast.walk(ast.parse(source.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{source}: imports are absolute"
+            yield node.module.partition(".")[0]
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.relative_to(PACKAGE).as_posix())
+def test_imports(source):
+    assert set(imports(source)) <= ALLOWED
+
+
+def test_importing_everything_loads_nothing_foreign():
+    modules = [
+        ".".join(("reference_rt", *s.relative_to(PACKAGE).with_suffix("").parts)) for s in SOURCES
+    ]
+    names = ", ".join(m.removesuffix(".__init__") for m in modules)
+    code = f"import sys, {names}; print(*sorted({FOREIGN} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
+
+
+def test_public_names_exist():
+    for name in reference_rt.__all__:
+        assert hasattr(reference_rt, name)
+    assert list(reference_rt.__all__) == sorted(reference_rt.__all__)
