@@ -35,10 +35,10 @@ class Hit(NamedTuple):
 class SurfacePoint(NamedTuple):
     """A point on a surface, in world coordinates.
 
-    p: the point;  n: unit geometric normal (outward, or by winding);  ns: unit shading normal, on
-    the same side;  error: a bound on the distance of `p` from the surface *as the next ray's
-    intersection routine sees it*;  material: row of the material tables;  light: row of the area
-    lights, -1 where the surface does not emit.
+    p: the point;  n: unit geometric normal (outward, or by winding);  ns: unit shading normal (a
+    mesh's own may lie on the other side);  error: a bound on the distance of `p` from the surface
+    *as the next ray's intersection routine sees it*;  material: row of the material tables;
+    light: row of the area lights, -1 where the surface does not emit.
     """
 
     p: Vec3

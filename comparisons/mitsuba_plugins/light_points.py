@@ -115,12 +115,13 @@ def _triangle_point(mi: Any, corners: FloatArray) -> FixedPoint:
 
 
 def _box_point(mi: Any, vertices: FloatArray) -> FixedPoint:
-    """Half way through the list -x +x -y +y -z +z of faces, each as long as its area."""
+    """Half way through the list -x +x -y +y -z +z of faces, each as long as its area, begun half
+    of the first face's length before it."""
     center = vertices.mean(axis=0)
     edges = _half_edges(vertices)
     normals = np.cross(edges[[1, 2, 0]], edges[[2, 0, 1]])
     face_areas = 4.0 * np.linalg.norm(normals, axis=1)
-    rest = float(face_areas.sum())
+    rest = float(face_areas.sum()) - 0.5 * float(face_areas[0])
     axis = 0
     while axis < 2 and rest >= 2.0 * face_areas[axis]:
         rest -= 2.0 * float(face_areas[axis])

@@ -14,7 +14,7 @@ class UntranslatableError(ReferenceRtError):
     exit_code = 4
 
     def __init__(self, part: Any, kind: str) -> None:
-        name = type(part).__name__
+        name = part if isinstance(part, str) else type(part).__name__
         self.part = name
         super().__init__(
             f"the {kind} {name} cannot be compared: comparisons.translate has no translation for it"

@@ -83,6 +83,9 @@ def _map(linear: FloatArray, offset: FloatArray) -> Any:
 
 def _mesh(table: Triangles, parts: dict[str, Any]) -> Any:
     """A mesh of separate triangles in our order: Mitsuba's prim_index is our face."""
+    if "emitter" in parts and table.normals is not None:
+        # Which side shines: ours by the geometric normal, Mitsuba's by the shading normal.
+        raise UntranslatableError("Mesh that shines and has vertex normals", "shape")
     mi = mitsuba()
     properties = mi.Properties()
     for name, part in parts.items():

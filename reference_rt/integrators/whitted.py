@@ -105,6 +105,6 @@ def _direct_light(
     for k in range(len(choice.kind)):
         if choice.kind[k] != CONSTANT:
             sample = direct(scene, point, frame, wo, k, 0.5, 0.5)
-            if max_component(sample.contribution) > 0.0:
+            if sample.light.pdf > 0.0:
                 total = total + sample.contribution * (1.0 / sample.light.pdf)
     return total

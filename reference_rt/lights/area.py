@@ -47,7 +47,11 @@ def pdf(areas: Areas, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> float
 
 @kernel
 def emitted(areas: Areas | None, q: SurfacePoint, w: Vec3) -> Vec3:
-    """The radiance that the surface at `q` emits towards `w`."""
+    """The radiance that the surface at `q` emits towards `w`.
+
+    The front is the geometric one: a shading normal does not change where light comes from.
+    Mitsuba asks the shading normal.
+    """
     if areas is None:
         return Vec3(0.0, 0.0, 0.0)
     if q.light < 0 or dot(q.n, w) <= 0.0:

@@ -256,7 +256,10 @@ def surface(boxes: Boxes, ray: Ray, hit: Hit) -> SurfacePoint:
 @kernel
 def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
     """A point uniform over the faces, as a light for `p`; u0 picks the face and is used again."""
-    v = u0 * area
+    # Half a face's shift: the middle, u0 = 1/2, would else be where two faces of a cube meet.
+    v = u0 * area - 0.5 * boxes.face_areas[i, 0]
+    if v < 0.0:
+        v += area
     axis = 0
     while axis < 2 and v >= 2.0 * boxes.face_areas[i, axis]:
         v -= 2.0 * boxes.face_areas[i, axis]

@@ -27,20 +27,16 @@ class Mesh(Shape):
         m = transform.affine(self.transform)
         transform.invert(m)  # refuses singular maps
         data = read_mesh(folder / self.file)
-        vertices = transform.apply_points(m, data.vertices)[data.faces]
+        vertices = transform.apply_points(m, data.vertices)[data.faces].reshape(-1, 9)
         normals = None
         if data.normals is not None and not self.face_normals:
             normals = transform.apply_normals(m, data.normals)[data.faces].reshape(-1, 9)
-        triangles = triangle.soup(
-            np.ascontiguousarray(vertices.reshape(-1, 9)), normals, shape, material
-        )
-        # Without area there is no normal, but rounding alone makes rays hit: left out, where the
-        # others keep their numbers.
-        has_area = triangle.areas(triangles) > 0.0
+        # Without area there is no normal, but rounding alone makes rays hit: left out.
+        has_area = np.linalg.norm(triangle.geometric_normals(vertices), axis=1) > 0.0
         if not has_area.any():
             raise ValueError(f"mesh {folder / self.file}: no triangle has any area")
-        columns: list[Any] = [None if a is None else a[has_area] for a in triangles]
-        return triangle.Triangles(*columns)
+        normals = None if normals is None else np.ascontiguousarray(normals[has_area])
+        return triangle.soup(np.ascontiguousarray(vertices[has_area]), normals, shape, material)
 
 
 class MeshData:

@@ -25,7 +25,7 @@ from reference_rt.shapes.shape import (
     outward,
     pack,
 )
-from reference_rt.vec3 import Vec3, dot, frame_from_normal, normalize, row, to_world
+from reference_rt.vec3 import Vec3, dot, frame_from_normal, length, normalize, row, to_world
 
 
 class Sphere(Shape):
@@ -168,6 +168,13 @@ def uv(spheres: Spheres, ray: Ray, hit: Hit) -> tuple[float, float]:
 
 
 @kernel
+def is_outside(p: Vec3, center: Vec3, r: float) -> bool:
+    """Whether `p` is off the sphere by more than its own error bound: a point of the sphere itself
+    sees none of it, whatever side its rounding put it on."""
+    return length(center - p) - r > surface_error(p, center, 2.0 * r)
+
+
+@kernel
 def cone_of_sight(distance2: float, r: float) -> float:
     """1 - cos(theta_max) of the cone in which a sphere is seen, without cancellation."""
     sin2 = r * r / distance2
@@ -184,7 +191,7 @@ def sample(spheres: Spheres, i: int, p: Vec3, u0: float, u1: float) -> LightPoin
     r = spheres.radius[i]
     to_center = center - p
     distance2 = dot(to_center, to_center)
-    if distance2 <= r * r:
+    if not is_outside(p, center, r):
         return no_light_point()
     one_minus_cos_max = cone_of_sight(distance2, r)
     one_minus_cos = u0 * one_minus_cos_max
@@ -208,6 +215,6 @@ def pdf(spheres: Spheres, i: int, p: Vec3) -> float:
     to_center = row(spheres.center, i) - p
     distance2 = dot(to_center, to_center)
     r = spheres.radius[i]
-    if distance2 <= r * r:
+    if not is_outside(p, row(spheres.center, i), r):
         return 0.0
     return 0.5 / (math.pi * cone_of_sight(distance2, r))

@@ -100,6 +100,13 @@ def test_no_two_are_correlated(sampler):
         assert abs(np.corrcoef(first, other)[0, 1]) < 5 / np.sqrt(n), name
 
 
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_no_pixel_repeats_another_seeds_pixel(sampler):
+    """Pairs of 64 bits: among 2^15 a single repetition has a chance of 1 in 2^35."""
+    pairs = np.concatenate([draw(sampler(spp=1, seed=s), np.arange(1024), 0, 2) for s in range(32)])
+    assert len(np.unique(pairs, axis=0)) == len(pairs)
+
+
 def test_sobol_dimensions_are_shuffled_against_each_other():
     """Within a pixel, sample k of one pair says nothing of sample k of the next."""
     u = np.array(
