@@ -193,19 +193,20 @@ def _run_bands(
 
     step = max(1, min(pixels, SAMPLES_PER_BAND // spp))
     say("render", 0.0)
-    with ThreadPoolExecutor(threads, thread_name_prefix="band") as pool:
+    pool = ThreadPoolExecutor(threads, thread_name_prefix="band")
+    try:
         waiting = {pool.submit(run, k, min(k + step, pixels)) for k in range(0, pixels, step)}
         total = len(waiting)
-        try:
-            while waiting:
-                done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in done:
-                    future.result()
-                say("render", 1.0 - len(waiting) / total)
-        except BaseException:
-            stop.set()
-            pool.shutdown(cancel_futures=True)
-            raise
+        while waiting:
+            done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+            for future in done:
+                future.result()
+            say("render", 1.0 - len(waiting) / total)
+    except BaseException:
+        stop.set()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 __all__ = ["Picture", "Progress", "render"]

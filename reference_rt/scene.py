@@ -10,11 +10,11 @@ from typing import Any, Self
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.perspective import Perspective
 from reference_rt.description import Description
+from reference_rt.diagnosis import first_problem, line_of
 from reference_rt.errors import SceneError
 from reference_rt.film import Film
 from reference_rt.integrators import AnyIntegrator
@@ -23,8 +23,6 @@ from reference_rt.lights import AnyLight, Constant
 from reference_rt.materials import AnyMaterial, Emissive
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.shapes import AnyShape
-
-Keys = tuple[str | int, ...]
 
 
 class Scene(Description):
@@ -97,7 +95,7 @@ class Scene(Description):
         if self._source is None:
             return SceneError(message, path)
         name, text = self._source
-        return SceneError(message, path, name, _line_of(text, path))
+        return SceneError(message, path, name, line_of(text, path))
 
     @property
     def resolved_sampler(self) -> AnySampler:
@@ -150,11 +148,11 @@ class Scene(Description):
         try:
             scene = cls.model_validate(data)
         except SceneError as error:
-            line = _line_of(text, error.path)
+            line = line_of(text, error.path)
             raise SceneError(error.message, error.path, name, line) from None
         except ValidationError as error:
-            message, keys = _first_problem(error, data)
-            raise SceneError(message, keys, name, _line_of(text, keys)) from None
+            message, keys = first_problem(cls, error, data)
+            raise SceneError(message, keys, name, line_of(text, keys)) from None
         scene._folder = Path() if folder is None else folder
         scene._source = (name, text)
         return scene
@@ -195,71 +193,6 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(dict(pairs)) < len(pairs):
         raise ValueError("the same key twice")
     return dict(pairs)
-
-
-def _first_problem(error: ValidationError, data: Any) -> tuple[str, Keys]:
-    """One clear line and the keys of the culprit, from pydantic's first complaint."""
-    first = error.errors()[0]
-    keys, allowed = _keys_in(data, first["loc"])
-    message = first["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
-    if first["type"] == "extra_forbidden":
-        message = f"unknown key; expected one of: {allowed}" if allowed else "unknown key"
-    elif first["type"] == "missing":
-        message = "missing; expected a value"
-    elif first["type"] == "union_tag_not_found":
-        message = "missing 'type'; expected the name of a kind"
-    elif first["type"] == "union_tag_invalid":
-        ctx = first["ctx"]
-        message = f"unknown type '{ctx['tag']}'; expected one of: {ctx['expected_tags']}"
-    elif first["type"] in _PLAIN:
-        message = f"expected {_PLAIN[first['type']]}"
-    elif first["type"] != "value_error" and not isinstance(first["input"], dict | list):
-        message += f", got {first['input']!r}"
-    return message, keys
-
-
-_PLAIN = {
-    "model_type": "keys with values",
-    "model_attributes_type": "keys with values",
-    "dict_type": "keys with values",
-    "tuple_type": "a list",
-}
-"""What pydantic calls by the names of Python's types."""
-
-
-def _keys_in(data: Any, location: tuple[int | str, ...]) -> tuple[Keys, str]:
-    """pydantic's location without the names of union members, which are not keys of the data."""
-    keys: list[int | str] = []
-    for position, key in enumerate(location):
-        last = position == len(location) - 1
-        if isinstance(data, dict) and (key in data or (last and key != data.get("type"))):
-            keys.append(key)
-            data = data.get(key)
-        elif isinstance(data, list) and isinstance(key, int) and key < len(data):
-            keys.append(key)
-            data = data[key]
-    return tuple(keys), ""
-
-
-def _line_of(text: str, keys: Keys | tuple[str | int, ...]) -> int | None:
-    """The line, from 1, of the part at `keys`, or of the closest part around it."""
-    try:
-        node: Node | None = YAML(typ="safe", pure=True).compose(text)
-    except YAMLError:
-        return None
-    line = 1
-    for key in keys:
-        if isinstance(node, MappingNode):
-            found = [(k, v) for k, v in node.value if k.value == str(key)]
-            if not found:
-                break
-            line, node = found[0][0].start_mark.line + 1, found[0][1]
-        elif isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.value):
-            node = node.value[key]
-            line = node.start_mark.line + 1
-        else:
-            break
-    return line
 
 
 def json_schema() -> dict[str, Any]:

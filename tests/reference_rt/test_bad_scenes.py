@@ -52,7 +52,7 @@ WRONG = {
         "camera: {type: fisheye}",
         1,
         "camera",
-        "unknown type 'fisheye'; expected one of: 'perspective', 'orth",
+        "unknown type 'fisheye'; expected one of: ",
     ),
     "missing type": (
         "materials:\n  a: {reflectance: 1}",

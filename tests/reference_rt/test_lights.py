@@ -165,6 +165,31 @@ def test_something_in_the_way():
     assert not rt.render(scene).colour.any()
 
 
+def test_whitteds_area_light_is_its_middle():
+    """One point of radiance times area: L A cos cos' / r² (the area is 4 times 1.2 times 0.6)."""
+    m = transform.affine(STEPS)
+    w = m[:, 3]
+    r2 = w @ w
+    normal = np.cross(m[:, 0], m[:, 1])  # of half the edges: a quarter of the area long
+    expected = RHO / math.pi * RADIANCE * 4 * (-normal @ w) * w[1] / r2**2
+    lamp = rt.Rectangle(transform=STEPS, material="lamp")
+    scene = lit(lamp).changed(integrator=rt.Whitted(), sampler=rt.Grid())
+    # The view is 1e-9 wide.
+    assert np.allclose(rt.render(scene).colour, expected, rtol=1e-8)
+
+
+def test_whitteds_environment_is_seen_and_lights_nothing():
+    scene = rt.Scene(
+        camera=rt.Perspective(eye=(0, 0, 3), fov=60),
+        film=rt.Film(width=9, height=9),
+        integrator=rt.Whitted(),
+        shapes=(rt.Sphere(),),
+        lights=(rt.Constant(radiance=(1.0, 2.0, 3.0)),),
+    )
+    colour = rt.render(scene).colour
+    assert np.unique(colour.reshape(-1, 3), axis=0).tolist() == [[0, 0, 0], [1, 2, 3]]
+
+
 # ---- furnaces -----------------------------------------------------------------------------------
 
 

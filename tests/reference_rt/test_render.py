@@ -3,6 +3,8 @@
 import dataclasses
 import importlib
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -61,6 +63,27 @@ def test_an_error_in_progress_stops_the_render(cornell):
     with pytest.raises(KeyboardInterrupt):
         render(cornell.changed(sampler=rt.Sobol(spp=2**16)), progress=stop)
     assert threading.active_count() == before
+
+
+def test_an_interrupt_while_bands_are_handed_out(monkeypatch):
+    """Of the hundred bands that wait by then, a sleeping thread must not go on to do them all."""
+    module = importlib.import_module("reference_rt.render")
+    ran = []
+
+    class Pool(ThreadPoolExecutor):
+        def submit(self, run, begin, end):
+            if begin == 100:
+                raise KeyboardInterrupt
+            return super().submit(run, begin, end)
+
+    def band(begin, end):
+        time.sleep(0.02)
+        ran.append(begin)
+
+    monkeypatch.setattr(module, "ThreadPoolExecutor", Pool)
+    with pytest.raises(KeyboardInterrupt):
+        module._run_bands(band, (), 1000, module.SAMPLES_PER_BAND, 1, lambda what, fraction: None)
+    assert len(ran) < 50
 
 
 def test_the_shape_of_the_picture(cornell):

@@ -1,0 +1,108 @@
+"""What is wrong with a scene file, and where: pydantic's complaint as one line for people."""
+
+from collections.abc import Iterator
+from typing import Any, get_args
+
+from pydantic import ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
+
+from reference_rt.description import Description
+
+Keys = tuple[str | int, ...]
+
+_PLAIN = {
+    "model_type": "keys with values",
+    "model_attributes_type": "keys with values",
+    "dict_type": "keys with values",
+    "tuple_type": "a list",
+}
+"""What pydantic calls by the names of Python's types."""
+
+
+def first_problem(model: type[Description], error: ValidationError, data: Any) -> tuple[str, Keys]:
+    """One clear line and the keys of the culprit, from the first complaint about `data`."""
+    first = error.errors()[0]
+    location: Keys = first["loc"]
+    keys = _keys_in(data, location)
+    message = first["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
+    if first["type"] == "extra_forbidden":
+        known = _models_at(model, location[:-1])[0].model_fields
+        message = f"unknown key; expected one of: {', '.join(known)}"
+    elif first["type"] == "missing":
+        message = "missing; expected a value"
+    elif first["type"] == "union_tag_not_found":
+        message = f"missing 'type'; expected one of: {_types(_models_at(model, location))}"
+    elif first["type"] == "union_tag_invalid":
+        known_types = _types(_models_at(model, location))
+        message = f"unknown type '{first['ctx']['tag']}'; expected one of: {known_types}"
+    elif first["type"] in _PLAIN:
+        message = f"expected {_PLAIN[first['type']]}"
+    elif first["type"] != "value_error" and not isinstance(first["input"], dict | list):
+        message += f", got {first['input']!r}"
+    return message, keys
+
+
+def _keys_in(data: Any, location: Keys) -> Keys:
+    """pydantic's location without the names of union members, which are not keys of the data."""
+    keys: list[int | str] = []
+    for position, key in enumerate(location):
+        last = position == len(location) - 1
+        if isinstance(data, dict) and (key in data or (last and key != data.get("type"))):
+            keys.append(key)
+            data = data.get(key)
+        elif isinstance(data, list) and isinstance(key, int) and key < len(data):
+            keys.append(key)
+            data = data[key]
+    return tuple(keys)
+
+
+def _models_at(model: type[Description], location: Keys) -> list[type[Description]]:
+    """The descriptions that may stand at pydantic's location: several where one is to be chosen."""
+    models = [model]
+    for key in location:
+        chosen = [m for m in models if len(models) > 1 and _type_of(m) == key]
+        fields = [m.model_fields[key] for m in models if key in m.model_fields]
+        if chosen:
+            models = chosen
+        elif isinstance(key, str) and fields:
+            models = list(_descriptions_in(fields[0].annotation)) or models
+    return models
+
+
+def _descriptions_in(annotation: Any) -> Iterator[type[Description]]:
+    """The descriptions that a field's annotation names, however deep."""
+    if isinstance(annotation, type) and issubclass(annotation, Description):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _descriptions_in(part)
+
+
+def _type_of(model: type[Description]) -> Any:
+    return model.model_fields["type"].default if "type" in model.model_fields else None
+
+
+def _types(models: list[type[Description]]) -> str:
+    return ", ".join(str(_type_of(m)) for m in models)
+
+
+def line_of(text: str, keys: Keys) -> int | None:
+    """The line, from 1, of the part at `keys`, or of the closest part around it."""
+    try:
+        node: Node | None = YAML(typ="safe", pure=True).compose(text)
+    except YAMLError:
+        return None
+    line = 1
+    for key in keys:
+        if isinstance(node, MappingNode):
+            found = [(k, v) for k, v in node.value if k.value == str(key)]
+            if not found:
+                break
+            line, node = found[0][0].start_mark.line + 1, found[0][1]
+        elif isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.value):
+            node = node.value[key]
+            line = node.start_mark.line + 1
+        else:
+            break
+    return line
