@@ -20,7 +20,7 @@ from reference_rt.sampling import draw_pair, start_sample
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.tables import SceneTables, build_tables, colours
-from reference_rt.vec3 import Vec3
+from reference_rt.vec3 import row
 
 SAMPLES_PER_BAND = 1 << 15
 """A band takes some 20 ms: short enough for progress and Ctrl-C, long against the 0.1 ms that
@@ -51,8 +51,9 @@ class Picture:
 
     @property
     def nonfinite(self) -> int:
-        """Pixels of the colour with a NaN or an infinity in them."""
-        return int(np.count_nonzero(~np.isfinite(self.colour).all(axis=-1)))
+        """Pixels of the colour with a NaN, or with more than float32, which files hold, can."""
+        held = np.abs(self.colour) <= np.finfo(np.float32).max
+        return int(np.count_nonzero(~held.all(axis=-1)))
 
 
 @entry_kernel
@@ -67,13 +68,16 @@ def _render_band(
     out: FloatArray,
     begin: int,
     end: int,
+    first: int,
+    last: int,
 ) -> None:
-    """The mean of `spp` samples for the pixels begin..end, counted along rows, into out (n, 3)."""
+    """Samples first..last of the pixels begin..end, counted along rows, added to out (n, 3); with
+    the last of all `spp` samples the sum becomes the mean."""
     width, height = shape
     for pixel in range(begin, end):
         y, x = pixel // width, pixel % width
-        total = Vec3(0.0, 0.0, 0.0)
-        for sample in range(spp):
+        total = row(out, pixel)
+        for sample in range(first, last):
             sampler = start_sample(sampler_setup, pixel, sample)
             u0, u1 = draw_pair(sampler, sampling.FILM)
             dx, weight_x = film_offset(film_filter, u0)
@@ -81,9 +85,9 @@ def _render_band(
             ray = camera_ray(view, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height)
             arriving = radiance(integrator, scene, ray, sampler)
             total = total + arriving * (weight_x * weight_y)
-        out[pixel, 0] = total.x / spp
-        out[pixel, 1] = total.y / spp
-        out[pixel, 2] = total.z / spp
+        if last == spp:
+            total = total / spp
+        out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
 
 
 @entry_kernel
@@ -95,8 +99,11 @@ def _cast_band(
     out: FloatArray,
     begin: int,
     end: int,
+    first: int,
+    last: int,
 ) -> None:
-    """Colour, distance, normal and id at the centres of the pixels begin..end, into out (n, 8)."""
+    """Colour, distance, normal and id at the centres of the pixels begin..end, into out (n, 8);
+    `first` and `last`, which samples, are there for the likeness to `_render_band`."""
     width, height = shape
     for pixel in range(begin, end):
         y, x = pixel // width, pixel % width
@@ -140,7 +147,7 @@ def render(
         setups = (integrator.setup(), tables, view, film.filter.setup(), sampler.setup())
         band, arguments = _render_band, (*setups, shape, spp, out)
     say("compile", 0.0)
-    precompile(band, *arguments, 0, 0)
+    precompile(band, *arguments, 0, 0, 0, 0)
     say("compile", 1.0)
     clock.append(time.perf_counter())
     _run_bands(band, arguments, pixels, spp, threads or os.cpu_count() or 1, say)
@@ -188,8 +195,10 @@ def _run_bands(
         # In plain Python (NUMBA_DISABLE_JIT=1) NumPy would warn of the infinities that IEEE
         # division and wrapping hashes are meant to make.
         with np.errstate(all="ignore"):
-            if not stop.is_set():
-                band(*arguments, begin, end)
+            for first in range(0, spp, SAMPLES_PER_BAND):
+                if stop.is_set():
+                    return
+                band(*arguments, begin, end, first, min(first + SAMPLES_PER_BAND, spp))
 
     step = max(1, min(pixels, SAMPLES_PER_BAND // spp))
     say("render", 0.0)

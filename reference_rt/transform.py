@@ -79,7 +79,7 @@ def invert(m: Affine) -> Affine:
     linear = m[:, :3]
     # Row scaling removes the units of each axis: what is left of the condition number beyond 1/u
     # means that the rows are dependent to within float64's own rounding.
-    norms = np.linalg.norm(linear, axis=1)
+    norms = np.abs(linear).max(axis=1)
     if not (np.all(np.isfinite(m)) and np.all(norms > 0.0)):
         raise ValueError("the transform is singular: it flattens space")
     if np.linalg.cond(linear / norms[:, None]) > 2.0**52:

@@ -114,12 +114,6 @@ def test_sphere_points_lie_on_it_and_are_the_right_root():
 # ---- flat shapes --------------------------------------------------------------------------------
 
 
-def expected_rectangle(center, x_edge, y_edge, o, d):
-    """(t, x, y) of the plane, exact; None where parallel."""
-    found = solve([q(x_edge), q(y_edge), [-x for x in q(d)]], sub(q(o), q(center)))
-    return None if found is None else (found[2], found[0], found[1])
-
-
 @pytest.mark.parametrize("kind", ["rectangle", "triangle"])
 def test_flat_shapes(kind):
     """Hit or miss by the exact coordinates in the plane, away from the edge by their rounding;
@@ -140,16 +134,13 @@ def test_flat_shapes(kind):
     found = probe(tables, {"rectangle": RECTANGLE, "triangle": TRIANGLE}[kind], rows, o, d)
     hits = 0
     for i in range(N):
-        if kind == "rectangle":
-            exact = expected_rectangle(anchor[i], e0[i], e1[i], o[i], d[i])
-        else:
-            a, b, c = (q(x) for x in v[i])
-            solved = solve([sub(b, a), sub(c, a), [-x for x in q(d[i])]], sub(q(o[i]), a))
-            exact = None if solved is None else (solved[2], solved[0], solved[1])
+        corners = [q(x) for x in v[i]] if kind == "triangle" else None
+        edges = [sub(c, corners[0]) for c in corners[1:]] if corners else [q(e0[i]), q(e1[i])]
+        exact = solve([*edges, [-x for x in q(d[i])]], sub(q(o[i]), q(anchor[i])))
         if exact is None:
             assert np.isinf(found.t[i])
             continue
-        t, x, y = exact
+        x, y, t = exact
         n = np.cross(e0[i], e1[i])
         cosine = abs(n @ d[i]) / (np.linalg.norm(n) * np.linalg.norm(d[i]))
         reach = np.linalg.norm(o[i] - anchor[i]) + np.linalg.norm(e0[i]) + np.linalg.norm(e1[i])
