@@ -1,4 +1,4 @@
-"""Writes the meshes that the scenes use: `python scenes/make_meshes.py` gives the same bytes always."""
+"""Writes the meshes of the scenes: `python scenes/make_meshes.py` gives the same bytes always."""
 
 import math
 from pathlib import Path
