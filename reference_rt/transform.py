@@ -96,6 +96,7 @@ def apply_points(m: Affine, points: npt.NDArray[np.float64]) -> npt.NDArray[np.f
 def apply_normals(m: Affine, normals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """(n, 3) unit normals, mapped by the inverse transpose and made unit again."""
     mapped = normals @ invert(m)[:, :3]
+    mapped /= np.abs(mapped).max(axis=1, keepdims=True)  # squares of extreme scales overflow
     return np.asarray(mapped / np.linalg.norm(mapped, axis=1, keepdims=True))
 
 

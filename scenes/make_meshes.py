@@ -42,7 +42,7 @@ def torus_knot(p: int, q: int, around: int, along: int, tube: float) -> tuple[Ar
     i, j = np.meshgrid(np.arange(along), np.arange(around), indexing="ij")
     i2, j2 = (i + 1) % along, (j + 1) % around
     c00, c10, c01, c11 = i * around + j, i2 * around + j, i * around + j2, i2 * around + j2
-    faces = np.stack([c00, c10, c11, c00, c11, c01], axis=-1).reshape(-1, 3)
+    faces = np.stack([c00, c11, c10, c00, c01, c11], axis=-1).reshape(-1, 3)
     return vertices.reshape(-1, 3), normals.reshape(-1, 3), faces
 
 

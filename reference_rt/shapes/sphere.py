@@ -37,9 +37,10 @@ class Sphere(Shape):
 
     def tabulate(self, shape: int, material: int, folder: Path) -> "Spheres":
         m = transform.affine(self.transform)
-        linear = m[:, :3]
-        factor = math.sqrt(max(0.0, float(np.trace(linear.T @ linear))) / 3.0)
         transform.invert(m)  # refuses singular maps
+        size = np.abs(m[:, :3]).max()  # kept apart: squares of extreme scales overflow
+        linear = m[:, :3] / size
+        factor = math.sqrt(float(np.trace(linear.T @ linear)) / 3.0)
         # A similarity has A^T A = s² 1; each entry of the product rounds at most 8 times.
         if np.max(np.abs(linear.T @ linear - factor**2 * np.eye(3))) > 8e-16 * 4 * factor**2:
             raise ValueError(
@@ -48,7 +49,7 @@ class Sphere(Shape):
             )
         return Spheres(
             center=transform.apply_points(m, np.array([self.center])),
-            radius=np.array([self.radius * factor]),
+            radius=np.array([self.radius * factor * size]),
             to_local=np.asarray(np.linalg.inv(linear / factor), np.float64).reshape(1, 9),
             owner=np.array([shape]),
             material=np.array([material]),
