@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from reference_rt.cli import adjusted, guarded
+from reference_rt.errors import ReferenceUnavailableError
 from reference_rt.scene import Scene
 
 
@@ -32,8 +33,13 @@ def compare(
 ) -> None:
     """Render scenes here and in Mitsuba, and say whether they agree."""
     # Imported here: `reference-rt render` must not wait for what only comparing needs.
-    from comparisons.compare import Options, compare_scenes
-    from comparisons.verdict import exit_code
+    try:
+        from comparisons.compare import Options, compare_scenes
+        from comparisons.verdict import exit_code
+    except ModuleNotFoundError as error:
+        raise ReferenceUnavailableError(
+            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
+        ) from None
 
     descriptions = [adjusted(Scene.load(path), spp, size, None, seed) for path in scenes]
     cases = compare_scenes(descriptions, out, Options(replicates, threads))
