@@ -7,14 +7,14 @@ from reference_rt import shapes as any_shape
 from reference_rt.bvh import FAR_SLACK, STACK_SIZE, Bvh
 from reference_rt.kernel import kernel, local_floats, local_integers, reciprocal
 from reference_rt.ray import Hit, Ray, no_hit
-from reference_rt.shapes import Shapes, box, rectangle, sphere, triangle
+from reference_rt.shapes import Shapes, triangle
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.shapes.triangle import shear_of
 from reference_rt.vec3 import Vec3
 
 
 class Packets(NamedTuple):
-    """Shapes as `intersect_all` takes them, where no hierarchy leads to them; else None."""
+    """Shapes as `nearest_of` takes them, where no hierarchy leads to them; else None."""
 
     spheres: FloatArray | None
     rectangles: FloatArray | None
@@ -50,9 +50,9 @@ def _trace(bvh: Bvh | None, shapes: Shapes, packets: Packets, ray: Ray, any_hit:
     if bvh is not None:
         return _traverse(bvh, shapes, ray, any_hit, closest)
     # For a few shapes, asking after each whether the ray is done costs more than testing the rest.
-    closest = sphere.intersect_all(shapes.spheres, packets.spheres, ray, closest)
-    closest = rectangle.intersect_all(shapes.rectangles, packets.rectangles, ray, closest)
-    closest = box.intersect_all(shapes.boxes, packets.boxes, ray, closest)
+    closest = any_shape.nearest_of(shapes.spheres, packets.spheres, ray, closest)
+    closest = any_shape.nearest_of(shapes.rectangles, packets.rectangles, ray, closest)
+    closest = any_shape.nearest_of(shapes.boxes, packets.boxes, ray, closest)
     return triangle.intersect_all(shapes.triangles, ray, closest)
 
 

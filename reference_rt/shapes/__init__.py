@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from reference_rt.kernel import kernel
+from reference_rt.kernel import ByClass, kernel, local_floats
 from reference_rt.ray import Hit, Ray, SurfacePoint
 from reference_rt.shapes import box, rectangle, sphere, triangle
 from reference_rt.shapes.box import Box, Boxes
@@ -17,11 +17,14 @@ from reference_rt.shapes.mesh import Mesh
 from reference_rt.shapes.rectangle import Rectangle, Rectangles
 from reference_rt.shapes.shape import (
     BOX,
+    LANES,
     RECTANGLE,
     SPHERE,
     TRIANGLE,
+    FloatArray,
     IntArray,
     LightPoint,
+    nearest_lane,
     no_light_point,
     solid_angle_pdf,
 )
@@ -48,6 +51,32 @@ TABLES: tuple[tuple[int, str, type, Any], ...] = (
     (TRIANGLE, "triangles", Triangles, triangle),
 )
 """(code, field of Shapes, table, module with `bounds` and `areas`), in the order of the codes."""
+
+# Shapes that are tested side by side where there is no hierarchy; triangles come in meshes.
+_lane_distance, _found = ByClass("lane_distance"), ByClass("found")
+for _table, _module in ((Spheres, sphere), (Rectangles, rectangle), (Boxes, box)):
+    _lane_distance.register(_table, _module.lane_distance)
+    _found.register(_table, _module.found)
+lane_distance, found = _lane_distance.function, _found.function
+
+
+@kernel
+def nearest_of(table: Any, packets: FloatArray | None, ray: Ray, closest: Hit) -> Hit:
+    """The nearest of `closest` and all shapes of a table, from their packets."""
+    if table is None:
+        return closest
+    if packets is None:
+        return closest
+    distances = local_floats(LANES)
+    best, t = -1, closest.t
+    for k in range(len(packets)):
+        for lane in range(LANES):
+            distances[lane] = lane_distance(table, packets, k, lane, ray)
+        best, t = nearest_lane(distances, k, best, t)
+    if best < 0:
+        return closest
+    nearest: Hit = found(table, best, ray, t)
+    return nearest
 
 
 @kernel
@@ -231,6 +260,7 @@ __all__ = [
     "Sphere",
     "Triangle",
     "intersect",
+    "nearest_of",
     "owner",
     "pdf",
     "sample",

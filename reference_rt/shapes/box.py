@@ -7,18 +7,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt import transform
-from reference_rt.kernel import kernel, local_floats
+from reference_rt.kernel import kernel
 from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.shapes.shape import (
     BOX,
-    LANES,
     Bounds,
     FloatArray,
     IntArray,
     LightPoint,
     Shape,
     lane_vector,
-    nearest_lane,
     outward,
     pack,
     solid_angle_pdf,
@@ -182,27 +180,15 @@ def intersect(boxes: Boxes, i: int, ray: Ray, closest: Hit) -> Hit:
 
 
 @kernel
-def intersect_all(boxes: Boxes | None, packets: FloatArray | None, ray: Ray, closest: Hit) -> Hit:
-    """The nearest of `closest` and all boxes, from their packets (see `pack_all`)."""
-    if boxes is None:
-        return closest
-    if packets is None:
-        return closest
-    distances = local_floats(LANES)
-    best, t = -1, closest.t
-    for k in range(len(packets)):
-        for lane in range(LANES):
-            distances[lane] = distance(
-                ray,
-                lane_vector(packets, k, 0, lane),
-                lane_vector(packets, k, 3, lane),
-                lane_vector(packets, k, 6, lane),
-                lane_vector(packets, k, 9, lane),
-            )
-        best, t = nearest_lane(distances, k, best, t)
-    if best < 0:
-        return closest
-    return found(boxes, best, ray, t)
+def lane_distance(boxes: Boxes, packets: FloatArray, k: int, lane: int, ray: Ray) -> float:
+    """`distance` for one lane of packet k of `pack_all`."""
+    return distance(
+        ray,
+        lane_vector(packets, k, 0, lane),
+        lane_vector(packets, k, 3, lane),
+        lane_vector(packets, k, 6, lane),
+        lane_vector(packets, k, 9, lane),
+    )
 
 
 @kernel

@@ -8,11 +8,10 @@ import numpy as np
 
 from reference_rt import transform
 from reference_rt.description import Positive, Vector
-from reference_rt.kernel import kernel, local_floats
+from reference_rt.kernel import kernel
 from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.sampling.warp import on_circle
 from reference_rt.shapes.shape import (
-    LANES,
     SPHERE,
     Bounds,
     FloatArray,
@@ -20,7 +19,6 @@ from reference_rt.shapes.shape import (
     LightPoint,
     Shape,
     lane_vector,
-    nearest_lane,
     no_light_point,
     outward,
     pack,
@@ -119,27 +117,9 @@ def intersect(spheres: Spheres, i: int, ray: Ray, closest: Hit) -> Hit:
 
 
 @kernel
-def intersect_all(
-    spheres: Spheres | None, packets: FloatArray | None, ray: Ray, closest: Hit
-) -> Hit:
-    """The nearest of `closest` and all spheres, from their packets (see `pack_all`)."""
-    if spheres is None:
-        return closest
-    if packets is None:
-        return closest
-    distances = local_floats(LANES)
-    best, t = -1, closest.t
-    for k in range(len(packets)):
-        for lane in range(LANES):
-            distances[lane] = distance(
-                ray,
-                lane_vector(packets, k, 0, lane),
-                packets[k, 3, lane],
-            )
-        best, t = nearest_lane(distances, k, best, t)
-    if best < 0:
-        return closest
-    return found(spheres, best, ray, t)
+def lane_distance(spheres: Spheres, packets: FloatArray, k: int, lane: int, ray: Ray) -> float:
+    """`distance` for one lane of packet k of `pack_all`."""
+    return distance(ray, lane_vector(packets, k, 0, lane), packets[k, 3, lane])
 
 
 @kernel
