@@ -35,13 +35,13 @@ class ProgressLine:
             TimeRemainingColumn(),
             console=self._console,
             transient=True,
-            disable=not self._console.is_terminal,
         )
         self._tasks: dict[str, TaskID] = {}
         self._started: dict[str, float] = {}
 
     def __enter__(self) -> Self:
-        self._bar.start()
+        if self._console.is_terminal:
+            self._bar.start()
         return self
 
     def __exit__(
@@ -50,7 +50,8 @@ class ProgressLine:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._bar.stop()
+        if self._console.is_terminal:
+            self._bar.stop()
 
     def __call__(self, what: str, fraction: float) -> None:
         words = _WORDS.get(what, what)
