@@ -5,13 +5,14 @@ rungs before them decide about it.
 """
 
 import math
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from skimage.metrics import structural_similarity
 
 from comparisons.results import FloatArray, Metrics
+from reference_rt.image import srgb
 
 WHITE_PERCENTILE = 99.0
 """The brightest percent of the lit values (lamps, highlights) may clip; the rest is resolved."""
@@ -88,9 +89,7 @@ def white_level(reference: FloatArray) -> float:
 def encode(image: FloatArray, white: float) -> FloatArray:
     """Linear radiance to sRGB in [0, 1] (IEC 61966-2-1), with `white` mapped to 1 and clipped."""
     # Clipping before the division: a picture far brighter than `white` cannot overflow.
-    linear = np.clip(image, 0.0, white) / white
-    curve = 1.055 * linear ** (1.0 / 2.4) - 0.055
-    return cast(FloatArray, np.where(linear <= 0.0031308, 12.92 * linear, curve))
+    return srgb(np.clip(image, 0.0, white) / white)
 
 
 def _ssim(a: FloatArray, b: FloatArray) -> float:
@@ -119,4 +118,4 @@ def ratio(x: FloatArray, y: FloatArray) -> FloatArray:
     # Divides by one where y is zero, so that no warning has to be silenced.
     quotient = x / np.where(y == 0.0, 1.0, y)
     of_nothing = np.where(x == 0.0, 0.0, np.copysign(np.inf, x))
-    return cast(FloatArray, np.where(y == 0.0, of_nothing, quotient))
+    return np.asarray(np.where(y == 0.0, of_nothing, quotient))

@@ -19,8 +19,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from PIL import Image
 
 from comparisons.metrics import encode, nonfinite_pixels, white_level
-from comparisons.report.results_json import write_atomically
 from comparisons.results import RUNGS, Case, FloatArray, Images, Metrics, Status
+from reference_rt.files import replacing
 
 ORDER: tuple[Status, ...] = (
     "invalid",
@@ -106,7 +106,8 @@ def write_report(path: Path, cases: Sequence[Case], provenance: Mapping[str, Any
         provenance=provenance,
         cases=[_view(case) for case in ranked],
     )
-    write_atomically(path, page)
+    with replacing(path) as temporary:
+        temporary.write_text(page, encoding="utf-8", newline="\n")
 
 
 def shown(value: Any, name: str = "") -> str:

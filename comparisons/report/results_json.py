@@ -2,7 +2,6 @@
 
 import json
 import math
-import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.results import Case, Tier
+from reference_rt.files import replacing
 
 SCHEMA = 1
 """Raised whenever a reader of the former layout would misread the new one."""
@@ -34,20 +34,9 @@ def write_results(path: Path, cases: Sequence[Case], provenance: Mapping[str, An
         "provenance": _plain(provenance),
         "cases": [_case(case) for case in cases],
     }
-    write_atomically(path, json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Write a UTF-8 file so that a reader sees the old one or the whole new one, never a part."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    # In the same folder, since a rename is atomic within one file system only.
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
-    try:
-        with temporary.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _case(case: Case) -> dict[str, Any]:
