@@ -3,6 +3,7 @@
 import functools
 import importlib.metadata
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -188,8 +189,11 @@ def _add_commands() -> None:
 
 def main() -> None:
     """The `reference-rt` program."""
-    _add_commands()
-    app()
+    try:
+        _add_commands()
+        app()
+    except KeyboardInterrupt:  # before or after a command, which has its own answer
+        sys.exit(130)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from reference_rt.materials import TABLES as MATERIAL_TABLES
 from reference_rt.sampling import Grid
 from reference_rt.scene import Scene
 from reference_rt.shapes import TABLES as SHAPE_TABLES
-from reference_rt.tables import BVH_FROM, SceneTables
+from reference_rt.tables import SceneTables
 
 Lines = list[tuple[str, str]]
 
@@ -41,7 +41,7 @@ def _hierarchy(tables: SceneTables, used: Lines, left_out: Lines) -> None:
     shapes = tables.geometry.shapes
     count = sum(len(table.owner) for table in shapes if table is not None)
     if hierarchy is None:
-        reason = f"{count} primitives: below {BVH_FROM} testing all side by side is as fast"
+        reason = f"{count} primitives: testing a few one after another is faster"
         left_out.append(("hierarchy", reason))
         return
     size = sum(a.nbytes for a in hierarchy)
