@@ -16,11 +16,13 @@ _SMALLEST = float(np.finfo(np.float32).tiny)
 
 
 class FixedPoint(NamedTuple):
-    """A primitive that is seen as its point p, with unit normal n and an area: (3,), (3,), 1."""
+    """A primitive that is seen as its point p, with unit normal n and an area: (3,), (3,), 1; shape
+    is Mitsuba's object.  Which side shines is the emitter's to say."""
 
     p: Any
     n: Any
     area: Any
+    shape: Any
 
     def seen_from(self, mi: Any, dr: Any, p: Any) -> tuple[Any, Any]:
         """The point, and the solid angle that it stands for: area cos / distance²."""
@@ -36,6 +38,7 @@ class SphereLight(NamedTuple):
 
     center: Any
     radius: Any
+    shape: Any
 
     def seen_from(self, mi: Any, dr: Any, p: Any) -> tuple[Any, Any]:
         """The point in the middle of the cone of sight's cosines, and the cone's solid angle.
@@ -61,7 +64,23 @@ class SphereLight(NamedTuple):
         return p + d * along, solid_angle
 
 
-LightPoint = FixedPoint | SphereLight
+class BoxPoint(NamedTuple):
+    """The point of a box: on one of its faces, which is not seen from behind; a ray towards it from
+    there would end on another face, and near an edge as good as where it should."""
+
+    face: FixedPoint
+
+    @property
+    def shape(self) -> Any:
+        return self.face.shape
+
+    def seen_from(self, mi: Any, dr: Any, p: Any) -> tuple[Any, Any]:
+        """As `FixedPoint.seen_from`, 0 from behind the face."""
+        point, solid_angle = self.face.seen_from(mi, dr, p)
+        return point, dr.select(dr.dot(p - self.face.p, self.face.n) > 0.0, solid_angle, 0.0)
+
+
+LightPoint = FixedPoint | BoxPoint | SphereLight
 
 
 def light_points(mi: Any, scene: Any) -> list[LightPoint]:
@@ -79,17 +98,21 @@ def _points_of(mi: Any, shape: Any) -> list[LightPoint]:
     if kind == "Sphere":
         m = _to_world(mi, shape)
         return [
-            SphereLight(mi.Point3f(m[:3, 3].tolist()), mi.Float(float(np.linalg.norm(m[:3, 0]))))
+            SphereLight(
+                mi.Point3f(m[:3, 3].tolist()), mi.Float(float(np.linalg.norm(m[:3, 0]))), shape
+            )
         ]
     if kind == "Rectangle":
         m = _to_world(mi, shape)
-        return [_fixed(mi, m[:3, 3], 4.0 * np.cross(m[:3, 0], m[:3, 1]))]
+        return [_fixed(mi, shape, m[:3, 3], 4.0 * np.cross(m[:3, 0], m[:3, 1]))]
     values = mi.traverse(shape)
     vertices = np.array(values["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     if kind == "Cube":
-        return [_box_point(mi, vertices)]
+        return [_box_point(mi, shape, vertices)]
     corners = vertices[np.array(values["faces"]).reshape(-1, 3)]
-    return [_triangle_point(mi, triangle) for triangle in corners if _double_area(triangle) > 0.0]
+    return [
+        _triangle_point(mi, shape, triangle) for triangle in corners if _double_area(triangle) > 0.0
+    ]
 
 
 def _to_world(mi: Any, shape: Any) -> FloatArray:
@@ -101,20 +124,22 @@ def _double_area(corners: FloatArray) -> float:
     return float(np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0])))
 
 
-def _fixed(mi: Any, p: FloatArray, area: FloatArray) -> FixedPoint:
+def _fixed(mi: Any, shape: Any, p: FloatArray, area: FloatArray) -> FixedPoint:
     """`area` (3,): the normal, as long as the area."""
     size = float(np.linalg.norm(area))
-    return FixedPoint(mi.Point3f(p.tolist()), mi.Vector3f((area / size).tolist()), mi.Float(size))
+    return FixedPoint(
+        mi.Point3f(p.tolist()), mi.Vector3f((area / size).tolist()), mi.Float(size), shape
+    )
 
 
-def _triangle_point(mi: Any, corners: FloatArray) -> FixedPoint:
+def _triangle_point(mi: Any, shape: Any, corners: FloatArray) -> FixedPoint:
     """Turk's square root warp: barycentrics sqrt(1/2) / 2 of the second and the third corner."""
     b = 0.5 * math.sqrt(0.5)
     p = corners[0] * (1.0 - 2.0 * b) + (corners[1] + corners[2]) * b
-    return _fixed(mi, p, 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0]))
+    return _fixed(mi, shape, p, 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0]))
 
 
-def _box_point(mi: Any, vertices: FloatArray) -> FixedPoint:
+def _box_point(mi: Any, shape: Any, vertices: FloatArray) -> "BoxPoint":
     """Half way through the list -x +x -y +y -z +z of faces, each as long as its area, begun half
     of the first face's length before it."""
     center = vertices.mean(axis=0)
@@ -133,7 +158,7 @@ def _box_point(mi: Any, vertices: FloatArray) -> FixedPoint:
     first = edges[1 if axis == 0 else 0]
     p = center + edges[axis] * sign + first * (2.0 * min(rest, 1.0) - 1.0)
     n = normals[axis] / np.linalg.norm(normals[axis])
-    return _fixed(mi, p, n * 2.0 * float(face_areas.sum()))
+    return BoxPoint(_fixed(mi, shape, p, n * sign * 2.0 * float(face_areas.sum())))
 
 
 def _half_edges(vertices: FloatArray) -> FloatArray:

@@ -164,11 +164,19 @@ def register(mi: Any) -> None:
                 # begun off its line, the ray meets a surface seen edge-on somewhere else.
                 missing = dr.norm(target - si.p) * (1.0 - mi.math.ShadowEpsilon) - found.t
                 near = missing * dr.abs(dr.dot(ray.d, found.n)) <= 2.0 * height
-                visible = active & found.is_valid() & near
+                visible = active & found.is_valid() & near & self.is_shape(found, light.shape)
                 radiance = emitted(mi, scene, found, visible)
                 total += dr.select(visible, value * radiance * solid_angle, 0.0)
                 dr.eval(total)
             return total
+
+        @staticmethod
+        def is_shape(found: Any, shape: Any) -> Any:
+            """Whether a ray met this very shape: another may stand within the tolerance before it,
+            and shine too."""
+            if _is_wide(mi):
+                return found.shape == mi.ShapePtr(shape)
+            return found.shape is shape
 
         def aov_names(self) -> list[str]:
             return []
