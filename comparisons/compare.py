@@ -20,6 +20,7 @@ from comparisons.report import write_report, write_results
 from comparisons.results import Case, Tier
 from comparisons.statistics import compare_replicates
 from comparisons.translate import UntranslatableError, load
+from comparisons.twin import Twin
 from comparisons.verdict import decide
 from reference_rt.film import BoxFilter
 from reference_rt.integrators import Path as PathTracing
@@ -77,7 +78,7 @@ def compare_scene(
     scene = scene.changed(film=scene.film.model_copy(update={"filter": BoxFilter()}))
     clock = time.perf_counter()
     try:
-        mi_scene = load(scene)
+        twin = load(scene)
     except UntranslatableError as error:
         tier = Tier("geometry", "not-comparable", str(error))
         seconds = {"ours": {"load": load_seconds}, "mitsuba": {}}
@@ -86,8 +87,13 @@ def compare_scene(
         "ours": {"load": load_seconds},
         "mitsuba": {"load": time.perf_counter() - clock},
     }
-    rungs = _deterministic_rungs(scene, tables, mi_scene, console)
-    rendered, more = _pictures(scene, tables, mi_scene, options, console)
+    rungs = _deterministic_rungs(scene, tables, twin, console)
+    notes += twin.notes()
+    if twin.lacking and not isinstance(scene.integrator, RayCast):
+        rungs += [Tier(name, "not-comparable", twin.lacking) for name in ("statistics", "images")]
+        verdict, reason = decide(rungs, None)
+        return Case(scene.name, verdict, reason, tuple(rungs), None, seconds, None, tuple(notes))
+    rendered, more = _pictures(scene, tables, twin, options, console)
     rungs += more
     for side, times in rendered.seconds.items():
         seconds[side] |= times
@@ -107,7 +113,7 @@ def compare_scene(
 
 
 def _deterministic_rungs(
-    scene: Scene, tables: SceneTables, mi_scene: Any, console: Console
+    scene: Scene, tables: SceneTables, twin: Twin, console: Console
 ) -> list[Tier]:
     """Geometry, then light, each only where the rung before it holds: a convention that is wrong
     below must not be reported as light that is wrong above."""
@@ -122,10 +128,12 @@ def _deterministic_rungs(
             tier = Tier(name, "not-applicable", f"the {broken.name} rung below is broken")
         elif name != "geometry" and isinstance(scene.integrator, RayCast):
             tier = Tier(name, "not-applicable", _NO_LIGHT)
+        elif name != "geometry" and twin.lacking:
+            tier = Tier(name, "not-comparable", twin.lacking)
         else:
             with console.status(f"{scene.name}: {name}"):
                 start = time.perf_counter()
-                tier = climb(scene, tables, mi_scene)
+                tier = climb(scene, tables, twin)
                 seconds = time.perf_counter() - start
             console.print(f"{scene.name}: {name}: {tier.status} ({seconds:.1f} s)", markup=False)
         found.append(tier)
@@ -133,7 +141,7 @@ def _deterministic_rungs(
 
 
 def _pictures(
-    scene: Scene, tables: SceneTables, mi_scene: Any, options: Options, console: Console
+    scene: Scene, tables: SceneTables, twin: Twin, options: Options, console: Console
 ) -> tuple[pictures.Rendered, list[Tier]]:
     """The pictures of both sides, and the statistics where there is noise."""
     with console.status(f"{scene.name}: pictures") as status:
@@ -142,12 +150,12 @@ def _pictures(
             status.update(f"{scene.name}: {step}")
 
         if isinstance(scene.integrator, RayCast):
-            rendered = pictures.cast(scene, tables, mi_scene)
+            rendered = pictures.cast(scene, tables, twin)
         elif not isinstance(scene.integrator, PathTracing):
-            rendered = pictures.whitted(scene, tables, mi_scene)
+            rendered = pictures.whitted(scene, tables, twin)
         else:
             rendered = pictures.replicates(
-                scene, tables, mi_scene, options.replicates, options.threads, say
+                scene, tables, twin, options.replicates, options.threads, say
             )
     if rendered.replicates is None:
         return rendered, [Tier("statistics", "not-applicable", "deterministic: there is no noise")]

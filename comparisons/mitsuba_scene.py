@@ -5,14 +5,13 @@ are passed to `for_rays` are written once for both.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from comparisons.mitsuba_backend import mitsuba
-from reference_rt.query import Intersections
 from reference_rt.shapes.shape import FloatArray, IntArray
 
 _SHAPE = "shape_"
@@ -24,21 +23,9 @@ def shape_id(i: int) -> str:
     return f"{_SHAPE}{i}"
 
 
-def shape_index(name: str) -> int:
-    """Our index of Mitsuba's shape."""
-    return int(name.removeprefix(_SHAPE))
-
-
 def light_id(i: int) -> str:
     """Mitsuba's id of entry i of our scene's lights."""
     return f"{_LIGHT}{i}"
-
-
-class SensorRays(NamedTuple):
-    """Origins and unit directions (n, 3)."""
-
-    o: FloatArray
-    d: FloatArray
 
 
 class Replicates(NamedTuple):
@@ -89,62 +76,84 @@ def _array(value: Any, n: int) -> npt.NDArray[Any]:
     return np.broadcast_to(array, (*array.shape[:-1], n)).T.copy()
 
 
-def sensor_rays(mi_scene: Any, x: FloatArray, y: FloatArray) -> SensorRays:
-    """The rays of the scene's sensor through film points, in pixels from the top left corner.
+class Hits(NamedTuple):
+    """What rays hit in a Mitsuba scene.
 
-    Origins lie on the near plane.
+    t (n,), inf for a miss;  which (n,): number of the id among those asked for, -1 for a miss;
+    prim (n,): Mitsuba's prim_index;  p, n, ns (n, 3), uv (n, 2).
     """
-    mi = mitsuba()
-    sensor = mi_scene.sensors()[0]
-    width, height = (int(s) for s in sensor.film().crop_size())
 
-    def ray(u: Any, v: Any) -> tuple[Any, ...]:
-        found, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(u, v), mi.Point2f(0.5, 0.5))
-        return found.o, found.d
+    t: FloatArray
+    which: IntArray
+    prim: IntArray
+    p: FloatArray
+    n: FloatArray
+    ns: FloatArray
+    uv: FloatArray
 
-    return SensorRays(*for_rays(ray, x / width, y / height))
 
+def first_hits(mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArray) -> Hits:
+    """What Mitsuba hits first; `ids` are the numbers of its shapes, of an instance its own.
 
-def trace(mi_scene: Any, o: FloatArray, d: FloatArray) -> Intersections:
-    """What Mitsuba hits first, in the same record as `reference_rt.query.intersect` returns.
-
-    `face` is Mitsuba's prim_index: a triangle's number in its mesh, of no meaning elsewhere.
     Mitsuba sees the rays rounded to float32.
     """
     mi = mitsuba()
-    number = _shape_numbers(mi_scene)
+    number = _shape_numbers(ids)
 
     def hit(origin: Any, direction: Any) -> tuple[Any, ...]:
         si = mi_scene.ray_intersect(mi.Ray3f(mi.Point3f(origin), direction))
         return si.t, number(si), si.prim_index, si.p, si.n, si.sh_frame.n, si.uv
 
-    t, shape, face, p, n, ns, uv = for_rays(hit, o, d)
-    shape = _decode_shapes(mi_scene, shape)
-    missed = shape < 0
-    for array in (face, p, n, ns, uv):
+    t, number_found, prim, p, n, ns, uv = for_rays(hit, o, d)
+    which = _decoded(mi_scene, ids, number_found)
+    missed = which < 0
+    for array in (prim, p, n, ns, uv):
         array[missed] = 0
-    return Intersections(
-        t=np.where(missed, np.inf, t),
-        shape=shape,
-        face=np.where(missed, -1, face.astype(np.int64)),
-        p=p,
-        n=n,
-        ns=ns,
-        uv=uv,
-    )
+    return Hits(np.where(missed, np.inf, t), which, prim.astype(np.int64), p, n, ns, uv)
 
 
-def _shape_numbers(mi_scene: Any) -> Callable[[Any], Any]:
-    """How to tell the shape of a hit: its index in scalar variants, its registry id otherwise."""
+def first_distances(
+    mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArray
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """t, which and prim of `first_hits`, without asking the shapes for more.
+
+    For a scene of many instances: each is asked about every shape there is, so that compiling takes
+    time by the square of their number (25 s for a thousand).
+    """
+    mi = mitsuba()
+    number = _shape_numbers(ids)
+
+    def hit(origin: Any, direction: Any) -> tuple[Any, ...]:
+        found = mi_scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), direction))
+        return found.t, number(found), found.prim_index
+
+    t, number_found, prim = for_rays(hit, o, d)
+    which = _decoded(mi_scene, ids, number_found)
+    return np.where(which < 0, np.inf, t), which, prim.astype(np.int64)
+
+
+def _shape_numbers(ids: Mapping[str, int]) -> Callable[[Any], Any]:
+    """How to tell the shape, or instance, of a hit: its number in scalar variants, its registry id
+    otherwise."""
     mi = mitsuba()
     if mi.variant().startswith("scalar"):
-        return lambda si: -1 if si.shape is None else shape_index(si.shape.id())
+
+        def number(hit: Any) -> int:
+            met = hit.shape if hit.instance is None else hit.instance
+            return -1 if met is None else ids[met.id()]
+
+        return number
     import drjit as dr
 
-    return lambda si: dr.reinterpret_array(mi.UInt32, si.shape)
+    def registry_id(hit: Any) -> Any:
+        shape = dr.reinterpret_array(mi.UInt32, hit.shape)
+        instance = dr.reinterpret_array(mi.UInt32, hit.instance)
+        return dr.select(instance != 0, instance, shape)
+
+    return registry_id
 
 
-def _decode_shapes(mi_scene: Any, numbers: npt.NDArray[Any]) -> IntArray:
+def _decoded(mi_scene: Any, ids: Mapping[str, int], numbers: npt.NDArray[Any]) -> IntArray:
     mi = mitsuba()
     if mi.variant().startswith("scalar"):
         return numbers.astype(np.int64)
@@ -153,7 +162,7 @@ def _decode_shapes(mi_scene: Any, numbers: npt.NDArray[Any]) -> IntArray:
     registered = np.array(dr.reinterpret_array(mi.UInt32, mi_scene.shapes_dr()))
     ours = np.full(int(max(registered, default=0)) + 1, -1)  # 0 is Mitsuba's "no shape"
     for registry_id, shape in zip(registered, mi_scene.shapes(), strict=True):
-        ours[registry_id] = shape_index(shape.id())
+        ours[registry_id] = ids[shape.id()]
     return np.asarray(ours[numbers])
 
 
@@ -178,13 +187,12 @@ def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicate
 
 
 __all__ = [
+    "Hits",
     "Replicates",
-    "SensorRays",
+    "first_distances",
+    "first_hits",
     "for_rays",
     "light_id",
     "render",
-    "sensor_rays",
     "shape_id",
-    "shape_index",
-    "trace",
 ]

@@ -3,15 +3,17 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from comparisons import mitsuba_scene
+from comparisons.answers import Answers
 from comparisons.results import Images, Metrics, Tier
+from comparisons.tiers.bounds import ShapeSizes
 from comparisons.tiers.camera import camera_rays
 from comparisons.tiers.rays import Rays
 from comparisons.tiers.whitted import plugin_radiance
+from comparisons.twin import Twin, trace
 from reference_rt.image import display
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.render import Picture, render
@@ -45,7 +47,7 @@ class Rendered:
     notes: tuple[str, ...] = field(default=())
 
 
-def cast(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
+def cast(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
     """Ray casting: the shown layer as its picture, Mitsuba's from its own hits of the same rays."""
     assert isinstance(scene.integrator, RayCast)
     ours = render(scene, tables=tables)
@@ -53,24 +55,55 @@ def cast(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
     y, x = np.mgrid[0 : film.height, 0 : film.width]
     o, d = camera_rays(scene, x.ravel() + 0.5, y.ravel() + 0.5)
     start = time.perf_counter()
-    hits = mitsuba_scene.trace(mi_scene, o, d)
+    hits = trace(twin, o, d)
     seconds = time.perf_counter() - start
-    names = [*scene.materials, None]
-    material = np.array([names.index(shape.material) for shape in scene.shapes])
-    hit = hits.shape >= 0
+    notes = [f"the pictures show the layer '{ours.shown}' as displayed, not radiance"]
+    uv = np.where(hits.has_uv[:, None], hits.uv, ours.layers["uv"].reshape(-1, 2))
+    if ours.shown == "uv" and not hits.has_uv[hits.shape >= 0].all():
+        notes.append(
+            "Mitsuba has other uv, or none, for some shapes: there ours stand on both sides"
+        )
     layers = {
-        "colour": np.where(hit[:, None], colours(scene)[material[hits.shape]], 0.0),
+        "colour": _colours(scene, hits),
         "distance": hits.t,
-        "normal": hits.n,
+        "normal": np.where(hits.stands_in[:, None], hits.ns, hits.n),
         "id": hits.shape.astype(np.float64),
+        "uv": uv,
     }
     shaped = {k: v.reshape(film.height, film.width, *v.shape[1:]) for k, v in layers.items()}
     theirs = Picture(shaped, ours.shown)
     return Rendered(
-        Images(display(ours), display(theirs)),
-        _seconds(ours, seconds),
-        notes=(f"the pictures show the layer '{ours.shown}' as displayed, not radiance",),
+        Images(display(ours), display(theirs)), _seconds(ours, seconds), notes=tuple(notes)
     )
+
+
+def _colours(scene: Scene, hits: Answers) -> FloatArray:
+    """The colour (n, 3) of what was hit: of its material, or of a mesh's vertices at the place."""
+    sizes = ShapeSizes(scene)
+    names, of_materials = [*scene.materials, None], colours(scene)
+    leaf, local = sizes.leaf_of(hits), sizes.local_points(hits)
+    found = np.zeros((len(hits.t), 3))
+    for number in np.unique(leaf[leaf >= 0]).tolist():
+        rows = np.flatnonzero(leaf == number)
+        sizes_of = sizes.leaves[number]
+        found[rows] = of_materials[names.index(sizes_of.material)]
+        if sizes_of.field == "triangles" and sizes_of.table.colours is not None:
+            primitive = hits.primitive[rows]
+            weights = _barycentrics(sizes_of.table.vertices[primitive], local[rows])
+            of_corners = sizes_of.table.colours[primitive].reshape(-1, 3, 3)
+            has_any = of_corners[:, 0, 0] >= 0.0
+            mixed = np.einsum("nk,nki->ni", weights, of_corners)
+            found[rows] = np.where(has_any[:, None], mixed, found[rows])
+    return found
+
+
+def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
+    """(n, 3) weights of the corners of triangles (n, 9), by the areas opposite, for points (n, 3) of
+    their planes."""
+    v = vertices.reshape(-1, 3, 3)
+    normal = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
+    areas = [np.sum(normal * np.cross(v[:, k - 2] - p, v[:, k - 1] - p), axis=1) for k in range(3)]
+    return np.stack(areas, axis=1) / np.sum(normal * normal, axis=1)[:, None]
 
 
 def _seconds(ours: Picture, mitsuba: float) -> dict[str, dict[str, float]]:
@@ -78,7 +111,7 @@ def _seconds(ours: Picture, mitsuba: float) -> dict[str, dict[str, float]]:
     return {"ours": times, "mitsuba": {"render": mitsuba}}
 
 
-def whitted(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
+def whitted(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
     """Recursive ray tracing: Mitsuba's plugin along the rays of our grid of samples."""
     assert isinstance(scene.integrator, Whitted)
     ours = render(scene, tables=tables)
@@ -92,7 +125,7 @@ def whitted(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
             film_x = x.ravel() + (column + 0.5) / n
             film_y = y.ravel() + (row + 0.5) / n
             rays = Rays(*camera_rays(scene, film_x, film_y))
-            total += plugin_radiance(mi_scene, scene.integrator, rays)
+            total += plugin_radiance(twin.mi_scene, scene.integrator, rays)
     seconds = time.perf_counter() - start
     theirs = (total / n**2).reshape(film.height, film.width, 3)
     return Rendered(Images(ours.colour, theirs), _seconds(ours, seconds))
@@ -101,7 +134,7 @@ def whitted(scene: Scene, tables: SceneTables, mi_scene: Any) -> Rendered:
 def replicates(
     scene: Scene,
     tables: SceneTables,
-    mi_scene: Any,
+    twin: Twin,
     count: int,
     threads: int | None,
     say: Callable[[str], None],
@@ -118,7 +151,7 @@ def replicates(
         ours.append(picture.colour)
         times.append(picture.seconds)
     say(f"Mitsuba's {count} replicates")
-    theirs = mitsuba_scene.render(mi_scene, count, sampler.spp, first)
+    theirs = mitsuba_scene.render(twin.mi_scene, count, sampler.spp, first)
     pair = (np.stack(ours), theirs.pictures)
     return Rendered(
         Images(pair[0].mean(axis=0), pair[1].mean(axis=0)),

@@ -1,5 +1,8 @@
 """What a scene needs, what was left out, and why."""
 
+import numpy as np
+
+from reference_rt import bvh
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.materials import TABLES as MATERIAL_TABLES
 from reference_rt.sampling import Grid
@@ -9,13 +12,21 @@ from reference_rt.tables import SceneTables
 
 Lines = list[tuple[str, str]]
 
+_METHODS = {
+    "auto": "BVH by surface area heuristic",
+    "sah": "BVH by surface area heuristic",
+    "median": "BVH by median split",
+    "spatial": "BVH with spatial splits",
+    "none": "each shape in turn",
+}
+
 
 def explain(scene: Scene, tables: SceneTables) -> tuple[Lines, Lines]:
     """(what is used, what was left out), each a list of (what, how much or why)."""
     used: Lines = []
     left_out: Lines = []
     _shapes(tables, used, left_out)
-    _hierarchy(tables, used, left_out)
+    _hierarchy(scene, tables, used, left_out)
     _materials(tables, used, left_out)
     _lights(scene, tables, used, left_out)
     _integration(scene, tables, used, left_out)
@@ -32,11 +43,26 @@ def _shapes(tables: SceneTables, used: Lines, left_out: Lines) -> None:
             size = sum(a.nbytes for a in table if a is not None)
             used.append((field, f"{len(table.owner):,} ({_bytes(size)})"))
     triangles = tables.geometry.shapes.triangles
-    if triangles is not None and triangles.normals is None:
-        left_out.append(("vertex normals", "no mesh brings any: triangles are shaded flat"))
+    if triangles is not None:
+        for column, name, otherwise in (
+            (triangles.normals, "vertex normals", "triangles are shaded flat"),
+            (triangles.uvs, "texture coordinates", "a triangle's own are its barycentrics"),
+            (triangles.colours, "vertex colours", "a triangle's is its material's"),
+        ):
+            if column is None:
+                left_out.append((name, f"no mesh brings any: {otherwise}"))
+    solids, instances = tables.geometry.solids, tables.geometry.instances
+    if solids is None:
+        left_out.append(("solids", "no union, intersection or difference"))
+    else:
+        used.append(("solids", f"{len(solids.first):,} of {len(solids.kind):,} operands"))
+    if instances is None:
+        left_out.append(("instances", "no group is drawn"))
+    else:
+        used.append(("instances", f"{len(instances.root):,} of {len(np.unique(instances.root)):,}"))
 
 
-def _hierarchy(tables: SceneTables, used: Lines, left_out: Lines) -> None:
+def _hierarchy(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> None:
     hierarchy = tables.geometry.bvh
     shapes = tables.geometry.shapes
     count = sum(len(table.owner) for table in shapes if table is not None)
@@ -44,17 +70,34 @@ def _hierarchy(tables: SceneTables, used: Lines, left_out: Lines) -> None:
         reason = f"{count} primitives: testing a few one after another is faster"
         left_out.append(("hierarchy", reason))
         return
-    size = sum(a.nbytes for a in hierarchy)
-    leaves = int((hierarchy.size > 0).sum())
+    size = hierarchy.nodes.nbytes + hierarchy.references.nbytes
+    nodes = hierarchy.nodes[: _nodes_of_the_scene(tables)]
+    first, count_of = nodes[:, 6].astype(np.int64), nodes[:, 7].astype(np.int64)
+    found = bvh.statistics(bvh.Nodes(nodes[:, :6], first, count_of))
     used.append(
         (
             "hierarchy",
-            f"BVH by surface area heuristic: {len(hierarchy.size):,} nodes, {leaves:,} leaves, "
-            f"{count / leaves:.1f} primitives a leaf, {_bytes(size)}",
+            f"{_METHODS[scene.hierarchy]}: {found.nodes:,} nodes, {found.leaves:,} leaves of "
+            f"{found.mean_leaf:.1f} references (at most {found.largest_leaf}), depth "
+            f"{found.depth}, "
+            f"expected tests {found.sah_cost:.3g}, {_bytes(size)}",
         )
     )
     total = size + sum(a.nbytes for table in shapes if table for a in table if a is not None)
     used.append(("memory", f"{total / count:.0f} bytes per primitive, hierarchy included"))
+
+
+def _nodes_of_the_scene(tables: SceneTables) -> int:
+    """How many nodes the first of all hierarchies has: those of groups and meshes come after."""
+    geometry = tables.geometry
+    assert geometry.bvh is not None
+    starts = [np.array([len(geometry.bvh.nodes), geometry.bvh.unbounded])]
+    if geometry.instances is not None:
+        starts.append(geometry.instances.root)
+    if geometry.solids is not None:
+        starts.append(geometry.solids.root)
+    after = np.concatenate(starts)
+    return int(after[after > 0].min())
 
 
 def _materials(tables: SceneTables, used: Lines, left_out: Lines) -> None:

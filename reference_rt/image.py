@@ -20,6 +20,7 @@ _CHANNELS: dict[str, tuple[str, ...]] = {
     "distance": ("distance.Z",),
     "normal": ("normal.X", "normal.Y", "normal.Z"),
     "id": ("id.V",),
+    "uv": ("uv.U", "uv.V"),
 }
 
 
@@ -39,7 +40,7 @@ def write(path: Path, picture: Picture, provenance: Mapping[str, str]) -> None:
 
 
 def write_exr(path: Path, layers: Mapping[str, FloatArray], provenance: Mapping[str, str]) -> None:
-    """Layers (height, width[, 3]) as float32 channels; provenance as text in the header."""
+    """Layers (height, width[, channels]) as float32 channels; provenance as text in the header."""
     import OpenEXR
 
     channels: dict[str, Any] = {}
@@ -94,7 +95,8 @@ def display(picture: Picture) -> FloatArray:
     """The shown layer as display values (height, width, 3), nominally in [0, 1].
 
     Radiance by sRGB's transfer function; distances from white (nearest) to black, misses black;
-    normals as (n + 1) / 2, misses black; each id a colour of its own, misses black.
+    normals as (n + 1) / 2, misses black; each id a colour of its own, misses black; u as red, v as
+    green, by what they are beyond a whole number.
     """
     layer = picture.layers[picture.shown]
     if picture.shown == "colour":
@@ -104,6 +106,8 @@ def display(picture: Picture) -> FloatArray:
         return np.where(missed, 0.0, 0.5 * (layer + 1.0))
     if picture.shown == "distance":
         return _grey(_nearness(layer))
+    if picture.shown == "uv":
+        return np.concatenate([np.mod(layer, 1.0), np.zeros_like(layer[..., :1])], axis=-1)
     return _palette(layer.astype(np.int64))
 
 

@@ -1,4 +1,6 @@
-"""`@kernel` and `@entry_kernel`: the one way to compile, with an exact cache; `ByClass` for choice.
+"""`@kernel`, `@large_kernel`, `@entry_kernel`: the one way to compile, with an exact cache; `ByClass`
+for choice.
+
 
 A kernel is plain scalar code on floats, integers, arrays and NamedTuples of these.  With
 ``NUMBA_DISABLE_JIT=1`` the same text runs as plain Python with bit-identical results; the rules
@@ -72,6 +74,9 @@ CACHE_FOLDER = _prepare_cache()
 # times slower on the Cornell box, with threads that contend.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 
+# Nothing calls kernels from C: the wrappers for it took a fifth of the compile time (measured).
+_INSIDE = _OPTIONS | {"no_cfunc_wrapper": True}
+
 
 def kernel(function: F) -> F:
     """Let compiled code call `function`, inlined; called from Python it runs as plain Python.
@@ -80,8 +85,15 @@ def kernel(function: F) -> F:
     tables field by field, some 400 words a call: hence the inlining (measured: 1.5 times faster).
     Not giving each kernel a Python wrapper and a cache file of its own halves the compile time.
     """
-    inlined: F = register_jitable(**_OPTIONS, forceinline=True)(function)
+    inlined: F = register_jitable(**_INSIDE, forceinline=True)(function)
     return inlined
+
+
+def large_kernel(function: F) -> F:
+    """As `kernel`, but compiled once for all of its callers: for what is large and called seldom
+    enough that passing the tables to it does not count."""
+    called: F = register_jitable(**_INSIDE)(function)
+    return called
 
 
 def entry_kernel(function: F) -> F:
@@ -111,9 +123,9 @@ def is_named_tuple(numba_type: Any, cls: type) -> bool:
 class ByClass:
     """A function that runs the kernel registered for the class of its first argument.
 
-    For choices made once per render (camera, sampler, filter, integrator): the first argument is a
-    NamedTuple, its class is known when the caller compiles, and the choice costs nothing at run
-    time.  Register kernels with `register`; see `reference_rt.cameras`.
+    For choices made once per render (camera, sampler, filter, integrator; a table or its absence):
+    the first argument is a NamedTuple or None, its class is known when the caller compiles, and the
+    choice costs nothing at run time.  Register kernels with `register`; see `reference_rt.cameras`.
     """
 
     def __init__(self, name: str) -> None:
@@ -128,12 +140,14 @@ class ByClass:
         @overload(choose, strict=False)  # type: ignore[untyped-decorator]
         def _compiled(first: Any, *rest: Any) -> Callable[..., Any] | None:
             for cls, function in self._kernels.items():
-                if is_named_tuple(first, cls):
+                if is_named_tuple(first, cls) or (
+                    cls is type(None) and isinstance(first, types.NoneType)
+                ):
                     return function
             return None
 
     def register(self, cls: type, function: Callable[..., Any]) -> None:
-        """Run `function` where the first argument is a `cls`."""
+        """Run `function` where the first argument is a `cls`; type(None) stands for None."""
         self._kernels[cls] = function
 
 

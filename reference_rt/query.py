@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt import shapes as any_shape
-from reference_rt.geometry import closest_hit
+from reference_rt.geometry import closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
@@ -28,14 +27,18 @@ from reference_rt.vec3 import Vec3, frame_from_normal, row, to_local
 class Intersections:
     """What n rays hit first.
 
-    t (n,): inf for a miss;  shape (n,): index in the scene's shapes, -1 for a miss;  face (n,):
-    number of the triangle in its mesh, or of the box's face (axis, + 3 on the positive side);
+    t (n,): inf for a miss;  shape (n,): index in the scene's shapes, -1 for a miss;  primitive
+    (n,): number of the triangle in its mesh, or of the face of a solid (of a box: axis, + 3 on the
+    positive side);  part (n,): number of the operand in its solid, or of the shape in its group;
+    instance (n,): number of the copy that the shape stands for, -1 outside groups;
     p, n, ns (n, 3): point, unit geometric and shading normal, 0 for a miss;  uv (n, 2).
     """
 
     t: FloatArray
     shape: IntArray
-    face: IntArray
+    primitive: IntArray
+    part: IntArray
+    instance: IntArray
     p: FloatArray
     n: FloatArray
     ns: FloatArray
@@ -62,15 +65,18 @@ def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray
         ray = Ray(row(o, i), row(d, i), math.inf)
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
-            out[i, 0], out[i, 1], out[i, 2] = math.inf, -1.0, -1.0
+            out[i, 0] = math.inf
+            for k in range(1, 5):
+                out[i, k] = -1.0
             continue
-        point = any_shape.surface(scene.geometry.shapes, ray, hit)
-        owner = any_shape.owner(scene.geometry.shapes, ray, hit)
-        out[i, 0], out[i, 1], out[i, 2] = hit.t, owner.shape, owner.face
-        out[i, 3], out[i, 4], out[i, 5] = point.p
-        out[i, 6], out[i, 7], out[i, 8] = point.n
-        out[i, 9], out[i, 10], out[i, 11] = point.ns
-        out[i, 12], out[i, 13] = owner.u, owner.v
+        point = surface(scene.geometry, ray, hit)
+        whose = owner(scene.geometry, ray, hit)
+        out[i, 0], out[i, 1], out[i, 2] = hit.t, whose.shape, whose.face
+        out[i, 3], out[i, 4] = whose.part, whose.instance
+        out[i, 5], out[i, 6], out[i, 7] = point.p
+        out[i, 8], out[i, 9], out[i, 10] = point.n
+        out[i, 11], out[i, 12], out[i, 13] = point.ns
+        out[i, 14], out[i, 15] = whose.u, whose.v
 
 
 @entry_kernel
@@ -90,7 +96,7 @@ def _direct(
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
             continue
-        point = any_shape.surface(scene.geometry.shapes, ray, hit)
+        point = surface(scene.geometry, ray, hit)
         frame = frame_from_normal(point.ns)
         wo = to_local(frame, -ray.d)
         found = direct(scene, point, frame, wo, k, u, v)
@@ -121,18 +127,20 @@ def intersect(
 ) -> Intersections:
     """The closest hit of each ray."""
     o, d = _rays(origins, directions)
-    out = np.zeros((len(o), 14))
+    out = np.zeros((len(o), 16))
     with np.errstate(all="ignore"):
         _intersect(scene, o, d, out)
-    integers = out[:, 1:3].astype(np.int64)
+    shape, primitive, part, instance = out[:, 1:5].astype(np.int64).T
     return Intersections(
         t=out[:, 0],
-        shape=integers[:, 0],
-        face=integers[:, 1],
-        p=out[:, 3:6],
-        n=out[:, 6:9],
-        ns=out[:, 9:12],
-        uv=out[:, 12:14],
+        shape=shape,
+        primitive=primitive,
+        part=part,
+        instance=instance,
+        p=out[:, 5:8],
+        n=out[:, 8:11],
+        ns=out[:, 11:14],
+        uv=out[:, 14:16],
     )
 
 

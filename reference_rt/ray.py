@@ -18,11 +18,20 @@ class Ray(NamedTuple):
     t_max: float
 
 
+class Crossing(NamedTuple):
+    """Where a ray meets one primitive: `t`, inf for nowhere; `u`, `v` are what the primitive needs
+    to place the point: see its `intersect`."""
+
+    t: float
+    u: float
+    v: float
+
+
 class Hit(NamedTuple):
     """The closest intersection so far; for none, `kind` is -1 and `t` the ray's t_max.
 
-    `kind` and `row` say which primitive: a code of `reference_rt.shapes` and a row of its table.
-    `u`, `v` are what that shape needs to place the point: see its `intersect`.
+    `kind` and `row` say which primitive: a code of `reference_rt.shapes` and a row of its table;
+    `instance` the row of the instance that it was met in, -1 for none;  `u`, `v`: see `Crossing`.
     """
 
     t: float
@@ -30,6 +39,7 @@ class Hit(NamedTuple):
     row: int
     u: float
     v: float
+    instance: int
 
 
 class SurfacePoint(NamedTuple):
@@ -56,9 +66,14 @@ def at(ray: Ray, t: float) -> Vec3:
 
 
 @kernel
+def miss() -> Crossing:
+    return Crossing(math.inf, 0.0, 0.0)
+
+
+@kernel
 def no_hit(ray: Ray) -> Hit:
     """Nothing found up to the ray's end."""
-    return Hit(ray.t_max, -1, -1, 0.0, 0.0)
+    return Hit(ray.t_max, -1, -1, 0.0, 0.0, -1)
 
 
 @kernel

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from reference_rt import sampling
-from reference_rt.cameras import camera_ray
+from reference_rt.cameras import LENS_CENTRE, camera_ray, lens_sample
 from reference_rt.film import film_offset
 from reference_rt.integrators import RayCast, radiance
 from reference_rt.integrators.ray_cast import cast
@@ -35,9 +35,10 @@ class Picture:
     """A rendered scene.
 
     layers: (height, width, 3) float64 linear radiance as "colour", or for ray casting all of
-    colour (height, width, 3), distance (height, width), normal (height, width, 3) and id (height,
-    width);  shown: the layer that is the picture;  seconds: wall clock of "tables" (files, arrays,
-    hierarchy), "compile" (or loading what was compiled before) and "render".
+    colour (height, width, 3), distance (height, width), normal (height, width, 3), id (height,
+    width) and uv (height, width, 2);  shown: the layer that is the picture;  seconds: wall clock of
+    "tables" (files, arrays, hierarchy), "compile" (or loading what was compiled before) and
+    "render".
     """
 
     layers: dict[str, FloatArray]
@@ -82,7 +83,8 @@ def _render_band(
             u0, u1 = draw_pair(sampler, sampling.FILM)
             dx, weight_x = film_offset(film_filter, u0)
             dy, weight_y = film_offset(film_filter, u1)
-            ray = camera_ray(view, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height)
+            lens = lens_sample(view, sampler)
+            ray = camera_ray(view, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
             arriving = radiance(integrator, scene, ray, sampler)
             total = total + arriving * (weight_x * weight_y)
         if last == spp:
@@ -102,17 +104,17 @@ def _cast_band(
     first: int,
     last: int,
 ) -> None:
-    """Colour, distance, normal and id at the centres of the pixels begin..end, into out (n, 8);
+    """All layers at the centres of the pixels begin..end, into out (n, 10);
     `first` and `last`, which samples, are there for the likeness to `_render_band`."""
     width, height = shape
     for pixel in range(begin, end):
         y, x = pixel // width, pixel % width
-        ray = camera_ray(view, (x + 0.5) / width, (y + 0.5) / height)
+        ray = camera_ray(view, (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
         found = cast(scene, material_colours, ray)
         out[pixel, 0], out[pixel, 1], out[pixel, 2] = found.colour
         out[pixel, 3] = found.distance
         out[pixel, 4], out[pixel, 5], out[pixel, 6] = found.n
-        out[pixel, 7] = found.id
+        out[pixel, 7], out[pixel, 8], out[pixel, 9] = found.id, found.u, found.v
 
 
 def render(
@@ -133,13 +135,13 @@ def render(
     tables = build_tables(scene) if tables is None else tables
     clock.append(time.perf_counter())
     film, integrator = scene.film, scene.integrator
-    view = scene.camera.view(film.width, film.height)
+    view = scene.camera.setup(film.width, film.height)
     shape = (film.width, film.height)
     pixels = film.width * film.height
     band: Any
     arguments: tuple[Any, ...]
     if isinstance(integrator, RayCast):
-        out, spp = np.zeros((pixels, 8)), 1
+        out, spp = np.zeros((pixels, 10)), 1
         band, arguments = _cast_band, (tables, colours(scene), view, shape, out)
     else:
         sampler = scene.resolved_sampler
@@ -164,6 +166,7 @@ def _picture(integrator: Any, out: FloatArray, seconds: dict[str, float]) -> Pic
         "distance": out[..., 3],
         "normal": out[..., 4:7],
         "id": out[..., 7],
+        "uv": out[..., 8:10],
     }
     return Picture(layers, integrator.show, seconds)
 
@@ -171,8 +174,8 @@ def _picture(integrator: Any, out: FloatArray, seconds: dict[str, float]) -> Pic
 def _check_memory(scene: Scene) -> None:
     """Refuse a picture that cannot fit, before anything is allocated."""
     film = scene.film
-    # 3 or 8 channels of float64, and as much again while files are written.
-    needed = film.width * film.height * 8 * 2 * 8
+    # 3 or 10 channels of float64, and as much again while files are written.
+    needed = film.width * film.height * 10 * 2 * 8
     try:
         available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):  # not every system tells

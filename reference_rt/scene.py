@@ -3,26 +3,35 @@
 import hashlib
 import io
 import json
+import math
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
+import numpy as np
+import numpy.typing as npt
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.perspective import Perspective
+from reference_rt.csg import AnyShape, Solid
 from reference_rt.description import Description
 from reference_rt.diagnosis import first_problem, line_of
 from reference_rt.errors import SceneError
 from reference_rt.film import Film
+from reference_rt.groups import Instance
 from reference_rt.integrators import AnyIntegrator
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import AnyLight, Constant
 from reference_rt.materials import AnyMaterial, Emissive
 from reference_rt.sampling import AnySampler, Grid, Sobol
-from reference_rt.shapes import AnyShape
+from reference_rt.shapes import Shape
+
+if TYPE_CHECKING:
+    from reference_rt.query import Intersections
+    from reference_rt.tables import SceneTables
 
 
 class Scene(Description):
@@ -38,16 +47,27 @@ class Scene(Description):
     materials: dict[str, AnyMaterial] = Field(default_factory=dict)
     """Materials by name."""
     shapes: tuple[AnyShape, ...] = Field(default=(), strict=False)
+    groups: dict[str, Annotated[tuple[AnyShape, ...], Field(strict=False, min_length=1)]] = Field(
+        default_factory=dict
+    )
+    """Shapes by name, stored once, which shapes of type `instance` draw."""
+    hierarchy: Literal["auto", "sah", "median", "spatial", "none"] = "auto"
+    """How rays are led to shapes: by surface area heuristic, median split, spatial splits, or each
+    shape in turn; auto: the first, where the shapes are not few.  Pictures are the same."""
     lights: tuple[AnyLight, ...] = Field(default=(), strict=False)
     """Lights that are not shapes; a shape with an emissive material is a light too."""
 
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: "tuple[str, str] | None" = PrivateAttr(default=None)
+    _tables: "SceneTables | None" = PrivateAttr(default=None)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for i, shape in enumerate(self.shapes):
-            self._check_material(shape.material, "shapes", i, "material")
+            self._check_shape(shape, "shapes", i)
+        for name, shapes in self.groups.items():
+            for k, shape in enumerate(shapes):
+                self._check_shape(shape, "groups", name, k)
         for name, material in self.materials.items():
             if isinstance(material, Emissive) and material.base is not None:
                 self._check_material(material.base, "materials", name, "base")
@@ -65,6 +85,23 @@ class Scene(Description):
                 ("sampler", "type"),
             )
         return self
+
+    def _check_shape(self, shape: Shape, *path: str | int) -> None:
+        self._check_material(shape.material, *path, "material")
+        if isinstance(shape, Solid):
+            for k, operand in enumerate(shape.of):
+                self._check_shape(operand, *path, "of", k)
+        if isinstance(shape, Instance):
+            if shape.group not in self.groups:
+                known = ", ".join(f"'{g}'" for g in self.groups) or "none"
+                raise SceneError(
+                    f"there is no group '{shape.group}'; expected one of: {known}", (*path, "group")
+                )
+            if shape.material is not None:
+                raise SceneError(
+                    "an instance has the materials of its group; expected none here",
+                    (*path, "material"),
+                )
 
     def _check_material(self, name: str | None, *path: str | int) -> None:
         if name is not None and name not in self.materials:
@@ -107,6 +144,31 @@ class Scene(Description):
     def digest(self) -> str:
         """SHA-256 of the description: what pictures name as their source."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+    # ---- what rays find -------------------------------------------------------------------------
+
+    @property
+    def tables(self) -> "SceneTables":
+        """What kernels see, made once.  Raises SceneError for files that cannot be used."""
+        if self._tables is None:
+            from reference_rt.tables import build_tables  # which imports this module
+
+            self._tables = build_tables(self)
+        return self._tables
+
+    def intersect(self, origins: npt.ArrayLike, directions: npt.ArrayLike) -> "Intersections":
+        """What rays hit first: see `reference_rt.query.intersect`."""
+        from reference_rt import query
+
+        return query.intersect(self.tables, origins, directions)
+
+    def occluded(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, t_max: npt.ArrayLike = math.inf
+    ) -> npt.NDArray[np.bool_]:
+        """Whether anything lies on each ray at 0 < t < t_max: see `reference_rt.query.occluded`."""
+        from reference_rt import query
+
+        return query.occluded(self.tables, origins, directions, t_max)
 
     # ---- in -------------------------------------------------------------------------------------
 

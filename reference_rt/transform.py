@@ -16,8 +16,11 @@ from reference_rt.description import Description, Direction, Vector
 Affine = npt.NDArray[np.float64]
 
 
+IDENTITY: Affine = np.eye(3, 4)
+
+
 def identity() -> Affine:
-    return np.eye(3, 4)
+    return IDENTITY.copy()
 
 
 def translate(offset: Vector) -> Affine:
@@ -89,8 +92,12 @@ def invert(m: Affine) -> Affine:
 
 
 def apply_points(m: Affine, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """(n, 3) points, mapped."""
-    return np.asarray(points @ m[:, :3].T + m[:, 3])
+    """(n, 3) points, mapped: each by the same operations, so that equal points stay equal.
+
+    A product of matrices rounds by where in the array a point stands.
+    """
+    x, y, z = points[:, :1], points[:, 1:2], points[:, 2:]
+    return np.asarray(x * m[:, 0] + y * m[:, 1] + z * m[:, 2] + m[:, 3])
 
 
 def apply_normals(m: Affine, normals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -54,9 +54,48 @@ def obj(vertices: Array, normals: Array, faces: Array) -> str:
     return "\n".join(lines).replace("-0.000000", "0.000000").replace("-0.00000 ", "0.00000 ") + "\n"
 
 
+def petal(n: int) -> tuple[Array, Array, Array, Array]:
+    """An open sheet of n x n squares, curled and waved, coloured by its place.
+
+    Returns vertices ((n + 1)², 3), uv ((n + 1)², 2), 8-bit colours ((n + 1)², 3) and triangles
+    (2 n², 3).
+    """
+    u, v = np.meshgrid(np.linspace(0.0, 1.0, n + 1), np.linspace(0.0, 1.0, n + 1), indexing="ij")
+    angle = 2.0 * (u - 0.5)
+    vertices = np.stack(
+        [
+            np.sin(angle) * (0.6 + 0.5 * v),
+            2.0 * v - 1.0,
+            np.cos(angle) - 1.0 + 0.15 * np.sin(9.0 * v),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    uv = np.stack([u, v], axis=-1).reshape(-1, 2)
+    colours = np.stack([255.0 * u, 120.0 + 100.0 * np.cos(6.0 * v), 255.0 * (1.0 - v)], axis=-1)
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    c00, c10 = i * (n + 1) + j, (i + 1) * (n + 1) + j
+    faces = np.stack([c00, c10, c10 + 1, c00, c10 + 1, c00 + 1], axis=-1).reshape(-1, 3)
+    return vertices, uv, np.round(colours).reshape(-1, 3), faces
+
+
+def ply(vertices: Array, uv: Array, colours: Array, faces: Array) -> str:
+    """Text of a .ply file with uv and 8-bit colours."""
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
+    lines += [f"property float {name}" for name in ("x", "y", "z", "u", "v")]
+    lines += [f"property uchar {name}" for name in ("red", "green", "blue")]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    lines += [
+        "{:.6f} {:.6f} {:.6f} {:.5f} {:.5f} {:.0f} {:.0f} {:.0f}".format(*row)
+        for row in np.hstack([vertices, uv, colours])
+    ]
+    lines += ["3 {} {} {}".format(*face) for face in faces]
+    return "\n".join(lines).replace("-0.000000", "0.000000") + "\n"
+
+
 def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     (FOLDER / "knot.obj").write_text(obj(*torus_knot(2, 3, around=24, along=440, tube=0.22)))
+    (FOLDER / "petal.ply").write_text(ply(*petal(24)))
 
 
 if __name__ == "__main__":

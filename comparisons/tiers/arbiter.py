@@ -17,10 +17,14 @@ NEIGHBOURS = 48
 """Moved rays for each radius.  So many points on a sphere leave no cap empty that is higher than a
 twelfth of the radius: an edge that cuts off more than that has a moved ray beyond it."""
 
-MOST = 2000
+MOST = 20_000
 """Rays that are arbitrated; the rest count as they are, against agreement."""
 
 RADII = (1.0, 0.5)
+
+SEARCHES = ((MOST, NEIGHBOURS, RADII), (500, 400, (1.0, 0.5, 0.2)))
+"""(at most so many rays, moves, radii): first as said, then finer for the few that are left, which
+pass through a corner, or a face seen edge-on."""
 
 LIMIT = 0.01
 """The fraction of rays that may need the arbiter.  Edges and silhouettes, a float32 bound wide,
@@ -45,13 +49,14 @@ def explained(
     agree with Mitsuba.  False for all beyond the first MOST.
     """
     found = np.zeros(len(rays), bool)
-    for factor in RADII:
-        for move in directions(NEIGHBOURS):
-            open_ = np.flatnonzero(~found[:MOST])
-            if len(open_) == 0:
-                return found
-            offsets = move * (factor * radius[open_])[:, None]
-            found[open_] = like_theirs(rays[open_], offsets)
+    for most, count, radii in SEARCHES:
+        for factor in radii:
+            for move in directions(count):
+                open_ = np.flatnonzero(~found[:MOST])
+                if len(open_) == 0 or len(open_) > most:
+                    break
+                offsets = move * (factor * radius[open_])[:, None]
+                found[open_] = like_theirs(rays[open_], offsets)
     return found
 
 

@@ -1,13 +1,15 @@
 """The camera: our rays against those of Mitsuba's sensor."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from comparisons.mitsuba_scene import sensor_rays
+from comparisons.mitsuba_backend import mitsuba
+from comparisons.mitsuba_scene import for_rays
 from comparisons.tiers.bounds import ROUNDINGS, UNIT_ROUNDOFF, largest
-from reference_rt.cameras import camera_ray
+from reference_rt.cameras import LENS_CENTRE, ThinLens, camera_ray
 from reference_rt.film import Film
 from reference_rt.kernel import entry_kernel
 from reference_rt.scene import Scene
@@ -35,39 +37,76 @@ def pixel_centres(film: Film, most: int) -> tuple[FloatArray, FloatArray]:
 
 
 @entry_kernel
-def _camera_rays(view: Any, x: FloatArray, y: FloatArray, out: FloatArray) -> None:
+def _camera_rays(
+    view: Any, x: FloatArray, y: FloatArray, lens: FloatArray, out: FloatArray
+) -> None:
     for i in range(len(x)):
-        ray = camera_ray(view, x[i], y[i])
+        ray = camera_ray(view, x[i], y[i], (lens[0], lens[1]))
         out[i, 0], out[i, 1], out[i, 2] = ray.o.x, ray.o.y, ray.o.z
         out[i, 3], out[i, 4], out[i, 5] = ray.d.x, ray.d.y, ray.d.z
 
 
-def camera_rays(scene: Scene, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Our camera's origins and unit directions (n, 3) through film points in pixels."""
+def camera_rays(
+    scene: Scene, x: FloatArray, y: FloatArray, lens: Sequence[float] = LENS_CENTRE
+) -> tuple[FloatArray, FloatArray]:
+    """Our camera's origins and unit directions (n, 3) of film points in pixels, through one point
+    of its lens: the centre, as deterministic integrators have it, or that of the sample `lens`."""
     film = scene.film
     out = np.zeros((len(x), 6))
-    _camera_rays(scene.camera.view(film.width, film.height), x / film.width, y / film.height, out)
+    view = scene.camera.setup(film.width, film.height)
+    _camera_rays(view, x / film.width, y / film.height, np.array(lens), out)
     return out[:, :3].copy(), out[:, 3:].copy()
 
 
-def compare_camera(scene: Scene, mi_scene: Any, most: int) -> CameraComparison:
-    """Directions, and how far Mitsuba's origins lie off our rays, at pixel centres.
+LENS_SAMPLES = (LENS_CENTRE, (0.9, 0.6), (0.2, 0.3), (0.55, 0.99), (0.4, 0.02))
+"""Points of a lens that rays are compared through: the middle and one in each triangle of the
+map from square to disk."""
 
-    Bounds: a direction passes matrices whose entries reach the tan of half the angle of view, an
-    origin one whose entries reach the eye's coordinates and half the picture's width.
+
+def sensor_rays(
+    mi_scene: Any, x: FloatArray, y: FloatArray, lens: Sequence[float]
+) -> tuple[FloatArray, FloatArray]:
+    """The same rays of Mitsuba's sensor; origins lie on the near plane."""
+    mi = mitsuba()
+    sensor = mi_scene.sensors()[0]
+    width, height = (int(s) for s in sensor.film().crop_size())
+    # Its x is to the left on the lens too; the map from square to disk keeps mirror images.
+    aperture = mi.Point2f(1.0 - lens[0], lens[1])
+
+    def ray(u: Any, v: Any) -> tuple[Any, ...]:
+        found, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(u, v), aperture)
+        return found.o, found.d
+
+    o, d = for_rays(ray, x / width, y / height)
+    return o, d
+
+
+def compare_camera(scene: Scene, mi_scene: Any, most: int) -> CameraComparison:
+    """Directions, and how far Mitsuba's origins lie off our rays, at pixel centres, for a lens
+    through several of its points.
+
+    Bounds: a direction passes matrices whose entries reach the tan of the largest angle to the
+    axis, an origin one whose entries reach the eye's coordinates and half the picture's width.
     """
-    x, y = pixel_centres(scene.film, most)
-    o, d = camera_rays(scene, x, y)
-    theirs = sensor_rays(mi_scene, x, y)
-    # Before it is made unit a direction is 1 long along the view and tan across: rounded numbers as
-    # large as on the picture's rim, 1 / cos there, and then shortened by its own cosine.
-    forward = np.subtract(scene.camera.target, scene.camera.eye)
-    cosine = d @ (forward / np.linalg.norm(forward))
-    direction = np.linalg.norm(theirs.d - d, axis=1)
-    direction_bound = ROUNDINGS * UNIT_ROUNDOFF * (1.0 + cosine / cosine.min())
-    apart = theirs.o - o
+    camera, film = scene.camera, scene.film
+    x, y = pixel_centres(film, most)
+    samples = LENS_SAMPLES if isinstance(camera, ThinLens) else (LENS_CENTRE,)
+    o, d = _stacked(camera_rays(scene, x, y, lens) for lens in samples)
+    their_o, their_d = _stacked(sensor_rays(mi_scene, x, y, lens) for lens in samples)
+    forward = -camera.basis[2]
+    # Before it is made unit a direction is 1 long along the axis and tan across: rounded numbers as
+    # large as in the picture's farthest corner, 1 / cos there, and then shortened by its own
+    # cosine. A lens takes the point on it, over the focus distance, from that.
+    corners = np.array([[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]])
+    _, rim = camera_rays(scene, corners[0] * film.width, corners[1] * film.height)
+    steepest = 1.0 / (rim @ forward).min()
+    if isinstance(camera, ThinLens):
+        steepest += camera.aperture_radius / camera.focus
+    direction = np.linalg.norm(their_d - d, axis=1)
+    direction_bound = ROUNDINGS * UNIT_ROUNDOFF * (1.0 + (d @ forward) * steepest)
+    apart = their_o - o
     off_line = np.linalg.norm(apart - np.sum(apart * d, axis=1)[:, None] * d, axis=1)
-    reach = largest(o).max() + np.abs(scene.camera.eye).max()
+    reach = largest(o).max() + np.abs(camera.eye).max()
     # Mitsuba's origin lies on the near plane, along its own direction.
     near = np.linalg.norm(apart, axis=1) * direction_bound
     origin_bound = ROUNDINGS * UNIT_ROUNDOFF * reach + near
@@ -80,9 +119,15 @@ def compare_camera(scene: Scene, mi_scene: Any, most: int) -> CameraComparison:
     if not wrong.any():
         return CameraComparison(numbers, "")
     k = int(np.argmax(wrong))
+    at = k % len(x)
     problem = (
-        f"the camera: {np.count_nonzero(wrong)} of {len(x)} rays differ; the first at film point "
-        f"({x[k]:g}, {y[k]:g}): ours from {o[k]} along {d[k]}, Mitsuba's from {theirs.o[k]} along "
-        f"{theirs.d[k]}"
+        f"the camera: {np.count_nonzero(wrong)} of {len(o)} rays differ; the first at film point "
+        f"({x[at]:g}, {y[at]:g}): ours from {o[k]} along {d[k]}, Mitsuba's from {their_o[k]} along "
+        f"{their_d[k]}"
     )
     return CameraComparison(numbers, problem)
+
+
+def _stacked(rays: Iterable[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    o, d = zip(*rays, strict=True)
+    return np.concatenate(o), np.concatenate(d)

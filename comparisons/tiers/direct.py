@@ -4,13 +4,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.answers import rows_of
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_plugins.whitted import emitted, without
 from comparisons.mitsuba_scene import for_rays, light_id
 from comparisons.results import Tier
 from comparisons.tiers import arbiter
-from comparisons.tiers.bounds import UNIT_ROUNDOFF, ShapeSizes, delta, largest, shape_sizes, slide
+from comparisons.tiers.bounds import UNIT_ROUNDOFF, ShapeSizes, delta, largest, slide
 from comparisons.tiers.rays import RAY_EPSILON, SHADOW_EPSILON, Rays, mixed_rays
+from comparisons.twin import Twin
 from reference_rt import query
 from reference_rt.lights import CONSTANT, POINT, Point
 from reference_rt.query import DirectLight, Intersections
@@ -33,7 +35,7 @@ class Setting(NamedTuple):
 
     scene: Scene
     tables: SceneTables
-    mi_scene: Any
+    twin: Twin
     rays: Rays
     hits: Intersections
     sizes: ShapeSizes
@@ -51,7 +53,7 @@ class Outcome(NamedTuple):
 
 
 def direct(
-    scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXELS, seed: int = 0
+    scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS, seed: int = 0
 ) -> Tier:
     """Compare f cos L of single lights at what camera, random and secondary rays hit.
 
@@ -61,12 +63,14 @@ def direct(
     choice = tables.lights.choice
     if choice is None:
         return Tier("direct", "not-applicable", "the scene has no light")
+    if twin.lacking:
+        return Tier("direct", "not-comparable", twin.lacking)
     if tables.materials.diffuses is None:
         return Tier("direct", "not-applicable", "no material scatters light that a light sends")
-    sizes = shape_sizes(tables, len(scene.shapes))
+    sizes = ShapeSizes(scene)
     rays = mixed_rays(scene, tables, sizes, pixels, seed)
     hits = query.intersect(tables, rays.o, rays.d)
-    setting = Setting(scene, tables, mi_scene, rays, hits, sizes)
+    setting = Setting(scene, tables, twin, rays, hits, sizes)
     count = len(choice.kind)
     tested = np.unique(np.linspace(0, count - 1, min(count, LIGHTS)).round().astype(int))
     outcomes: dict[tuple[int, tuple[float, float]], Outcome] = {}
@@ -109,7 +113,7 @@ def _compare(setting: Setting, light: int, u: tuple[float, float]) -> Outcome:
     known = np.flatnonzero((hits.shape >= 0) & np.isfinite(target).all(axis=1))
     if len(known) == 0:
         return Outcome(0, known, 0, 0.0, 0.0)
-    rays, hits, target = Rays(rays.o[known], rays.d[known]), _rows(hits, known), target[known]
+    rays, hits, target = Rays(rays.o[known], rays.d[known]), rows_of(hits, known), target[known]
     value = ours.contribution[known]
     theirs, their_cosine = _mitsuba_direct(setting, light, rays, target)
     bound = _bounds(setting, light, rays, hits, target, (value, theirs, their_cosine))
@@ -124,7 +128,7 @@ def _compare(setting: Setting, light: int, u: tuple[float, float]) -> Outcome:
         apart = np.abs(moved - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
         lit_differs = value[numbers].any(axis=1) == dark
-        now_dark = _dark(setting, light, _rows(hits, numbers), target[numbers], offsets)
+        now_dark = _dark(setting, light, rows_of(hits, numbers), target[numbers], offsets)
         return np.asarray((apart <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
     radius = delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
@@ -170,7 +174,7 @@ def _bounds(
     square by 2 e / r; and the products round some 16 times.
     """
     value, theirs, their_cosine = values
-    e = slide(setting.sizes, rays.o, rays.d, hits.p, hits.n, hits.shape)
+    e = slide(setting.sizes, rays.o, rays.d, hits, _sag(setting, hits))
     if _kind(setting, light) == CONSTANT:
         w, distance = target, np.full(len(target), np.inf)
     else:
@@ -180,18 +184,22 @@ def _bounds(
     with np.errstate(divide="ignore", invalid="ignore"):
         ours_full = np.where(cosine > 0.0, value.max(axis=1) / cosine, 0.0)
         theirs_full = np.where(their_cosine > 0.0, theirs.max(axis=1) / their_cosine, 0.0)
-    turn = 2.0 * e / setting.sizes.feature_of(hits.shape, hits.face)
+    turn = 2.0 * e / setting.sizes.feature_of(hits)
     relative = turn + 4.0 * e / distance + 16.0 * UNIT_ROUNDOFF
     return np.asarray(np.maximum(ours_full, theirs_full) * relative)
+
+
+def _sag(setting: Setting, hits: Intersections) -> FloatArray:
+    """(n,): how far the meshes that stand for shapes are off these."""
+    sag = np.zeros(len(setting.scene.shapes) + 1)
+    for shape, found in setting.twin.stand_ins().items():
+        sag[shape] = max(s.sag for s in found)
+    return np.asarray(sag[hits.shape])
 
 
 def _kind(setting: Setting, light: int) -> int:
     choice = setting.tables.lights.choice
     return -1 if choice is None else int(choice.kind[light])
-
-
-def _rows(hits: Intersections, rows: IntArray) -> Intersections:
-    return Intersections(**{name: array[rows] for name, array in vars(hits).items()})
 
 
 # ---- Mitsuba's side -----------------------------------------------------------------------------
@@ -203,7 +211,7 @@ def _mitsuba_direct(
     """f cos L (n, 3) and the cosine at the surface (n,): Mitsuba's hit, BSDF, visibility, light."""
     import drjit as dr
 
-    mi, scene, kind = mitsuba(), setting.mi_scene, _kind(setting, light)
+    mi, scene, kind = mitsuba(), setting.twin.mi_scene, _kind(setting, light)
     emitter = _point_emitter(setting, light) if kind == POINT else None
 
     def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
@@ -236,7 +244,7 @@ def _point_emitter(setting: Setting, light: int) -> Any:
     row = 0 if choice is None else int(choice.row[light])
     lights = setting.scene.lights
     index = [i for i, described in enumerate(lights) if isinstance(described, Point)][row]
-    for emitter in setting.mi_scene.emitters():
+    for emitter in setting.twin.mi_scene.emitters():
         if emitter.id() == light_id(index):
             return emitter
     raise LookupError(f"Mitsuba's scene has no emitter {light_id(index)}")

@@ -1,193 +1,257 @@
 """The first rung: the same rays hit the same places."""
 
-from typing import Any
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.mitsuba_scene import trace
-from comparisons.results import Tier
+from comparisons.answers import Answers, BoolArray, rows_of
+from comparisons.exact.referee import Referee
+from comparisons.float32 import delta
+from comparisons.results import Status, Tier
 from comparisons.tiers import arbiter
-from comparisons.tiers.bounds import ShapeSizes, delta, shape_sizes, slide
+from comparisons.tiers.aimed import aimed_rays
+from comparisons.tiers.bounds import ShapeSizes
 from comparisons.tiers.camera import compare_camera
+from comparisons.tiers.coincidence import coincident, in_one_place
+from comparisons.tiers.comparer import DISCRETE, KINDS, Comparer
+from comparisons.tiers.judgement import FEW, MOST_JUDGED, Judgement, judged
 from comparisons.tiers.rays import Rays, mixed_rays
+from comparisons.twin import Twin, trace
 from reference_rt import query
 from reference_rt.query import Intersections
 from reference_rt.scene import Scene
-from reference_rt.shapes import Box, Mesh, Sphere, Triangle
 from reference_rt.shapes.shape import FloatArray, IntArray
-from reference_rt.tables import SceneTables, build_tables
-from reference_rt.transform import Translate
+from reference_rt.tables import SceneTables
 
-KINDS = ("hit", "shape", "face", "t", "normal", "shading_normal", "uv")
+PIXELS = 16_700
+"""Camera rays that are compared at most, evenly strided.  With these make 50,000 random rays and
+rays from hits; 50,000 more are aimed: see `mixed_rays` and `aimed_rays`."""
 
-PIXELS = 128 * 128
-"""Camera rays that are compared at most, evenly strided; as many others join them."""
+
+class Answered(NamedTuple):
+    """Rays, what ours and Mitsuba's found, errors over bounds (n, KINDS), and how far a ray may be
+    moved for the arbiter (n,)."""
+
+    rays: Rays
+    ours: Intersections
+    theirs: Answers
+    ratios: FloatArray
+    radius: FloatArray
 
 
 def geometry(
-    scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXELS, seed: int = 0
+    scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS, seed: int = 0
 ) -> Tier:
-    """Compare camera rays, and what camera, random and secondary rays hit.
+    """Compare camera rays, and what rays hit: 3 `pixels` of the camera, at random and from hits, and
+    as many that are aimed at edges, drawn with `seed`.
 
-    `pixels` bounds the number of camera rays; there are as many random rays through the scene's
-    bounds, drawn with `seed`, and as many from the camera rays' hits.  Both tracers get the same
-    float32 numbers.  Agreement needs every ray's hit, shape, face, t, normals and uv to be within
-    float32's bound, or the arbiter to say that float32 cannot resolve the ray.
+    Both tracers get the same float32 numbers.  Agreement needs every ray's hit, shape, face, t,
+    normals and uv to be within float32's bound, or the arbiter to say that float32 cannot resolve
+    the ray.  What remains is told, and whose fault it is.
     """
-    camera = compare_camera(scene, mi_scene, pixels)
-    sizes = shape_sizes(tables, len(scene.shapes))
-    rays = mixed_rays(scene, tables, sizes, pixels, seed)
-    ours, theirs = query.intersect(tables, rays.o, rays.d), trace(mi_scene, rays.o, rays.d)
-    comparer = Comparer(scene, sizes)
-    ratios = comparer.ratios(rays, ours, theirs)
-    wrong = np.flatnonzero((ratios > 1.0).any(axis=1))
-    reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))
-    radius = delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
-
-    def like_theirs(numbers: IntArray, offsets: FloatArray) -> arbiter.BoolArray:
-        moved = Rays(rays.o[numbers] + offsets, rays.d[numbers])
-        again = query.intersect(tables, moved.o, moved.d)
-        ratios = comparer.ratios(moved, again, _rows(theirs, numbers))
-        # The move itself shifts t and uv by as much as the bound: twice is allowed.
-        return np.asarray((ratios <= 2.0).all(axis=1))
-
-    settled = arbiter.explained(wrong, radius[wrong], like_theirs)
+    camera = compare_camera(scene, twin, pixels)
+    sizes = ShapeSizes(scene)
+    unaimed = mixed_rays(scene, tables, sizes, pixels, seed)
+    aimed = aimed_rays(tables, sizes, len(unaimed.o), seed)
+    rays = Rays(*(np.concatenate(pair) for pair in zip(unaimed, aimed, strict=True)))
+    is_aimed = np.arange(len(rays.o)) >= len(unaimed.o)
+    comparer = Comparer(sizes)
+    answered, beyond = _answered(tables, twin, comparer, rays)
+    wrong = np.flatnonzero((answered.ratios > 1.0).any(axis=1))
+    settled = _explained(tables, comparer, answered, wrong)
     left = wrong[~settled]
-    coincident = _coincident(scene, comparer, rays, left, (ours, theirs))
-    mismatches = left[~coincident]
-    right = ratios[(ratios <= 1.0).all(axis=1)]
+    together = coincident(scene, twin, comparer, answered, left)
+    mismatches = left[~together]
+    # What the arbiter explained may lie in one place too.
+    apart = wrong[settled][~in_one_place(comparer, answered, wrong[settled])]
+    mismatches = mismatches[np.argsort(is_aimed[mismatches], kind="stable")]
+    verdict = judged(Referee(tables, sizes), rays, answered.ours, answered.theirs, mismatches)
+    explained = apart
+    right = answered.ratios[(answered.ratios <= 1.0).all(axis=1)]
     numbers: dict[str, Any] = {
         "rays": len(rays.o),
-        "hits": int(np.count_nonzero(ours.shape >= 0)),
+        "hits": int(np.count_nonzero(answered.ours.shape >= 0)),
         "mismatches": len(mismatches),
-        "explained": len(wrong) - len(mismatches),
-        "coincident": int(np.count_nonzero(coincident)),
+        "decided_ours": len(verdict.ours),
+        "decided_mitsuba": len(verdict.mitsuba),
+        "undecided": len(verdict.undecided),
+        "explained": int(np.count_nonzero(~is_aimed[explained])),
+        "aimed_rays": int(np.count_nonzero(is_aimed)),
+        "aimed_mismatches": int(np.count_nonzero(is_aimed[mismatches])),
+        "aimed_explained": int(np.count_nonzero(is_aimed[explained])),
+        "coincident": len(wrong) - len(mismatches) - len(explained),
+        "beyond_planes": beyond,
         **{
             f"max_{kind}_error_over_bound": float(right[:, k].max(initial=0.0))
             for k, kind in enumerate(KINDS)
-            if k > 2
+            if k >= DISCRETE
         },
         "mismatches_by_kind": {
-            kind: int(np.count_nonzero(ratios[mismatches, k] > 1.0)) for k, kind in enumerate(KINDS)
+            kind: int(np.count_nonzero(answered.ratios[mismatches, k] > 1.0))
+            for k, kind in enumerate(KINDS)
+        },
+        "mitsuba_wrong": [_describe(answered, k) for k in verdict.mitsuba[:LISTED].tolist()],
+        "stand_ins": {
+            f"shape_{shape}": [s._asdict() for s in found]
+            for shape, found in twin.stand_ins().items()
         },
         **camera.numbers,
     }
     if camera.problem:
         return Tier("geometry", "differ", camera.problem, numbers)
-    if len(mismatches):
-        where = _describe(rays, ours, theirs, ratios, int(mismatches[0]))
-        reason = f"{len(mismatches)} of {len(rays.o)} rays differ; the first: {where}"
-        return Tier("geometry", "differ", reason, numbers)
-    unresolved = (
-        f"{numbers['explained']} of {len(rays.o)} rays meet edges, or surfaces that coincide, "
-        "which float32 cannot resolve"
-    )
-    if numbers["explained"] > arbiter.LIMIT * len(rays.o):
-        return Tier("geometry", "reference-limited", unresolved, numbers)
-    worst = right.max(initial=0.0)
-    reason = f"{len(rays.o)} rays agree to {worst:.2g} of float32's bound; {unresolved}"
-    return Tier("geometry", "agree", reason, numbers)
+    status, reason = _outcome(answered, verdict, is_aimed, numbers)
+    return Tier("geometry", status, reason, numbers)
 
 
-# ---- one answer against the other ---------------------------------------------------------------
+LISTED = 20
+"""Rays that Mitsuba gets wrong, of those that are listed."""
 
 
-class Comparer:
-    """Errors of Mitsuba's answers over their bounds."""
-
-    def __init__(self, scene: Scene, sizes: ShapeSizes) -> None:
-        self.sizes = sizes
-        shapes = [*scene.shapes, None]
-        # A hit without a shape has index -1: the last of these.
-        self.has_faces = np.array([isinstance(s, Mesh | Triangle) for s in shapes])
-        self.is_sphere = np.array([isinstance(s, Sphere) for s in shapes])
-        self.is_box = np.array([isinstance(s, Box) for s in shapes])
-
-    def ratios(self, rays: Rays, ours: Intersections, theirs: Intersections) -> FloatArray:
-        """(n, len(KINDS)): error over bound, infinite for another hit, shape or face.
-
-        With e = delta / cos, how far the point may slide along the surface: |t| may be off by e,
-        uv and normals by e over the smallest length on which they change, shading normals, which
-        turn by up to two unit vectors on that length, by twice that.
-        """
-        hit = (ours.shape >= 0) & (theirs.shape >= 0)
-        same = hit & (ours.shape == theirs.shape)
-        other_face = self.has_faces[ours.shape] & (ours.face != theirs.face)
-        length = np.linalg.norm(rays.d, axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            e = slide(self.sizes, rays.o, rays.d, ours.p, ours.n, ours.shape)
-            turn = e / self.sizes.feature_of(ours.shape, ours.face)
-            error_t = np.abs(theirs.t - ours.t) * length / e
-            error_n = np.linalg.norm(theirs.n - ours.n, axis=1) / turn
-            error_ns = np.linalg.norm(theirs.ns - ours.ns, axis=1) / (2.0 * turn)
-            error_uv = np.linalg.norm(self._place(theirs) - self._place(ours), axis=1) / turn
-        # A box's faces are counted and parametrised differently: its normals tell them apart.
-        error_uv[self.is_box[ours.shape]] = 0.0
-        different = np.column_stack(
-            [(ours.shape >= 0) != (theirs.shape >= 0), hit & ~same, same & other_face]
+def _outcome(
+    answered: Answered, verdict: Judgement, is_aimed: BoolArray, numbers: dict[str, Any]
+) -> tuple[Status, str]:
+    """What the mismatches mean: those that are Mitsuba's own are its limit, where they are few."""
+    total, mitsuba = len(is_aimed), verdict.mitsuba
+    count = int(np.count_nonzero(~is_aimed))
+    unaimed = int(np.count_nonzero(~is_aimed[mitsuba]))
+    ours = np.concatenate([verdict.ours, verdict.undecided])
+    if len(ours) and (len(verdict.ours) or not _is_rest(answered, verdict, is_aimed)):
+        told = f"{numbers['mismatches']} of {total} rays differ"
+        if len(verdict.ours):
+            told += f", {len(verdict.ours)} by our fault"
+        first = int((verdict.ours if len(verdict.ours) else ours)[0])
+        return "differ", f"{told}; the first: {_describe(answered, first)}"
+    if unaimed > FEW * count:
+        where = _describe(answered, int(mitsuba[0]))
+        return "differ", (
+            f"{numbers['mismatches']} of {total} rays differ, and ours are right about what they "
+            f"meet: Mitsuba's scene is another; the first: {where}"
         )
-        errors = np.column_stack([error_t, error_n, error_ns, error_uv])
-        errors[~same | other_face] = 0.0  # of another surface they mean nothing
-        # A NaN is never within a bound.
-        return np.hstack([np.where(different, np.inf, 0.0), np.nan_to_num(errors, nan=np.inf)])
+    told = (
+        f"{numbers['explained']} of {count} rays meet edges that float32 cannot resolve "
+        f"({numbers['aimed_explained']} of {total - count} aimed at edges)"
+    )
+    if numbers["coincident"]:
+        told += f", {numbers['coincident']} two surfaces in one place"
+    if numbers["beyond_planes"]:
+        told += f", {numbers['beyond_planes']} an infinite plane beyond its twin"
+    if numbers["mismatches"]:
+        aimed = numbers["aimed_mismatches"]
+        told += f"; {unaimed} and {aimed} aimed are Mitsuba's mistakes, by exact arithmetic"
+    few_aimed = numbers["aimed_mismatches"] <= arbiter.LIMIT * (total - count)
+    if numbers["explained"] > arbiter.LIMIT * count or unaimed or not few_aimed:
+        return "reference-limited", told
+    worst = max(v for k, v in numbers.items() if k.endswith("error_over_bound"))
+    return "agree", f"{total} rays agree to {worst:.2g} of float32's bound; {told}"
 
-    def _place(self, hits: Intersections) -> FloatArray:
-        """uv as coordinates without seam or pole: a sphere's as a unit vector."""
-        phi, theta = 2.0 * np.pi * hits.uv[:, 0], np.pi * hits.uv[:, 1]
-        r = np.sin(theta)
-        on_sphere = np.column_stack([r * np.cos(phi), r * np.sin(phi), np.cos(theta)])
-        flat = np.column_stack([hits.uv, np.zeros(len(phi))])
-        return np.where(self.is_sphere[hits.shape][:, None], on_sphere, flat)
+
+def _is_rest(answered: Answered, verdict: Judgement, is_aimed: BoolArray) -> bool:
+    """Whether what is undecided are aimed rays for which there was no time, all others of which
+    were found to be Mitsuba's."""
+    count = len(verdict.mitsuba) + len(verdict.undecided)
+    return (
+        len(verdict.mitsuba) == MOST_JUDGED < count
+        and bool(is_aimed[verdict.undecided].all())
+        and bool((answered.ratios[verdict.undecided, :DISCRETE] > 1.0).any(axis=1).all())
+    )
 
 
-COINCIDENCES = 8
-"""Shapes that are looked behind: each costs building the tables again."""
+def _answered(
+    tables: SceneTables, twin: Twin, comparer: Comparer, rays: Rays
+) -> tuple[Answered, int]:
+    """What both found, and how many rays are left out: those that meet an infinite plane beyond
+    what there is of it in Mitsuba."""
+    ours, theirs = query.intersect(tables, rays.o, rays.d), trace(twin, rays.o, rays.d)
+    ratios = comparer.ratios(rays, ours, theirs)
+    beyond = _beyond(twin, ours)
+    ratios[beyond] = 0.0
+    sizes = comparer.sizes
+    reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))
+    sag = np.zeros(len(sizes.reach) + 1)
+    for shape, found in twin.stand_ins().items():
+        sag[shape] = max(s.sag for s in found)
+    radius = delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
+    radius += np.maximum(sag[ours.shape], sag[theirs.shape])
+    return Answered(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
 
 
-def _coincident(
-    scene: Scene,
-    comparer: Comparer,
-    rays: Rays,
-    numbers: IntArray,
-    answers: tuple[Intersections, Intersections],
-) -> arbiter.BoolArray:
-    """Which rays (m,) meet two shapes in one place, of which ours found one, Mitsuba the other.
+def _beyond(twin: Twin, ours: Intersections) -> BoolArray:
+    beyond = np.zeros(len(ours.t), bool)
+    for shape, extent in twin.extents().items():
+        far = np.linalg.norm(ours.p - extent.middle, axis=1) > extent.radius
+        beyond |= (ours.shape == shape) & far
+    return beyond
 
-    So it is where ours gives Mitsuba's answer once its own shape is far away, at the same t.
+
+def _explained(
+    tables: SceneTables, comparer: Comparer, answered: Answered, wrong: IntArray
+) -> BoolArray:
+    """Which of the rays `wrong` (m,) float32 cannot resolve: beside them, ours has Mitsuba's answer.
+
+    Or two rays beside have it together: one comes as far as Mitsuba's hit, and one that begins just
+    before meets what it hit.  Along an edge Mitsuba may miss one side and yet hit the other from
+    behind, as no single ray can.
     """
-    ours, theirs = (_rows(hits, numbers) for hits in answers)
-    found = np.zeros(len(numbers), bool)
-    for shape in np.unique(ours.shape[ours.shape >= 0])[:COINCIDENCES].tolist():
-        mine = np.flatnonzero(ours.shape == shape)
-        some = Rays(rays.o[numbers[mine]], rays.d[numbers[mine]])
-        rest = build_tables(_without(scene, shape, comparer.sizes))
-        behind = query.intersect(rest, some.o, some.d)
-        agrees = (comparer.ratios(some, behind, _rows(theirs, mine)) <= 1.0).all(axis=1)
-        e = slide(comparer.sizes, some.o, some.d, behind.p, behind.n, behind.shape)
-        with np.errstate(invalid="ignore"):
-            found[mine] = agrees & (np.abs(behind.t - ours.t[mine]) <= e)
+    rays, radius = answered.rays, answered.radius
+    found = arbiter.explained(wrong, radius[wrong], _same_answer(tables, comparer, answered))
+    rest = np.flatnonzero(~found & (answered.theirs.shape[wrong] >= 0))
+    numbers = wrong[rest]
+    theirs = rows_of(answered.theirs, numbers)
+    near = rows_of_rays(rays, numbers)
+    length = np.linalg.norm(near.d, axis=1)
+    along = np.abs(np.sum(theirs.n * near.d, axis=1)) / length
+    margin = 4.0 * radius[numbers] / np.maximum(along, 1.0 / STEEPEST) / length
+
+    def comes_so_far(rows: IntArray, offsets: FloatArray) -> BoolArray:
+        moved = query.intersect(tables, near.o[rows] + offsets, near.d[rows])
+        return np.asarray(moved.t >= (theirs.t - margin)[rows])
+
+    here = np.arange(len(numbers))
+    comes = arbiter.explained(here, radius[numbers], comes_so_far)
+    meets = np.zeros(len(numbers), bool)
+    for way in (1.0, -1.0):  # from just before Mitsuba's hit, and from just behind it, back
+        start = near.o + near.d * (theirs.t - way * margin)[:, None]
+        some = dataclasses.replace(theirs, t=margin)
+        beside = answered._replace(rays=Rays(start, way * near.d), theirs=some)
+        open_ = np.flatnonzero(comes & ~meets)
+        same = _same_answer(tables, comparer, beside)
+        meets[open_] = arbiter.explained(open_, radius[numbers[open_]], same)
+    found[rest] = meets
     return found
 
 
-def _without(scene: Scene, index: int, sizes: ShapeSizes) -> Scene:
-    """The scene with one shape far away.  Left out, it would make kernels compile again."""
-    far = 1e6 * float(sizes.reach.max())
-    shapes = list(scene.shapes)
-    steps = (*shapes[index].transform, Translate(translate=(far, far, far)))
-    shapes[index] = shapes[index].model_copy(update={"transform": steps})
-    return scene.changed(shapes=tuple(shapes))
+def rows_of_rays(rays: Rays, rows: IntArray) -> Rays:
+    return Rays(rays.o[rows], rays.d[rows])
 
 
-def _rows(hits: Intersections, rows: IntArray) -> Intersections:
-    return Intersections(**{name: array[rows] for name, array in vars(hits).items()})
+STEEPEST = 64.0
+"""Of one over the cosine, for where a ray begins just before a hit."""
 
 
-def _describe(
-    rays: Rays, ours: Intersections, theirs: Intersections, ratios: FloatArray, k: int
-) -> str:
-    kind = KINDS[int(np.argmax(ratios[k]))]
+def _same_answer(
+    tables: SceneTables, comparer: Comparer, answered: Answered
+) -> Callable[[IntArray, FloatArray], BoolArray]:
+    """Whether rays that are moved have Mitsuba's answer in ours."""
+    rays, theirs = answered.rays, answered.theirs
+
+    def like_theirs(numbers: IntArray, offsets: FloatArray) -> BoolArray:
+        moved = Rays(rays.o[numbers] + offsets, rays.d[numbers])
+        again = query.intersect(tables, moved.o, moved.d)
+        ratios = comparer.ratios(moved, again, rows_of(theirs, numbers))
+        # The move itself shifts t and uv by as much as the bound: twice is allowed.
+        return np.asarray((ratios <= 2.0).all(axis=1))
+
+    return like_theirs
+
+
+def _describe(answered: Answered, k: int) -> str:
+    rays = answered.rays
+    kind = KINDS[int(np.argmax(answered.ratios[k]))]
     sides = [
-        f"{who} shape {hits.shape[k]} face {hits.face[k]} at t = {hits.t[k]:.9g}, n = {hits.n[k]}"
-        for who, hits in (("ours", ours), ("Mitsuba's", theirs))
+        f"{who} shape {hits.shape[k]} part {hits.part[k]} primitive {hits.primitive[k]} instance "
+        f"{hits.instance[k]} at t = {hits.t[k]:.9g}, n = {hits.n[k]}"
+        for who, hits in (("ours", answered.ours), ("Mitsuba's", answered.theirs))
     ]
     return f"{kind}, from {rays.o[k].tolist()} along {rays.d[k].tolist()}: {'; '.join(sides)}"

@@ -1,10 +1,11 @@
-"""The rays that the rungs compare: of the camera, at random, and from what was hit."""
+"""The rays that the rungs compare: of the camera, at random, from what was hit."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.tiers.bounds import ShapeSizes, largest, round32
+from comparisons.float32 import largest, round32
+from comparisons.tiers.bounds import ShapeSizes
 from comparisons.tiers.camera import camera_rays, pixel_centres
 from reference_rt import query
 from reference_rt.scene import Scene
@@ -32,26 +33,34 @@ def pixel_rays(scene: Scene, most: int) -> Rays:
 
 
 def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, seed: int) -> Rays:
-    """At most `most` camera rays, as many random ones through the scene's bounds, and one in a
-    random direction from each camera ray's hit."""
+    """3 `most` rays: at most `most` of the camera, `most` in random directions from what these and
+    others hit, and for the rest random ones through the scene's bounds."""
     camera = pixel_rays(scene, most)
     if len(scene.shapes) == 0:
         return camera
     rng = np.random.default_rng(seed)
-    n = len(camera.o)
-    margin = 0.1 * (sizes.upper - sizes.lower)  # so that some begin outside
-    start, end = rng.uniform(sizes.lower - margin, sizes.upper + margin, (2, n, 3))
-    hits = query.intersect(tables, camera.o, camera.d)
-    hit = hits.shape >= 0
-    out = rng.normal(size=(n, 3))[hit]
+    through = random_rays(sizes, 3 * most - len(camera.o), rng)
+    first = Rays(*(np.concatenate(pair) for pair in zip(camera, through, strict=True)))
+    hits = query.intersect(tables, first.o, first.d)
+    hit = np.flatnonzero(hits.shape >= 0)[:most]
+    out = rng.normal(size=(len(hit), 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
     # Off the surface as far as Mitsuba's own rays: an origin within float32's error of a surface
     # would be on no defined side of it.
     side = np.sign(np.sum(out * hits.n[hit], axis=1))
     height = side * (1.0 + largest(hits.p[hit])) * RAY_EPSILON
-    from_hits = hits.p[hit] + hits.n[hit] * height[:, None]
-    d = np.concatenate([end - start, out])
-    d /= np.linalg.norm(d, axis=1)[:, None]
-    return Rays(
-        np.concatenate([camera.o, round32(start), round32(from_hits)]),
-        np.concatenate([camera.d, round32(d)]),
-    )
+    from_hits = Rays(round32(hits.p[hit] + hits.n[hit] * height[:, None]), round32(out))
+    rest = 3 * most - len(camera.o) - len(hit)
+    parts = (camera, Rays(through.o[:rest], through.d[:rest]), from_hits)
+    o, d = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Rays(o, d)
+
+
+def random_rays(sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
+    """From a point in the scene's bounds, or beside, towards another."""
+    margin = 0.1 * (sizes.upper - sizes.lower)  # so that some begin outside
+    start, end = rng.uniform(sizes.lower - margin, sizes.upper + margin, (2, n, 3))
+    d = end - start
+    length = np.linalg.norm(d, axis=1)[:, None]
+    d = np.divide(d, length, out=np.tile([0.0, 0.0, 1.0], (n, 1)), where=length > 0.0)
+    return Rays(round32(start), round32(d))

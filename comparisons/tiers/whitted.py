@@ -16,9 +16,9 @@ from comparisons.tiers.bounds import (
     delta,
     largest,
     round32,
-    shape_sizes,
 )
 from comparisons.tiers.rays import RAY_EPSILON, Rays, pixel_rays
+from comparisons.twin import Twin
 from reference_rt import query
 from reference_rt.integrators import Whitted
 from reference_rt.lights import CONSTANT
@@ -44,7 +44,7 @@ What lies closer to a light, or is fanned out by curved mirrors, goes to the arb
 the project's scenes: 0.6e-5."""
 
 
-def whitted(scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXELS) -> Tier:
+def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS) -> Tier:
     """Compare the radiance through pixel centres with that of our Whitted plugin in Mitsuba.
 
     With the scene's own depth where its integrator is Whitted, else the default's.  Outliers are
@@ -57,6 +57,9 @@ def whitted(scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXE
     if lights > MOST_LIGHTS:
         reason = f"{lights} lights, each a shadow ray at every surface: more than {MOST_LIGHTS}"
         return Tier("whitted", "not-applicable", reason)
+    if twin.lacking:
+        return Tier("whitted", "not-comparable", twin.lacking)
+    mi_scene = twin.mi_scene
     integrator = scene.integrator if isinstance(scene.integrator, Whitted) else Whitted()
     rays = pixel_rays(scene, pixels)
     setup = integrator.setup()
@@ -78,7 +81,7 @@ def whitted(scene: Scene, tables: SceneTables, mi_scene: Any, pixels: int = PIXE
     settled = _explained(
         some,
         ((ours[outliers], ours_along), (theirs[outliers], theirs_along)),
-        _radii(tables, shape_sizes(tables, len(scene.shapes)), some),
+        _radii(tables, ShapeSizes(scene), some),
         bound[outliers],
     )
     unexplained = outliers[~settled]

@@ -1,56 +1,164 @@
-"""Scene -> Mitsuba dict: one `singledispatch` function per public type.
+"""Scene -> Mitsuba: one `singledispatch` function per public type.
 
 To translate a new type: register a function for it in the file of its kind; until then it raises
 `UntranslatableError`, which makes a scene `not-comparable`.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from comparisons.layout import Copy, Leaf, copies_of, place_of
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_scene import light_id, shape_id
+from comparisons.pieces import Piece, Plugin
+from comparisons.solids import Operand, SolidTwin
 from comparisons.translate.cameras import translate_camera
 from comparisons.translate.errors import UntranslatableError
 from comparisons.translate.film import translate_film, translate_sampler
 from comparisons.translate.integrators import translate_integrator
 from comparisons.translate.lights import translate_light
 from comparisons.translate.materials import parts_of
-from comparisons.translate.shapes import translate_shape
+from comparisons.translate.shapes import Site, translate_shape
+from comparisons.twin import Crowd, Twin
 from reference_rt.scene import Scene
+
+# Without it Embree drops rays that meet a shared edge (Mitsuba issue 1149).
+ROBUST = {"embree_use_robust_intersections": True}
+
+
+class _Translated(NamedTuple):
+    plain: dict[str, Any]
+    pieces: dict[str, Piece]
+    solids: list[SolidTwin]
 
 
 def to_mitsuba(scene: Scene) -> dict[str, Any]:
-    """The scene as a dict for `mitsuba.load_dict`; shape i of ours has the id "shape_<i>".
+    """The scene as a dict for `mitsuba.load_dict`, without its solids; shape i of ours has the id
+    "shape_<i>", or several such with suffixes.
 
     Meshes are Mitsuba objects already, made of the very triangles of our tables.  There is no
     integrator where ours is ray casting.  Raises UntranslatableError, SceneError for a file that
     cannot be used, ReferenceUnavailableError without Mitsuba.
     """
-    sensor = translate_camera(scene.camera)
+    return _translated(scene).plain
+
+
+def load(scene: Scene) -> Twin:
+    """The scene in Mitsuba, its shapes not merged.  Raises as `to_mitsuba` does."""
+    found = _translated(scene)
+    crowd = _crowd(found)
+    mi_scene = mitsuba().load_dict(found.plain, optimize=False)
+    return Twin(mi_scene, found.pieces, tuple(found.solids), crowd)
+
+
+FEW = 32
+"""Instances that Mitsuba's own scene may have: see `mitsuba_scene.first_distances`."""
+
+
+def _crowd(found: _Translated) -> Crowd | None:
+    """Takes the instances out, where they are more than a few."""
+    names = [name for name, piece in found.pieces.items() if piece.plugin.within is not None]
+    if len(names) <= FEW:
+        return None
+    pieces = {name: found.pieces.pop(name) for name in names}
+    load_dict = mitsuba().load_dict
+    instances = {name: found.plain.pop(name) for name in names}
+    within = [piece.plugin.within for piece in pieces.values() if piece.plugin.within is not None]
+    groups = {w.name: found.plain.pop(w.name, w.group) for w in within}
+    members = {w.name: w.member for w in within}
+    return Crowd(
+        load_dict({"type": "scene", **ROBUST, **groups, **instances}, optimize=False),
+        pieces,
+        np.array([w.m for w in within]),
+        [list(members).index(w.name) for w in within],
+        [
+            load_dict({"type": "scene", **ROBUST, "member": member}, optimize=False)
+            for member in members.values()
+        ],
+    )
+
+
+def _translated(scene: Scene) -> _Translated:
+    sensor = translate_camera(scene.camera, scene.film)
     sensor["film"] = translate_film(scene.film)
     sensor["sampler"] = translate_sampler(scene.resolved_sampler)
-    result: dict[str, Any] = {
-        "type": "scene",
-        # Without it Embree drops rays that meet a shared edge (Mitsuba issue 1149).
-        "embree_use_robust_intersections": True,
-        "sensor": sensor,
-    }
+    plain: dict[str, Any] = {"type": "scene", **ROBUST, "sensor": sensor}
     integrator = translate_integrator(scene.integrator)
     if integrator is not None:
-        result["integrator"] = integrator
-    for i, shape in enumerate(scene.shapes):
-        parts = parts_of(shape.material, scene.materials)
+        plain["integrator"] = integrator
+    result = _Translated(plain, {}, [])
+    copies = copies_of(scene)
+    count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
+    shared: dict[Any, Any] = {}
+    reach = _reach(scene, copies)
+    for copy in copies:
         try:
-            result[shape_id(i)] = translate_shape(shape, scene.folder, parts)
+            _add(result, scene, copy, count[copy.group] if copy.group else 1, shared, reach)
         except ValueError as error:
-            raise scene.error(str(error), "shapes", i) from None
+            raise scene.error(str(error), "shapes", copy.shape) from None
     for i, light in enumerate(scene.lights):
-        result[light_id(i)] = translate_light(light)
+        plain[light_id(i)] = translate_light(light)
     return result
 
 
-def load(scene: Scene) -> Any:
-    """The scene as Mitsuba's own object, its shapes not merged.  Raises as `to_mitsuba` does."""
-    return mitsuba().load_dict(to_mitsuba(scene), optimize=False)
+def _reach(scene: Scene, copies: list[Copy]) -> float:
+    """About the largest coordinate: of the eye, and of unit shapes where they stand."""
+    found = float(np.abs([scene.camera.eye, scene.camera.target]).max())
+    for copy in copies:
+        for leaf in (leaf for member in copy.members for leaf in member.leaves):
+            m = leaf.shape.map_in(place_of(scene, leaf, copy.outer))
+            found = max(found, float((np.abs(m[:, 3]) + np.abs(m[:, :3]).sum(axis=1)).max()))
+    return found
+
+
+def _add(
+    result: _Translated,
+    scene: Scene,
+    copy: Copy,
+    count: int,
+    shared: dict[Any, Any],
+    reach: float,
+) -> None:
+    """Puts the shapes of one copy, of `count` of its group, into what is translated."""
+    mirrored = bool(np.linalg.det(copy.outer[:, :3]) < 0.0)
+    for number, member in enumerate(copy.members):
+        name = shape_id(copy.shape)
+        if copy.instance >= 0:
+            name += f"_{copy.instance}_{number}"
+        operands = []
+        for leaf in member.leaves:
+            parts = parts_of(leaf.material, scene.materials)
+            place = place_of(scene, leaf, copy.outer)
+            site = Site(place, mirrored, parts, leaf.material, count, shared, reach)
+            plugins = translate_shape(leaf.shape, site)
+            if member.tree is None:
+                values, pieces = _named(plugins, name, copy, leaf)
+                result.plain.update(values)
+                result.pieces.update(pieces)
+            else:
+                values, pieces = _named(plugins, f"{name}_part{leaf.part}", copy, leaf)
+                mi_scene = mitsuba().load_dict(
+                    {"type": "scene", **ROBUST, **values}, optimize=False
+                )
+                operands.append(Operand(mi_scene, pieces, leaf, place))
+        if member.tree is not None:
+            result.solids.append(SolidTwin(tuple(operands), member.tree))
+
+
+def _named(
+    plugins: list[Plugin], name: str, copy: Copy, leaf: Leaf
+) -> tuple[dict[str, Any], dict[str, Piece]]:
+    values, pieces = {}, {}
+    for plugin in plugins:
+        key = name + plugin.suffix
+        values[key] = plugin.value
+        if plugin.within is not None:
+            values[plugin.within.name] = plugin.within.group
+        pieces[key] = Piece(
+            copy.shape, leaf.part, copy.instance, leaf.shape, plugin._replace(value=None)
+        )
+    return values, pieces
 
 
 __all__ = ["UntranslatableError", "load", "to_mitsuba"]

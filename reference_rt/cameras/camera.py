@@ -1,4 +1,4 @@
-"""What all cameras share: where they stand, and the text-book's view rectangle."""
+"""What all cameras share: where they stand, and that most have no lens."""
 
 from typing import Any, Self
 
@@ -6,6 +6,12 @@ from pydantic import model_validator
 
 from reference_rt import transform
 from reference_rt.description import Description, Direction, Vector
+from reference_rt.kernel import kernel
+from reference_rt.sampling import Sample
+from reference_rt.shapes.shape import FloatArray
+
+LENS_CENTRE = (0.5, 0.5)
+"""The lens sample that meets the middle of any lens."""
 
 
 class Camera(Description):
@@ -20,6 +26,17 @@ class Camera(Description):
         transform.look_at(self.eye, self.target, self.up)
         return self
 
-    def view(self, width: int, height: int) -> Any:
+    @property
+    def basis(self) -> FloatArray:
+        """(3, 3): the text-book's u, v, w as rows: right, up, and back from where it looks."""
+        return transform.look_at(self.eye, self.target, self.up)[:, :3].T
+
+    def setup(self, width: int, height: int) -> Any:
         """The camera as its kernel needs it, for a picture of width x height pixels."""
         raise NotImplementedError
+
+
+@kernel
+def no_lens(view: Any, sampler: Sample) -> tuple[float, float]:
+    """For cameras whose rays all pass one point, or none: nothing is drawn."""
+    return LENS_CENTRE

@@ -1,10 +1,12 @@
 """Orthographic: parallel rays that start on the view rectangle."""
 
 import math
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Self
 
-from reference_rt import transform
+from pydantic import model_validator
+
 from reference_rt.cameras.camera import Camera
+from reference_rt.cameras.view_rectangle import Edges, Rectangle, by_width, place, vec3
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
 from reference_rt.ray import Ray
@@ -12,23 +14,32 @@ from reference_rt.vec3 import Vec3
 
 
 class Orthographic(Camera):
-    """A view rectangle around the eye, across the view direction; all rays are parallel."""
+    """A view rectangle through the eye, across the view direction; all rays are parallel."""
 
     type: Literal["orthographic"] = "orthographic"
-    width: Positive = 2.0
-    """Width of the view rectangle in scene units; its height follows from the picture's shape."""
+    width: Positive | None = None
+    """Width of the view rectangle, centred on the eye, in scene units; its height follows from the
+    picture's shape.  Without `width` and `view`, 2."""
+    view: Edges | None = None
+    """Instead of `width`: the view rectangle [l, r, b, t].  Where its shape is not the picture's,
+    pixels are not square."""
 
-    def view(self, width: int, height: int) -> "OrthographicView":
-        basis = transform.look_at(self.eye, self.target, self.up)
-        u, v, w = basis[:, 0], basis[:, 1], basis[:, 2]
-        half_x = self.width / 2.0
-        half_y = half_x * height / width
-        return OrthographicView(
-            Vec3(*(self.eye - half_x * u + half_y * v).tolist()),
-            Vec3(*(2.0 * half_x * u).tolist()),
-            Vec3(*(-2.0 * half_y * v).tolist()),
-            Vec3(*(-w).tolist()),
-        )
+    @model_validator(mode="after")
+    def _one_of_width_and_view(self) -> Self:
+        if self.width is not None and self.view is not None:
+            raise ValueError("both 'width' and 'view'; expected one of them")
+        return self
+
+    def rectangle(self, n_x: int, n_y: int) -> Rectangle:
+        """The view rectangle for a picture of n_x x n_y pixels."""
+        if self.view is None:
+            return by_width(2.0 if self.width is None else self.width, n_x, n_y)
+        return Rectangle(*self.view)
+
+    def setup(self, width: int, height: int) -> "OrthographicView":
+        basis = self.basis
+        corner, right, down = place(self.rectangle(width, height), basis, 0.0)
+        return OrthographicView(Vec3(*self.eye) + corner, right, down, vec3(-basis[2]))
 
 
 class OrthographicView(NamedTuple):
@@ -41,6 +52,6 @@ class OrthographicView(NamedTuple):
 
 
 @kernel
-def camera_ray(view: OrthographicView, x: float, y: float) -> Ray:
+def camera_ray(view: OrthographicView, x: float, y: float, lens: tuple[float, float]) -> Ray:
     """From (x, y) of the rectangle, forward (T2: u_s = l + (r - l)(i + 1/2) / n_x)."""
     return Ray(view.corner + view.right * x + view.down * y, view.forward, math.inf)

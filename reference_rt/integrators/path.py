@@ -7,9 +7,8 @@ from pydantic import Field
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt import shapes as any_shape
 from reference_rt.description import Description
-from reference_rt.geometry import closest_hit
+from reference_rt.geometry import closest_hit, surface
 from reference_rt.integrators.integrator import direct, power_heuristic
 from reference_rt.kernel import kernel
 from reference_rt.lights import area, constant
@@ -65,7 +64,7 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sa
                 weight = power_heuristic(bsdf_pdf, light_pdf)
             total = total + throughput * constant.background(lights.environment) * weight
             break
-        point = any_shape.surface(shapes, ray, hit)
+        point = surface(scene.geometry, ray, hit)
         if point.light >= 0:
             weight = 1.0
             if bsdf_pdf > 0.0:

@@ -7,9 +7,8 @@ from pydantic import Field
 
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt import shapes as any_shape
 from reference_rt.description import Description
-from reference_rt.geometry import closest_hit
+from reference_rt.geometry import closest_hit, surface
 from reference_rt.integrators.integrator import direct
 from reference_rt.kernel import kernel, local_floats
 from reference_rt.lights import CONSTANT, Choice, area, constant
@@ -73,7 +72,7 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampl
         if hit.kind < 0:
             total = total + weight * constant.background(scene.lights.environment)
             continue
-        point = any_shape.surface(scene.geometry.shapes, ray, hit)
+        point = surface(scene.geometry, ray, hit)
         frame = frame_from_normal(point.ns)
         wo = to_local(frame, -ray.d)
         total = total + weight * area.emitted(scene.lights.areas, point, -ray.d)

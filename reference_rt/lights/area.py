@@ -42,7 +42,7 @@ def sample(areas: Areas, i: int, shapes: Shapes, p: Vec3, u0: float, u1: float) 
 @kernel
 def pdf(areas: Areas, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> float:
     """The density per solid angle with which `sample` picks, from `p`, the point `q` on light i."""
-    return any_shape.pdf(shapes.spheres, areas.kind[i], areas.row[i], areas.area[i], p, q)
+    return any_shape.pdf(shapes, areas.kind[i], areas.row[i], areas.area[i], p, q)
 
 
 @kernel

@@ -38,6 +38,22 @@ def on_circle(turns: float) -> tuple[float, float]:
 
 
 @kernel
+def concentric_disk(u0: float, u1: float) -> tuple[float, float]:
+    """A point of the unit disk, uniformly: squares around the middle become circles (Shirley & Chiu
+    1997, "A Low Distortion Map Between Disk and Square").  The middle, (1/2, 1/2), stays exactly.
+    """
+    x, y = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
+    a, b = abs(x), abs(y)
+    r = max(a, b)
+    if r == 0.0:
+        return 0.0, 0.0
+    cosine, sine = on_circle(0.125 * (min(a, b) / r))  # an eighth of a turn at most
+    if a < b:
+        cosine, sine = sine, cosine
+    return math.copysign(r * cosine, x), math.copysign(r * sine, y)
+
+
+@kernel
 def cosine_hemisphere(u0: float, u1: float) -> Vec3:
     """A direction with density cos theta / pi: the disk lifted to the hemisphere (Malley)."""
     r = math.sqrt(u0)

@@ -1,27 +1,29 @@
 """Box: the cube [-1, 1]³ under an affine map."""
 
 import math
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from reference_rt import transform
 from reference_rt.kernel import kernel
-from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at
+from reference_rt.shapes import placement
+from reference_rt.shapes.placement import columns, local_point, world_surface
 from reference_rt.shapes.shape import (
-    BOX,
     Bounds,
     FloatArray,
     IntArray,
     LightPoint,
+    Place,
     Shape,
+    Spans,
     lane_vector,
-    outward,
+    no_spans,
+    one_span,
     pack,
     solid_angle_pdf,
 )
-from reference_rt.vec3 import Vec3, dot, max_abs, normalize, row, triple
+from reference_rt.vec3 import Vec3, dot, row, triple
 
 
 class Box(Shape):
@@ -29,21 +31,11 @@ class Box(Shape):
 
     type: Literal["box"] = "box"
 
-    def tabulate(self, shape: int, material: int, folder: Path) -> "Boxes":
-        m = transform.affine(self.transform)
-        inverse = transform.invert(m)[:, :3]
+    def tabulate(self, place: Place) -> "Boxes":
+        m = self.map_in(place)
         edges = m[:, :3]
         face_areas = 4.0 * np.linalg.norm(np.cross(edges.T[[1, 2, 0]], edges.T[[2, 0, 1]]), axis=1)
-        return Boxes(
-            center=m[:, 3].copy()[None],
-            to_local=inverse.reshape(1, 9).copy(),
-            edges=edges.T.reshape(1, 9).copy(),
-            face_areas=face_areas[None],
-            owner=np.array([shape]),
-            material=np.array([material]),
-            light=np.array([-1]),
-            face=np.array([0]),
-        )
+        return Boxes(face_areas=face_areas[None], **columns(m, place))
 
 
 class Boxes(NamedTuple):
@@ -63,23 +55,12 @@ class Boxes(NamedTuple):
 
 def bounds(boxes: Boxes) -> Bounds:
     """Boxes along the axes (n, 3), (n, 3) that contain the boxes, rounded outwards."""
-    reach = np.abs(boxes.edges.reshape(-1, 3, 3)).sum(axis=1)
-    # Three sums of three products round up to eight times, on numbers no larger than the reach.
-    reach *= 1.0 + 8.0 * np.finfo(float).eps
-    return outward(boxes.center - reach, boxes.center + reach)
+    one = np.ones((len(boxes.center), 3))
+    return placement.bounds(boxes.center, boxes.edges, -one, one)
 
 
 def areas(boxes: Boxes) -> FloatArray:
     return np.asarray(2.0 * boxes.face_areas.sum(axis=1))
-
-
-@kernel
-def local_direction(boxes: Boxes, i: int, v: Vec3) -> Vec3:
-    return Vec3(
-        dot(triple(boxes.to_local, i, 0), v),
-        dot(triple(boxes.to_local, i, 1), v),
-        dot(triple(boxes.to_local, i, 2), v),
-    )
 
 
 def pack_all(boxes: Boxes) -> FloatArray:
@@ -130,45 +111,74 @@ def slabs(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> Slabs:
 
 
 @kernel
-def distance(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> float:
-    """The smallest t > 0 at which a ray meets a box's surface, inf where it does not: from inside,
-    where it leaves."""
-    s = slabs(ray, center, x_of, y_of, z_of)
+def inside(s: Slabs) -> tuple[float, float]:
+    """Where a ray enters and leaves all three slabs; enters after it leaves where it misses."""
     # max(a, NaN) is a: begun with a number, neither bound can become NaN.
     t_in = max(max(max(-math.inf, s.x_in), s.y_in), s.z_in)
     t_out = min(min(min(math.inf, s.x_out), s.y_out), s.z_out)
+    return t_in, t_out
+
+
+@kernel
+def distance(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> float:
+    """The smallest t > 0 at which a ray meets a box's surface, inf where it does not: from inside,
+    where it leaves."""
+    t_in, t_out = inside(slabs(ray, center, x_of, y_of, z_of))
     t = t_in if t_in > 0.0 else t_out
     return t if (t_in <= t_out) & (t > 0.0) else math.inf
 
 
 @kernel
-def found(boxes: Boxes, i: int, ray: Ray, t: float) -> Hit:
-    """The hit of box i at t; its u is the face: axis, + 3 on the positive side."""
-    s = slabs(
+def slabs_of(boxes: Boxes, i: int, ray: Ray) -> Slabs:
+    return slabs(
         ray,
         row(boxes.center, i),
         triple(boxes.to_local, i, 0),
         triple(boxes.to_local, i, 1),
         triple(boxes.to_local, i, 2),
     )
-    if t == s.x_in:
-        face = 0 if s.x_up else 3
-    elif t == s.y_in:
-        face = 1 if s.y_up else 4
-    elif t == s.z_in:
-        face = 2 if s.z_up else 5
-    elif t == s.x_out:
-        face = 3 if s.x_up else 0
-    elif t == s.y_out:
-        face = 4 if s.y_up else 1
-    else:
-        face = 5 if s.z_up else 2
-    return Hit(t, BOX, i, float(face), 0.0)
 
 
 @kernel
-def intersect(boxes: Boxes, i: int, ray: Ray, closest: Hit) -> Hit:
-    """The nearer of `closest` and box i."""
+def face_entered(s: Slabs, t: float) -> float:
+    """The face through which a ray comes in at t: axis, + 3 on the positive side."""
+    if t == s.x_in:
+        return 0.0 if s.x_up else 3.0
+    if t == s.y_in:
+        return 1.0 if s.y_up else 4.0
+    return 2.0 if s.z_up else 5.0
+
+
+@kernel
+def face_left(s: Slabs, t: float) -> float:
+    """The face through which a ray goes out at t."""
+    if t == s.x_out:
+        return 3.0 if s.x_up else 0.0
+    if t == s.y_out:
+        return 4.0 if s.y_up else 1.0
+    return 5.0 if s.z_up else 2.0
+
+
+@kernel
+def found(boxes: Boxes, i: int, ray: Ray, t: float) -> Crossing:
+    """The crossing of box i at t; its u is the face: axis, + 3 on the positive side."""
+    s = slabs_of(boxes, i, ray)
+    t_in, _ = inside(s)
+    return Crossing(t, face_entered(s, t) if t == t_in else face_left(s, t), 0.0)
+
+
+@kernel
+def spans(boxes: Boxes, i: int, ray: Ray) -> Spans:
+    s = slabs_of(boxes, i, ray)
+    t_in, t_out = inside(s)
+    if t_in <= t_out:
+        return one_span(t_in, face_entered(s, t_in), t_out, face_left(s, t_out))
+    return no_spans()
+
+
+@kernel
+def intersect(boxes: Boxes, i: int, ray: Ray) -> Crossing:
+    """Where the ray meets box i."""
     t = distance(
         ray,
         row(boxes.center, i),
@@ -176,7 +186,7 @@ def intersect(boxes: Boxes, i: int, ray: Ray, closest: Hit) -> Hit:
         triple(boxes.to_local, i, 1),
         triple(boxes.to_local, i, 2),
     )
-    return found(boxes, i, ray, t) if t < closest.t else closest
+    return found(boxes, i, ray, t)
 
 
 @kernel
@@ -192,22 +202,6 @@ def lane_distance(boxes: Boxes, packets: FloatArray, k: int, lane: int, ray: Ray
 
 
 @kernel
-def face_normal(boxes: Boxes, i: int, axis: int, sign: float) -> Vec3:
-    """The covector of the face's own coordinate, made unit: the inverse transpose at work."""
-    return normalize(triple(boxes.to_local, i, axis)) * sign
-
-
-@kernel
-def place(boxes: Boxes, i: int, local: Vec3) -> Vec3:
-    return (
-        row(boxes.center, i)
-        + triple(boxes.edges, i, 0) * local.x
-        + triple(boxes.edges, i, 1) * local.y
-        + triple(boxes.edges, i, 2) * local.z
-    )
-
-
-@kernel
 def on_face(local: Vec3, axis: int, sign: float) -> Vec3:
     """`local` with the coordinate `axis` set to exactly ±1."""
     if axis == 0:
@@ -218,13 +212,9 @@ def on_face(local: Vec3, axis: int, sign: float) -> Vec3:
 
 
 @kernel
-def error_at(boxes: Boxes, i: int, p: Vec3) -> float:
-    size = (
-        max_abs(triple(boxes.edges, i, 0))
-        + max_abs(triple(boxes.edges, i, 1))
-        + max_abs(triple(boxes.edges, i, 2))
-    )
-    return surface_error(p, row(boxes.center, i), size)
+def face_normal(axis: int, sign: float) -> Vec3:
+    """The local normal of a face."""
+    return on_face(Vec3(0.0, 0.0, 0.0), axis, sign)
 
 
 @kernel
@@ -233,10 +223,10 @@ def surface(boxes: Boxes, ray: Ray, hit: Hit) -> SurfacePoint:
     axis, sign = int(hit.u), -1.0
     if axis >= 3:
         axis, sign = axis - 3, 1.0
-    local = local_direction(boxes, i, at(ray, hit.t) - row(boxes.center, i))
-    p = place(boxes, i, on_face(local, axis, sign))
-    n = face_normal(boxes, i, axis, sign)
-    return SurfacePoint(p, n, n, error_at(boxes, i, p), boxes.material[i], boxes.light[i])
+    q = on_face(local_point(boxes, i, at(ray, hit.t)), axis, sign)
+    # The slabs' ±1 - o rounds relative to what world_error counts already: no error of their own.
+    n = face_normal(axis, sign)
+    return world_surface(boxes, i, q, n, 0.0, boxes.material[i], boxes.light[i])
 
 
 @kernel
@@ -257,17 +247,24 @@ def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
     # The sums above round: v may end a hair above 1.
     a, b = 2.0 * min(v, 1.0) - 1.0, 2.0 * u1 - 1.0
     local = Vec3(a, a, b) if axis == 0 else Vec3(a, b, b)
-    q = place(boxes, i, on_face(local, axis, sign))
-    n = face_normal(boxes, i, axis, sign)
-    return LightPoint(q, n, error_at(boxes, i, q), solid_angle_pdf(p, q, n, area))
+    q = on_face(local, axis, sign)
+    point = world_surface(boxes, i, q, face_normal(axis, sign), 0.0, -1, -1)
+    pdf = solid_angle_pdf(p, point.p, point.n, area)
+    return LightPoint(point.p, point.n, point.error, pdf)
 
 
 @kernel
 def uv(boxes: Boxes, ray: Ray, hit: Hit) -> tuple[float, float]:
     """The two other local coordinates of the face, in the order x, y, z, from 0 to 1."""
     i = hit.row
-    local = local_direction(boxes, i, at(ray, hit.t) - row(boxes.center, i))
+    local = local_point(boxes, i, at(ray, hit.t))
     axis = int(hit.u) % 3
     a = local.y if axis == 0 else local.x
     b = local.y if axis == 2 else local.z
     return 0.5 * (a + 1.0), 0.5 * (b + 1.0)
+
+
+@kernel
+def face_of(boxes: Boxes, hit: Hit) -> int:
+    """The axis, + 3 on the positive side."""
+    return int(hit.u)

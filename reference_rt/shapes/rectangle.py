@@ -1,20 +1,20 @@
 """Rectangle: the square [-1, 1]² in the plane z = 0, normal +z, under an affine map."""
 
 import math
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt import transform
 from reference_rt.kernel import kernel
-from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.shapes.placement import owners
 from reference_rt.shapes.shape import (
-    RECTANGLE,
     Bounds,
     FloatArray,
     IntArray,
     LightPoint,
+    Place,
     Shape,
     lane_vector,
     outward,
@@ -29,8 +29,8 @@ class Rectangle(Shape):
 
     type: Literal["rectangle"] = "rectangle"
 
-    def tabulate(self, shape: int, material: int, folder: Path) -> "Rectangles":
-        m = transform.affine(self.transform)
+    def tabulate(self, place: Place) -> "Rectangles":
+        m = self.map_in(place)
         inverse = transform.invert(m)
         return Rectangles(
             center=m[:, 3].copy()[None],
@@ -39,10 +39,7 @@ class Rectangle(Shape):
             y_of=inverse[1, :3].copy()[None],
             x_edge=m[:, 0].copy()[None],
             y_edge=m[:, 1].copy()[None],
-            owner=np.array([shape]),
-            material=np.array([material]),
-            light=np.array([-1]),
-            face=np.array([0]),
+            **owners(place),
         )
 
 
@@ -92,15 +89,15 @@ def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> fl
 
 
 @kernel
-def found(rectangles: Rectangles, i: int, ray: Ray, t: float) -> Hit:
-    """The hit of rectangle i at t; its u, v are the local x, y in [-1, 1]."""
+def found(rectangles: Rectangles, i: int, ray: Ray, t: float) -> Crossing:
+    """The crossing of rectangle i at t; its u, v are the local x, y in [-1, 1]."""
     q = at(ray, t) - row(rectangles.center, i)
-    return Hit(t, RECTANGLE, i, dot(q, row(rectangles.x_of, i)), dot(q, row(rectangles.y_of, i)))
+    return Crossing(t, dot(q, row(rectangles.x_of, i)), dot(q, row(rectangles.y_of, i)))
 
 
 @kernel
-def intersect(rectangles: Rectangles, i: int, ray: Ray, closest: Hit) -> Hit:
-    """The nearer of `closest` and rectangle i."""
+def intersect(rectangles: Rectangles, i: int, ray: Ray) -> Crossing:
+    """Where the ray meets rectangle i."""
     t = distance(
         ray,
         row(rectangles.center, i),
@@ -108,7 +105,7 @@ def intersect(rectangles: Rectangles, i: int, ray: Ray, closest: Hit) -> Hit:
         row(rectangles.x_of, i),
         row(rectangles.y_of, i),
     )
-    return found(rectangles, i, ray, t) if t < closest.t else closest
+    return found(rectangles, i, ray, t)
 
 
 @kernel
@@ -138,7 +135,7 @@ def error_at(rectangles: Rectangles, i: int, p: Vec3) -> float:
 
 
 @kernel
-def surface(rectangles: Rectangles, hit: Hit) -> SurfacePoint:
+def surface(rectangles: Rectangles, ray: Ray, hit: Hit) -> SurfacePoint:
     i = hit.row
     p = place(rectangles, i, hit.u, hit.v)
     n = row(rectangles.normal, i)
@@ -148,7 +145,7 @@ def surface(rectangles: Rectangles, hit: Hit) -> SurfacePoint:
 
 
 @kernel
-def uv(hit: Hit) -> tuple[float, float]:
+def uv(rectangles: Rectangles, ray: Ray, hit: Hit) -> tuple[float, float]:
     """(x + 1) / 2 and (y + 1) / 2."""
     return 0.5 * (hit.u + 1.0), 0.5 * (hit.v + 1.0)
 

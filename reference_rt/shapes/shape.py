@@ -9,32 +9,68 @@ import numpy.typing as npt
 
 from reference_rt.description import Description
 from reference_rt.kernel import kernel
-from reference_rt.transform import Transform
+from reference_rt.transform import IDENTITY, Affine, Transform, affine, compose, invert
 from reference_rt.vec3 import Vec3, dot
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 Bounds = tuple[FloatArray, FloatArray]
 
-# Codes of `Hit.kind`: which table a primitive is a row of.
-SPHERE, RECTANGLE, BOX, TRIANGLE = 0, 1, 2, 3
+
+class Place(NamedTuple):
+    """As what a shape is tabulated.
+
+    owner: its index in the scene (in its group);  material: the row of its material;  folder: what
+    file names are relative to;  outer: the map that its own transform is followed by.
+    """
+
+    owner: int = 0
+    material: int = 0
+    folder: Path = Path()
+    outer: Affine = IDENTITY
 
 
 class Shape(Description):
     """A shape of the scene: what it is made of and where it stands."""
 
     material: str | None = None
-    """A key of the scene's materials; none means diffuse grey of reflectance 0.5."""
+    """A key of the scene's materials; none means diffuse grey of reflectance 0.5, in a group or a
+    solid that of the whole."""
     transform: Transform = ()
     """Steps from the shape's own coordinates to the world's, the first one first."""
 
-    def tabulate(self, shape: int, material: int, folder: Path) -> Any:
-        """This shape as rows of its table.
-
-        `shape` is its index in the scene, `material` the row of its material, `folder` what file
-        names are relative to.  Raises ValueError (what is wrong, what was expected).
-        """
+    def tabulate(self, place: Place) -> Any:
+        """This shape as rows of its table.  Raises ValueError (what is wrong, what was
+        expected)."""
         raise NotImplementedError
+
+    def __and__(self, other: "Shape") -> "Shape":
+        """The points that both solids share."""
+        return _solid("Intersection", self, other)
+
+    def __or__(self, other: "Shape") -> "Shape":
+        """The points of either solid."""
+        return _solid("Union", self, other)
+
+    def __sub__(self, other: "Shape") -> "Shape":
+        """The points of the first solid that are not in the second."""
+        return _solid("Difference", self, other)
+
+    def map_in(self, place: Place) -> Affine:
+        """The map from the shape's own coordinates to those of the place.  Raises ValueError for
+        one that flattens space."""
+        if not self.transform and place.outer is IDENTITY:
+            return IDENTITY  # as most shapes of a large scene stand
+        m = compose(affine(self.transform), place.outer)
+        invert(m)
+        return m
+
+
+def _solid(name: str, *operands: Shape) -> Shape:
+    from reference_rt import csg  # which is made of shapes
+
+    made: Shape = getattr(csg, name)(of=operands)
+    return made
 
 
 LANES = 8
@@ -103,6 +139,32 @@ def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float) -> float:
     if cos_times_length <= 0.0:
         return 0.0
     return distance2 * math.sqrt(distance2) / (cos_times_length * area)
+
+
+class Spans(NamedTuple):
+    """Where a line runs inside a solid: from t0 to t1 and from t2 to t3, in order, over all t, also
+    below 0; inf for what there is not.  u0 to u3 are what the primitive needs to place the point,
+    as `Crossing.u`.  A line that comes from inside has t0 = -inf."""
+
+    t0: float
+    u0: float
+    t1: float
+    u1: float
+    t2: float
+    u2: float
+    t3: float
+    u3: float
+
+
+@kernel
+def no_spans() -> Spans:
+    """A line that stays outside."""
+    return one_span(math.inf, 0.0, math.inf, 0.0)
+
+
+@kernel
+def one_span(t0: float, u0: float, t1: float, u1: float) -> Spans:
+    return Spans(t0, u0, t1, u1, math.inf, 0.0, math.inf, 0.0)
 
 
 def outward(lower: FloatArray, upper: FloatArray) -> Bounds:

@@ -1,7 +1,6 @@
 """Sphere: |p - c| = r."""
 
 import math
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -9,17 +8,22 @@ import numpy as np
 from reference_rt import transform
 from reference_rt.description import Positive, Vector
 from reference_rt.kernel import kernel
-from reference_rt.ray import Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.sampling.warp import on_circle
+from reference_rt.shapes.placement import owners
+from reference_rt.shapes.quadric import Quadrics, ellipsoid
 from reference_rt.shapes.shape import (
-    SPHERE,
     Bounds,
     FloatArray,
     IntArray,
     LightPoint,
+    Place,
     Shape,
+    Spans,
     lane_vector,
     no_light_point,
+    no_spans,
+    one_span,
     outward,
     pack,
 )
@@ -27,32 +31,32 @@ from reference_rt.vec3 import Vec3, dot, frame_from_normal, length, normalize, r
 
 
 class Sphere(Shape):
-    """A sphere; its outward normal is the front.  Transforms must keep it round."""
+    """A sphere; its outward normal is the front.  A transform may make it an ellipsoid."""
 
     type: Literal["sphere"] = "sphere"
     center: Vector = (0.0, 0.0, 0.0)
     radius: Positive = 1.0
 
-    def tabulate(self, shape: int, material: int, folder: Path) -> "Spheres":
-        m = transform.affine(self.transform)
-        transform.invert(m)  # refuses singular maps
+    def tabulate(self, place: Place) -> "Spheres | Quadrics":
+        m = self.map_in(place)
+        if m is transform.IDENTITY:
+            return Spheres(
+                center=np.array([self.center]),
+                radius=np.array([self.radius]),
+                to_local=np.eye(3).reshape(1, 9),
+                **owners(place),
+            )
         size = np.abs(m[:, :3]).max()  # kept apart: squares of extreme scales overflow
         linear = m[:, :3] / size
         factor = math.sqrt(float(np.trace(linear.T @ linear)) / 3.0)
         # A similarity has A^T A = s² 1; each entry of the product rounds at most 8 times.
         if np.max(np.abs(linear.T @ linear - factor**2 * np.eye(3))) > 8e-16 * 4 * factor**2:
-            raise ValueError(
-                "the transform makes this sphere an ellipsoid; expected rotation, translation and "
-                "one scale factor for all axes"
-            )
+            return ellipsoid(place, m, self.center, self.radius)
         return Spheres(
             center=transform.apply_points(m, np.array([self.center])),
             radius=np.array([self.radius * factor * size]),
             to_local=np.asarray(np.linalg.inv(linear / factor), np.float64).reshape(1, 9),
-            owner=np.array([shape]),
-            material=np.array([material]),
-            light=np.array([-1]),
-            face=np.array([0]),
+            **owners(place),
         )
 
 
@@ -85,8 +89,8 @@ def pack_all(spheres: Spheres) -> FloatArray:
 
 
 @kernel
-def distance(ray: Ray, center: Vec3, r: float) -> float:
-    """The smallest t > 0 at which a ray meets a sphere, inf where it does not.
+def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
+    """(whether the line meets the sphere, where it enters, where it leaves), t of any sign.
 
     The quadratic in a form without cancellation for far or small spheres (Haines et al. 2019, "Ray
     Tracing Gems", ch. 7): the discriminant from the closest approach, the second root from c / q.
@@ -99,21 +103,33 @@ def distance(ray: Ray, center: Vec3, r: float) -> float:
     q = b + math.copysign(math.sqrt(a * max(discriminant, 0.0)), b)
     t0 = (dot(f, f) - r * r) / q
     t1 = q / a
-    near, far = min(t0, t1), max(t0, t1)
+    return discriminant >= 0.0, min(t0, t1), max(t0, t1)
+
+
+@kernel
+def distance(ray: Ray, center: Vec3, r: float) -> float:
+    """The smallest t > 0 at which a ray meets a sphere, inf where it does not."""
+    meets, near, far = roots(ray, center, r)
     t = near if near > 0.0 else far
-    return t if (discriminant >= 0.0) & (t > 0.0) else math.inf
+    return t if meets & (t > 0.0) else math.inf
 
 
 @kernel
-def found(spheres: Spheres, i: int, ray: Ray, t: float) -> Hit:
-    return Hit(t, SPHERE, i, 0.0, 0.0)
+def spans(spheres: Spheres, i: int, ray: Ray) -> Spans:
+    meets, near, far = roots(ray, row(spheres.center, i), spheres.radius[i])
+    return one_span(near, 0.0, far, 0.0) if meets else no_spans()
 
 
 @kernel
-def intersect(spheres: Spheres, i: int, ray: Ray, closest: Hit) -> Hit:
-    """The nearer of `closest` and sphere i."""
-    t = distance(ray, row(spheres.center, i), spheres.radius[i])
-    return found(spheres, i, ray, t) if t < closest.t else closest
+def found(spheres: Spheres, i: int, ray: Ray, t: float) -> Crossing:
+    """The crossing of sphere i at t: nothing else is needed."""
+    return Crossing(t, 0.0, 0.0)
+
+
+@kernel
+def intersect(spheres: Spheres, i: int, ray: Ray) -> Crossing:
+    """Where the ray meets sphere i."""
+    return Crossing(distance(ray, row(spheres.center, i), spheres.radius[i]), 0.0, 0.0)
 
 
 @kernel
@@ -163,7 +179,7 @@ def cone_of_sight(distance2: float, r: float) -> float:
 
 
 @kernel
-def sample(spheres: Spheres, i: int, p: Vec3, u0: float, u1: float) -> LightPoint:
+def sample(spheres: Spheres, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
     """A point of the sphere seen from `p` outside, uniform in the cone of sight.
 
     pdf per solid angle: 1 / (2 pi (1 - cos theta_max)) (Shirley, Wang & Zimmerman 1996).
@@ -191,7 +207,7 @@ def sample(spheres: Spheres, i: int, p: Vec3, u0: float, u1: float) -> LightPoin
 
 
 @kernel
-def pdf(spheres: Spheres, i: int, p: Vec3) -> float:
+def pdf(spheres: Spheres, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, for directions from `p` that meet the sphere."""
     to_center = row(spheres.center, i) - p
     distance2 = dot(to_center, to_center)

@@ -1,7 +1,7 @@
 """Triangle: three vertices, watertight along shared edges."""
 
 import math
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -9,13 +9,13 @@ import numpy as np
 from reference_rt import transform
 from reference_rt.description import Vector
 from reference_rt.kernel import kernel
-from reference_rt.ray import Hit, Ray, SurfacePoint, surface_error
+from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
 from reference_rt.shapes.shape import (
-    TRIANGLE,
     Bounds,
     FloatArray,
     IntArray,
     LightPoint,
+    Place,
     Shape,
     solid_angle_pdf,
 )
@@ -30,39 +30,84 @@ class Triangle(Shape):
     v1: Vector
     v2: Vector
 
-    def tabulate(self, shape: int, material: int, folder: Path) -> "Triangles":
-        m = transform.affine(self.transform)
-        transform.invert(m)  # refuses singular maps
+    def tabulate(self, place: Place) -> "Triangles":
+        m = self.map_in(place)
         vertices = transform.apply_points(m, np.array([self.v0, self.v1, self.v2]))
-        triangles = soup(vertices.reshape(1, 9), None, shape, material)
+        triangles = soup(vertices.reshape(1, 9), place)
         if areas(triangles)[0] == 0.0:
             raise ValueError("the triangle has no area; expected three points not on a line")
         return triangles
 
 
 class Triangles(NamedTuple):
-    """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), None where none has any;
-    owners (n,); face, the number within its shape."""
+    """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), texture coordinates (n, 6)
+    and linear sRGB colours (n, 9; -1 for none) of the vertices, each None where no triangle has
+    any; owners (n,); face, the number within its shape."""
 
     vertices: FloatArray
     normals: FloatArray | None
+    uvs: FloatArray | None
+    colours: FloatArray | None
     owner: IntArray
     material: IntArray
     light: IntArray
     face: IntArray
 
 
-def soup(vertices: FloatArray, normals: FloatArray | None, shape: int, material: int) -> Triangles:
-    """Triangles of one shape from their vertices (n, 9) and vertex normals (n, 9)."""
+def soup(
+    vertices: FloatArray,
+    place: Place,
+    normals: FloatArray | None = None,
+    uvs: FloatArray | None = None,
+    colours: FloatArray | None = None,
+) -> Triangles:
+    """Triangles of one shape: see `Triangles`."""
     n = len(vertices)
     return Triangles(
         vertices=vertices,
         normals=normals,
-        owner=np.full(n, shape),
-        material=np.full(n, material),
+        uvs=uvs,
+        colours=colours,
+        owner=np.full(n, place.owner),
+        material=np.full(n, place.material),
         light=np.full(n, -1),
         face=np.arange(n),
     )
+
+
+def align(parts: Sequence[Triangles]) -> list[Triangles]:
+    """Tables with the same columns: what one has, the others get."""
+    parts = list(parts)
+    if any(part.normals is not None for part in parts):
+        parts = [
+            part._replace(normals=_flat_normals(part)) if part.normals is None else part
+            for part in parts
+        ]
+    if any(part.uvs is not None for part in parts):
+        # The barycentrics, which are the coordinates of a triangle without any.
+        corners = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]])
+        parts = [
+            part._replace(uvs=np.repeat(corners, len(part.face), axis=0))
+            if part.uvs is None
+            else part
+            for part in parts
+        ]
+    if any(part.colours is not None for part in parts):
+        parts = [
+            part._replace(colours=np.full((len(part.face), 9), -1.0))
+            if part.colours is None
+            else part
+            for part in parts
+        ]
+    return parts
+
+
+def _flat_normals(triangles: Triangles) -> FloatArray:
+    """Each triangle's own normal at its vertices."""
+    n = geometric_normals(triangles.vertices)
+    with np.errstate(invalid="ignore"):
+        n = np.nan_to_num(n / np.linalg.norm(n, axis=1, keepdims=True))
+    return np.tile(n, 3)
 
 
 def geometric_normals(vertices: FloatArray) -> FloatArray:
@@ -121,13 +166,27 @@ def shear_of(ray: Ray) -> Shear:
     )
 
 
-@kernel
-def intersect(triangles: Triangles, i: int, shear: Shear, closest: Hit) -> Hit:
-    """The nearer of `closest` and triangle i; the hit's u, v are the barycentrics of v1 and v2.
+class Projection(NamedTuple):
+    """A triangle as a ray sees it: its edge functions, whose sum is twice its area, and the depths
+    of its vertices; side, 0 where the ray passes by, else the sign of the area."""
 
-    Watertight (Woop, Benthin & Wald 2013): each vertex is projected by arithmetic of its own, and
-    each edge function of two neighbours differs in sign alone, as rounding is symmetric; a ray
-    through an edge is inside one of them, on the edge inside both.
+    side: int
+    e0: float
+    e1: float
+    e2: float
+    a_z: float
+    b_z: float
+    c_z: float
+
+
+@kernel
+def project(triangles: Triangles, i: int, shear: Shear) -> Projection:
+    """Triangle i seen along a ray (Woop, Benthin & Wald 2013).
+
+    Each vertex is projected by arithmetic of its own, and two neighbours' edge functions differ in
+    sign alone.  Products round monotonically: a difference that is not 0 has the right sign.  Where
+    it is 0, `exactly` decides: of the triangles around an edge or a vertex that a ray passes
+    through, it passes through exactly those that it would pass through a hair beside it.
     """
     v = triangles.vertices
     a_z = v[i, shear.z] - shear.o_z
@@ -142,27 +201,65 @@ def intersect(triangles: Triangles, i: int, shear: Shear, closest: Hit) -> Hit:
     e0 = c_x * b_y - c_y * b_x
     e1 = a_x * c_y - a_y * c_x
     e2 = b_x * a_y - b_y * a_x
-    if (e0 < 0.0 or e1 < 0.0 or e2 < 0.0) and (e0 > 0.0 or e1 > 0.0 or e2 > 0.0):
-        return closest
-    determinant = e0 + e1 + e2
-    if determinant == 0.0:
-        return closest
-    inverse = 1.0 / determinant
-    t = (e0 * a_z + e1 * b_z + e2 * c_z) * shear.s_z * inverse
-    if t > 0.0 and t < closest.t:
-        return Hit(t, TRIANGLE, i, e1 * inverse, e2 * inverse)
-    return closest
+    side = 0
+    if e0 > 0.0 and e1 > 0.0 and e2 > 0.0:
+        side = 1
+    elif e0 < 0.0 and e1 < 0.0 and e2 < 0.0:
+        side = -1
+    elif e0 == 0.0 or e1 == 0.0 or e2 == 0.0:
+        e0, s0 = exactly(c_x, c_y, b_x, b_y)
+        e1, s1 = exactly(a_x, a_y, c_x, c_y)
+        e2, s2 = exactly(b_x, b_y, a_x, a_y)
+        side = s0 if s0 == s1 and s1 == s2 else 0
+    return Projection(side, e0, e1, e2, a_z, b_z, c_z)
 
 
 @kernel
-def intersect_all(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hit:
-    """The nearest of `closest` and all triangles."""
-    if triangles is None:
-        return closest
-    shear = shear_of(ray)
-    for i in range(len(triangles.owner)):
-        closest = intersect(triangles, i, shear, closest)
-    return closest
+def product_error(x: float, y: float, product: float) -> float:
+    """x y - product, exactly, for product = fl(x y) (Dekker 1971, Veltkamp's splitting)."""
+    x_high = x * 134217729.0  # 2^27 + 1
+    x_high = x_high - (x_high - x)
+    y_high = y * 134217729.0
+    y_high = y_high - (y_high - y)
+    x_low, y_low = x - x_high, y - y_high
+    return ((x_high * y_high - product) + x_high * y_low + x_low * y_high) + x_low * y_low
+
+
+@kernel
+def exactly(p_x: float, p_y: float, q_x: float, q_y: float) -> tuple[float, int]:
+    """The edge function p_x q_y - p_y q_x to within one rounding, and its sign, which is right.
+
+    On the edge it is that beside the edge, as if the ray were moved by (h, h²) for an h above 0 and
+    below everything else: 0 only for an edge without length.
+    """
+    left, right = p_x * q_y, p_y * q_x
+    e = left - right + (product_error(p_x, q_y, left) - product_error(p_y, q_x, right))
+    along_x, along_y = p_y - q_y, q_x - p_x
+    for decides in (e, along_x, along_y):
+        if decides > 0.0:
+            return e, 1
+        if decides < 0.0:
+            return e, -1
+    return 0.0, 0
+
+
+@kernel
+def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
+    """Where the ray meets triangle i; u, v are the barycentrics of v1 and v2."""
+    seen = project(triangles, i, shear)
+    if seen.side == 0:
+        return miss()
+    inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
+    t = (seen.e0 * seen.a_z + seen.e1 * seen.b_z + seen.e2 * seen.c_z) * shear.s_z * inverse
+    if t > 0.0:
+        return Crossing(t, seen.e1 * inverse, seen.e2 * inverse)
+    return miss()
+
+
+@kernel
+def enters(triangles: Triangles, i: int, shear: Shear) -> int:
+    """+1 where the ray comes to the front of triangle i, -1 where it comes from behind."""
+    return -project(triangles, i, shear).side
 
 
 @kernel
@@ -203,7 +300,7 @@ def shading_normal(normals: FloatArray | None, i: int, u: float, v: float, n: Ve
 
 
 @kernel
-def surface(triangles: Triangles, hit: Hit) -> SurfacePoint:
+def surface(triangles: Triangles, ray: Ray, hit: Hit) -> SurfacePoint:
     i = hit.row
     p = interpolate(triangles.vertices, i, hit.u, hit.v)
     n = normal(triangles, i)
@@ -220,3 +317,41 @@ def sample(triangles: Triangles, i: int, area: float, p: Vec3, u0: float, u1: fl
     q = interpolate(triangles.vertices, i, root * (1.0 - u1), root * u1)
     n = normal(triangles, i)
     return LightPoint(q, n, error_at(triangles, i, q), solid_angle_pdf(p, q, n, area))
+
+
+@kernel
+def uv(triangles: Triangles, ray: Ray, hit: Hit) -> tuple[float, float]:
+    """The interpolated texture coordinates; without any, the barycentrics of v1 and v2."""
+    return _interpolated_uv(triangles.uvs, hit)
+
+
+@kernel
+def _interpolated_uv(uvs: FloatArray | None, hit: Hit) -> tuple[float, float]:
+    if uvs is None:
+        return hit.u, hit.v
+    w = uvs[hit.row]
+    a = 1.0 - hit.u - hit.v
+    return a * w[0] + hit.u * w[2] + hit.v * w[4], a * w[1] + hit.u * w[3] + hit.v * w[5]
+
+
+@kernel
+def colour(triangles: Triangles | None, hit: Hit, without: Vec3) -> Vec3:
+    """The interpolated colour of the vertices; `without` any, that."""
+    if triangles is None:
+        return without
+    return _interpolated_colour(triangles.colours, hit, without)
+
+
+@kernel
+def _interpolated_colour(colours: FloatArray | None, hit: Hit, without: Vec3) -> Vec3:
+    if colours is None:
+        return without
+    if colours[hit.row, 0] < 0.0:
+        return without
+    return interpolate(colours, hit.row, hit.u, hit.v)
+
+
+@kernel
+def face_of(triangles: Triangles, hit: Hit) -> int:
+    """The number of the triangle in its mesh."""
+    return int(triangles.face[hit.row])

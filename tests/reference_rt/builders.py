@@ -102,6 +102,8 @@ materials:
   glass: {type: dielectric}
   silver: {type: mirror, reflectance: 0.9}
   lamp: {type: emissive, radiance: [5, 4, 3], base: grey}
+groups:
+  pair: [{type: sphere, radius: 0.2}, {type: box, transform: [{scale: 0.1}]}]
 shapes:
   - {type: mesh, file: ball.obj, material: glass}
   - {type: sphere, center: [-1.5, 0, 0], radius: 0.7, material: silver}
@@ -110,6 +112,16 @@ shapes:
     transform: [{scale: 5}, {rotate: {axis: [1, 0, 0], degrees: -90}}, {translate: [0, -1, 0]}]
   - {type: box, material: lamp, transform: [{scale: 0.2}, {translate: [1, -0.5, 1.5]}]}
   - {type: triangle, v0: [-2, 2, -1], v1: [-1, 2, -1], v2: [-2, 3, -1], material: lamp}
+  - {type: disk, material: silver, transform: [{translate: [-3, 1, -2]}]}
+  - {type: plane, transform: [{translate: [0, 0, -9]}]}
+  - {type: polygon, rings: [[[0, 0], [1, 0], [0, 1]]], transform: [{translate: [2, 1, -1]}]}
+  - {type: cylinder, radius: 0.2, transform: [{translate: [-1, -0.5, 1]}]}
+  - {type: torus, major_radius: 0.3, minor_radius: 0.1, transform: [{translate: [0, 0, 2]}]}
+  - {type: instance, group: pair, transform: [{translate: [0, 0, -2]}]}
+  - type: difference
+    material: grey
+    of: [{type: box, transform: [{scale: 0.3}]}, {type: sphere, radius: 0.4}]
+    transform: [{translate: [0, 1.5, 0]}]
 lights:
   - {type: point, position: [0, 4, 2], intensity: 9}
   - {type: constant, radiance: [0.2, 0.3, 0.4]}

@@ -5,11 +5,13 @@ import math
 import numpy as np
 
 from reference_rt import shapes as any_shape
-from reference_rt.kernel import entry_kernel
-from reference_rt.ray import Ray, no_hit, ray_from
+from reference_rt.geometry import closest_hit, surface
+from reference_rt.kernel import entry_kernel, kernel
+from reference_rt.ray import Hit, Ray, ray_from
+from reference_rt.shapes import TABLES
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.shapes.triangle import shear_of
-from reference_rt.vec3 import row
+from reference_rt.vec3 import dot, row
 
 
 class Probe:
@@ -22,26 +24,55 @@ class Probe:
         self.u, self.v, self.face = out[:, 12], out[:, 13], out[:, 14]
 
 
+@kernel
+def meet(shapes, kind, i, ray):
+    """The hit of one primitive alone."""
+    t, u, v = any_shape.intersect(shapes, kind, i, ray, shear_of(ray))
+    return Hit(t, kind if t < math.inf else -1, i, u, v, -1)
+
+
 @entry_kernel
 def _probe(shapes, kind, rows, o, d, w, out):
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
-        hit = any_shape.intersect(shapes, kind, rows[i], ray, shear_of(ray), no_hit(ray))
+        hit = meet(shapes, kind, rows[i], ray)
         out[i, 0] = hit.t
         out[i, 1] = math.inf
         if hit.kind < 0:
             continue
         point = any_shape.surface(shapes, ray, hit)
-        owner = any_shape.owner(shapes, ray, hit)
+        u, v = any_shape.uv(shapes, ray, hit)
         leaving = ray_from(point, row(w, i))
-        again = any_shape.intersect(
-            shapes, kind, rows[i], leaving, shear_of(leaving), no_hit(leaving)
-        )
+        again = meet(shapes, kind, rows[i], leaving)
         out[i, 1], out[i, 2] = again.t, point.error
         out[i, 3], out[i, 4], out[i, 5] = point.p
         out[i, 6], out[i, 7], out[i, 8] = point.n
         out[i, 9], out[i, 10], out[i, 11] = leaving.o
-        out[i, 12], out[i, 13], out[i, 14] = owner.u, owner.v, owner.face
+        out[i, 12], out[i, 13], out[i, 14] = u, v, any_shape.face(shapes, hit)
+
+
+@entry_kernel
+def _leave(geometry, o, d, w, out):
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        hit = closest_hit(geometry, ray)
+        out[i] = -1.0
+        if hit.kind >= 0:
+            point = surface(geometry, ray, hit)
+            away = row(w, i)
+            if dot(away, point.n) < 0.0:
+                away = -away
+            out[i] = closest_hit(geometry, ray_from(point, away)).t
+
+
+def leave_scene(scene, o, d, w):
+    """Ray i meets the scene, then leaves what it hit towards w[i] or -w[i], whichever is on the
+    normal's side: (t of what it meets next, whether there was a hit)."""
+    out = np.zeros(len(o))
+    arrays = (np.ascontiguousarray(a, float) for a in (o, d, w))
+    with np.errstate(all="ignore"):
+        _leave(scene.tables.geometry, *arrays, out)
+    return out, out >= 0.0
 
 
 def probe(shapes, kind, rows, o, d, w=None) -> Probe:
@@ -52,3 +83,21 @@ def probe(shapes, kind, rows, o, d, w=None) -> Probe:
     with np.errstate(all="ignore"):
         _probe(shapes, kind, np.ascontiguousarray(rows, np.int64), o, d, w, out)
     return Probe(out)
+
+
+@entry_kernel
+def _spans(geometry, kind, o, d, out):
+    for i in range(len(o)):
+        s = any_shape.spans(geometry.shapes, kind, 0, Ray(row(o, i), row(d, i), math.inf))
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = s.t0, s.t1, s.t2, s.t3
+
+
+def spans_of(scene, o, d):
+    """Where n rays cross the only shape of a scene, a solid: t0 to t3 (n, 4), inf for none."""
+    shapes = scene.tables.geometry.shapes
+    (kind,) = (code for code, field, _, _ in TABLES if getattr(shapes, field) is not None)
+    out = np.zeros((len(o), 4))
+    o, d = (np.ascontiguousarray(a, float) for a in (o, d))
+    with np.errstate(all="ignore"):
+        _spans(scene.tables.geometry, kind, o, d, out)
+    return out

@@ -104,12 +104,6 @@ WRONG = {
         "shapes[0].transform[0].matrix[2][2]",
         "expected a finite",
     ),
-    "ellipsoid": (
-        SHAPE + "transform: [{scale: [1, 2, 1]}]",
-        2,
-        "shapes[0]",
-        "the transform makes this sphere an ellipsoid; expected",
-    ),
     "flat triangle": (
         "shapes:\n  - {type: triangle, v0: [0, 0, 0], v1: [1, 1, 1], v2: [2, 2, 2]}",
         2,

@@ -2,31 +2,36 @@
 
 import numpy as np
 import pytest
-from builders import cube, random_shape, unit_vectors, write_obj
+from builders import cube, placed, random_shape, unit_vectors, write_obj
 
 import reference_rt as rt
-from reference_rt import bvh, query, tables, transform
+from reference_rt import query, transform, trees
 
 RAYS = 20_000
 KINDS = ("sphere", "rectangle", "box", "triangle")
 
 
-def hits(shapes, bvh_from, o, d, monkeypatch):
-    monkeypatch.setattr(tables, "BVH_FROM", bvh_from)
-    built = rt.build_tables(rt.Scene(shapes=tuple(shapes)))
-    assert (built.geometry.bvh is None) == (bvh_from > 1)
-    return query.intersect(built, o, d), query.occluded(built, o, d)
+METHODS = ("sah", "median", "spatial", "none")
+
+
+def answers(scene, o, d):
+    tables = rt.build_tables(scene)
+    return query.intersect(tables, o, d), query.occluded(tables, o, d)
 
 
 def assert_same(shapes, o, d, monkeypatch):
-    """Bit for bit the same hits with and without.  Where t is the same to the last bit on two
-    shapes (they touch), either may be named: the same t is all there is to ask."""
-    one, shadow_one = hits(shapes, 10**9, o, d, monkeypatch)
-    tree, shadow_tree = hits(shapes, 1, o, d, monkeypatch)
-    assert np.array_equal(one.t, tree.t)
-    assert np.array_equal(shadow_one, shadow_tree)
-    assert np.array_equal(shadow_tree, np.isfinite(tree.t))
-    return one, tree
+    """The very same hits, bit for bit, whatever leads to the shapes: also where several are met at
+    the same t."""
+    scene = rt.Scene(shapes=tuple(shapes))
+    monkeypatch.setattr(trees, "BVH_FROM", 10**9)
+    one, shadow = answers(scene, o, d)
+    assert np.array_equal(shadow, np.isfinite(one.t))
+    for method in METHODS:
+        other, other_shadow = answers(scene.changed(hierarchy=method), o, d)
+        assert np.array_equal(shadow, other_shadow), method
+        for name in vars(one):
+            assert np.array_equal(getattr(one, name), getattr(other, name)), (method, name)
+    return one
 
 
 @pytest.mark.parametrize("offset", [2.0, 1e3])
@@ -36,19 +41,15 @@ def test_mixed_shapes(offset, monkeypatch):
     shapes = [random_shape(KINDS[i % 4], rng, size, offset) for i, size in enumerate(sizes)]
     o = offset * rng.uniform(-2, 2, (RAYS, 3))
     d = offset * rng.uniform(-1, 1, (RAYS, 3)) - o
-    one, tree = assert_same(shapes, o, d, monkeypatch)
-    assert np.array_equal(one.shape, tree.shape)
-    for name in ("face", "p", "n", "ns", "uv"):
-        assert np.array_equal(getattr(one, name), getattr(tree, name)), name
+    one = assert_same(shapes, o, d, monkeypatch)
     assert np.isfinite(one.t).mean() > 0.2
 
 
 def test_rays_that_start_inside_and_on_things(monkeypatch):
     rng = np.random.default_rng(32)
     shapes = [random_shape(kind, rng, 1.0, 1.0) for kind in KINDS for _ in range(10)]
-    first, _ = assert_same(
-        shapes, rng.uniform(-1, 1, (RAYS, 3)), unit_vectors(rng, RAYS), monkeypatch
-    )
+    o = rng.uniform(-1, 1, (RAYS, 3))
+    first = assert_same(shapes, o, unit_vectors(rng, RAYS), monkeypatch)
     assert_same(shapes, first.p, unit_vectors(rng, RAYS), monkeypatch)
 
 
@@ -71,9 +72,9 @@ def test_rays_in_the_planes_of_nodes(tmp_path, monkeypatch):
     elsewhere = [random_shape(kind, np.random.default_rng(0), 1.0, 1.0) for kind in KINDS]
     away = (transform.Translate(translate=(1e3, 1e3, 1e3)),)
     elsewhere = [s.model_copy(update={"transform": (*s.transform, *away)}) for s in elsewhere]
-    one, _ = assert_same([mesh, *elsewhere], np.concatenate(o), np.concatenate(d), monkeypatch)
-    # Through the inner vertices of a face, from inside and from outside: one third each.
-    assert np.isfinite(one.t).mean() > 0.5
+    one = assert_same([mesh, *elsewhere], np.concatenate(o), np.concatenate(d), monkeypatch)
+    # Two of three towards the cube; of the 5 x 5 lines through its vertices 4 x 4 count as inside.
+    assert np.isfinite(one.t).sum() == len(one.t) * 16 / 25 * 2 / 3
 
 
 def test_coincident_primitives(monkeypatch):
@@ -81,44 +82,73 @@ def test_coincident_primitives(monkeypatch):
     shapes = [rt.Sphere(radius=2.0), rt.Box(), rt.Rectangle(), triangle] * 30
     o = np.array([[0, 0, 3.0], [0, 0, 0.5], [0.25, 0.25, 0.5], [3, 3, 3.0]])
     d = np.array([[0, 0, -1.0], [1.0, 0, 0], [0, 0, -1.0], [0, 0, 1.0]])
-    one, _ = assert_same(shapes, o, d, monkeypatch)
+    one = assert_same(shapes, o, d, monkeypatch)
     assert one.t.tolist() == [1.0, 1.0, 0.5, np.inf]
-
-
-def depth_of(tree_first, tree_size):
-    deepest, waiting = 0, [(0, 1)]
-    while waiting:
-        node, depth = waiting.pop()
-        deepest = max(deepest, depth)
-        if tree_size[node] == 0:
-            waiting += [(tree_first[node], depth + 1), (tree_first[node] + 1, depth + 1)]
-    return deepest
-
-
-@pytest.mark.parametrize("ratio", [0.5, 0.1, 0.999])
-def test_depth_of_geometric_progressions(ratio):
-    """Sizes and places that shrink by a ratio make the heuristic peel one primitive at a time."""
-    n = 2000
-    x = np.maximum(ratio ** np.arange(n), 1e-300)[:, None] * np.ones(3)
-    boxes, first, size, order = bvh.build(x, 1.5 * x)
-    assert sorted(order) == list(range(n))
-    assert sorted(k for f, s in zip(first, size, strict=True) for k in range(f, f + s)) == list(
-        range(n)
-    )
-    # The traversal's stack holds one node for each level above the leaf's.
-    assert depth_of(first, size) <= bvh.STACK_SIZE
-    assert size.max() <= bvh.LEAF_SIZE
-    for node in np.flatnonzero(size == 0):
-        for child in (first[node], first[node] + 1):
-            assert (boxes[node, :3] <= boxes[child, :3]).all()
-            assert (boxes[node, 3:] >= boxes[child, 3:]).all()
 
 
 def test_one_primitive_and_bounds_that_touch_infinity(monkeypatch):
     """Sizes near the largest float: products of extents overflow, hits do not get lost."""
     shapes = [rt.Sphere(radius=1e100, center=(0, 0, k * 1e101)) for k in range(20)]
     o, d = np.array([[0, 0, -1e102]]), np.array([[0, 0, 1.0]])
-    one, _ = assert_same(shapes, o, d, monkeypatch)
+    one = assert_same(shapes, o, d, monkeypatch)
     assert one.shape[0] == 0
-    lone, _ = hits([rt.Sphere()], 1, [[0, 0, 3.0]], [[0, 0, -1.0]], monkeypatch)
+    lone, _ = answers(
+        rt.Scene(shapes=(rt.Sphere(),), hierarchy="sah"), [[0, 0, 3.0]], [[0, 0, -1.0]]
+    )
     assert lone.t[0] == 2.0
+
+
+def everything_at_random(rng, folder):
+    """Shapes of every kind, most of them turned and stretched, groups and solids among them; some
+    the same twice, some touching."""
+    file = write_obj(folder / "cube.obj", *cube(3))
+    star = [(np.sin(4 * np.pi * k / 5), np.cos(4 * np.pi * k / 5)) for k in range(5)]
+    made = {
+        "sphere": lambda t: rt.Sphere(transform=t),
+        "rectangle": lambda t: rt.Rectangle(transform=t),
+        "box": lambda t: rt.Box(transform=t),
+        "triangle": lambda t: rt.Triangle(v0=(0, 0, 0), v1=(1, 0, 0), v2=(0, 1, 0), transform=t),
+        "mesh": lambda t: rt.Mesh(file=str(file), transform=t),
+        "disk": lambda t: rt.Disk(transform=t),
+        "plane": lambda t: rt.Plane(transform=t),
+        "polygon": lambda t: rt.Polygon(rings=(tuple((*p, 0.0) for p in star),), transform=t),
+        "cylinder": lambda t: rt.Cylinder(capped=False, transform=t),
+        "cone": lambda t: rt.Cone(transform=t),
+        "torus": lambda t: rt.Torus(transform=t),
+        "solid": lambda t: rt.Difference(of=(rt.Box(), rt.Sphere(radius=1.2)), transform=t),
+        "instance": lambda t: rt.Instance(group="pair", transform=t),
+    }
+    shapes = []
+    for k in range(200):
+        make = list(made.values())[k % len(made)]
+        if make is made["plane"] and k > 2 * len(made):
+            make = made["sphere"]
+        steps = placed(rng, 0.25, 3.0)
+        if k % 3 == 0:
+            # Along the axes, on a lattice: faces and edges of several coincide.
+            at = tuple(np.round(rng.uniform(-3, 3, 3)))
+            steps = (transform.Scale(scale=(0.5,) * 3), transform.Translate(translate=at))
+        shapes += [make(steps)] * (2 if k % 20 == 0 else 1)
+    groups = {"pair": (rt.Box(), rt.Sphere(center=(0.0, 0.0, 1.5), radius=0.5))}
+    return rt.Scene(shapes=tuple(shapes), groups=groups)
+
+
+@pytest.mark.parametrize("n", [5_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+def test_any_hierarchy_finds_the_same(n, tmp_path):
+    """Half of the rays aim at lattice points, along axes and diagonals of it, where faces coincide
+    and rays run in the planes of boxes."""
+    rng = np.random.default_rng(33)
+    scene = everything_at_random(rng, tmp_path)
+    o, d = rng.uniform(-5, 5, (n, 3)), rng.normal(size=(n, 3))
+    half = slice(0, n, 2)
+    o[half] = np.round(2 * o[half]) / 2
+    d[half] = np.round(d[half])
+    d[~d.any(axis=1)] = (1.0, 0.0, -0.0)
+    one, shadow = answers(scene.changed(hierarchy="none"), o, d)
+    assert 0.5 < np.isfinite(one.t).mean() < 1.0
+    assert np.array_equal(shadow, np.isfinite(one.t))
+    for method in ("sah", "median", "spatial"):
+        other, other_shadow = answers(scene.changed(hierarchy=method), o, d)
+        for name in vars(one):
+            assert np.array_equal(getattr(one, name), getattr(other, name)), (method, name)
+        assert np.array_equal(shadow, other_shadow)

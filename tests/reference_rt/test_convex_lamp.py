@@ -17,7 +17,7 @@ from reference_rt import (
     Whitted,
     render,
 )
-from reference_rt.shapes import AnyShape
+from reference_rt.shapes import Shape
 
 
 @pytest.mark.parametrize("integrator", [Path(max_depth=6), Whitted()], ids=["path", "whitted"])
@@ -26,7 +26,7 @@ from reference_rt.shapes import AnyShape
     [Sphere(material="lamp"), Rectangle(material="lamp"), Box(material="lamp")],
     ids=["sphere", "rectangle", "box"],
 )
-def test_emits_what_it_says(shape: AnyShape, integrator: Path | Whitted) -> None:
+def test_emits_what_it_says(shape: Shape, integrator: Path | Whitted) -> None:
     scene = Scene(
         camera=Perspective(eye=(1.0, 1.5, 4.0), fov=60.0),
         film=Film(width=24, height=24),

@@ -5,13 +5,14 @@ from builders import SCENES, everything
 from typer.testing import CliRunner
 
 import reference_rt as rt
-from reference_rt import tables as tables_module
+from reference_rt import trees
 from reference_rt.cli import app
 from reference_rt.explain import explain
+from reference_rt.shapes import TABLES
 
 FILES = sorted(SCENES.glob("*.yaml"))
 
-SHAPES = ("spheres", "rectangles", "boxes", "triangles")
+SHAPES = tuple(field for _, field, _, _ in TABLES)
 MATERIALS = ("diffuses", "mirrors", "dielectrics")
 
 
@@ -43,8 +44,8 @@ def test_tables(file):
 
 def test_everything_is_used(tmp_path):
     _, used, left_out = explained(rt.Scene.load(everything(tmp_path)))
-    assert set(SHAPES) | set(MATERIALS) <= set(used)
-    assert set(left_out) == {"vertex normals", "Mitsuba"}
+    assert set(SHAPES) | set(MATERIALS) | {"solids", "instances"} <= set(used)
+    assert set(left_out) == {"vertex normals", "vertex colours", "texture coordinates", "Mitsuba"}
 
 
 def test_nothing_is_used():
@@ -56,7 +57,7 @@ def test_nothing_is_used():
 def test_the_hierarchy_by_number(monkeypatch):
     scene = rt.Scene(shapes=(rt.Sphere(),) * 3)
     assert "hierarchy" in explained(scene)[2]
-    monkeypatch.setattr(tables_module, "BVH_FROM", 3)
+    monkeypatch.setattr(trees, "BVH_FROM", 3)
     assert "hierarchy" in explained(scene)[1]
 
 

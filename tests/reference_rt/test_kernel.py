@@ -52,8 +52,9 @@ def test_an_edit_of_a_callee_is_seen(copy, tmp_path):
     assert warm[1:] == (2.0, 1)
     callee = copy / "reference_rt" / "shapes" / "sphere.py"
     text = callee.read_text()
-    assert text.count("return Hit(t, SPHERE") == 1
-    callee.write_text(text.replace("return Hit(t, SPHERE", "return Hit(t + 1.0, SPHERE"))
+    found = "return Crossing(t, 0.0, 0.0)"
+    assert text.count(found) == 1
+    callee.write_text(text.replace(found, found.replace("t,", "t + 1.0,")))
     edited = first_hit(copy, tmp_path)
     callee.write_text(text)
     assert edited[1:] == (3.0, 0)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from reference_rt.shapes.mesh import read_mesh
+from reference_rt.shapes.mesh_files import read_mesh
 
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -14,6 +14,16 @@ def test_knot_is_what_the_script_writes() -> None:
     script = runpy.run_path(str(SCENES / "make_meshes.py"))
     text = script["obj"](*script["torus_knot"](2, 3, around=24, along=440, tube=0.22))
     assert (SCENES / "meshes" / "knot.obj").read_text() == text
+
+
+def test_petal_is_what_the_script_writes() -> None:
+    script = runpy.run_path(str(SCENES / "make_meshes.py"))
+    assert (SCENES / "meshes" / "petal.ply").read_text() == script["ply"](*script["petal"](24))
+    mesh = read_mesh(SCENES / "meshes" / "petal.ply")
+    assert mesh.uv is not None
+    assert mesh.colours is not None
+    assert mesh.normals is None
+    assert len(mesh.faces) == 2 * 24 * 24
 
 
 def test_knot_is_closed_and_outward() -> None:

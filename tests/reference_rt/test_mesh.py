@@ -90,7 +90,7 @@ def test_triangles_without_area_are_left_out(tmp_path):
     hit = np.isfinite(found.t)
     assert hit.mean() > 0.99
     assert np.array_equal(found.n[hit], np.tile([0.0, 0, 1], (hit.sum(), 1)))
-    assert set(found.face[hit]) == {0, 1}
+    assert set(found.primitive[hit]) == {0, 1}
 
 
 def test_meshes_are_placed_and_turned_like_other_shapes(tmp_path):
@@ -130,7 +130,11 @@ WRONG = {
     "nothing": ("mesh.obj", "", "is empty; expected vertices and faces"),
     "rubbish": ("mesh.obj", b"\x80\xff\x00\n" * 50, "is empty; expected"),
     "no area": ("mesh.obj", V + "f 1 1 2\n", "no triangle has any area"),
-    "unknown format": ("mesh.stl", "solid", "'.stl' is not supported; expected .obj or .ply"),
+    "unknown format": (
+        "mesh.xyzw",
+        "solid",
+        "'.xyzw' is not supported; expected one of .obj, .ply, .stl, .off, .glb, .gltf",
+    ),
     "ply: cut": ("mesh.ply", ply(body=POINTS + b"\x03\0\0"), "is malformed: "),
     "ply: cut earlier": ("mesh.ply", ply(body=POINTS[:20]), "is malformed: "),
     "ply: cut header": ("mesh.ply", ply()[:60], "is malformed: "),

@@ -155,7 +155,7 @@ def test_schema_allows_everything():
         "film: {width: 0}",
         "film: {width: 1.5}",
         "shapes: [{type: sphere, radius: -1}]",
-        "shapes: [{type: cone}]",
+        "shapes: [{type: teapot}]",
         "materials: {a: {type: diffuse, reflectance: 2}}",
         "lights: [{type: point}]",
     ],

@@ -268,7 +268,9 @@ def test_rectangle_on_a_lattice():
 
 
 def test_triangle_on_a_lattice():
-    """Its edges and corners belong to it, whatever the winding; rays in its plane miss."""
+    """A ray on an edge or a corner is where it would be moved by (h, h²), across the axes other
+    than the largest of d, in cyclic order; swapped where that is negative.  Whatever the winding;
+    rays in the triangle's plane miss."""
     for shape in (
         rt.Triangle(v0=(-1, -1, 0), v1=(2, -1, 0), v2=(-1, 2, 0)),
         rt.Triangle(v0=(-1, -1, 0), v1=(-1, 2, 0), v2=(2, -1, 0)),
@@ -277,8 +279,16 @@ def test_triangle_on_a_lattice():
         for i in range(len(o)):
             t = np.inf
             if d[i, 2] != 0 and -o[i, 2] / d[i, 2] > 0:
-                x, y, _ = o[i] - d[i] * (o[i, 2] / d[i, 2])
-                t = -o[i, 2] / d[i, 2] if x >= -1 and y >= -1 and x + y <= 1 else np.inf
+                h = 1e-5
+                largest = int(np.flatnonzero(np.abs(d[i]) == 1.0)[0])
+                first, second = (largest + 1) % 3, (largest + 2) % 3
+                if d[i, largest] < 0:
+                    first, second = second, first
+                moved = o[i].copy()
+                moved[first] += h
+                moved[second] += h * h
+                x, y, _ = moved - d[i] * (moved[2] / d[i, 2])
+                t = -o[i, 2] / d[i, 2] if x > -1 and y > -1 and x + y < 1 else np.inf
             # The area is 9: dividing by it rounds, once for 1/9 and once for its product.
             assert np.isclose(found.t[i], t, rtol=2 * U, atol=0), (o[i], d[i])
 

@@ -5,7 +5,7 @@ import pytest
 from builders import cube, icosphere, placed, unit_vectors, write_obj
 
 import reference_rt as rt
-from reference_rt import query, tables, transform
+from reference_rt import query, transform, trees
 
 MESHES = {
     "ball": icosphere(3),
@@ -30,7 +30,7 @@ def _placement(name):
 def test_no_ray_leaks(mesh, bvh_from, placement, tmp_path, monkeypatch):
     """Aimed at vertices, at middles of edges, at points along edges, and anywhere."""
     vertices, faces = MESHES[mesh]
-    monkeypatch.setattr(tables, "BVH_FROM", bvh_from)
+    monkeypatch.setattr(trees, "BVH_FROM", bvh_from)
     steps = _placement(placement)
     file = write_obj(tmp_path / "mesh.obj", vertices, faces)
     scene = rt.build_tables(rt.Scene(shapes=(rt.Mesh(file=str(file), transform=steps),)))

@@ -1,0 +1,82 @@
+"""Shapes that Mitsuba has too, from the float64 numbers that our own tables hold.
+
+Mitsuba's rectangles, cubes and spheres turn inside out, or disagree with themselves (a rectangle's
+geometric normal follows the winding, its shading normal the transform), where a transform mirrors
+space; ours keep their outward side.  So a mirroring transform is never passed on to these.  Its
+disks are right under every affine map; its spheres only under one that keeps them round.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.pieces import Plugin, same_uv
+from comparisons.translate.shapes.choice import translate_shape
+from comparisons.translate.shapes.plugins import Site, curved_instance, is_similarity, to_world
+from reference_rt.shapes import Box, Disk, Rectangle, Sphere
+from reference_rt.shapes.shape import FloatArray
+
+CUBE_FACES = (1, 4, 3, 5, 0, 2)
+"""Our numbers of the faces of Mitsuba's cube, which are -y +y +x +z -x -z, two triangles each
+(src/shapes/cube.cpp)."""
+
+
+@translate_shape.register
+def _(shape: Sphere, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    if not is_similarity(m[:, :3]):
+        m = m @ np.vstack([np.column_stack([shape.radius * np.eye(3), shape.center]), [0, 0, 0, 1]])
+        return [curved_instance("sphere", m, site)._replace(uv=same_uv)]
+    table: Any = shape.tabulate(site.place)
+    rotation = np.linalg.inv(table.to_local[0].reshape(3, 3))
+    plugin = {
+        "type": "sphere",
+        "to_world": to_world(rotation * table.radius[0], table.center[0]),
+        # A mirrored sphere keeps its mirrored uv; turned over once more, its normals are outward.
+        "flip_normals": bool(np.linalg.det(rotation) < 0.0),
+        **site.parts,
+    }
+    return [Plugin(plugin, uv=same_uv)]
+
+
+@translate_shape.register
+def _(shape: Rectangle, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
+    # The third column moves nothing: any that makes the map proper will do.
+    columns = np.column_stack([m[:, 0], m[:, 1], -m[:, 2] if mirrored else m[:, 2]])
+    plugin = {
+        "type": "rectangle",
+        "to_world": to_world(columns, m[:, 3]),
+        "flip_normals": mirrored,
+        **site.parts,
+    }
+    return [Plugin(plugin, faces=np.zeros(2, np.int64), uv=same_uv)]  # two triangles
+
+
+@translate_shape.register
+def _(shape: Disk, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    return [
+        Plugin({"type": "disk", "to_world": to_world(m[:, :3], m[:, 3]), **site.parts}, uv=same_uv)
+    ]
+
+
+@translate_shape.register
+def _(shape: Box, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    edges = m[:, :3].copy()
+    faces = np.array(CUBE_FACES)
+    if np.linalg.det(edges) < 0.0:
+        # The same box.  Where it is a light of Whitted's, the point that stands for it lies in the
+        # middle along this axis, and stays (see comparisons.mitsuba_plugins.light_points).
+        turned = _middle_axis(edges)
+        edges[:, turned] *= -1.0
+        faces = np.where(faces % 3 == turned, (faces + 3) % 6, faces)
+    plugin = {"type": "cube", "to_world": to_world(edges, m[:, 3]), **site.parts}
+    return [Plugin(plugin, faces=np.repeat(faces, 2))]
+
+
+def _middle_axis(edges: FloatArray) -> int:
+    areas = np.linalg.norm(np.cross(edges.T[[1, 2, 0]], edges.T[[2, 0, 1]]), axis=1)
+    return 1 if areas[2] >= areas[0] + areas[1] else 2

@@ -1,0 +1,143 @@
+"""A scene's twin in Mitsuba, and what rays hit in it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from comparisons.answers import Answers, nothing, put_nearer, read
+from comparisons.float32 import round32
+from comparisons.mitsuba_scene import Hits, first_distances, first_hits
+from comparisons.pieces import Extent, Piece, StandIn
+from comparisons.solids import SLIGHT, SolidTwin
+from reference_rt.shapes.shape import FloatArray
+
+
+class Crowd(NamedTuple):
+    """Instances in a Mitsuba scene of their own, where they are many.
+
+    mi_scene: of the instances;  pieces: of each, by its id;  maps: from the group to the scene;
+    inside: the number, in `scenes`, of the scene of what its group holds.
+    """
+
+    mi_scene: Any
+    pieces: Mapping[str, Piece]
+    maps: FloatArray
+    inside: Sequence[int]
+    scenes: Sequence[Any]
+
+
+@dataclass(frozen=True)
+class Twin:
+    """mi_scene: Mitsuba's scene, without what follows;  pieces: what its shapes stand for, by their
+    ids;  solids: what set operations make;  crowd: instances, where they are many."""
+
+    mi_scene: Any
+    pieces: Mapping[str, Piece]
+    solids: tuple[SolidTwin, ...] = ()
+    crowd: Crowd | None = None
+
+    def sensors(self) -> Any:
+        """Mitsuba's sensors."""
+        return self.mi_scene.sensors()
+
+    @property
+    def lacking(self) -> str:
+        """Why light cannot be compared; empty where it can."""
+        if self.solids:
+            return (
+                "Mitsuba has no set operations: what rays hit is found from its hits of each "
+                "operand, but its integrators see no solids"
+            )
+        if self.crowd is not None:
+            return (
+                f"{len(self.crowd.pieces)} instances: Mitsuba's integrators take minutes to "
+                "compile for more than a few"
+            )
+        return ""
+
+    def notes(self) -> list[str]:
+        """What a reader should know of what stands for what."""
+        return [
+            f"a mesh of {s.triangles:,} triangles stands in for shape {shape} ({s.name}), within "
+            f"{s.sag:.2g} of it; {s.ratio:.2g} times more at half the fineness"
+            for shape, found in self.stand_ins().items()
+            for s in dict.fromkeys(found)
+        ]
+
+    def all_pieces(self) -> list[Piece]:
+        """Everything that stands for something, operands of solids included."""
+        found = list(self.pieces.values())
+        if self.crowd is not None:
+            found += self.crowd.pieces.values()
+        for solid in self.solids:
+            for operand in solid.operands:
+                found += operand.pieces.values()
+        return found
+
+    def extents(self) -> dict[int, Extent]:
+        """What there is of infinite planes, by the index of the shape."""
+        return {p.shape: p.plugin.extent for p in self.pieces.values() if p.plugin.extent}
+
+    def stand_ins(self) -> dict[int, list[StandIn]]:
+        """The meshes that stand for something else, by the index of the shape."""
+        found: dict[int, list[StandIn]] = {}
+        for piece in self.all_pieces():
+            if piece.plugin.stand_in is not None:
+                found.setdefault(piece.shape, []).append(piece.plugin.stand_in)
+        return found
+
+
+def trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -> Answers:
+    """What Mitsuba hits first, in the same record as `reference_rt.query.intersect` returns.
+
+    Mitsuba sees the rays rounded to float32.  `tolerance`: see `SolidTwin.trace`.
+    """
+    found = _hits(twin.mi_scene, twin.pieces, o, d)
+    everything = np.arange(len(o))
+    if twin.crowd is not None and len(o) > 0:
+        put_nearer(found, everything, _hits_of_crowd(twin.crowd, o, d))
+    for solid in twin.solids:
+        near = solid.near(o, d)
+        if len(near) == 0:
+            continue
+        put_nearer(found, near, solid.trace(o[near], d[near], tolerance))
+    return found
+
+
+def _hits(mi_scene: Any, pieces: Mapping[str, Piece], o: FloatArray, d: FloatArray) -> Answers:
+    if not pieces or len(o) == 0:  # Dr.Jit takes no empty arrays
+        return nothing(len(o))
+    ids = {name: k for k, name in enumerate(pieces)}
+    return read(first_hits(mi_scene, ids, o, d), list(pieces.values()), o)
+
+
+def _hits_of_crowd(crowd: Crowd, o: FloatArray, d: FloatArray) -> Answers:
+    """Which instance is hit, where and in which primitive is Mitsuba's answer; the normals and uv
+    are those that it finds in the group along the same ray."""
+    ids = {name: k for k, name in enumerate(crowd.pieces)}
+    t, which, prim = first_distances(crowd.mi_scene, ids, o, d)
+    n = len(o)
+    vectors = [np.zeros((n, k)) for k in (3, 3, 3, 2)]
+    hits = Hits(t, which, prim, *vectors)
+    met = np.flatnonzero(which >= 0)
+    hits.p[met] = o[met] + d[met] * t[met, None]
+    inside = np.asarray(crowd.inside)[which[met]]
+    for k, mi_scene in enumerate(crowd.scenes):
+        rows = met[inside == k]
+        if len(rows) == 0:
+            continue
+        inverse = np.linalg.inv(crowd.maps[which[rows], :, :3])
+        moved = o[rows] - crowd.maps[which[rows], :, 3]
+        local_o = np.einsum("nij,nj->ni", inverse, moved)
+        local_d = np.einsum("nij,nj->ni", inverse, d[rows])
+        local = first_hits(mi_scene, {"member": 0}, round32(local_o), round32(local_d))
+        for name in ("n", "ns"):
+            mapped = np.einsum("nji,nj->ni", inverse, getattr(local, name))
+            length = np.linalg.norm(mapped, axis=1, keepdims=True)
+            getattr(hits, name)[rows] = np.divide(
+                mapped, length, out=np.zeros_like(mapped), where=length > 0.0
+            )
+        hits.uv[rows] = local.uv
+    return read(hits, list(crowd.pieces.values()), o)

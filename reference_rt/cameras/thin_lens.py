@@ -1,0 +1,88 @@
+"""Thin lens: perspective through a round lens, sharp in one plane."""
+
+import math
+from typing import Literal, NamedTuple, Self
+
+from pydantic import model_validator
+
+from reference_rt.cameras.view_rectangle import STEEPEST, CentralCamera, place, vec3
+from reference_rt.description import Positive
+from reference_rt.kernel import kernel
+from reference_rt.ray import Ray
+from reference_rt.sampling import LENS, Sample, draw_pair
+from reference_rt.sampling.warp import concentric_disk
+from reference_rt.vec3 import Vec3, normalize
+
+
+class ThinLens(CentralCamera):
+    """An ideal lens around the eye, across the view direction (Cook et al. 1984): all rays of one
+    film point meet again in the plane in focus.
+
+    The lens is sampled.  Where no random numbers are drawn - by ray casting, and on a `grid` -
+    every ray passes its centre: the picture of `perspective`, sharp everywhere.
+    """
+
+    type: Literal["thin_lens"] = "thin_lens"
+    aperture_radius: Positive
+    """Radius of the lens in scene units."""
+    focus_distance: Positive | None = None
+    """From the lens to the plane in focus, along the axis of view; none: the plane through
+    `target`."""
+
+    @model_validator(mode="after")
+    def _focuses(self) -> Self:
+        if not self.aperture_radius / self.focus <= STEEPEST:
+            raise ValueError(
+                "the lens is too wide for its focus; expected a larger 'focus_distance' or a "
+                "smaller 'aperture_radius'"
+            )
+        return self
+
+    @property
+    def focus(self) -> float:
+        """The focus distance, or what stands in for none."""
+        return self.focus_distance or math.dist(self.eye, self.target)
+
+    def setup(self, width: int, height: int) -> "ThinLensView":
+        u, v, _ = basis = self.basis
+        return ThinLensView(
+            Vec3(*self.eye),
+            *place(self.rectangle(width, height), basis, 1.0),
+            vec3(u),
+            vec3(v),
+            self.aperture_radius,
+            self.aperture_radius / self.focus,
+        )
+
+
+class ThinLensView(NamedTuple):
+    """eye, corner, right, down: as of `PerspectiveView`, at distance 1;  u, v: the unit axes of the
+    lens;  radius: its radius;  slope: that over the focus distance."""
+
+    eye: Vec3
+    corner: Vec3
+    right: Vec3
+    down: Vec3
+    u: Vec3
+    v: Vec3
+    radius: float
+    slope: float
+
+
+@kernel
+def lens_sample(view: ThinLensView, sampler: Sample) -> tuple[float, float]:
+    u0, u1 = draw_pair(sampler, LENS)
+    return u0, u1
+
+
+@kernel
+def camera_ray(view: ThinLensView, x: float, y: float, lens: tuple[float, float]) -> Ray:
+    """From a point q of the lens to where the ray through its centre meets the plane in focus.
+
+    With s as long along the axis as 1, that is e + f s, and the direction f s - q, here over f:
+    s - q / f has no sum with the eye, and no overflow however far the focus.
+    """
+    a, b = concentric_disk(lens[0], lens[1])
+    q = view.u * a + view.v * b
+    s = view.corner + view.right * x + view.down * y
+    return Ray(view.eye + q * view.radius, normalize(s - q * view.slope), math.inf)

@@ -1,0 +1,77 @@
+"""Closed meshes as operands: the crossings of a ray, one after another."""
+
+import math
+from typing import NamedTuple
+
+from reference_rt.bvh import STACK_SIZE, Bvh, first_of, size_of
+from reference_rt.kernel import kernel, local_integers
+from reference_rt.ray import Ray
+from reference_rt.shapes import triangle
+from reference_rt.shapes.triangle import Triangles, shear_of
+from reference_rt.traversal import entry, view_of
+
+
+class Step(NamedTuple):
+    """A crossing: t, inf for none; the triangle and its barycentrics; sign, +1 where the ray goes
+    in, -1 where it comes out."""
+
+    t: float
+    row: int
+    u: float
+    v: float
+    sign: int
+
+
+@kernel
+def next_crossing(
+    triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray, after: float, row: int
+) -> Step:
+    """The first crossing of a mesh that comes after (`after`, `row`), ordered by t and then by the
+    triangles' rows, so that none is left out where several have the same t."""
+    found, _ = _walk(triangles, bvh, root, ray, after, row, False)
+    return found
+
+
+@kernel
+def winding(triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray) -> int:
+    """How many times a closed mesh goes round the origin of a ray: 0 outside, 1 inside."""
+    _, total = _walk(triangles, bvh, root, ray, 0.0, -1, True)
+    return -total
+
+
+@kernel
+def _walk(
+    triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray, after: float, row: int, total: bool
+) -> tuple[Step, int]:
+    """The next crossing, and with `total` the sum of the signs of all that come."""
+    found, balance = Step(math.inf, -1, 0.0, 0.0, 0), 0
+    if triangles is None:
+        return found, balance
+    stack = local_integers(STACK_SIZE)
+    view, shear = view_of(bvh, root, ray), shear_of(ray)
+    node, top = root, 0
+    while True:
+        begin, size = first_of(bvh, node), size_of(bvh, node)
+        if size > 0:
+            for k in range(begin, begin + size):
+                i = bvh.references[k, 1]
+                t, u, v = triangle.intersect(triangles, i, shear)
+                if t < math.inf and (t > after or (t == after and i > row)):
+                    if t < found.t or (t == found.t and i < found.row):
+                        found = Step(t, i, u, v, triangle.enters(triangles, i, shear))
+                    if total:
+                        balance += triangle.enters(triangles, i, shear)
+        else:
+            limit = math.inf if total else found.t
+            left = begin
+            t_left, t_right = entry(bvh, left, view, limit), entry(bvh, left + 1, view, limit)
+            if t_left < math.inf or t_right < math.inf:
+                node = left if t_left <= t_right else left + 1
+                if t_left < math.inf and t_right < math.inf:
+                    stack[top] = left + 1 if t_left <= t_right else left
+                    top += 1
+                continue
+        if top == 0:
+            return found, balance
+        top -= 1
+        node = stack[top]
