@@ -32,8 +32,10 @@ class Answers(Intersections):
 
 
 CURVED = 4.0
-"""A quadratic's discriminant, solved in float32 for a surface of radius r at the distance D, is off by
-some u D²: t by this many times u D² / r at most.  Measured for Mitsuba's cylinders in llvm variants,
+"""A quadratic's discriminant, solved in float32 for a surface of radius r at the distance D, is
+off by
+some u D²: t by this many times u D² / r at most.  Measured for Mitsuba's cylinders in llvm
+variants,
 up to D / r = 100: 2.6; for its spheres, whose quadratic is a better one, within instances: 3.3."""
 
 
@@ -59,6 +61,7 @@ def read(hits: Hits, pieces: Sequence[Piece], o: FloatArray) -> Answers:
             uv = hits.uv[rows]
             found.uv[rows] = uv if plugin.uv is same_uv else plugin.uv(uv)
             found.has_uv[rows] = True
+        found.stands_in[rows] = plugin.faceted
         if plugin.stand_in is not None:
             found.sag[rows], found.turn[rows] = plugin.stand_in.sag, plugin.stand_in.turn
             found.stands_in[rows] = True

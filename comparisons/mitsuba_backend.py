@@ -4,6 +4,7 @@ A libLLVM that does not fit the machine aborts the process instead of raising, s
 tried in a child process before this one depends on it.
 """
 
+import contextlib
 import ctypes.util
 import functools
 import importlib.metadata
@@ -14,6 +15,7 @@ import platform
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -135,6 +137,18 @@ def mitsuba() -> Any:
     return mi
 
 
+@contextlib.contextmanager
+def scalar() -> Iterator[Any]:
+    """Mitsuba in its scalar variant, while the context lasts."""
+    mi = mitsuba()
+    chosen = mi.variant()
+    mi.set_variant(SCALAR)
+    try:
+        yield mi
+    finally:
+        mi.set_variant(chosen)
+
+
 def prove(variant: str, llvm_path: str | None) -> str | None:
     """Render a small scene in a child process: None if it works, else what happened."""
     environment = dict(os.environ)
@@ -242,4 +256,4 @@ def _write_memory(memory: dict[str, str | None]) -> None:
         part.unlink(missing_ok=True)
 
 
-__all__ = ["Backend", "backend", "choose", "mitsuba", "prove"]
+__all__ = ["Backend", "backend", "choose", "mitsuba", "prove", "scalar"]

@@ -112,26 +112,6 @@ def first_hits(mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArr
     return Hits(np.where(missed, np.inf, t), which, prim.astype(np.int64), p, n, ns, uv)
 
 
-def first_distances(
-    mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArray
-) -> tuple[FloatArray, IntArray, IntArray]:
-    """t, which and prim of `first_hits`, without asking the shapes for more.
-
-    For a scene of many instances: each is asked about every shape there is, so that compiling takes
-    time by the square of their number (25 s for a thousand).
-    """
-    mi = mitsuba()
-    number = _shape_numbers(ids)
-
-    def hit(origin: Any, direction: Any) -> tuple[Any, ...]:
-        found = mi_scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), direction))
-        return found.t, number(found), found.prim_index
-
-    t, number_found, prim = for_rays(hit, o, d)
-    which = _decoded(mi_scene, ids, number_found)
-    return np.where(which < 0, np.inf, t), which, prim.astype(np.int64)
-
-
 def _shape_numbers(ids: Mapping[str, int]) -> Callable[[Any], Any]:
     """How to tell the shape, or instance, of a hit: its number in scalar variants, its registry id
     otherwise."""
@@ -189,7 +169,6 @@ def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicate
 __all__ = [
     "Hits",
     "Replicates",
-    "first_distances",
     "first_hits",
     "for_rays",
     "light_id",

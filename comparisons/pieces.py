@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from reference_rt.shapes.shape import FloatArray, IntArray
-from reference_rt.transform import Affine
 
 UvMap = Callable[[FloatArray], FloatArray]
 """Mitsuba's uv (n, 2) of a shape -> ours."""
@@ -39,7 +38,9 @@ class Plugin(NamedTuple):
     where they are all 0;  uv: how its uv become ours, None where the two have nothing in common;
     stand_in: for a mesh in place of a surface that Mitsuba does not have;  extent: what it is of an
     infinite plane;  within: of an instance;  curved: the radius of a surface whose equation Mitsuba
-    solves in float32 (see `answers.read`), 0 for none.
+    solves in float32 (see `answers.read`), 0 for none;  faceted: whether it is so many small
+    triangles
+    that float32 turns their own normals: those of the corners tell the surface's.
     """
 
     value: Any
@@ -50,16 +51,15 @@ class Plugin(NamedTuple):
     extent: Extent | None = None
     within: "Within | None" = None
     curved: float = 0.0
+    faceted: bool = False
 
 
 class Within(NamedTuple):
-    """What an instance holds: the group, which a scene must have beside the instance, its id, the
-    one Mitsuba shape in it, the map to the scene."""
+    """What an instance holds: the id of the group;  member: the dict of the one Mitsuba shape in it,
+    or a function that makes the object in the variant that is set."""
 
     name: str
-    group: Any
     member: Any
-    m: Affine
 
 
 class Piece(NamedTuple):

@@ -1,31 +1,28 @@
 """A scene's twin in Mitsuba, and what rays hit in it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from comparisons.answers import Answers, nothing, put_nearer, read
-from comparisons.float32 import round32
-from comparisons.mitsuba_scene import Hits, first_distances, first_hits
+from comparisons.mitsuba_backend import scalar
+from comparisons.mitsuba_scene import first_hits
 from comparisons.pieces import Extent, Piece, StandIn
 from comparisons.solids import SLIGHT, SolidTwin
 from reference_rt.shapes.shape import FloatArray
 
 
 class Crowd(NamedTuple):
-    """Instances in a Mitsuba scene of their own, where they are many.
+    """Instances in a scene of Mitsuba's scalar variant, where they are many: in others, every shape
+    is asked about every other, so that a thousand instances take half a minute to compile.
 
-    mi_scene: of the instances;  pieces: of each, by its id;  maps: from the group to the scene;
-    inside: the number, in `scenes`, of the scene of what its group holds.
+    pieces: what the instances stand for, by their ids.
     """
 
     mi_scene: Any
     pieces: Mapping[str, Piece]
-    maps: FloatArray
-    inside: Sequence[int]
-    scenes: Sequence[Any]
 
 
 @dataclass(frozen=True)
@@ -97,7 +94,8 @@ def trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -
     found = _hits(twin.mi_scene, twin.pieces, o, d)
     everything = np.arange(len(o))
     if twin.crowd is not None and len(o) > 0:
-        put_nearer(found, everything, _hits_of_crowd(twin.crowd, o, d))
+        with scalar():
+            put_nearer(found, everything, _hits(twin.crowd.mi_scene, twin.crowd.pieces, o, d))
     for solid in twin.solids:
         near = solid.near(o, d)
         if len(near) == 0:
@@ -111,33 +109,3 @@ def _hits(mi_scene: Any, pieces: Mapping[str, Piece], o: FloatArray, d: FloatArr
         return nothing(len(o))
     ids = {name: k for k, name in enumerate(pieces)}
     return read(first_hits(mi_scene, ids, o, d), list(pieces.values()), o)
-
-
-def _hits_of_crowd(crowd: Crowd, o: FloatArray, d: FloatArray) -> Answers:
-    """Which instance is hit, where and in which primitive is Mitsuba's answer; the normals and uv
-    are those that it finds in the group along the same ray."""
-    ids = {name: k for k, name in enumerate(crowd.pieces)}
-    t, which, prim = first_distances(crowd.mi_scene, ids, o, d)
-    n = len(o)
-    vectors = [np.zeros((n, k)) for k in (3, 3, 3, 2)]
-    hits = Hits(t, which, prim, *vectors)
-    met = np.flatnonzero(which >= 0)
-    hits.p[met] = o[met] + d[met] * t[met, None]
-    inside = np.asarray(crowd.inside)[which[met]]
-    for k, mi_scene in enumerate(crowd.scenes):
-        rows = met[inside == k]
-        if len(rows) == 0:
-            continue
-        inverse = np.linalg.inv(crowd.maps[which[rows], :, :3])
-        moved = o[rows] - crowd.maps[which[rows], :, 3]
-        local_o = np.einsum("nij,nj->ni", inverse, moved)
-        local_d = np.einsum("nij,nj->ni", inverse, d[rows])
-        local = first_hits(mi_scene, {"member": 0}, round32(local_o), round32(local_d))
-        for name in ("n", "ns"):
-            mapped = np.einsum("nji,nj->ni", inverse, getattr(local, name))
-            length = np.linalg.norm(mapped, axis=1, keepdims=True)
-            getattr(hits, name)[rows] = np.divide(
-                mapped, length, out=np.zeros_like(mapped), where=length > 0.0
-            )
-        hits.uv[rows] = local.uv
-    return read(hits, list(crowd.pieces.values()), o)

@@ -1,4 +1,5 @@
-"""`@kernel`, `@large_kernel`, `@entry_kernel`: the one way to compile, with an exact cache; `ByClass`
+"""`@kernel`, `@large_kernel`, `@entry_kernel`: the one way to compile, with an exact cache;
+`ByClass`
 for choice.
 
 

@@ -130,7 +130,7 @@ def quotient(a: Dyadic, b: Dyadic) -> Fixed:
     zero = b.n == 0
     numerator = a.n << shift if shift >= 0 else a.n
     denominator = np.where(zero, 1, b.n if shift >= 0 else b.n << -shift)
-    return np.where(zero, NEVER, numerator // denominator)
+    return np.asarray(np.where(zero, NEVER, numerator // denominator))
 
 
 def square_root(a: Dyadic) -> Dyadic:

@@ -26,7 +26,9 @@ def aimed_rays(tables: SceneTables, sizes: ShapeSizes, n: int, seed: int) -> Ray
     """At most n rays: half at where two rays from one origin, that find different things, part;
     half at corners and the middles of edges, a third of these exactly."""
     rng = np.random.default_rng([seed, 1])
-    parts = (_parting(tables, sizes, n // 2, rng), _at_spots(sizes, n - n // 2, rng))
+    spots = _spots(sizes, rng)
+    at_spots = n // 2 if len(spots) else 0
+    parts = (_parting(tables, sizes, n - at_spots, rng), _at_spots(sizes, spots, at_spots, rng))
     o, d = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Rays(o, d)
 
@@ -68,9 +70,8 @@ def _beside(d: FloatArray, rng: np.random.Generator) -> FloatArray:
     return np.asarray(turned / np.linalg.norm(turned, axis=1)[:, None])
 
 
-def _at_spots(sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
-    spots = _spots(sizes, rng)
-    if len(spots) == 0:
+def _at_spots(sizes: ShapeSizes, spots: FloatArray, n: int, rng: np.random.Generator) -> Rays:
+    if n == 0:
         return Rays(np.zeros((0, 3)), np.zeros((0, 3)))
     o = random_rays(sizes, n, rng).o
     d = spots[rng.integers(0, len(spots), n)] - o

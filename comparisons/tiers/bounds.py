@@ -120,7 +120,8 @@ class ShapeSizes:
     def local_points(self, hits: Intersections) -> FloatArray:
         """(n, 3): the points that were hit, in the coordinates of their groups."""
         copy = self.copy_of(hits)
-        return np.einsum("nij,nj->ni", self._inverse[copy], hits.p - self._offset[copy])
+        moved = hits.p - self._offset[copy]
+        return np.asarray(np.einsum("nij,nj->ni", self._inverse[copy], moved))
 
     def feature_of(self, hits: Intersections) -> FloatArray:
         """(n,): infinite for no shape."""
@@ -163,7 +164,8 @@ def _features(field: str, table: Any) -> FloatArray:
         v = table.vertices.reshape(-1, 3, 3)
         edges = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1)
         double_area = np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
-        return np.divide(double_area, edges, out=np.zeros_like(edges), where=edges > 0.0)
+        height = np.divide(double_area, edges, out=np.zeros_like(edges), where=edges > 0.0)
+        return np.asarray(height)
     least = np.linalg.norm(table.to_local.reshape(3, 3), axis=1).max()  # of a box, a torus
     if field == "tori":
         return np.asarray(table.minor / np.linalg.norm(table.to_local.reshape(3, 3), 2))
@@ -171,7 +173,8 @@ def _features(field: str, table: Any) -> FloatArray:
 
 
 def _quadric_features(table: Any, p: FloatArray, primitive: IntArray) -> FloatArray:
-    """The length over which f's gradient turns, |grad f| / |Hessian|, in the group's coordinates; of
+    """The length over which f's gradient turns, |grad f| / |Hessian|, in the group's coordinates;
+    of
     a cap, the smallest height of the clip box."""
     m = table.to_local[0].reshape(3, 3)
     k = table.coefficients[0]
@@ -182,7 +185,8 @@ def _quadric_features(table: Any, p: FloatArray, primitive: IntArray) -> FloatAr
     with np.errstate(divide="ignore"):
         feature = np.linalg.norm(gradient, axis=1) / bend
     heights = (table.upper - table.lower)[0] / np.linalg.norm(m, axis=1)
-    return np.where(primitive > 0, heights.min(), np.minimum(feature, heights.min()))
+    least = heights.min()
+    return np.asarray(np.where(primitive > 0, least, np.minimum(feature, least)))
 
 
 def slide(

@@ -44,7 +44,8 @@ class Answered(NamedTuple):
 def geometry(
     scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS, seed: int = 0
 ) -> Tier:
-    """Compare camera rays, and what rays hit: 3 `pixels` of the camera, at random and from hits, and
+    """Compare camera rays, and what rays hit: 3 `pixels` of the camera, at random and from hits,
+    and
     as many that are aimed at edges, drawn with `seed`.
 
     Both tracers get the same float32 numbers.  Agreement needs every ray's hit, shape, face, t,
@@ -188,7 +189,8 @@ def _beyond(twin: Twin, ours: Intersections) -> BoolArray:
 def _explained(
     tables: SceneTables, comparer: Comparer, answered: Answered, wrong: IntArray
 ) -> BoolArray:
-    """Which of the rays `wrong` (m,) float32 cannot resolve: beside them, ours has Mitsuba's answer.
+    """Which of the rays `wrong` (m,) float32 cannot resolve: beside them, ours has Mitsuba's
+    answer.
 
     Or two rays beside have it together: one comes as far as Mitsuba's hit, and one that begins just
     before meets what it hit.  Along an edge Mitsuba may miss one side and yet hit the other from

@@ -14,7 +14,8 @@ MOST_JUDGED = 400
 """Mismatches that are judged: some 10 ms each."""
 
 FEW = 1e-4
-"""The fraction of rays, not aimed at edges, that Mitsuba may get wrong by itself.  More is no matter
+"""The fraction of rays, not aimed at edges, that Mitsuba may get wrong by itself.  More is no
+matter
 of rounding: its scene is another."""
 
 SHARE = 1e-6

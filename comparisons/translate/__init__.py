@@ -4,12 +4,13 @@ To translate a new type: register a function for it in the file of its kind; unt
 `UntranslatableError`, which makes a scene `not-comparable`.
 """
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from comparisons.layout import Copy, Leaf, copies_of, place_of
-from comparisons.mitsuba_backend import mitsuba
+from comparisons.mitsuba_backend import mitsuba, scalar
 from comparisons.mitsuba_scene import light_id, shape_id
 from comparisons.pieces import Piece, Plugin
 from comparisons.solids import Operand, SolidTwin
@@ -41,19 +42,21 @@ def to_mitsuba(scene: Scene) -> dict[str, Any]:
     integrator where ours is ray casting.  Raises UntranslatableError, SceneError for a file that
     cannot be used, ReferenceUnavailableError without Mitsuba.
     """
-    return _translated(scene).plain
+    found = _translated(scene)
+    return {**_groups(found.pieces), **found.plain}
 
 
 def load(scene: Scene) -> Twin:
     """The scene in Mitsuba, its shapes not merged.  Raises as `to_mitsuba` does."""
     found = _translated(scene)
     crowd = _crowd(found)
-    mi_scene = mitsuba().load_dict(found.plain, optimize=False)
+    plain = {**_groups(found.pieces), **found.plain}
+    mi_scene = mitsuba().load_dict(plain, optimize=False)
     return Twin(mi_scene, found.pieces, tuple(found.solids), crowd)
 
 
 FEW = 32
-"""Instances that Mitsuba's own scene may have: see `mitsuba_scene.first_distances`."""
+"""Instances that a scene of Mitsuba's fast variants may have: see `Crowd`."""
 
 
 def _crowd(found: _Translated) -> Crowd | None:
@@ -62,21 +65,20 @@ def _crowd(found: _Translated) -> Crowd | None:
     if len(names) <= FEW:
         return None
     pieces = {name: found.pieces.pop(name) for name in names}
-    load_dict = mitsuba().load_dict
     instances = {name: found.plain.pop(name) for name in names}
-    within = [piece.plugin.within for piece in pieces.values() if piece.plugin.within is not None]
-    groups = {w.name: found.plain.pop(w.name, w.group) for w in within}
-    members = {w.name: w.member for w in within}
-    return Crowd(
-        load_dict({"type": "scene", **ROBUST, **groups, **instances}, optimize=False),
-        pieces,
-        np.array([w.m for w in within]),
-        [list(members).index(w.name) for w in within],
-        [
-            load_dict({"type": "scene", **ROBUST, "member": member}, optimize=False)
-            for member in members.values()
-        ],
-    )
+    with scalar() as mi:
+        groups = _groups(pieces)
+        mi_scene = mi.load_dict({"type": "scene", **ROBUST, **groups, **instances}, optimize=False)
+    return Crowd(mi_scene, pieces)
+
+
+def _groups(pieces: Mapping[str, Piece]) -> dict[str, Any]:
+    """The groups that these are instances of, in the variant that is set."""
+    within = {p.plugin.within.name: p.plugin.within for p in pieces.values() if p.plugin.within}
+    return {
+        name: {"type": "shapegroup", "member": w.member() if callable(w.member) else w.member}
+        for name, w in within.items()
+    }
 
 
 def _translated(scene: Scene) -> _Translated:
@@ -138,8 +140,9 @@ def _add(
                 result.pieces.update(pieces)
             else:
                 values, pieces = _named(plugins, f"{name}_part{leaf.part}", copy, leaf)
+                groups = _groups(pieces)
                 mi_scene = mitsuba().load_dict(
-                    {"type": "scene", **ROBUST, **values}, optimize=False
+                    {"type": "scene", **ROBUST, **groups, **values}, optimize=False
                 )
                 operands.append(Operand(mi_scene, pieces, leaf, place))
         if member.tree is not None:
@@ -153,8 +156,6 @@ def _named(
     for plugin in plugins:
         key = name + plugin.suffix
         values[key] = plugin.value
-        if plugin.within is not None:
-            values[plugin.within.name] = plugin.within.group
         pieces[key] = Piece(
             copy.shape, leaf.part, copy.instance, leaf.shape, plugin._replace(value=None)
         )

@@ -71,9 +71,7 @@ def twin(scene: Scene) -> Any:
 
 
 @pytest.mark.parametrize("rung", [geometry, direct, whitted])
-def test_the_same_scene_agrees(
-    rung: Rung, scene: Scene, tables: SceneTables, twin: Any
-) -> None:
+def test_the_same_scene_agrees(rung: Rung, scene: Scene, tables: SceneTables, twin: Any) -> None:
     tier = rung(scene, tables, twin)
     assert tier.status == "agree", tier.reason
     assert tier.name == rung.__name__

@@ -8,7 +8,7 @@ import numpy as np
 from comparisons.translate.shapes.stand_ins import Box, Patch
 from reference_rt.shapes.shape import FloatArray, IntArray
 
-CURVED = (1024, 512)
+CURVED = (768, 384)
 STRAIGHT = (2048, 1)
 """Cells of a patch that is curved both ways, and of one that is straight along v."""
 
@@ -46,7 +46,7 @@ def patches_of(matrix: FloatArray, linear: FloatArray, constant: float, box: Box
     shapes = _shapes(eigenvalues, slope, flat, constant, reach)
 
     def place(shape: Shape, u: FloatArray, v: FloatArray) -> FloatArray:
-        return (np.stack(shape(u, v), axis=-1) + origin) @ axes.T
+        return np.asarray((np.stack(shape(u, v), axis=-1) + origin) @ axes.T)
 
     found = [narrowed(Patch(partial(place, shape), cells), box) for shape, cells in shapes]
     return [patch for patch in found if patch is not None]
@@ -218,25 +218,17 @@ def _with_center(mu: FloatArray, reach: float) -> list[tuple[Shape, tuple[int, i
         return [(_ordered((i, j, k), hyperboloid), STRAIGHT if straight else CURVED)]
     if len(positive) == 0:
         return []
-    i = int(positive[0])
+    i, (j, k) = int(positive[0]), (int(x) for x in sorted(rest, key=lambda x: mu[x]))
+    straight = mu[k] == 0.0  # the axis along which nothing changes
     end = np.arccosh(max(1.0, reach / a[i]))
-    sheets = []
-    for sign in (-1.0, 1.0):
-        if np.all(mu[rest] < 0.0):
-            j, k = int(rest[0]), int(rest[1])
 
-            def sheet(u: FloatArray, v: FloatArray, sign: float = sign) -> Coordinates:
-                phi, s = 2.0 * np.pi * u, end * v
-                y, z = a[j] * np.sinh(s) * np.cos(phi), a[k] * np.sinh(s) * np.sin(phi)
-                return sign * a[i] * np.cosh(s), y, z
+    def sheet(sign: float, u: FloatArray, v: FloatArray) -> Coordinates:
+        if straight:
+            s = end * (2.0 * u - 1.0)
+            return sign * a[i] * np.cosh(s), a[j] * np.sinh(s), reach * (2.0 * v - 1.0)
+        phi, s = 2.0 * np.pi * u, end * v
+        y, z = a[j] * np.sinh(s) * np.cos(phi), a[k] * np.sinh(s) * np.sin(phi)
+        return sign * a[i] * np.cosh(s), y, z
 
-            sheets.append((_ordered((i, j, k), sheet), CURVED))
-        else:
-            j, k = (int(x) for x in sorted(rest, key=lambda x: mu[x]))  # k is the straight axis
-
-            def wall(u: FloatArray, v: FloatArray, sign: float = sign) -> Coordinates:
-                s = end * (2.0 * u - 1.0)
-                return sign * a[i] * np.cosh(s), a[j] * np.sinh(s), reach * (2.0 * v - 1.0)
-
-            sheets.append((_ordered((i, j, k), wall), STRAIGHT))
-    return sheets
+    cells = STRAIGHT if straight else CURVED
+    return [(_ordered((i, j, k), partial(sheet, sign)), cells) for sign in (-1.0, 1.0)]

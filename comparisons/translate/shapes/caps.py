@@ -21,16 +21,20 @@ Form = Callable[[FloatArray], FloatArray]
 
 
 def cap_faces(value: Form, box: Box) -> tuple[Soup, IntArray]:
-    """Triangles of all six faces that face outwards, uv from 0 to 1 across each, and our numbers of
+    """Triangles of all six faces that face outwards, with normals, uv from 0 to 1 across each, and
+    our numbers of
     their faces: 1 + the axis, + 3 on the positive side."""
-    positions, uvs, numbers = [], [], []
+    positions, normals, uvs, numbers = [], [], [], []
     for axis in range(3):
         for side in (0, 1):
             triangles = _cap(value, box, axis, side)
             positions.append(_on_face(triangles, box, axis, side).reshape(-1, 3))
+            outward = np.where(np.arange(3) == axis, 2.0 * side - 1.0, 0.0)
+            normals.append(np.tile(outward, (3 * len(triangles), 1)))
             uvs.append(triangles.reshape(-1, 2))
             numbers.append(np.full(len(triangles), 1 + axis + 3 * side))
-    return Soup(np.concatenate(positions), uvs=np.concatenate(uvs)), np.concatenate(numbers)
+    soup = Soup(np.concatenate(positions), np.concatenate(normals), np.concatenate(uvs))
+    return soup, np.concatenate(numbers)
 
 
 def _on_face(xy: FloatArray, box: Box, axis: int, side: int) -> FloatArray:

@@ -54,4 +54,4 @@ def _zero(at0: FloatArray, middle: FloatArray, at1: FloatArray) -> FloatArray:
     # Of the two the one that lies in between, or next to it.
     outside = np.abs(np.nan_to_num(roots, nan=np.inf) - 0.5)
     chosen = np.take_along_axis(roots, outside.argmin(axis=0)[None], axis=0)[0]
-    return np.clip(np.nan_to_num(chosen, nan=0.5), 0.0, 1.0)
+    return np.asarray(np.clip(np.nan_to_num(chosen, nan=0.5), 0.0, 1.0))

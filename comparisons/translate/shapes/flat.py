@@ -9,7 +9,7 @@ from comparisons.translate.shapes.meshes import Soup
 from comparisons.translate.shapes.plugins import Site
 from reference_rt import transform
 from reference_rt.shapes import Plane, Polygon
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.shapes.shape import FloatArray, IntArray
 
 RINGS = (-14, 21)
 """Powers of two: radii of the first ring of an infinite plane and of the last, in units of how far
@@ -41,7 +41,7 @@ def _(shape: Plane, site: Site) -> list[Plugin]:
     return [Plugin(soup.mesh(site.parts), faces=soup.all_of_face(0), uv=same_uv, extent=extent)]
 
 
-def _web(rings: int) -> FloatArray:
+def _web(rings: int) -> IntArray:
     """The triangles between a middle, vertex 0, and `rings` rings of SIDES vertices around it,
     counter-clockwise."""
     k = np.arange(SIDES)
@@ -81,7 +81,7 @@ DIGITS = 2.0**20
 """Clipper2 rounds coordinates to 1e-8: of numbers this large that is 1e-14."""
 
 
-def triangulated(rings: list[FloatArray], fill: str) -> tuple[FloatArray, FloatArray]:
+def triangulated(rings: list[FloatArray], fill: str) -> tuple[FloatArray, IntArray]:
     """Vertices (n, 2) and counter-clockwise triangles (m, 3) of what rings (k, 2) enclose, whose
     coordinates are in [0, 1]; `fill` is "even_odd" or "nonzero"."""
     rule = {"even_odd": manifold3d.FillRule.EvenOdd, "nonzero": manifold3d.FillRule.NonZero}[fill]

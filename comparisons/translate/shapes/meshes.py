@@ -98,11 +98,8 @@ def placed(soup: Soup, key: Any, m: transform.Affine, mirrored: bool, site: Site
     the one mesh for `key`.  `mirrored`: see `Soup.moved`."""
     if site.copies == 1 or site.copies * len(soup.faces) <= MOST_TRIANGLES:
         return Plugin(soup.moved(m, mirrored).mesh(site.parts))
-    made = ("placed", key, site.material)
-    if made not in site.shared:
-        site.shared[made] = soup.mesh(site.parts)
     # Mitsuba maps normals as ours are mapped: the front stays the front.
-    return instance_of(str(made), site.shared[made], m, site)
+    return instance_of(str(key), lambda: soup.mesh(site.parts), m, site)
 
 
 def _soup(table: Triangles) -> Soup:

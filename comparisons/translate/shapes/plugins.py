@@ -38,17 +38,17 @@ def to_world(linear: FloatArray, offset: FloatArray) -> Any:
 
 
 def instance_of(name: str, member: Any, m: Affine, site: Site) -> Plugin:
-    """A Mitsuba shape, a dict without its material or an object, under any affine map: as an
-    instance of a group of its own, of which there is one for each `name` and material."""
+    """A Mitsuba shape, see `Within.member`, under any affine map: as an instance of a group of its
+    own, of which there is one for each `name` and material."""
     key = (name, site.material)
     if key not in site.shared:
         if isinstance(member, dict):
             member = {**member, **site.parts}
-        group = mitsuba().load_dict({"type": "shapegroup", "member": member})
-        site.shared[key] = f"group_{len(site.shared)}", group, member
-    name, group, member = site.shared[key]
-    value = {"type": "instance", "to_world": to_world(m[:, :3], m[:, 3]), "group": group}
-    return Plugin(value, within=Within(name, group, member, m))
+        site.shared[key] = Within(f"group_{len(site.shared)}", member)
+    within: Within = site.shared[key]
+    reference = {"type": "ref", "id": within.name}
+    value = {"type": "instance", "to_world": to_world(m[:, :3], m[:, 3]), "group": reference}
+    return Plugin(value, within=within)
 
 
 def curved_instance(name: str, m: Affine, site: Site) -> Plugin:
@@ -65,7 +65,8 @@ def curved_instance(name: str, m: Affine, site: Site) -> Plugin:
 
 
 def in_float32(radius: float) -> float:
-    """`Plugin.curved` of a surface of this radius: scalar variants solve its equation in float64."""
+    """`Plugin.curved` of a surface of this radius: scalar variants solve its equation in
+    float64."""
     return 0.0 if mitsuba().variant().startswith("scalar") else float(radius)
 
 

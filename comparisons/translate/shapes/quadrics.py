@@ -25,7 +25,8 @@ ANGLES = 4096
 """Around a cone, which is straight the other way."""
 
 THIN = 64.0
-"""Cylinders this many times smaller than the scene are meshes in llvm variants: Mitsuba's own, which
+"""Cylinders this many times smaller than the scene are meshes in llvm variants: Mitsuba's own,
+which
 it solves for in float32, are off by some u D² / r (see `answers.CURVED`), and with D / r = 1000 are
 missed by every other ray."""
 
@@ -150,5 +151,5 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
             m = shape.map_in(site.place)
             mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
             plugin = placed(soup, key, m, mirrored, site)
-            found.append(plugin._replace(suffix="_caps", faces=faces, uv=same_uv))
+            found.append(plugin._replace(suffix="_caps", faces=faces, uv=same_uv, faceted=True))
     return found

@@ -9,7 +9,7 @@ from comparisons.translate.shapes.stand_ins import Implicit, Patch, stand_in
 from reference_rt.shapes import Torus
 from reference_rt.shapes.shape import FloatArray
 
-CELLS = (1024, 512)
+CELLS = (768, 384)
 """Around the axis and around the tube."""
 
 
