@@ -55,7 +55,8 @@ class Plugin(NamedTuple):
 
 
 class Within(NamedTuple):
-    """What an instance holds: the id of the group;  member: the dict of the one Mitsuba shape in it,
+    """What an instance holds: the id of the group;  member: the dict of the one Mitsuba shape in
+    it,
     or a function that makes the object in the variant that is set."""
 
     name: str
