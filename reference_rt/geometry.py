@@ -11,7 +11,7 @@ from reference_rt.groups import Instances, out_of, ray_in
 from reference_rt.kernel import kernel, local_floats, local_integers
 from reference_rt.ray import Hit, Ray, SurfacePoint, no_hit
 from reference_rt.shapes import TRIANGLE, Packets, Shapes, triangle
-from reference_rt.shapes.triangle import shear_of
+from reference_rt.shapes.watertight import shear_of
 from reference_rt.traversal import can_be_nearer, entry, view_of
 from reference_rt.vec3 import Vec3
 

@@ -93,6 +93,10 @@ def light_points(mi: Any, scene: Any) -> list[LightPoint]:
     return found
 
 
+_FLAT = {"Rectangle": 4.0, "Disk": math.pi}
+"""The areas of plugins whose point is their middle, before their map."""
+
+
 def _points_of(mi: Any, shape: Any) -> list[LightPoint]:
     kind = shape.class_name()
     if kind == "Sphere":
@@ -102,9 +106,9 @@ def _points_of(mi: Any, shape: Any) -> list[LightPoint]:
                 mi.Point3f(m[:3, 3].tolist()), mi.Float(float(np.linalg.norm(m[:3, 0]))), shape
             )
         ]
-    if kind == "Rectangle":
+    if kind in _FLAT:
         m = _to_world(mi, shape)
-        return [_fixed(mi, shape, m[:3, 3], 4.0 * np.cross(m[:3, 0], m[:3, 1]))]
+        return [_fixed(mi, shape, m[:3, 3], _FLAT[kind] * np.cross(m[:3, 0], m[:3, 1]))]
     values = mi.traverse(shape)
     vertices = np.array(values["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     if kind == "Cube":

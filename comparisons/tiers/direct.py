@@ -132,6 +132,7 @@ def _compare(setting: Setting, light: int, u: tuple[float, float]) -> Outcome:
         return np.asarray((apart <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
     radius = delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
+    radius += _stand_ins(setting, hits)[0]
     settled = arbiter.explained(wrong, radius[wrong], like_theirs)
     right = error <= bound
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -174,7 +175,8 @@ def _bounds(
     square by 2 e / r; and the products round some 16 times.
     """
     value, theirs, their_cosine = values
-    e = slide(setting.sizes, rays.o, rays.d, hits, _sag(setting, hits))
+    sag, of_normal = _stand_ins(setting, hits)
+    e = slide(setting.sizes, rays.o, rays.d, hits, sag)
     if _kind(setting, light) == CONSTANT:
         w, distance = target, np.full(len(target), np.inf)
     else:
@@ -184,17 +186,17 @@ def _bounds(
     with np.errstate(divide="ignore", invalid="ignore"):
         ours_full = np.where(cosine > 0.0, value.max(axis=1) / cosine, 0.0)
         theirs_full = np.where(their_cosine > 0.0, theirs.max(axis=1) / their_cosine, 0.0)
-    turn = 2.0 * e / setting.sizes.feature_of(hits)
+    turn = 2.0 * e / setting.sizes.feature_of(hits) + of_normal
     relative = turn + 4.0 * e / distance + 16.0 * UNIT_ROUNDOFF
     return np.asarray(np.maximum(ours_full, theirs_full) * relative)
 
 
-def _sag(setting: Setting, hits: Intersections) -> FloatArray:
-    """(n,): how far the meshes that stand for shapes are off these."""
-    sag = np.zeros(len(setting.scene.shapes) + 1)
+def _stand_ins(setting: Setting, hits: Intersections) -> tuple[FloatArray, FloatArray]:
+    """(n,) each: how far the meshes that stand for shapes are off these, and their normals."""
+    sag, turn = np.zeros((2, len(setting.scene.shapes) + 1))
     for shape, found in setting.twin.stand_ins().items():
-        sag[shape] = max(s.sag for s in found)
-    return np.asarray(sag[hits.shape])
+        sag[shape], turn[shape] = max(s.sag for s in found), max(s.turn for s in found)
+    return sag[hits.shape], turn[hits.shape]
 
 
 def _kind(setting: Setting, light: int) -> int:

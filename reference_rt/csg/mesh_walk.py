@@ -7,7 +7,8 @@ from reference_rt.bvh import STACK_SIZE, Bvh, first_of, size_of
 from reference_rt.kernel import kernel, local_integers
 from reference_rt.ray import Ray
 from reference_rt.shapes import triangle
-from reference_rt.shapes.triangle import Triangles, shear_of
+from reference_rt.shapes.triangle import Triangles
+from reference_rt.shapes.watertight import shear_of
 from reference_rt.traversal import entry, view_of
 
 

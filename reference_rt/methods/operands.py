@@ -13,7 +13,8 @@ from reference_rt.methods.method import FloatArray, ray_of
 from reference_rt.shapes import TABLES, TRIANGLE, Shapes
 from reference_rt.shapes.mesh_topology import describe_boundary
 from reference_rt.shapes.shape import IntArray, Place, Shape
-from reference_rt.shapes.triangle import Shear, Triangles, project, shear_of
+from reference_rt.shapes.triangle import Triangles
+from reference_rt.shapes.watertight import Shear, project, shear_of
 from reference_rt.transform import Affine, affine, compose, identity, invert
 
 
@@ -98,7 +99,7 @@ def _spans(shapes: Shapes, kind: int, o: FloatArray, d: FloatArray, t: FloatArra
 def _mesh_crossing(triangles: Triangles, i: int, shear: Shear) -> tuple[float, int]:
     """Where the line crosses triangle i, at t of any sign, and +1 where it goes in, -1 where it
     comes out, 0 where it passes by.  The arithmetic is that of `triangle.intersect`."""
-    seen = project(triangles, i, shear)
+    seen = project(triangles.vertices, i, shear)
     if seen.side == 0:
         return math.inf, 0
     inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
@@ -111,7 +112,7 @@ def _count(triangles: Triangles, o: FloatArray, d: FloatArray, count: IntArray) 
     for i in range(len(o)):
         shear = shear_of(ray_of(o, d, i))
         for k in range(len(triangles.face)):
-            if project(triangles, k, shear).side != 0:
+            if project(triangles.vertices, k, shear).side != 0:
                 count[i] += 1
 
 

@@ -158,7 +158,7 @@ def watertight(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
     function of the reversed edge is its exact negative: neighbours cannot both reject a ray
     through their edge.  The form that renders, but for edge functions that round to 0: those the
     renderer works out exactly, and what is on the edge it gives to one neighbour alone, as if the
-    ray were moved by less than any number (`shapes.triangle.project`).
+    ray were moved by less than any number (`shapes.watertight.project`).
     Cost: 22 +, 16 *, 4 /.
     Fails: never at edges, but a ray whose edge function rounds to 0 hits both neighbours; with
     slivers, where t is off by 3e3 u in the median, and with grazing rays, as all do.  (In float32

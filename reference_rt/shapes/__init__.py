@@ -47,7 +47,8 @@ from reference_rt.shapes.shape import (
 )
 from reference_rt.shapes.sphere import Sphere, Spheres
 from reference_rt.shapes.torus import Tori, Torus
-from reference_rt.shapes.triangle import Shear, Triangle, Triangles, shear_of
+from reference_rt.shapes.triangle import Triangle, Triangles
+from reference_rt.shapes.watertight import Shear, shear_of
 from reference_rt.vec3 import Vec3
 
 # Codes of `Hit.kind`: which table a primitive is a row of.

@@ -19,6 +19,7 @@ from reference_rt.kernel import kernel
 from reference_rt.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
 from reference_rt.shapes import flat
 from reference_rt.shapes.flat import Integers, integers
+from reference_rt.shapes.rounding import product_error
 from reference_rt.shapes.shape import Bounds, FloatArray, IntArray, Place, Shape, outward
 
 OFF_PLANE = 64
@@ -28,8 +29,6 @@ eight times as much where the others are."""
 
 MASKS = {"even_odd": 1, "nonzero": -1}
 """The bits of a winding number of which one must be 1 inside."""
-
-SPLITTER = 2.0**27 + 1.0
 
 
 def _point(value: Any, handler: Any) -> Any:
@@ -221,16 +220,6 @@ def _turns(steps: Integers) -> Integers:
     following = np.roll(steps, -1, axis=0)
     turns: Integers = steps[:, 0] * following[:, 1] - steps[:, 1] * following[:, 0]
     return np.asarray(turns[turns != 0])
-
-
-@kernel
-def product_error(a: float, b: float, product: float) -> float:
-    """a b - `product`, exactly unless it underflows, for product = fl(a b) (Dekker 1971, splitting
-    as Veltkamp)."""
-    c, d = SPLITTER * a, SPLITTER * b
-    a_high, b_high = c - (c - a), d - (d - b)
-    a_low, b_low = a - a_high, b - b_high
-    return a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
 @kernel

@@ -19,7 +19,8 @@ from reference_rt.shapes.shape import (
     Shape,
     solid_angle_pdf,
 )
-from reference_rt.vec3 import Vec3, component, cross, dot, length, max_abs, normalize, triple
+from reference_rt.shapes.watertight import Shear, project
+from reference_rt.vec3 import Vec3, cross, dot, length, max_abs, normalize, triple
 
 
 class Triangle(Shape):
@@ -126,127 +127,10 @@ def bounds(triangles: Triangles) -> Bounds:
     return v.min(axis=1), v.max(axis=1)
 
 
-class Shear(NamedTuple):
-    """A ray turned so that its direction is the unit z axis: the axes permuted to x y z, and the
-    shear that remains (Woop, Benthin & Wald 2013, JCGT 2(1))."""
-
-    x: int
-    y: int
-    z: int
-    o_x: float
-    o_y: float
-    o_z: float
-    s_x: float
-    s_y: float
-    s_z: float
-
-
-@kernel
-def shear_of(ray: Ray) -> Shear:
-    """Once per ray: the largest axis of d becomes z; x and y swap to keep the winding."""
-    z = 2
-    if abs(ray.d.x) >= abs(ray.d.y) and abs(ray.d.x) >= abs(ray.d.z):
-        z = 0
-    elif abs(ray.d.y) >= abs(ray.d.z):
-        z = 1
-    x, y = (z + 1) % 3, (z + 2) % 3
-    d_z = component(ray.d, z)
-    if d_z < 0.0:
-        x, y = y, x
-    return Shear(
-        x,
-        y,
-        z,
-        component(ray.o, x),
-        component(ray.o, y),
-        component(ray.o, z),
-        component(ray.d, x) / d_z,
-        component(ray.d, y) / d_z,
-        1.0 / d_z,
-    )
-
-
-class Projection(NamedTuple):
-    """A triangle as a ray sees it: its edge functions, whose sum is twice its area, and the depths
-    of its vertices; side, 0 where the ray passes by, else the sign of the area."""
-
-    side: int
-    e0: float
-    e1: float
-    e2: float
-    a_z: float
-    b_z: float
-    c_z: float
-
-
-@kernel
-def project(triangles: Triangles, i: int, shear: Shear) -> Projection:
-    """Triangle i seen along a ray (Woop, Benthin & Wald 2013).
-
-    Each vertex is projected by arithmetic of its own, and two neighbours' edge functions differ in
-    sign alone.  Products round monotonically: a difference that is not 0 has the right sign.  Where
-    it is 0, `exactly` decides: of the triangles around an edge or a vertex that a ray passes
-    through, it passes through exactly those that it would pass through a hair beside it.
-    """
-    v = triangles.vertices
-    a_z = v[i, shear.z] - shear.o_z
-    b_z = v[i, 3 + shear.z] - shear.o_z
-    c_z = v[i, 6 + shear.z] - shear.o_z
-    a_x = v[i, shear.x] - shear.o_x - shear.s_x * a_z
-    b_x = v[i, 3 + shear.x] - shear.o_x - shear.s_x * b_z
-    c_x = v[i, 6 + shear.x] - shear.o_x - shear.s_x * c_z
-    a_y = v[i, shear.y] - shear.o_y - shear.s_y * a_z
-    b_y = v[i, 3 + shear.y] - shear.o_y - shear.s_y * b_z
-    c_y = v[i, 6 + shear.y] - shear.o_y - shear.s_y * c_z
-    e0 = c_x * b_y - c_y * b_x
-    e1 = a_x * c_y - a_y * c_x
-    e2 = b_x * a_y - b_y * a_x
-    side = 0
-    if e0 > 0.0 and e1 > 0.0 and e2 > 0.0:
-        side = 1
-    elif e0 < 0.0 and e1 < 0.0 and e2 < 0.0:
-        side = -1
-    elif e0 == 0.0 or e1 == 0.0 or e2 == 0.0:
-        e0, s0 = exactly(c_x, c_y, b_x, b_y)
-        e1, s1 = exactly(a_x, a_y, c_x, c_y)
-        e2, s2 = exactly(b_x, b_y, a_x, a_y)
-        side = s0 if s0 == s1 and s1 == s2 else 0
-    return Projection(side, e0, e1, e2, a_z, b_z, c_z)
-
-
-@kernel
-def product_error(x: float, y: float, product: float) -> float:
-    """x y - product, exactly, for product = fl(x y) (Dekker 1971, Veltkamp's splitting)."""
-    x_high = x * 134217729.0  # 2^27 + 1
-    x_high = x_high - (x_high - x)
-    y_high = y * 134217729.0
-    y_high = y_high - (y_high - y)
-    x_low, y_low = x - x_high, y - y_high
-    return ((x_high * y_high - product) + x_high * y_low + x_low * y_high) + x_low * y_low
-
-
-@kernel
-def exactly(p_x: float, p_y: float, q_x: float, q_y: float) -> tuple[float, int]:
-    """The edge function p_x q_y - p_y q_x to within one rounding, and its sign, which is right.
-
-    On the edge it is that beside the edge, as if the ray were moved by (h, h²) for an h above 0 and
-    below everything else: 0 only for an edge without length.
-    """
-    left, right = p_x * q_y, p_y * q_x
-    e = left - right + (product_error(p_x, q_y, left) - product_error(p_y, q_x, right))
-    along_x, along_y = p_y - q_y, q_x - p_x
-    for decides in (e, along_x, along_y):
-        if decides > 0.0:
-            return e, 1
-        if decides < 0.0:
-            return e, -1
-    return 0.0, 0
-
-
 @kernel
 def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
     """Where the ray meets triangle i; u, v are the barycentrics of v1 and v2."""
-    seen = project(triangles, i, shear)
+    seen = project(triangles.vertices, i, shear)
     if seen.side == 0:
         return miss()
     inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
@@ -259,7 +143,7 @@ def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
 @kernel
 def enters(triangles: Triangles, i: int, shear: Shear) -> int:
     """+1 where the ray comes to the front of triangle i, -1 where it comes from behind."""
-    return -project(triangles, i, shear).side
+    return -project(triangles.vertices, i, shear).side
 
 
 @kernel

@@ -10,7 +10,7 @@ from reference_rt.kernel import entry_kernel, kernel
 from reference_rt.ray import Hit, Ray, ray_from
 from reference_rt.shapes import TABLES
 from reference_rt.shapes.shape import FloatArray
-from reference_rt.shapes.triangle import shear_of
+from reference_rt.shapes.watertight import shear_of
 from reference_rt.vec3 import dot, row
 
 

@@ -14,7 +14,7 @@ from reference_rt.kernel import entry_kernel, kernel
 from reference_rt.methods import operands
 from reference_rt.methods.method import ray_of
 from reference_rt.ray import Hit, surface_error
-from reference_rt.shapes.triangle import project, shear_of
+from reference_rt.shapes.watertight import project, shear_of
 from reference_rt.vec3 import dot
 
 N = 10_000
@@ -132,7 +132,7 @@ def _of_mesh(shapes, kind, o, d, t, w):
         ray, n = ray_of(o, d, i), 0
         shear = shear_of(ray)
         for k in range(len(shapes.triangles.owner)):
-            seen = project(shapes.triangles, k, shear)
+            seen = project(shapes.triangles.vertices, k, shear)
             if seen.side != 0:
                 inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
                 depth = seen.e0 * seen.a_z + seen.e1 * seen.b_z + seen.e2 * seen.c_z
