@@ -63,10 +63,11 @@ def test_roots_are_enclosed() -> None:
 
 def test_degenerate_equations() -> None:
     one, two, zero = (Dyadic.of([x]) for x in (1.0, 2.0, 0.0))
-    sign, near, far = roots(zero, one, -two)  # 2 t = 2
-    assert (sign[0], nearest(near)[0], far[0]) == (1, 1.0, NEVER)
-    sign, near, far = roots(zero, -one, -two)  # -2 t = 2
-    assert (nearest(near)[0], far[0]) == (-1.0, NEVER)
+    # Of a line, f <= 0 up to its zero where it rises, and from there on where it falls.
+    sign, near, far = roots(zero, one, -two)  # 2 t - 2
+    assert (sign[0], near[0], nearest(far)[0]) == (1, -NEVER, 1.0)
+    sign, near, far = roots(zero, -one, -two)  # -2 t - 2
+    assert (sign[0], nearest(near)[0], far[0]) == (1, -1.0, NEVER)
     sign, near, far = roots(one, -one, one)  # (t - 1)²
     assert sign[0] == 0
     assert tied(near, far)[0]
