@@ -17,14 +17,12 @@ from reference_rt.transform import Affine
 
 class Leaf(NamedTuple):
     """A primitive shape: its description, the map that its own transform is followed by, the name
-    of its material;  part: its number in its group or its solid;  turned: whether its outside is
-    the solid's inside."""
+    of its material;  part: its number in its group or its solid."""
 
     shape: Shape
     outer: Affine
     material: str | None
     part: int
-    turned: bool
 
 
 class Tree(NamedTuple):
@@ -94,29 +92,22 @@ def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple
 def member_of(shape: Shape, number: int) -> Member:
     """A shape that is no instance, number `number` of its group."""
     if not isinstance(shape, Solid):
-        leaf = Leaf(shape, transform.identity(), shape.material, number, False)
+        leaf = Leaf(shape, transform.identity(), shape.material, number)
         return Member((leaf,), None)
     leaves: list[Leaf] = []
-    tree = _tree(shape, transform.identity(), None, False, leaves)
+    tree = _tree(shape, transform.identity(), None, leaves)
     assert isinstance(tree, Tree)
     return Member(tuple(leaves), tree)
 
 
-def _tree(
-    shape: Shape, outer: Affine, material: str | None, turned: bool, leaves: list[Leaf]
-) -> Tree | int:
+def _tree(shape: Shape, outer: Affine, material: str | None, leaves: list[Leaf]) -> Tree | int:
     """Puts the operands into `leaves`, from left to right."""
     material = shape.material if shape.material is not None else material
     if not isinstance(shape, Solid):
-        leaves.append(Leaf(shape, outer, material, len(leaves), turned))
+        leaves.append(Leaf(shape, outer, material, len(leaves)))
         return len(leaves) - 1
     outer = transform.compose(transform.affine(shape.transform), outer)
-    takes_away = isinstance(shape, Difference)
-    operation = (
-        "difference" if takes_away else "union" if isinstance(shape, Union) else "intersection"
-    )
-    of = [
-        _tree(operand, outer, material, turned != (takes_away and k > 0), leaves)
-        for k, operand in enumerate(shape.of)
-    ]
-    return Tree(operation, tuple(of))
+    of = tuple(_tree(operand, outer, material, leaves) for operand in shape.of)
+    if isinstance(shape, Difference):
+        return Tree("difference", of)
+    return Tree("union" if isinstance(shape, Union) else "intersection", of)

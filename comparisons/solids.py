@@ -108,6 +108,12 @@ class SolidTwin:
     operands: Sequence[Operand]
     tree: Tree
 
+    @property
+    def place(self) -> tuple[int, int]:
+        """The shape, and the instance, that the solid is."""
+        piece = next(iter(self.operands[0].pieces.values()))
+        return piece.shape, piece.instance
+
     def near(self, o: FloatArray, d: FloatArray) -> IntArray:
         """The rays (k,) that come near any of the operands."""
         if any(isinstance(operand.leaf.shape, Plane) for operand in self.operands):
@@ -154,6 +160,23 @@ class SolidTwin:
             some_hits = rows_of(crossing.at, column[j, rays])
             put(result, rays, some_hits)
         return self._facing(result, d, evaluated(self.tree, states))
+
+    def meets(
+        self, o: FloatArray, d: FloatArray, part: IntArray, t: FloatArray, primitive: IntArray
+    ) -> BoolArray:
+        """Whether the operands with the numbers `part` (n,) have a crossing, of this primitive, at
+        t to within float32."""
+        found = np.zeros(len(o), bool)
+        for operand in self.operands:
+            rows = np.flatnonzero(part == operand.leaf.part)
+            if len(rows) == 0:
+                continue
+            _, crossings = operand.walk(o[rows], d[rows])
+            for crossing in crossings:
+                mine = rows[crossing.rays]
+                near = np.abs(crossing.at.t - t[mine]) <= crossing.slack
+                found[mine] |= near & (crossing.at.primitive == primitive[mine])
+        return found
 
     def _first_change(
         self,

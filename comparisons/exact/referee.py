@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,10 +19,8 @@ from comparisons.exact.dyadic import (
     nearest,
 )
 from comparisons.layout import Copy, Member, Tree
-from comparisons.tiers.bounds import LeafSizes, ShapeSizes
-from reference_rt import transform
+from comparisons.sizes import LeafSizes, ShapeSizes, corners_of
 from reference_rt.query import Intersections
-from reference_rt.tables import SceneTables
 
 MARGIN = 1e-9
 """Of a scene's size, by which boxes and triangles are made larger where floats choose what is worth
@@ -59,18 +57,13 @@ class Truth:
 
 
 class Referee:
-    """Decides for rays of one scene."""
+    """Decides for rays of one scene, from its description alone."""
 
-    def __init__(self, tables: SceneTables, sizes: ShapeSizes) -> None:
-        self.tables, self.sizes = tables, sizes
+    def __init__(self, sizes: ShapeSizes) -> None:
+        self.sizes = sizes
         self.margin = MARGIN * float(np.abs([sizes.lower, sizes.upper]).max())
         boxes = [_box(copy, sizes.leaves_of(copy)) for copy in sizes.copies]
         self.lower, self.upper = (np.array(side) for side in zip(*boxes, strict=True))
-        self.rows: dict[tuple[int, int], int] = {}
-        instances = tables.geometry.instances
-        if instances is not None:
-            pairs = zip(instances.owner.tolist(), instances.copy.tolist(), strict=True)
-            self.rows = {pair: row for row, pair in enumerate(pairs)}
 
     def decide(self, o: FloatArray, d: FloatArray) -> list[Truth]:
         """What each ray meets first."""
@@ -88,10 +81,9 @@ class Referee:
     ) -> None:
         exact_o, exact_d = Dyadic.of(o), Dyadic.of(d)
         if copy.instance >= 0:
-            table: Any = self.tables.geometry.instances
-            row = self.rows[copy.shape, copy.instance]
-            m = Dyadic.of(table.to_local[row : row + 1])
-            exact_o = apply(m, exact_o - Dyadic.of(table.center[row : row + 1]))
+            # The inverse as our tables have it: rounded once, and taken for exact from there on.
+            m = Dyadic.of(np.linalg.inv(copy.outer[:, :3]).reshape(1, 9))
+            exact_o = apply(m, exact_o - Dyadic.of(copy.outer[None, :, 3]))
             exact_d = apply(m, exact_d)
             o, d = exact_o.floats(), exact_d.floats()
         leaves = self.sizes.by_part(copy)
@@ -110,18 +102,11 @@ class Referee:
 
 
 def _box(copy: Copy, leaves: list[LeafSizes]) -> tuple[FloatArray, FloatArray]:
-    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-    for leaf in leaves:
-        if not leaf.is_finite:
-            return np.full(3, -np.inf), np.full(3, np.inf)
-        ends = np.stack(leaf.bounds)
-        pick = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-        corners = transform.apply_points(copy.outer, ends[pick, [0, 1, 2]])
-        lower, upper = (
-            np.minimum(lower, corners.min(axis=0)),
-            np.maximum(upper, corners.max(axis=0)),
-        )
-    return lower, upper
+    """A box around everything of a copy, infinite where something is."""
+    if not all(leaf.is_finite for leaf in leaves):
+        return np.full(3, -np.inf), np.full(3, np.inf)
+    corners = np.concatenate([corners_of(leaf.bounds, copy.outer) for leaf in leaves])
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _meets_box(o: FloatArray, d: FloatArray, lower: FloatArray, upper: FloatArray) -> BoolArray:

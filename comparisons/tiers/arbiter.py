@@ -31,6 +31,10 @@ LIMIT = 0.01
 take 1e-4 of a picture or less; past a hundredth the reference's precision is what is compared."""
 
 
+AT_ONCE = 2000
+"""Moved rays that are asked for together, where fewer rays than these are left."""
+
+
 def directions(n: int) -> FloatArray:
     """n unit vectors (n, 3) spread evenly over the sphere (the golden spiral)."""
     k = np.arange(n) + 0.5
@@ -50,13 +54,17 @@ def explained(
     """
     found = np.zeros(len(rays), bool)
     for most, count, radii in SEARCHES:
-        for factor in radii:
-            for move in directions(count):
-                open_ = np.flatnonzero(~found[:MOST])
-                if len(open_) == 0 or len(open_) > most:
-                    break
-                offsets = move * (factor * radius[open_])[:, None]
-                found[open_] = like_theirs(rays[open_], offsets)
+        moves = np.concatenate([factor * directions(count) for factor in radii])
+        done = 0
+        while done < len(moves):
+            open_ = np.flatnonzero(~found[:MOST])
+            if len(open_) == 0 or len(open_) > most:
+                break
+            some = moves[done : done + max(1, AT_ONCE // len(open_))]
+            offsets = some * radius[open_][:, None, None]
+            agree = like_theirs(np.repeat(rays[open_], len(some)), offsets.reshape(-1, 3))
+            found[open_] = agree.reshape(len(open_), -1).any(axis=1)
+            done += len(some)
     return found
 
 

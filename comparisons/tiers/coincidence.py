@@ -10,7 +10,6 @@ from comparisons.tiers.comparer import DISCRETE, Comparer
 from comparisons.tiers.rays import Rays
 from comparisons.twin import Twin, trace
 from reference_rt import query
-from reference_rt.csg import Solid
 from reference_rt.query import Intersections
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import IntArray
@@ -44,7 +43,7 @@ def coincident(
             again = rows_of(theirs, k)
             if tolerance is not None:
                 again = trace(twin, some.o, some.d, tolerance)
-            _as_one_part(scene, mine, again)
+            _as_one_part(twin, some, mine, again)
             found[rest] = (comparer.ratios(some, mine, again) <= 1.0).all(axis=1)
     left = ours.shape[numbers][~found]
     for shape in np.unique(left[left >= 0])[:COINCIDENCES].tolist():
@@ -75,13 +74,20 @@ def in_one_place(comparer: Comparer, answered: Any, numbers: IntArray) -> BoolAr
     return np.asarray(near & parallel & other & (ours.shape >= 0) & (theirs.shape >= 0))
 
 
-def _as_one_part(scene: Scene, ours: Intersections, theirs: Answers) -> None:
-    """Takes the operands of a solid for one surface."""
-    is_solid = np.array([isinstance(shape, Solid) for shape in (*scene.shapes, None)])
-    rows = is_solid[ours.shape] & (ours.shape == theirs.shape)
-    for name in ("part", "primitive"):
-        getattr(theirs, name)[rows] = getattr(ours, name)[rows]
-    theirs.has_uv[rows] = False
+def _as_one_part(twin: Twin, rays: Rays, ours: Intersections, theirs: Answers) -> None:
+    """Puts the operand that ours found in place of Mitsuba's, where Mitsuba meets that too."""
+    for solid in twin.solids:
+        shape, instance = solid.place
+        rows = (theirs.shape == shape) & (theirs.instance == instance)
+        rows &= (ours.shape == shape) & (ours.instance == instance)
+        rows &= (ours.part != theirs.part) | (ours.primitive != theirs.primitive)
+        some = np.flatnonzero(rows)
+        if len(some) == 0:
+            continue
+        part, primitive = ours.part[some], ours.primitive[some]
+        met = solid.meets(rays.o[some], rays.d[some], part, ours.t[some], primitive)
+        theirs.part[some[met]], theirs.primitive[some[met]] = part[met], primitive[met]
+        theirs.has_uv[some[met]] = False
 
 
 def _without(scene: Scene, index: int, reach: float) -> Scene:

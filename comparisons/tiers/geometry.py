@@ -68,7 +68,7 @@ def geometry(
     # What the arbiter explained may lie in one place too.
     apart = wrong[settled][~in_one_place(comparer, answered, wrong[settled])]
     mismatches = mismatches[np.argsort(is_aimed[mismatches], kind="stable")]
-    verdict = judged(Referee(tables, sizes), rays, answered.ours, answered.theirs, mismatches)
+    verdict = judged(Referee(sizes), rays, answered.ours, answered.theirs, mismatches)
     explained = apart
     right = answered.ratios[(answered.ratios <= 1.0).all(axis=1)]
     numbers: dict[str, Any] = {
