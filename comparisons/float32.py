@@ -26,7 +26,6 @@ def largest(vectors: FloatArray) -> FloatArray:
 
 
 def delta(o: FloatArray, p: FloatArray, reach: FloatArray) -> FloatArray:
-    """(n,): how far float32 may move a surface, seen along a ray from o to p: ROUNDINGS u (|o| +
-    |p|
-    + the shape's reach)."""
+    """(n,): how far float32 may move a surface, seen along a ray from o to p:
+    ROUNDINGS u (|o| + |p| + the shape's reach)."""
     return ROUNDINGS * UNIT_ROUNDOFF * (largest(o) + largest(p) + reach)

@@ -99,8 +99,7 @@ def _colours(scene: Scene, hits: Answers) -> FloatArray:
 
 def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
     """(n, 3) weights of the corners of triangles (n, 9), by the areas opposite, for points (n, 3)
-    of
-    their planes."""
+    of their planes."""
     v = vertices.reshape(-1, 3, 3)
     normal = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
     areas = [np.sum(normal * np.cross(v[:, k - 2] - p, v[:, k - 1] - p), axis=1) for k in range(3)]

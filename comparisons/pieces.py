@@ -35,12 +35,11 @@ class Plugin(NamedTuple):
     """One of Mitsuba's shapes.
 
     value: its dict, or the object;  suffix: of its id;  faces: our numbers of its primitives, None
-    where they are all 0;  uv: how its uv become ours, None where the two have nothing in common;
+    where they are the same;  uv: how its uv become ours, None where the two have nothing in common;
     stand_in: for a mesh in place of a surface that Mitsuba does not have;  extent: what it is of an
     infinite plane;  within: of an instance;  curved: the radius of a surface whose equation Mitsuba
     solves in float32 (see `answers.read`), 0 for none;  faceted: whether it is so many small
-    triangles
-    that float32 turns their own normals: those of the corners tell the surface's.
+    triangles that float32 turns their own normals: those of the corners tell the surface's.
     """
 
     value: Any
@@ -56,8 +55,7 @@ class Plugin(NamedTuple):
 
 class Within(NamedTuple):
     """What an instance holds: the id of the group;  member: the dict of the one Mitsuba shape in
-    it,
-    or a function that makes the object in the variant that is set."""
+    it, or a function that makes the object in the variant that is set."""
 
     name: str
     member: Any

@@ -169,8 +169,7 @@ def _features(field: str, table: Any) -> FloatArray:
 
 def _quadric_features(table: Any, p: FloatArray, primitive: IntArray) -> FloatArray:
     """The length over which f's gradient turns, |grad f| / |Hessian|, in the group's coordinates;
-    of
-    a cap, the smallest height of the clip box."""
+    of a cap, the smallest height of the clip box."""
     m = table.to_local[0].reshape(3, 3)
     k = table.coefficients[0]
     hessian = np.array([[2 * k[0], k[3], k[5]], [k[3], 2 * k[1], k[4]], [k[5], k[4], 2 * k[2]]])

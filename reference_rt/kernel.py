@@ -1,7 +1,6 @@
-"""`@kernel`, `@large_kernel`, `@entry_kernel`: the one way to compile, with an exact cache;
-`ByClass`
-for choice.
+"""`@kernel`, `@large_kernel`, `@entry_kernel`: the one way to compile; `ByClass` for choice.
 
+Compiled code is kept on disk in an exact cache.
 
 A kernel is plain scalar code on floats, integers, arrays and NamedTuples of these.  With
 ``NUMBA_DISABLE_JIT=1`` the same text runs as plain Python with bit-identical results; the rules

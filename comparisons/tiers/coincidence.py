@@ -61,8 +61,7 @@ def coincident(
 
 def in_one_place(comparer: Comparer, answered: Any, numbers: IntArray) -> BoolArray:
     """Which of the rays `numbers` (m,) meet two surfaces that touch along their whole: at the same
-    t,
-    with the same normal or the opposite one."""
+    t, with the same normal or the opposite one."""
     ours, theirs = rows_of(answered.ours, numbers), rows_of(answered.theirs, numbers)
     rays = Rays(answered.rays.o[numbers], answered.rays.d[numbers])
     e = slide(comparer.sizes, rays.o, rays.d, ours, theirs.sag)

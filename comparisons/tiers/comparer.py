@@ -42,8 +42,7 @@ class Comparer:
         With e = (delta + sag) / cos, how far the point may slide along the surface: |t| may be off
         by e, uv and normals by e over the smallest length on which they change, shading normals,
         which turn by up to two unit vectors on that length, by twice that.  Of a mesh that stands
-        in
-        for a curved surface the shading normal is taken for both.
+        in for a curved surface the shading normal is taken for both.
         """
         hit = (ours.shape >= 0) & (theirs.shape >= 0)
         different = [(ours.shape >= 0) != (theirs.shape >= 0)]

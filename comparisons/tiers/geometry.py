@@ -45,8 +45,7 @@ def geometry(
     scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS, seed: int = 0
 ) -> Tier:
     """Compare camera rays, and what rays hit: 3 `pixels` of the camera, at random and from hits,
-    and
-    as many that are aimed at edges, drawn with `seed`.
+    and as many that are aimed at edges, drawn with `seed`.
 
     Both tracers get the same float32 numbers.  Agreement needs every ray's hit, shape, face, t,
     normals and uv to be within float32's bound, or the arbiter to say that float32 cannot resolve

@@ -15,8 +15,7 @@ MOST_JUDGED = 400
 
 FEW = 1e-4
 """The fraction of rays, not aimed at edges, that Mitsuba may get wrong by itself.  More is no
-matter
-of rounding: its scene is another."""
+matter of rounding: its scene is another."""
 
 SHARE = 1e-6
 """How far, as a fraction of the distance and over the cosine, our t may be from the exact one where

@@ -1,5 +1,4 @@
-"""Twins of shapes that Mitsuba lacks, of groups and of solids: the same rays, and planted
-faults."""
+"""Twins of shapes that Mitsuba lacks, of groups and of solids: same rays, and planted faults."""
 
 import numpy as np
 import pytest

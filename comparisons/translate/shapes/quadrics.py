@@ -26,9 +26,8 @@ ANGLES = 4096
 
 THIN = 64.0
 """Cylinders this many times smaller than the scene are meshes in llvm variants: Mitsuba's own,
-which
-it solves for in float32, are off by some u D² / r (see `answers.CURVED`), and with D / r = 1000 are
-missed by every other ray."""
+which it solves for in float32, are off by some u D² / r (see `answers.CURVED`), and with
+D / r = 1000 are missed by every other ray."""
 
 BOTTOM, TOP = 3, 6
 """Faces: 0 is the surface itself, of the others 1 + the axis, + 3 on the positive side."""

@@ -1,6 +1,5 @@
 """Curved surfaces that Mitsuba does not have, as fine meshes with the surface's own normals; how
-far
-these are from the surface is measured, not assumed."""
+far these are from the surface is measured, not assumed."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
