@@ -34,7 +34,8 @@ class Answers(Intersections):
 CURVED = 4.0
 """A quadratic's discriminant, solved in float32 for a surface of radius r at the distance D, is
 off by some u D²: t by this many times u D² / r at most.  Measured for Mitsuba's cylinders in llvm
-variants, up to D / r = 100: 2.6; for its spheres, whose quadratic is a better one, within instances: 3.3."""
+variants, up to D / r = 100: 2.6; for its spheres, whose quadratic is a better one, within
+instances: 3.3."""
 
 
 def read(hits: Hits, pieces: Sequence[Piece], o: FloatArray) -> Answers:
