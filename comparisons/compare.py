@@ -20,11 +20,11 @@ from comparisons.report import write_report, write_results
 from comparisons.results import Case, Tier
 from comparisons.statistics import compare_replicates
 from comparisons.translate import UntranslatableError, load
+from comparisons.translate.notes import notes_of
 from comparisons.twin import Twin
 from comparisons.verdict import decide
-from reference_rt.film import BoxFilter
-from reference_rt.integrators import Path as PathTracing
-from reference_rt.integrators import RayCast
+from reference_rt.filters import BoxFilter
+from reference_rt.integrators import RayCast, Whitted
 from reference_rt.scene import Scene
 from reference_rt.tables import SceneTables, build_tables
 
@@ -75,6 +75,7 @@ def compare_scene(
     # A filter wider than the pixel shares samples between pixels on Mitsuba's side, and their
     # noise with them: the statistics need independent pixels, and the filter is not in question.
     notes = [] if isinstance(scene.film.filter, BoxFilter) else ["compared with a box filter"]
+    film_filter = scene.film.filter
     scene = scene.changed(film=scene.film.model_copy(update={"filter": BoxFilter()}))
     clock = time.perf_counter()
     try:
@@ -87,8 +88,9 @@ def compare_scene(
         "ours": {"load": load_seconds},
         "mitsuba": {"load": time.perf_counter() - clock},
     }
-    rungs = _deterministic_rungs(scene, tables, twin, console)
-    notes += twin.notes()
+    rungs = [] if isinstance(film_filter, BoxFilter) else [tiers.film(film_filter)]
+    rungs += _deterministic_rungs(scene, tables, twin, console)
+    notes += [*twin.notes(), *notes_of(scene)]
     if twin.lacking and not isinstance(scene.integrator, RayCast):
         rungs += [Tier(name, "not-comparable", twin.lacking) for name in ("statistics", "images")]
         verdict, reason = decide(rungs, None)
@@ -151,7 +153,7 @@ def _pictures(
 
         if isinstance(scene.integrator, RayCast):
             rendered = pictures.cast(scene, tables, twin)
-        elif not isinstance(scene.integrator, PathTracing):
+        elif isinstance(scene.integrator, Whitted):
             rendered = pictures.whitted(scene, tables, twin)
         else:
             rendered = pictures.replicates(

@@ -16,10 +16,13 @@ from comparisons.tiers.whitted import plugin_radiance
 from comparisons.twin import Twin, trace
 from reference_rt.image import display
 from reference_rt.integrators import RayCast, Whitted
+from reference_rt.kernel import entry_kernel
 from reference_rt.render import Picture, render
 from reference_rt.scene import Scene
-from reference_rt.shapes.shape import FloatArray
-from reference_rt.tables import SceneTables, colours
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.tables import SceneTables
+from reference_rt.textures import At, colour_at
+from reference_rt.vec3 import row as row_of
 
 DETERMINISTIC_SSIM = 0.9999
 """Pictures without noise differ where float32 moves an edge across a sample: a pixel here and there
@@ -64,7 +67,7 @@ def cast(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
             "Mitsuba has other uv, or none, for some shapes: there ours stand on both sides"
         )
     layers = {
-        "colour": _colours(scene, hits),
+        "colour": _colours(scene, tables, hits, uv),
         "distance": hits.t,
         "normal": np.where(hits.stands_in[:, None], hits.ns, hits.n),
         "id": hits.shape.astype(np.float64),
@@ -77,24 +80,37 @@ def cast(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
     )
 
 
-def _colours(scene: Scene, hits: Answers) -> FloatArray:
+def _colours(scene: Scene, tables: SceneTables, hits: Answers, uv: FloatArray) -> FloatArray:
     """The colour (n, 3) of what was hit: of its material, or of a mesh's vertices at the place."""
     sizes = ShapeSizes(scene)
-    names, of_materials = [*scene.materials, None], colours(scene)
+    names = [*scene.materials, None]
     leaf, local = sizes.leaf_of(hits), sizes.local_points(hits)
     found = np.zeros((len(hits.t), 3))
+    mixed = np.full((len(hits.t), 3), -1.0)  # negative stands for none
+    material = np.full(len(hits.t), -1)
     for number in np.unique(leaf[leaf >= 0]).tolist():
         rows = np.flatnonzero(leaf == number)
         sizes_of = sizes.leaves[number]
-        found[rows] = of_materials[names.index(sizes_of.material)]
+        material[rows] = names.index(sizes_of.material)
         if sizes_of.field == "triangles" and sizes_of.table.colours is not None:
             primitive = hits.primitive[rows]
             weights = _barycentrics(sizes_of.table.vertices[primitive], local[rows])
             of_corners = sizes_of.table.colours[primitive].reshape(-1, 3, 3)
-            has_any = of_corners[:, 0, 0] >= 0.0
-            mixed = np.einsum("nk,nki->ni", weights, of_corners)
-            found[rows] = np.where(has_any[:, None], mixed, found[rows])
-    return found
+            has_any = of_corners[:, :1, 0] >= 0.0
+            mixed[rows] = np.where(has_any, np.einsum("nk,nki->ni", weights, of_corners), -1.0)
+    _shown(tables, material, uv, mixed, found)
+    return np.where(mixed[:, :1] >= 0.0, mixed, found)
+
+
+@entry_kernel
+def _shown(
+    tables: SceneTables, material: IntArray, uv: FloatArray, colours: FloatArray, out: FloatArray
+) -> None:
+    """The colours of materials (n,), -1 for none, at surface coordinates (n, 2)."""
+    for i in range(len(material)):
+        if material[i] >= 0:
+            at = At(tables.textures, uv[i, 0], uv[i, 1], row_of(colours, i))
+            out[i, 0], out[i, 1], out[i, 2] = colour_at(tables.materials.shown, material[i], at)
 
 
 def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
@@ -118,14 +134,14 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
     n = round(scene.resolved_sampler.spp**0.5)
     film = scene.film
     total = np.zeros((film.height * film.width, 3))
+    theirs_at = plugin_radiance(scene, tables, twin, scene.integrator)
     y, x = np.mgrid[0 : film.height, 0 : film.width]
     start = time.perf_counter()
     for row in range(n):
         for column in range(n):
             film_x = x.ravel() + (column + 0.5) / n
             film_y = y.ravel() + (row + 0.5) / n
-            rays = Rays(*camera_rays(scene, film_x, film_y))
-            total += plugin_radiance(twin.mi_scene, scene.integrator, rays)
+            total += theirs_at(Rays(*camera_rays(scene, film_x, film_y)))
     seconds = time.perf_counter() - start
     theirs = (total / n**2).reshape(film.height, film.width, 3)
     return Rendered(Images(ours.colour, theirs), _seconds(ours, seconds))

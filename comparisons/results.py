@@ -18,7 +18,7 @@ Status = Literal[
     "invalid",  # non-finite pixels, wrong size: no statement about agreement is possible
 ]
 
-RUNGS = ("geometry", "direct", "whitted", "statistics", "images")
+RUNGS = ("film", "geometry", "direct", "whitted", "statistics", "images")
 """The ladder, in order: a failure is reported at the first rung that breaks."""
 
 

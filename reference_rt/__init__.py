@@ -9,11 +9,37 @@ from reference_rt.errors import (
     SceneError,
     UsageError,
 )
-from reference_rt.film import BoxFilter, Film, GaussianFilter, TentFilter
+from reference_rt.film import (
+    BoxFilter,
+    CatmullRomFilter,
+    Film,
+    GaussianFilter,
+    LanczosFilter,
+    MitchellFilter,
+    TentFilter,
+)
 from reference_rt.groups import Instance
-from reference_rt.integrators import Path, RayCast, Whitted
-from reference_rt.lights import Constant, Point
-from reference_rt.materials import Dielectric, Diffuse, Emissive, Mirror
+from reference_rt.integrators import Direct, Path, RayCast, Whitted
+from reference_rt.lights import Ambient, Constant, Directional, EnvironmentMap, Point, Spot
+from reference_rt.materials import (
+    Blend,
+    Bump,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Emissive,
+    Mask,
+    Mirror,
+    NormalMap,
+    Phong,
+    Plastic,
+    Principled,
+    RoughConductor,
+    RoughDielectric,
+    RoughPlastic,
+    ThinDielectric,
+    TwoSided,
+)
 from reference_rt.render import Picture, render
 from reference_rt.sampling import Grid, Independent, Sobol
 from reference_rt.scene import Scene, json_schema
@@ -32,18 +58,29 @@ from reference_rt.shapes import (
     Triangle,
 )
 from reference_rt.tables import SceneTables, build_tables
+from reference_rt.textures import Bitmap, Checker, VertexColours
 
 __all__ = [
+    "Ambient",
+    "Bitmap",
+    "Blend",
     "Box",
     "BoxFilter",
+    "Bump",
+    "CatmullRomFilter",
+    "Checker",
+    "Conductor",
     "Cone",
     "Constant",
     "Cylinder",
     "Dielectric",
     "Difference",
     "Diffuse",
+    "Direct",
+    "Directional",
     "Disk",
     "Emissive",
+    "EnvironmentMap",
     "Film",
     "GaussianFilter",
     "Grid",
@@ -51,32 +88,46 @@ __all__ = [
     "Independent",
     "Instance",
     "Intersection",
+    "LanczosFilter",
+    "Mask",
     "Mesh",
     "Mirror",
+    "MitchellFilter",
+    "NormalMap",
     "Orthographic",
     "Path",
     "Perspective",
+    "Phong",
     "Picture",
     "Pinhole",
     "Plane",
+    "Plastic",
     "Point",
     "Polygon",
+    "Principled",
     "Quadric",
     "RayCast",
     "Rectangle",
     "ReferenceRtError",
     "ReferenceUnavailableError",
+    "RoughConductor",
+    "RoughDielectric",
+    "RoughPlastic",
     "Scene",
     "SceneError",
     "SceneTables",
     "Sobol",
     "Sphere",
+    "Spot",
     "TentFilter",
+    "ThinDielectric",
     "ThinLens",
     "Torus",
     "Triangle",
+    "TwoSided",
     "Union",
     "UsageError",
+    "VertexColours",
     "Whitted",
     "build_tables",
     "json_schema",

@@ -10,7 +10,6 @@ from reference_rt.csg import NOT, OR, Solid
 from reference_rt.csg.tables import Parts, Solids
 from reference_rt.geometry import SOLID, Geometry
 from reference_rt.groups import Instance
-from reference_rt.materials import Emissive
 from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes
 from reference_rt.shapes.mesh_topology import describe_boundary
 from reference_rt.shapes.shape import Bounds, FloatArray, IntArray, Place
@@ -122,11 +121,6 @@ class _Assembly:
 
     def part(self, shape: int, number: int, turned: bool, material: str | None) -> Place:
         """The place of a part of a shape, with an owner number of its own."""
-        if material is not None and isinstance(self.scene.materials[material], Emissive):
-            raise ValueError(
-                f"'{material}' is emissive; expected a material that does not shine on a shape "
-                "in a group or in a solid"
-            )
         self.parts.append((shape, number, int(turned)))
         return Place(len(self.parts) - 1, self.materials[material], self.scene.folder)
 

@@ -15,8 +15,8 @@ from rich.table import Table
 
 from reference_rt.console import ProgressLine
 from reference_rt.errors import ImageError, ReferenceRtError, UsageError
+from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
-from reference_rt.integrators import RayCast, Whitted
 from reference_rt.scene import Scene
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -69,7 +69,9 @@ def render(
     ],
     spp: Annotated[int | None, typer.Option(help="Samples per pixel.")] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
-    integrator: Annotated[str | None, typer.Option(help="ray_cast, whitted or path.")] = None,
+    integrator: Annotated[
+        str | None, typer.Option(help="ray_cast, whitted, direct or path.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
 ) -> None:
@@ -91,8 +93,13 @@ def render(
         f"kernels, {seconds['render']:.2f} s to render",
         err=True,
     )
-    if picture.nonfinite:
-        raise ImageError(f"{output}: {picture.nonfinite} pixels are not finite")
+    bad = picture.nonfinite_pixels
+    if len(bad) > 0:
+        places = ", ".join(f"({x}, {y})" for x, y in bad[:4])
+        raise ImageError(
+            f"{output}: {len(bad)} pixels are not finite; (column, row): {places}"
+            + (", ..." if len(bad) > 4 else "")
+        )
 
 
 @app.command()
@@ -137,7 +144,7 @@ def adjusted(
             raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{size}'")
         parts["film"] = _changed(scene.film, "--size", width=int(width), height=int(height))
     if integrator is not None and integrator != scene.integrator.type:
-        known = {"ray_cast": RayCast, "whitted": Whitted, "path": PathTracing}
+        known = {"ray_cast": RayCast, "whitted": Whitted, "direct": Direct, "path": PathTracing}
         if integrator not in known:
             raise UsageError(
                 f"--integrator: expected one of {', '.join(known)}, got '{integrator}'"

@@ -24,23 +24,25 @@ def _three_numbers(value: Any) -> Any:
         raise ValueError("expected finite numbers") from None
 
 
-def _colour(value: Any) -> Any:
+def colour(value: Any) -> Any:
+    """Linear sRGB of at least 0 from one number or three.  Raises ValueError."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         value = (value, value, value)
     try:
-        colour = _three_numbers(value)
+        rgb = _three_numbers(value)
     except ValueError:
         raise ValueError("expected one number or three [r, g, b] (linear sRGB)") from None
-    if not all(x >= 0.0 for x in colour):  # also refuses NaN
+    if not all(x >= 0.0 for x in rgb):  # also refuses NaN
         raise ValueError("expected numbers of at least 0")
-    return colour
+    return rgb
 
 
-def _reflectance(value: Any) -> Any:
-    colour = _colour(value)
-    if max(colour) > 1.0:
+def reflectance(value: Any) -> Any:
+    """The same, of at most 1."""
+    rgb = colour(value)
+    if max(rgb) > 1.0:
         raise ValueError("expected numbers from 0 to 1: more would create energy")
-    return colour
+    return rgb
 
 
 def _unit_free_direction(value: Any) -> Any:
@@ -58,7 +60,8 @@ _Triple = Annotated[tuple[float, float, float], Strict(False)]
 _VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
 
 
-def _colour_schema(maximum: float | None) -> dict[str, Any]:
+def colour_schema(maximum: float | None) -> dict[str, Any]:
+    """The JSON Schema of a colour of at most `maximum`."""
     number: dict[str, Any] = {"type": "number", "minimum": 0}
     if maximum is not None:
         number["maximum"] = maximum
@@ -71,10 +74,10 @@ Vector = Annotated[_Triple, BeforeValidator(_three_numbers), WithJsonSchema(_VEC
 Direction = Annotated[_Triple, BeforeValidator(_unit_free_direction), WithJsonSchema(_VECTOR)]
 """[x, y, z], not zero, of any length."""
 
-Colour = Annotated[_Triple, BeforeValidator(_colour), WithJsonSchema(_colour_schema(None))]
+Colour = Annotated[_Triple, BeforeValidator(colour), WithJsonSchema(colour_schema(None))]
 """Linear sRGB, each at least 0; a single number stands for grey."""
 
-Reflectance = Annotated[_Triple, BeforeValidator(_reflectance), WithJsonSchema(_colour_schema(1.0))]
+Reflectance = Annotated[_Triple, BeforeValidator(reflectance), WithJsonSchema(colour_schema(1.0))]
 """Linear sRGB, each from 0 to 1; a single number stands for grey."""
 
 Positive = Annotated[float, Field(gt=0)]

@@ -1,14 +1,21 @@
 """What a scene needs, what was left out, and why."""
 
+from typing import Any
+
 import numpy as np
 
 from reference_rt import bvh
 from reference_rt.integrators import RayCast, Whitted
-from reference_rt.materials import TABLES as MATERIAL_TABLES
+from reference_rt.lights import Lights
+from reference_rt.lights.environment_map import EnvironmentMaps
+from reference_rt.materials import SMOOTH
+from reference_rt.materials.layers import Layers
+from reference_rt.materials.leaves import TABLES as MATERIAL_TABLES
 from reference_rt.sampling import Grid
 from reference_rt.scene import Scene
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.tables import SceneTables
+from reference_rt.textures import TABLES as TEXTURE_TABLES
 
 Lines = list[tuple[str, str]]
 
@@ -28,6 +35,7 @@ def explain(scene: Scene, tables: SceneTables) -> tuple[Lines, Lines]:
     _shapes(tables, used, left_out)
     _hierarchy(scene, tables, used, left_out)
     _materials(tables, used, left_out)
+    _textures(tables, used, left_out)
     _lights(scene, tables, used, left_out)
     _integration(scene, tables, used, left_out)
     left_out.append(("Mitsuba", "rendering never imports it; only comparing does"))
@@ -101,12 +109,57 @@ def _nodes_of_the_scene(tables: SceneTables) -> int:
 
 
 def _materials(tables: SceneTables, used: Lines, left_out: Lines) -> None:
-    for _, field, _, _ in MATERIAL_TABLES:
-        table = getattr(tables.materials, field)
+    materials = tables.materials
+    for _, field, _, _, _ in MATERIAL_TABLES:
+        table = getattr(materials.leaves, field)
         if table is None:
             left_out.append((field, "no material of this kind: its kernels are not compiled"))
         else:
-            used.append((field, f"{len(table[0])}"))
+            used.append((field, f"{_rows(table):,}"))
+    _layers(materials.layers, used, left_out)
+    if materials.oriented is None:
+        left_out.append(("tangents", "no material depends on where u and v point"))
+    else:
+        used.append(("tangents", "dp/du and dp/dv at every hit"))
+
+
+def _layers(layers: Layers | None, used: Lines, left_out: Lines) -> None:
+    if layers is None:
+        left_out.append(("layers", "no material is made of others"))
+        return
+    used.append(("layers", f"{len(layers.kind):,}, of {len(layers.first):,} materials"))
+    for name, table, what in (
+        ("shares", layers.weights, "mask or blend"),
+        ("bumps", layers.bumps, "bump"),
+        ("normal maps", layers.normal_maps, "normal map"),
+    ):
+        if table is None:
+            left_out.append((name, f"no material is a {what}"))
+        else:
+            used.append((name, f"{_rows(table):,}"))
+
+
+def _textures(tables: SceneTables, used: Lines, left_out: Lines) -> None:
+    if tables.textures is None:
+        left_out.append(("textures", "the scene has none: surface coordinates are not found"))
+        return
+    for _, field, _, _ in TEXTURE_TABLES:
+        table = getattr(tables.textures, field)
+        if table is None:
+            left_out.append((f"textures: {field}", "no texture of this kind"))
+        else:
+            size = _bytes(sum(column.nbytes for column in table))
+            used.append((f"textures: {field}", f"{len(table[-1]):,} ({size})"))
+
+
+def _rows(table: Any) -> int:
+    """How many rows a table has, whose columns may be tables; 0 for one that is not there."""
+    if table is None:
+        return 0
+    first = table
+    while isinstance(first, tuple):
+        first = first[0]
+    return len(first)
 
 
 def _lights(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> None:
@@ -114,24 +167,62 @@ def _lights(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> 
     if isinstance(scene.integrator, RayCast):
         left_out.append(("lights", "ray casting shows surfaces as they are"))
         return
-    if lights.choice is None:
-        left_out.append(("light sampling", "there is no light: the picture is black"))
-        return
-    for table, name in ((lights.points, "point lights"), (lights.areas, "emissive primitives")):
+    for name, table in (
+        ("point lights", lights.points),
+        ("spots", lights.spots),
+        ("directional lights", lights.directionals),
+        ("emissive primitives", lights.areas),
+    ):
         if table is None:
             left_out.append((name, "the scene has none"))
         else:
-            used.append((name, f"{len(table[0]):,}"))
-    if lights.environment is None:
+            used.append((name, f"{_rows(table):,}"))
+    _surroundings(scene, lights, used, left_out)
+    hidden = 0 if lights.areas is None else int(np.count_nonzero(lights.areas.area == np.inf))
+    if hidden:
+        reason = "of types that cannot be sampled, in groups or in solids: scattered rays find them"
+        left_out.append((f"sampling of {hidden:,} emissive primitives", reason))
+    _picking(tables, used, left_out)
+
+
+def _surroundings(scene: Scene, lights: Lights, used: Lines, left_out: Lines) -> None:
+    whitted = isinstance(scene.integrator, Whitted)
+    environment = lights.environment
+    if environment is None:
         left_out.append(("environment", "the scene has none: rays that miss are black"))
+    elif isinstance(environment, EnvironmentMaps):
+        height, width = environment.texels.shape[:2]
+        size = _bytes(sum(column.nbytes for column in environment))
+        used.append(("environment", f"a map of {width} x {height} pixels ({size})"))
     else:
         used.append(("environment", "constant"))
-    if tables.materials.diffuses is None:
+    if environment is not None and whitted:
+        left_out.append(("light of the environment", "Whitted sees it, but does not gather it"))
+    if lights.ambient is None:
+        left_out.append(("ambient light", "the scene has none"))
+    elif whitted:
+        used.append(("ambient light", "added by materials with a k_a: those of type phong"))
+    else:
+        left_out.append(("ambient light", "Whitted alone knows it: it comes from nowhere"))
+
+
+def _picking(tables: SceneTables, used: Lines, left_out: Lines) -> None:
+    choice, tree = tables.lights.choice, tables.lights.tree
+    if choice is None:
+        left_out.append(("light sampling", "there is no light to sample"))
+        return
+    if not (tables.materials.traits & SMOOTH).any():
         left_out.append(
             ("light sampling", "every material mirrors or refracts: it would find none")
         )
-    if len(lights.choice.kind) == 1:
+    if len(choice.kind) == 1:
         left_out.append(("picking a light", "there is one"))
+    elif tree is None:
+        left_out.append(("light tree", "few lights: they are picked by their power"))
+    else:
+        size = _bytes(sum(column.nbytes for column in tree))
+        placed = np.count_nonzero(tree.light >= 0)
+        used.append(("light tree", f"{placed:,} lights, by power, distance and direction ({size})"))
 
 
 def _integration(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> None:
@@ -147,10 +238,14 @@ def _integration(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines
         used.append(("samples", f"{sampler.spp} fixed per pixel"))
     else:
         used.append(("samples", f"{sampler.spp} per pixel, {sampler.type}, seed {sampler.seed}"))
-    if film.filter.type == "box":
-        left_out.append(("filter weights", "a box filter's are all 1"))
-    if isinstance(integrator, Whitted) and tables.lights.environment is not None:
-        left_out.append(("light of the environment", "Whitted sees it, but does not gather it"))
+    if film.filter.type in ("box", "tent"):
+        left_out.append(("filter weights", f"samples lie as dense as a {film.filter.type} weighs"))
+    if isinstance(integrator, RayCast):
+        left_out.append(("film layers", "ray casting writes its own"))
+    elif not film.layers:
+        left_out.append(("film layers", "none beside the colour is asked for"))
+    else:
+        used.append(("film layers", ", ".join(film.layers)))
 
 
 def _bytes(n: int) -> str:

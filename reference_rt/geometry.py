@@ -7,10 +7,11 @@ from reference_rt import shapes as any_shape
 from reference_rt.bvh import STACK_SIZE, Bvh, first_of, size_of
 from reference_rt.csg import evaluate
 from reference_rt.csg.tables import Parts, Solids
-from reference_rt.groups import Instances, out_of, ray_in
+from reference_rt.groups import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.kernel import kernel, local_floats, local_integers
 from reference_rt.ray import Hit, Ray, SurfacePoint, no_hit
 from reference_rt.shapes import TRIANGLE, Packets, Shapes, triangle
+from reference_rt.shapes.shape import Tangents
 from reference_rt.shapes.watertight import shear_of
 from reference_rt.traversal import can_be_nearer, entry, view_of
 from reference_rt.vec3 import Vec3
@@ -206,6 +207,32 @@ def owner(geometry: Geometry, ray: Ray, hit: Hit) -> Owner:
     return Owner(shape, copy, part, face, u, v)
 
 
+class Coordinates(NamedTuple):
+    """What textures are asked with: the surface coordinates, and the interpolated colour of a
+    mesh's vertices, negative where there is none."""
+
+    u: float
+    v: float
+    colour: Vec3
+
+
+@kernel
+def coordinates(geometry: Geometry, ray: Ray, hit: Hit) -> Coordinates:
+    """Where on its surface a hit lies."""
+    local = ray_in(geometry.instances, hit.instance, ray)
+    u, v = any_shape.uv(geometry.shapes, local, hit)
+    return Coordinates(u, v, colour(geometry.shapes, hit, Vec3(-1.0, -1.0, -1.0)))
+
+
+@kernel
+def tangents(geometry: Geometry, ray: Ray, hit: Hit) -> Tangents:
+    """dp/du and dp/dv at a hit, u and v being those of `coordinates`.  Where an operand's outside
+    is the inside of its solid they are the same: only normals turn over."""
+    local = ray_in(geometry.instances, hit.instance, ray)
+    found = any_shape.tangents(geometry.shapes, local, hit)
+    return tangents_out_of(geometry.instances, hit.instance, found)
+
+
 @kernel
 def _whole(parts: Parts | None, number: int) -> tuple[int, int]:
     """(shape, part) of a primitive's owner."""
@@ -225,8 +252,8 @@ def _in_scene(instances: Instances | None, i: int, shape: int) -> tuple[int, int
 
 
 @kernel
-def colour(geometry: Geometry, hit: Hit, without: Vec3) -> Vec3:
+def colour(shapes: Shapes, hit: Hit, without: Vec3) -> Vec3:
     """The colour that a mesh brings for its vertices, interpolated; `without` one, that."""
     if hit.kind == TRIANGLE:
-        return triangle.colour(geometry.shapes.triangles, hit, without)
+        return triangle.colour(shapes.triangles, hit, without)
     return without

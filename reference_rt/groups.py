@@ -9,8 +9,9 @@ from reference_rt.shapes.placement import (
     world_covector,
     world_error,
     world_point,
+    world_vector,
 )
-from reference_rt.shapes.shape import FloatArray, IntArray, Shape
+from reference_rt.shapes.shape import FloatArray, IntArray, Shape, Tangents
 from reference_rt.vec3 import length, normalize
 
 
@@ -63,4 +64,16 @@ def out_of(instances: Instances | None, i: int, point: SurfacePoint) -> SurfaceP
         error,
         point.material,
         point.light,
+    )
+
+
+@kernel
+def tangents_out_of(instances: Instances | None, i: int, tangents: Tangents) -> Tangents:
+    """Tangents to a group's surface, in the world; as they are for i = -1."""
+    if instances is None:
+        return tangents
+    if i < 0:
+        return tangents
+    return Tangents(
+        world_vector(instances, i, tangents.dpdu), world_vector(instances, i, tangents.dpdv)
     )

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.errors import ImageError, UsageError
+from reference_rt.errors import UsageError
+from reference_rt.exr import write_exr
 from reference_rt.files import replacing
 from reference_rt.render import Picture
 from reference_rt.shapes.shape import FloatArray
@@ -21,6 +21,9 @@ _CHANNELS: dict[str, tuple[str, ...]] = {
     "normal": ("normal.X", "normal.Y", "normal.Z"),
     "id": ("id.V",),
     "uv": ("uv.U", "uv.V"),
+    "albedo": ("albedo.R", "albedo.G", "albedo.B"),
+    "depth": ("depth.Z",),
+    "variance": ("variance.R", "variance.G", "variance.B"),
 }
 
 
@@ -36,38 +39,17 @@ def write(path: Path, picture: Picture, provenance: Mapping[str, str]) -> None:
     if path.suffix.lower() == ".png":
         write_png(path, display(picture), provenance)
     else:
-        write_exr(path, picture.layers, provenance)
+        write_exr(path, channels(picture.layers), provenance)
 
 
-def write_exr(path: Path, layers: Mapping[str, FloatArray], provenance: Mapping[str, str]) -> None:
-    """Layers (height, width[, channels]) as float32 channels; provenance as text in the header."""
-    import OpenEXR
-
-    channels: dict[str, Any] = {}
-    with np.errstate(over="ignore"):  # beyond float32 is infinity, which stays visible as such
-        for name, layer in layers.items():
-            planes = np.moveaxis(np.atleast_3d(layer), -1, 0).astype(np.float32)
-            for channel, plane in zip(_CHANNELS[name], planes, strict=True):
-                channels[channel] = np.ascontiguousarray(plane)
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with replacing(path) as temporary:
-        try:
-            OpenEXR.File(header | dict(provenance), channels).write(str(temporary))
-        except RuntimeError as error:  # what the library raises for any failure to write
-            raise OSError(None, str(error)) from None
-
-
-def read_exr(path: Path) -> tuple[dict[str, FloatArray], dict[str, Any]]:
-    """Channels (height, width) by name, as float64, and the header.  Raises ImageError."""
-    import OpenEXR
-
-    try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            header = dict(file.header())
-            channels = {n: np.array(c.pixels, np.float64) for n, c in file.channels().items()}
-    except (RuntimeError, OSError, TypeError) as error:
-        raise ImageError(f"{path}: cannot be read as EXR: {error}") from None
-    return channels, header
+def channels(layers: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The layers (height, width[, channels]) of a picture as planes (height, width) by the names
+    that they have in .exr files."""
+    planes = {}
+    for name, layer in layers.items():
+        for k, channel in enumerate(_CHANNELS[name]):
+            planes[channel] = np.atleast_3d(layer)[..., k]
+    return planes
 
 
 def write_png(path: Path, image: FloatArray, provenance: Mapping[str, str]) -> None:

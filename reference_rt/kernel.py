@@ -1,4 +1,4 @@
-"""`@kernel`, `@large_kernel`, `@entry_kernel`: the one way to compile; `ByClass` for choice.
+"""`@kernel`, `@entry_kernel`: the one way to compile; `ByClass` for choice.
 
 Compiled code is kept on disk in an exact cache.
 
@@ -87,13 +87,6 @@ def kernel(function: F) -> F:
     """
     inlined: F = register_jitable(**_INSIDE, forceinline=True)(function)
     return inlined
-
-
-def large_kernel(function: F) -> F:
-    """As `kernel`, but compiled once for all of its callers: for what is large and called seldom
-    enough that passing the tables to it does not count."""
-    called: F = register_jitable(**_INSIDE)(function)
-    return called
 
 
 def entry_kernel(function: F) -> F:

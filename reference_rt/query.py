@@ -15,12 +15,14 @@ from reference_rt.geometry import closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
-from reference_rt.kernel import entry_kernel
+from reference_rt.kernel import entry_kernel, local_floats
+from reference_rt.materials import layer_floats
 from reference_rt.ray import Ray
 from reference_rt.sampling.grid import GridSample
+from reference_rt.shading import shade
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3, frame_from_normal, row, to_local
+from reference_rt.vec3 import Vec3, row
 
 
 @dataclass(frozen=True)
@@ -91,15 +93,13 @@ def _occluded(
 def _direct(
     scene: SceneTables, o: FloatArray, d: FloatArray, k: int, u: float, v: float, out: FloatArray
 ) -> None:
+    layers = local_floats(layer_floats(scene.materials))
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
             continue
-        point = surface(scene.geometry, ray, hit)
-        frame = frame_from_normal(point.ns)
-        wo = to_local(frame, -ray.d)
-        found = direct(scene, point, frame, wo, k, u, v)
+        found = direct(scene, shade(scene, ray, hit, layers), k, u, v)
         out[i, 0], out[i, 1], out[i, 2] = found.light.target
         out[i, 3] = found.light.pdf
         out[i, 4], out[i, 5], out[i, 6] = found.contribution
@@ -167,6 +167,9 @@ def direct_light(
 ) -> DirectLight:
     """Light from entry `light` of `scene.lights.choice`, at its point that `u` picks."""
     o, d = _rays(origins, directions)
+    choice = scene.lights.choice
+    if choice is None or choice.probability[light] == 0.0:
+        raise ValueError(f"light {light} cannot be sampled; expected one that can be picked")
     out = np.zeros((len(o), 7))
     with np.errstate(all="ignore"):
         _direct(scene, o, d, light, u[0], u[1], out)

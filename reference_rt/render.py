@@ -6,21 +6,16 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference_rt import sampling
-from reference_rt.cameras import LENS_CENTRE, camera_ray, lens_sample
-from reference_rt.film import film_offset
-from reference_rt.integrators import RayCast, radiance
-from reference_rt.integrators.ray_cast import cast
-from reference_rt.kernel import entry_kernel, precompile
-from reference_rt.sampling import draw_pair, start_sample
+from reference_rt.bands import cast_band, first_hits_band, render_band
+from reference_rt.integrators import RayCast
+from reference_rt.kernel import precompile
 from reference_rt.scene import Scene
-from reference_rt.shapes.shape import FloatArray
-from reference_rt.tables import SceneTables, build_tables, colours
-from reference_rt.vec3 import row
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.tables import SceneTables, build_tables
 
 SAMPLES_PER_BAND = 1 << 15
 """A band takes some 20 ms: short enough for progress and Ctrl-C, long against the 0.1 ms that
@@ -34,11 +29,12 @@ Progress = Callable[[str, float], None]
 class Picture:
     """A rendered scene.
 
-    layers: (height, width, 3) float64 linear radiance as "colour", or for ray casting all of
-    colour (height, width, 3), distance (height, width), normal (height, width, 3), id (height,
-    width) and uv (height, width, 2);  shown: the layer that is the picture;  seconds: wall clock of
-    "tables" (files, arrays, hierarchy), "compile" (or loading what was compiled before) and
-    "render".
+    layers: (height, width, 3) float64 linear radiance as "colour", and what `Film.layers` asks for:
+    albedo, normal and variance (height, width, 3), depth and id (height, width); or for ray casting
+    all of colour (height, width, 3), distance (height, width), normal (height, width, 3), id
+    (height, width) and uv (height, width, 2);  shown: the layer that is the picture;  seconds: wall
+    clock of "tables" (files, arrays, hierarchy), "compile" (or loading what was compiled before)
+    and "render".
     """
 
     layers: dict[str, FloatArray]
@@ -51,70 +47,28 @@ class Picture:
         return self.layers["colour"]
 
     @property
+    def nonfinite_pixels(self) -> IntArray:
+        """(n, 2) column and row, along rows, of the pixels with a NaN, or with more than float32,
+        which files hold, can; in all layers but the depth, which is inf for a miss."""
+        most = np.finfo(np.float32).max
+        bad = np.zeros(self.colour.shape[:2], np.bool_)
+        for name, layer in self.layers.items():
+            if name not in ("depth", "distance"):
+                bad |= ~(np.abs(layer.reshape(*bad.shape, -1)) <= most).all(axis=-1)
+        return np.argwhere(bad)[:, ::-1]
+
+    @property
     def nonfinite(self) -> int:
-        """Pixels of the colour with a NaN, or with more than float32, which files hold, can."""
-        held = np.abs(self.colour) <= np.finfo(np.float32).max
-        return int(np.count_nonzero(~held.all(axis=-1)))
+        """The number of `nonfinite_pixels`."""
+        return len(self.nonfinite_pixels)
 
 
-@entry_kernel
-def _render_band(
-    integrator: Any,
-    scene: SceneTables,
-    view: Any,
-    film_filter: Any,
-    sampler_setup: Any,
-    shape: tuple[int, int],
-    spp: int,
-    out: FloatArray,
-    begin: int,
-    end: int,
-    first: int,
-    last: int,
-) -> None:
-    """Samples first..last of the pixels begin..end, counted along rows, added to out (n, 3); with
-    the last of all `spp` samples the sum becomes the mean."""
-    width, height = shape
-    for pixel in range(begin, end):
-        y, x = pixel // width, pixel % width
-        total = row(out, pixel)
-        for sample in range(first, last):
-            sampler = start_sample(sampler_setup, pixel, sample)
-            u0, u1 = draw_pair(sampler, sampling.FILM)
-            dx, weight_x = film_offset(film_filter, u0)
-            dy, weight_y = film_offset(film_filter, u1)
-            lens = lens_sample(view, sampler)
-            ray = camera_ray(view, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
-            arriving = radiance(integrator, scene, ray, sampler)
-            total = total + arriving * (weight_x * weight_y)
-        if last == spp:
-            total = total / spp
-        out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
+class _Job(NamedTuple):
+    """A kernel of `bands`, its arguments but for the last four, and its samples per pixel."""
 
-
-@entry_kernel
-def _cast_band(
-    scene: SceneTables,
-    material_colours: FloatArray,
-    view: Any,
-    shape: tuple[int, int],
-    out: FloatArray,
-    begin: int,
-    end: int,
-    first: int,
-    last: int,
-) -> None:
-    """All layers at the centres of the pixels begin..end, into out (n, 10);
-    `first` and `last`, which samples, are there for the likeness to `_render_band`."""
-    width, height = shape
-    for pixel in range(begin, end):
-        y, x = pixel // width, pixel % width
-        ray = camera_ray(view, (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
-        found = cast(scene, material_colours, ray)
-        out[pixel, 0], out[pixel, 1], out[pixel, 2] = found.colour
-        out[pixel, 3] = found.distance
-        out[pixel, 4], out[pixel, 5], out[pixel, 6] = found.n
-        out[pixel, 7], out[pixel, 8], out[pixel, 9] = found.id, found.u, found.v
+    band: Any
+    arguments: tuple[Any, ...]
+    spp: int
 
 
 def render(
@@ -130,37 +84,39 @@ def render(
     spares building them again.  Ctrl-C stops within a band.  Raises SceneError.
     """
     say = progress or (lambda what, fraction: None)
-    _check_memory(scene)
+    _check(scene)
     clock = [time.perf_counter()]
     tables = build_tables(scene) if tables is None else tables
     clock.append(time.perf_counter())
-    film, integrator = scene.film, scene.integrator
-    view = scene.camera.setup(film.width, film.height)
-    shape = (film.width, film.height)
-    pixels = film.width * film.height
-    band: Any
-    arguments: tuple[Any, ...]
+    integrator = scene.integrator
     if isinstance(integrator, RayCast):
-        out, spp = np.zeros((pixels, 10)), 1
-        band, arguments = _cast_band, (tables, colours(scene), view, shape, out)
+        shown, (jobs, layers) = integrator.show, _cast_jobs(scene, tables)
     else:
-        sampler = scene.resolved_sampler
-        out, spp = np.zeros((pixels, 3)), sampler.spp
-        setups = (integrator.setup(), tables, view, film.filter.setup(), sampler.setup())
-        band, arguments = _render_band, (*setups, shape, spp, out)
+        shown, (jobs, layers) = "colour", _render_jobs(scene, integrator.setup(), tables)
     say("compile", 0.0)
-    precompile(band, *arguments, 0, 0, 0, 0)
+    for job in jobs:
+        precompile(job.band, *job.arguments, 0, 0, 0, 0)
     say("compile", 1.0)
     clock.append(time.perf_counter())
-    _run_bands(band, arguments, pixels, spp, threads or os.cpu_count() or 1, say)
+    pixels = scene.film.width * scene.film.height
+    threads = threads or os.cpu_count() or 1
+    for k, job in enumerate(jobs):
+
+        def say_part(what: str, fraction: float, k: int = k) -> None:
+            say(what, (k + fraction) / len(jobs))
+
+        _run_bands(job.band, job.arguments, pixels, job.spp, threads, say_part)
     clock.append(time.perf_counter())
     seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
-    return _picture(integrator, out.reshape(film.height, film.width, -1), seconds)
+    return Picture(layers, shown, seconds)
 
 
-def _picture(integrator: Any, out: FloatArray, seconds: dict[str, float]) -> Picture:
-    if not isinstance(integrator, RayCast):
-        return Picture({"colour": out}, "colour", seconds)
+def _cast_jobs(scene: Scene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:
+    """What fills the layers of ray casting, and these layers."""
+    film = scene.film
+    out = np.zeros((film.height, film.width, 10))
+    view = scene.camera.setup(film.width, film.height)
+    job = _Job(cast_band, (tables, view, (film.width, film.height), out.reshape(-1, 10)), 1)
     layers = {
         "colour": out[..., 0:3],
         "distance": out[..., 3],
@@ -168,14 +124,45 @@ def _picture(integrator: Any, out: FloatArray, seconds: dict[str, float]) -> Pic
         "id": out[..., 7],
         "uv": out[..., 8:10],
     }
-    return Picture(layers, integrator.show, seconds)
+    return [job], layers
 
 
-def _check_memory(scene: Scene) -> None:
-    """Refuse a picture that cannot fit, before anything is allocated."""
+def _render_jobs(
+    scene: Scene, integrator: Any, tables: SceneTables
+) -> tuple[list[_Job], dict[str, FloatArray]]:
+    """What fills the picture and the layers that the film asks for, and these."""
+    film, sampler = scene.film, scene.resolved_sampler
+    shape, spp = (film.width, film.height), sampler.spp
+    out = np.zeros((film.height, film.width, 3))
+    spread = np.zeros_like(out) if "variance" in film.layers else None
+    rows = None if spread is None else spread.reshape(-1, 3)
+    view = scene.camera.setup(*shape)
+    setups = (tables, view, film.filter.setup(), sampler.setup(), shape, spp)
+    arguments = (integrator, *setups, out.reshape(-1, 3), rows)
+    jobs, layers = [_Job(render_band, arguments, spp)], {"colour": out}
+    if spread is not None:
+        layers["variance"] = spread
+    if {"albedo", "normal"} & set(film.layers):
+        layers |= {"albedo": np.zeros_like(out), "normal": np.zeros_like(out)}
+        hits = [layers[name].reshape(-1, 3) for name in ("albedo", "normal")]
+        jobs.append(_Job(first_hits_band, (*setups, *hits), spp))
+    if {"depth", "id"} & set(film.layers):
+        centres, cast = _cast_jobs(scene, tables)
+        jobs += centres
+        layers |= {"depth": cast["distance"], "id": cast["id"]}
+    return jobs, {name: layers[name] for name in ("colour", *film.layers)}
+
+
+def _check(scene: Scene) -> None:
+    """Refuse a picture that cannot fit, before anything is allocated, or cannot be estimated."""
     film = scene.film
-    # 3 or 10 channels of float64, and as much again while files are written.
-    needed = film.width * film.height * 10 * 2 * 8
+    casts = isinstance(scene.integrator, RayCast)
+    if "variance" in film.layers and scene.resolved_sampler.spp < 2 and not casts:
+        raise scene.error(
+            "one sample per pixel has no variance; expected at least 2", "film", "layers"
+        )
+    # At most 10 channels of float64, 22 with layers, and as much again while files are written.
+    needed = film.width * film.height * (22 if film.layers else 10) * 2 * 8
     try:
         available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):  # not every system tells

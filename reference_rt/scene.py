@@ -24,10 +24,12 @@ from reference_rt.film import Film
 from reference_rt.groups import Instance
 from reference_rt.integrators import AnyIntegrator
 from reference_rt.integrators import Path as PathTracing
-from reference_rt.lights import AnyLight, Constant
-from reference_rt.materials import AnyMaterial, Emissive
+from reference_rt.lights import AnyLight, Constant, EnvironmentMap
+from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
+from reference_rt.materials.layers import ways
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.shapes import Shape
+from reference_rt.textures import AnyTexture, texture_names
 
 if TYPE_CHECKING:
     from reference_rt.query import Intersections
@@ -44,6 +46,8 @@ class Scene(Description):
     sampler: AnySampler | None = None
     """Where samples lie; none: Sobol' points for path tracing, pixel centres otherwise."""
     integrator: AnyIntegrator = PathTracing()
+    textures: dict[str, AnyTexture] = Field(default_factory=dict)
+    """Textures by name, which parameters of materials take."""
     materials: dict[str, AnyMaterial] = Field(default_factory=dict)
     """Materials by name."""
     shapes: tuple[AnyShape, ...] = Field(default=(), strict=False)
@@ -69,14 +73,14 @@ class Scene(Description):
             for k, shape in enumerate(shapes):
                 self._check_shape(shape, "groups", name, k)
         for name, material in self.materials.items():
-            if isinstance(material, Emissive) and material.base is not None:
-                self._check_material(material.base, "materials", name, "base")
-                if isinstance(self.materials[material.base], Emissive):
-                    raise SceneError(
-                        f"'{material.base}' is emissive itself; expected what it scatters like",
-                        ("materials", name, "base"),
-                    )
-        if sum(isinstance(light, Constant) for light in self.lights) > 1:
+            self._check_parts(name, material)
+        for name, material in self.materials.items():
+            if isinstance(material, Wrapper):
+                try:
+                    ways(name, self.materials)
+                except ValueError as error:
+                    raise SceneError(str(error), ("materials", name)) from None
+        if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
             raise SceneError("more than one environment; expected at most one", ("lights",))
         if isinstance(self.sampler, Grid) and not self.integrator.deterministic:
             raise SceneError(
@@ -85,6 +89,29 @@ class Scene(Description):
                 ("sampler", "type"),
             )
         return self
+
+    def _check_parts(self, name: str, material: Material) -> None:
+        """Whether the textures and materials that a material names are there and fit."""
+        for field, texture in texture_names(material).items():
+            if texture not in self.textures:
+                known = ", ".join(f"'{t}'" for t in self.textures) or "none"
+                raise SceneError(
+                    f"there is no texture '{texture}'; expected one of: {known}",
+                    ("materials", name, field),
+                )
+        bases: tuple[str, ...] = ()
+        if isinstance(material, Emissive):
+            bases = ("base",)
+        elif isinstance(material, Wrapper):
+            bases = material.bases
+        for field in bases:
+            base = getattr(material, field)
+            self._check_material(base, "materials", name, field)
+            if base is not None and isinstance(self.materials[base], Emissive):
+                raise SceneError(
+                    f"'{base}' is emissive itself; expected what it scatters like",
+                    ("materials", name, field),
+                )
 
     def _check_shape(self, shape: Shape, *path: str | int) -> None:
         self._check_material(shape.material, *path, "material")

@@ -123,6 +123,12 @@ def max_component(a: Vec3) -> float:
 
 
 @kernel
+def luminance(a: Vec3) -> float:
+    """Of a linear sRGB colour (IEC 61966-2-1: its Y)."""
+    return 0.2126 * a.x + 0.7152 * a.y + 0.0722 * a.z
+
+
+@kernel
 def is_black(a: Vec3) -> bool:
     return a.x == 0.0 and a.y == 0.0 and a.z == 0.0
 

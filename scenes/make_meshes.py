@@ -92,10 +92,36 @@ def ply(vertices: Array, uv: Array, colours: Array, faces: Array) -> str:
     return "\n".join(lines).replace("-0.000000", "0.000000") + "\n"
 
 
+def lanterns(n: int) -> tuple[Array, Array, Array, Array]:
+    """n small octahedra strewn over a square of 8 x 8, between heights 0.2 and 1.2, each of a
+    colour of its own.
+
+    Returns vertices (6 n, 3), uv (6 n, 2), 8-bit colours (6 n, 3) and triangles (8 n, 3),
+    counter-clockwise seen from outside.
+    """
+    rng = np.random.default_rng(1980)
+    center = rng.uniform([-4.0, 0.2, -4.0], [4.0, 1.2, 4.0], (n, 3))
+    size = rng.uniform(0.04, 0.09, (n, 1, 1))
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    vertices = (center[:, None] + size * axes).reshape(-1, 3)
+    hue = rng.uniform(0.0, 1.0, n)[:, None] + np.array([0.0, 1.0 / 3.0, 2.0 / 3.0])
+    colours = np.round(255.0 * (0.55 + 0.45 * np.cos(2.0 * math.pi * hue)))
+    corners = [
+        (a, b, c) if signs % 2 == 0 else (a, c, b)
+        for x in (0, 3)
+        for y in (1, 4)
+        for z in (2, 5)
+        for a, b, c, signs in [(x, y, z, (x == 3) + (y == 4) + (z == 5))]
+    ]
+    faces = (6 * np.arange(n)[:, None, None] + np.array(corners)).reshape(-1, 3)
+    return vertices, np.zeros((6 * n, 2)), np.repeat(colours, 6, axis=0), faces
+
+
 def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     (FOLDER / "knot.obj").write_text(obj(*torus_knot(2, 3, around=24, along=440, tube=0.22)))
     (FOLDER / "petal.ply").write_text(ply(*petal(24)))
+    (FOLDER / "lanterns.ply").write_text(ply(*lanterns(313)))
 
 
 if __name__ == "__main__":

@@ -5,9 +5,10 @@ The classes derive from classes of a variant, so they are made and registered af
 
 from typing import Any
 
-from comparisons.mitsuba_plugins import whitted
+from comparisons.mitsuba_plugins import exact_beckmann, exact_coat, mixtures, phong, whitted
 
 
 def register(mi: Any) -> None:
     """Make the plugins of this folder known to `mi.load_dict`, for the variant that is set."""
-    whitted.register(mi)
+    for plugin in (exact_beckmann, exact_coat, mixtures, phong, whitted):
+        plugin.register(mi)

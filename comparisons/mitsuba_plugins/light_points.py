@@ -6,6 +6,7 @@ shapes, in float64.
 """
 
 import math
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,12 +84,12 @@ class BoxPoint(NamedTuple):
 LightPoint = FixedPoint | BoxPoint | SphereLight
 
 
-def light_points(mi: Any, scene: Any) -> list[LightPoint]:
-    """The points of all area lights of a scene."""
+def light_points(mi: Any, scene: Any, unlit: Collection[str] = ()) -> list[LightPoint]:
+    """The points of all area lights of a scene, but for shapes whose id is among `unlit`."""
     found: list[LightPoint] = []
     for emitter in scene.emitters():
         shape = emitter.get_shape()
-        if shape is not None:
+        if shape is not None and shape.id() not in unlit:
             found += _points_of(mi, shape)
     return found
 

@@ -1,12 +1,13 @@
-"""The deterministic rungs of the ladder: geometry, direct light, the Whitted tree.
+"""The deterministic rungs: the film's filter; geometry, direct light, the Whitted tree.
 
-Each takes the scene, our tables of it and Mitsuba's scene, and returns a `Tier`.  `differ` means a
+Each but the first takes the scene, our tables of it and Mitsuba's scene.  `differ` means a
 difference that float32 and Mitsuba's own epsilons do not explain; every ray that differs is first
 put to our float64 tracer as the arbiter (`comparisons.tiers.arbiter`).
 """
 
 from comparisons.tiers.direct import direct
+from comparisons.tiers.film import film
 from comparisons.tiers.geometry import geometry
 from comparisons.tiers.whitted import whitted
 
-__all__ = ["direct", "geometry", "whitted"]
+__all__ = ["direct", "film", "geometry", "whitted"]

@@ -1,9 +1,11 @@
 """The second rung: direct light, one light at a time."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.accuracy import accuracy
 from comparisons.answers import rows_of
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_plugins.whitted import emitted, without
@@ -12,9 +14,21 @@ from comparisons.results import Tier
 from comparisons.tiers import arbiter
 from comparisons.tiers.bounds import UNIT_ROUNDOFF, ShapeSizes, delta, largest, slide
 from comparisons.tiers.rays import RAY_EPSILON, SHADOW_EPSILON, Rays, mixed_rays
+from comparisons.tiers.slopes import is_steep, moved, slopes
 from comparisons.twin import Twin
 from reference_rt import query
-from reference_rt.lights import CONSTANT, POINT, Point
+from reference_rt.lights import (
+    AREA,
+    DIRECTIONAL,
+    ENVIRONMENT,
+    POINT,
+    SPOT,
+    Directional,
+    EnvironmentMap,
+    Point,
+    Spot,
+)
+from reference_rt.materials import SMOOTH, Emissive
 from reference_rt.query import DirectLight, Intersections
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -28,6 +42,18 @@ LIGHTS = 8
 
 POINTS = ((0.5, 0.4), (0.13, 0.71), (0.83, 0.22), (0.37, 0.93))
 """(u, v) that pick a point on a light: none on the edge of a face of any shape."""
+
+
+POINT_LIKE: dict[int, type] = {POINT: Point, SPOT: Spot, DIRECTIONAL: Directional}
+"""What Mitsuba's emitters tell of themselves, by kind: these have one direction."""
+
+FAINTEST = 1e-12
+"""Of the brightest hit of a light: float32 ends, and Mitsuba's microfacets where fewer than 1e-20
+of them face a direction, long after that."""
+
+U_STEP = 2.0**-20
+"""How far points on lights with textures are moved, in their own coordinates: what float32 does to
+a light ten times as far away as it is large."""
 
 
 class Setting(NamedTuple):
@@ -65,17 +91,18 @@ def direct(
         return Tier("direct", "not-applicable", "the scene has no light")
     if twin.lacking:
         return Tier("direct", "not-comparable", twin.lacking)
-    if tables.materials.diffuses is None:
+    if not (tables.materials.traits & SMOOTH).any():
         return Tier("direct", "not-applicable", "no material scatters light that a light sends")
     sizes = ShapeSizes(scene)
     rays = mixed_rays(scene, tables, sizes, pixels, seed)
     hits = query.intersect(tables, rays.o, rays.d)
     setting = Setting(scene, tables, twin, rays, hits, sizes)
-    count = len(choice.kind)
-    tested = np.unique(np.linspace(0, count - 1, min(count, LIGHTS)).round().astype(int))
+    lights = np.flatnonzero(choice.probability > 0.0)
+    count = len(lights)
+    tested = lights[np.unique(np.linspace(0, count - 1, min(count, LIGHTS)).round().astype(int))]
     outcomes: dict[tuple[int, tuple[float, float]], Outcome] = {}
     for light in tested.tolist():
-        points = POINTS[:1] if choice.kind[light] == POINT else POINTS
+        points = POINTS[:1] if choice.kind[light] in POINT_LIKE else POINTS
         for u in points:
             outcomes[light, u] = _compare(setting, light, u)
     total = sum(o.rays for o in outcomes.values())
@@ -117,15 +144,16 @@ def _compare(setting: Setting, light: int, u: tuple[float, float]) -> Outcome:
     value = ours.contribution[known]
     theirs, their_cosine = _mitsuba_direct(setting, light, rays, target)
     bound = _bounds(setting, light, rays, hits, target, (value, theirs, their_cosine))
+    bound += _slopes(setting, light, u, rays, hits, value)
     error = np.abs(theirs - value).max(axis=1)
     wrong = np.flatnonzero(~(error <= bound))
 
     def like_theirs(numbers: IntArray, offsets: FloatArray) -> arbiter.BoolArray:
-        moved = query.direct_light(
+        there = query.direct_light(
             tables, rays.o[numbers] + offsets, rays.d[numbers], light, u
         ).contribution
         # The move itself shifts the value by as much as the bound: twice is allowed.
-        apart = np.abs(moved - theirs[numbers]).max(axis=1)
+        apart = np.abs(there - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
         lit_differs = value[numbers].any(axis=1) == dark
         now_dark = _dark(setting, light, rows_of(hits, numbers), target[numbers], offsets)
@@ -177,7 +205,8 @@ def _bounds(
     value, theirs, their_cosine = values
     sag, of_normal = _stand_ins(setting, hits)
     e = slide(setting.sizes, rays.o, rays.d, hits, sag)
-    if _kind(setting, light) == CONSTANT:
+    kind = _kind(setting, light)
+    if kind in (ENVIRONMENT, DIRECTIONAL):
         w, distance = target, np.full(len(target), np.inf)
     else:
         w = target - hits.p
@@ -188,7 +217,66 @@ def _bounds(
         theirs_full = np.where(their_cosine > 0.0, theirs.max(axis=1) / their_cosine, 0.0)
     turn = 2.0 * e / setting.sizes.feature_of(hits) + of_normal
     relative = turn + 4.0 * e / distance + 16.0 * UNIT_ROUNDOFF
-    return np.asarray(np.maximum(ours_full, theirs_full) * relative)
+    relative += _tables_of(setting, hits)
+    bound = np.maximum(ours_full, theirs_full) * relative + FAINTEST * value.max(initial=0.0)
+    if kind == SPOT:
+        bound += value.max(initial=0.0) * _rim(setting, light)
+    return np.asarray(bound)
+
+
+def _tables_of(setting: Setting, hits: Intersections) -> FloatArray:
+    """(n,): how far tables of materials are off, see `comparisons.accuracy`."""
+    scene = setting.scene
+    leaf = setting.sizes.leaf_of(hits)
+    names = [of.material for of in setting.sizes.leaves]
+    by_leaf = np.array([accuracy(scene, name) for name in names] + [0.0])
+    return np.asarray(by_leaf[leaf])
+
+
+def _rim(setting: Setting, light: int) -> float:
+    """How far Mitsuba's falloff of a spot is off: it has the angle from the cosine, whose rounding
+    turns the angle by 4 u over its sine, and divides by the width of the rim."""
+    spot = _described(setting, light)
+    assert isinstance(spot, Spot)
+    beam = 0.75 * spot.cutoff_angle if spot.beam_width is None else spot.beam_width
+    width, sine = np.radians(spot.cutoff_angle - beam), np.sin(np.radians(max(beam, 1.0)))
+    if not (width > 0.0 and sine > 0.0):
+        return 0.0
+    return float(4.0 * UNIT_ROUNDOFF / (sine * width))
+
+
+def _slopes(
+    setting: Setting,
+    light: int,
+    u: tuple[float, float],
+    rays: Rays,
+    hits: Intersections,
+    value: FloatArray,
+) -> FloatArray:
+    """(n,): how far float32's bound moves what highlights and textures send, by asking ours along
+    moved rays, and for moved points of lights with textures."""
+    asked: list[tuple[Rays, tuple[float, float]]] = []
+    if is_steep(setting.scene):
+        radius = delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
+        asked += [(other, u) for other in moved(rays, radius)]
+    if _has_image(setting, light):
+        for step in (-U_STEP, U_STEP):
+            asked += [(rays, (u[0] + step, u[1])), (rays, (u[0], u[1] + step))]
+
+    def value_of(other: Rays, at: tuple[float, float]) -> Callable[[], FloatArray]:
+        return lambda: query.direct_light(setting.tables, other.o, other.d, light, at).contribution
+
+    others = [value_of(*one) for one in asked]
+    return slopes(value, others, float(value.max(initial=0.0)))
+
+
+def _has_image(setting: Setting, light: int) -> bool:
+    """Whether what a light sends depends on where it is seen by a texture."""
+    kind, scene = _kind(setting, light), setting.scene
+    if kind == ENVIRONMENT:
+        return any(isinstance(described, EnvironmentMap) for described in scene.lights)
+    emissive = (m for m in scene.materials.values() if isinstance(m, Emissive))
+    return kind == AREA and any(isinstance(m.radiance, str) for m in emissive)
 
 
 def _stand_ins(setting: Setting, hits: Intersections) -> tuple[FloatArray, FloatArray]:
@@ -214,15 +302,16 @@ def _mitsuba_direct(
     import drjit as dr
 
     mi, scene, kind = mitsuba(), setting.twin.mi_scene, _kind(setting, light)
-    emitter = _point_emitter(setting, light) if kind == POINT else None
+    emitter = _point_emitter(setting, light) if kind in POINT_LIKE else None
+    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
 
     def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
         si = scene.ray_intersect(mi.Ray3f(mi.Point3f(o), d))
         active = si.is_valid()
         if not dr.any(active):
             return mi.Color3f(0.0), mi.Float(0.0)
-        wi = at if kind == CONSTANT else dr.normalize(at - si.p)
-        ray = si.spawn_ray(wi) if kind == CONSTANT else si.spawn_ray_to(mi.Point3f(at))
+        wi = at if is_far else dr.normalize(at - si.p)
+        ray = si.spawn_ray(wi) if is_far else si.spawn_ray_to(mi.Point3f(at))
         visible = without(active, scene.ray_test(ray, active))
         if emitter is not None:
             sample, radiance = emitter.sample_direction(si, mi.Point2f(0.5, 0.5), active)
@@ -240,16 +329,26 @@ def _mitsuba_direct(
     return contribution, cosine
 
 
-def _point_emitter(setting: Setting, light: int) -> Any:
-    """Mitsuba's emitter of a point light: rows of our table count the scene's point lights."""
+def _described(setting: Setting, light: int) -> Any:
+    """The description of a light that is a point or a direction."""
+    return setting.scene.lights[_number(setting, light)]
+
+
+def _number(setting: Setting, light: int) -> int:
+    """Its place in the scene's lights: rows of our tables count those of its kind."""
     choice = setting.tables.lights.choice
     row = 0 if choice is None else int(choice.row[light])
-    lights = setting.scene.lights
-    index = [i for i, described in enumerate(lights) if isinstance(described, Point)][row]
+    described = POINT_LIKE[_kind(setting, light)]
+    return [i for i, x in enumerate(setting.scene.lights) if isinstance(x, described)][row]
+
+
+def _point_emitter(setting: Setting, light: int) -> Any:
+    """Mitsuba's emitter of such a light."""
+    wanted = light_id(_number(setting, light))
     for emitter in setting.twin.mi_scene.emitters():
-        if emitter.id() == light_id(index):
+        if emitter.id() == wanted:
             return emitter
-    raise LookupError(f"Mitsuba's scene has no emitter {light_id(index)}")
+    raise LookupError(f"Mitsuba's scene has no emitter {wanted}")
 
 
 def _dark(
@@ -257,13 +356,14 @@ def _dark(
 ) -> arbiter.BoolArray:
     """Whether ours finds Mitsuba's shadow ray dark: begun and ended as Mitsuba does it."""
     kind = _kind(setting, light)
-    w = target if kind == CONSTANT else target - hits.p
+    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+    w = target if is_far else target - hits.p
     side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
     height = side * (1.0 + largest(hits.p)) * RAY_EPSILON
     o = hits.p + hits.n * height[:, None] + offsets
-    if kind == CONSTANT:
+    if is_far:
         return query.occluded(setting.tables, o, w)
-    if kind == POINT:
+    if kind in POINT_LIKE:
         return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)
     # Seen from the moved origin a light may turn its back, or its rim be missed.
     met = query.intersect(setting.tables, o, target - o)

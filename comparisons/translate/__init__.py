@@ -12,15 +12,16 @@ import numpy as np
 from comparisons.layout import Copy, Leaf, copies_of, place_of
 from comparisons.mitsuba_backend import mitsuba, scalar
 from comparisons.mitsuba_scene import light_id, shape_id
-from comparisons.pieces import Piece, Plugin
+from comparisons.pieces import Piece, Plugin, same_uv
 from comparisons.solids import Operand, SolidTwin
 from comparisons.translate.cameras import translate_camera
 from comparisons.translate.errors import UntranslatableError
 from comparisons.translate.film import translate_film, translate_sampler
 from comparisons.translate.integrators import translate_integrator
 from comparisons.translate.lights import translate_light
-from comparisons.translate.materials import parts_of
 from comparisons.translate.shapes import Site, translate_shape
+from comparisons.translate.textures import Surroundings
+from comparisons.translate.wrappers import coloured_parts_of, is_textured, parts_of
 from comparisons.twin import Crowd, Twin
 from reference_rt.scene import Scene
 
@@ -93,14 +94,18 @@ def _translated(scene: Scene) -> _Translated:
     copies = copies_of(scene)
     count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
     shared: dict[Any, Any] = {}
+    around = Surroundings.of(scene)
     reach = _reach(scene, copies)
     for copy in copies:
         try:
-            _add(result, scene, copy, count[copy.group] if copy.group else 1, shared, reach)
+            of_group = count[copy.group] if copy.group else 1
+            _add(result, scene, copy, of_group, shared, around, reach)
         except ValueError as error:
             raise scene.error(str(error), "shapes", copy.shape) from None
     for i, light in enumerate(scene.lights):
-        plain[light_id(i)] = translate_light(light)
+        emitter = translate_light(light, around)
+        if emitter is not None:
+            plain[light_id(i)] = emitter
     return result
 
 
@@ -120,6 +125,7 @@ def _add(
     copy: Copy,
     count: int,
     shared: dict[Any, Any],
+    around: Surroundings,
     reach: float,
 ) -> None:
     """Puts the shapes of one copy, of `count` of its group, into what is translated."""
@@ -130,10 +136,23 @@ def _add(
             name += f"_{copy.instance}_{number}"
         operands = []
         for leaf in member.leaves:
-            parts = parts_of(leaf.material, scene.materials)
             place = place_of(scene, leaf, copy.outer)
-            site = Site(place, mirrored, parts, leaf.material, count, shared, reach)
+            parts = parts_of(leaf.material, around)
+            site = Site(
+                place=place,
+                mirrored=mirrored,
+                parts=parts,
+                coloured=coloured_parts_of(leaf.material, around) or parts,
+                textured=is_textured(leaf.material, around),
+                material=leaf.material,
+                copies=count,
+                shared=shared,
+                reach=reach,
+            )
             plugins = translate_shape(leaf.shape, site)
+            if site.textured and any(plugin.uv is not same_uv for plugin in plugins):
+                kind = type(leaf.shape).__name__
+                raise UntranslatableError(f"{kind} under a texture, with other uv,", "shape")
             if member.tree is None:
                 values, pieces = _named(plugins, name, copy, leaf)
                 result.plain.update(values)

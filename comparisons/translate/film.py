@@ -4,7 +4,15 @@ from functools import singledispatch
 from typing import Any
 
 from comparisons.translate.errors import UntranslatableError
-from reference_rt.film import BoxFilter, Film, GaussianFilter, TentFilter
+from reference_rt.film import Film
+from reference_rt.filters import (
+    BoxFilter,
+    CatmullRomFilter,
+    GaussianFilter,
+    LanczosFilter,
+    MitchellFilter,
+    TentFilter,
+)
 from reference_rt.sampling import Grid, Independent, Sobol
 
 
@@ -42,6 +50,21 @@ def _(film_filter: TentFilter) -> dict[str, Any]:
 @translate_filter.register
 def _(film_filter: GaussianFilter) -> dict[str, Any]:
     return {"type": "gaussian", "stddev": film_filter.stddev}
+
+
+@translate_filter.register
+def _(film_filter: MitchellFilter) -> dict[str, Any]:
+    return {"type": "mitchell", "B": film_filter.b, "C": film_filter.c}
+
+
+@translate_filter.register
+def _(film_filter: CatmullRomFilter) -> dict[str, Any]:
+    return {"type": "catmullrom"}
+
+
+@translate_filter.register
+def _(film_filter: LanczosFilter) -> dict[str, Any]:
+    return {"type": "lanczos", "lobes": film_filter.lobes}
 
 
 @singledispatch

@@ -4,7 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 from comparisons.translate.errors import UntranslatableError
-from reference_rt.integrators import Path, RayCast, Whitted
+from reference_rt.integrators import Direct, Path, RayCast, Whitted
 
 
 @singledispatch
@@ -18,6 +18,7 @@ def translate_integrator(integrator: Any) -> dict[str, Any] | None:
 
 @translate_integrator.register
 def _(integrator: Path) -> dict[str, Any]:
+    """Which samples ours takes is no question of what the mean is."""
     return {
         "type": "path",
         "max_depth": -1 if integrator.max_depth is None else integrator.max_depth,
@@ -26,8 +27,17 @@ def _(integrator: Path) -> dict[str, Any]:
 
 
 @translate_integrator.register
+def _(integrator: Direct) -> dict[str, Any]:
+    return {
+        "type": "direct",
+        "emitter_samples": integrator.light_samples,
+        "bsdf_samples": integrator.bsdf_samples,
+    }
+
+
+@translate_integrator.register
 def _(integrator: Whitted) -> dict[str, Any]:
-    """Our plugin: `comparisons.mitsuba_plugins.whitted`."""
+    """Our plugin: `comparisons.mitsuba_plugins.whitted`; its lights are told by the rung."""
     return {
         "type": "whitted",
         "max_depth": integrator.max_depth,
@@ -38,4 +48,3 @@ def _(integrator: Whitted) -> dict[str, Any]:
 @translate_integrator.register
 def _(integrator: RayCast) -> None:
     """Everything that ray casting shows is compared ray by ray: the rung of geometry."""
-    return

@@ -13,7 +13,7 @@ from reference_rt import shapes as any_shape
 from reference_rt.bvh import Bvh
 from reference_rt.csg.mesh_walk import Step, next_crossing, winding
 from reference_rt.csg.tables import AND, NOT, OR, Solids
-from reference_rt.kernel import kernel, large_kernel, local_floats, local_integers
+from reference_rt.kernel import kernel, local_floats, local_integers
 from reference_rt.ray import Hit, Ray, at, surface_error
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -145,7 +145,7 @@ def _width(shapes: Shapes, hit: Hit, ray: Ray) -> float:
     return error / cosine if cosine > 0.0 else math.inf
 
 
-@large_kernel
+@kernel
 def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max: float) -> Hit:
     """The first point of the surface of solid s at t in (0, t_max], as a hit of the operand that it
     belongs to; at inf for none."""
@@ -175,12 +175,11 @@ def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max:
     while best >= 0 and hit.t <= t_max:
         for k in range(count):
             walk.before[k], walk.met[k] = walk.state[k], 0
-        passed, reach = 0, hit.t
+        reach = hit.t
         while best >= 0:
             # The last crossing of each operand is the one that may show.
             t[best], u[best], v[best], row[best] = hit.t, hit.u, hit.v, hit.row
             walk.met[best] = 1
-            passed += 1
             _pass(solids, shapes, bvh, first + best, best, ray, walk)
             previous = hit
             best, hit = _nearest(solids, first, count, walk)

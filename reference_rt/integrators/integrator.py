@@ -7,9 +7,9 @@ from reference_rt import materials as any_material
 from reference_rt.geometry import occluded
 from reference_rt.kernel import kernel
 from reference_rt.lights import LightSample, shadow_ray
-from reference_rt.ray import SurfacePoint
+from reference_rt.materials import Shading
 from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Frame, Vec3, is_black, to_local
+from reference_rt.vec3 import Vec3, is_black, to_local
 
 
 class Direct(NamedTuple):
@@ -21,16 +21,22 @@ class Direct(NamedTuple):
 
 
 @kernel
-def direct(
-    scene: SceneTables, point: SurfacePoint, frame: Frame, wo: Vec3, k: int, u0: float, u1: float
-) -> Direct:
-    """Light k of the scene's choice at a surface; `wo` and the result's `wi` are local."""
-    light = any_light.sample_one(scene.lights, k, scene.geometry.shapes, point.p, u0, u1)
+def direct(scene: SceneTables, shading: Shading, k: int, u0: float, u1: float) -> Direct:
+    """Light k of the scene's choice at a surface; the result's `wi` is local."""
+    shapes, p = scene.geometry.shapes, shading.point.p
+    light = any_light.sample_one(scene.lights, k, shapes, scene.textures, p, u0, u1)
+    return direct_from(scene, shading, light)
+
+
+@kernel
+def direct_from(scene: SceneTables, shading: Shading, light: LightSample) -> Direct:
+    """A light sample at a surface; the result's `wi` is local."""
+    point = shading.point
     black = Vec3(0.0, 0.0, 0.0)
     if light.pdf == 0.0:
         return Direct(light, black, black)
-    wi = to_local(frame, light.wi)
-    f_cos = any_material.evaluate(scene.materials, point.material, wo, wi)
+    wi = to_local(shading.frame, light.wi)
+    f_cos = any_material.evaluate(scene.materials, shading, wi)
     # Most shadow rays to the wrong side of a surface are spared here.
     if is_black(f_cos) or occluded(scene.geometry, shadow_ray(point, light)):
         return Direct(light, wi, black)
@@ -43,3 +49,11 @@ def power_heuristic(pdf: float, other: float) -> float:
     (Veach 1997, eq. 9.13), as a ratio, which cannot overflow."""
     ratio = other / pdf
     return 1.0 / (1.0 + ratio * ratio)
+
+
+@kernel
+def receiver(scene: SceneTables, shading: Shading) -> Vec3:
+    """The normal that lights are picked for: none where light may come from both sides."""
+    if any_material.takes_light_from_behind(scene.materials, shading.point.material):
+        return Vec3(0.0, 0.0, 0.0)
+    return shading.frame.n

@@ -6,9 +6,10 @@ from reference_rt.description import Description
 from reference_rt.geometry import closest_hit, colour, owner, surface
 from reference_rt.kernel import kernel
 from reference_rt.ray import Ray
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.shading import texture_place
 from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3, length, row
+from reference_rt.textures import colour_at
+from reference_rt.vec3 import Vec3, length
 
 LAYERS = ("colour", "distance", "normal", "id", "uv")
 
@@ -36,13 +37,15 @@ class Cast(NamedTuple):
 
 
 @kernel
-def cast(scene: SceneTables, colours: FloatArray, ray: Ray) -> Cast:
-    """All layers of one ray; `colours` (materials, 3)."""
+def cast(scene: SceneTables, ray: Ray) -> Cast:
+    """All layers of one ray."""
     nothing = Vec3(0.0, 0.0, 0.0)
     hit = closest_hit(scene.geometry, ray)
     if hit.kind < 0:
         return Cast(nothing, hit.t, nothing, -1, 0.0, 0.0)
     point = surface(scene.geometry, ray, hit)
     whose = owner(scene.geometry, ray, hit)
-    shown = colour(scene.geometry, hit, row(colours, point.material))
+    at = texture_place(scene.textures, scene.geometry, ray, hit)
+    own = colour_at(scene.materials.shown, point.material, at)
+    shown = colour(scene.geometry.shapes, hit, own)
     return Cast(shown, hit.t * length(ray.d), point.n, whose.shape, whose.u, whose.v)

@@ -5,21 +5,25 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
+from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
 from reference_rt.description import Description
-from reference_rt.geometry import closest_hit, surface
-from reference_rt.integrators.integrator import direct
+from reference_rt.geometry import closest_hit
+from reference_rt.integrators.integrator import direct_from
 from reference_rt.kernel import kernel, local_floats
-from reference_rt.lights import CONSTANT, Choice, area, constant
-from reference_rt.ray import Ray, SurfacePoint, ray_from
+from reference_rt.lights import ENVIRONMENT, Choice, area
+from reference_rt.materials import Shading
+from reference_rt.ray import Ray, ray_from
+from reference_rt.shading import shade
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Frame, Vec3, frame_from_normal, max_component, to_local, to_world
+from reference_rt.vec3 import Vec3, max_component, to_world
 
 
 class Whitted(Description):
-    """Direct light with shadows; mirrored and refracted rays, recursively; the background.
+    """Ambient and direct light with shadows; mirrored and refracted rays, recursively; the
+    background.
 
     Every area light is one point, the middle of its parameters; an environment is seen, but lights
     nothing but through mirrors and glass.
@@ -58,8 +62,10 @@ def _vector(stack: FloatArray, k: int) -> Vec3:
 @kernel
 def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
     """The radiance along `ray`.  The tree of rays is walked depth first on a stack of its own:
-    each level leaves one ray waiting at most."""
-    stack = local_floats(10 * (whitted.max_depth + 2))
+    each level leaves all its branches but one waiting at most."""
+    waiting = 2 * any_material.most_branches(scene.materials) - 1
+    stack = local_floats(10 * (waiting * whitted.max_depth + 2))
+    layers = local_floats(any_material.layer_floats(scene.materials))
     _push(stack, 0, ray, Vec3(1.0, 1.0, 1.0), 0)
     top = 1
     total = Vec3(0.0, 0.0, 0.0)
@@ -70,40 +76,44 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampl
         weight, depth = _vector(stack, k + 6), int(stack[k + 9])
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
-            total = total + weight * constant.background(scene.lights.environment)
+            background = any_light.background(scene.lights.environment, ray.d)
+            total = total + weight * background
             continue
-        point = surface(scene.geometry, ray, hit)
-        frame = frame_from_normal(point.ns)
-        wo = to_local(frame, -ray.d)
-        total = total + weight * area.emitted(scene.lights.areas, point, -ray.d)
+        shading = shade(scene, ray, hit, layers)
+        point = shading.point
+        total = total + weight * area.emitted(scene.lights.areas, point, shading.at, -ray.d)
+        ambient = any_material.ambient(scene.materials, shading) * any_light.ambient(scene.lights)
+        total = total + weight * ambient
         if any_material.is_smooth(scene.materials, point.material):
-            total = total + weight * _direct_light(scene, scene.lights.choice, point, frame, wo)
-        elif depth < whitted.max_depth:
-            branch = any_material.branches(scene.materials, point.material, wo)
+            total = total + weight * _direct_light(scene, scene.lights.choice, shading)
+        if depth == whitted.max_depth:
+            continue
+        for k in range(any_material.branch_count(scene.materials, point.material)):
+            branch = any_material.branches(scene.materials, shading, k)
             mirrored = weight * branch.reflectance
             if max_component(mirrored) > whitted.min_contribution:
-                next_ray = ray_from(point, to_world(frame, branch.reflected))
+                next_ray = ray_from(point, to_world(shading.frame, branch.reflected))
                 _push(stack, top, next_ray, mirrored, depth + 1)
                 top += 1
             refracted = weight * branch.transmittance
             if max_component(refracted) > whitted.min_contribution:
-                next_ray = ray_from(point, to_world(frame, branch.refracted))
+                next_ray = ray_from(point, to_world(shading.frame, branch.refracted))
                 _push(stack, top, next_ray, refracted, depth + 1)
                 top += 1
     return total
 
 
 @kernel
-def _direct_light(
-    scene: SceneTables, choice: Choice | None, point: SurfacePoint, frame: Frame, wo: Vec3
-) -> Vec3:
-    """Every point light, and the middle of every area light."""
+def _direct_light(scene: SceneTables, choice: Choice | None, shading: Shading) -> Vec3:
+    """Every light that is a point or a direction, and the middle of every area light."""
     total = Vec3(0.0, 0.0, 0.0)
     if choice is None:
         return total
+    shapes = scene.geometry.shapes
     for k in range(len(choice.kind)):
-        if choice.kind[k] != CONSTANT:
-            sample = direct(scene, point, frame, wo, k, 0.5, 0.5)
+        if choice.kind[k] != ENVIRONMENT and choice.probability[k] > 0.0:
+            light = any_light.middle(scene.lights, k, shapes, scene.textures, shading.point.p)
+            sample = direct_from(scene, shading, light)
             if sample.light.pdf > 0.0:
                 total = total + sample.contribution * (1.0 / sample.light.pdf)
     return total

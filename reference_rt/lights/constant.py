@@ -10,7 +10,7 @@ from reference_rt.kernel import kernel
 from reference_rt.lights.light import LightSample
 from reference_rt.sampling.warp import uniform_sphere
 from reference_rt.shapes.shape import FloatArray
-from reference_rt.vec3 import Vec3, row
+from reference_rt.vec3 import Vec3, luminance, row
 
 PDF = 0.25 / math.pi
 """Directions are drawn uniformly over the sphere."""
@@ -34,14 +34,26 @@ class Environment(NamedTuple):
 
 
 @kernel
+def radiance(environment: Environment, d: Vec3) -> Vec3:
+    """What arrives from the direction `d`."""
+    return row(environment.radiance, 0)
+
+
+@kernel
+def pdf(environment: Environment, d: Vec3) -> float:
+    """The density of `sample` per solid angle."""
+    return PDF
+
+
+@kernel
 def sample(environment: Environment, u0: float, u1: float) -> LightSample:
+    """A direction, uniformly over the sphere."""
     wi = uniform_sphere(u0, u1)
     return LightSample(wi, row(environment.radiance, 0), PDF, wi, math.inf, False)
 
 
-@kernel
-def background(environment: Environment | None) -> Vec3:
-    """The radiance of a ray that hits nothing."""
-    if environment is None:
-        return Vec3(0.0, 0.0, 0.0)
-    return row(environment.radiance, 0)
+def power(environment: Environment, scene_radius: float) -> FloatArray:
+    """Luminance of the power (1,) into the sphere of the scene's radius R: 4 pi² R² L, its area
+    4 pi R² times the irradiance pi L."""
+    arriving = luminance(Vec3(*environment.radiance.T))
+    return np.asarray(4.0 * math.pi * math.pi * scene_radius * scene_radius * arriving)

@@ -8,7 +8,7 @@ from reference_rt.ray import Ray, SurfacePoint, ray_from, segment_to
 from reference_rt.vec3 import Vec3
 
 # Codes of `Lights.kind`.
-POINT, AREA, CONSTANT = 0, 1, 2
+AREA, POINT, SPOT, DIRECTIONAL, ENVIRONMENT = range(5)
 
 
 class LightSample(NamedTuple):

@@ -9,7 +9,7 @@ from reference_rt.description import Colour, Description, Vector
 from reference_rt.kernel import kernel
 from reference_rt.lights.light import LightSample
 from reference_rt.shapes.shape import FloatArray
-from reference_rt.vec3 import Vec3, dot, row
+from reference_rt.vec3 import Vec3, dot, luminance, row
 
 
 class Point(Description):
@@ -40,3 +40,8 @@ def sample(points: Points, i: int, p: Vec3) -> LightSample:
     distance = math.sqrt(distance2)
     radiance = row(points.intensity, i) * (1.0 / distance2)
     return LightSample(w * (1.0 / distance), radiance, 1.0, target, distance, True)
+
+
+def power(points: Points, scene_radius: float) -> FloatArray:
+    """Luminance of the power (n,): 4 pi I."""
+    return np.asarray(4.0 * math.pi * luminance(Vec3(*points.intensity.T)))

@@ -6,26 +6,43 @@ towards where the radiance goes, `wi` towards where it comes from.  A value of z
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from reference_rt.description import Description
 from reference_rt.kernel import kernel
+from reference_rt.textures import Palette
 from reference_rt.vec3 import Vec3, is_black
-
-# Codes of `Materials.kind`.
-DIFFUSE, MIRROR, DIELECTRIC, BLACK = 0, 1, 2, 3
 
 
 class Material(Description):
     """How a surface scatters light."""
 
+    smooth: ClassVar[bool] = False
+    """Whether it scatters to a continuum of directions, so that lights can be sampled."""
+    delta: ClassVar[bool] = False
+    """Whether it has `branches`: a few directions that no light sample could find."""
+
+    chooses: ClassVar[bool] = True
+    """Whether `sample` uses `u_lobe`."""
+
     @property
-    def colour(self) -> tuple[float, float, float]:
-        """What ray casting shows of it, linear sRGB."""
+    def colour(self) -> tuple[float, float, float] | str:
+        """What ray casting shows of it: linear sRGB, or the name of a texture."""
         raise NotImplementedError
 
-    def tabulate(self) -> Any:
-        """This material as one row of its table."""
+    @property
+    def transmits(self) -> bool:
+        """Whether light passes to the other side."""
+        return False
+
+    @property
+    def oriented(self) -> bool:
+        """Whether it scatters differently along u and v: then x of the frame is along dp/du."""
+        return False
+
+    def tabulate(self, palette: Palette) -> Any:
+        """This material as one row of its table.  Raises ValueError (what is wrong, what was
+        expected)."""
         raise NotImplementedError
 
 
@@ -70,6 +87,20 @@ class Branches(NamedTuple):
 def no_branches() -> Branches:
     zero = Vec3(0.0, 0.0, 0.0)
     return Branches(zero, zero, zero, zero, 1.0, 1.0)
+
+
+@kernel
+def reflection(wo: Vec3, reflectance: Vec3) -> Branches:
+    """The mirrored direction alone."""
+    zero = Vec3(0.0, 0.0, 0.0)
+    return Branches(Vec3(-wo.x, -wo.y, wo.z), reflectance, zero, zero, 1.0, 1.0)
+
+
+@kernel
+def straight_on(wo: Vec3) -> Branches:
+    """What is not there: everything passes."""
+    zero, one = Vec3(0.0, 0.0, 0.0), Vec3(1.0, 1.0, 1.0)
+    return Branches(zero, zero, -wo, one, 0.0, 1.0)
 
 
 @kernel

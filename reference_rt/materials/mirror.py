@@ -1,40 +1,37 @@
 """Mirror: R = 2 (wo·n) n - wo, times a colour, on the front side."""
 
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
-import numpy as np
-
-from reference_rt.description import Reflectance
 from reference_rt.kernel import kernel
-from reference_rt.materials.material import Branches, Material, no_branches
-from reference_rt.shapes.shape import FloatArray
-from reference_rt.vec3 import Vec3, row
+from reference_rt.materials.material import Branches, Material, no_branches, reflection
+from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.vec3 import Vec3
 
 
 class Mirror(Material):
     """A perfect mirror with a colour (the text-book's k_r); its back is black."""
 
+    delta: ClassVar[bool] = True
     type: Literal["mirror"] = "mirror"
-    reflectance: Reflectance = (1.0, 1.0, 1.0)
+    reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
 
     @property
-    def colour(self) -> tuple[float, float, float]:
+    def colour(self) -> tuple[float, float, float] | str:
         return self.reflectance
 
-    def tabulate(self) -> "Mirrors":
-        return Mirrors(np.array([self.reflectance]))
+    def tabulate(self, palette: Palette) -> "Mirrors":
+        return Mirrors(palette.colours(self.reflectance))
 
 
 class Mirrors(NamedTuple):
-    """reflectance (n, 3), linear sRGB."""
+    """reflectance (n), linear sRGB."""
 
-    reflectance: FloatArray
+    reflectance: Colours
 
 
 @kernel
-def branches(mirrors: Mirrors, i: int, wo: Vec3) -> Branches:
+def branches(mirrors: Mirrors, i: int, at: At, wo: Vec3) -> Branches:
     """The one mirrored direction."""
     if wo.z <= 0.0:
         return no_branches()
-    zero = Vec3(0.0, 0.0, 0.0)
-    return Branches(Vec3(-wo.x, -wo.y, wo.z), row(mirrors.reflectance, i), zero, zero, 1.0, 1.0)
+    return reflection(wo, colour_at(mirrors.reflectance, i, at))

@@ -17,6 +17,7 @@ from reference_rt.shapes.shape import (
     Place,
     Shape,
     Spans,
+    Tangents,
     lane_vector,
     no_spans,
     one_span,
@@ -250,7 +251,8 @@ def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
     q = on_face(local, axis, sign)
     point = world_surface(boxes, i, q, face_normal(axis, sign), 0.0, -1, -1)
     pdf = solid_angle_pdf(p, point.p, point.n, area)
-    return LightPoint(point.p, point.n, point.error, pdf)
+    face = axis + 3.0 if sign > 0.0 else axis + 0.0
+    return LightPoint(point.p, point.n, point.error, pdf, face, 0.0)
 
 
 @kernel
@@ -262,6 +264,13 @@ def uv(boxes: Boxes, ray: Ray, hit: Hit) -> tuple[float, float]:
     a = local.y if axis == 0 else local.x
     b = local.y if axis == 2 else local.z
     return 0.5 * (a + 1.0), 0.5 * (b + 1.0)
+
+
+@kernel
+def tangents(boxes: Boxes, ray: Ray, hit: Hit) -> Tangents:
+    axis = int(hit.u) % 3
+    a, b = 1 if axis == 0 else 0, 1 if axis == 2 else 2
+    return Tangents(triple(boxes.edges, hit.row, a) * 2.0, triple(boxes.edges, hit.row, b) * 2.0)
 
 
 @kernel

@@ -6,7 +6,8 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from reference_rt.description import Positive
-from reference_rt.shapes.quadric import Quadrics, tabulate
+from reference_rt.shapes.quadric import tabulate
+from reference_rt.shapes.quadrics import Quadrics
 from reference_rt.shapes.shape import Place, Shape
 
 

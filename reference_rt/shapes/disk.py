@@ -16,10 +16,12 @@ from reference_rt.shapes.shape import (
     LightPoint,
     Place,
     Shape,
+    Tangents,
+    any_tangents,
     outward,
     solid_angle_pdf,
 )
-from reference_rt.vec3 import Vec3
+from reference_rt.vec3 import Vec3, row
 
 
 class Disk(Shape):
@@ -89,8 +91,19 @@ def uv(disks: Disks, ray: Ray, hit: Hit) -> tuple[float, float]:
 
 
 @kernel
+def tangents(disks: Disks, ray: Ray, hit: Hit) -> Tangents:
+    """Of polar coordinates; any in the middle."""
+    i, x, y = hit.row, hit.u, hit.v
+    r = math.sqrt(x * x + y * y)
+    if r == 0.0:
+        return any_tangents(row(disks.normal, i))
+    a, b = row(disks.x_edge, i), row(disks.y_edge, i)
+    return Tangents(a * (x / r) + b * (y / r), (b * x - a * y) * (2.0 * math.pi))
+
+
+@kernel
 def sample(disks: Disks, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
     """A point uniform over the area, as a light for `p`."""
     x, y = concentric_disk(u0, u1)
     q = flat.surface_at(disks, i, x, y)
-    return LightPoint(q.p, q.n, q.error, solid_angle_pdf(p, q.p, q.n, area))
+    return LightPoint(q.p, q.n, q.error, solid_angle_pdf(p, q.p, q.n, area), x, y)

@@ -109,10 +109,12 @@ def surface_at(table: Any, i: int, x: float, y: float) -> SurfacePoint:
     Two sums and two products, of numbers no larger than |center| and `reach`, and the normal's
     own rounding across `reach` are 2 |center| + 5 reach of u a component; seeing the next origin
     from the plane is |p| + 4 reach: within what `surface_error` bounds, however large x and y.
+    `reach` is the shape's own size at least: at x = y = 0 of a shape at the origin nothing rounds,
+    but the bound must still take a ray off the surface.
     """
-    along_x, along_y = row(table.x_edge, i) * x, row(table.y_edge, i) * y
+    x_edge, y_edge = row(table.x_edge, i), row(table.y_edge, i)
     center, n = row(table.center, i), row(table.normal, i)
-    p = center + along_x + along_y
-    reach = max_abs(along_x) + max_abs(along_y)
+    p = center + x_edge * x + y_edge * y
+    reach = max_abs(x_edge) * max(1.0, abs(x)) + max_abs(y_edge) * max(1.0, abs(y))
     error = surface_error(p, center, reach)
     return SurfacePoint(p, n, n, error, table.material[i], table.light[i])

@@ -82,6 +82,16 @@ def world_point(table: Any, i: int, q: Vec3) -> Vec3:
 
 
 @kernel
+def world_vector(table: Any, i: int, v: Vec3) -> Vec3:
+    """A v."""
+    return (
+        triple(table.edges, i, 0) * v.x
+        + triple(table.edges, i, 1) * v.y
+        + triple(table.edges, i, 2) * v.z
+    )
+
+
+@kernel
 def world_covector(table: Any, i: int, n: Vec3) -> Vec3:
     """M^T n: a normal of any length, by the inverse transpose."""
     return (
@@ -157,4 +167,5 @@ __all__ = [
     "world_error",
     "world_point",
     "world_surface",
+    "world_vector",
 ]

@@ -15,6 +15,7 @@ from reference_rt.shapes.shape import (
     Place,
     Shape,
     Spans,
+    Tangents,
     no_spans,
     one_span,
 )
@@ -83,3 +84,8 @@ def surface(planes: Planes, ray: Ray, hit: Hit) -> SurfacePoint:
 def uv(planes: Planes, ray: Ray, hit: Hit) -> tuple[float, float]:
     """The local x and y."""
     return flat.coordinates(planes, hit.row, ray, hit.t)
+
+
+@kernel
+def tangents(planes: Planes, ray: Ray, hit: Hit) -> Tangents:
+    return Tangents(row(planes.x_edge, hit.row), row(planes.y_edge, hit.row))

@@ -20,7 +20,16 @@ from reference_rt.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, mi
 from reference_rt.shapes import flat
 from reference_rt.shapes.flat import Integers, integers
 from reference_rt.shapes.rounding import product_error
-from reference_rt.shapes.shape import Bounds, FloatArray, IntArray, Place, Shape, outward
+from reference_rt.shapes.shape import (
+    Bounds,
+    FloatArray,
+    IntArray,
+    Place,
+    Shape,
+    Tangents,
+    outward,
+)
+from reference_rt.vec3 import row
 
 OFF_PLANE = 64
 """How far a point may be off the plane of the others, in u times the largest coordinate: a map
@@ -286,3 +295,12 @@ def uv(polygons: Polygons, ray: Ray, hit: Hit) -> tuple[float, float]:
     u = (hit.u - lower[hit.row, 0]) / (upper[hit.row, 0] - lower[hit.row, 0])
     v = (hit.v - lower[hit.row, 1]) / (upper[hit.row, 1] - lower[hit.row, 1])
     return u, v
+
+
+@kernel
+def tangents(polygons: Polygons, ray: Ray, hit: Hit) -> Tangents:
+    i, lower, upper = hit.row, polygons.lower, polygons.upper
+    return Tangents(
+        row(polygons.x_edge, i) * (upper[i, 0] - lower[i, 0]),
+        row(polygons.y_edge, i) * (upper[i, 1] - lower[i, 1]),
+    )

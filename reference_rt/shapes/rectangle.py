@@ -5,10 +5,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from reference_rt import transform
 from reference_rt.kernel import kernel
-from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
-from reference_rt.shapes.placement import owners
+from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
+from reference_rt.shapes import flat, spherical_rectangle
 from reference_rt.shapes.shape import (
     Bounds,
     FloatArray,
@@ -16,12 +15,30 @@ from reference_rt.shapes.shape import (
     LightPoint,
     Place,
     Shape,
+    Tangents,
     lane_vector,
     outward,
     pack,
     solid_angle_pdf,
 )
+from reference_rt.shapes.spherical_rectangle import Seen
 from reference_rt.vec3 import Vec3, dot, max_abs, row
+
+_RIGHT = 2.0**-40
+"""The cosine between edges that counts as none: solid angles are then wrong by as little, and
+turned edges are right to a few u = 2^-53."""
+
+_NEAR = 3.0
+"""Half diagonals within which a light is sampled by solid angle.  Measured at this distance: by
+area, the irradiance has a relative variance per sample of 0.002 seen from the front, of 0.08 to
+0.16 obliquely, which a path's own outweighs and stratified numbers remove; solid angles take
+70 ns more."""
+
+_LEAST_SOLID_ANGLE = 2.0**-26
+"""It rounds by a few u = 2^-53: here half of its digits are left.  Below, by area."""
+
+_LEAST_HEIGHT = 2.0**-500
+"""In half diagonals: its square is a float64."""
 
 
 class Rectangle(Shape):
@@ -31,22 +48,23 @@ class Rectangle(Shape):
 
     def tabulate(self, place: Place) -> "Rectangles":
         m = self.map_in(place)
-        inverse = transform.invert(m)
-        return Rectangles(
-            center=m[:, 3].copy()[None],
-            normal=transform.apply_normals(m, np.array([[0.0, 0.0, 1.0]])),
-            x_of=inverse[0, :3].copy()[None],
-            y_of=inverse[1, :3].copy()[None],
-            x_edge=m[:, 0].copy()[None],
-            y_edge=m[:, 1].copy()[None],
-            **owners(place),
-        )
+        rectangles = Rectangles(**flat.facing_z(m, place), lengths=_lengths(m[:, 0], m[:, 1]))
+        if not 0.0 < areas(rectangles)[0] < math.inf:
+            raise ValueError("the rectangle's area is not a float64; expected an ordinary size")
+        return rectangles
+
+
+def _lengths(x_edge: FloatArray, y_edge: FloatArray) -> FloatArray:
+    """(1, 2): of the half edges; 0 where they are not perpendicular."""
+    x, y = math.hypot(*x_edge), math.hypot(*y_edge)
+    is_right = abs(float((x_edge / x) @ (y_edge / y))) <= _RIGHT
+    return np.array([[x, y] if is_right else [0.0, 0.0]])
 
 
 class Rectangles(NamedTuple):
-    """n parallelograms: center, unit normal, the covectors that give a point's local x and y, the
-    half edges that these undo, all (n, 3); owner, the shape's index
-    in the scene; material, light: rows of those tables; face (n,)."""
+    """n parallelograms: see `flat` for center, normal, x_of, y_of and for the half edges x_edge and
+    y_edge; lengths (n, 2) of these, 0 where they are not perpendicular; owner, the shape's index in
+    the scene; material, light: rows of those tables; face (n,)."""
 
     center: FloatArray
     normal: FloatArray
@@ -54,6 +72,7 @@ class Rectangles(NamedTuple):
     y_of: FloatArray
     x_edge: FloatArray
     y_edge: FloatArray
+    lengths: FloatArray
     owner: IntArray
     material: IntArray
     light: IntArray
@@ -91,21 +110,17 @@ def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> fl
 @kernel
 def found(rectangles: Rectangles, i: int, ray: Ray, t: float) -> Crossing:
     """The crossing of rectangle i at t; its u, v are the local x, y in [-1, 1]."""
-    q = at(ray, t) - row(rectangles.center, i)
-    return Crossing(t, dot(q, row(rectangles.x_of, i)), dot(q, row(rectangles.y_of, i)))
+    x, y = flat.coordinates(rectangles, i, ray, t)
+    return Crossing(t, x, y)
 
 
 @kernel
 def intersect(rectangles: Rectangles, i: int, ray: Ray) -> Crossing:
-    """Where the ray meets rectangle i."""
-    t = distance(
-        ray,
-        row(rectangles.center, i),
-        row(rectangles.normal, i),
-        row(rectangles.x_of, i),
-        row(rectangles.y_of, i),
-    )
-    return found(rectangles, i, ray, t)
+    """Where the ray meets rectangle i: by the same operations as `distance`."""
+    found = flat.meet(rectangles, i, ray)
+    if (abs(found.u) <= 1.0) & (abs(found.v) <= 1.0):
+        return found
+    return miss()
 
 
 @kernel
@@ -130,6 +145,8 @@ def place(rectangles: Rectangles, i: int, x: float, y: float) -> Vec3:
 
 @kernel
 def error_at(rectangles: Rectangles, i: int, p: Vec3) -> float:
+    """By the whole size, unlike `flat.surface_at`: at the center of a rectangle at the origin that
+    bound is 0, and a light's point has to be off it."""
     size = max_abs(row(rectangles.x_edge, i)) + max_abs(row(rectangles.y_edge, i))
     return surface_error(p, row(rectangles.center, i), size)
 
@@ -151,10 +168,66 @@ def uv(rectangles: Rectangles, ray: Ray, hit: Hit) -> tuple[float, float]:
 
 
 @kernel
+def tangents(rectangles: Rectangles, ray: Ray, hit: Hit) -> Tangents:
+    i = hit.row
+    return Tangents(row(rectangles.x_edge, i) * 2.0, row(rectangles.y_edge, i) * 2.0)
+
+
+@kernel
+def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
+    """Rectangle i from `p` in front of it, in units of half its diagonal; of solid angle 0 where it
+    is to be sampled by area."""
+    w = p - row(rectangles.center, i)
+    width, height = rectangles.lengths[i, 0], rectangles.lengths[i, 1]
+    half_diagonal2 = width * width + height * height
+    if dot(w, w) >= _NEAR * _NEAR * half_diagonal2:
+        return spherical_rectangle.unseen()
+    unit = 1.0 / math.sqrt(half_diagonal2)
+    h = dot(w, row(rectangles.normal, i)) * unit
+    if h <= _LEAST_HEIGHT:
+        return spherical_rectangle.unseen()
+    width, height = width * unit, height * unit
+    x, y = dot(w, row(rectangles.x_of, i)), dot(w, row(rectangles.y_of, i))
+    return spherical_rectangle.see(
+        h, -(1.0 + x) * width, (1.0 - x) * width, -(1.0 + y) * height, (1.0 - y) * height
+    )
+
+
+@kernel
 def sample(
     rectangles: Rectangles, i: int, area: float, p: Vec3, u0: float, u1: float
 ) -> LightPoint:
+    """A point as a light for `p`: near by uniform over the solid angle, else over the area."""
+    seen = _see(rectangles, i, p)
+    if seen.solid_angle < _LEAST_SOLID_ANGLE:
+        return sample_by_area(rectangles, i, area, p, u0, u1)
+    x, y = spherical_rectangle.sample(seen, u0, u1)
+    x = 2.0 * (x - seen.x0) / (seen.x1 - seen.x0) - 1.0
+    y = 2.0 * (y - seen.y0) / (seen.y1 - seen.y0) - 1.0
+    q, n = place(rectangles, i, x, y), row(rectangles.normal, i)
+    return LightPoint(q, n, error_at(rectangles, i, q), 1.0 / seen.solid_angle, x, y)
+
+
+@kernel
+def sample_by_area(
+    rectangles: Rectangles, i: int, area: float, p: Vec3, u0: float, u1: float
+) -> LightPoint:
     """A point uniform over the area, as a light for `p`."""
-    q = place(rectangles, i, 2.0 * u0 - 1.0, 2.0 * u1 - 1.0)
-    n = row(rectangles.normal, i)
-    return LightPoint(q, n, error_at(rectangles, i, q), solid_angle_pdf(p, q, n, area))
+    x, y = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
+    q, n = place(rectangles, i, x, y), row(rectangles.normal, i)
+    return LightPoint(q, n, error_at(rectangles, i, q), solid_angle_pdf(p, q, n, area), x, y)
+
+
+@kernel
+def middle(rectangles: Rectangles, i: int, area: float, p: Vec3) -> LightPoint:
+    """Its middle as a light for `p`, of the density that the whole area has there."""
+    return sample_by_area(rectangles, i, area, p, 0.5, 0.5)
+
+
+@kernel
+def pdf(rectangles: Rectangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
+    """The density of `sample` per solid angle, at the point `q` of the rectangle."""
+    seen = _see(rectangles, i, p)
+    if seen.solid_angle < _LEAST_SOLID_ANGLE:
+        return solid_angle_pdf(p, q.p, q.n, area)
+    return 1.0 / seen.solid_angle

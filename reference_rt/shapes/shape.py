@@ -10,7 +10,7 @@ import numpy.typing as npt
 from reference_rt.description import Description
 from reference_rt.kernel import kernel
 from reference_rt.transform import IDENTITY, Affine, Transform, affine, compose, invert
-from reference_rt.vec3 import Vec3, dot
+from reference_rt.vec3 import Vec3, dot, frame_from_normal
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -113,18 +113,20 @@ def nearest_lane(d: FloatArray, packet: int, best: int, t: float) -> tuple[int, 
 class LightPoint(NamedTuple):
     """A point of a shape picked as a light: position, unit normal, the error bound of the position
     (see `SurfacePoint.error`) and the density per solid angle at the receiver; pdf = 0 means that
-    nothing can arrive from there."""
+    nothing can arrive from there;  u, v: as in `Crossing`."""
 
     p: Vec3
     n: Vec3
     error: float
     pdf: float
+    u: float
+    v: float
 
 
 @kernel
 def no_light_point() -> LightPoint:
     zero = Vec3(0.0, 0.0, 0.0)
-    return LightPoint(zero, zero, 0.0, 0.0)
+    return LightPoint(zero, zero, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -139,6 +141,21 @@ def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float) -> float:
     if cos_times_length <= 0.0:
         return 0.0
     return distance2 * math.sqrt(distance2) / (cos_times_length * area)
+
+
+class Tangents(NamedTuple):
+    """dp/du and dp/dv: how the point moves with the surface coordinates that a shape's `uv` gives.
+    Not made unit, nor orthogonal."""
+
+    dpdu: Vec3
+    dpdv: Vec3
+
+
+@kernel
+def any_tangents(n: Vec3) -> Tangents:
+    """Where u and v are no coordinates, as at a pole: a unit basis of the tangent plane."""
+    frame = frame_from_normal(n)
+    return Tangents(frame.s, frame.t)
 
 
 class Spans(NamedTuple):

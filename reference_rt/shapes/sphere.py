@@ -10,8 +10,9 @@ from reference_rt.description import Positive, Vector
 from reference_rt.kernel import kernel
 from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.sampling.warp import on_circle
-from reference_rt.shapes.placement import owners
-from reference_rt.shapes.quadric import Quadrics, ellipsoid
+from reference_rt.shapes.placement import local_vector, owners, world_covector
+from reference_rt.shapes.quadric import ellipsoid
+from reference_rt.shapes.quadrics import Quadrics
 from reference_rt.shapes.shape import (
     Bounds,
     FloatArray,
@@ -20,6 +21,8 @@ from reference_rt.shapes.shape import (
     Place,
     Shape,
     Spans,
+    Tangents,
+    any_tangents,
     lane_vector,
     no_light_point,
     no_spans,
@@ -154,14 +157,27 @@ def surface(spheres: Spheres, ray: Ray, hit: Hit) -> SurfacePoint:
 def uv(spheres: Spheres, ray: Ray, hit: Hit) -> tuple[float, float]:
     """(phi / 2 pi from local +x, theta / pi from local +z), each in [0, 1]."""
     n = normalize(at(ray, hit.t) - row(spheres.center, hit.row))
-    m = spheres.to_local[hit.row]
-    x = m[0] * n.x + m[1] * n.y + m[2] * n.z
-    y = m[3] * n.x + m[4] * n.y + m[5] * n.z
-    z = m[6] * n.x + m[7] * n.y + m[8] * n.z
+    x, y, z = local_vector(spheres, hit.row, n)
     phi = math.atan2(y, x)
     if phi < 0.0:
         phi += 2.0 * math.pi
     return phi / (2.0 * math.pi), math.atan2(math.sqrt(x * x + y * y), z) / math.pi
+
+
+@kernel
+def tangents(spheres: Spheres, ray: Ray, hit: Hit) -> Tangents:
+    """Eastwards and southwards; any at a pole."""
+    i = hit.row
+    n = normalize(at(ray, hit.t) - row(spheres.center, i))
+    x, y, z = local_vector(spheres, i, n)
+    rho = math.sqrt(x * x + y * y)
+    if rho == 0.0:
+        return any_tangents(n)
+    # The inverse of a rotation is its transpose.
+    east = world_covector(spheres, i, Vec3(-y, x, 0.0))
+    south = world_covector(spheres, i, Vec3(x * z / rho, y * z / rho, -rho))
+    r = spheres.radius[i]
+    return Tangents(east * (2.0 * math.pi * r), south * (math.pi * r))
 
 
 @kernel
@@ -203,7 +219,8 @@ def sample(spheres: Spheres, i: int, area: float, p: Vec3, u0: float, u1: float)
     along = math.sqrt(distance2) * cos_theta - math.sqrt(half_chord2)
     n = normalize(p + wi * along - center)
     q = center + n * r
-    return LightPoint(q, n, surface_error(q, center, 2.0 * r), 0.5 / (math.pi * one_minus_cos_max))
+    density = 0.5 / (math.pi * one_minus_cos_max)
+    return LightPoint(q, n, surface_error(q, center, 2.0 * r), density, 0.0, 0.0)
 
 
 @kernel

@@ -6,11 +6,25 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt.description import Positive
-from reference_rt.kernel import kernel, large_kernel, local_floats
+from reference_rt.kernel import kernel, local_floats
 from reference_rt.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, at
 from reference_rt.shapes import placement
-from reference_rt.shapes.placement import columns, local_point, local_ray, world_surface
-from reference_rt.shapes.shape import Bounds, FloatArray, IntArray, Place, Shape, Spans
+from reference_rt.shapes.placement import (
+    columns,
+    local_point,
+    local_ray,
+    world_surface,
+    world_vector,
+)
+from reference_rt.shapes.shape import (
+    Bounds,
+    FloatArray,
+    IntArray,
+    Place,
+    Shape,
+    Spans,
+    Tangents,
+)
 from reference_rt.vec3 import Vec3, dot, length
 
 
@@ -127,7 +141,7 @@ def _root(
     return s
 
 
-@large_kernel
+@kernel
 def _crossings(tori: Tori, i: int, ray: Ray, t: FloatArray) -> int:
     """All t at which the line meets torus i, in order, into t (4,); how many: 0, 2 or 4.
 
@@ -220,3 +234,16 @@ def uv(tori: Tori, ray: Ray, hit: Hit) -> tuple[float, float]:
     off = math.sqrt(q.x * q.x + q.y * q.y) - tori.major[i]
     tube = math.atan2(q.z, off) / (2.0 * math.pi)
     return around if around >= 0.0 else around + 1.0, tube if tube >= 0.0 else tube + 1.0
+
+
+@kernel
+def tangents(tori: Tori, ray: Ray, hit: Hit) -> Tangents:
+    """Around the axis, and around the tube."""
+    i = hit.row
+    q = local_point(tori, i, at(ray, hit.t))
+    rho = math.sqrt(q.x * q.x + q.y * q.y)
+    up = Vec3(-q.z * q.x / rho, -q.z * q.y / rho, rho - tori.major[i])
+    return Tangents(
+        world_vector(tori, i, Vec3(-q.y, q.x, 0.0)) * (2.0 * math.pi),
+        world_vector(tori, i, up) * (2.0 * math.pi),
+    )

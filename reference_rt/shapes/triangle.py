@@ -9,7 +9,7 @@ import numpy as np
 from reference_rt import transform
 from reference_rt.description import Vector
 from reference_rt.kernel import kernel
-from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
+from reference_rt.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss, surface_error
 from reference_rt.shapes.shape import (
     Bounds,
     FloatArray,
@@ -17,6 +17,8 @@ from reference_rt.shapes.shape import (
     LightPoint,
     Place,
     Shape,
+    Tangents,
+    any_tangents,
     solid_angle_pdf,
 )
 from reference_rt.shapes.watertight import Shear, project
@@ -198,9 +200,10 @@ def surface(triangles: Triangles, ray: Ray, hit: Hit) -> SurfacePoint:
 def sample(triangles: Triangles, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
     """A point uniform over the area, as a light for `p` (Turk 1990: the square root warp)."""
     root = math.sqrt(u0)
-    q = interpolate(triangles.vertices, i, root * (1.0 - u1), root * u1)
+    u, v = root * (1.0 - u1), root * u1
+    q = interpolate(triangles.vertices, i, u, v)
     n = normal(triangles, i)
-    return LightPoint(q, n, error_at(triangles, i, q), solid_angle_pdf(p, q, n, area))
+    return LightPoint(q, n, error_at(triangles, i, q), solid_angle_pdf(p, q, n, area), u, v)
 
 
 @kernel
@@ -216,6 +219,33 @@ def _interpolated_uv(uvs: FloatArray | None, hit: Hit) -> tuple[float, float]:
     w = uvs[hit.row]
     a = 1.0 - hit.u - hit.v
     return a * w[0] + hit.u * w[2] + hit.v * w[4], a * w[1] + hit.u * w[3] + hit.v * w[5]
+
+
+@kernel
+def tangents(triangles: Triangles, ray: Ray, hit: Hit) -> Tangents:
+    """Those of texture coordinates without area are any."""
+    i = hit.row
+    v0 = triple(triangles.vertices, i, 0)
+    a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
+    return _tangents_of_uv(triangles.uvs, i, a, b, normal(triangles, i))
+
+
+@kernel
+def _tangents_of_uv(uvs: FloatArray | None, i: int, a: Vec3, b: Vec3, n: Vec3) -> Tangents:
+    """From the edges a = v1 - v0 and b = v2 - v0: a = du_a dp/du + dv_a dp/dv, and b likewise."""
+    if uvs is None:
+        return Tangents(a, b)
+    w = uvs[i]
+    du_a, dv_a, du_b, dv_b = w[2] - w[0], w[3] - w[1], w[4] - w[0], w[5] - w[1]
+    x, y = du_a * dv_b, dv_a * du_b
+    # Differences and products round x and y by 3 u each, and their difference by another.
+    if abs(x - y) <= 4.0 * UNIT_ROUNDOFF * (abs(x) + abs(y)):
+        return any_tangents(n)
+    inverse = 1.0 / (x - y)
+    dpdu, dpdv = (a * dv_b - b * dv_a) * inverse, (b * du_a - a * du_b) * inverse
+    if max(max_abs(dpdu), max_abs(dpdv)) < math.inf:
+        return Tangents(dpdu, dpdv)
+    return any_tangents(n)
 
 
 @kernel

@@ -58,8 +58,9 @@ def test_path_tracing_is_compared_by_replicates(tmp_path: Path) -> None:
 def test_wrong_light_differs_at_its_rung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     translate = comparisons.translate.translate_light
 
-    def brighter(light: Any) -> dict[str, Any]:
-        emitter = translate(light)
+    def brighter(light: Any, around: Any) -> dict[str, Any]:
+        emitter = translate(light, around)
+        assert emitter is not None
         if emitter["type"] == "point":
             emitter["intensity"]["value"] = [1.01 * x for x in emitter["intensity"]["value"]]
         return emitter
@@ -77,7 +78,7 @@ def test_wrong_light_differs_at_its_rung(tmp_path: Path, monkeypatch: pytest.Mon
 def test_type_without_translation_is_not_comparable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(light: Any) -> dict[str, Any]:
+    def refuse(light: Any, around: Any) -> dict[str, Any]:
         raise UntranslatableError(light, "light")
 
     monkeypatch.setattr(comparisons.translate, "translate_light", refuse)

@@ -178,3 +178,8 @@ def model_3mf(folder, vertices, faces):
             "</model>",
         )
     return folder / "a.3mf"
+
+
+def expect_one_line(error, start):
+    assert str(error).startswith(start)
+    assert "\n" not in str(error)

@@ -7,8 +7,8 @@ import pytest
 from builders import SCENES
 from typer.testing import CliRunner
 
-from reference_rt import image
 from reference_rt.cli import app
+from reference_rt.exr import read_exr
 
 SPHERES = str(SCENES / "spheres_whitted.yaml")
 SMALL = ("--size", "16x10")
@@ -42,12 +42,12 @@ def test_options_change_the_scene(tmp_path):
         "render", box, "-o", tmp_path / "a.exr", "--size", "7x5", "--spp", "3", "--seed", "9"
     )
     assert done.exit_code == 0
-    channels, header = image.read_exr(tmp_path / "a.exr")
+    channels, header = read_exr(tmp_path / "a.exr")
     assert channels["R"].shape == (5, 7)
     assert json.loads(header["sampler"]) == {"type": "sobol", "spp": 3, "seed": 9}
     done = run("render", box, "-o", tmp_path / "b.exr", "--size", "7x5", "--integrator", "ray_cast")
     assert done.exit_code == 0
-    channels, header = image.read_exr(tmp_path / "b.exr")
+    channels, header = read_exr(tmp_path / "b.exr")
     assert json.loads(header["integrator"])["type"] == "ray_cast"
     assert {"distance.Z", "normal.X", "id.V"} <= set(channels)
 
@@ -63,7 +63,10 @@ def test_options_change_the_scene(tmp_path):
         (["--size", "0x4"], "--size: expected greater than or equal to 1"),
         (["--spp", "0"], "--spp: expected greater than or equal to 1"),
         (["--spp", "3"], "--spp: expected a square number of samples (1, 4, 9, ...), got 3"),
-        (["--integrator", "photon"], "--integrator: expected one of ray_cast, whitted, path"),
+        (
+            ["--integrator", "photon"],
+            "--integrator: expected one of ray_cast, whitted, direct, path",
+        ),
         (["--integrator", "path", "--seed", "-1"], "--seed: expected greater than or equal to 0"),
         (["-o", "picture.jpg"], "picture.jpg: '.jpg' is not supported; expected .exr or .png"),
         (["-o", "picture"], "picture: '' is not supported; expected .exr or .png"),
@@ -121,8 +124,11 @@ def test_pixels_that_are_not_finite(tmp_path):
     )
     result = run("render", scene, "-o", out)
     assert result.exit_code == 3
-    assert result.stderr.splitlines()[-1] == f"error: {out}: 16 pixels are not finite"
-    assert np.isinf(image.read_exr(out)[0]["R"]).all()
+    assert result.stderr.splitlines()[-1] == (
+        f"error: {out}: 16 pixels are not finite; "
+        "(column, row): (0, 0), (1, 0), (2, 0), (3, 0), ..."
+    )
+    assert np.isinf(read_exr(out)[0]["R"]).all()
 
 
 @pytest.mark.parametrize("command", [[], ["render"], ["explain"], ["schema"]])

@@ -291,12 +291,6 @@ def test_operands_must_be_solids(tmp_path):
     assert "edge" in message
 
 
-def test_parts_cannot_shine():
-    lamp = {"lamp": rt.Emissive(radiance=(1, 1, 1))}
-    message = refusal(shapes=(rt.Sphere() - rt.Box(material="lamp"),), materials=lamp)
-    assert "'lamp' is emissive" in message
-
-
 def test_nothing_to_combine():
     with pytest.raises(rt.SceneError, match="shapes"):
         rt.Scene.parse("shapes: [{type: union, of: []}]")

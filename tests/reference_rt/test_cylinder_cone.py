@@ -11,18 +11,17 @@ from quadric_checks import (
     anywhere,
     check_against_exact,
     check_leaving,
-    exactly,
     guides_at,
-    meetings,
     probe,
     put,
     rays_at,
     rotation,
     table_of,
 )
+from quadric_exact import exactly, meetings
 
 import reference_rt as rt
-from reference_rt.shapes import quadric
+from reference_rt.shapes import quadrics
 
 KINDS = {
     "cylinder": [rt.Cylinder(), rt.Cylinder(radius=0.3, z_min=-2.0, z_max=0.7)],
@@ -125,13 +124,13 @@ def test_spans(name):
 def test_bounds_are_tight(name):
     for shape in KINDS[name]:
         exact = exactly(shape)
-        lower, upper = quadric.bounds(table_of(shape))
+        lower, upper = quadrics.bounds(table_of(shape))
         assert np.allclose(lower[0], [float(x) for x in exact.lower], rtol=1e-14, atol=1e-14)
         assert np.allclose(upper[0], [float(x) for x in exact.upper], rtol=1e-14, atol=1e-14)
         rng = seeded(name, 5)
         placed = anywhere(rng, shape, 1.0)
         found = probe(placed, *rays_at(rng, exactly(placed), 2000))
-        lower, upper = quadric.bounds(table_of(placed))
+        lower, upper = quadrics.bounds(table_of(placed))
         assert (found.p[found.hits] >= lower).all()
         assert (found.p[found.hits] <= upper).all()
 

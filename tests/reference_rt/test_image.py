@@ -6,6 +6,7 @@ from PIL import Image
 
 import reference_rt as rt
 from reference_rt import image
+from reference_rt.exr import read_exr
 from reference_rt.files import replacing
 
 PROVENANCE = {"software": "reference_rt 0", "scene": "a scene", "sampler": '{"spp": 4}'}
@@ -28,7 +29,7 @@ def picture(shown="colour"):
 def test_exr_keeps_every_layer_as_float32(tmp_path):
     made = picture()
     image.write(tmp_path / "a.exr", made, PROVENANCE)
-    channels, header = image.read_exr(tmp_path / "a.exr")
+    channels, header = read_exr(tmp_path / "a.exr")
     expected = {
         **{c: made.colour[..., i] for i, c in enumerate("RGB")},
         "distance.Z": made.layers["distance"],
@@ -45,7 +46,7 @@ def test_exr_keeps_what_is_not_finite(tmp_path):
     colour = np.zeros((2, 2, 3))
     colour[0, 0], colour[0, 1], colour[1, 0] = np.nan, np.inf, -np.inf
     image.write(tmp_path / "a.exr", rt.Picture({"colour": colour}), PROVENANCE)
-    channels, _ = image.read_exr(tmp_path / "a.exr")
+    channels, _ = read_exr(tmp_path / "a.exr")
     assert np.array_equal(channels["G"], colour[..., 1], equal_nan=True)
 
 
@@ -141,6 +142,6 @@ def test_reading_what_is_no_exr(tmp_path):
     for content in (b"", b"rubbish", b"v/1\x01\x02\x00\x00\x00cut"):
         (tmp_path / "a.exr").write_bytes(content)
         with pytest.raises(rt.ImageError, match="cannot be read as EXR"):
-            image.read_exr(tmp_path / "a.exr")
+            read_exr(tmp_path / "a.exr")
     with pytest.raises(rt.ImageError, match="cannot be read as EXR"):
-        image.read_exr(tmp_path / "missing.exr")
+        read_exr(tmp_path / "missing.exr")

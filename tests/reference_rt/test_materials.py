@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 
 import reference_rt as rt
 from reference_rt.materials import dielectric, diffuse, mirror
-from reference_rt.materials.dielectric import fresnel
+from reference_rt.materials.fresnel import fresnel
 from reference_rt.materials.material import sample_branch
+from reference_rt.textures import NO_TEXTURES, At
 from reference_rt.vec3 import Vec3, dot, length
 
+AT = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
 INDICES = (1.0003, 1.33, 1.5, 2.4)
 
 etas = st.floats(0.25, 4.0).filter(lambda eta: abs(eta - 1) > 1e-3)
@@ -74,10 +76,10 @@ def test_fresnel_is_reciprocal(cosine, eta):
 
 @given(cosines, azimuths, etas, st.sampled_from([1.0, -1.0]))
 def test_dielectric_branches(cosine, phi, eta, side):
-    table = rt.Dielectric(interior_ior=eta).tabulate()
+    table = rt.Dielectric(interior_ior=eta).tabulate(NO_TEXTURES)
     wo = towards(cosine, phi)
     wo = Vec3(wo.x, wo.y, side * wo.z)
-    found = dielectric.branches(table, 0, wo)
+    found = dielectric.branches(table, 0, AT, wo)
     ratio = eta if side > 0 else 1 / eta
     # Energy: radiance is compressed by eta² where it enters.
     total = found.reflectance.x + found.transmittance.x * ratio**2
@@ -95,7 +97,9 @@ def test_dielectric_branches(cosine, phi, eta, side):
 @given(cosines, azimuths, etas, st.floats(0, 1, exclude_max=True))
 def test_a_sampled_branch_weighs_what_it_must(cosine, phi, eta, u):
     """weight times probability is the branch's factor, whichever is drawn."""
-    found = dielectric.branches(rt.Dielectric(interior_ior=eta).tabulate(), 0, towards(cosine, phi))
+    found = dielectric.branches(
+        rt.Dielectric(interior_ior=eta).tabulate(NO_TEXTURES), 0, AT, towards(cosine, phi)
+    )
     drawn = sample_branch(found, u)
     reflected = u < found.share
     assert drawn.is_delta
@@ -106,22 +110,22 @@ def test_a_sampled_branch_weighs_what_it_must(cosine, phi, eta, u):
 
 
 def test_mirror_is_one_sided():
-    table = rt.Mirror(reflectance=(0.2, 0.4, 0.6)).tabulate()
-    front = mirror.branches(table, 0, Vec3(0.6, 0.0, 0.8))
+    table = rt.Mirror(reflectance=(0.2, 0.4, 0.6)).tabulate(NO_TEXTURES)
+    front = mirror.branches(table, 0, AT, Vec3(0.6, 0.0, 0.8))
     assert front.reflected == (-0.6, 0.0, 0.8)
     assert front.reflectance == (0.2, 0.4, 0.6)
     assert sample_branch(front, 0.999).wi == front.reflected
-    back = mirror.branches(table, 0, Vec3(0.6, 0.0, -0.8))
+    back = mirror.branches(table, 0, AT, Vec3(0.6, 0.0, -0.8))
     assert sample_branch(back, 0.5).pdf == 0.0
 
 
 @given(cosines, st.floats(1e-9, 1 - 1e-9), st.floats(0, 1, exclude_max=True))
 def test_diffuse_sample_evaluate_and_pdf_agree(cosine, u0, u1):
-    table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate()
+    table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate(NO_TEXTURES)
     wo = towards(cosine, 0.3)
-    drawn = diffuse.sample(table, 0, wo, u0, u1)
-    value = diffuse.evaluate(table, 0, wo, drawn.wi)
-    assert drawn.pdf == diffuse.pdf(wo, drawn.wi)
+    drawn = diffuse.sample(table, 0, AT, wo, 0.5, u0, u1)
+    value = diffuse.evaluate(table, 0, AT, wo, drawn.wi)
+    assert drawn.pdf == diffuse.pdf(table, 0, AT, wo, drawn.wi)
     assert not drawn.is_delta
     for k in range(3):
         assert value[k] == pytest.approx(drawn.weight[k] * drawn.pdf, rel=4 * U)
@@ -130,21 +134,21 @@ def test_diffuse_sample_evaluate_and_pdf_agree(cosine, u0, u1):
 
 @given(cosines, cosines)
 def test_diffuse_is_one_sided_and_reciprocal(a, b):
-    table = rt.Diffuse().tabulate()
+    table = rt.Diffuse().tabulate(NO_TEXTURES)
     wo, wi = towards(a, 0.3), towards(b, 2.0)
     below = Vec3(wi.x, wi.y, -wi.z)
-    assert diffuse.evaluate(table, 0, wo, below) == (0.0, 0.0, 0.0)
-    assert diffuse.evaluate(table, 0, below, wo) == (0.0, 0.0, 0.0)
-    assert diffuse.pdf(wo, below) == diffuse.pdf(below, wo) == 0.0
-    assert diffuse.sample(table, 0, below, 0.5, 0.5).pdf == 0.0
-    there, back = diffuse.evaluate(table, 0, wo, wi).x, diffuse.evaluate(table, 0, wi, wo).x
+    assert diffuse.evaluate(table, 0, AT, wo, below) == (0.0, 0.0, 0.0)
+    assert diffuse.evaluate(table, 0, AT, below, wo) == (0.0, 0.0, 0.0)
+    assert diffuse.pdf(table, 0, AT, wo, below) == diffuse.pdf(table, 0, AT, below, wo) == 0.0
+    assert diffuse.sample(table, 0, AT, below, 0.5, 0.5, 0.5).pdf == 0.0
+    there, back = diffuse.evaluate(table, 0, AT, wo, wi).x, diffuse.evaluate(table, 0, AT, wi, wo).x
     assert there / wi.z == pytest.approx(back / wo.z, rel=4 * U)
 
 
 def test_diffuse_reflects_its_reflectance():
     """The integral of f cos over the hemisphere, by the midpoint rule in cos and phi."""
-    table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate()
+    table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate(NO_TEXTURES)
     ticks = (np.arange(64) + 0.5) / 64
-    values = [diffuse.evaluate(table, 0, Vec3(0, 0, 1), towards(c, 0.0)) for c in ticks]
+    values = [diffuse.evaluate(table, 0, AT, Vec3(0, 0, 1), towards(c, 0.0)) for c in ticks]
     # Linear in the cosine: the midpoint rule is exact.
     assert 2 * math.pi * np.mean(values, axis=0) == pytest.approx((0.1, 0.5, 0.9), rel=1e-14)

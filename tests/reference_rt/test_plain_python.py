@@ -7,19 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import SCENES, everything
+from builders import SCENES, every_law, every_light, every_shape
 
 import reference_rt as rt
 
-VARIANTS = {
-    "path": {},
-    "whitted": {"integrator": rt.Whitted(), "sampler": rt.Grid(spp=1)},
-    "ray_cast": {"integrator": rt.RayCast(), "sampler": None},
-    "independent, tent": {
-        "sampler": rt.Independent(spp=2, seed=5),
-        "film": rt.Film(width=6, height=4, filter=rt.TentFilter()),
-    },
-}
 SMALL = rt.Film(width=6, height=4)
 
 _RENDER = """
@@ -31,17 +22,33 @@ np.savez(sys.argv[3], **here.pictures(Path(sys.argv[2])))
 """
 
 
-def pictures(folder):
-    """Every variant of the scene with everything, and two without a hierarchy."""
-    scene = rt.Scene.load(everything(folder))
-    scenes = {name: scene.changed(**parts) for name, parts in VARIANTS.items()}
+def scenes(folder):
+    """Every shape, material, texture, light, integrator and sampler, and two of the usual scenes,
+    which lack most of them."""
+    shapes = rt.Scene.load(every_shape(folder))
+    laws = rt.Scene.load(every_law(folder))
+    lights = rt.Scene.load(every_light(folder))
+    whitted = {"integrator": rt.Whitted(), "sampler": rt.Grid(spp=4)}
     box = rt.Scene.load(SCENES / "cornell_box.yaml")
-    scenes["cornell_box"] = box.changed(film=SMALL, sampler=rt.Sobol(spp=2))
     spheres = rt.Scene.load(SCENES / "spheres_whitted.yaml")
-    scenes["spheres"] = spheres.changed(film=SMALL, sampler=rt.Grid(spp=1))
     return {
-        f"{name}.{layer}": pixels
-        for name, scene in scenes.items()
+        "shapes": shapes,
+        "shapes, ray cast": shapes.changed(integrator=rt.RayCast(), sampler=None),
+        "laws": laws,
+        "laws, whitted": laws.changed(**whitted),
+        "lights": lights,
+        "lights, direct": lights.changed(integrator=rt.Direct(light_samples=2, bsdf_samples=2)),
+        "lights, whitted": lights.changed(**whitted),
+        "cornell box": box.changed(film=SMALL, sampler=rt.Sobol(spp=2)),
+        "spheres": spheres.changed(film=SMALL, sampler=rt.Grid(spp=1)),
+    }
+
+
+def pictures(folder):
+    """Every layer of every scene."""
+    return {
+        f"{name}: {layer}": pixels
+        for name, scene in scenes(folder).items()
         for layer, pixels in rt.render(scene, threads=1).layers.items()
     }
 
@@ -51,12 +58,16 @@ def both(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plain")
     file = folder / "plain.npz"
     arguments = [str(Path(__file__).parent), str(folder), str(file)]
-    subprocess.run(
+    plain = subprocess.Popen(  # the while, this process compiles
         [sys.executable, "-W", "error", "-c", _RENDER, *arguments],
-        check=True,
         env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
     )
-    return pictures(folder), dict(np.load(file))
+    try:
+        compiled = pictures(tmp_path_factory.mktemp("compiled"))
+    finally:
+        code = plain.wait()
+    assert code == 0
+    return compiled, dict(np.load(file))
 
 
 def test_same_bits(both):

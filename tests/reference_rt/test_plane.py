@@ -157,14 +157,6 @@ def test_not_in_a_group():
         rt.build_tables(scene)
 
 
-def test_not_a_light():
-    scene = rt.Scene(
-        materials={"lamp": rt.Emissive(radiance=(1, 1, 1))}, shapes=(rt.Plane(material="lamp"),)
-    )
-    with pytest.raises(rt.SceneError, match="a shape of this type cannot be a light"):
-        rt.build_tables(scene)
-
-
 # ---- as a solid ---------------------------------------------------------------------------------
 
 

@@ -100,6 +100,13 @@ def test_nonfinite_pixels_are_counted():
     picture = rt.Picture({"colour": layer})
     assert picture.nonfinite == 2
     assert dataclasses.replace(picture, layers={"colour": np.ones((1, 1, 3))}).nonfinite == 0
+    others = {"depth": np.full((2, 3), np.inf), "id": np.full((2, 3), -1.0)}
+    others["variance"] = np.full((2, 3, 3), 1e39)
+    picture = rt.Picture({"colour": np.ones((2, 3, 3)), **others})
+    assert picture.nonfinite == 6
+    assert picture.nonfinite_pixels.tolist() == [[x, y] for y in range(2) for x in range(3)]
+    del others["variance"]
+    assert rt.Picture({"colour": np.ones((2, 3, 3)), **others}).nonfinite == 0
 
 
 def test_a_picture_that_cannot_fit_is_refused(cornell):

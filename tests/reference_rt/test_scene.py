@@ -3,12 +3,13 @@
 import json
 
 import pytest
-from builders import EVERYTHING, SCENES, everything
+from builders import EVERY_LAW, EVERY_LIGHT, EVERY_SHAPE, SCENES, every_shape
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import reference_rt as rt
+from reference_rt.textures.texture import UvMap
 
 FILES = sorted(SCENES.glob("*.yaml"))
 
@@ -32,26 +33,90 @@ shapes = st.one_of(
     st.builds(rt.Triangle, v0=vectors, v1=vectors, v2=vectors),
     st.builds(rt.Mesh, file=printable, face_normals=st.booleans()),
 )
+units = st.floats(0, 1)
+numbers = st.one_of(units, st.just("t"))
+reflectances = st.one_of(colours, st.just("t"))
+indices = st.tuples(*[positive] * 3)
+uv = st.builds(UvMap, scale=st.tuples(positive, positive), rotate=st.floats(-720, 720))
+textures = st.one_of(
+    st.builds(rt.Checker, first=colours, second=colours, uv=uv),
+    st.builds(rt.Bitmap, file=printable, wrap=st.sampled_from(["repeat", "clamp"]), scale=positive),
+    st.builds(rt.VertexColours, without=colours),
+)
+glasses = {
+    "interior_ior": positive,
+    "exterior_ior": positive,
+    "reflectance": reflectances,
+    "transmittance": reflectances,
+}
+metals = {"eta": indices, "k": colours, "reflectance": reflectances}
+plastics = {"reflectance": reflectances, "interior_ior": positive, "nonlinear": st.booleans()}
+alphas = st.floats(1e-3, 1)
+rough = {
+    "distribution": st.sampled_from(["ggx", "beckmann"]),
+    "alpha": st.one_of(alphas, st.tuples(alphas, alphas), st.just("t")),
+}
 materials = st.one_of(
-    st.builds(rt.Diffuse, reflectance=colours),
-    st.builds(rt.Mirror, reflectance=colours),
-    st.builds(rt.Dielectric, interior_ior=positive, exterior_ior=positive),
-    st.builds(rt.Emissive, radiance=colours),
+    st.builds(rt.Diffuse, reflectance=reflectances),
+    st.builds(rt.Mirror, reflectance=reflectances),
+    st.builds(rt.Dielectric, **glasses),
+    st.builds(rt.ThinDielectric, **glasses),
+    st.builds(rt.RoughDielectric, **glasses, **rough),
+    st.builds(rt.Conductor, **metals),
+    st.builds(rt.RoughConductor, **metals, **rough),
+    st.builds(rt.Plastic, **plastics),
+    st.builds(rt.RoughPlastic, **plastics, alpha=alphas),
+    st.builds(rt.Principled, base_colour=reflectances, roughness=numbers, eta=positive),
+    st.builds(rt.Phong, diffuse=reflectances, specular=colours, half_vector=st.booleans()),
+)
+wrappers = st.one_of(
+    st.builds(rt.Emissive, radiance=reflectances, base=st.sampled_from([None, "m"])),
+    st.builds(rt.Mask, base=st.just("m"), opacity=numbers),
+    st.builds(rt.Blend, first=st.just("m"), second=st.just("other"), weight=numbers),
+    st.builds(rt.TwoSided, base=st.just("other"), back=st.sampled_from([None, "other"])),
+    st.builds(rt.Bump, base=st.just("m"), height=st.just("t"), scale=st.floats(-9, 9)),
+    st.builds(rt.NormalMap, base=st.just("m"), normals=st.just("t")),
+)
+lights = st.one_of(
+    st.builds(rt.Point, position=vectors, intensity=colours),
+    st.builds(rt.Spot, origin=st.just((0.0, 0, 7e6)), target=vectors, intensity=colours),
+    st.builds(rt.Directional, direction=st.just((1.0, 0.5, 1e-300)), irradiance=colours),
+    st.builds(rt.Ambient, radiance=colours),
+)
+skies = st.one_of(
+    st.builds(rt.Constant, radiance=colours),
+    st.builds(
+        lambda file, steps: rt.EnvironmentMap.model_validate({"file": file, "transform": steps}),
+        printable,
+        steps,
+    ),
+)
+filters = st.one_of(
+    st.builds(rt.TentFilter, radius=positive),
+    st.builds(rt.GaussianFilter, stddev=positive),
+    st.builds(rt.MitchellFilter, b=units, c=units),
+    st.builds(rt.CatmullRomFilter),
+    st.builds(rt.LanczosFilter, lobes=st.integers(1, 64)),
+)
+names = st.lists(st.sampled_from(["albedo", "normal", "depth", "id", "variance"]), unique=True)
+integrators = st.one_of(
+    st.builds(rt.Direct, light_samples=st.integers(1, 9), bsdf_samples=st.integers(0, 9)),
+    st.builds(rt.Path, sampling=st.sampled_from(["both", "lights", "bsdf"])),
 )
 scenes = st.builds(
     rt.Scene,
     description=printable,
-    film=st.builds(
-        rt.Film, width=st.integers(1, 10**6), filter=st.builds(rt.TentFilter, radius=positive)
-    ),
+    film=st.builds(rt.Film, width=st.integers(1, 10**6), filter=filters, layers=names.map(tuple)),
     sampler=st.one_of(
         st.none(), st.builds(rt.Sobol, spp=st.integers(1, 2**31), seed=st.integers(0, 2**63 - 1))
     ),
-    materials=st.fixed_dictionaries({"m": materials}),
-    shapes=st.lists(shapes, max_size=4).map(tuple),
-    lights=st.lists(st.builds(rt.Point, position=vectors, intensity=colours), max_size=2).map(
-        tuple
+    integrator=integrators,
+    textures=st.fixed_dictionaries({"t": textures}),
+    materials=st.fixed_dictionaries(
+        {"m": materials, "w": wrappers, "other": st.just(rt.Plastic())}
     ),
+    shapes=st.lists(shapes, max_size=3).map(tuple),
+    lights=st.builds(lambda some, sky: (*some, sky), st.lists(lights, max_size=3), skies),
 )
 
 
@@ -144,8 +209,15 @@ def test_schema_allows_the_scenes(file):
     assert problems(data_of(file.read_text()), SCHEMA) == []
 
 
-def test_schema_allows_everything():
-    assert problems(data_of(EVERYTHING), SCHEMA) == []
+@pytest.mark.parametrize("text", [EVERY_SHAPE, EVERY_LAW, EVERY_LIGHT])
+def test_schema_allows_everything(text):
+    assert problems(data_of(text), SCHEMA) == []
+
+
+@given(scenes)
+@settings(max_examples=20)
+def test_schema_allows_what_is_written(scene):
+    assert problems(json.loads(scene.to_json()), SCHEMA) == []
 
 
 @pytest.mark.parametrize(
@@ -158,6 +230,15 @@ def test_schema_allows_everything():
         "shapes: [{type: teapot}]",
         "materials: {a: {type: diffuse, reflectance: 2}}",
         "lights: [{type: point}]",
+        "lights: [{type: laser}]",
+        "materials: {a: {type: conductor, eta: 1}}",
+        "materials: {a: {type: mask, base: b, opacity: 1.5}, b: {type: mirror}}",
+        "materials: {a: {type: principled, metallic: -0.1}}",
+        "materials: {a: {type: rough_plastic, alpha: 0}}",
+        "materials: {a: {type: rough_conductor, eta: 1, k: 1, distribution: phong}}",
+        "textures: {a: {type: bitmap, file: b.png, filter: cubic}}",
+        "film: {layers: [albedo, ghosts]}",
+        "film: {filter: {type: lanczos, lobes: 0}}",
     ],
 )
 def test_schema_refuses_what_the_scene_refuses(text):
@@ -200,7 +281,7 @@ def test_frozen():
 
 
 def test_changed(tmp_path):
-    scene = rt.Scene.load(everything(tmp_path))
+    scene = rt.Scene.load(every_shape(tmp_path))
     before = scene.to_json()
     other = scene.changed(film=rt.Film(width=3))
     assert other.film.width == 3

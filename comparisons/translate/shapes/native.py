@@ -11,10 +11,13 @@ from typing import Any
 import numpy as np
 
 from comparisons.pieces import Plugin, same_uv
+from comparisons.translate.errors import UntranslatableError
 from comparisons.translate.shapes.choice import translate_shape
+from comparisons.translate.shapes.meshes import Soup
 from comparisons.translate.shapes.plugins import Site, curved_instance, is_similarity, to_world
 from reference_rt.shapes import Box, Disk, Rectangle, Sphere
 from reference_rt.shapes.shape import FloatArray
+from reference_rt.transform import Affine, apply_points
 
 CUBE_FACES = (1, 4, 3, 5, 0, 2)
 """Our numbers of the faces of Mitsuba's cube, which are -y +y +x +z -x -z, two triangles each
@@ -65,6 +68,8 @@ def _(shape: Disk, site: Site) -> list[Plugin]:
 @translate_shape.register
 def _(shape: Box, site: Site) -> list[Plugin]:
     m = shape.map_in(site.place)
+    if site.textured:
+        return [_box_of_triangles(m, site)]
     edges = m[:, :3].copy()
     faces = np.array(CUBE_FACES)
     if np.linalg.det(edges) < 0.0:
@@ -75,6 +80,27 @@ def _(shape: Box, site: Site) -> list[Plugin]:
         faces = np.where(faces % 3 == turned, (faces + 3) % 6, faces)
     plugin = {"type": "cube", "to_world": to_world(edges, m[:, 3]), **site.parts}
     return [Plugin(plugin, faces=np.repeat(faces, 2))]
+
+
+def _box_of_triangles(m: Affine, site: Site) -> Plugin:
+    """With our uv: of each face the two other coordinates in the order x, y, z, from 0 to 1."""
+    if "emitter" in site.parts:
+        # As a light of Whitted's a mesh is as many points as it has triangles.
+        raise UntranslatableError("emissive material with a texture on a Box", "material")
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    positions, faces = np.empty((6, 4, 3)), []
+    for face in range(6):
+        axis, sign = face % 3, 1.0 if face >= 3 else -1.0
+        a, b = (k for k in range(3) if k != axis)
+        positions[face][:, [a, b]] = 2.0 * square - 1.0
+        positions[face][:, axis] = sign
+        triangles = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * face
+        # a, b and the outward normal are right-handed for +x, -y, +z; a mirror turns all round.
+        outward = sign * (-1.0 if axis == 1 else 1.0) * np.linalg.det(m[:, :3])
+        faces.append(triangles if outward > 0.0 else triangles[:, ::-1])
+    uvs = np.tile(square, (6, 1))
+    soup = Soup(apply_points(m, positions.reshape(-1, 3)), uvs=uvs, faces=np.concatenate(faces))
+    return Plugin(soup.mesh(site.parts), faces=np.repeat(np.arange(6), 2), uv=same_uv)
 
 
 def _middle_axis(edges: FloatArray) -> int:

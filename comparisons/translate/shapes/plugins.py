@@ -6,6 +6,7 @@ import numpy as np
 
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.pieces import Plugin, Within
+from comparisons.translate.errors import UntranslatableError
 from reference_rt.shapes.shape import FloatArray, Place
 from reference_rt.transform import Affine
 
@@ -16,14 +17,17 @@ class Site(NamedTuple):
     place: where its own transform is followed by the maps of its solid and its instance;  mirrored:
     whether that of its instance mirrors space, where triangles keep their front although their
     corners then run the other way round;  parts: the BSDF and, where it shines, the emitter;
-    material: its name;  copies: how many of the leaf there are;  shared: what the leaves of one
-    scene have in common, by key: a group, the triangles of a file;  reach: about the largest
-    coordinate of the scene.
+    coloured: the same for a mesh with colours of its vertices;  textured: whether the look of the
+    material depends on the surface's coordinates;  material: its name;  copies: how many of the
+    leaf there are;  shared: what the leaves of one scene have in common, by key: a group, the
+    triangles of a file;  reach: about the largest coordinate of the scene.
     """
 
     place: Place
     mirrored: bool
     parts: dict[str, Any]
+    coloured: dict[str, Any]
+    textured: bool
     material: str | None
     copies: int
     shared: dict[Any, Any]
@@ -40,6 +44,8 @@ def to_world(linear: FloatArray, offset: FloatArray) -> Any:
 def instance_of(name: str, member: Any, m: Affine, site: Site) -> Plugin:
     """A Mitsuba shape, see `Within.member`, under any affine map: as an instance of a group of its
     own, of which there is one for each `name` and material."""
+    if "emitter" in site.parts:
+        raise UntranslatableError("emissive material of an instance", "material")
     key = (name, site.material)
     if key not in site.shared:
         if isinstance(member, dict):

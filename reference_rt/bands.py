@@ -1,0 +1,159 @@
+"""What is computed for a band of pixels: the kernels that `render` hands to threads.
+
+All take samples first..last of the pixels begin..end, counted along rows, and write the rows of
+these pixels.
+"""
+
+from typing import Any, NamedTuple
+
+from reference_rt import sampling
+from reference_rt.cameras import LENS_CENTRE, camera_ray, lens_sample
+from reference_rt.filters import film_offset
+from reference_rt.geometry import closest_hit, surface
+from reference_rt.integrators import radiance
+from reference_rt.integrators.ray_cast import cast
+from reference_rt.kernel import entry_kernel, kernel
+from reference_rt.ray import Ray
+from reference_rt.sampling import draw_pair, start_sample
+from reference_rt.shading import texture_place
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.tables import SceneTables
+from reference_rt.textures import colour_at
+from reference_rt.vec3 import Vec3, row
+
+
+class FilmRay(NamedTuple):
+    """A ray through a point near a pixel, and the weight of what it brings there."""
+
+    ray: Ray
+    weight: float
+
+
+@kernel
+def _film_ray(
+    view: Any, film_filter: Any, sampler: Any, shape: tuple[int, int], x: int, y: int
+) -> FilmRay:
+    width, height = shape
+    u0, u1 = draw_pair(sampler, sampling.FILM)
+    dx, weight_x = film_offset(film_filter, u0)
+    dy, weight_y = film_offset(film_filter, u1)
+    lens = lens_sample(view, sampler)
+    ray = camera_ray(view, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
+    return FilmRay(ray, weight_x * weight_y)
+
+
+@entry_kernel
+def render_band(
+    integrator: Any,
+    scene: SceneTables,
+    view: Any,
+    film_filter: Any,
+    sampler_setup: Any,
+    shape: tuple[int, int],
+    spp: int,
+    out: FloatArray,
+    spread: FloatArray | None,
+    begin: int,
+    end: int,
+    first: int,
+    last: int,
+) -> None:
+    """Radiance, added to out (n, 3); with the last of all `spp` samples the sum becomes the mean,
+    and spread (n, 3) the estimate of the mean's variance."""
+    for pixel in range(begin, end):
+        y, x = pixel // shape[0], pixel % shape[0]
+        total = row(out, pixel)
+        for sample in range(first, last):
+            sampler = start_sample(sampler_setup, pixel, sample)
+            seen = _film_ray(view, film_filter, sampler, shape, x, y)
+            one = radiance(integrator, scene, seen.ray, sampler) * seen.weight
+            total = total + one
+            _add_spread(spread, pixel, sample, one, total)
+        if last == spp:
+            total = total / spp
+            _finish_spread(spread, pixel, spp)
+        out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
+
+
+@kernel
+def _add_spread(spread: FloatArray | None, pixel: int, sample: int, one: Vec3, total: Vec3) -> None:
+    """The sum of squared differences from the mean, with number `sample`; total: the sum with it
+    (Youngs & Cramer 1971: squares of differences, so that nothing cancels)."""
+    if spread is None:
+        return
+    if sample > 0:
+        count = sample + 1.0
+        off = one * count - total
+        scale = 1.0 / (count * sample)
+        spread[pixel, 0] += off.x * off.x * scale
+        spread[pixel, 1] += off.y * off.y * scale
+        spread[pixel, 2] += off.z * off.z * scale
+
+
+@kernel
+def _finish_spread(spread: FloatArray | None, pixel: int, spp: int) -> None:
+    if spread is None:
+        return
+    scale = 1.0 / (spp * (spp - 1.0))
+    for k in range(3):
+        spread[pixel, k] *= scale
+
+
+@entry_kernel
+def first_hits_band(
+    scene: SceneTables,
+    view: Any,
+    film_filter: Any,
+    sampler_setup: Any,
+    shape: tuple[int, int],
+    spp: int,
+    albedos: FloatArray,
+    normals: FloatArray,
+    begin: int,
+    end: int,
+    first: int,
+    last: int,
+) -> None:
+    """Albedo and shading normal of what the rays of `render_band` hit first, their means into
+    albedos (n, 3) and normals (n, 3)."""
+    for pixel in range(begin, end):
+        y, x = pixel // shape[0], pixel % shape[0]
+        albedo, normal = row(albedos, pixel), row(normals, pixel)
+        for sample in range(first, last):
+            sampler = start_sample(sampler_setup, pixel, sample)
+            seen = _film_ray(view, film_filter, sampler, shape, x, y)
+            hit = closest_hit(scene.geometry, seen.ray)
+            if hit.kind >= 0:
+                point = surface(scene.geometry, seen.ray, hit)
+                at = texture_place(scene.textures, scene.geometry, seen.ray, hit)
+                own = colour_at(scene.materials.shown, point.material, at)
+                albedo = albedo + own * seen.weight
+                normal = normal + point.ns * seen.weight
+        if last == spp:
+            albedo, normal = albedo / spp, normal / spp
+        albedos[pixel, 0], albedos[pixel, 1], albedos[pixel, 2] = albedo
+        normals[pixel, 0], normals[pixel, 1], normals[pixel, 2] = normal
+
+
+@entry_kernel
+def cast_band(
+    scene: SceneTables,
+    view: Any,
+    shape: tuple[int, int],
+    out: FloatArray,
+    begin: int,
+    end: int,
+    first: int,
+    last: int,
+) -> None:
+    """All layers of ray casting at the pixels' centres, into out (n, 10); `first` and `last` are
+    there for the likeness to `render_band`."""
+    width, height = shape
+    for pixel in range(begin, end):
+        y, x = pixel // width, pixel % width
+        ray = camera_ray(view, (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
+        found = cast(scene, ray)
+        out[pixel, 0], out[pixel, 1], out[pixel, 2] = found.colour
+        out[pixel, 3] = found.distance
+        out[pixel, 4], out[pixel, 5], out[pixel, 6] = found.n
+        out[pixel, 7], out[pixel, 8], out[pixel, 9] = found.id, found.u, found.v

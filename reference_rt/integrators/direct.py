@@ -1,0 +1,135 @@
+"""Direct light: what surfaces send to the eye without any other surface between."""
+
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+
+from pydantic import Field, model_validator
+
+from reference_rt import lights as any_light
+from reference_rt import materials as any_material
+from reference_rt import sampling
+from reference_rt.description import Description
+from reference_rt.geometry import closest_hit, surface
+from reference_rt.integrators.integrator import direct, power_heuristic, receiver
+from reference_rt.kernel import kernel, local_floats
+from reference_rt.lights import area
+from reference_rt.materials import Shading
+from reference_rt.ray import Ray, ray_from
+from reference_rt.sampling import draw_pair
+from reference_rt.shading import shade, texture_place
+from reference_rt.tables import SceneTables
+from reference_rt.vec3 import Vec3, max_component, to_world
+
+_Count = Annotated[int, Field(ge=0, le=1024)]
+
+
+class Direct(Description):
+    """Emission, and light that is scattered once: n samples of lights and m of the material,
+    joined by multiple importance sampling."""
+
+    deterministic: ClassVar[bool] = False
+    type: Literal["direct"] = "direct"
+    light_samples: _Count = 1
+    """Of lights, for each ray; without any, lights that are points or directions are not seen."""
+    bsdf_samples: _Count = 1
+    """Of the material."""
+
+    @model_validator(mode="after")
+    def _any(self) -> Self:
+        if self.light_samples + self.bsdf_samples == 0:
+            raise ValueError("no samples at all; expected light_samples or bsdf_samples above 0")
+        return self
+
+    def setup(self) -> "DirectSetup":
+        return DirectSetup(self.light_samples, self.bsdf_samples)
+
+
+class DirectSetup(NamedTuple):
+    light_samples: int
+    bsdf_samples: int
+
+
+@kernel
+def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
+    """An estimate of the radiance along `ray` by paths of at most two edges; its mean is exact."""
+    lights = scene.lights
+    hit = closest_hit(scene.geometry, ray)
+    if hit.kind < 0:
+        behind: Vec3 = any_light.background(lights.environment, ray.d)
+        return behind
+    layers = local_floats(any_material.layer_floats(scene.materials))
+    shading = shade(scene, ray, hit, layers)
+    total = area.emitted(lights.areas, shading.point, shading.at, -ray.d)
+    normal = receiver(scene, shading)
+    if any_material.is_smooth(scene.materials, shading.point.material):
+        for k in range(setup.light_samples):
+            total = total + _from_light(setup, scene, shading, normal, sampler, k)
+    for k in range(setup.bsdf_samples):
+        total = total + _from_bsdf(setup, scene, shading, normal, sampler, k)
+    return total
+
+
+@kernel
+def _from_light(
+    setup: DirectSetup,
+    scene: SceneTables,
+    shading: Shading,
+    normal: Vec3,
+    sampler: sampling.Sample,
+    k: int,
+) -> Vec3:
+    """Light sample k of n, as its share of the estimate."""
+    black = Vec3(0.0, 0.0, 0.0)
+    if any_light.count(scene.lights) == 0:
+        return black
+    dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * k
+    u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_PICK)
+    picked = any_light.pick(scene.lights, shading.point.p, normal, u_pick)
+    if picked.probability == 0.0:
+        return black
+    u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
+    sample = direct(scene, shading, picked.light, u0, u1)
+    if max_component(sample.contribution) == 0.0:
+        return black
+    pdf = sample.light.pdf * picked.probability
+    n = float(setup.light_samples)
+    if sample.light.is_delta:
+        return sample.contribution * (1.0 / (n * pdf))
+    bsdf_pdf = any_material.pdf(scene.materials, shading, sample.wi)
+    weight = power_heuristic(n * pdf, setup.bsdf_samples * bsdf_pdf)
+    return sample.contribution * (weight / (n * pdf))
+
+
+@kernel
+def _from_bsdf(
+    setup: DirectSetup,
+    scene: SceneTables,
+    shading: Shading,
+    normal: Vec3,
+    sampler: sampling.Sample,
+    k: int,
+) -> Vec3:
+    """Sample k of m of the material, as its share of the estimate."""
+    black = Vec3(0.0, 0.0, 0.0)
+    lights = scene.lights
+    dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * k
+    u_lobe, _ = draw_pair(sampler, dimension + sampling.LOBE_AND_ROULETTE)
+    u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
+    scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
+    if scattered.pdf == 0.0:
+        return black
+    ray = ray_from(shading.point, to_world(shading.frame, scattered.wi))
+    hit = closest_hit(scene.geometry, ray)
+    p = shading.point.p
+    if hit.kind < 0:
+        arriving: Vec3 = any_light.background(lights.environment, ray.d)
+        light_pdf = any_light.environment_pdf(lights, p, normal, ray.d)
+    else:
+        there = surface(scene.geometry, ray, hit)
+        at = texture_place(scene.textures, scene.geometry, ray, hit)
+        arriving = area.emitted(lights.areas, there, at, -ray.d)
+        light_pdf = any_light.area_pdf(lights, scene.geometry.shapes, p, normal, there)
+    weight = 1.0
+    m = float(setup.bsdf_samples)
+    if not scattered.is_delta:
+        weight = power_heuristic(m * scattered.pdf, setup.light_samples * light_pdf)
+    return scattered.weight * arriving * (weight / m)

@@ -1,0 +1,126 @@
+"""The materials of a scene as tables."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reference_rt.materials import BEHIND, CHOOSES, SMOOTH, Materials
+from reference_rt.materials.diffuse import Diffuse
+from reference_rt.materials.emissive import Emissive
+from reference_rt.materials.layers import LayerTables, Way, needs_tangents, transmits, ways
+from reference_rt.materials.leaves import BLACK, CLEAR, TABLES, Leaves
+from reference_rt.materials.material import Material
+from reference_rt.materials.phong import Phong
+from reference_rt.materials.wrappers import Wrapper
+from reference_rt.textures import Palette
+from reference_rt.textures.parameter import join
+
+if TYPE_CHECKING:
+    from reference_rt.scene import Scene
+
+DEFAULT = "\0"
+"""The name, which no scene can use, of what shapes without a material are made of."""
+
+
+def material_tables(scene: "Scene", palette: Palette, default: bool) -> Materials:
+    """The materials of a scene in its order, then the default one, if that is used (`default`).
+
+    An emissive material scatters as its base does.  Raises SceneError.
+    """
+    materials: dict[str, Material] = {**scene.materials, DEFAULT: Diffuse()}
+    leaves, layers = _Leaves(materials, palette), LayerTables(palette)
+    kinds, rows, traits, shown = [], [], [], []
+    oriented = False
+    for name in materials:
+        try:
+            shown.append(palette.colours(_shown(name, materials), np.inf))
+            scattering = _scattering(name, materials)
+            if scattering is None or (name == DEFAULT and not default):
+                found = []
+            else:
+                found = ways(scattering, materials)
+            if scene.integrator.type == "path":
+                _check_energy(found, materials, palette)
+            numbers = [leaves.add(way.leaf) for way in found]
+            layers.add(list(zip(found, numbers, strict=True)))
+        except ValueError as error:
+            raise scene.error(str(error), "materials", name) from None
+        kind, row = numbers[0] if len(numbers) == 1 else (BLACK, -1)
+        kinds.append(kind)
+        rows.append(row)
+        traits.append(_traits(found, materials))
+        oriented = oriented or any(needs_tangents(way, materials) for way in found)
+    return Materials(
+        kind=np.array(kinds),
+        row=np.array(rows),
+        traits=np.array(traits),
+        shown=join(shown),
+        oriented=np.zeros(1, np.int64) if oriented else None,
+        layers=layers.tables(),
+        leaves=leaves.tables(),
+    )
+
+
+def _check_energy(found: list[Way], materials: Mapping[str, Material], palette: Palette) -> None:
+    """Raises ValueError for the text-book's local shading where it is no law that paths can follow:
+    it may return more light than arrives."""
+    for way in found:
+        leaf = materials[way.leaf] if way.leaf is not None else None
+        if isinstance(leaf, Phong) and leaf.energy_bound(palette) > 1.0:
+            raise ValueError(
+                f"creates energy: up to {leaf.energy_bound(palette):.4g} of the light comes back; "
+                "expected at most 1 for path tracing, or the integrator 'whitted'"
+            )
+
+
+def _scattering(name: str, materials: Mapping[str, Material]) -> str | None:
+    """The name of the material that scatters: of an emissive one its base, if it has any."""
+    material = materials[name]
+    return material.base if isinstance(material, Emissive) else name
+
+
+def _shown(name: str, materials: Mapping[str, Material]) -> tuple[float, float, float] | str:
+    """The colour of a material, of a wrapper that of the first that it wraps."""
+    material = materials[name]
+    while isinstance(material, Wrapper):
+        material = materials[getattr(material, material.bases[0])]
+    return material.colour
+
+
+def _traits(found: list[Way], materials: Mapping[str, Material]) -> int:
+    """The bits of `Materials.traits`."""
+    leaves = [materials[way.leaf] for way in found if way.leaf is not None]
+    bits = 0
+    if any(leaf.smooth for leaf in leaves):
+        bits |= SMOOTH
+    if len(found) > 1 or any(leaf.chooses for leaf in leaves):
+        bits |= CHOOSES
+    if any(transmits(way, materials) or way.turns for way in found):
+        bits |= BEHIND
+    return bits
+
+
+class _Leaves:
+    """Collects the rows of leaves, each once."""
+
+    def __init__(self, materials: Mapping[str, Material], palette: Palette) -> None:
+        self.materials, self.palette = materials, palette
+        self.parts: dict[int, list[Any]] = {}
+        self.known: dict[str, tuple[int, int]] = {}
+
+    def add(self, name: str | None) -> tuple[int, int]:
+        """(kind, row) of a leaf, without a name of what is not there.  Raises ValueError."""
+        if name is None:
+            return CLEAR, -1
+        if name not in self.known:
+            material = self.materials[name]
+            code = next(c for c, _, cls, _, _ in TABLES if isinstance(material, cls))
+            rows = self.parts.setdefault(code, [])
+            rows.append(material.tabulate(self.palette))
+            self.known[name] = code, len(rows) - 1
+        return self.known[name]
+
+    def tables(self) -> Leaves:
+        found = {code: join(rows) for code, rows in self.parts.items()}
+        return Leaves(**{field: found.get(code) for code, field, _, _, _ in TABLES})

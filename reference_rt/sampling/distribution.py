@@ -1,0 +1,53 @@
+"""Tabulated densities, sampled by inversion: running sums, searched by bisection."""
+
+import math
+
+import numpy as np
+
+from reference_rt.kernel import kernel
+from reference_rt.shapes.shape import FloatArray
+
+
+def running_sums(values: FloatArray) -> FloatArray:
+    """(..., n + 1): 0 and the sums of the first 1 to n of values (..., n)."""
+    start = np.zeros((*values.shape[:-1], 1))
+    return np.concatenate([start, np.cumsum(values, axis=-1)], axis=-1)
+
+
+@kernel
+def cell_of(sums: FloatArray, x: float) -> int:
+    """The i with sums[i] <= x < sums[i + 1], of running sums (n + 1,): never one of no width."""
+    return min(max(int(np.searchsorted(sums, x, "right")) - 1, 0), len(sums) - 2)
+
+
+@kernel
+def blended(sums: FloatArray, k: int, s: float, i: int) -> float:
+    """Entry i of the running sums between rows k, for s = 0, and k + 1, for s = 1."""
+    return float(sums[k, i] * (1.0 - s) + sums[k + 1, i] * s)
+
+
+@kernel
+def blended_cell_of(sums: FloatArray, k: int, s: float, x: float) -> int:
+    """As `cell_of`, in `blended` rows of sums (m, n + 1)."""
+    low, high = 0, sums.shape[1] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if blended(sums, k, s, middle) <= x:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def linear(u: float, a: float, b: float) -> float:
+    """A number from 0 to 1 with a density that is linear from a >= 0 at 0 to b >= 0 at 1.
+
+    The root of (1 - t) a + t b's integral, (a t + (b - a) t² / 2) = u (a + b) / 2, in the form
+    that does not cancel; both divided by the larger, so that no square overflows.
+    """
+    most = max(a, b)
+    if u <= 0.0 or most == 0.0:
+        return 0.0
+    a, b = a / most, b / most
+    return min(u * (a + b) / (a + math.sqrt((1.0 - u) * a * a + u * b * b)), 1.0)

@@ -1,0 +1,53 @@
+"""From a hit to what materials are asked about: the point, its frame, where textures are asked."""
+
+from reference_rt.geometry import Geometry, coordinates, surface, tangents
+from reference_rt.kernel import kernel
+from reference_rt.materials import Shading, prepare
+from reference_rt.ray import Hit, Ray
+from reference_rt.shading_frame import oriented_frame
+from reference_rt.shapes.shape import FloatArray, IntArray, Tangents
+from reference_rt.tables import SceneTables
+from reference_rt.textures import At, Textures
+from reference_rt.vec3 import Frame, Vec3, frame_from_normal, to_local
+
+_NO_COLOUR = Vec3(-1.0, -1.0, -1.0)
+
+
+@kernel
+def shade(scene: SceneTables, ray: Ray, hit: Hit, layers: FloatArray) -> Shading:
+    """What the material at a hit (which must be one) is asked about, seen along the ray.
+
+    `layers` (`materials.layer_floats`,) is scratch that the answer lives in.
+    """
+    point = surface(scene.geometry, ray, hit)
+    world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
+    frame = _frame(scene.materials.oriented, point.ns, world)
+    local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))
+    at = texture_place(scene.textures, scene.geometry, ray, hit)
+    shading = Shading(point, frame, to_local(frame, -ray.d), at, local, layers)
+    prepare(scene.materials, shading)
+    return shading
+
+
+@kernel
+def texture_place(textures: Textures | None, geometry: Geometry, ray: Ray, hit: Hit) -> At:
+    """Where textures are asked at a hit: computed only where the scene has any."""
+    if textures is None:
+        return At(textures, 0.0, 0.0, _NO_COLOUR)
+    found = coordinates(geometry, ray, hit)
+    return At(textures, found.u, found.v, found.colour)
+
+
+@kernel
+def _tangents(oriented: IntArray | None, geometry: Geometry, ray: Ray, hit: Hit) -> Tangents:
+    if oriented is None:
+        zero = Vec3(0.0, 0.0, 0.0)
+        return Tangents(zero, zero)
+    return tangents(geometry, ray, hit)
+
+
+@kernel
+def _frame(oriented: IntArray | None, ns: Vec3, world: Tangents) -> Frame:
+    if oriented is None:
+        return frame_from_normal(ns)
+    return oriented_frame(ns, world)

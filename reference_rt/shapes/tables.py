@@ -1,0 +1,92 @@
+"""The tables of all shapes, and what is primitive.
+
+To add a shape: its file with description, table and kernels; here, a code, a field of `Shapes`, a
+line in `TABLES`, a member of `Primitive`; in `dispatch.py` one `if` in each kernel; a translator
+function in `comparisons.translate`; a scene; a row in the tests' tuple.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from reference_rt.kernel import ByClass
+from reference_rt.shapes import (
+    box,
+    disk,
+    plane,
+    polygon,
+    quadrics,
+    rectangle,
+    sphere,
+    torus,
+    triangle,
+)
+from reference_rt.shapes.box import Box, Boxes
+from reference_rt.shapes.cone import Cone
+from reference_rt.shapes.cylinder import Cylinder
+from reference_rt.shapes.disk import Disk, Disks
+from reference_rt.shapes.mesh import Mesh
+from reference_rt.shapes.plane import Plane, Planes
+from reference_rt.shapes.polygon import Polygon, Polygons
+from reference_rt.shapes.quadric import Quadric
+from reference_rt.shapes.quadrics import Quadrics
+from reference_rt.shapes.rectangle import Rectangle, Rectangles
+from reference_rt.shapes.sphere import Sphere, Spheres
+from reference_rt.shapes.torus import Tori, Torus
+from reference_rt.shapes.triangle import Triangle, Triangles
+
+# Codes of `Hit.kind`: which table a primitive is a row of.
+SPHERE, RECTANGLE, BOX, TRIANGLE, DISK, PLANE, POLYGON, QUADRIC, TORUS = range(9)
+
+Primitive = (
+    Sphere
+    | Rectangle
+    | Triangle
+    | Box
+    | Mesh
+    | Disk
+    | Plane
+    | Polygon
+    | Quadric
+    | Cylinder
+    | Cone
+    | Torus
+)
+"""The descriptions that are primitives by themselves; `reference_rt.csg` adds what is made of them.
+"""
+
+
+class Shapes(NamedTuple):
+    """Every primitive of a scene; None for a table that the scene does not have."""
+
+    spheres: Spheres | None
+    rectangles: Rectangles | None
+    boxes: Boxes | None
+    triangles: Triangles | None
+    disks: Disks | None
+    planes: Planes | None
+    polygons: Polygons | None
+    quadrics: Quadrics | None
+    tori: Tori | None
+
+
+TABLES: tuple[tuple[int, str, type, Any], ...] = (
+    (SPHERE, "spheres", Spheres, sphere),
+    (RECTANGLE, "rectangles", Rectangles, rectangle),
+    (BOX, "boxes", Boxes, box),
+    (TRIANGLE, "triangles", Triangles, triangle),
+    (DISK, "disks", Disks, disk),
+    (PLANE, "planes", Planes, plane),
+    (POLYGON, "polygons", Polygons, polygon),
+    (QUADRIC, "quadrics", Quadrics, quadrics),
+    (TORUS, "tori", Tori, torus),
+)
+"""(code, field of Shapes, table, module with its kernels), in the order of the codes."""
+
+
+def of_table(name: str, without: Callable[..., Any]) -> Callable[..., Any]:
+    """The kernel `name` of the module of the table that is the first argument."""
+    choice = ByClass(name)
+    choice.register(type(None), without)
+    for _, _, table, module in TABLES:
+        choice.register(table, getattr(module, name, without))
+    return choice.function

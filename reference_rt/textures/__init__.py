@@ -1,0 +1,61 @@
+"""All textures: one file each; here, their names.
+
+To add a texture: its file with description, table and `lookup` kernel; a code in `texture.py`; in
+`lookup.py` a field of `Textures` and a branch; below, `AnyTexture` and a line in `TABLES`; a
+translator function in `comparisons.translate`; a scene; a row in the tests' tuple.
+"""
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from reference_rt.textures import bitmap, checker, vertex_colours
+from reference_rt.textures.bitmap import Bitmap
+from reference_rt.textures.checker import Checker
+from reference_rt.textures.lookup import At, Textures
+from reference_rt.textures.parameter import (
+    NO_TEXTURES,
+    ColourParameter,
+    Colours,
+    Numbers,
+    Palette,
+    ReflectanceParameter,
+    TextureName,
+    UnitParameter,
+    colour_at,
+    number_at,
+    texture_names,
+)
+from reference_rt.textures.texture import BITMAP, CHECKER, VERTEX_COLOURS, Texture
+from reference_rt.textures.vertex_colours import VertexColours
+
+AnyTexture = Annotated[Checker | Bitmap | VertexColours, Field(discriminator="type")]
+
+TABLES: tuple[tuple[int, str, type[Texture], Any], ...] = (
+    (CHECKER, "checkers", Checker, checker),
+    (BITMAP, "bitmaps", Bitmap, bitmap),
+    (VERTEX_COLOURS, "vertex_colours", VertexColours, vertex_colours),
+)
+"""(code, field of Textures, description, module)."""
+
+__all__ = [
+    "NO_TEXTURES",
+    "TABLES",
+    "AnyTexture",
+    "At",
+    "Bitmap",
+    "Checker",
+    "ColourParameter",
+    "Colours",
+    "Numbers",
+    "Palette",
+    "ReflectanceParameter",
+    "Texture",
+    "TextureName",
+    "Textures",
+    "UnitParameter",
+    "VertexColours",
+    "colour_at",
+    "number_at",
+    "texture_names",
+]

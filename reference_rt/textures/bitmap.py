@@ -1,0 +1,150 @@
+"""Bitmap: an image laid over the surface, its top row along v = 1."""
+
+import math
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.description import Positive
+from reference_rt.kernel import kernel
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.textures.texture import Texture
+from reference_rt.vec3 import Vec3, luminance, row
+
+_FILTERS = ("bilinear", "nearest")
+_WRAPS = ("repeat", "clamp", "mirror")
+_NEAREST = 1
+_CLAMP, _MIRROR = 1, 2
+
+
+class Bitmap(Texture):
+    """An image: (0, 0) is its lower left corner, (1, 1) its upper right one."""
+
+    type: Literal["bitmap"] = "bitmap"
+    file: str
+    """.png, .jpg, .exr and what Pillow reads besides, relative to the scene."""
+    filter: Literal["bilinear", "nearest"] = "bilinear"
+    wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
+    """What lies beyond (0, 1)."""
+    encoding: Literal["auto", "srgb", "raw"] = "auto"
+    """srgb: values are undone to linear ones; raw: taken as they are; auto: srgb for files of
+    integers, raw for those of floats."""
+    scale: Positive = 1.0
+    """What linear values are multiplied with: lamps and heights may need more than 1."""
+
+    def tabulate(self, folder: Path) -> "Bitmaps":
+        from reference_rt.textures.image_file import read_image  # Pillow and OpenEXR take a while
+
+        with np.errstate(over="ignore"):
+            texels = self.scale * read_image(folder / self.file, self.encoding)
+        if not np.isfinite(texels).all():
+            raise ValueError(f"{folder / self.file}: overflows; expected a smaller scale")
+        height, width = texels.shape[:2]
+        return Bitmaps(
+            texels=texels.reshape(-1, 3),
+            first=np.array([0]),
+            width=np.array([width]),
+            height=np.array([height]),
+            filter=np.array([_FILTERS.index(self.filter)]),
+            wrap=np.array([_WRAPS.index(self.wrap)]),
+        )
+
+
+class Bitmaps(NamedTuple):
+    """n images: texels (all, 3) of all, linear sRGB, rows from the top; of each (n,): the first of
+    its texels, width, height, filter, wrap."""
+
+    texels: FloatArray
+    first: IntArray
+    width: IntArray
+    height: IntArray
+    filter: IntArray
+    wrap: IntArray
+
+
+def join(parts: list[Bitmaps]) -> Bitmaps:
+    """One table from several: texels are counted on."""
+    counts = [len(part.texels) for part in parts]
+    starts = np.cumsum([0, *counts[:-1]])
+    moved = [
+        part._replace(first=part.first + start) for part, start in zip(parts, starts, strict=True)
+    ]
+    return Bitmaps(*(np.concatenate(column) for column in zip(*moved, strict=True)))
+
+
+def greatest(bitmaps: Bitmaps) -> float:
+    return float(bitmaps.texels.max())
+
+
+@kernel
+def _wrapped(i: int, n: int, wrap: int) -> int:
+    """The texel that stands at i of a row of n that goes on for ever."""
+    if wrap == _CLAMP:
+        return min(max(i, 0), n - 1)
+    if wrap == _MIRROR:
+        i = i % (2 * n)
+        return min(i, 2 * n - 1 - i)
+    return i % n
+
+
+@kernel
+def texel(bitmaps: Bitmaps, i: int, x: int, y: int) -> Vec3:
+    """Column x, row y (from the top) of image i, both beyond its edges too."""
+    width, height, wrap = bitmaps.width[i], bitmaps.height[i], bitmaps.wrap[i]
+    k = _wrapped(y, height, wrap) * width + _wrapped(x, width, wrap)
+    return row(bitmaps.texels, bitmaps.first[i] + k)
+
+
+class Patch(NamedTuple):
+    """The four texels whose middles are around a point, and how far it is from the left and from
+    the upper ones, from 0 to 1."""
+
+    upper_left: Vec3
+    upper_right: Vec3
+    lower_left: Vec3
+    lower_right: Vec3
+    x: float
+    y: float
+
+
+@kernel
+def _patch(bitmaps: Bitmaps, i: int, u: float, v: float) -> Patch:
+    """Texel (x, y) has its middle at u = (x + 1/2) / width, v = 1 - (y + 1/2) / height."""
+    x, y = u * bitmaps.width[i] - 0.5, (1.0 - v) * bitmaps.height[i] - 0.5
+    column, line = math.floor(x), math.floor(y)
+    return Patch(
+        texel(bitmaps, i, column, line),
+        texel(bitmaps, i, column + 1, line),
+        texel(bitmaps, i, column, line + 1),
+        texel(bitmaps, i, column + 1, line + 1),
+        x - column,
+        y - line,
+    )
+
+
+@kernel
+def lookup(bitmaps: Bitmaps, i: int, u: float, v: float) -> Vec3:
+    """The colour at texture coordinates (u, v)."""
+    if bitmaps.filter[i] == _NEAREST:
+        return texel(
+            bitmaps, i, math.floor(u * bitmaps.width[i]), math.floor((1.0 - v) * bitmaps.height[i])
+        )
+    patch = _patch(bitmaps, i, u, v)
+    upper = patch.upper_left * (1.0 - patch.x) + patch.upper_right * patch.x
+    lower = patch.lower_left * (1.0 - patch.x) + patch.lower_right * patch.x
+    return upper * (1.0 - patch.y) + lower * patch.y
+
+
+@kernel
+def gradient(bitmaps: Bitmaps, i: int, u: float, v: float) -> tuple[float, float]:
+    """The derivatives of the luminance at texture coordinates (u, v) by these: of the bilinear
+    patch there; (0, 0) for the filter `nearest`."""
+    if bitmaps.filter[i] == _NEAREST:
+        return 0.0, 0.0
+    patch = _patch(bitmaps, i, u, v)
+    left, right = luminance(patch.upper_left), luminance(patch.upper_right)
+    low_left, low_right = luminance(patch.lower_left), luminance(patch.lower_right)
+    along_x = (right - left) * (1.0 - patch.y) + (low_right - low_left) * patch.y
+    along_y = (low_left - left) * (1.0 - patch.x) + (low_right - right) * patch.x
+    return along_x * bitmaps.width[i], -along_y * bitmaps.height[i]

@@ -1,0 +1,46 @@
+"""Checker: two colours in turn, four squares to each unit square of (u, v)."""
+
+import math
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.description import Colour
+from reference_rt.kernel import kernel
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.textures.texture import Texture
+from reference_rt.vec3 import Vec3, row
+
+
+class Checker(Texture):
+    """Two colours: `first` where u and v lie in the same half of their unit intervals, `second`
+    where they do not."""
+
+    type: Literal["checker"] = "checker"
+    first: Colour = (0.4, 0.4, 0.4)
+    second: Colour = (0.2, 0.2, 0.2)
+
+    def tabulate(self, folder: Path) -> "Checkers":
+        return Checkers(np.array([self.first]), np.array([self.second]))
+
+
+class Checkers(NamedTuple):
+    """first (n, 3), second (n, 3), linear sRGB."""
+
+    first: FloatArray
+    second: FloatArray
+
+
+def greatest(checkers: Checkers) -> float:
+    return float(max(checkers.first.max(), checkers.second.max()))
+
+
+@kernel
+def lookup(checkers: Checkers, i: int, u: float, v: float) -> Vec3:
+    """The colour at texture coordinates (u, v)."""
+    low_u = u - math.floor(u) < 0.5
+    low_v = v - math.floor(v) < 0.5
+    if low_u == low_v:
+        return row(checkers.first, i)
+    return row(checkers.second, i)

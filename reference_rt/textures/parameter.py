@@ -1,0 +1,163 @@
+"""Parameters of materials: a colour or a number, or the name of one of the scene's textures."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from pydantic import BeforeValidator, Strict, WithJsonSchema
+
+from reference_rt.description import Description, colour, colour_schema, reflectance
+from reference_rt.kernel import kernel
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.textures.lookup import At, lookup
+from reference_rt.vec3 import Vec3, luminance, row
+
+
+class MayBeTexture:
+    """Marks the fields of a description that may name a texture."""
+
+
+def _or_name(value_of: Callable[[Any], Any]) -> BeforeValidator:
+    return BeforeValidator(lambda value: value if isinstance(value, str) else value_of(value))
+
+
+def _number(least: float, most: float) -> Callable[[Any], float]:
+    def check(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError("expected a number, or the name of a texture")
+        if not least <= value <= most:
+            raise ValueError(f"expected a number from {least:g} to {most:g}")
+        return float(value)
+
+    return check
+
+
+def _schema(value: dict[str, Any]) -> WithJsonSchema:
+    name = {"type": "string", "description": "the name of a texture"}
+    return WithJsonSchema({"anyOf": [value, name]})
+
+
+_Colour = Annotated[tuple[float, float, float], Strict(False)]
+
+ReflectanceParameter = Annotated[
+    _Colour | str, MayBeTexture(), _or_name(reflectance), _schema(colour_schema(1.0))
+]
+"""Linear sRGB, each from 0 to 1; a single number stands for grey, a string names a texture."""
+
+ColourParameter = Annotated[
+    _Colour | str, MayBeTexture(), _or_name(colour), _schema(colour_schema(None))
+]
+"""Linear sRGB, each at least 0; or the name of a texture."""
+
+UnitParameter = Annotated[
+    float | str,
+    MayBeTexture(),
+    _or_name(_number(0.0, 1.0)),
+    _schema({"type": "number", "minimum": 0, "maximum": 1}),
+]
+"""A number from 0 to 1, or the name of a texture, whose luminance it is."""
+
+TextureName = Annotated[str, MayBeTexture()]
+"""The name of a texture."""
+
+
+def texture_names(description: Description) -> dict[str, str]:
+    """The textures that a description names, by field."""
+    found = {}
+    for field, info in type(description).model_fields.items():
+        value = getattr(description, field)
+        if isinstance(value, str) and any(isinstance(m, MayBeTexture) for m in info.metadata):
+            found[field] = value
+    return found
+
+
+class Colours(NamedTuple):
+    """A parameter of n materials: value (n, 3); texture (n,), -1 for none, None where none of them
+    has any."""
+
+    value: FloatArray
+    texture: IntArray | None
+
+
+class Numbers(NamedTuple):
+    """The same of numbers: value (n,)."""
+
+    value: FloatArray
+    texture: IntArray | None
+
+
+class Palette:
+    """The scene's textures by name: makes columns of parameters."""
+
+    def __init__(self, numbers: Mapping[str, int], greatest: Sequence[float]) -> None:
+        """numbers: of the textures in their table;  greatest: the largest value of each."""
+        self.numbers_of, self.greatest = numbers, greatest
+
+    def colours(self, value: tuple[float, float, float] | str, most: float = 1.0) -> Colours:
+        """One row.  Raises ValueError for a texture with values above `most`."""
+        if isinstance(value, str):
+            return Colours(np.zeros((1, 3)), np.array([self.number(value, most)]))
+        return Colours(np.array([value], dtype=np.float64), np.array([-1]))
+
+    def numbers(self, value: float | str, most: float = 1.0) -> Numbers:
+        """One row.  Raises ValueError for a texture with values above `most`."""
+        if isinstance(value, str):
+            return Numbers(np.zeros(1), np.array([self.number(value, most)]))
+        return Numbers(np.array([value], dtype=np.float64), np.array([-1]))
+
+    def number(self, name: str, most: float) -> int:
+        """The row of the texture `name`."""
+        k = self.numbers_of[name]
+        if self.greatest[k] > most:
+            raise ValueError(
+                f"the texture '{name}' has values up to {self.greatest[k]:.6g}; "
+                f"expected at most {most:g}"
+            )
+        return k
+
+
+NO_TEXTURES = Palette({}, ())
+
+
+def join(parts: Sequence[Any]) -> Any:
+    """One table from several of a class: the rows one after another, in nested tables too.
+
+    Of parameters that name no texture the column of textures becomes None.
+    """
+    first = parts[0]
+    if not isinstance(first, tuple):
+        return np.ascontiguousarray(np.concatenate(parts))
+    columns = [join(column) for column in zip(*parts, strict=True)]
+    if isinstance(first, Colours | Numbers) and (columns[1] < 0).all():
+        columns[1] = None
+    return type(first)(*columns)
+
+
+@kernel
+def colour_at(colours: Colours, i: int, at: At) -> Vec3:
+    """The colour of row i at a place of a surface."""
+    return _colour_at(colours.texture, colours.value, i, at)
+
+
+@kernel
+def _colour_at(texture: IntArray | None, value: FloatArray, i: int, at: At) -> Vec3:
+    if texture is None:
+        return row(value, i)
+    if texture[i] < 0:
+        return row(value, i)
+    return lookup(texture[i], at)
+
+
+@kernel
+def number_at(numbers: Numbers, i: int, at: At) -> float:
+    """The number of row i at a place of a surface: of a texture its luminance."""
+    return _number_at(numbers.texture, numbers.value, i, at)
+
+
+@kernel
+def _number_at(texture: IntArray | None, value: FloatArray, i: int, at: At) -> float:
+    if texture is None:
+        return float(value[i])
+    if texture[i] < 0:
+        return float(value[i])
+    return luminance(lookup(texture[i], at))

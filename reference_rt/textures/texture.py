@@ -1,0 +1,88 @@
+"""What all textures share: the codes of their tables, where they are asked, and the uv map."""
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, WithJsonSchema
+
+from reference_rt.description import Description
+from reference_rt.kernel import kernel
+from reference_rt.shapes.shape import FloatArray
+
+# Codes of `Textures.kind`.
+CHECKER, BITMAP, VERTEX_COLOURS = 0, 1, 2
+
+
+def _pair(value: Any) -> Any:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        value = (value, value)
+    if isinstance(value, list):
+        value = tuple(value)
+    return value
+
+
+_NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+
+Pair = Annotated[
+    tuple[float, float],
+    BeforeValidator(_pair),
+    Field(strict=False),
+    WithJsonSchema({"anyOf": [{"type": "number"}, _NUMBERS]}),
+]
+"""Two numbers; one stands for both."""
+
+
+class UvMap(Description):
+    """Surface coordinates to texture coordinates: scaled, then turned, then moved."""
+
+    scale: Pair = (1.0, 1.0)
+    rotate: float = 0.0
+    """Degrees, counterclockwise in (u, v)."""
+    offset: Pair = (0.0, 0.0)
+
+    def matrix(self) -> FloatArray:
+        """(6,): u' = m0 u + m1 v + m2, v' = m3 u + m4 v + m5."""
+        degrees = self.rotate % 360.0
+        turn = math.radians(degrees)
+        # Whole quarter turns exactly.
+        c, s = (
+            (round(math.cos(turn)), round(math.sin(turn)))
+            if degrees % 90.0 == 0.0
+            else (math.cos(turn), math.sin(turn))
+        )
+        (a, b), (du, dv) = self.scale, self.offset
+        return np.array([c * a, -s * b, du, s * a, c * b, dv], dtype=np.float64)
+
+
+class Texture(Description):
+    """A colour, or through its luminance a number, for every point of a surface."""
+
+    uv: UvMap = UvMap()
+    """From the surface's coordinates to the texture's."""
+
+    def tabulate(self, folder: Any) -> Any:
+        """This texture as one row of its table.  Raises ValueError (what is wrong, what was
+        expected)."""
+        raise NotImplementedError
+
+
+_FAR = 2.0**40
+
+
+@kernel
+def _near(x: float) -> float:
+    """x; 0 for NaN, and for what is so far away that no integer could count texels up to there and
+    its last bits would say little of the place among them."""
+    if not abs(x) < _FAR:
+        return 0.0
+    return x
+
+
+@kernel
+def map_uv(uv: FloatArray, k: int, u: float, v: float) -> tuple[float, float]:
+    """(u, v) under row k of the maps (n, 6); 0 for coordinates beyond 2^40."""
+    return (
+        _near(uv[k, 0] * u + uv[k, 1] * v + uv[k, 2]),
+        _near(uv[k, 3] * u + uv[k, 4] * v + uv[k, 5]),
+    )
