@@ -1,191 +1,191 @@
-"""The comparison of scenes, from loading to verdicts, `results.json` and the report."""
+"""The comparison of one scene with Mitsuba, rung by rung, from its files to its verdict."""
 
-import datetime
-import importlib.metadata
-import os
-import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-from rich.console import Console
 
 from comparisons import pictures, tiers
-from comparisons.metrics import image_metrics
-from comparisons.mitsuba_backend import Backend, backend, mitsuba
-from comparisons.report import write_report, write_results
+from comparisons.budget import Budget
+from comparisons.control import control
+from comparisons.judge import Evidence, Rendered, judge
 from comparisons.results import Case, Tier
-from comparisons.statistics import compare_replicates
+from comparisons.single_lights import single_lights
 from comparisons.translate import UntranslatableError, load
 from comparisons.translate.notes import notes_of
 from comparisons.twin import Twin
-from comparisons.verdict import decide
-from reference_rt.filters import BoxFilter
+from reference_rt.explain import explain
+from reference_rt.filters import BoxFilter, Filter
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.scene import Scene
 from reference_rt.tables import SceneTables, build_tables
 
 _NO_LIGHT = "ray casting shows surfaces, not light"
 
+LIGHT_SPP = 64
+"""Samples per pixel of pictures of single lights: they are to be recognised, not measured."""
+
+Say = Callable[[str], None]
+"""Is told of each step, a line at a time."""
+
 
 @dataclass(frozen=True)
-class Options:
-    """replicates: independent renderings on each side of a path-traced scene;  threads: of ours,
-    None for all cores."""
+class Subject:
+    """scene: what we render;  reference: what Mitsuba renders, the same unless a fault is planted
+    in one of them (None stands for the same)."""
 
-    replicates: int = 16
-    threads: int | None = None
-
-
-def compare_scenes(scenes: Sequence[Scene], out: Path, options: Options) -> list[Case]:
-    """Compare each scene with Mitsuba; `results.json` and `report.html` in `out` tell of it.
-
-    Every scene's files are read before the first is compared.  `results.json` is whole after each
-    scene, so that an interrupted run keeps what it found.  Raises SceneError, ImageError,
-    ReferenceUnavailableError.
-    """
-    console = Console(stderr=True, highlight=False)
-    tables = []
-    for scene in scenes:
-        start = time.perf_counter()
-        built = build_tables(scene)
-        tables.append((built, time.perf_counter() - start))
-    chosen = backend()
-    console.print(f"Mitsuba {chosen.version}, {chosen.variant}: {chosen.reason}", markup=False)
-    mitsuba()
-    facts = provenance(chosen, options)
-    cases: list[Case] = []
-    for scene, (built, seconds) in zip(scenes, tables, strict=True):
-        case = compare_scene(scene, built, seconds, options, console)
-        cases.append(case)
-        console.print(f"{case.scene}: {case.verdict}: {case.reason}", markup=False)
-        write_results(out / "results.json", cases, facts)
-    write_report(out / "report.html", cases, facts)
-    console.print(f"{out / 'results.json'}, {out / 'report.html'}", markup=False)
-    return cases
+    scene: Scene
+    reference: Scene | None = None
 
 
 def compare_scene(
-    scene: Scene, tables: SceneTables, load_seconds: float, options: Options, console: Console
+    subject: Subject,
+    budget: Budget,
+    say: Say,
+    threads: int | None = None,
+    rungs: tuple[str, ...] = (),
 ) -> Case:
-    """One scene, rung by rung."""
-    # A filter wider than the pixel shares samples between pixels on Mitsuba's side, and their
-    # noise with them: the statistics need independent pixels, and the filter is not in question.
-    notes = [] if isinstance(scene.film.filter, BoxFilter) else ["compared with a box filter"]
-    film_filter = scene.film.filter
-    scene = scene.changed(film=scene.film.model_copy(update={"filter": BoxFilter()}))
+    """One scene, rung by rung;  threads: of ours, None for all cores;  rungs: only these, if any.
+
+    Raises SceneError, ImageError, ReferenceUnavailableError.
+    """
+    if budget.control:
+        return control(budgeted(subject.scene, budget), budget, say)
+    evidence = gather(subject, budget, say, threads, rungs)
+    return judge(evidence, budget.limit)
+
+
+def budgeted(scene: Scene, budget: Budget) -> Scene:
+    """The scene with the budget's size and samples, seen through a box filter.
+
+    A filter wider than the pixel shares samples between pixels on Mitsuba's side, and their noise
+    with them: the statistics need independent pixels, and the filter has a rung of its own.
+    """
+    film: dict[str, object] = {"filter": BoxFilter()}
+    if budget.size is not None:
+        film |= dict(zip(("width", "height"), budget.size, strict=True))
+    sampler = scene.resolved_sampler
+    if budget.spp is not None and not scene.integrator.deterministic:
+        sampler = sampler.model_copy(update={"spp": budget.spp})
+    return scene.changed(film=scene.film.model_copy(update=film), sampler=sampler)
+
+
+def gather(
+    subject: Subject,
+    budget: Budget,
+    say: Say,
+    threads: int | None = None,
+    only: tuple[str, ...] = (),
+) -> Evidence:
+    """Climb the deterministic rungs and render the pictures of both sides."""
+    scene = budgeted(subject.scene, budget)
+    clock = time.perf_counter()
+    tables = build_tables(scene)
+    seconds: dict[str, dict[str, float]] = {
+        "candidate": {"load": time.perf_counter() - clock},
+        "reference": {},
+    }
+    left_out = _left_out(scene, tables)
+    judged_by = budgeted(subject.reference or subject.scene, budget)
     clock = time.perf_counter()
     try:
-        twin = load(scene)
+        twin = load(judged_by)
     except UntranslatableError as error:
         tier = Tier("geometry", "not-comparable", str(error))
-        seconds = {"ours": {"load": load_seconds}, "mitsuba": {}}
-        return Case(scene.name, "not-comparable", str(error), (tier,), None, seconds)
-    seconds = {
-        "ours": {"load": load_seconds},
-        "mitsuba": {"load": time.perf_counter() - clock},
-    }
-    rungs = [] if isinstance(film_filter, BoxFilter) else [tiers.film(film_filter)]
-    rungs += _deterministic_rungs(scene, tables, twin, console)
-    notes += [*twin.notes(), *notes_of(scene)]
+        return Evidence(scene.name, (tier,), None, seconds, left_out=left_out)
+    seconds["reference"] = {"load": time.perf_counter() - clock}
+
+    notes = [*twin.notes(), *notes_of(scene)]
+    if not isinstance(subject.scene.film.filter, BoxFilter):
+        notes.insert(0, "compared with a box filter")
+    film_filters = (subject.scene.film.filter, (subject.reference or subject.scene).film.filter)
+    found = _deterministic_rungs(scene, tables, twin, film_filters, budget, only, say)
+    pictured = not only or not {"statistics", "images"}.isdisjoint(only)
     if twin.lacking and not isinstance(scene.integrator, RayCast):
-        rungs += [Tier(name, "not-comparable", twin.lacking) for name in ("statistics", "images")]
-        verdict, reason = decide(rungs, None)
-        return Case(scene.name, verdict, reason, tuple(rungs), None, seconds, None, tuple(notes))
-    rendered, more = _pictures(scene, tables, twin, options, console)
-    rungs += more
+        found += [Tier(name, "not-comparable", twin.lacking) for name in ("statistics", "images")]
+        pictured = False
+    if not pictured:
+        return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
+    rendered = _pictures(scene, tables, twin, budget, threads, say)
     for side, times in rendered.seconds.items():
-        seconds[side] |= times
-    metrics = image_metrics(rendered.images.ours, rendered.images.mitsuba)
-    rungs.append(pictures.images_tier(rendered, metrics))
-    verdict, reason = decide(rungs, metrics)
-    return Case(
+        seconds[side] = seconds[side] | times
+    notes.extend(rendered.notes)
+    return Evidence(
         scene.name,
-        verdict,
-        reason,
-        tuple(rungs),
-        metrics,
+        tuple(found),
+        rendered,
         seconds,
-        rendered.images,
-        (*notes, *rendered.notes),
+        tuple(notes),
+        left_out,
+        lights=None
+        if scene.integrator.deterministic
+        else lambda: single_lights(judged_by, LIGHT_SPP),
     )
 
 
+def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:
+    """What the scene does not need, by the reason why."""
+    by_reason: dict[str, list[str]] = {}
+    for what, why in explain(scene, tables)[1]:
+        by_reason.setdefault(why, []).append(what)
+    return tuple(f"{', '.join(names)}: {why}" for why, names in by_reason.items())
+
+
 def _deterministic_rungs(
-    scene: Scene, tables: SceneTables, twin: Twin, console: Console
+    scene: Scene,
+    tables: SceneTables,
+    twin: Twin,
+    film_filters: tuple[Filter, Filter],
+    budget: Budget,
+    only: tuple[str, ...],
+    say: Say,
 ) -> list[Tier]:
-    """Geometry, then light, each only where the rung before it holds: a convention that is wrong
-    below must not be reported as light that is wrong above."""
+    """The filter; geometry, then light, each only where the rung before it holds: a convention that
+    is wrong below must not be reported as light that is wrong above."""
+    climbs: dict[str, Callable[[], Tier]] = {
+        "geometry": lambda: tiers.geometry(scene, tables, twin, budget.pixels),
+        "direct": lambda: tiers.direct(scene, tables, twin, budget.light_pixels),
+        "whitted": lambda: tiers.whitted(scene, tables, twin, budget.pixels),
+    }
+    if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):
+        climbs = {"film": lambda: tiers.film(*film_filters), **climbs}
     found: list[Tier] = []
-    for name, climb in (
-        ("geometry", tiers.geometry),
-        ("direct", tiers.direct),
-        ("whitted", tiers.whitted),
-    ):
+    for name, climb in climbs.items():
+        if only and name not in only:
+            continue
         broken = next((t for t in found if t.status == "differ"), None)
+        of_light = name in ("direct", "whitted")
         if broken is not None:
             tier = Tier(name, "not-applicable", f"the {broken.name} rung below is broken")
-        elif name != "geometry" and isinstance(scene.integrator, RayCast):
+        elif of_light and isinstance(scene.integrator, RayCast):
             tier = Tier(name, "not-applicable", _NO_LIGHT)
-        elif name != "geometry" and twin.lacking:
+        elif of_light and twin.lacking:
             tier = Tier(name, "not-comparable", twin.lacking)
         else:
-            with console.status(f"{scene.name}: {name}"):
-                start = time.perf_counter()
-                tier = climb(scene, tables, twin)
-                seconds = time.perf_counter() - start
-            console.print(f"{scene.name}: {name}: {tier.status} ({seconds:.1f} s)", markup=False)
+            start = time.perf_counter()
+            tier = climb()
+            say(f"{name}: {tier.status} ({time.perf_counter() - start:.1f} s)")
         found.append(tier)
     return found
 
 
 def _pictures(
-    scene: Scene, tables: SceneTables, twin: Twin, options: Options, console: Console
-) -> tuple[pictures.Rendered, list[Tier]]:
-    """The pictures of both sides, and the statistics where there is noise."""
-    with console.status(f"{scene.name}: pictures") as status:
-
-        def say(step: str) -> None:
-            status.update(f"{scene.name}: {step}")
-
-        if isinstance(scene.integrator, RayCast):
-            rendered = pictures.cast(scene, tables, twin)
-        elif isinstance(scene.integrator, Whitted):
-            rendered = pictures.whitted(scene, tables, twin)
-        else:
-            rendered = pictures.replicates(
-                scene, tables, twin, options.replicates, options.threads, say
-            )
-    if rendered.replicates is None:
-        return rendered, [Tier("statistics", "not-applicable", "deterministic: there is no noise")]
-    tier = compare_replicates(*rendered.replicates)
-    console.print(f"{scene.name}: statistics: {tier.status}", markup=False)
-    return rendered, [tier]
+    scene: Scene,
+    tables: SceneTables,
+    twin: Twin,
+    budget: Budget,
+    threads: int | None,
+    say: Say,
+) -> Rendered:
+    if isinstance(scene.integrator, RayCast):
+        return pictures.cast(scene, tables, twin)
+    if isinstance(scene.integrator, Whitted):
+        return pictures.whitted(scene, tables, twin)
+    start = time.perf_counter()
+    rendered = pictures.replicates(
+        scene, tables, twin, budget.replicates, budget.reference_spp, threads
+    )
+    say(f"{budget.replicates} + {budget.replicates} pictures ({time.perf_counter() - start:.1f} s)")
+    return rendered
 
 
-def provenance(chosen: Backend, options: Options) -> dict[str, Any]:
-    """What a reader must know to repeat a run."""
-    return {
-        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "reference_rt": importlib.metadata.version("reference-rt"),
-        "mitsuba": f"{chosen.version}, {chosen.variant}: {chosen.reason}",
-        "numpy": np.__version__,
-        "numba": importlib.metadata.version("numba"),
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}, {_processor()}",
-        "cores": os.cpu_count(),
-        "replicates": options.replicates,
-    }
-
-
-def _processor() -> str:
-    """The processor's name, where the system tells."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor() or "unknown processor"
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else "unknown processor"
+__all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]

@@ -131,22 +131,36 @@ def mitsuba() -> Any:
     # Plugins log a warning per load in scalar variants ("terrible performance"): known, and told
     # by `Backend.reason`.
     mi.set_log_level(mi.LogLevel.Error)
-    from comparisons.mitsuba_plugins import register
-
-    register(mi)
+    _register_once(chosen.variant)
     return mi
 
 
 @contextlib.contextmanager
-def scalar() -> Iterator[Any]:
-    """Mitsuba in its scalar variant, while the context lasts."""
+def variant(name: str) -> Iterator[Any]:
+    """Mitsuba in another variant, our plugins registered there too, while the context lasts."""
     mi = mitsuba()
     chosen = mi.variant()
-    mi.set_variant(SCALAR)
+    mi.set_variant(name)
     try:
+        _register_once(name)
         yield mi
     finally:
         mi.set_variant(chosen)
+
+
+@functools.cache
+def _register_once(name: str) -> None:
+    import mitsuba as mi
+
+    from comparisons.mitsuba_plugins import register
+
+    assert mi.variant() == name
+    register(mi)
+
+
+def scalar() -> contextlib.AbstractContextManager[Any]:
+    """Mitsuba in its scalar variant, while the context lasts."""
+    return variant(SCALAR)
 
 
 def prove(variant: str, llvm_path: str | None) -> str | None:
@@ -256,4 +270,4 @@ def _write_memory(memory: dict[str, str | None]) -> None:
         part.unlink(missing_ok=True)
 
 
-__all__ = ["Backend", "backend", "choose", "mitsuba", "prove", "scalar"]
+__all__ = ["Backend", "backend", "choose", "mitsuba", "prove", "scalar", "variant"]

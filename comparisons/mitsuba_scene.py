@@ -153,17 +153,22 @@ def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicate
     not count.
     """
     mi = mitsuba()
-    pictures, seconds = [], []
     if not mi.variant().startswith("scalar"):
         # Dr.Jit divides by powers of two in another way: those are kernels of their own.
         alike = 1 if spp & (spp - 1) == 0 else 3
-        np.array(mi.render(mi_scene, spp=alike, seed=seed + replicates))
+        picture(mi_scene, alike, seed + replicates)
+    pictures, seconds = [], []
     for k in range(replicates):
         start = time.perf_counter()
-        # The array is what forces the lazy rendering to happen.
-        pictures.append(np.array(mi.render(mi_scene, spp=spp, seed=seed + k), dtype=np.float64))
+        pictures.append(picture(mi_scene, spp, seed + k))
         seconds.append(time.perf_counter() - start)
-    return Replicates(np.stack(pictures)[..., :3], np.array(seconds))
+    return Replicates(np.stack(pictures), np.array(seconds))
+
+
+def picture(mi_scene: Any, spp: int, seed: int) -> FloatArray:
+    """One picture (height, width, 3)."""
+    # The array is what forces the lazy rendering to happen.
+    return np.array(mitsuba().render(mi_scene, spp=spp, seed=seed), dtype=np.float64)[..., :3]
 
 
 __all__ = [
@@ -172,6 +177,7 @@ __all__ = [
     "first_hits",
     "for_rays",
     "light_id",
+    "picture",
     "render",
     "shape_id",
 ]

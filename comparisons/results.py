@@ -18,8 +18,9 @@ Status = Literal[
     "invalid",  # non-finite pixels, wrong size: no statement about agreement is possible
 ]
 
-RUNGS = ("film", "geometry", "direct", "whitted", "statistics", "images")
-"""The ladder, in order: a failure is reported at the first rung that breaks."""
+RUNGS = ("run", "input", "film", "geometry", "direct", "whitted", "statistics", "images")
+"""The ladder, in order: a failure is reported at the first rung that breaks.  `run` exists only
+where a case could not be carried through; `input` says what is wrong with pictures as such."""
 
 
 @dataclass(frozen=True)
@@ -34,24 +35,53 @@ class Tier:
 
 @dataclass(frozen=True)
 class Metrics:
-    """Image metrics of ours against Mitsuba's picture; NaN where undefined (null in JSON)."""
+    """Image metrics of the candidate against the reference; NaN where undefined (null in JSON)."""
 
     ssim: float
+    flip: float
+    """Mean HDR-FLIP error, 0 to 1, with fixed exposures."""
     psnr: float
     rmse: float
     relmse: float
     mean_bias: tuple[float, float, float]
-    """(mean(ours) - mean(mitsuba)) / mean(mitsuba), per channel R, G, B."""
+    """(mean(candidate) - mean(reference)) / mean(reference), per channel R, G, B."""
     nonfinite: int
     """Pixels of either picture with a NaN or an infinity in them."""
 
 
 @dataclass(frozen=True)
 class Images:
-    """The two pictures, (height, width, 3) linear sRGB radiance, row 0 on top."""
+    """The two pictures, (height, width, 3) linear sRGB radiance, row 0 on top; where they are means
+    of noisy replicates also the standard error of their difference, of the same shape."""
 
-    ours: FloatArray
-    mitsuba: FloatArray
+    candidate: FloatArray
+    reference: FloatArray
+    error: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Place:
+    """A part of the pictures that is worth a look: its left and upper edge and its size in pixels,
+    and what is the matter there."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+    what: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """The likeliest cause of a difference.
+
+    name: in a few words, such as "half-pixel shift";  evidence: one sentence with the numbers that
+    speak for it;  explained: which fraction of the squared difference beyond noise it accounts for.
+    """
+
+    name: str
+    evidence: str
+    explained: float
 
 
 @dataclass(frozen=True)
@@ -67,4 +97,13 @@ class Case:
     """Wall clock by side and step: "load" (files, arrays, hierarchy), "compile", "render"."""
     images: Images | None = None
     notes: tuple[str, ...] = ()
-    """What a reader should know besides: translations that are approximate, what was left out."""
+    """What a reader should know besides: translations that are approximate."""
+    sides: tuple[str, str] = ("ours", "Mitsuba's")
+    """Whose pictures the candidate and the reference are."""
+    cause: Cause | None = None
+    worst: tuple[Place, ...] = ()
+    """Where the pictures differ most, the worst first."""
+    left_out: tuple[str, ...] = ()
+    """What the scene does not need, and so was not run."""
+    again: str = ""
+    """The command that repeats this case alone."""

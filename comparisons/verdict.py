@@ -21,8 +21,8 @@ def decide(tiers: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]
 
     The gravest status of any rung decides: `invalid` (also by pixels not finite in the pictures),
     `differ`, `inconclusive`, `not-comparable`, `reference-limited`; among rungs of that status the
-    first one of RUNGS is told. Otherwise the scene agrees if at least one rung did; a scene
-    without one is `not-comparable`. Raises ValueError for a tier that is not of RUNGS.
+    first one of RUNGS is told. Otherwise the scene agrees if at least one rung but `input` did; a
+    scene without one is `not-comparable`. Raises ValueError for a tier that is not of RUNGS.
     """
     if unknown := {tier.name for tier in tiers} - set(RUNGS):
         raise ValueError(f"not a rung: {', '.join(sorted(unknown))}; the rungs are {RUNGS}")
@@ -35,18 +35,20 @@ def decide(tiers: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]
             if tier.status == status:
                 return status, f"{tier.name}: {tier.reason}"
     agreed = [tier for tier in ladder if tier.status == "agree"]
-    if not agreed:
+    if not any(tier.name != "input" for tier in agreed):
         return "not-comparable", "no rung applies to this scene"
     rungs = ", ".join(tier.name for tier in agreed)
-    return "agree", f"{rungs}: {agreed[-1].reason}"
+    # Where there is noise, what could have been seen says how much the agreement is worth.
+    told = next((tier for tier in agreed if tier.name == "statistics"), agreed[-1])
+    return "agree", f"{rungs}: {told.reason}"
 
 
 def exit_code(cases: Sequence[Case]) -> int:
     """0 if every case agrees or is limited by the reference only, otherwise 1.
 
-    4 if a case could not run, which is one without any tier, or if there is no case: a run that
-    compared nothing has not passed. It goes before 1, because such a run is incomplete.
+    4 if a case could not be carried through (its process died or hung), or if there is no case: a
+    run that compared nothing has not passed. It goes before 1, because such a run is incomplete.
     """
-    if not cases or any(not case.tiers for case in cases):
+    if not cases or any(tier.name == "run" for case in cases for tier in case.tiers):
         return 4
     return 0 if all(case.verdict in PASSING for case in cases) else 1

@@ -1,26 +1,29 @@
 """One HTML page about a run: offline, a single file, what failed comes first.
 
 The page asks for nothing beyond itself (its content security policy forbids it), so it can be
-kept, mailed, or opened from disk. All text is escaped: names of scenes come from outside.
+kept, mailed, or opened from disk. All text is escaped: names of scenes come from outside. The
+pictures are drawn from float data by the page's own script; without it there are thumbnails.
 """
 
 import base64
-import io
-import math
+import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from PIL import Image
+from markupsafe import Markup
 
-from comparisons.metrics import encode, nonfinite_pixels, white_level
-from comparisons.results import RUNGS, Case, FloatArray, Images, Metrics, Status
+from comparisons.report.fitting import Fitted, fitted
+from comparisons.report.thumbnails import Thumbnail, Thumbnails, thumbnails
+from comparisons.report.values import label, shown
+from comparisons.results import RUNGS, Case, Metrics, Status
 from reference_rt.files import replacing
+
+MOST_BYTES = 15_000_000
+"""Of a page, unless the caller says otherwise: what is still mailed and opened without a wait."""
 
 ORDER: tuple[Status, ...] = (
     "invalid",
@@ -33,6 +36,9 @@ ORDER: tuple[Status, ...] = (
 )
 """What needs attention comes first."""
 
+FAILED = frozenset({"invalid", "differ", "inconclusive"})
+"""Verdicts whose pictures are the last to lose detail."""
+
 SIGNS: dict[Status, str] = {
     "invalid": "!",
     "differ": "✗",
@@ -44,52 +50,36 @@ SIGNS: dict[Status, str] = {
 }
 """Beside the word of a verdict, which a reader need then not tell by its colour."""
 
-DIFFERENCE_PERCENTILE = 99.5
-"""Where the difference's colours end: a few fireflies may saturate, the rest stays visible."""
+MODES = (
+    ("side", "side by side"),
+    ("flip", "flip"),
+    ("blink", "blink"),
+    ("slider", "slider"),
+    ("single", "single"),
+)
+"""Views of the pictures, in the order of their keys 1 to 5."""
 
-PICTURE_WIDTH = 400
-"""CSS pixels of a column of pictures; smaller pictures are enlarged by a whole factor up to it."""
-
-MAGENTA = (255, 0, 255)
-RED, WHITE, BLUE = (178, 24, 43), (255, 255, 255), (33, 102, 172)
-"""Ends and middle of ColorBrewer's RdBu, which colour-blind readers can tell apart."""
-
-SHOWN_ITEMS = 8
-"""Of a list of numbers; `results.json` has them all."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture as the page shows it."""
-
-    url: str
-    """data: URL of a PNG"""
-    width: int
-    height: int
-    """CSS pixels"""
-    enlarged: bool
-    nonfinite: int
+SCRIPTS = ("unpack.js", "colour.js", "crop.js", "view.js", "viewer.js")
+"""In this order one module."""
 
 
-@dataclass(frozen=True)
-class Pictures:
-    ours: Picture
-    mitsuba: Picture
-    difference: Picture | None
-    """None if the pictures are of unlike size."""
-    white: float
-    """Radiance shown as white."""
-    scale: float
-    """Radiance difference shown as full red or blue; 0 if the pictures are equal."""
-
-
-def write_report(path: Path, cases: Sequence[Case], provenance: Mapping[str, Any]) -> None:
+def write_report(
+    path: Path,
+    cases: Sequence[Case],
+    provenance: Mapping[str, Any],
+    *,
+    most_bytes: int = MOST_BYTES,
+) -> None:
     """Write the page about `cases`, at once or not at all.
 
     `provenance` is shown as it comes: the caller names versions, Mitsuba's variant and why it was
     chosen, the machine and the date. In the numbers of a tier, a name that ends in `_bias` means
-    a fraction and is shown in percent; nested mappings and lists are shown in line.
+    a fraction and is shown in percent; nested mappings and lists are shown in line. A page that
+    would be larger than `most_bytes` loses detail in its float pictures, those of passing cases
+    first, and says so; its text and thumbnails are never cut.
     """
+    ranked = sorted(cases, key=lambda case: ORDER.index(case.verdict))
+    views = [_view(case) for case in ranked]
     environment = Environment(
         loader=PackageLoader("comparisons", "report"),
         autoescape=True,
@@ -97,134 +87,97 @@ def write_report(path: Path, cases: Sequence[Case], provenance: Mapping[str, Any
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"shown": shown, "label": label, "percent": percent}
-    ranked = sorted(cases, key=lambda case: ORDER.index(case.verdict))
+    environment.filters |= {"shown": shown, "label": label}
+    template = environment.get_template("page.html.jinja")
+    script = Markup(_script())  # our own, not from outside
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
     counts = Counter(case.verdict for case in cases)
-    page = environment.get_template("page.html.jinja").render(
-        counts=[(status, counts[status]) for status in ORDER if counts[status]],
-        signs=SIGNS,
-        provenance=provenance,
-        cases=[_view(case) for case in ranked],
-    )
+
+    def rendered(pictures: Sequence[Fitted | None]) -> str:
+        for view, data in zip(views, pictures, strict=True):
+            # JSON without <, > and & by its maker.
+            view["data"] = Markup(data.data) if data else ""
+            view["factor"] = data.factor if data else 1
+        return template.render(
+            counts=[(status, counts[status]) for status in ORDER if counts[status]],
+            signs=SIGNS,
+            modes=MODES,
+            provenance=provenance,
+            cases=views,
+            coarser=sum(view["factor"] > 1 for view in views),
+            most_megabytes=most_bytes / 1e6,
+            script=script,
+            script_digest=digest,
+        )
+
+    left = most_bytes - len(_encoded(rendered([None] * len(views))))
+    # What stands around float data, or tells that it was left out, takes room, too.
+    left -= 4000 * len(views)
+    failed = [case.verdict in FAILED for case in ranked]
+    pictures = [view["case"].images if view["pictures"] else None for view in views]
+    page = rendered(fitted(pictures, failed, max(left, 0)))
     with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", newline="\n")
+        temporary.write_bytes(_encoded(page))
 
 
-def shown(value: Any, name: str = "") -> str:
-    """A value for people: four digits, powers of ten, percent where `name` ends in `_bias`."""
-    match value:
-        case None:
-            return "–"
-        case bool() | np.bool_():
-            return "yes" if value else "no"
-        case int() | np.integer():
-            return f"{int(value):,}"
-        case float() | np.floating():
-            return percent(float(value)) if name.endswith("_bias") else _real(float(value))
-        case Mapping():
-            return ", ".join(f"{label(key)} {shown(item, name)}" for key, item in value.items())
-        case np.ndarray():
-            return shown(value.tolist(), name)
-        case list() | tuple():
-            rest = f", … ({len(value)} in all)" if len(value) > SHOWN_ITEMS else ""
-            return ", ".join(shown(item, name) for item in value[:SHOWN_ITEMS]) + rest
-        case _:
-            return str(value)
+def _encoded(page: str) -> bytes:
+    # A lone surrogate, of a file name that is not UTF-8, becomes a reference to no character.
+    return page.encode(errors="xmlcharrefreplace")
 
 
-def percent(fraction: float) -> str:
-    """Three digits of a percentage."""
-    return f"{_real(100.0 * fraction, '.3g')} %" if math.isfinite(fraction) else _real(fraction)
-
-
-def label(name: object) -> str:
-    """`worst_tile_x` -> `worst tile x`"""
-    return str(name).replace("_", " ")
-
-
-def _real(value: float, format_: str = ".4g") -> str:
-    if math.isnan(value):
-        return "undefined"
-    if math.isinf(value):
-        return "∞" if value > 0 else "−∞"
-    mantissa, _, exponent = f"{value:{format_}}".replace("-", "−").partition("e")
-    if not exponent:
-        return mantissa
-    digits = str(int(exponent.replace("−", "-")))
-    return f"{mantissa} × 10{digits.translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+def _script() -> str:
+    folder = files("comparisons.report")
+    return "\n" + "\n".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
 
 
 def _view(case: Case) -> dict[str, Any]:
     """What the template shows of a case."""
-    ladder = sorted(case.tiers, key=lambda tier: RUNGS.index(tier.name))
     stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
+    pictures = _thumbnails(case)
     return {
         "case": case,
-        "tiers": ladder,
-        "pictures": _pictures(case.images) if case.images else None,
+        "tiers": sorted(case.tiers, key=lambda tier: _rung(tier.name)),
+        "pictures": pictures,
+        "figures": _figures(case, pictures) if pictures else [],
         "metrics": _metric_rows(case.metrics) if case.metrics else [],
         "stages": list(stages),
         "totals": {who: sum(times.values()) for who, times in case.seconds.items()},
     }
 
 
+def _thumbnails(case: Case) -> Thumbnails | None:
+    """None also for pictures without a pixel, which a gate may have been given."""
+    images = case.images
+    if images is None or not images.candidate.size or not images.reference.size:
+        return None
+    return thumbnails(images)
+
+
+def _figures(case: Case, pictures: Thumbnails) -> list[tuple[str, Thumbnail, str]]:
+    """Kind, thumbnail and title of each picture; the z-map is drawn by the script alone."""
+    candidate, reference = case.sides
+    figures = [
+        ("candidate", pictures.candidate, candidate),
+        ("reference", pictures.reference, reference),
+    ]
+    if pictures.difference:
+        figures.append(("difference", pictures.difference, f"{candidate} − {reference}"))
+        if case.images and case.images.error is not None:
+            figures.append(("z", pictures.candidate, "difference / standard error"))
+    return figures
+
+
+def _rung(name: str) -> int:
+    return RUNGS.index(name) if name in RUNGS else len(RUNGS)
+
+
 def _metric_rows(metrics: Metrics) -> list[tuple[str, str]]:
     return [
         ("SSIM", shown(metrics.ssim)),
+        ("FLIP", shown(metrics.flip)),
         ("PSNR, dB", shown(metrics.psnr)),
         ("RMSE, W·sr⁻¹·m⁻²", shown(metrics.rmse)),
         ("relMSE", shown(metrics.relmse)),
         ("Mean bias", shown(dict(zip("RGB", metrics.mean_bias, strict=True)), "mean_bias")),
         ("Pixels not finite", shown(metrics.nonfinite)),
     ]
-
-
-def _pictures(images: Images) -> Pictures:
-    white = white_level(images.mitsuba)
-    scale, difference = 0.0, None
-    if images.ours.shape == images.mitsuba.shape:
-        scale, difference = _difference(images)
-    return Pictures(
-        ours=_exposed(images.ours, white),
-        mitsuba=_exposed(images.mitsuba, white),
-        difference=difference,
-        white=white,
-        scale=scale,
-    )
-
-
-def _exposed(image: FloatArray, white: float) -> Picture:
-    bad = nonfinite_pixels(image)
-    return _picture(255.0 * encode(np.where(bad[..., None], 0.0, image), white), bad)
-
-
-def _difference(images: Images) -> tuple[float, Picture]:
-    """Ours minus Mitsuba's in the channel that differs most, so that no two channels cancel."""
-    bad = nonfinite_pixels(images.ours, images.mitsuba)
-    ours, mitsuba = (np.where(bad[..., None], 0.0, i) for i in (images.ours, images.mitsuba))
-    error = ours - mitsuba
-    most = np.abs(error).argmax(axis=-1)[..., None]
-    signed = np.take_along_axis(error, most, axis=-1)
-    sizes = np.abs(signed)
-    # The largest difference where fewer than 0.5 % of the pixels differ at all.
-    scale = float(np.percentile(sizes, DIFFERENCE_PERCENTILE)) or float(sizes.max())
-    amount = np.clip(signed, -scale, scale) / (scale or 1.0)
-    end = np.where(amount > 0.0, RED, BLUE)
-    return scale, _picture(WHITE + np.abs(amount) * (end - np.array(WHITE)), bad)
-
-
-def _picture(values: FloatArray, bad: npt.NDArray[np.bool_]) -> Picture:
-    """Pixels of 0 to 255, the bad ones in magenta."""
-    pixels = np.rint(values).astype(np.uint8)
-    pixels[bad] = MAGENTA
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "PNG", optimize=True)
-    height, width = bad.shape
-    factor = max(1, PICTURE_WIDTH // width)
-    return Picture(
-        url="data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii"),
-        width=width * factor,
-        height=height * factor,
-        enlarged=width < PICTURE_WIDTH,
-        nonfinite=int(np.count_nonzero(bad)),
-    )

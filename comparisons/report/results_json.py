@@ -12,18 +12,30 @@ import numpy as np
 from comparisons.results import Case, Tier
 from reference_rt.files import replacing
 
-SCHEMA = 1
+SCHEMA = 2
 """Raised whenever a reader of the former layout would misread the new one."""
 
 
-def write_results(path: Path, cases: Sequence[Case], provenance: Mapping[str, Any]) -> None:
+def write_results(
+    path: Path,
+    cases: Sequence[Case],
+    provenance: Mapping[str, Any],
+    suite: str | None = None,
+    not_run: Mapping[str, str] | None = None,
+) -> None:
     """Write `results.json`, at once or not at all.
 
-        {"schema": 1, "provenance": {...},
+        {"schema": 2, "suite": name or null, "provenance": {...},
+         "not_run": {name of a case: why it was not run},
          "cases": [{"scene", "verdict", "reason",
+                    "sides": {"candidate": whose pictures, "reference": whose},
                     "tiers": {name: {"status", "reason", and the numbers of the tier}},
-                    "metrics": {"ssim", "psnr", "rmse", "relmse", "mean_bias", "nonfinite"} or null,
-                    "seconds": {"ours": {...}, "mitsuba": {...}}, "notes": [...]}]}
+                    "metrics": {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias",
+                                "nonfinite"} or null,
+                    "cause": {"name", "evidence", "explained"} or null,
+                    "worst": [{"x", "y", "width", "height", "what"}],
+                    "seconds": {side: {step: seconds}}, "notes": [...], "left_out": [...],
+                    "again": command}]}
 
     Strict JSON (RFC 8259): NaN and the infinities become null, so a null number says "undefined or
     unbounded" (the PSNR of equal pictures, say), never zero. Raises ValueError if two tiers of a
@@ -31,12 +43,15 @@ def write_results(path: Path, cases: Sequence[Case], provenance: Mapping[str, An
     """
     document = {
         "schema": SCHEMA,
+        "suite": suite,
         "provenance": _plain(provenance),
+        "not_run": dict(not_run or {}),
         "cases": [_case(case) for case in cases],
     }
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
     with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        # A lone surrogate, of a file name that is not UTF-8, becomes JSON's escape for it.
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def _case(case: Case) -> dict[str, Any]:
@@ -47,10 +62,15 @@ def _case(case: Case) -> dict[str, Any]:
         "scene": case.scene,
         "verdict": case.verdict,
         "reason": case.reason,
+        "sides": dict(zip(("candidate", "reference"), case.sides, strict=True)),
         "tiers": tiers,
         "metrics": _plain(asdict(case.metrics)) if case.metrics else None,
+        "cause": _plain(asdict(case.cause)) if case.cause else None,
+        "worst": [_plain(asdict(place)) for place in case.worst],
         "seconds": _plain(case.seconds),
         "notes": list(case.notes),
+        "left_out": list(case.left_out),
+        "again": case.again,
     }
 
 

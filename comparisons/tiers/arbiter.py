@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 from reference_rt.shapes.shape import FloatArray, IntArray
 
@@ -30,9 +31,17 @@ LIMIT = 0.01
 """The fraction of rays that may need the arbiter.  Edges and silhouettes, a float32 bound wide,
 take 1e-4 of a picture or less; past a hundredth the reference's precision is what is compared."""
 
+SURE = 1e-4
+"""The chance at which a fraction of rays is said to be beyond a limit that it does not exceed."""
 
 AT_ONCE = 2000
 """Moved rays that are asked for together, where fewer rays than these are left."""
+
+
+def too_many(count: int, total: int, limit: float = LIMIT) -> bool:
+    """Whether `count` of `total` rays prove that more than the fraction `limit` are such: of few
+    rays one may be one too many by chance (binomial test)."""
+    return bool(stats.binom.sf(count - 1, total, limit) < SURE)
 
 
 def directions(n: int) -> FloatArray:

@@ -28,9 +28,10 @@ GAUSSIAN = 5e-4
 (src/rfilters/gaussian.cpp)."""
 
 
-def film(film_filter: Filter) -> Tier:
-    """Compare our filter with Mitsuba's, both divided by their integrals."""
-    plugin = mitsuba().load_dict(translate_filter(film_filter))
+def film(ours: Filter, reference: Filter) -> Tier:
+    """Compare our filter with Mitsuba's of another, usually the same; both divided by their
+    integrals."""
+    plugin = mitsuba().load_dict(translate_filter(reference))
     radius = float(plugin.radius())
 
     def theirs(x: Any) -> Any:
@@ -40,9 +41,9 @@ def film(film_filter: Filter) -> Tier:
     step = 2.0 * radius / CELLS
     integral = float(theirs(-radius + step * (np.arange(CELLS) + 0.5)).sum() * step)
     x = 1.1 * radius * (2.0 * (np.arange(POINTS) + 0.5) / POINTS - 1.0)
-    ours = np.array([film_filter.value(at) for at in x.tolist()])
-    error = float(np.abs(ours - theirs(x) / integral).max() / film_filter.value(0.0))
-    bound = GAUSSIAN if isinstance(film_filter, GaussianFilter) else TOLERANCE
+    values = np.array([ours.value(at) for at in x.tolist()])
+    error = float(np.abs(values - theirs(x) / integral).max() / ours.value(0.0))
+    bound = GAUSSIAN if isinstance(reference, GaussianFilter) else TOLERANCE
     numbers = {"points": POINTS, "max_error": error, "max_error_over_bound": error / bound}
     told = f"the filters differ by {error:.2g} of their middle at most"
     return Tier("film", "agree" if error <= bound else "differ", told, numbers)

@@ -123,7 +123,7 @@ def _outcome(
             told += f", {len(verdict.ours)} by our fault"
         first = int((verdict.ours if len(verdict.ours) else ours)[0])
         return "differ", f"{told}; the first: {_describe(answered, first)}"
-    if unaimed > FEW * count:
+    if arbiter.too_many(unaimed, count, FEW):
         where = _describe(answered, int(mitsuba[0]))
         return "differ", (
             f"{numbers['mismatches']} of {total} rays differ, and ours are right about what they "
@@ -140,8 +140,8 @@ def _outcome(
     if numbers["mismatches"]:
         aimed = numbers["aimed_mismatches"]
         told += f"; {unaimed} and {aimed} aimed are Mitsuba's mistakes, by exact arithmetic"
-    few_aimed = numbers["aimed_mismatches"] <= arbiter.LIMIT * (total - count)
-    if numbers["explained"] > arbiter.LIMIT * count or unaimed or not few_aimed:
+    many_aimed = arbiter.too_many(numbers["aimed_mismatches"], total - count)
+    if arbiter.too_many(numbers["explained"], count) or unaimed or many_aimed:
         return "reference-limited", told
     worst = max(v for k, v in numbers.items() if k.endswith("error_over_bound"))
     return "agree", f"{total} rays agree to {worst:.2g} of float32's bound; {told}"

@@ -122,7 +122,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
         )
         return Tier("whitted", "differ", reason, numbers)
     edges = f"{numbers['explained']} of {len(rays.o)} lie on edges within float32 or its epsilons"
-    if numbers["explained"] > arbiter.LIMIT * len(rays.o):
+    if arbiter.too_many(numbers["explained"], len(rays.o)):
         return Tier("whitted", "reference-limited", edges, numbers)
     reason = f"pixels agree to {numbers['max_error']:.2g} W/sr/m²; {edges}"
     return Tier("whitted", "agree", reason, numbers)

@@ -31,16 +31,16 @@ def test_scenes_agree(tmp_path: Path) -> None:
     scenes = [str(SCENES / f"{name}.yaml") for name in ("spheres_whitted", "polygons_fill_rules")]
     result, found = compare(tmp_path, *scenes, "--size", "48x32")
     assert result.exit_code == 0, result.output
-    assert found["schema"] == 1
+    assert found["schema"] == 2
     assert [case["verdict"] for case in found["cases"]] == ["agree", "agree"]
     case = found["cases"][0]
     assert set(case) >= {"scene", "verdict", "reason", "tiers", "metrics", "seconds"}
-    assert list(case["tiers"]) == ["geometry", "direct", "whitted", "statistics", "images"]
-    assert set(case["metrics"]) >= {"ssim", "psnr", "rmse", "relmse", "mean_bias"}
+    assert list(case["tiers"]) == ["input", "geometry", "direct", "whitted", "statistics", "images"]
+    assert set(case["metrics"]) >= {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias"}
     geometry = case["tiers"]["geometry"]
     assert (geometry["decided_ours"], geometry["undecided"]) == (0, 0)
-    assert case["seconds"]["ours"]["render"] > 0.0
-    assert case["seconds"]["mitsuba"]["render"] > 0.0
+    assert case["seconds"]["candidate"]["render"] > 0.0
+    assert case["seconds"]["reference"]["render"] > 0.0
     assert "spheres_whitted" in (tmp_path / "report.html").read_text()
 
 
@@ -51,7 +51,7 @@ def test_path_tracing_is_compared_by_replicates(tmp_path: Path) -> None:
     # 4 x 16 samples of 32 x 32 pixels are too few to tell half a percent: it must say so.
     assert found["cases"][0]["verdict"] == "inconclusive"
     assert statistics["status"] == "inconclusive"
-    assert "detectable bias" in statistics["reason"]
+    assert "smallest bias of the image mean seen with 99 % power" in statistics["reason"]
     assert result.exit_code == 1
 
 

@@ -1,6 +1,7 @@
-"""results.json and the page, read back with the standard library's parsers."""
+"""The page, read back with the standard library's parser; a browser opens it elsewhere."""
 
 import base64
+import hashlib
 import io
 import json
 import math
@@ -11,40 +12,51 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons.report import write_report, write_results
-from comparisons.report.page import shown
-from comparisons.results import Case, Images, Metrics, Tier
+from comparisons.report import write_report
+from comparisons.report.fitting import fitted
+from comparisons.report.pictures_data import as_json, pack, reduced, reduced_images, unpack
+from comparisons.report.values import shown
+from comparisons.results import Case, Cause, Images, Metrics, Place, Tier
 
-NASTY = "<script>alert('x')</script>&\"glass\""
+NASTY = "<script>alert('x')</script>&\"glass\"<!-- ]]> </style>"
 PROVENANCE = {"date": "2025-11-20", "mitsuba": "3.9.1 llvm_ad_rgb", "versions": {"numpy": "2.4"}}
 
 
-def case(verdict, scene=None, images=None, **numbers):
-    metrics = Metrics(math.nan, math.inf, 0.5, 0.25, (0.0, math.inf, -0.01), 0)
-    tier = Tier("geometry", verdict, f"why {verdict}", numbers)
+def case(verdict, scene=None, images=None, numbers=None, **more):
+    metrics = Metrics(math.nan, 0.0625, math.inf, 0.5, 0.25, (0.0, math.inf, -0.01), 0)
+    tier = Tier("geometry", verdict, f"why {verdict}", numbers or {})
     seconds = {"ours": {"load": 0.5, "render": 1.5}, "mitsuba": {"render": 2.0}}
     name = scene or f"scene-{verdict}"
-    return Case(name, verdict, f"geometry: {verdict}", (tier,), metrics, seconds, images, ("note",))
+    told = f"geometry: {verdict}"
+    return Case(name, verdict, told, (tier,), metrics, seconds, images, ("note",), **more)
+
+
+def noise(shape, seed=0):
+    return np.random.default_rng(seed).lognormal(size=(*shape, 3))
 
 
 class Page(HTMLParser):
-    """What a page asks the network for, its headings of cases, and its pictures."""
+    """What a page asks the network for, its headings of cases, its pictures and its scripts."""
 
     VOID = frozenset({"meta", "img", "input", "link", "br"})
 
     def __init__(self, text):
         super().__init__()
-        self.references, self.open, self.titles, self.tags = [], [], [], []
+        self.references, self.open, self.titles, self.tags, self.scripts = [], [], [], [], []
+        self.handlers = []
         self.feed(text)
         self.close()
 
     def handle_starttag(self, tag, attrs):
         self.tags.append(tag)
         self.references += [v for k, v in attrs if k in {"src", "href", "srcset", "data", "action"}]
+        self.handlers += [k for k, _ in attrs if k.startswith("on")]
         if tag not in self.VOID:
             self.open.append(tag)
         if tag == "h2":
             self.titles.append("")
+        if tag == "script":
+            self.scripts.append([dict(attrs)["type"], ""])
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
@@ -52,22 +64,35 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if "h2" in self.open:
             self.titles[-1] += data
+        if self.open and self.open[-1] == "script":
+            self.scripts[-1][1] += data
 
     def pixels(self, index):
         url = [r for r in self.references if r.startswith("data:")][index]
         data = base64.b64decode(url.removeprefix("data:image/png;base64,"))
         return np.asarray(Image.open(io.BytesIO(data)))
 
+    @property
+    def cases(self):
+        return self.titles[:-1]  # the last one is that of the help
+
+    @property
+    def data(self):
+        return [json.loads(text) for type_, text in self.scripts if type_ == "application/json"]
+
 
 @pytest.fixture
 def page(tmp_path):
-    def write(*cases):
+    def write(*cases, **options):
         path = tmp_path / "report.html"
-        write_report(path, cases, PROVENANCE)
+        write_report(path, cases, PROVENANCE, **options)
         text = path.read_text(encoding="utf-8")
         return Page(text), text
 
     return write
+
+
+# The page
 
 
 def test_the_page_asks_for_nothing_outside(page):
@@ -76,35 +101,84 @@ def test_the_page_asks_for_nothing_outside(page):
     assert parsed.open == []
     assert parsed.references
     assert all(r.startswith(("data:image/png;base64,", "#")) for r in parsed.references)
-    assert not re.search(r"https?:|url\(|@import", text)
+    assert not re.search(r"https?:|url\(|@import|\bfetch\(|\beval\b|innerHTML", text)
     assert "default-src 'none'" in text
-    assert not {"script", "link", "iframe"} & set(parsed.tags)
+    assert not {"link", "iframe", "object"} & set(parsed.tags)
+
+
+def test_only_the_page_s_own_script_may_run(page):
+    parsed, text = page(case("agree", images=Images(noise((2, 2)), noise((2, 2)))))
+    (module,) = [script for type_, script in parsed.scripts if type_ == "module"]
+    digest = base64.b64encode(hashlib.sha256(module.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}';" in text
+    assert parsed.handlers == []
 
 
 def test_failures_come_first(page):
     given = ["agree", "reference-limited", "inconclusive", "not-comparable", "differ", "invalid"]
     parsed, text = page(*map(case, given))
     expected = ["invalid", "differ", "inconclusive", "not-comparable", "reference-limited", "agree"]
-    assert [title.split()[0] for title in parsed.titles] == [f"scene-{v}" for v in expected]
+    assert [title.split()[0] for title in parsed.cases] == [f"scene-{v}" for v in expected]
     # The verdict is a word beside the name, not only a colour.
-    assert [title.split()[-1] for title in parsed.titles] == expected
+    assert [title.split()[-1] for title in parsed.cases] == expected
     assert "6 cases" in text
 
 
 def test_what_others_wrote_is_escaped(page):
-    parsed, text = page(case("differ", scene=NASTY, **{NASTY: NASTY}))
-    assert "script" not in parsed.tags
+    images = Images(noise((3, 3)), noise((3, 3), 1), noise((3, 3), 2))
+    nasty = case(
+        "differ",
+        NASTY,
+        images,
+        {NASTY: NASTY},
+        sides=(NASTY, NASTY),
+        cause=Cause(NASTY, NASTY, 0.5),
+        worst=(Place(0, 0, 1, 1, NASTY),),
+        left_out=(NASTY,),
+        again=NASTY,
+    )
+    parsed, text = page(nasty)
+    assert parsed.open == []
+    assert [type_ for type_, _ in parsed.scripts] == ["application/json", "module"]
     assert NASTY not in text
-    assert parsed.titles[0].startswith(NASTY)
+    assert "alert('x')" not in text
+    assert parsed.cases[0].startswith(NASTY)
+
+
+def test_a_name_that_is_not_unicode_does_not_stop_the_page(page):
+    assert page(case("agree", scene="odd\udcff"))[0].cases[0].startswith("odd")
+
+
+def test_everything_a_case_says_is_there(page):
+    told = case(
+        "differ",
+        cause=Cause("lost light", "r = 0.97", 0.94),
+        worst=(Place(8, 16, 4, 2, "z = 14"),),
+        left_out=("mirrors: none",),
+        again="reference-rt compare x.yaml",
+    )
+    _, text = page(told)
+    for words in (
+        "Likeliest cause: lost light.",
+        "r = 0.97",
+        "4 × 2 pixels at (8, 16)",
+        "z = 14",
+        "mirrors: none",
+        "<code>reference-rt compare x.yaml</code>",
+        "why differ",
+        "0.0625",
+        "note",
+    ):
+        assert words in text, words
 
 
 def test_the_difference_is_signed_and_bad_pixels_are_magenta(page):
-    ours, mitsuba = np.full((4, 4, 3), 0.5), np.full((4, 4, 3), 0.5)
-    ours[0, 0, 1] += 0.1
-    ours[0, 1, 2] -= 0.1
-    ours[3, 3, 0] = np.nan
-    mitsuba[3, 2, 0] = np.inf
-    parsed, text = page(case("invalid", images=Images(ours, mitsuba)))
+    candidate, reference = np.full((4, 4, 3), 0.5), np.full((4, 4, 3), 0.5)
+    candidate[0, 0, 1] += 0.1
+    candidate[0, 1, 2] -= 0.1
+    candidate[3, 3, 0] = np.nan
+    reference[3, 2, 0] = np.inf
+    parsed, text = page(case("invalid", images=Images(candidate, reference)))
     difference = parsed.pixels(2)
     assert tuple(difference[0, 0]) == (178, 24, 43)
     assert tuple(difference[0, 1]) == (33, 102, 172)
@@ -115,18 +189,73 @@ def test_the_difference_is_signed_and_bad_pixels_are_magenta(page):
     assert "+0.1</span>" in text
 
 
+def test_a_bad_pixel_shows_in_the_thumbnail_of_a_large_picture(page):
+    candidate = np.ones((100, 300, 3))
+    candidate[57, 123, 1] = -np.inf
+    parsed, _ = page(case("invalid", images=Images(candidate, np.ones_like(candidate))))
+    assert parsed.pixels(0).shape == (20, 60, 3)
+    assert tuple(parsed.pixels(0)[57 // 5, 123 // 5]) == (255, 0, 255)
+
+
 def test_equal_pictures_and_pictures_of_unlike_size(page):
-    picture = np.random.default_rng(0).uniform(size=(3, 5, 3))
+    picture = noise((3, 5))
     parsed, text = page(case("agree", images=Images(picture, picture)))
     assert "equal everywhere" in text
     assert (parsed.pixels(2) == 255).all()
     assert (parsed.pixels(0) == parsed.pixels(1)).all()
+    nothing = np.full((3, 5, 3), math.nan)
+    assert "equal everywhere" not in page(case("invalid", images=Images(nothing, nothing)))[1]
     _, text = page(case("invalid", images=Images(picture, picture[1:])))
     assert "unlike size" in text
 
 
+@pytest.mark.parametrize("value", [0.0, math.nan, -math.inf, 1e300, 5e-324, -1.0])
+def test_odd_pictures(page, value):
+    images = Images(np.full((1, 1, 3), value), np.full((1, 1, 3), -value), np.zeros((1, 1, 3)))
+    parsed, _ = page(case("invalid", images=images))
+    back = unpack(parsed.data[0])
+    np.testing.assert_allclose(back.candidate, images.candidate, rtol=2**-10)
+    np.testing.assert_allclose(back.reference, images.reference, rtol=2**-11)
+
+
+def test_a_picture_without_pixels_is_none(page):
+    nothing = np.empty((0, 4, 3))
+    assert "No pictures." in page(case("invalid", images=Images(nothing, noise((4, 4)))))[1]
+
+
 def test_a_run_without_cases_still_has_a_page(page):
     assert "0 cases" in page()[1]
+
+
+def test_a_large_run_stays_within_the_bound_and_says_what_it_lost(page):
+    images = Images(noise((64, 64)), noise((64, 64), 1), noise((64, 64), 2))
+    cases = [case("agree", images=images)] * 6 + [case("differ", images=images)]
+    whole, text = page(*cases)
+    assert [data["factor"] for data in whole.data] == [1] * 7
+    assert "the mean of" not in text
+    most = 3 * len(text) // 4
+    parsed, text = page(*cases, most_bytes=most)
+    assert len(text.encode()) < most
+    assert [data["factor"] for data in parsed.data[:1]] == [1]
+    assert any(data["factor"] == 2 for data in parsed.data[1:])
+    assert "each pixel here is the mean of 2 × 2" in text
+    _, text = page(*cases, most_bytes=1000)
+    assert "there are only thumbnails here" in text
+
+
+class Speechless:
+    def __str__(self):
+        raise RuntimeError("no words")
+
+
+def test_a_failed_write_leaves_the_former_page(tmp_path):
+    path = tmp_path / "report.html"
+    write_report(path, [case("agree")], PROVENANCE)
+    before = path.read_bytes()
+    with pytest.raises(RuntimeError, match="no words"):
+        write_report(path, [case("agree", numbers={"x": Speechless()})], PROVENANCE)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.parametrize(
@@ -148,62 +277,89 @@ def test_values_for_people(value, name, text):
     assert shown(value, name) == text
 
 
-# results.json
+# Float pictures
 
 
-def refuse(token):
-    raise AssertionError(f"{token} is not JSON")
+def test_what_is_packed_comes_back_within_the_stated_bounds():
+    rng = np.random.default_rng(1)
+    reference = rng.lognormal(sigma=3.0, size=(40, 50, 3)) * rng.choice([-1, 0, 1], (40, 50, 3))
+    relative = 10.0 ** rng.uniform(-9, 1, reference.shape) * rng.choice([-1, 0, 1], reference.shape)
+    candidate = reference * (1.0 + relative)
+    error = rng.lognormal(sigma=3.0, size=reference.shape)
+    back = unpack(pack(Images(candidate, reference, error)))
+    # The floor: the smallest half float's half, below the 99.9th percentile by 34 powers of two.
+    floor = 2.0**-33 * np.percentile(np.abs(reference), 99.9)
+    np.testing.assert_allclose(back.reference, reference, rtol=2**-11, atol=floor)
+    np.testing.assert_allclose(back.candidate, candidate, rtol=2**-10, atol=floor)
+    np.testing.assert_allclose(back.error, error, rtol=2**-4)
+    difference = candidate - reference
+    np.testing.assert_allclose(back.difference, difference, rtol=2**-6, atol=2**-6 * floor)
+    assert (back.difference[difference == 0.0] == 0.0).all()
+    assert (np.sign(back.reference) == np.sign(reference)).all()
 
 
-def test_results_are_strict_json(tmp_path):
-    path = tmp_path / "new" / "results.json"
-    numbers = {"rays": np.int64(7), "errors": np.array([1.0, np.nan]), "pair": (1, math.inf)}
-    write_results(path, [case("differ", **numbers)], PROVENANCE)
-    document = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
-    assert document["schema"] == 1
-    assert document["provenance"] == PROVENANCE
-    (entry,) = document["cases"]
-    assert entry == {
-        "scene": "scene-differ",
-        "verdict": "differ",
-        "reason": "geometry: differ",
-        "tiers": {
-            "geometry": {
-                "status": "differ",
-                "reason": "why differ",
-                "rays": 7,
-                "errors": [1.0, None],
-                "pair": [1, None],
-            }
-        },
-        "metrics": {
-            "ssim": None,
-            "psnr": None,
-            "rmse": 0.5,
-            "relmse": 0.25,
-            "mean_bias": [0.0, None, -0.01],
-            "nonfinite": 0,
-        },
-        "seconds": {"ours": {"load": 0.5, "render": 1.5}, "mitsuba": {"render": 2.0}},
-        "notes": ["note"],
-    }
+def test_what_is_not_finite_or_far_too_bright_comes_back_as_it_is():
+    reference, candidate = noise((20, 20)), noise((20, 20), 1)
+    candidate[0, :4, 0] = np.nan, np.inf, -np.inf, 1e30
+    reference[1, :3, 1] = 3e38, np.nan, -1e300
+    back = unpack(pack(Images(candidate, reference, np.zeros_like(reference))))
+    np.testing.assert_array_equal(back.candidate[0, :4, 0], candidate[0, :4, 0])
+    np.testing.assert_array_equal(back.reference[1, :3, 1], reference[1, :3, 1])
+    # ... and the others keep their digits beside it.
+    others = np.ones(reference.shape, dtype=bool)
+    others[:2, :4] = False
+    np.testing.assert_allclose(back.candidate[others], candidate[others], rtol=2**-10)
+    np.testing.assert_allclose(back.reference[others], reference[others], rtol=2**-11)
 
 
-def test_a_failed_write_leaves_the_former_file(tmp_path):
-    path = tmp_path / "results.json"
-    write_results(path, [case("agree")], PROVENANCE)
-    before = path.read_bytes()
-    with pytest.raises(TypeError):
-        write_results(path, [case("agree", odd=object())], PROVENANCE)
-    with pytest.raises(UnicodeEncodeError):
-        write_results(path, [case("agree", odd="\ud800")], PROVENANCE)
-    assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]
+def test_pictures_of_unlike_size_are_packed_alone():
+    candidate, reference = noise((3, 7)), noise((5, 2))
+    back = unpack(pack(Images(candidate, reference)))
+    np.testing.assert_allclose(back.candidate, candidate, rtol=2**-11)
+    np.testing.assert_allclose(back.reference, reference, rtol=2**-11)
+    assert back.difference is None
+    assert back.error is None
 
 
-def test_a_number_cannot_replace_the_status(tmp_path):
-    with pytest.raises(ValueError, match="status"):
-        write_results(tmp_path / "r.json", [case("differ", status="agree")], {})
-    twice = Tier("geometry", "differ", ""), Tier("geometry", "agree", "")
-    with pytest.raises(ValueError, match="same name"):
-        write_results(tmp_path / "r.json", [Case("s", "differ", "", twice, None, {})], {})
+def test_pictures_alike_are_small():
+    """Bytes a pixel of noisy pictures: what the page's size follows from."""
+    picture = noise((64, 64))
+    error = 0.01 * picture
+    seeds = np.random.default_rng(5).normal(size=(2, *picture.shape))
+    candidate, reference = picture + error * seeds / math.sqrt(2)
+    noisy = len(pack(Images(candidate, reference, error))["bytes"]) / 64**2
+    equal = len(pack(Images(picture, picture))["bytes"]) / 64**2
+    assert noisy < 20.0
+    assert equal < 8.0
+
+
+def test_reduced_pictures_are_means():
+    picture = np.arange(30.0).reshape(2, 5, 3)
+    small = reduced(picture, 2)
+    assert small.shape == (1, 3, 3)
+    np.testing.assert_array_equal(small[0, 0], picture[:, :2].mean(axis=(0, 1)))
+    np.testing.assert_array_equal(small[0, 2], picture[:, 4:].mean(axis=(0, 1)))
+    picture[1, 1, 0] = np.nan
+    assert np.isnan(reduced(picture, 2)[0, 0, 0])
+    assert np.isfinite(reduced(picture, 2)[0, 1:]).all()
+    images = Images(picture, picture, np.full((2, 5, 3), 2.0))
+    np.testing.assert_array_equal(reduced_images(images, 2).error[0, :, 0], [1, 1, math.sqrt(2)])
+
+
+def test_data_cannot_end_its_script_element():
+    assert not set("<>&") & set(as_json({"x": "</script><!--&"}))
+    assert json.loads(as_json({"x": "</script>&"})) == {"x": "</script>&"}
+    with pytest.raises(ValueError, match="JSON"):
+        as_json({"x": math.nan})
+
+
+def test_passing_cases_lose_detail_first_and_the_largest_first():
+    large, small = (Images(noise((n, n)), noise((n, n), 1)) for n in (32, 16))
+    pictures, failed = [large, small, large, None], [True, False, False, False]
+    sizes = [len(as_json(pack(images))) for images in (large, small, large)]
+    assert [f and f.factor for f in fitted(pictures, failed, sum(sizes))] == [1, 1, 1, None]
+    assert [f and f.factor for f in fitted(pictures, failed, sum(sizes) - 1)] == [1, 1, 2, None]
+    only_failed = fitted(pictures, failed, sizes[0])
+    assert [f.data == "" for f in only_failed[:3]] == [False, True, True]
+    assert only_failed[0].factor == 1
+    assert fitted(pictures, failed, 0)[0].data == ""

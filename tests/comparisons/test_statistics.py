@@ -2,277 +2,266 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
-
-from comparisons.statistics import (
-    FAMILY_LEVEL,
-    IMAGE_MARGIN,
-    bias_of_means,
-    bias_of_tiles,
-    compare_replicates,
+from planted import (
+    FAULTS,
+    HEIGHT,
+    LAMP,
+    MARGINS,
+    STILL,
+    TILE,
+    WIDTH,
+    judged,
+    patched,
+    replicates,
+    scene,
 )
 
-SEEDS = 300
+from comparisons.statistics import Known, Margins, compare, standard_error, worst_places
+from comparisons.statistics.decide import _decide, findings
+
+# The decision: specificity and equivalence
 
 
-def scene(height=32, width=32):
-    """A picture with a bright, a dim and a black part, and a channel of little light."""
-    mean = np.full((height, width, 3), 0.5)
-    mean[: height // 2, : width // 2] = 0.02
-    mean[height // 2 :, : width // 2] = 0.0
-    mean[..., 2] *= 0.1
-    return mean
+def test_equal_distributions_agree():
+    statuses = [judged(scene(), seed).status for seed in range(60)]
+    assert statuses.count("agree") >= 57
+    assert "differ" not in statuses
+    assert "invalid" not in statuses
 
 
-def replicates(rng, mean, count=16, samples=20_000):
-    """Poisson noise, as of `samples` samples a pixel that are either lit or not."""
-    return rng.poisson(mean * samples, (count, *mean.shape)) / samples
+def test_the_reason_of_agreement_states_power_and_equivalence():
+    tier = judged(scene())
+    assert tier.status == "agree"
+    assert tier.name == "statistics"
+    assert "within ±0.5 %; no tile and no pixel differs" in tier.reason
+    assert "the smallest bias of the image mean seen with 99 % power is 0." in tier.reason
+    assert "the means are equivalent within ±0." in tier.reason
+    assert tier.reason.endswith("% at 99.95 %")
+    assert max(tier.numbers["detectable_bias"].values()) <= 0.005
+    reach = [
+        abs(tier.numbers["relative_bias"][c]) + tier.numbers["image"]["half_width_of_bias"][c]
+        for c in "RGB"
+    ]
+    assert tier.numbers["equivalent_within"] == pytest.approx(max(reach))
 
 
-# Welch's test itself
+def test_agreement_needs_power_and_not_only_a_narrow_interval():
+    """A bias as large as the limit must be seen, or the run is not conclusive."""
+    found = {}
+    for noise in (0.13, 0.16, 0.2, 0.25, 0.3):
+        tier = judged(scene(), noise=noise)
+        numbers = tier.numbers
+        sees = max(numbers["detectable_bias"].values()) <= 0.005
+        assert (tier.status == "agree") == (sees and numbers["equivalent_within"] <= 0.005)
+        found[sees, numbers["equivalent_within"] <= 0.005] = tier
+    hidden = found[False, True]
+    assert hidden.status == "inconclusive"
+    assert ", within ±0.5 %; a bias of that size could be overlooked; it takes" in hidden.reason
+    assert ", not within ±0.5 %; a bias of" in found[False, False].reason
 
 
-def test_statistic_is_welchs():
+def test_agreement_needs_an_interval_within_the_limit():
+    """A run that would see the limit, but happens to be too far off, and not yet proven so."""
     rng = np.random.default_rng(0)
-    ours, mitsuba = rng.normal(1.0, 0.1, (5, 4, 4, 3)), rng.normal(1.1, 0.3, (9, 4, 4, 3))
-    test = bias_of_means(ours, mitsuba, margin=0.0, level=0.05)
-    expected = stats.ttest_ind(ours.mean(axis=(1, 2)), mitsuba.mean(axis=(1, 2)), equal_var=False)
-    assert test.difference / test.standard_error == pytest.approx(expected.statistic)
-    assert test.dof == 4
-    assert test.p_value == pytest.approx(2.0 * stats.t.sf(np.abs(expected.statistic), 4))
-    quantile = stats.t.ppf(0.5 + 0.5 * 0.95 ** (1.0 / 3.0), 4)
-    assert test.half_width == pytest.approx(quantile * test.standard_error)
-    assert test.relative == pytest.approx(ours.mean((0, 1, 2)) / mitsuba.mean((0, 1, 2)) - 1.0)
+    pictures = [replicates(rng, scene(), noise=0.11) for _ in range(2)]
+    found = findings(*pictures, 16, MARGINS)
+    image = found.image
+    assert image.over_scale(image.detectable).max() < 0.005
+    only_green = np.array([0.0, 1.0, 0.0])
+    off = replace(image, difference=only_green * (0.00505 * image.scale - image.half_width))
+    assert not off.differs.any()
+    assert _decide(found, 0.005)[0] == "agree"
+    status, reason = _decide(replace(found, image=off), 0.005)
+    assert status == "inconclusive"
+    assert ", not within ±0.5 %; it takes about" in reason
 
 
-def tiles_of_eight(ours, mitsuba, **options):
-    return bias_of_tiles(ours, mitsuba, 8, **options)[0]
-
-
-@pytest.mark.parametrize("bias", [bias_of_means, tiles_of_eight])
-def test_level_is_the_stated_one(bias):
-    """Against a side without noise the test is Student's, whose level is exact.
-
-    Without a margin, equal means must then be rejected as often as the family's level says.
-    """
-    level = 0.05
-    exact = np.ones((6, 16, 16, 3))
-    alarms = 0
-    for seed in range(SEEDS):
-        ours = np.random.default_rng(seed).normal(1.0, 0.2, exact.shape)
-        alarms += bool(bias(ours, exact, margin=0.0, level=level).differs.any())
-    assert stats.binom.ppf(1e-4, SEEDS, level) <= alarms <= stats.binom.isf(1e-4, SEEDS, level)
-
-
-@pytest.mark.parametrize(("count", "noise"), [(4, 10.0), (16, 2.0)])
-def test_level_holds_far_out_in_the_tail(count, noise):
-    """At one in 1e4, where Welch and Satterthwaite's dof give many times the stated alarms."""
-    rng = np.random.default_rng(0)
-    ours = rng.normal(1.0, noise, (4, 300, 300, 3))
-    mitsuba = rng.normal(1.0, 1.0, (count, 300, 300, 3))
-    p_value = bias_of_tiles(ours, mitsuba, tile=1, margin=0.0)[0].p_value
-    alarms = np.count_nonzero(p_value < 1e-4)
-    assert alarms <= stats.binom.isf(1e-4, p_value.size, 1e-4)
-
-
-@pytest.mark.parametrize("count", [2, 3, 8])
-def test_detectable_bias_is_detected_that_often(count):
-    """The power can be counted: 99 %, by the definition of the detectable bias.
-
-    The approximation errs by up to 3 % of the bias, to the safe side for few replicates.
-    """
-    rng = np.random.default_rng(5)
-    ours, mitsuba = rng.normal(1.0, 0.01, (2, count, 1, 1, 3))
-    test = bias_of_means(ours, mitsuba, margin=0.001)
-    # Runs of the same dof whose true standard error is the one that was estimated.
-    error, dof = test.standard_error, test.dof
-    runs = 20_000
-    difference = rng.normal(test.detectable, error, (runs, 3))
-    estimated = error * np.sqrt(rng.chisquare(dof, (runs, 3)) / dof)
-    proven = difference - test.half_width / error * estimated > test.margin * test.scale
-    power = proven.mean(axis=0)
-    assert np.all(power > 0.985)
-    assert np.all(power < 0.997)
-
-
-# The decision: specificity
-
-
-def test_equal_distributions_do_not_differ():
-    alarms = agreements = 0
-    for seed in range(SEEDS):
-        rng = np.random.default_rng(seed)
-        tier = compare_replicates(replicates(rng, scene()), replicates(rng, scene()))
-        alarms += tier.status == "differ"
-        agreements += tier.status == "agree"
-    assert alarms <= stats.binom.isf(1e-3, SEEDS, 2 * FAMILY_LEVEL)
-    assert agreements >= 0.95 * SEEDS
-
-
-@pytest.mark.parametrize(("count_ours", "count_mitsuba"), [(2, 2), (4, 16), (16, 4)])
-def test_few_and_unequal_replicates_do_not_differ(count_ours, count_mitsuba):
-    alarms = 0
-    for seed in range(SEEDS):
-        rng = np.random.default_rng(seed)
-        # Unlike noise on the two sides, which a pooled variance would get wrong.
-        ours = replicates(rng, scene(16, 16), count_ours, samples=200)
-        mitsuba = replicates(rng, scene(16, 16), count_mitsuba, samples=3_000)
-        alarms += compare_replicates(ours, mitsuba, tile=4).status == "differ"
-    assert alarms <= stats.binom.isf(1e-3, SEEDS, 2 * FAMILY_LEVEL)
+def test_a_wider_limit_is_met_sooner():
+    assert judged(scene(), noise=0.5).status == "inconclusive"
+    assert judged(scene(), noise=0.5, limit=0.03).status == "agree"
+    with pytest.raises(ValueError, match=r"limit 0.001: expected more than the margin 0.001"):
+        judged(scene(), limit=0.001)
 
 
 def test_noise_is_inconclusive_and_the_stated_samples_decide():
     decided = 0
     for seed in range(20):
-        rng = np.random.default_rng(seed)
-        tier = compare_replicates(*(replicates(rng, scene(), samples=400) for _ in range(2)))
+        tier = judged(scene(), seed, noise=0.4)
         assert tier.status == "inconclusive"
-        assert "times as many samples" in tier.reason
-        samples = math.ceil(400 * tier.numbers["samples_factor"])
-        assert samples > 400
-        more = (replicates(rng, scene(), samples=samples) for _ in range(2))
-        decided += compare_replicates(*more).status == "agree"
-    assert decided >= 18
+        factor = tier.numbers["samples_factor"]
+        assert factor > 1.0
+        assert f"replicates x {factor:.{0 if factor > 10 else 1}f} or spp x" in tier.reason
+        decided += judged(scene(), seed + 100, noise=0.4 / math.sqrt(factor)).status == "agree"
+    assert decided >= 17
+
+
+def test_a_bias_within_the_margin_is_permitted():
+    noisy = np.where(STILL, scene(), scene() * 1.0005)
+    assert judged(noisy, noise=0.05).status == "agree"
+    tight = Margins(image=1e-5, tile=1e-4, pixel=1e-4, constant=1e-12)
+    assert judged(noisy, noise=0.002, margins=tight).status == "differ"
 
 
 # The decision: sensitivity
 
 
-def found(changed, tile=16, **options):
-    """In how many of 20 runs `changed` is told from `scene()`."""
-    results = []
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        ours, mitsuba = replicates(rng, changed, **options), replicates(rng, scene(), **options)
-        results.append(compare_replicates(ours, mitsuba, tile))
-    return sum(tier.status == "differ" for tier in results), results[0]
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_are_found_and_named(fault):
+    changed, words = FAULTS[fault]
+    for seed in range(3):
+        tier = judged(changed, seed)
+        assert tier.status == "differ"
+        assert words in tier.reason
+        assert "beyond ±" in tier.reason
 
 
-def test_one_percent_of_gain_is_found():
-    count, tier = found(scene() * 1.01)
-    assert count == 20
-    assert "image mean" in tier.reason
-    bias = tier.numbers["relative_bias"]
-    assert bias["R"] == pytest.approx(0.01, abs=0.002)
-    assert max(tier.numbers["detectable_bias"].values()) < 0.01
+def test_numbers_of_the_worst_tile_and_pixel():
+    tile = judged(patched(TILE, 1.05)).numbers["tiles"]
+    assert (tile["side"], tile["tested"], tile["differ"]) == (16, 12, 1)
+    assert (tile["worst_x"], tile["worst_y"]) == (32, 16)
+    assert tile["worst_bias"] == pytest.approx(0.05, abs=0.01)
+    assert tile["worst_p_value"] < 1e-6
+    pixel = judged(patched((30, 41), 2.0)).numbers["pixels"]
+    assert (pixel["worst_x"], pixel["worst_y"], pixel["differ"]) == (41, 30, 1)
+    assert pixel["worst_bias"] == pytest.approx(1.0, abs=0.3)
 
 
-@pytest.mark.parametrize("channel", [0, 1, 2])
-def test_one_wrong_channel_is_found(channel):
-    changed = scene()
-    changed[..., channel] *= 0.98
-    count, tier = found(changed)
-    assert count == 20
-    assert f"image mean {'RGB'[channel]} -" in tier.reason
-
-
-def test_one_wrong_tile_is_found_and_named():
-    """Energy that moves within a tile's neighbourhood leaves the image mean alone."""
-    changed = scene(48, 80)
-    changed[16:32, 64:80, 1] *= 1.05
-    changed[32:48, 64:80, 1] *= 0.95
-    rng = np.random.default_rng(0)
-    tier = compare_replicates(replicates(rng, changed), replicates(rng, scene(48, 80)))
+def test_many_small_differences_are_found_by_uniformity():
+    """A pattern that no pixel and no tile can prove."""
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] // 4
+    pattern = np.where(STILL, 0.0, np.where((x + y) % 2, 0.06, -0.06)[..., None])
+    tier = judged(scene() * (1.0 + pattern), noise=0.4)
     assert tier.status == "differ"
-    assert "not the image mean" in tier.reason
-    assert tier.numbers["tiles_that_differ"] == 2
-    assert (tier.numbers["worst_tile_x"], tier.numbers["worst_tile_y"]) in [(64, 16), (64, 32)]
-    assert tier.numbers["worst_tile_channel"] == "G"
-    assert abs(tier.numbers["worst_tile_bias"]) == pytest.approx(0.05, abs=0.01)
+    assert "small blocks differ more between the sides than within: mean p-value" in tier.reason
+    assert tier.numbers["tiles"]["differ"] == tier.numbers["pixels"]["differ"] == 0
 
 
-def test_light_in_a_black_tile_is_found():
-    changed = scene()
-    changed[16:, :16] = 0.01
-    count, _ = found(changed)
-    assert count == 20
+# Pixels without noise
 
 
-def test_a_bias_within_the_margin_is_permitted():
-    rng = np.random.default_rng(0)
-    ours = replicates(rng, scene() * (1.0 + IMAGE_MARGIN / 2), samples=200_000)
-    assert compare_replicates(ours, replicates(rng, scene(), samples=200_000)).status == "agree"
+@pytest.mark.parametrize("count", [2, 4, 16])
+def test_rounding_of_pixels_without_noise_is_permitted_and_no_more(count):
+    """The background is compared with the dark level, the lamp with itself."""
+    for where, change, status in (
+        ((3, 3), 1e-7, None),
+        (LAMP, 5e-6, None),
+        ((3, 3), 1e-4, "differ"),
+        ((11, 30), 1e-3, "differ"),
+        (LAMP, 1e-3, "differ"),
+    ):
+        changed = scene()
+        changed[where] += change
+        tier = judged(changed, count=count)
+        assert (tier.status == "differ") == (status == "differ"), (where, change, tier.reason)
 
 
-# No noise, no light, no number
-
-
-def test_pictures_without_noise():
+def test_pictures_without_any_noise():
     still = np.stack([scene()] * 4)
-    assert compare_replicates(still, still).status == "agree"
-    assert compare_replicates(still * (1.0 + 1e-15), still).status == "agree"
+    assert compare(still, still).status == "agree"
+    assert compare(still * (1.0 + 1e-7), still).status == "agree"
     tile = still.copy()
-    tile[:, :8, :8] *= 1.5
-    tier = compare_replicates(tile, still, tile=8)
+    tile[:, 16:32, :16] *= 1.5
+    tier = compare(tile, still)
     assert tier.status == "differ"
-    assert (tier.numbers["worst_tile_x"], tier.numbers["worst_tile_y"]) == (0, 0)
-    assert (
-        compare_replicates(still, np.random.default_rng(0).permuted(still, axis=0)).status
-        == "agree"
-    )
+    assert standard_error(still, still).max() <= 5.0 * 2.0**-24
 
 
-def test_a_tile_without_noise_that_differs_fails_beside_noisy_ones():
+def test_no_noise_by_chance_beside_noise_is_no_proof():
+    """Four replicates of a pixel of two values, equal by chance, amid others like it."""
     rng = np.random.default_rng(0)
-    ours, mitsuba = replicates(rng, scene()), replicates(rng, scene())
-    ours[:, 16:, :16] = 0.002
-    mitsuba[:, 16:, :16] = 0.0
-    test, worst = bias_of_tiles(ours, mitsuba)
-    assert worst == (0, 16)
-    assert test.p_value[1, 0, 0] == 0.0
-    assert compare_replicates(ours, mitsuba).status == "differ"
+    a, b = rng.integers(0, 2, (2, 4, 32, 32, 3)).astype(float)
+    a[:, 9, 9], b[:, 9, 9] = 1.0, 0.0
+    assert not findings(a, b, 16, MARGINS).pixels.differs.any()
+
+
+# What is said where there is nothing to compare
 
 
 def test_black_pictures():
     rng = np.random.default_rng(0)
     lit = replicates(rng, scene())
-    assert compare_replicates(lit * 0, lit * 0).status == "not-applicable"
-    assert compare_replicates(lit * 0, lit).status == "differ"
-    assert compare_replicates(lit, lit * 0).status == "differ"
+    assert compare(lit * 0, lit * 0).status == "not-applicable"
+    for pair in ((lit * 0, lit), (lit, lit * 0), (lit[:1] * 0, lit), (lit, lit[:1] * 0)):
+        tier = compare(*pair)
+        assert tier.status == "differ"
+        json.dumps(tier.numbers, allow_nan=False)
+    assert "where the reference is black" in compare(lit, lit * 0).reason
     spark = lit * 0
     spark[0, 3, 3] = 1.0  # in one replicate only: not proven
-    tier = compare_replicates(spark, lit * 0)
+    tier = compare(spark, lit * 0)
     assert tier.status == "inconclusive"
+    assert "cannot be told" in tier.reason
     json.dumps(tier.numbers, allow_nan=False)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_pixels_not_finite_are_invalid(value):
-    ours = np.ones((4, 8, 8, 3))
-    ours[2, 3, 4, 0] = value
-    tier = compare_replicates(np.ones((4, 8, 8, 3)), ours)
+    pictures = np.ones((4, 8, 8, 3))
+    bad = pictures.copy()
+    bad[2, 3, 4, 0] = value
+    tier = compare(pictures, bad)
     assert tier.status == "invalid"
-    assert "0 of ours, 1 of Mitsuba's" in tier.reason
+    assert "0 of the candidate, 1 of the reference" in tier.reason
+    assert compare(pictures, Known(pictures[0], bad[2])).status == "invalid"
+    assert compare(pictures, Known(pictures[0], -pictures[0])).status == "invalid"
+    assert np.isfinite(standard_error(pictures, bad)).all()
     with pytest.raises(ValueError, match="not finite"):
-        bias_of_means(ours, ours)
+        worst_places(pictures, bad)
 
 
 def test_sizes():
-    images = np.ones((2, 8, 8, 3))
-    assert compare_replicates(images, np.ones((2, 8, 9, 3))).status == "invalid"
-    for wrong in (np.ones((1, 8, 8, 3)), np.ones((8, 8, 3)), np.ones((2, 8, 8, 4))):
-        with pytest.raises(ValueError, match="expected"):
-            compare_replicates(wrong, images)
-    with pytest.raises(ValueError, match="differ in size"):
-        bias_of_tiles(images, np.ones((2, 8, 9, 3)))
+    images = np.ones((2, 8, 6, 3))
+    tier = compare(images, np.ones((2, 8, 9, 3)))
+    assert tier.status == "invalid"
+    assert tier.reason == "candidate is 6 x 8, reference 9 x 8 pixels (width x height)"
+    for wrong in (np.ones((8, 6, 3)), np.ones((2, 8, 6, 4)), np.ones((0, 8, 6, 3))):
+        with pytest.raises(ValueError, match=r"candidate: expected \(R, height, width, 3\)"):
+            compare(wrong, images)
+        with pytest.raises(ValueError, match=r"reference: expected \(R, height, width, 3\)"):
+            compare(images, wrong)
+    with pytest.raises(ValueError, match=r"reference's mean: expected \(height, width, 3\)"):
+        compare(images, Known(images, images))
+    with pytest.raises(ValueError, match="its variance"):
+        compare(images, Known(images[0], images[0, :4]))
+    for function in (standard_error, worst_places):
+        with pytest.raises(ValueError, match="candidate is 6 x 8, reference 9 x 8"):
+            function(images, np.ones((2, 8, 9, 3)))
 
 
-def test_tiles_at_the_edges_are_means_of_what_is_there():
-    images = np.arange(2 * 5 * 7 * 3, dtype=float).reshape(2, 5, 7, 3)
-    test, _ = bias_of_tiles(images, images * 2.0, tile=4)
-    assert test.difference.shape == (2, 2, 3)
-    assert test.difference[1, 1] == pytest.approx(-images[:, 4:, 4:].mean(axis=(0, 1, 2)))
-    assert test.difference[0, 1] == pytest.approx(-images[:, :4, 4:].mean(axis=(0, 1, 2)))
-
-
-def test_numbers_are_json_and_the_reason_states_the_power():
+@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (3, 5), (17, 16), (40, 1)])
+@pytest.mark.parametrize("counts", [(1, 1), (1, 4), (2, 2), (4, 1), (5, 9)])
+def test_small_pictures(shape, counts):
     rng = np.random.default_rng(0)
-    for samples in (100, 20_000):
-        noisy = [replicates(rng, scene(), samples=samples) for _ in range(2)]
-        tier = compare_replicates(*noisy)
+    a, b = (1.0 + 0.1 * rng.standard_normal((count, *shape, 3)) for count in counts)
+    tier = compare(a, b)
+    assert tier.status == "inconclusive"
+    json.dumps(tier.numbers, allow_nan=False)
+    assert standard_error(a, b).shape == (*shape, 3)
+    assert np.isfinite(standard_error(a, b)).all()
+    worst_places(a, b)
+    assert compare(a[:, :, :, :], Known(b[0], 0.01 * np.ones_like(b[0]))).status == "inconclusive"
+
+
+def test_negative_radiance_of_a_filter():
+    rng = np.random.default_rng(0)
+    pictures = 0.5 + 2.0 * rng.standard_normal((2, 16, 64, 64, 3))
+    tier = compare(*pictures)
+    assert tier.status == "inconclusive"
+    gain = compare(pictures[0] + 0.5, pictures[1])
+    assert gain.status == "differ"
+
+
+def test_numbers_are_json():
+    for noise in (0.05, 1.0):
+        tier = judged(scene(), noise=noise)
         json.dumps(tier.numbers, allow_nan=False)
-        assert "smallest detectable bias" in tier.reason
-        assert tier.name == "statistics"
+        for scale in ("image", "tiles", "pixels", "uniformity"):
+            assert isinstance(tier.numbers[scale], dict)
+        for key in ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value"):
+            assert list(tier.numbers[key]) == ["R", "G", "B"]
+        assert tier.numbers["replicates_candidate"] == tier.numbers["replicates_reference"] == 16
+        assert tier.numbers["mean_reference"]["R"] == pytest.approx(scene()[..., 0].mean(), rel=0.1)

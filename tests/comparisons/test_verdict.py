@@ -5,7 +5,7 @@ import pytest
 from comparisons.results import Case, Metrics, Tier
 from comparisons.verdict import decide, exit_code
 
-METRICS = Metrics(1.0, 60.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0)
+METRICS = Metrics(1.0, 0.0, 60.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0)
 
 
 def tiers(**statuses):
@@ -43,7 +43,7 @@ def test_agreement_needs_a_rung_that_agreed():
 
 def test_pixels_not_finite_go_before_everything():
     nan = float("nan")
-    metrics = Metrics(nan, nan, nan, nan, (nan, nan, nan), 3)
+    metrics = Metrics(nan, nan, nan, nan, nan, (nan, nan, nan), 3)
     verdict, reason = decide(tiers(geometry="differ", statistics="agree"), metrics)
     assert (verdict, reason) == ("invalid", "images: 3 pixels not finite")
     assert decide(tiers(direct="invalid"), metrics)[1] == "direct: direct says invalid"
@@ -76,4 +76,4 @@ def test_exit_code(verdicts, code):
 def test_exit_code_of_a_case_that_could_not_run():
     ran = [case("agree", direct="agree"), case("differ", direct="differ")]
     assert exit_code(ran) == 1
-    assert exit_code([*ran, case("not-comparable")]) == 4
+    assert exit_code([*ran, case("invalid", run="invalid")]) == 4

@@ -1,0 +1,1 @@
+"""What a run found, for the machines that build and test."""

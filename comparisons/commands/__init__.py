@@ -1,0 +1,1 @@
+"""The commands that `comparisons` adds to `reference-rt`, one to a file."""

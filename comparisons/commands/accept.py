@@ -1,0 +1,120 @@
+"""`reference-rt accept`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from reference_rt.cli import guarded
+from reference_rt.errors import ReferenceUnavailableError, SceneError, UsageError
+from reference_rt.scene import Scene
+
+if TYPE_CHECKING:
+    from comparisons.gate.baselines import Record
+
+
+@guarded
+def accept(
+    candidates: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[CANDIDATE]...", help="The pictures; several are replicates."),
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="What the baseline is called.")] = None,
+    reason: Annotated[str | None, typer.Option(help="Why these pictures are right.")] = None,
+    scene: Annotated[
+        Path | None,
+        typer.Option(help="What they are pictures of: when it changes, they are stale."),
+    ] = None,
+    baselines: Annotated[Path, typer.Option(metavar="DIR", help="Baselines' folder.")] = Path(
+        "baselines"
+    ),
+    layer: Annotated[
+        str, typer.Option(help="Prefix of an EXR's channels: 'beauty' for beauty.R.")
+    ] = "",
+    noise_free: Annotated[
+        bool, typer.Option("--noise-free", help="The pictures are made without random numbers.")
+    ] = False,
+    listed: Annotated[
+        bool, typer.Option("--list", help="Say what baselines there are, and which are stale.")
+    ] = False,
+    unused: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Say which baselines no results.json below DIR names: exit code 1."
+        ),
+    ] = None,
+) -> None:
+    """Accept pictures as a baseline for `gate --baseline`; never in CI."""
+    # Imported here: `reference-rt render` must not wait for what only comparing needs.
+    try:
+        from comparisons.gate import baselines as store
+        from comparisons.gate.digest import scene_digest
+        from comparisons.gate.pictures_in import read_candidates
+        from comparisons.gate.reference import check_sizes, is_noise_free
+        from comparisons.provenance import ours
+    except ModuleNotFoundError as error:
+        raise ReferenceUnavailableError(
+            f"accepting needs {error.name}: pip install 'reference-rt[compare]'"
+        ) from None
+
+    if listed or unused is not None:
+        if candidates or name:
+            raise UsageError("--list and --unused accept nothing; expected no candidates")
+        found = store.all_in(baselines)
+        used = None if unused is None else store.used_in(unused)
+        for one in found:
+            if used is None or one.record.name not in used:
+                typer.echo(_told(one.record, baselines))
+        idle = [one for one in found if used is not None and one.record.name not in used]
+        raise typer.Exit(1 if idle else 0)
+    if not candidates or name is None or reason is None:
+        raise UsageError("expected CANDIDATE... with --name and --reason, or --list, or --unused")
+    store.refuse_in_ci()
+    pictures = [p for path in candidates for p in read_candidates(path, layer)]
+    of_scene = None
+    if scene is not None:
+        described = Scene.load(scene)
+        film = described.film
+        check_sizes(pictures, f"{film.width} x {film.height}", "the size of the scene")
+        of_scene = store.SceneOf(file=scene.as_posix(), digest=scene_digest(described))
+        noise_free = noise_free or is_noise_free(described)
+    facts = ours()
+    written = store.accept(
+        baselines,
+        name,
+        reason,
+        pictures,
+        scene=of_scene,
+        noise_free=noise_free,
+        facts={key: facts[key] for key in ("reference_rt", "numpy", "numba", "python")},
+        machine=facts["machine"],
+        date=facts["date"],
+    )
+    typer.echo(f"{written.folder}: accepted; commit it", err=True)
+    if len(pictures) == 1 and not noise_free:
+        typer.echo(
+            "note: of one picture the noise is not known, and gates see less; accept several with "
+            "different seeds, or say --noise-free",
+            err=True,
+        )
+
+
+def _told(record: "Record", folder: Path) -> str:
+    """A baseline in one line."""
+    from comparisons.gate.baselines import scene_of
+    from comparisons.gate.digest import scene_digest
+
+    of = "no scene"
+    if record.scene is not None:
+        of = record.scene.file
+        try:
+            scene = scene_of(record, folder)
+            if scene is None:
+                of += " (not found)"
+            elif scene_digest(scene) != record.scene.digest:
+                of += " (stale)"
+        except SceneError:
+            of += " (cannot be read)"
+    count = "1 picture" if record.replicates == 1 else f"{record.replicates} pictures"
+    size = f"{record.width} x {record.height}"
+    return f"{record.name}: {record.date}: {of}: {count} of {size}: {record.reason}"

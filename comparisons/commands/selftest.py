@@ -1,0 +1,48 @@
+"""`reference-rt selftest`."""
+
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from reference_rt.cli import guarded
+from reference_rt.errors import UsageError
+
+
+@guarded
+def selftest(
+    out: Annotated[Path, typer.Option(help="Folder for selftest.json and selftest.md.")] = Path(
+        "out"
+    ),
+    only: Annotated[
+        list[str] | None, typer.Option(help="Patterns of the names of faults to plant.")
+    ] = None,
+    seeds: Annotated[
+        int, typer.Option(min=0, help="Runs of the right renderer, to count false alarms.")
+    ] = 1000,
+    power: Annotated[bool, typer.Option(help="Measure the power curves.")] = True,
+    scenes: Annotated[Path, typer.Option(help="Folder of the scenes.")] = Path("scenes"),
+) -> None:
+    """Plant faults and see whether the suites catch them; count false alarms without any."""
+    from comparisons.selftest import FAULTS
+    from comparisons.selftest.run import SUITES, run
+
+    patterns = only or ["*"]
+    faults = [f for f in FAULTS if any(fnmatchcase(f.name, pattern) for pattern in patterns)]
+    if not faults:
+        raise UsageError(f"--only: no fault fits {', '.join(patterns)}")
+    console = Console(stderr=True, highlight=False)
+
+    def say(line: str) -> None:
+        console.print(line, markup=False, soft_wrap=True)
+
+    outcome = run(faults, scenes, seeds, out, say, power)
+    for suite in SUITES:
+        caught, total = outcome.share(suite)
+        say(f"{suite}: {caught} of {total} faults caught")
+    for alarms in outcome.alarms:
+        say(f"{alarms.scene}: {alarms.false_alarms} false alarms in {alarms.runs:,} runs")
+    say(f"{out / 'selftest.json'}, {out / 'selftest.md'}")
+    raise typer.Exit(0 if outcome.holds else 1)

@@ -1,0 +1,76 @@
+"""`reference-rt suite`."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from comparisons.results import RUNGS
+from reference_rt.cli import guarded
+from reference_rt.errors import ReferenceUnavailableError, UsageError
+
+MOST_JOBS = 4
+"""At once, where nobody says: each takes up to 2 GB."""
+
+
+@guarded
+def suite(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="smoke, standard, full or a .yaml file.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for what is found.  [default: out/NAME]")
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="GLOB", help="Only cases of such names, like 'material_*'."),
+    ] = None,
+    tier: Annotated[
+        list[str] | None, typer.Option(metavar="RUNG", help=f"Only these: {', '.join(RUNGS[2:])}.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes at once.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
+    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML too.")] = None,
+    github: Annotated[
+        bool,
+        typer.Option("--github", help="Annotations and a summary; by itself in GitHub Actions."),
+    ] = False,
+    scenes: Annotated[Path, typer.Option(metavar="DIR", help="The folder of scenes.")] = Path(
+        "scenes"
+    ),
+) -> None:
+    """Compare all scenes of a folder with Mitsuba; what is done is not done again."""
+    # Imported here: `reference-rt render` must not wait for what only comparing needs.
+    try:
+        from comparisons.ci import github as github_actions
+        from comparisons.ci import junit as junit_xml
+        from comparisons.suites.display import summarise
+        from comparisons.suites.run import Options, run_suite
+        from comparisons.suites.suite import load_suite, plan
+        from comparisons.verdict import exit_code
+    except ModuleNotFoundError as error:
+        raise ReferenceUnavailableError(
+            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
+        ) from None
+
+    rungs = tuple(tier or ())
+    if unknown := [rung for rung in rungs if rung not in RUNGS[2:]]:
+        raise UsageError(f"--tier: expected one of {', '.join(RUNGS[2:])}, got '{unknown[0]}'")
+    source = load_suite(name)
+    planned = plan(source, scenes, tuple(only or ()), rungs)
+    folder = out or Path("out") / source.name
+    jobs = jobs or min(os.cpu_count() or 1, MOST_JOBS)
+    threads = max((os.cpu_count() or 1) // jobs, 1)
+    run = run_suite(source, planned, Options(folder, rungs, jobs, threads, fresh))
+    files = {work.name: work.path.as_posix() for work in planned.work}
+    if junit is not None:
+        junit_xml.write(junit, run.cases, source.name, run.walls, run.not_run)
+    if github or github_actions.is_there():
+        github_actions.annotate(run.cases, sys.stdout, files)
+        if (summary := github_actions.summary_path()) is not None:
+            github_actions.summarise(run.cases, summary, source.name, run.not_run)
+    summarise(run.cases, run.walls, run.not_run)
+    typer.echo(f"{folder / 'results.json'}, {folder / 'report.html'}", err=True)
+    raise typer.Exit(exit_code(run.cases))

@@ -1,0 +1,1 @@
+"""The gate for other people's renderers: their pictures against a scene or another picture."""

@@ -1,0 +1,269 @@
+"""Baselines: pictures that somebody looked at and accepted, with where they came from and why.
+
+A folder per baseline, `NAME/`: the replicates, as `picture-00.exr` and so on, and `baseline.json`,
+which has their SHA-256 and a seal of its own.  Replicates, not a mean and its variance: how well a
+variance is known decides what may be called a difference.  Only `accept` writes a baseline, never a
+gate, and never in CI.
+"""
+
+import hashlib
+import json
+import os
+import re
+import shlex
+import tempfile
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
+from comparisons.gate.pictures_in import Picture, read_candidate
+from comparisons.gate.reference import Reference, stacked, usable
+from reference_rt.description import Description
+from reference_rt.errors import ImageError, UsageError
+from reference_rt.exr import write_exr
+from reference_rt.scene import Scene
+
+RECORD = "baseline.json"
+
+MOST_KEPT = 8
+"""Pictures: of more replicates the means of so many groups are kept, with 7 degrees of freedom."""
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+
+
+class SceneOf(Description):
+    """The scene that a baseline is a picture of."""
+
+    file: str
+    digest: str
+
+
+class Former(Description):
+    """What a baseline replaced."""
+
+    date: str
+    reason: str
+    files: dict[str, str]
+
+
+class Record(Description):
+    """`baseline.json`.  files: SHA-256 by name;  sources: of each accepted picture its file, its
+    SHA-256 and the text in its header (software, samples, seed, where the renderer wrote them)."""
+
+    format: Annotated[int, Field(ge=1, le=1)] = 1
+    name: str
+    reason: str
+    date: str
+    width: int
+    height: int
+    replicates: int
+    noise_free: bool
+    quantised: bool
+    scene: SceneOf | None
+    sources: tuple[dict[str, Any], ...] = Field(strict=False)
+    versions: dict[str, str]
+    machine: str
+    files: dict[str, str]
+    history: tuple[Former, ...] = Field(default=(), strict=False)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A baseline as it was accepted: its record and its folder."""
+
+    record: Record
+    folder: Path
+
+    def reference(self) -> Reference:
+        """Its pictures.  Raises BaselineEditedError."""
+        for name, digest in self.record.files.items():
+            if _sha256(self.folder / name) != digest:
+                raise BaselineEditedError(
+                    f"{self.folder / name}: is not what was accepted (SHA-256 differs); restore "
+                    "it, or accept a new baseline"
+                )
+        pictures = [read_candidate(self.folder / name) for name in sorted(self.record.files)]
+        name = f"the baseline's, {self.record.name}"
+        return Reference(stacked(pictures), None, self.record.noise_free, name)
+
+
+def check_name(name: str) -> None:
+    """Refuse what could be a path.  Raises UsageError."""
+    if not _NAME.fullmatch(name):
+        raise UsageError(
+            f"'{name}' is no name of a baseline; expected letters, digits, '.', '_' and '-', "
+            "beginning with a letter or a digit"
+        )
+
+
+def load(folder: Path, name: str, candidates: Sequence[str] = ()) -> Baseline:
+    """The baseline `name` in `folder`.
+
+    candidates: files that could be accepted where there is none.  Raises UsageError,
+    BaselineMissingError, BaselineEditedError.
+    """
+    check_name(name)
+    path = folder / name / RECORD
+    if not path.exists():
+        files = shlex.join(candidates) if candidates else "CANDIDATE..."
+        options = shlex.join(["--name", name, "--baselines", str(folder)])
+        raise BaselineMissingError(
+            f"there is no baseline '{name}' in {folder}; look at the candidate, and if it is "
+            f'right: reference-rt accept {files} {options} --reason "..." [--scene SCENE]'
+        )
+    return Baseline(_record(path), folder / name)
+
+
+def check_fresh(baseline: Baseline, digest: str, scene: str) -> None:
+    """Refuse a baseline of another scene than that of `digest`.  Raises BaselineMissingError."""
+    accepted = baseline.record.scene
+    if accepted is not None and accepted.digest != digest:
+        raise BaselineMissingError(
+            f"the baseline '{baseline.record.name}' is stale: {scene} has changed since it was "
+            f"accepted on {baseline.record.date}; render the scene anew and accept the picture"
+        )
+
+
+def all_in(folder: Path) -> list[Baseline]:
+    """Every baseline in a folder, by name.  Raises BaselineEditedError."""
+    return [Baseline(_record(path), path.parent) for path in sorted(folder.glob(f"[!.]*/{RECORD}"))]
+
+
+def accept(
+    folder: Path,
+    name: str,
+    reason: str,
+    candidates: Sequence[Picture],
+    *,
+    scene: SceneOf | None,
+    noise_free: bool,
+    facts: dict[str, str],
+    machine: str,
+    date: str,
+) -> Baseline:
+    """Write the baseline `name`, whole or not at all, in place of a former one.
+
+    facts: versions, by package.  Raises UsageError (no reason, bad name, in CI) and ImageError
+    (pictures of unlike size, or none that could be a reference).
+    """
+    refuse_in_ci()
+    check_name(name)
+    if not reason.strip():
+        raise UsageError("--reason: is empty; expected why this picture is right")
+    pictures = usable(candidates)
+    former = folder / name / RECORD
+    history: tuple[Former, ...] = ()
+    if former.exists():
+        with suppress(BaselineEditedError):  # one that was edited is what accepting mends
+            old = _record(former)
+            history = (*old.history, Former(date=old.date, reason=old.reason, files=old.files))
+    if noise_free and len(pictures) > 1:
+        raise UsageError(f"{len(pictures)} candidates of a picture without noise; expected one")
+    groups = np.array_split(pictures, min(len(pictures), MOST_KEPT))
+    kept = {f"picture-{k:02d}.exr": group.mean(axis=0) for k, group in enumerate(groups)}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".accepting-") as temporary:
+            new = Path(temporary) / "new"
+            for file, picture in kept.items():
+                planes = dict(zip("RGB", np.moveaxis(picture, -1, 0), strict=True))
+                write_exr(new / file, planes, {})
+            record = Record(
+                name=name,
+                reason=reason.strip(),
+                date=date,
+                width=pictures.shape[2],
+                height=pictures.shape[1],
+                replicates=len(pictures),
+                noise_free=noise_free,
+                quantised=any(candidate.quantised for candidate in candidates),
+                scene=scene,
+                sources=tuple(_source(candidate) for candidate in candidates),
+                versions=facts,
+                machine=machine,
+                files={file: _sha256(new / file) for file in kept},
+                history=history,
+            )
+            (new / RECORD).write_text(_sealed(record), encoding="utf-8", newline="\n")
+            if (folder / name).exists():
+                (folder / name).rename(Path(temporary) / "old")
+            new.rename(folder / name)
+    except OSError as error:
+        raise ImageError(
+            f"{folder / name}: cannot be written: {error.strerror}; expected a writable place"
+        ) from None
+    return Baseline(record, folder / name)
+
+
+def refuse_in_ci() -> None:
+    """Raise UsageError in an automatic run, which is told by the variable that CI services set."""
+    if os.environ.get("CI", "").lower() not in ("", "0", "false"):
+        raise UsageError(
+            "CI never writes baselines (the variable CI is set); accept on a machine of your own, "
+            "and commit the folder"
+        )
+
+
+def scene_of(record: Record, folder: Path) -> Scene | None:
+    """The scene of a baseline in `folder`, if its file is still there.  Raises SceneError."""
+    if record.scene is None:
+        return None
+    places = (Path(record.scene.file), folder.parent / record.scene.file)
+    there = next((path for path in places if path.is_file()), None)
+    return None if there is None else Scene.load(there)
+
+
+def used_in(results: Path) -> set[str]:
+    """The baselines that gates named whose `results.json` are in a folder or below it."""
+    found = set()
+    for path in results.rglob("results.json"):
+        with suppress(OSError, ValueError, AttributeError):
+            document = json.loads(path.read_text(encoding="utf-8"))
+            found.add(document["provenance"].get("baseline"))
+    return {name for name in found if isinstance(name, str)}
+
+
+def _source(picture: Picture) -> dict[str, Any]:
+    source: dict[str, Any] = {"file": Path(picture.name).name}
+    with suppress(OSError):
+        source["sha256"] = hashlib.sha256(Path(picture.name).read_bytes()).hexdigest()
+    header = {key: value[:500] for key, value in list(picture.header.items())[:32]}
+    return source | ({"header": header} if header else {})
+
+
+def _sealed(record: Record) -> str:
+    data = record.model_dump(mode="json")
+    return json.dumps(data | {"seal": _seal(data)}, indent=2, ensure_ascii=False) + "\n"
+
+
+def _seal(data: dict[str, Any]) -> str:
+    """Against edits by hand, not against forgers."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+
+def _record(path: Path) -> Record:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        seal = data.pop("seal")
+        if seal != _seal(data):
+            raise ValueError("its seal is broken")
+        return Record.model_validate(data)
+    except (OSError, ValueError, KeyError, AttributeError, ValidationError) as error:
+        reason = "its fields" if isinstance(error, ValidationError) else str(error)
+        raise BaselineEditedError(
+            f"{path}: is not what `accept` wrote ({' '.join(reason.split())[:100]}); restore it, "
+            "or accept a new baseline"
+        ) from None
+
+
+def _sha256(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return "missing"

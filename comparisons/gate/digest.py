@@ -1,0 +1,62 @@
+"""What a scene is, as a number: the same digest, the same expected picture."""
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+import reference_rt
+from reference_rt.scene import Scene
+
+_URI = re.compile(rb'"uri"\s*:\s*"([^"]+)"')
+
+
+def scene_digest(scene: Scene) -> str:
+    """SHA-256 of all that the expected picture depends on: the description, without what changes
+    no expectation, and the files that it names."""
+    description = json.loads(scene.to_json())
+    for key in ("description", "hierarchy"):
+        description.pop(key, None)
+    if not scene.integrator.deterministic:
+        description.pop("sampler", None)
+    digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
+    for path in _files(description, scene.folder):
+        with suppress(OSError):  # a file that is not there is for the loader to tell
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def _files(part: Any, folder: Path) -> Iterator[Path]:
+    """The files that a description names, and those that a glTF file names."""
+    if isinstance(part, dict):
+        if isinstance(part.get("file"), str):
+            path = folder / part["file"]
+            yield path
+            if path.suffix.lower() == ".gltf":
+                with suppress(OSError):
+                    for uri in _URI.findall(path.read_bytes()):
+                        if not uri.startswith(b"data:"):
+                            yield path.parent / unquote(uri.decode("utf-8", "replace"))
+        for value in part.values():
+            yield from _files(value, folder)
+    elif isinstance(part, list):
+        for value in part:
+            yield from _files(value, folder)
+
+
+@cache
+def source_digest() -> str:
+    """SHA-256 of the ray tracer's own source: another source, another picture."""
+    package = Path(reference_rt.__file__).parent
+    digest = hashlib.sha256(np.__version__.encode())
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()

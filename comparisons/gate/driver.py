@@ -1,0 +1,185 @@
+"""Driving a renderer from outside: a command line, run once for each replicate."""
+
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from comparisons.gate.errors import RendererError
+from comparisons.gate.pictures_in import Picture, read_candidate
+from reference_rt.errors import UsageError
+
+PLACEHOLDERS = ("scene", "output", "seed", "spp")
+
+_BRACES = re.compile(r"\{([A-Za-z_]*)\}")
+
+_PICTURES = (".exr", ".png", ".pfm", ".hdr", ".npy", ".jpg", ".jpeg", ".ppm", ".tif", ".tiff")
+
+_LAST_LINES = 5
+"""Of what a renderer that failed has said."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """How a renderer is called.
+
+    template: the command line, split like a shell's but run without one; in its arguments {scene},
+    {output}, {seed} and {spp} are replaced;  scene: the file for {scene};  suffix: of the output,
+    which tells most renderers the format;  seconds: that one run may take.
+    """
+
+    template: str
+    scene: Path | None = None
+    spp: int | None = None
+    suffix: str = ".exr"
+    seconds: float = 600.0
+
+    def arguments(self, output: Path, seed: int) -> list[str]:
+        """The arguments of one run.  Raises UsageError."""
+        try:
+            words = shlex.split(self.template)
+        except ValueError as error:
+            raise UsageError(f"--command: {str(error).lower()}; expected closed quotes") from None
+        if not words:
+            raise UsageError("--command: is empty; expected a program and its arguments")
+        values = {
+            "scene": None if self.scene is None else str(self.scene),
+            "output": str(output),
+            "seed": str(seed),
+            "spp": None if self.spp is None else str(self.spp),
+        }
+        named = {name for word in words for name in _BRACES.findall(word)}
+        known = ", ".join(f"{{{name}}}" for name in PLACEHOLDERS)
+        for name in sorted(named - set(PLACEHOLDERS)):
+            raise UsageError(f"--command: there is no {{{name}}}; expected some of {known}")
+        if "output" not in named:
+            raise UsageError("--command: has no {output}; expected it where the picture is named")
+        for name in sorted(named):
+            if values[name] is None:
+                raise UsageError(f"--command: has {{{name}}}, but there is no --{name}")
+        return [_BRACES.sub(lambda match: values[match[1]] or "", word) for word in words]
+
+
+def drive(
+    command: Command, seeds: range, keep: Path, say: Callable[[str], None] = lambda line: None
+) -> list[Picture]:
+    """The pictures of one run per seed, each into a fresh folder; they are kept in `keep`.
+
+    Raises UsageError, RendererError (it hung, crashed, wrote nothing or elsewhere) and ImageError
+    (what it wrote is no picture).
+    """
+    command.arguments(Path("checked first"), 0)
+    with suppress(OSError):  # of an earlier run: what is there afterwards is of this one
+        for old in keep.glob("candidate-*"):
+            old.unlink()
+    pictures = []
+    for k, seed in enumerate(seeds):
+        say(f"candidate {k + 1} of {len(seeds)}, seed {seed}")
+        with tempfile.TemporaryDirectory(prefix="candidate-", ignore_cleanup_errors=True) as name:
+            folder = Path(name)
+            (folder / "output").mkdir()
+            output = folder / "output" / f"candidate-{k:02d}{command.suffix}"
+            before = _pictures_here()
+            _run(command.arguments(output, seed), folder / "said", command.seconds, seed)
+            _check_written(output, before, seed)
+            kept = keep / output.name
+            try:
+                keep.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(output, kept)
+            except OSError as error:
+                raise UsageError(f"{kept}: cannot be written: {error.strerror}") from None
+        pictures.append(read_candidate(kept))
+    return pictures
+
+
+def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
+    """Run the renderer to its end, or kill it and all that it started."""
+    with said.open("wb") as log:
+        try:
+            # A session of its own, so that its children can be killed with it; files instead of
+            # pipes, which a child that lives on would keep open.
+            process = subprocess.Popen(
+                arguments,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise RendererError(f"{arguments[0]}: cannot be started: {reason}") from None
+    name = Path(arguments[0]).name
+    try:
+        code = process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        raise RendererError(
+            f"{name} hung with seed {seed}: not done after {seconds:g} s, and was killed with its "
+            f"children; expected less, or a longer --time-limit{_last_lines(said)}"
+        ) from None
+    finally:
+        _kill(process)
+    if code < 0:
+        with suppress(ValueError):
+            raise RendererError(
+                f"{name} crashed with seed {seed}: {signal.Signals(-code).name}{_last_lines(said)}"
+            )
+    if code != 0:
+        raise RendererError(
+            f"{name} failed with seed {seed}: exit code {code}, expected 0{_last_lines(said)}"
+        )
+
+
+def _kill(process: "subprocess.Popen[bytes]") -> None:
+    """The process and what it left behind, which could write later."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _last_lines(said: Path) -> str:
+    """The end of what the renderer said, in one line."""
+    with said.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(max(0, file.tell() - 4000))
+        text = file.read().decode("utf-8", "replace")
+    lines = [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+    printable = ["".join(c if c.isprintable() else "?" for c in line) for line in lines]
+    if not printable:
+        return "; it said nothing"
+    return "; it said: " + " | ".join(line[:200] for line in printable[-_LAST_LINES:])
+
+
+def _pictures_here() -> set[tuple[str, int]]:
+    """Name and time of the pictures in the working folder, where a renderer may write by itself."""
+    found = set()
+    with suppress(OSError), os.scandir() as entries:
+        for entry in entries:
+            if Path(entry.name).suffix.lower() in _PICTURES:
+                with suppress(OSError):
+                    found.add((entry.name, entry.stat().st_mtime_ns))
+    return found
+
+
+def _check_written(output: Path, before: set[tuple[str, int]], seed: int) -> None:
+    if output.is_file():
+        return
+    others = sorted(path.name for path in output.parent.iterdir())
+    here = sorted(name for name, _ in _pictures_here() - before)
+    if others or here:
+        found = [f"{name} in the same folder" for name in others[:3]]
+        found += [f"{name} in the working folder" for name in here[:3]]
+        raise RendererError(
+            f"the renderer wrote to another place with seed {seed}: {', '.join(found)}; expected "
+            f"{output.name}, at the path that {{output}} stands for"
+        )
+    raise RendererError(
+        f"the renderer ended well with seed {seed}, but wrote nothing; expected {output.name}, at "
+        "the path that {output} stands for"
+    )

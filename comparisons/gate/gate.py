@@ -1,0 +1,165 @@
+"""The gate: the pictures of somebody else's renderer against a reference, rung by rung."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from comparisons import causes, statistics
+from comparisons.checks import input_tier
+from comparisons.gate.pictures_in import Picture
+from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
+from comparisons.image_rung import images_tier
+from comparisons.judge import SURE, Lights
+from comparisons.metrics import image_metrics
+from comparisons.results import Case, Cause, FloatArray, Images, Metrics, Place, Status, Tier
+from comparisons.verdict import decide
+from reference_rt.errors import ImageError, UsageError
+from reference_rt.image import srgb
+from reference_rt.textures.image_file import linear
+
+LIMIT = 0.005
+"""The smallest relative bias of the image mean that must be visible."""
+
+_NO_NOISE = "the scene asks for no random numbers: there is no noise"
+_UNKNOWN_NOISE = "the noise of a single picture is not known"
+
+
+def gate_pictures(
+    candidates: Sequence[Picture],
+    reference: Reference,
+    *,
+    limit: float = LIMIT,
+    name: str = "candidate",
+    lights: Lights | None = None,
+    notes: Sequence[str] = (),
+) -> Case:
+    """The verdict on candidates, which are replicates if they are several.
+
+    limit: the smallest relative bias of the image mean that must be visible;  lights: for the
+    likeliest cause of a difference.  Raises ImageError for candidates of another size than the
+    reference, and UsageError for several candidates of what has no noise.
+    """
+    check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
+    notes = [*notes, *_notes(candidates)]
+    if reference.noise_free and candidates[0].displayed:
+        reference = replace(reference, pictures=_displayed(reference.pictures))
+        notes.append(
+            "the candidate is kept in 8 bits of sRGB: the reference is rounded and ends at 1 like "
+            "it, and what is brighter is not judged"
+        )
+    if reference.noise_free and len(candidates) > 1:
+        raise UsageError(f"{len(candidates)} candidates of a picture without noise; expected one")
+    pictures = stacked(candidates)
+    images = _images(pictures, reference)
+    rungs = [_input(candidates, pictures, reference)]
+    metrics = None
+    if rungs[0].status != "invalid":
+        metrics = image_metrics(images)
+        rungs += [
+            _statistics(pictures, reference, limit),
+            _images_rung(images, metrics, pictures, reference),
+        ]
+    verdict, reason = decide(rungs, metrics)
+    cause: Cause | None = None
+    worst: tuple[Place, ...] = ()
+    if verdict == "differ":
+        cause = causes.of_rungs(rungs) or _cause(images, lights)
+        worst = statistics.worst_places(pictures, _judged_by(reference))
+    return Case(
+        scene=name,
+        verdict=verdict,
+        reason=reason,
+        tiers=tuple(rungs),
+        metrics=metrics,
+        seconds={},
+        images=images,
+        notes=(*notes, *reference.notes),
+        sides=("candidate's", reference.name),
+        cause=cause,
+        worst=worst,
+    )
+
+
+def not_run(name: str, error: Exception) -> Case:
+    """What could not be carried through, as a case for the outputs."""
+    status: Status = "invalid" if isinstance(error, ImageError) else "not-comparable"
+    tier = Tier("run", status, str(error))
+    return Case(
+        name, status, f"run: {error}", (tier,), None, {}, sides=("candidate's", "reference")
+    )
+
+
+def _images(pictures: FloatArray, reference: Reference) -> Images:
+    means = Images(pictures.mean(axis=0), reference.pictures.mean(axis=0))
+    if reference.noise_free or not np.isfinite(pictures).all():
+        return means
+    known = statistics.standard_error(pictures, _judged_by(reference))
+    return replace(means, error=known)
+
+
+def _judged_by(reference: Reference) -> "FloatArray | statistics.Known":
+    """The reference as the statistics take it."""
+    if reference.variance is None:
+        return reference.pictures
+    return statistics.Known(reference.pictures.mean(axis=0), reference.variance)
+
+
+def _input(candidates: Sequence[Picture], pictures: FloatArray, reference: Reference) -> Tier:
+    for picture in candidates:
+        if picture.opacity is not None and not picture.opacity.any():
+            reason = f"{picture.name} is transparent throughout; expected an opaque picture"
+            return Tier("input", "invalid", reason)
+    opacity = None
+    if any(picture.opacity is not None for picture in candidates):
+        opaque = np.ones(pictures.shape[1:3])
+        opacity = np.stack([opaque if p.opacity is None else p.opacity for p in candidates])
+    if reference.noise_free:
+        return input_tier(pictures[0], reference.pictures[0], opacity)
+    judges = reference.pictures if reference.variance is None else reference.pictures[0]
+    return input_tier(pictures, judges, opacity)
+
+
+def _statistics(pictures: FloatArray, reference: Reference, limit: float) -> Tier:
+    if reference.noise_free:
+        return Tier("statistics", "not-applicable", _NO_NOISE)
+    return statistics.compare(pictures, _judged_by(reference), limit=limit)
+
+
+def _images_rung(
+    images: Images, metrics: Metrics, pictures: FloatArray, reference: Reference
+) -> Tier:
+    if reference.noise_free:
+        return images_tier(images, metrics, None)
+    replicates = _replicates(reference)
+    if replicates is None or len(pictures) < 2:
+        return Tier("images", "not-applicable", _UNKNOWN_NOISE)
+    return images_tier(images, metrics, (pictures, replicates))
+
+
+def _replicates(reference: Reference) -> FloatArray | None:
+    """The reference as replicates: where only mean and variance of the mean are known, the two that
+    have exactly these."""
+    if reference.variance is None:
+        return reference.pictures if len(reference.pictures) > 1 else None
+    mean, deviation = reference.pictures.mean(axis=0), np.sqrt(reference.variance)
+    return np.stack([mean + deviation, mean - deviation])
+
+
+def _cause(images: Images, lights: Lights | None) -> Cause | None:
+    found = causes.likeliest(images)
+    if lights is None or (found is not None and found.explained > SURE):
+        return found
+    return causes.likeliest(images, lights())
+
+
+def _displayed(pictures: FloatArray) -> FloatArray:
+    """As 8 bits of sRGB hold them."""
+    return linear(np.round(255.0 * srgb(np.clip(pictures, 0.0, 1.0))) / 255.0)
+
+
+def _notes(candidates: Sequence[Picture]) -> tuple[str, ...]:
+    """What a reader should know of the files."""
+    if any(picture.quantised and not picture.displayed for picture in candidates):
+        return ("the candidate is kept in 8 bits a channel: its rounding counts as its own",)
+    return ()

@@ -1,0 +1,52 @@
+"""What a gate leaves behind: results.json and the page, JUnit XML, what GitHub shows."""
+
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from comparisons.ci import github, junit
+from comparisons.provenance import ours
+from comparisons.report import write_report, write_results
+from comparisons.results import Case
+from comparisons.verdict import exit_code
+
+
+def write(
+    case: Case, out: Path, facts: dict[str, Any], page: bool = True
+) -> tuple[Path, Path | None]:
+    """`results.json` and `report.html` in `out`; their paths.  Raises ImageError.
+
+    facts: what to tell besides versions, date and machine, such as the baseline.
+    """
+    provenance = {**ours(), **facts}
+    results, report = out / "results.json", out / "report.html"
+    write_results(results, [case], provenance)
+    if not page:
+        report.unlink(missing_ok=True)
+        return results, None
+    write_report(report, [case], provenance)
+    return results, report
+
+
+def remove(out: Path) -> None:
+    """Remove what an earlier gate wrote: what is there afterwards is of this one."""
+    with suppress(OSError):
+        for name in ("results.json", "report.html"):
+            (out / name).unlink(missing_ok=True)
+
+
+def for_ci(case: Case, junit_file: Path | None, about: str, annotate: bool) -> None:
+    """JUnit XML where it is asked for; annotations and a summary where it is, or by itself in
+    GitHub Actions.  about: the file that the case is about, "" for none.  Raises ImageError."""
+    if junit_file is not None:
+        junit.write(junit_file, [case], "gate")
+    if annotate or github.is_there():
+        github.annotate([case], sys.stdout, {case.scene: about} if about else None)
+        if (summary := github.summary_path()) is not None:
+            github.summarise([case], summary, f"gate: {case.scene}")
+
+
+def code_of(case: Case) -> int:
+    """0 where the candidate passes, 3 where it is no picture that could be judged, else 1."""
+    return 3 if case.verdict == "invalid" else exit_code([case])

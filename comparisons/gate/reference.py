@@ -1,0 +1,267 @@
+"""What a candidate is judged by: our float64 rendering of a scene, or pictures from files."""
+
+import hashlib
+import math
+import os
+import zipfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+
+from comparisons.gate.digest import scene_digest, source_digest
+from comparisons.gate.pictures_in import Picture, variance_of
+from reference_rt.errors import ImageError, UsageError
+from reference_rt.files import replacing
+from reference_rt.render import render
+from reference_rt.sampling import Grid
+from reference_rt.scene import Scene
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.tables import build_tables
+
+REPLICATES = 16
+"""Of the reference: its own noise is then known to one part in five (15 degrees of freedom)."""
+
+SHARE = 1 / 20
+"""The reference's standard error as a fraction of the bias that must be visible. Confidence
+intervals for a few tests at a level of 5e-4 are about five standard errors wide to either side: a
+quarter of that bias is given to the reference's noise, the rest is left to the candidate's."""
+
+DARK = 0.1
+"""A channel is held to no more than this fraction of the picture's mean: see the statistics."""
+
+MOST_SAMPLES = 1 << 30
+"""Camera samples of a reference, some ten minutes: where these do not suffice the statistics say
+that the run was too noisy."""
+
+_ROUND = 1 << 18
+"""Camera samples of one picture in one round, at least: half a second's work."""
+
+_MOST_NUMBERS = 1 << 28
+"""Of all replicates together, 2 GiB: large pictures have fewer replicates."""
+
+_KEPT = 2 << 30
+"""Bytes of references in the cache; the one unused for longest goes first."""
+
+Say = Callable[[str, float], None]
+"""Is told what is being done, and the fraction of it that is done."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """pictures: (replicates, height, width, 3) linear radiance;  variance: (height, width, 3) of
+    their mean, where known from elsewhere;  noise_free: made without random numbers;  name: whose
+    it is, for people."""
+
+    pictures: FloatArray
+    variance: FloatArray | None = None
+    noise_free: bool = False
+    name: str = "the reference's"
+    notes: tuple[str, ...] = ()
+
+
+def is_noise_free(scene: Scene) -> bool:
+    """Whether a right renderer's picture of the scene has no noise: fixed samples, no chance."""
+    return scene.integrator.type == "ray_cast" or isinstance(scene.resolved_sampler, Grid)
+
+
+def of_scene(
+    scene: Scene,
+    limit: float,
+    *,
+    threads: int | None = None,
+    say: Say = lambda what, fraction: None,
+) -> Reference:
+    """Our own pictures of a scene, so many that their noise is small beside `limit`.
+
+    Each round adds the scene's own samples per pixel, with new seeds, to every replicate; rounds go
+    on until the standard error of the image mean is below SHARE of the limit in every channel, as
+    estimated from the replicates.  The cache keeps them for the same scene and the same source.
+    """
+    if is_noise_free(scene):
+        picture = _cached(scene, 1, lambda pictures, rounds: rounds >= 1, threads, say)[0]
+        told = ("ray casting: the colours of what is hit are judged",)
+        casts = scene.integrator.type == "ray_cast"
+        return Reference(picture, None, True, "reference_rt's", told if casts else ())
+    pixels = scene.film.width * scene.film.height
+    sampler = scene.resolved_sampler
+    # Small pictures in few rounds: a power of two, which suits Sobol' points.
+    spp = max(sampler.spp, 1 << max(0, (_ROUND // pixels).bit_length() - 1))
+    scene = scene.changed(sampler=sampler.model_copy(update={"spp": spp}))
+    count = min(REPLICATES, max(4, _MOST_NUMBERS // (3 * pixels)))
+    most = max(1, MOST_SAMPLES // (count * pixels * spp))
+    target = SHARE * limit
+
+    def enough(pictures: FloatArray, rounds: int) -> bool:
+        return rounds >= most or relative_error(pictures) <= target
+
+    pictures, rounds = _cached(scene, count, enough, threads, say, target)
+    error = relative_error(pictures)
+    notes = [
+        f"the reference: {count} pictures of {rounds * spp} samples a pixel, float64; the standard "
+        f"error of its mean is {100.0 * error:.2g} %"
+    ]
+    if error > target:
+        notes.append(f"the reference is noisier than the {100.0 * target:.2g} % that were meant")
+    return Reference(pictures, None, False, "reference_rt's", tuple(notes))
+
+
+def of_files(references: Sequence[Picture], variance: Path | None, noise_free: bool) -> Reference:
+    """Pictures from files, several being replicates.  Raises ImageError, UsageError."""
+    pictures = usable(references)
+    if noise_free and len(pictures) > 1:
+        raise UsageError(f"{len(pictures)} references of a picture without noise; expected one")
+    spread = None
+    if variance is not None:
+        if len(pictures) > 1:
+            raise UsageError("--variance: of one reference; several tell their variance themselves")
+        spread = variance_of(variance)
+        if spread.shape != pictures.shape[1:]:
+            raise ImageError(
+                f"{variance}: is {size_of(spread)} pixels; expected {size_of(pictures[0])}, as "
+                f"{references[0].name}"
+            )
+    return Reference(pictures, spread, noise_free)
+
+
+def check_sizes(candidates: Sequence[Picture], expected: str, whose: str) -> None:
+    """Raise ImageError for the first candidate that is not `expected`, "width x height"."""
+    if not candidates:
+        raise UsageError("there is no candidate; expected at least one")
+    for picture in candidates:
+        size = size_of(picture.radiance)
+        if size != expected:
+            raise ImageError(f"{picture.name}: is {size} pixels; expected {expected}, {whose}")
+
+
+def usable(pictures: Sequence[Picture]) -> FloatArray:
+    """(replicates, height, width, 3) of pictures to judge by.  Raises ImageError for unlike sizes,
+    for pixels that are not finite, and for blackness, by which nothing can be judged."""
+    for picture in pictures:
+        bad = int(np.count_nonzero(~np.isfinite(picture.radiance).all(axis=-1)))
+        if bad:
+            count = "1 pixel is" if bad == 1 else f"{bad} pixels are"
+            raise ImageError(f"{picture.name}: {count} not finite; expected finite ones")
+        if not picture.radiance.any():
+            raise ImageError(f"{picture.name}: is black throughout; expected a picture")
+    return stacked(pictures)
+
+
+def stacked(pictures: Sequence[Picture]) -> FloatArray:
+    """(replicates, height, width, 3).  Raises ImageError unless all are of one size."""
+    first = pictures[0]
+    for other in pictures[1:]:
+        if other.radiance.shape != first.radiance.shape:
+            raise ImageError(
+                f"{other.name}: is {size_of(other.radiance)} pixels; expected "
+                f"{size_of(first.radiance)}, as {first.name}: replicates are of one size"
+            )
+    return np.stack([picture.radiance for picture in pictures])
+
+
+def size_of(picture: FloatArray) -> str:
+    """Width and height, for people."""
+    return f"{picture.shape[1]} x {picture.shape[0]}"
+
+
+def relative_error(pictures: FloatArray) -> float:
+    """The largest standard error of a channel's image mean, relative to that mean; of pictures
+    (replicates >= 2, height, width, 3).  0 for black ones."""
+    means = pictures.mean(axis=(1, 2))
+    scale = np.maximum(np.abs(means.mean(axis=0)), DARK * abs(means.mean()))
+    error = means.std(axis=0, ddof=1) / math.sqrt(len(means))
+    return float(np.where(error > 0.0, error / np.where(scale > 0.0, scale, 1.0), 0.0).max())
+
+
+# ---- rendering, and the cache of what was rendered ----------------------------------------------
+
+
+def _cached(
+    scene: Scene,
+    count: int,
+    enough: Callable[[FloatArray, int], bool],
+    threads: int | None,
+    say: Say,
+    target: float = 0.0,
+) -> tuple[FloatArray, int]:
+    """`count` pictures of the scene, each the mean of some rounds, and the number of rounds."""
+    sampler = scene.resolved_sampler
+    spp = getattr(sampler, "spp", 1)
+    key = f"1 {scene_digest(scene)} {source_digest()} {sampler.type} {spp} {count}"
+    name = hashlib.sha256(key.encode()).hexdigest()
+    path = cache_folder() / f"{name[:40]}.npz"
+    shape = (count, scene.film.height, scene.film.width, 3)
+    pictures, rounds = _load(path, shape)
+    if rounds > 0 and enough(pictures, rounds):
+        return pictures, rounds
+    # Far from the seeds that people choose: equal ones would make equal noise on both sides.
+    first = int(name[40:52], 16) << 14
+    tables = build_tables(scene)
+    task, start = "rendering the reference", first + rounds * count
+
+    def compiling(what: str, part: float) -> None:
+        if what == "compile":
+            say(what, part)
+
+    say(task, 0.0)
+    while rounds == 0 or not enough(pictures, rounds):
+        begun = first + rounds * count
+        for k in range(count):
+            seeded = scene
+            if hasattr(sampler, "seed"):
+                seeded = scene.changed(sampler=sampler.model_copy(update={"seed": begun + k}))
+            picture = render(
+                seeded,
+                tables=tables,
+                threads=threads,
+                progress=compiling if k == 0 and begun == start else None,
+            ).colour
+            pictures[k] += (picture - pictures[k]) / (rounds + 1)
+            total = _rounds_needed(pictures, rounds, target)
+            say(task, min(0.999, (rounds + (k + 1) / count) / total))
+        rounds += 1
+    say(task, 1.0)
+    _save(path, pictures, rounds)
+    return pictures, rounds
+
+
+def _rounds_needed(pictures: FloatArray, rounds: int, target: float) -> float:
+    """From the rounds that are whole: the error falls with the root of their number."""
+    if rounds == 0 or target == 0.0:
+        return rounds + 1.0
+    return max(rounds + 1.0, rounds * (relative_error(pictures) / target) ** 2)
+
+
+def cache_folder() -> Path:
+    """Where references are kept: REFERENCE_RT_CACHE, or the user's cache folder."""
+    root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
+    return Path(root) / "references"
+
+
+def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
+    """What the cache has; zeros and 0 where it has nothing that can be used."""
+    with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
+        # Opened here, since NumPy leaves a file that is no archive open.
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            pictures, rounds = np.array(file["pictures"]), int(file["rounds"])
+        if pictures.shape == shape and pictures.dtype == np.float64 and rounds > 0:
+            with suppress(OSError):
+                os.utime(path)
+            return pictures, rounds
+    return np.zeros(shape), 0
+
+
+def _save(path: Path, pictures: FloatArray, rounds: int) -> None:
+    """Keep them, where there is a place for it, and forget what was unused for longest."""
+    with suppress(ImageError, OSError):
+        with replacing(path) as temporary:
+            np.savez(temporary, pictures=pictures, rounds=rounds)
+        kept = sorted(path.parent.glob("*.npz"), key=lambda file: -file.stat().st_mtime)
+        total = 0
+        for file in kept:
+            total += file.stat().st_size
+            if total > _KEPT and file != path:
+                file.unlink(missing_ok=True)

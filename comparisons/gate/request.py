@@ -1,0 +1,107 @@
+"""What a gate is asked for: by what the candidates are judged, and what that needs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from comparisons.gate import baselines, reference
+from comparisons.gate.digest import scene_digest
+from comparisons.gate.gate import LIMIT, gate_pictures
+from comparisons.gate.pictures_in import Picture
+from comparisons.gate.reference import Reference, Say, check_sizes
+from comparisons.judge import Lights
+from comparisons.results import Case
+from comparisons.single_lights import single_lights
+from reference_rt.errors import UsageError
+from reference_rt.scene import Scene
+
+LIGHT_SPP = 64
+"""Samples per pixel of the pictures of single lights: they only tell which one is missing."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """The judge of some candidates: pictures (`references`), else a baseline, else our rendering of
+    the scene, which besides tells sizes, noise and lights.
+
+    variance: a file, of the one reference;  baselines: their folder;  limit: the smallest relative
+    bias of the image mean that must be visible;  noise_free: the renderer uses no random numbers;
+    name: of the case.
+    """
+
+    scene: Scene | None = None
+    references: tuple[Picture, ...] = ()
+    variance: Path | None = None
+    baseline: str = ""
+    baselines: Path = Path("baselines")
+    limit: float = LIMIT
+    noise_free: bool = False
+    threads: int | None = None
+    name: str = "candidate"
+
+    def __post_init__(self) -> None:
+        if self.references and self.baseline:
+            raise UsageError("a reference and a baseline; expected one of them")
+        if not (self.references or self.baseline or self.scene is not None):
+            raise UsageError("nothing to judge by; expected a scene, a reference or a baseline")
+        if self.variance is not None and not self.references:
+            raise UsageError("a variance without a reference; expected both")
+        if not 0.0 < self.limit < 1.0:
+            raise UsageError(f"the limit is {self.limit:g}; expected a fraction, such as 0.005")
+        if self.baseline:
+            baselines.check_name(self.baseline)
+
+
+def gated(
+    request: Request,
+    candidates: Sequence[Picture],
+    say: Say = lambda what, fraction: None,
+) -> Case:
+    """The verdict.  Raises ImageError, SceneError, UsageError, BaselineMissingError,
+    BaselineEditedError."""
+    scene = request.scene
+    if scene is not None:
+        expected = f"{scene.film.width} x {scene.film.height}"
+        check_sizes(candidates, expected, f"the size of the scene '{scene.name}'")
+    judge, scene = _judge(request, scene, [picture.name for picture in candidates], say)
+    lights: Lights | None = None
+    if scene is not None:
+        lights = _lights(scene, request.threads)
+    return gate_pictures(
+        candidates,
+        judge,
+        limit=request.limit,
+        name=request.name,
+        lights=lights,
+    )
+
+
+def _judge(
+    request: Request, scene: Scene | None, files: Sequence[str], say: Say
+) -> tuple[Reference, Scene | None]:
+    """What the candidates are judged by, and the scene, as far as it is known."""
+    noise_free = request.noise_free or (scene is not None and reference.is_noise_free(scene))
+    if request.references:
+        found = reference.of_files(request.references, request.variance, noise_free)
+        return found, scene
+    if request.baseline:
+        return _baseline(request, scene, files)
+    assert scene is not None
+    return reference.of_scene(scene, request.limit, threads=request.threads, say=say), scene
+
+
+def _baseline(
+    request: Request, scene: Scene | None, files: Sequence[str]
+) -> tuple[Reference, Scene | None]:
+    found = baselines.load(request.baselines, request.baseline, files)
+    scene = scene or baselines.scene_of(found.record, request.baselines)
+    if scene is not None:
+        baselines.check_fresh(found, scene_digest(scene), f"the scene '{scene.name}'")
+    judge = found.reference()
+    if request.noise_free and len(judge.pictures) == 1:
+        judge = replace(judge, noise_free=True)
+    return judge, scene
+
+
+def _lights(scene: Scene, threads: int | None) -> Lights:
+    return lambda: single_lights(scene, LIGHT_SPP, threads)

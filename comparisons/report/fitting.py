@@ -1,0 +1,48 @@
+"""Keeping the page small: whose float pictures are kept whole, averaged, or left out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from comparisons.report.pictures_data import as_json, pack
+from comparisons.results import Images
+
+COARSEST = 32
+"""Pixels of each side that are averaged into one at most, before float data is left out."""
+
+FEWEST_BYTES = 1.0
+"""A pixel, as packed; only pictures that are nearly constant need fewer."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The float pictures of a case as JSON ("": left out), means over factor x factor pixels."""
+
+    data: str
+    factor: int
+
+
+def fitted(
+    pictures: Sequence[Images | None], failed: Sequence[bool], most_bytes: int
+) -> list[Fitted | None]:
+    """The pictures of all cases within `most_bytes`; None where a case has none.
+
+    Detail goes where it matters least: from the largest pictures of the cases that did not fail,
+    and of failed ones only when nothing else is left to give.
+    """
+    kept = {i: _packed(p, 1, most_bytes) for i, p in enumerate(pictures) if p is not None}
+    while sum(len(one.data) for one in kept.values()) > most_bytes:
+        _, _, coarse = max((not failed[i], len(one.data), i) for i, one in kept.items() if one.data)
+        images = pictures[coarse]
+        assert images is not None
+        kept[coarse] = _packed(images, 2 * kept[coarse].factor, most_bytes)
+    return [kept.get(i) for i in range(len(pictures))]
+
+
+def _packed(images: Images, factor: int, most_bytes: int) -> Fitted:
+    pixels = images.candidate[..., 0].size + images.reference[..., 0].size
+    # Packing takes seconds for a picture that cannot fit anyway.
+    while factor <= COARSEST and FEWEST_BYTES * pixels > most_bytes * factor**2:
+        factor *= 2
+    if factor > COARSEST:
+        return Fitted("", factor)
+    return Fitted(as_json(pack(images, factor)), factor)

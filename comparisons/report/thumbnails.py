@@ -1,0 +1,110 @@
+"""Small pictures of a case that show without a script, as PNGs inside the page."""
+
+import base64
+import io
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from comparisons.metrics import count_nonfinite, encode, nonfinite_pixels, white_level
+from comparisons.report.pictures_data import reduced
+from comparisons.results import FloatArray, Images
+
+DIFFERENCE_PERCENTILE = 99.5
+"""Where the difference's colours end: a few fireflies may saturate, the rest stays visible."""
+
+LONGEST = 64
+"""Pixels of the longer side of a thumbnail, at most; what a script shows is larger."""
+
+MAGENTA = (255, 0, 255)
+RED, WHITE, BLUE = (178, 24, 43), (255, 255, 255), (33, 102, 172)
+"""Ends and middle of ColorBrewer's RdBu, which colour-blind readers can tell apart."""
+
+
+@dataclass(frozen=True)
+class Thumbnail:
+    url: str
+    """data: URL of a PNG"""
+    width: int
+    height: int
+    """of the picture itself, which the thumbnail stands for"""
+    nonfinite: int
+    """pixels of the picture"""
+
+
+@dataclass(frozen=True)
+class Thumbnails:
+    candidate: Thumbnail
+    reference: Thumbnail
+    difference: Thumbnail | None
+    """None if the pictures are of unlike size."""
+    white: float
+    """Radiance shown as white: the 99th percentile of what is lit in the reference."""
+    span: float
+    """Radiance difference shown as full red or blue; 0 if the pictures are equal."""
+
+
+def thumbnails(images: Images) -> Thumbnails:
+    white = white_level(images.reference)
+    span, difference = 0.0, None
+    if images.candidate.shape == images.reference.shape:
+        span, difference = _difference(images)
+    return Thumbnails(
+        candidate=_exposed(images.candidate, white),
+        reference=_exposed(images.reference, white),
+        difference=difference,
+        white=white,
+        span=span,
+    )
+
+
+def _exposed(image: FloatArray, white: float) -> Thumbnail:
+    small = _shrunk(image)
+    bad = nonfinite_pixels(small)
+    pixels = 255.0 * encode(np.where(bad[..., None], 0.0, small), white)
+    return _thumbnail(pixels, bad, image.shape, count_nonfinite(image))
+
+
+def _difference(images: Images) -> tuple[float, Thumbnail]:
+    """Candidate minus reference in the channel that differs most, so that no two cancel."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        difference = images.candidate - images.reference
+    sizes = np.abs(_largest(difference))
+    sizes = sizes[np.isfinite(sizes)]
+    # The largest difference where fewer than 0.5 % of the pixels differ at all.
+    span = float(np.percentile(sizes, DIFFERENCE_PERCENTILE) or sizes.max()) if sizes.size else 0.0
+    small = _shrunk(difference)
+    bad = nonfinite_pixels(small)
+    amount = np.clip(_largest(np.where(bad[..., None], 0.0, small)), -span, span) / (span or 1.0)
+    end = np.where(amount > 0.0, RED, BLUE)
+    pixels = WHITE + np.abs(amount) * (end - np.array(WHITE))
+    nonfinite = count_nonfinite(images.candidate, images.reference)
+    return span, _thumbnail(pixels, bad, difference.shape, nonfinite)
+
+
+def _largest(difference: FloatArray) -> FloatArray:
+    """(h, w, 3) -> (h, w, 1): the channel that is farthest from zero."""
+    most = np.abs(difference).argmax(axis=-1)[..., None]
+    return np.take_along_axis(difference, most, axis=-1)
+
+
+def _shrunk(image: FloatArray) -> FloatArray:
+    return reduced(image, -(-max(image.shape) // LONGEST))
+
+
+def _thumbnail(
+    values: FloatArray, bad: npt.NDArray[np.bool_], shape: tuple[int, ...], nonfinite: int
+) -> Thumbnail:
+    """Pixels of 0 to 255, the bad ones in magenta."""
+    pixels = np.rint(values).astype(np.uint8)
+    pixels[bad] = MAGENTA
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG", optimize=True)
+    return Thumbnail(
+        url="data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii"),
+        width=shape[1],
+        height=shape[0],
+        nonfinite=nonfinite,
+    )

@@ -1,0 +1,71 @@
+// Float pictures out of a case's data: the same numbers as `unpack` of pictures_data.py.
+
+/** The value of every half float (IEEE 754 binary16), by its code. */
+const HALVES = new Float64Array(65536).map((_, code) => half(code));
+
+function half(code) {
+  const sign = code & 0x8000 ? -1 : 1;
+  const exponent = (code >> 10) & 31;
+  const fraction = code & 1023;
+  if (exponent === 31) return fraction ? NaN : sign * Infinity;
+  if (exponent === 0) return sign * fraction * 2 ** -24;
+  return sign * (1024 + fraction) * 2 ** (exponent - 25);
+}
+
+async function inflate(base64) {
+  const packed = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** A picture {width, height, values}: three values a pixel, row by row. */
+function decode(stored, codes) {
+  const scale = 2 ** stored.exponent;
+  const values = Float64Array.from(codes, (code) => HALVES[code] * scale);
+  for (const [index, value] of stored.beyond) values[index] = value;
+  return { width: stored.width, height: stored.height, values };
+}
+
+/** From the differences between the codes of two pictures, zigzag coded, to those of the second. */
+function codesBeside(base, zigzag) {
+  return base.map((code, i) => (code + ((zigzag[i] >>> 1) ^ -(zigzag[i] & 1))) & 0xffff);
+}
+
+/** What `pack` packed: {factor, candidate, reference, difference, error, z}, null where absent. */
+async function unpack(data) {
+  const bytes = await inflate(data.bytes);
+  let start = 0;
+  const next = (stored) => {
+    const count = 3 * stored.width * stored.height;
+    const [high, low] = [start, start + count];
+    start += 2 * count;
+    return Uint16Array.from({ length: count }, (_, i) => (bytes[high + i] << 8) | bytes[low + i]);
+  };
+  const base = next(data.reference);
+  const others = next(data.candidate);
+  const pictures = {
+    factor: data.factor,
+    reference: decode(data.reference, base),
+    candidate: decode(data.candidate, data.rest ? codesBeside(base, others) : others),
+    difference: null,
+    error: null,
+    z: null,
+  };
+  if (data.rest) pictures.difference = difference(pictures, decode(data.rest, next(data.rest)));
+  if (data.error) {
+    pictures.error = decode(data.error, next(data.error));
+    pictures.z = quotient(pictures.difference, pictures.error);
+  }
+  return pictures;
+}
+
+function difference({ candidate, reference }, rest) {
+  const values = candidate.values.map((value, i) => value - reference.values[i] + rest.values[i]);
+  return { ...candidate, values };
+}
+
+/** Differences in standard errors: nothing over nothing is 0, something over nothing infinite. */
+function quotient(differences, errors) {
+  const values = differences.values.map((value, i) => (value === 0 ? 0 : value / errors.values[i]));
+  return { ...differences, values };
+}

@@ -1,0 +1,261 @@
+// The pictures of one case: drawing, zoom, the pixel cursor and its readings.
+
+const SIGNIFICANT = { candidate: 3, reference: 3, difference: 2, z: 2 };
+
+/** A value with as many digits as were kept of it. */
+function reading(value, digits) {
+  if (Number.isNaN(value)) return "NaN";
+  if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
+  return String(Number(value.toPrecision(digits))).replaceAll("-", "−");
+}
+
+function clamp(value, low, high) {
+  return Math.min(Math.max(value, low), Math.max(low, high));
+}
+
+class CaseView {
+  constructor(section) {
+    this.section = section;
+    this.box = section.querySelector(".pictures");
+    this.row = this.box.querySelector(".row");
+    this.data = JSON.parse(this.box.querySelector("script.data").textContent);
+    this.factor = this.data.factor;
+    this.white = Number(this.box.dataset.white);
+    this.span = Number(this.box.dataset.span);
+    this.figures = [...this.row.querySelectorAll("figure")].map((element) => this.figure(element));
+    this.crops = [...section.querySelectorAll(".places button")].map((button) => new Crop(button));
+    /** What of the pictures shows: from (left, top), as fractions, 1 / zoom of each side. */
+    this.area = { zoom: 1, left: 0, top: 0 };
+    this.cursor = null;
+    this.region = null;
+    this.pictures = null;
+    this.row.tabIndex = 0;
+    this.listen();
+  }
+
+  /** A canvas in place of the thumbnail. */
+  figure(element) {
+    const kind = element.dataset.kind;
+    const stored = this.data[kind === "z" || kind === "difference" ? "reference" : kind];
+    const frame = element.querySelector(".frame");
+    const canvas = document.createElement("canvas");
+    const image = frame.querySelector("img");
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", image.alt || element.querySelector("b").textContent);
+    return {
+      element, kind, frame, image, canvas, width: stored.width, height: stored.height,
+      low: element.querySelector(".low"), high: element.querySelector(".high"),
+    };
+  }
+
+  /** Decode, unless it is done, and draw. */
+  async show(look) {
+    this.pictures ??= await unpack(this.data);
+    const own = { ...look, white: this.white, span: this.span };
+    for (const figure of this.figures) {
+      paintKind(figure.canvas, figure.kind, this.pictures[figure.kind], own);
+      figure.image.replaceWith(figure.canvas);
+      const end = reading(this.span / 2 ** look.stops, 4);
+      if (figure.high) [figure.low.textContent, figure.high.textContent] = [`−${end}`, `+${end}`];
+    }
+    this.box.querySelector(".exposed").textContent = this.exposed(look);
+    this.crops.forEach((crop) => crop.draw(this.figures, this.factor));
+    this.place();
+    this.read();
+    this.section.dataset.drawn = JSON.stringify(look);
+  }
+
+  /** Give the memory back; what is drawn stays. */
+  forget() {
+    this.pictures = null;
+  }
+
+  exposed({ stops, colours }) {
+    const white = this.white / 2 ** stops;
+    if (colours === "linear") return `Luminance: yellow is ${reading(white, 4)}, purple is 0`;
+    const dark = reading(white / 2 ** LOG_STOPS, 4);
+    if (colours === "log") return `Luminance: yellow is ${reading(white, 4)}, purple is ${dark}`;
+    return `White is radiance ${reading(white, 4)} in both pictures`;
+  }
+
+  listen() {
+    for (const figure of this.figures) {
+      const { frame } = figure;
+      frame.addEventListener("pointermove", (event) => this.moved(figure, event));
+      frame.addEventListener("pointerdown", (event) => this.pressed(figure, event));
+      frame.addEventListener("dblclick", (event) => this.zoomAt(this.fractions(figure, event), 2));
+      frame.addEventListener("wheel", (event) => this.wheeled(figure, event), { passive: false });
+    }
+    this.row.addEventListener("focus", () => this.moveCursor(0, 0));
+    this.crops.forEach((crop) => crop.button.addEventListener("click", () => this.visit(crop)));
+    for (const button of this.box.querySelectorAll("[data-zoom]")) {
+      button.addEventListener("click", () => this.zoom(button.dataset.zoom));
+    }
+    const wipe = this.box.querySelector(".wipe input");
+    wipe.addEventListener("input", () => this.box.style.setProperty("--wipe", `${wipe.value}%`));
+  }
+
+  /** Where in the whole picture an event happened, as fractions of its sides. */
+  fractions(figure, event) {
+    const box = figure.frame.getBoundingClientRect();
+    const { zoom, left, top } = this.area;
+    return {
+      x: left + (event.clientX - box.left) / box.width / zoom,
+      y: top + (event.clientY - box.top) / box.height / zoom,
+    };
+  }
+
+  moved(figure, event) {
+    if (event.buttons === 1 && this.area.zoom > 1) {
+      const box = figure.frame.getBoundingClientRect();
+      const { zoom, left, top } = this.area;
+      const [x, y] = [event.movementX / box.width, event.movementY / box.height];
+      this.setArea(zoom, left - x / zoom, top - y / zoom);
+    } else if (event.pointerType !== "touch") {
+      this.pointTo(figure, event);
+    }
+  }
+
+  pressed(figure, event) {
+    if (this.area.zoom > 1) figure.frame.setPointerCapture(event.pointerId);
+    this.pointTo(figure, event);
+  }
+
+  wheeled(figure, event) {
+    // The wheel alone scrolls the page.
+    if (!event.ctrlKey) return;
+    event.preventDefault();
+    this.zoomAt(this.fractions(figure, event), 2 ** (-event.deltaY / 200));
+  }
+
+  pointTo(figure, event) {
+    const { x, y } = this.fractions(figure, event);
+    this.setCursor(Math.floor(x * figure.width), Math.floor(y * figure.height));
+  }
+
+  setCursor(x, y) {
+    const width = Math.max(...this.figures.map((figure) => figure.width));
+    const height = Math.max(...this.figures.map((figure) => figure.height));
+    this.cursor = { x: clamp(x, 0, width - 1), y: clamp(y, 0, height - 1) };
+    this.place();
+    this.read();
+  }
+
+  /** Move the cursor by pixels, and what shows along with it. */
+  moveCursor(dx, dy) {
+    const { width, height } = this.figures[0];
+    const from = this.cursor ?? { x: Math.floor(width / 2), y: Math.floor(height / 2) };
+    this.setCursor(from.x + dx, from.y + dy);
+    const { zoom, left, top } = this.area;
+    const [x, y] = [this.cursor.x / width, this.cursor.y / height];
+    this.setArea(
+      zoom,
+      clamp(left, x + 1 / width - 1 / zoom, x),
+      clamp(top, y + 1 / height - 1 / zoom, y),
+    );
+  }
+
+  zoom(way) {
+    const { width, height } = this.figures[0];
+    const { zoom, left, top } = this.area;
+    const middle = { x: left + 0.5 / zoom, y: top + 0.5 / zoom };
+    const { x, y } = this.cursor
+      ? { x: (this.cursor.x + 0.5) / width, y: (this.cursor.y + 0.5) / height }
+      : middle;
+    if (way === "whole") this.setArea(1, 0, 0);
+    else this.zoomAt({ x: clamp(x, 0, 1), y: clamp(y, 0, 1) }, way === "in" ? 2 : 0.5);
+  }
+
+  /** Zoom so that a place of the picture, as fractions, stays where it is, if it shows. */
+  zoomAt({ x, y }, by) {
+    const { width, height } = this.figures[0];
+    const { zoom, left, top } = this.area;
+    const wanted = clamp(zoom * by, 1, Math.max(width, height) / 4);
+    const [inX, inY] = [clamp((x - left) * zoom, 0, 1), clamp((y - top) * zoom, 0, 1)];
+    this.setArea(wanted, x - inX / wanted, y - inY / wanted);
+  }
+
+  setArea(zoom, left, top) {
+    const most = 1 - 1 / zoom;
+    this.area = { zoom, left: clamp(left, 0, most), top: clamp(top, 0, most) };
+    this.place();
+  }
+
+  /** Show a worst place large in every picture, with the cursor on its worst pixel. */
+  visit(crop) {
+    const { width, height } = this.figures[0];
+    const place = crop.scaled(this.factor);
+    const filled = 0.5 / Math.max(place.width / width, place.height / height);
+    const zoom = clamp(filled, 1, Math.max(width, height) / 8);
+    const [x, y] = [place.x + place.width / 2, place.y + place.height / 2];
+    this.region = place;
+    this.setArea(zoom, x / width - 0.5 / zoom, y / height - 0.5 / zoom);
+    this.setCursor(...this.worstPixel(place));
+    this.row.scrollIntoView({ block: "nearest" });
+  }
+
+  worstPixel(place) {
+    const picture = this.pictures?.z ?? this.pictures?.difference;
+    let [x, y, most] = [Math.floor(place.x), Math.floor(place.y), -1];
+    if (!picture) return [x, y];
+    for (let row = y; row < Math.min(place.y + place.height, picture.height); row += 1) {
+      for (let column = Math.floor(place.x); column < place.x + place.width; column += 1) {
+        const size = this.values(picture, column, row).reduce(
+          // What is not a number is worse than any.
+          (far, value) => Math.max(far, Number.isNaN(value) ? Infinity : Math.abs(value)), -1,
+        );
+        if (size > most) [x, y, most] = [column, row, size];
+      }
+    }
+    return [x, y];
+  }
+
+  /** The three values of a pixel; none outside. */
+  values(picture, x, y) {
+    if (!picture || x >= picture.width || y >= picture.height) return [];
+    const at = 3 * (y * picture.width + x);
+    return [...picture.values.subarray(at, at + 3)];
+  }
+
+  /** Put the canvases and marks where zoom and cursor want them. */
+  place() {
+    const { zoom, left, top } = this.area;
+    this.box.classList.toggle("zoomed", zoom > 1);
+    // Those that do not show have no width; they get one when they do.
+    const shown = Math.max(...this.figures.map(({ frame }) => frame.clientWidth));
+    for (const { frame, canvas, width, height } of this.figures) {
+      frame.style.setProperty("--zoom", zoom);
+      frame.style.setProperty("--left", left);
+      frame.style.setProperty("--top", top);
+      canvas.classList.toggle("enlarged", shown * zoom >= width);
+      const cursor = this.cursor && { ...this.cursor, width: 1, height: 1 };
+      this.mark(frame.querySelector(".cursor"), cursor, width, height);
+      this.mark(frame.querySelector(".region"), this.region, width, height);
+    }
+  }
+
+  mark(element, place, width, height) {
+    element.hidden = !place;
+    if (!place) return;
+    const { zoom, left, top } = this.area;
+    const { style } = element;
+    style.left = `${100 * zoom * (place.x / width - left)}%`;
+    style.top = `${100 * zoom * (place.y / height - top)}%`;
+    style.width = `${(100 * zoom * place.width) / width}%`;
+    style.height = `${(100 * zoom * place.height) / height}%`;
+  }
+
+  read() {
+    if (!this.cursor || !this.pictures) return;
+    const { x, y } = this.cursor;
+    const range = (at) => (this.factor > 1 ? `${at * this.factor} to ${(at + 1) * this.factor - 1}` : at);
+    this.box.querySelector(".place").textContent = `x ${range(x)}, y ${range(y)}`;
+    for (const row of this.box.querySelectorAll("[data-row]")) {
+      const kind = row.dataset.row;
+      const values = this.values(this.pictures[kind], x, y);
+      [...row.cells].slice(1).forEach((cell, k) => {
+        cell.textContent = k < values.length ? reading(values[k], SIGNIFICANT[kind]) : "–";
+      });
+    }
+  }
+}

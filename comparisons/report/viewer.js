@@ -1,0 +1,211 @@
+// The page: which cases show, how their pictures show, and the keyboard.
+
+const COLOURS = ["srgb", "linear", "log"];
+const WHICH = ["candidate", "reference", "difference", "z"];
+const BLINK_MILLISECONDS = 700;
+
+const find = (selector) => document.querySelector(selector);
+const sections = [...document.querySelectorAll(".case")];
+const rows = [...document.querySelectorAll("nav tbody tr")];
+const views = new Map();
+const look = { stops: 0, colours: "srgb" };
+
+// Cases: search, verdicts, next and previous
+
+const texts = sections.map((section) => {
+  const parts = section.querySelectorAll("h2, .reason, .cause");
+  return [...parts].map((part) => part.textContent).join(" ").toLowerCase();
+});
+
+function filter() {
+  const words = find("#search").value.toLowerCase().split(/\s+/);
+  const boxes = [...document.querySelectorAll("[name=verdict]:checked")];
+  const verdicts = new Set(boxes.map((box) => box.value));
+  let count = 0;
+  sections.forEach((section, k) => {
+    const matches = words.every((word) => texts[k].includes(word));
+    const shown = matches && verdicts.has(section.dataset.verdict);
+    section.hidden = !shown;
+    rows[k].hidden = !shown;
+    count += shown;
+  });
+  find("#shown").textContent = `${count} of ${sections.length}`;
+  find("#none").hidden = count > 0 || sections.length === 0;
+}
+
+/** The case that has the focus, else the last one that begins above the window's upper third. */
+function current() {
+  const focused = document.activeElement.closest(".case:not([hidden])");
+  if (focused) return focused;
+  const above = (section) => section.getBoundingClientRect().top < window.innerHeight / 3;
+  return sections.filter((section) => !section.hidden).findLast(above);
+}
+
+function step(by) {
+  const shown = sections.filter((section) => !section.hidden);
+  const next = shown[shown.indexOf(current()) + by];
+  if (!next) return;
+  next.scrollIntoView();
+  (views.get(next)?.row ?? next).focus({ preventScroll: true });
+}
+
+// Pictures: views, exposure, colours
+
+const drawn = new IntersectionObserver(
+  (entries) => {
+    for (const { target, isIntersecting } of entries) {
+      const view = views.get(target);
+      view.near = isIntersecting;
+      if (isIntersecting) draw(target);
+      else view.forget();
+    }
+  },
+  { rootMargin: "400px" },
+);
+
+async function draw(section) {
+  try {
+    await views.get(section).show(look);
+  } catch (error) {
+    // The thumbnails remain.
+    const hint = section.querySelector(".exposed");
+    hint.textContent = `The pictures cannot be unpacked (${error.message}): these are thumbnails`;
+  }
+}
+
+function redraw() {
+  find("#stops").value = look.stops;
+  find("#stops-text").textContent = look.stops > 0 ? `+${look.stops}` : `${look.stops}`.replace("-", "−");
+  find("#colours").value = look.colours;
+  for (const [section, view] of views) if (view.near) draw(section);
+}
+
+function expose(stops) {
+  const { min, max } = find("#stops");
+  look.stops = clamp(stops, Number(min), Number(max));
+  redraw();
+}
+
+function colour(colours) {
+  look.colours = colours;
+  redraw();
+}
+
+let blinking = null;
+
+function setMode(mode) {
+  const section = current();
+  const before = section?.getBoundingClientRect().top;
+  document.body.dataset.mode = mode;
+  find(`[name=mode][value=${mode}]`).checked = true;
+  clearInterval(blinking);
+  if (mode === "blink") blinking = setInterval(flip, BLINK_MILLISECONDS);
+  if (mode !== "single" && WHICH.indexOf(document.body.dataset.which) > 1) setWhich("candidate");
+  // Pictures change their size: keep what is looked at where it is.
+  if (section) window.scrollBy(0, section.getBoundingClientRect().top - before);
+  resized();
+}
+
+function resized() {
+  for (const view of views.values()) if (view.near) view.place();
+}
+
+function setWhich(which) {
+  document.body.dataset.which = which;
+  find("#which").value = which;
+}
+
+/** The other picture of the pair; of a single view, the next one. */
+function flip() {
+  const { mode, which } = document.body.dataset;
+  const among = mode === "single" ? WHICH : WHICH.slice(0, 2);
+  setWhich(among[(WHICH.indexOf(which) + 1) % among.length]);
+}
+
+function flipKey() {
+  if (!["flip", "single"].includes(document.body.dataset.mode)) setMode("flip");
+  flip();
+}
+
+// Commands to copy
+
+async function copy(button) {
+  const code = button.parentElement.querySelector("code");
+  try {
+    await navigator.clipboard.writeText(code.textContent);
+    button.textContent = "copied";
+  } catch {
+    // Where a page from disk may not write to the clipboard, the user can.
+    getSelection().selectAllChildren(code);
+    button.textContent = "selected: press Ctrl+C";
+  }
+  setTimeout(() => (button.textContent = "copy"), 2000);
+}
+
+// Keys
+
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+const modes = [...document.querySelectorAll("[name=mode]")].map((radio) => radio.value);
+
+const KEYS = {
+  n: () => step(1),
+  p: () => step(-1),
+  f: flipKey,
+  c: () => colour(COLOURS[(COLOURS.indexOf(look.colours) + 1) % COLOURS.length]),
+  "+": () => expose(look.stops + 1),
+  "=": () => expose(look.stops + 1),
+  "-": () => expose(look.stops - 1),
+  0: () => expose(0),
+  i: () => views.get(current())?.zoom("in"),
+  o: () => views.get(current())?.zoom("out"),
+  w: () => views.get(current())?.zoom("whole"),
+  "/": () => find("#search").focus(),
+  "?": () => find("#help").showModal(),
+  ...Object.fromEntries(modes.map((mode, k) => [k + 1, () => setMode(mode)])),
+};
+
+function pressed(event) {
+  const { target, key } = event;
+  if (event.ctrlKey || event.metaKey || event.altKey || find("#help").open) return;
+  if (target.matches("[type=search], select")) {
+    if (key === "Escape") target.blur();
+    return;
+  }
+  const view = target.matches(".row") ? views.get(target.closest(".case")) : null;
+  if (view && key in ARROWS) {
+    const far = event.shiftKey ? 10 : 1;
+    view.moveCursor(...ARROWS[key].map((d) => far * d));
+  } else if (Object.hasOwn(KEYS, key)) {
+    KEYS[key]();
+  } else {
+    return;
+  }
+  event.preventDefault();
+}
+
+document.documentElement.classList.add("scripted");
+for (const section of sections) {
+  if (!section.querySelector("script.data")) continue;
+  views.set(section, new CaseView(section));
+  drawn.observe(section);
+}
+document.addEventListener("keydown", pressed);
+window.addEventListener("resize", resized);
+find(".toolbar").addEventListener("submit", (event) => event.preventDefault());
+find("#search").addEventListener("input", filter);
+find("#stops").addEventListener("input", (event) => expose(Number(event.target.value)));
+find("#colours").addEventListener("change", (event) => colour(event.target.value));
+find("#which").addEventListener("change", (event) => setWhich(event.target.value));
+find("#open-help").addEventListener("click", KEYS["?"]);
+for (const box of document.querySelectorAll("[name=verdict]")) box.addEventListener("change", filter);
+for (const radio of document.querySelectorAll("[name=mode]")) {
+  radio.addEventListener("change", () => setMode(radio.value));
+}
+for (const button of document.querySelectorAll(".copy")) {
+  button.addEventListener("click", () => copy(button));
+}
+// A browser that reloads the page keeps what was typed and chosen.
+setMode(find("[name=mode]:checked").value);
+expose(Number(find("#stops").value));
+filter();

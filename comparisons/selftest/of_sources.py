@@ -1,0 +1,108 @@
+"""Faults of the renderer: a line or two of its source, as they go wrong in renderers.
+
+`tests/comparisons/test_selftest.py` checks that each old text stands in its file exactly once.
+"""
+
+from comparisons.selftest.fault import SourceFault
+
+BOX, KNOT, GLASS = "colour_bleeding", "mesh_knot", "caustic_glass"
+METAL, SKY = "material_rough_conductor", "environment"
+
+FAULTS = (
+    SourceFault(
+        "direct light counted twice", BOX, "integrators/path.py",
+        "                weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, "
+        "light_pdf)\n            emitted",
+        "            emitted",
+    ),
+    SourceFault(
+        "cosine missing after the first bounce", BOX, "integrators/path.py",
+        "        throughput = throughput * scattered.weight\n",
+        "        throughput = throughput * scattered.weight\n"
+        "        if depth == 0 and scattered.wi.z > 0.0:\n"
+        "            throughput = throughput * (0.6666666666666666 / scattered.wi.z)\n",
+    ),
+    SourceFault(
+        "MIS weights that do not sum to one", "veach_mis", "integrators/integrator.py",
+        "    return 1.0 / (1.0 + ratio * ratio)\n",
+        "    return 1.0 / (1.0 + 0.5 * ratio * ratio)\n",
+    ),
+    SourceFault(
+        "roulette without compensation", BOX, "integrators/path.py",
+        "            throughput = throughput * (1.0 / survival)\n", "",
+    ),
+    SourceFault(
+        "1/eta² forgotten", GLASS, "materials/dielectric.py",
+        "    t = (1.0 - f) / (refraction.eta * refraction.eta)\n", "    t = 1.0 - f\n",
+    ),
+    SourceFault(
+        "biased warp", BOX, "sampling/warp.py",
+        "    r = math.sqrt(u0)\n    cos_phi, sin_phi = on_circle(u1)\n"
+        "    return Vec3(r * cos_phi, r * sin_phi, math.sqrt(1.0 - u0))\n",
+        "    r = u0\n    cos_phi, sin_phi = on_circle(u1)\n"
+        "    return Vec3(r * cos_phi, r * sin_phi, math.sqrt(1.0 - u0 * u0))\n",
+    ),
+    SourceFault(
+        "seed ignored", BOX, "sampling/sobol.py",
+        "combine(setup.seed, np.uint64(pixel))", "combine(np.uint64(0), np.uint64(pixel))",
+    ),
+    SourceFault(
+        "one leaf missing from the hierarchy", KNOT, "geometry.py",
+        "            end = begin + size\n            if instances is not None:\n"
+        "                if node == held:",
+        "            end = begin + size\n            if begin <= 5000 < end:\n"
+        "                end = begin\n            if instances is not None:\n"
+        "                if node == held:",
+    ),
+    SourceFault(
+        "normals of spheres flipped", GLASS, "shapes/sphere.py",
+        "    return SurfacePoint(p, n, n, error, spheres.material[i], spheres.light[i])\n",
+        "    return SurfacePoint(p, n, -n, error, spheres.material[i], spheres.light[i])\n",
+    ),
+    SourceFault(
+        "shadow rays begin 1 % late", BOX, "ray.py",
+        "    return Ray(o, target - o, 1.0)\n",
+        "    return Ray(o + (target - o) * 0.01, (target - o) * 0.99, 1.0)\n",
+    ),
+    SourceFault(
+        "no offset from surfaces", BOX, "ray.py",
+        "    return point.p + point.n * point.error\n", "    return point.p\n",
+    ),
+    SourceFault(
+        "Fresnel of one polarisation", GLASS, "materials/fresnel.py",
+        "0.5 * (parallel * parallel + perpendicular * perpendicular)",
+        "perpendicular * perpendicular",
+    ),
+    SourceFault(
+        "half a pixel off in the camera", BOX, "bands.py",
+        "    dx, weight_x = film_offset(film_filter, u0)\n",
+        "    dx, weight_x = film_offset(film_filter, u0)\n    dx = dx + 0.5\n",
+    ),
+    SourceFault(
+        "masking forgotten in rough metal", METAL, "materials/rough_conductor.py",
+        "    value = 0.25 * g1_over_cos(m, wo) * density(m, h) * g1(m, wi)\n",
+        "    value = 0.25 * g1_over_cos(m, wo) * density(m, h)\n",
+    ),
+    SourceFault(
+        "Beckmann in place of GGX", METAL, "materials/microfacet.py",
+        "    if m.kind == GGX:\n        norm = slope2", "    if m.kind < 0:\n        norm = slope2",
+    ),
+    SourceFault(
+        "sky off by half a texel", SKY, "lights/environment_map.py",
+        "    across, down = azimuth * width - 0.5,", "    across, down = azimuth * width,",
+    ),
+    SourceFault(
+        "1/pi written as 0.32", BOX, "materials/diffuse.py",
+        "    return colour_at(diffuses.reflectance, i, at) * (wi.z * INV_PI)\n",
+        "    return colour_at(diffuses.reflectance, i, at) * (wi.z * 0.32)\n",
+    ),
+    SourceFault(
+        "light of the back of lamps", BOX, "lights/area.py",
+        "    if q.light < 0 or dot(q.n, w) <= 0.0:\n", "    if q.light < 0:\n",
+    ),
+    SourceFault(
+        "boxes of the hierarchy without slack", KNOT, "traversal.py",
+        "    error = surface_error(ray.o, ray.o, reach)\n",
+        "    error = -1e-3 * reach\n",
+    ),
+)  # fmt: skip

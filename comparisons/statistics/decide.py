@@ -1,0 +1,209 @@
+"""The verdict of the statistics, and the words and numbers that explain it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from comparisons.metrics import count_nonfinite
+from comparisons.results import FloatArray, Status, Tier
+from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
+from comparisons.statistics.sides import Known, known_side, picture_array, side_of
+from comparisons.statistics.single import single_tests
+from comparisons.statistics.uniformity import Uniformity, uniformity
+from comparisons.statistics.welch import BiasTest, image_test, pixel_test, tile_test
+from comparisons.statistics.wording import (
+    beyond,
+    cell_numbers,
+    channels,
+    finite,
+    image_numbers,
+    interval,
+    percent,
+    uniformity_numbers,
+    uniformity_words,
+    which,
+)
+
+ONE_PICTURE = (
+    "with a single picture on a side the noise is estimated from the spread of the difference over "
+    "small blocks, presuming that of neighbouring blocks independent"
+)
+
+TOP = ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value")
+"""Of the image's numbers, those that stand at the top as well."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The tests at every scale."""
+
+    image: BiasTest
+    tiles: BiasTest
+    pixels: BiasTest
+    uniformity: Uniformity | None
+    tile: int
+    """Side in pixels."""
+    single: bool
+    """Whether a side is a single picture."""
+
+
+def compare(
+    candidate: npt.ArrayLike,
+    reference: npt.ArrayLike | Known,
+    *,
+    limit: float = 0.005,
+    tile: int = TILE,
+    margins: Margins | None = None,
+) -> Tier:
+    """Decide whether two sets of replicates have the same mean, by the rule of this package.
+
+    candidate, reference: linear radiance, (R, height, width, 3); R may differ, and is sharp from 16
+    on.  limit: the smallest bias of the image mean that must be visible, as a fraction;  tile: side
+    in pixels.  Pictures of unlike size and pixels that are not finite are `invalid`; two sides
+    that are black throughout are `not-applicable`, for they prove nothing.  Raises ValueError for
+    other shapes, and for a limit that is not beyond the margin of the image mean.
+    """
+    margins = margins or Margins()
+    if not limit > margins.image:
+        raise ValueError(f"limit {limit}: expected more than the margin {margins.image}")
+    a = picture_array(candidate, "candidate", 4)
+    b, variance = _reference(reference)
+    if a.shape[1:] != b.shape[1:]:
+        reason = f"candidate is {_size(a)}, reference {_size(b)} pixels (width x height)"
+        return Tier("statistics", "invalid", reason)
+    if count_nonfinite(a) or count_nonfinite(b):
+        bad = f"{count_nonfinite(a)} of the candidate, {count_nonfinite(b)} of the reference"
+        return Tier("statistics", "invalid", f"pixels not finite: {bad}")
+    if variance is not None and not (np.isfinite(variance).all() and variance.min() >= 0.0):
+        return Tier("statistics", "invalid", "the reference's variance is negative or not finite")
+    if not a.any() and not b.any():
+        return Tier("statistics", "not-applicable", "every picture of either side is black")
+    known = None if variance is None else Known(b[0], variance)
+    return _verdict(findings(a, known or b, tile, margins), a, b, limit)
+
+
+def findings(a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins) -> Findings:
+    """All tests of pictures (R, h, w, 3) that are finite and of one size."""
+    if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
+        image, tiles, pixels, side = single_tests(a, b, tile, margins)
+        return Findings(image, tiles, pixels, None, side, True)
+    one, two = side_of(a), known_side(b) if isinstance(b, Known) else side_of(b)
+    return Findings(
+        image_test(one, two, margins),
+        tile_test(one, two, tile, margins),
+        pixel_test(one, two, margins),
+        uniformity(one, two, margins),
+        tile,
+        False,
+    )
+
+
+def read(
+    candidate: npt.ArrayLike, reference: npt.ArrayLike | Known, *, finite: bool = True
+) -> tuple[FloatArray, FloatArray | Known]:
+    """The pictures, if they can be compared. Raises ValueError. Pixels that are not
+    finite become black unless `finite`."""
+    a = picture_array(candidate, "candidate", 4)
+    b, variance = _reference(reference)
+    if a.shape[1:] != b.shape[1:]:
+        raise ValueError(f"candidate is {_size(a)}, reference {_size(b)} pixels (width x height)")
+    if not finite:
+        a, b = _without_nan(a), _without_nan(b)
+    elif count_nonfinite(a) or count_nonfinite(b):
+        raise ValueError("pixels are not finite")
+    return a, (b if variance is None else Known(b[0], _without_nan(variance)))
+
+
+def _without_nan(values: FloatArray) -> FloatArray:
+    return values if np.isfinite(values).all() else np.nan_to_num(values, posinf=0.0, neginf=0.0)
+
+
+def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray | None]:
+    """(S, h, w, 3) and None, or a known mean as (1, h, w, 3) and its variance."""
+    if not isinstance(reference, Known):
+        return picture_array(reference, "reference", 4), None
+    mean = picture_array(reference.mean, "reference's mean", 3)
+    variance = picture_array(reference.variance, "reference's variance", 3)
+    if mean.shape != variance.shape:
+        raise ValueError(f"reference: mean is {mean.shape}, its variance {variance.shape}")
+    return mean[None], variance
+
+
+def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Tier:
+    status, finding = _decide(found, limit)
+    image = found.image
+    reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
+    reason = (
+        f"{finding}; the smallest bias of the image mean seen with {100.0 * POWER:g} % power is "
+        f"{percent(image.over_scale(image.detectable).max())}; the means are equivalent within "
+        f"±{percent(reach)} at {100.0 * (1.0 - IMAGE_LEVEL):g} %"
+    )
+    if found.single:
+        reason += f"; {ONE_PICTURE}"
+    of_image = image_numbers(image)
+    numbers = {
+        "replicates_candidate": len(a),
+        "replicates_reference": len(b),
+        "mean_candidate": channels(a.mean(axis=(0, 1, 2))),
+        "mean_reference": channels(b.mean(axis=(0, 1, 2))),
+        "limit": limit,
+        "confidence": 1.0 - IMAGE_LEVEL,
+        "power": POWER,
+        **{key: of_image[key] for key in TOP},
+        "equivalent_within": finite(reach),
+        "samples_factor": finite(image.samples_factor(limit)),
+        "image": of_image,
+        "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
+        "pixels": cell_numbers(found.pixels, 1),
+        "uniformity": uniformity_numbers(found.uniformity),
+    }
+    return Tier("statistics", status, reason, numbers)
+
+
+def _decide(found: Findings, limit: float) -> tuple[Status, str]:
+    image, spread = found.image, found.uniformity
+    if image.differs.any():
+        told = f"the image mean differs: {beyond(image, image.worst)}"
+        if found.tiles.differs.any():
+            told += f"; {which(found.tiles, found.tile, 'tiles')}"
+        return "differ", told
+    if found.tiles.differs.any():
+        return "differ", which(found.tiles, found.tile, "tiles", ", though not the image mean")
+    if found.pixels.differs.any():
+        return "differ", which(found.pixels, 1, "pixels", ", though not a whole tile")
+    if spread is not None and spread.wide:
+        return "differ", (
+            "small blocks differ more between the sides than within: "
+            f"{uniformity_words(spread)} ({spread.mean_beyond_margin:.3f} beyond the margin); many "
+            "small differences, or replicates that are not independent of each other"
+        )
+    if spread is not None and spread.narrow:
+        return "invalid", (
+            f"the sides are not independent of each other: {uniformity_words(spread)}; they share "
+            "their noise, as the same seeds or copied pictures do"
+        )
+    reach = image.over_scale(np.abs(image.difference) + image.half_width)
+    widest = f"image mean {interval(image, (int(reach.argmax()),))}"
+    sees = bool(np.all(image.over_scale(image.detectable) <= limit))
+    inside = bool(image.within(limit).all())
+    if inside and sees:
+        return "agree", f"{widest}, within ±{percent(limit)}; no tile and no pixel differs"
+    within = "within" if inside else "not within"
+    overlooked = "" if sees else "; a bias of that size could be overlooked"
+    return "inconclusive", (
+        f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
+        f"{_wanted(image.samples_factor(limit))}"
+    )
+
+
+def _wanted(factor: float) -> str:
+    if not math.isfinite(factor):
+        return "what it takes cannot be told from these pictures: give more replicates"
+    times = f"{factor:.{0 if factor > 10 else 1}f}"
+    return f"it takes about {times} times the samples: replicates x {times} or spp x {times}"
+
+
+def _size(images: FloatArray) -> str:
+    return f"{images.shape[2]} x {images.shape[1]}"

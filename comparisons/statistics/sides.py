@@ -1,0 +1,128 @@
+"""The two sides of a comparison, and what their replicates tell of their noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import correlate1d
+
+from comparisons.results import FloatArray
+from comparisons.statistics.scales import cell_means, cell_pixels, cell_sums
+
+NEIGHBOURS = 5
+"""Side of the square of pixels that a pixel's noise is compared with."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """A reference of which the mean and the variance of that mean are known, (height, width, 3)."""
+
+    mean: FloatArray
+    variance: FloatArray
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Variances of means, and their degrees of freedom; all arrays of one shape (or scalars).
+
+    own: from the spread of the means between replicates, free of any model of a picture's inside;
+    pixels: as the sum of the variances of single pixels, as if these were independent.
+    """
+
+    own: FloatArray
+    own_dof: FloatArray | float
+    pixels: FloatArray
+    pixels_dof: FloatArray | float
+
+
+@dataclass(frozen=True)
+class Side:
+    """pictures: (R, h, w, 3), None if only moments are known;  mean, variance (of one picture) and
+    fourth central moment (squared variance if known) of each pixel: (h, w, 3);  count: R, or 1 for
+    a mean that is known."""
+
+    pictures: FloatArray | None
+    mean: FloatArray
+    variance: FloatArray
+    fourth: FloatArray
+    count: int
+
+    def of_tiles(self, tile: int) -> Noise:
+        """The noise of tiles of one picture, (rows, columns, 3)."""
+        pixels = cell_pixels(self.mean, tile)
+        variance = cell_sums(self.variance, tile)
+        summed = variance / pixels**2
+        dof = self._dof(variance, cell_sums(self.fourth, tile), pixels)
+        if self.pictures is None:
+            return Noise(summed, dof, summed, dof)
+        own = cell_means(self.pictures, tile).var(axis=0, ddof=1)
+        return Noise(own, float(self.count - 1), summed, dof)
+
+    def of_image(self) -> Noise:
+        """The noise of the mean of one picture, (3,)."""
+        size = float(self.mean.shape[0] * self.mean.shape[1])
+        variance = self.variance.sum(axis=(0, 1))
+        summed = variance / size**2
+        dof = self._dof(variance, self.fourth.sum(axis=(0, 1)), size)
+        if self.pictures is None:
+            return Noise(summed, dof, summed, dof)
+        own = self.pictures.mean(axis=(1, 2)).var(axis=0, ddof=1)
+        return Noise(own, float(self.count - 1), summed, dof)
+
+    def of_pixels(self) -> Noise:
+        """The noise of single pixels, (h, w, 3); what stands for their inside is that of their
+        neighbours."""
+        around = neighbourhood(self.variance)
+        n = float(NEIGHBOURS**2)
+        dof = self._dof(n * around, n * neighbourhood(self.fourth), n)
+        own_dof = np.inf if self.pictures is None else float(self.count - 1)
+        return Noise(self.variance, own_dof, around, dof)
+
+    def _dof(
+        self, variance: FloatArray, fourth: FloatArray, pixels: FloatArray | float
+    ) -> FloatArray:
+        """Degrees of freedom of a sum of `pixels` variances: 2 n / (kurtosis - 1) (Box 1953).
+
+        n for normal noise; about the number of fireflies where these have most of the variance. Of
+        known variances, as if each were known with one degree of freedom (Satterthwaite 1946).
+        """
+        positive = np.where(variance > 0.0, variance, 1.0)
+        if self.pictures is None:
+            return np.asarray(positive**2 / np.where(variance > 0.0, fourth, 1.0))
+        excess = pixels * fourth / (positive * (1.0 - 1.0 / self.count)) ** 2 - 1.0
+        # The kurtosis is 1 at least, but for rounding; two parts are told apart below that.
+        return np.asarray(2.0 * pixels * (self.count - 1) / np.maximum(excess, 1.0))
+
+
+def side_of(images: FloatArray) -> Side:
+    """A side with replicates (R >= 2, h, w, 3)."""
+    mean = images.mean(axis=0)
+    squares = np.zeros_like(mean)
+    fourth = np.zeros_like(mean)
+    for image in images:  # one at a time: what fits the cache is several times as fast
+        square = (image - mean) ** 2
+        squares += square
+        fourth += square * square
+    return Side(images, mean, squares / (len(images) - 1), fourth / len(images), len(images))
+
+
+def known_side(known: Known) -> Side:
+    """A side of which only the mean and its variance are known."""
+    return Side(None, known.mean, known.variance, known.variance**2, 1)
+
+
+def neighbourhood(values: FloatArray) -> FloatArray:
+    """The mean over the square of NEIGHBOURS around each pixel, (h, w, 3)."""
+    # Not by a running sum, which drags the rounding of a firefly along its row.
+    weights = np.full(NEIGHBOURS, 1.0 / NEIGHBOURS)
+    rows = correlate1d(values, weights, axis=0, mode="reflect")
+    return np.asarray(correlate1d(rows, weights, axis=1, mode="reflect"))
+
+
+def picture_array(values: npt.ArrayLike, name: str, dimensions: int) -> FloatArray:
+    """`values` as float64 of `dimensions`, the last being three channels. Raises ValueError."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != dimensions or array.shape[-1] != 3 or array.size == 0:
+        expected = "(R, height, width, 3)" if dimensions == 4 else "(height, width, 3)"
+        raise ValueError(f"{name}: expected {expected}, got {array.shape}")
+    return array

@@ -1,0 +1,172 @@
+"""A side of one picture, whose noise must be estimated from the difference itself.
+
+The difference of the two pictures is noise about the bias. Its spread over small blocks within a
+tile gives the standard error of the tile's mean, and all of them that of the image mean, so that
+each part of the picture has a noise of its own (White 1980). This presumes that the noise of
+neighbouring blocks is independent. A bias that varies inside a tile counts as noise and errs to the
+safe side.
+
+One noisy pixel cannot be told from a firefly without replicates. Pixels are tested only where there
+is no noise, which is where the difference is the same all around.
+
+What the one picture has not met, a caustic's rare paths, its spread does not know of either; the
+replicates of the other side may. So the one picture's noise is taken to be at least the other's,
+times the ratio of the two in the typical tile (the median, which fireflies do not move).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from comparisons.results import FloatArray
+from comparisons.statistics.scales import (
+    DARK,
+    IMAGE_LEVEL,
+    PIXEL_LEVEL,
+    TILE_LEVEL,
+    Margins,
+    cell_means,
+    cell_pixels,
+    cell_sums,
+)
+from comparisons.statistics.sides import NEIGHBOURS, Known, known_side, neighbourhood, side_of
+from comparisons.statistics.welch import BiasTest, Error, bias_test
+
+BLOCK = 4
+"""Side of a block in pixels: larger than the reach of a usual reconstruction filter."""
+
+COARSE = 2 * BLOCK
+"""The image's standard error is also taken from blocks of this side: noise that reaches from one
+small block into the next makes it the larger of the two."""
+
+
+def single_tests(
+    candidate: FloatArray, reference: FloatArray | Known, tile: int, margins: Margins
+) -> tuple[BiasTest, BiasTest, BiasTest, int]:
+    """Image, tiles and pixels of pictures (R, h, w, 3) with R = 1 on a side; and the side of a
+    tile, which is made of whole blocks."""
+    mean = reference.mean if isinstance(reference, Known) else reference.mean(axis=0)
+    difference = candidate.mean(axis=0) - mean
+    tile = max(tile // COARSE, 1) * COARSE
+    level = float(mean.mean())
+    fine, coarse = (_Blocks.of(difference, tile, side) for side in (BLOCK, COARSE))
+    of_image, of_tiles = fine.image(), fine.tiles()
+    # Too few coarse blocks are in a tile to measure its noise, but not in the image.
+    known = np.isfinite(coarse.image().value) & (of_image.value > 0.0)
+    wider = np.where(known, coarse.image().value, 1.0) / np.where(known, of_image.value, 1.0)
+    of_tiles = Error(of_tiles.value * np.maximum(wider, 1.0), of_tiles.dof)
+    rare_image, rare_tiles = _rare(candidate, reference, difference, tile)
+    image = bias_test(
+        difference.mean(axis=(0, 1)),
+        mean.mean(axis=(0, 1)),
+        (of_image, coarse.image(), *rare_image),
+        margins.image,
+        IMAGE_LEVEL,
+        level,
+    )
+    tiles = bias_test(
+        cell_means(difference, tile),
+        cell_means(mean, tile),
+        (of_tiles, *rare_tiles),
+        margins.tile,
+        TILE_LEVEL,
+        level,
+    )
+    return image, tiles, _pixels(difference, mean, margins), tile
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Sums over tiles of squares and fourth powers of block sums about their tile's mean, and the
+    numbers of blocks and of pixels; all (rows, columns, 3)."""
+
+    squares: FloatArray
+    fourths: FloatArray
+    blocks: FloatArray
+    pixels: FloatArray
+
+    @classmethod
+    def of(cls, difference: FloatArray, tile: int, side: int) -> "_Blocks":
+        pixels = cell_pixels(difference, side)
+        sums = cell_sums(difference, side)
+        per_tile = tile // side
+        count = cell_pixels(sums, per_tile)
+        means = cell_means(difference, tile)
+        # A tile of one block has no spread of its own: there it is that about the image's mean.
+        means = np.where(count > 1, means, difference.mean(axis=(0, 1)))
+        spread = np.repeat(np.repeat(means, per_tile, axis=0), per_tile, axis=1)
+        rest = (sums - pixels * spread[: sums.shape[0], : sums.shape[1]]) ** 2
+        bessel = np.where(count > 1, count / np.maximum(count - 1.0, 1.0), 1.0)
+        return cls(
+            cell_sums(rest, per_tile) * bessel,
+            cell_sums(rest**2, per_tile) * bessel**2,
+            np.broadcast_to(count, means.shape),
+            np.broadcast_to(cell_pixels(difference, tile), means.shape),
+        )
+
+    def tiles(self) -> Error:
+        """The standard error of each tile's mean."""
+        free = np.maximum(self.blocks - 1.0, 1.0)
+        error = np.where(self.blocks > 1, np.sqrt(self.squares) / self.pixels, np.inf)
+        return Error(error, _dof(self.squares, self.fourths, self.blocks, free))
+
+    def image(self) -> Error:
+        """The standard error of the image mean."""
+        squares, fourths, blocks, pixels = (
+            values.sum(axis=(0, 1))
+            for values in (self.squares, self.fourths, self.blocks, self.pixels)
+        )
+        free = np.maximum(self.blocks - 1.0, 0.0).sum(axis=(0, 1))
+        error = np.where(free > 0, np.sqrt(squares) / pixels, np.inf)
+        return Error(error, _dof(squares, fourths, blocks, np.maximum(free, 1.0)))
+
+
+def _dof(
+    squares: FloatArray, fourths: FloatArray, blocks: FloatArray, free: FloatArray
+) -> FloatArray:
+    """As `Side` has them, and not more than there are free blocks."""
+    kurtosis = blocks * fourths / np.where(squares > 0.0, squares, 1.0) ** 2
+    return np.asarray(np.minimum(free, 2.0 * free / np.maximum(kurtosis - 1.0, 1.0)))
+
+
+def _rare(
+    candidate: FloatArray, reference: FloatArray | Known, difference: FloatArray, tile: int
+) -> tuple[list[Error], list[Error]]:
+    """Standard errors of the image and of tiles from the noise that the other side has met; none
+    where that is one picture too."""
+    # Steps from pixel to pixel, in which there is next to nothing of a bias.
+    steps = np.diff(difference, axis=1) ** 2
+    if isinstance(reference, Known):
+        many = known_side(reference)
+        of_one = reference.variance[:, 1:] + reference.variance[:, :-1]
+    elif len(candidate) == len(reference):
+        return [], []
+    else:
+        many = side_of(candidate if len(candidate) > 1 else reference)
+        assert many.pictures is not None
+        # As the single picture from the others' mean, so one of the replicates.
+        left_out = (many.pictures[0] - many.mean) * many.count / (many.count - 1.0)
+        of_one = np.diff(left_out, axis=1) ** 2
+    if difference.shape[1] < 2:
+        return [], []
+    ours, theirs = cell_sums(steps, tile), cell_sums(of_one, tile)
+    noisy = (ours > 0.0) & (theirs > 0.0)
+    factor = float(np.median(ours[noisy] / theirs[noisy])) if noisy.any() else 0.0
+    image, tiles = many.of_image(), many.of_tiles(tile)
+    return (
+        [Error(np.sqrt(factor * image.pixels), np.asarray(image.pixels_dof))],
+        [Error(np.sqrt(factor * tiles.pixels), np.asarray(tiles.pixels_dof))],
+    )
+
+
+def _pixels(difference: FloatArray, reference: FloatArray, margins: Margins) -> BiasTest:
+    """Pixels without noise; the others have an interval without end."""
+    scale = np.maximum(np.abs(reference), DARK * abs(float(reference.mean())))
+    around = neighbourhood(difference)
+    variance = neighbourhood(difference**2) - around**2
+    whole = min(difference.shape[:2]) >= NEIGHBOURS
+    still = whole & (variance <= (margins.constant * scale) ** 2)
+    error = Error(np.where(still, 0.0, np.inf), np.full(difference.shape, np.inf))
+    return bias_test(
+        difference, reference, (error,), margins.constant, PIXEL_LEVEL, float(reference.mean())
+    )

@@ -1,0 +1,111 @@
+"""The words and the numbers (fit for JSON) that tell what the tests found."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from comparisons.results import FloatArray
+from comparisons.statistics.scales import CHANNELS
+from comparisons.statistics.uniformity import Uniformity
+from comparisons.statistics.welch import BiasTest
+
+
+def channels(values: FloatArray) -> dict[str, float | None]:
+    """(3,) by channel."""
+    return {name: finite(value) for name, value in zip(CHANNELS, values, strict=True)}
+
+
+def finite(value: float | np.floating[Any]) -> float | None:
+    """None for what has no bound, or is relative to a black picture."""
+    return float(value) if math.isfinite(value) else None
+
+
+def percent(fraction: float, *, sign: bool = False) -> str:
+    """For example "0.31 %", or "+0.31 %" with its sign."""
+    if not math.isfinite(fraction):
+        return "∞"
+    number = 100.0 * fraction
+    # From a hundred on, two digits would be written with an exponent.
+    digits = f"{number:+.2g}" if abs(number) < 99.5 else f"{number:+.0f}"
+    return f"{digits if sign else digits.lstrip('+')} %"
+
+
+def interval(test: BiasTest, at: tuple[int, ...]) -> str:
+    """For example "G +0.12 ± 0.05 %", the half width being the confidence interval's."""
+    name = CHANNELS[at[-1]]
+    if not test.scale[at]:
+        return f"{name} {test.difference[at]:+.2g} where the reference is black"
+    half_width = percent(test.over_scale(test.half_width)[at])
+    return f"{name} {100.0 * test.relative[at]:+.3g} ± {half_width}"
+
+
+def beyond(test: BiasTest, at: tuple[int, ...]) -> str:
+    """The interval, and the margin that it lies outside."""
+    return f"{interval(test, at)}, beyond ±{percent(float(test.margin[at]))}"
+
+
+def which(test: BiasTest, side: int, what: str, though: str = "") -> str:
+    """How many cells of `side` pixels differ, and the worst of them."""
+    row, column, _ = test.worst
+    differ = test.differs.any(axis=-1)
+    return (
+        f"{np.count_nonzero(differ)} of {differ.size} {what} differ{though}; the "
+        f"worst, at x, y = ({column * side}, {row * side}): {beyond(test, test.worst)}"
+    )
+
+
+def image_numbers(test: BiasTest) -> dict[str, Any]:
+    """By channel; what ends in `_of_bias` or `_bias` is a fraction of the mean."""
+    return {
+        "relative_bias": channels(test.relative),
+        "standard_error_of_bias": channels(test.over_scale(test.standard_error)),
+        "half_width_of_bias": channels(test.over_scale(test.half_width)),
+        "detectable_bias": channels(test.over_scale(test.detectable)),
+        "p_value": channels(test.p_value()),
+        "degrees_of_freedom": channels(test.errors[0].dof),
+        "margin": float(test.margin[0]),
+        "differs": bool(test.differs.any()),
+    }
+
+
+def cell_numbers(test: BiasTest, side: int) -> dict[str, Any]:
+    """Of tiles, or of pixels where `side` is 1."""
+    row, column, channel = test.worst
+    differ = test.differs.any(axis=-1)
+    return {
+        "tested": differ.size,
+        "differ": int(np.count_nonzero(differ)),
+        "median_detectable_bias": finite(np.median(test.over_scale(test.detectable))),
+        "worst_x": column * side,
+        "worst_y": row * side,
+        "worst_channel": CHANNELS[channel],
+        "worst_bias": finite(test.relative[test.worst]),
+        "worst_half_width": finite(test.over_scale(test.half_width)[test.worst]),
+        "worst_margin": float(test.margin[test.worst]),
+        "worst_p_value": finite(float(test.p_value(test.worst))),
+    }
+
+
+def uniformity_numbers(found: Uniformity | None) -> dict[str, Any] | None:
+    """None where it was not tested."""
+    if found is None:
+        return None
+    return {
+        "mean_p_value": found.mean,
+        "mean_p_value_beyond_margin": found.mean_beyond_margin,
+        "expected": found.expected,
+        "standard_error": found.error,
+        "p_wide": found.p_wide,
+        "p_narrow": found.p_narrow,
+        "blocks": found.blocks,
+        "replicates": found.replicates,
+    }
+
+
+def uniformity_words(found: Uniformity) -> str:
+    """The mean p-value and what was expected of it."""
+    return (
+        f"mean p-value of the blocks {found.mean:.3f}, expected {found.expected:.3f} ± "
+        f"{found.error:.2g}"
+    )

@@ -1,0 +1,109 @@
+"""Progress of a suite for people: a bar and what runs on a terminal, a line per case without one;
+standard error only."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from comparisons.ci.ranking import ranked
+from comparisons.results import Case
+from comparisons.suites.worker import Request
+from comparisons.verdict import PASSING
+
+_STYLES = {
+    "agree": "green",
+    "reference-limited": "cyan",
+    "inconclusive": "yellow",
+    "not-comparable": "yellow",
+    "differ": "bold red",
+    "invalid": "bold red",
+}
+
+_SLOWEST = 3
+
+
+class Display:
+    """Told of each case as it begins and ends."""
+
+    def __init__(self, cases: int) -> None:
+        self._console = Console(stderr=True, highlight=False)
+        self._bar = Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            console=self._console,
+            transient=True,
+        )
+        self._task = self._bar.add_task("", total=cases)
+        self._running: dict[str, str] = {}
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._console.is_terminal:
+            self._bar.stop()
+
+    def line(self, text: str) -> None:
+        self._console.print(text, markup=False, soft_wrap=True)
+
+    def doing(self, request: Request, step: str) -> None:
+        """A case begins, or is at `step`."""
+        self._running[request.name] = step
+        self._show()
+
+    def done(self, case: Case, remark: str) -> None:
+        """A case has ended."""
+        self._running.pop(case.scene, None)
+        line = Text.assemble(f"{case.scene}: ", (case.verdict, _STYLES[case.verdict]))
+        line.append(f" ({remark})")
+        if case.verdict not in PASSING:
+            line.append(f": {case.reason}")
+        self._console.print(line, soft_wrap=True)
+        self._bar.advance(self._task)
+        self._show()
+
+    def _show(self) -> None:
+        told = [f"{name} {step}".rstrip() for name, step in self._running.items()]
+        self._bar.update(self._task, description=", ".join(told)[: self._console.width // 2])
+
+
+def summarise(
+    cases: Sequence[Case], walls: Mapping[str, float], not_run: Mapping[str, str]
+) -> None:
+    """Counts of the verdicts, what failed and at which rung first, the slowest, and what was not
+    run."""
+    console = Console(stderr=True, highlight=False)
+    counts = Counter(case.verdict for case in cases)
+    told = ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
+    console.print(f"{len(cases)} cases: {told}", markup=False)
+    failed = [case for case in ranked(cases) if case.verdict not in PASSING]
+    if failed:
+        # Why has been told on the line of the case.
+        table = Table("case", "verdict", "first rung", "seconds", box=None)
+        for case in failed:
+            rung = case.reason.partition(":")[0]
+            seconds = f"{walls[case.scene]:.1f}" if case.scene in walls else ""
+            verdict = Text(case.verdict, _STYLES[case.verdict])
+            table.add_row(Text(case.scene), verdict, Text(rung), seconds)
+        console.print(table)
+    slowest = sorted(walls, key=lambda name: walls[name], reverse=True)[:_SLOWEST]
+    if slowest:
+        told = ", ".join(f"{name} {walls[name]:.1f} s" for name in slowest)
+        console.print(f"slowest: {told}", markup=False, soft_wrap=True)
+    for name, why in not_run.items():
+        console.print(f"not run: {name}: {why}", markup=False, soft_wrap=True)

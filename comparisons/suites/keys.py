@@ -1,0 +1,91 @@
+"""What a case is made with, as one number: where that is unchanged, it need not be run again."""
+
+import functools
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import comparisons
+import reference_rt
+from comparisons.budget import Budget
+from comparisons.mitsuba_backend import Backend
+from reference_rt.scene import Scene
+
+_APART = ("report", "ci", "commands", "gate", "selftest", "pytest_plugin.py", "cli.py")
+"""Parts of `comparisons` that no verdict of a suite depends on."""
+
+_PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
+
+
+def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Backend) -> str:
+    """SHA-256 of the scene and the files it names, the budget, the rungs that are asked for, our
+    own sources, and the versions of what computes.  Raises SceneError for a file that is not there.
+    """
+    parts = {
+        "scene": scene.digest(),
+        "files": files_digest(scene),
+        "budget": budget.model_dump(),
+        "rungs": rungs,
+        "sources": sources_digest(),
+        "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
+        "variant": backend.variant,
+        "llvm": backend.llvm_path,
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def files_digest(scene: Scene) -> str:
+    """SHA-256 of the contents of every file that the scene names."""
+    digest = hashlib.sha256()
+    for name in sorted(set(_named(scene.model_dump()))):
+        for path in _with_parts(scene.folder / name):
+            digest.update(path.name.encode() + b"\0")
+            try:
+                digest.update(hashlib.sha256(path.read_bytes()).digest())
+            except OSError as error:
+                raise scene.error(f"{path}: cannot be read: {error.strerror}") from None
+    return digest.hexdigest()
+
+
+def _named(value: Any) -> Iterator[str]:
+    """The values of all keys `file`, however deep."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if key == "file" and isinstance(item, str):
+                yield item
+            else:
+                yield from _named(item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _named(item)
+
+
+def _with_parts(path: Path) -> list[Path]:
+    """The file, and those that it names itself, which of ours only .gltf does."""
+    if path.suffix.lower() != ".gltf":
+        return [path]
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        uris = [buffer["uri"] for buffer in data["buffers"] if "uri" in buffer]
+    except (OSError, ValueError, KeyError, TypeError):
+        return [path]
+    return [path, *(path.parent / unquote(u) for u in uris if not u.startswith("data:"))]
+
+
+@functools.cache
+def sources_digest() -> str:
+    """SHA-256 of the sources of both packages: a change of any line may change a verdict."""
+    digest = hashlib.sha256()
+    for package in (reference_rt, comparisons):
+        root = Path(package.__path__[0])
+        for source in sorted(root.rglob("*.py")):
+            name = source.relative_to(root)
+            if package is comparisons and name.parts[0] in _APART:
+                continue
+            digest.update(name.as_posix().encode() + b"\0")
+            digest.update(hashlib.sha256(source.read_bytes()).digest())
+    return digest.hexdigest()

@@ -1,0 +1,206 @@
+"""What a suite is: a YAML file that gives the scenes of a folder their budgets."""
+
+from fnmatch import fnmatchcase
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, ValidationError, field_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from comparisons.budget import Budget
+from reference_rt.description import Description, Positive
+from reference_rt.diagnosis import first_problem, line_of
+from reference_rt.errors import SceneError, UsageError
+from reference_rt.scene import Scene
+
+BUILT_IN = ("smoke", "standard", "full")
+
+_SUFFIXES = (".yaml", ".yml", ".json")
+
+
+class Entry(Budget):
+    """What of the defaults is another for one scene."""
+
+    skip: Annotated[str, Field(min_length=1)] | None = None
+    """Why the scene is not compared."""
+
+    @field_validator("control")
+    @classmethod
+    def _is_told_by_the_place(cls, control: bool) -> bool:
+        raise ValueError("is told by the place; expected the scene under 'controls' instead")
+
+    def over(self, defaults: Budget) -> Budget:
+        """`defaults`, changed by what is given here."""
+        given = self.model_fields_set - {"skip"}
+        return defaults.model_copy(update={name: getattr(self, name) for name in given})
+
+
+class Part(Description):
+    """Cases of one kind."""
+
+    defaults: Budget = Budget()
+    """The budget of scenes that are not named, and of what named ones do not say."""
+    only: Annotated[tuple[str, ...], Field(strict=False)] | None = None
+    """Names of scenes, all others being left out;  none: every scene of the folder."""
+    scenes: dict[str, Entry] = Field(default_factory=dict)
+    """Scenes by name with budgets of their own."""
+
+
+class Suite(Part):
+    """Every scene of a folder, each with a budget."""
+
+    about: str
+    """A line for people."""
+    case_seconds: Positive = 900.0
+    """How long one case may take before its process is ended."""
+    controls: Part | None = None
+    """Mitsuba against itself;  none: no such cases."""
+
+
+class Work(NamedTuple):
+    """One case that is to be run.  name: of the case;  scene: as read, with its file at `path`."""
+
+    name: str
+    path: Path
+    scene: Scene
+    budget: Budget
+
+
+class Source(NamedTuple):
+    """A suite, its name, what the command line calls it, and the file it was read from with its
+    text, for errors."""
+
+    suite: Suite
+    name: str
+    argument: str
+    file: str
+    text: str
+
+    def error(self, message: str, *keys: str | int) -> SceneError:
+        """An error about the part at `keys`, with file and line."""
+        return SceneError(message, keys, self.file, line_of(self.text, keys))
+
+
+class Plan(NamedTuple):
+    """work: the cases, in the order of their names;  skipped: why others are not run, by name."""
+
+    work: tuple[Work, ...]
+    skipped: dict[str, str]
+
+
+def load_suite(name: str) -> Source:
+    """The suite of this name, or in the YAML file of this name.
+
+    Raises UsageError for an unknown name, SceneError with file and line for its contents.
+    """
+    if name in BUILT_IN:
+        file = f"{name}.yaml"
+        text = (resources.files("comparisons.suites") / file).read_text(encoding="utf-8")
+        return Source(parse_suite(text, file), name, name, file, text)
+    path = Path(name)
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        raise UsageError(
+            f"there is no suite '{name}'; expected {', '.join(BUILT_IN)} or a .yaml file"
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror}", file=name) from None
+    except UnicodeDecodeError:
+        raise SceneError("is not text; expected UTF-8", file=name) from None
+    return Source(parse_suite(text, name), path.stem, name, name, text)
+
+
+def parse_suite(text: str, file: str) -> Suite:
+    """A suite from YAML text; `file` stands in errors.  Raises SceneError."""
+    try:
+        data = YAML(typ="safe", pure=True).load(text)
+    except MarkedYAMLError as error:
+        line = None if error.problem_mark is None else error.problem_mark.line + 1
+        problem = " ".join(str(error.problem or error.context).split())
+        raise SceneError(f"malformed: {problem}", file=file, line=line) from None
+    except (YAMLError, ValueError) as error:
+        raise SceneError(f"malformed: {' '.join(str(error).split())}", file=file) from None
+    except RecursionError:
+        raise SceneError("malformed: nested too deeply", file=file) from None
+    if not isinstance(data, dict):
+        raise SceneError("expected keys such as about, defaults, scenes", file=file, line=1)
+    try:
+        return Suite.model_validate(data)
+    except ValidationError as error:
+        message, keys = first_problem(Suite, error, data)
+        raise SceneError(message, keys, file, line_of(text, keys)) from None
+
+
+def plan(
+    source: Source, folder: Path, only: tuple[str, ...] = (), rungs: tuple[str, ...] = ()
+) -> Plan:
+    """What the suite means for the scenes of a folder, all of which are read.
+
+    only: patterns as of a shell, one of which the name of a case must fit;  rungs: only these, all
+    if none.  Raises SceneError: a scene cannot be read, one that is named is not there, or two have
+    one name;  UsageError: there is nothing to run.
+    """
+    suite = source.suite
+    scenes = _scenes(folder)
+    work: list[Work] = []
+    skipped: dict[str, str] = {}
+    for part, control in ((suite, False), (suite.controls, True)):
+        if part is None or (control and rungs and not {"statistics", "images"} & set(rungs)):
+            continue
+        _check_names(part, scenes, source, *(["controls"] if control else []))
+        for name, (path, scene) in scenes.items():
+            if part.only is not None and name not in part.only:
+                continue
+            case = control_name(name) if control else name
+            if only and not any(fnmatchcase(case, pattern) for pattern in only):
+                continue
+            entry = part.scenes.get(name, Entry())
+            if entry.skip is not None:
+                skipped[case] = entry.skip
+                continue
+            budget = entry.over(part.defaults).model_copy(update={"control": control})
+            work.append(Work(case, path, scene, budget))
+    if not work:
+        raise UsageError(
+            f"nothing to run: no case fits {', '.join(only)}" if only else "nothing to run"
+        )
+    return Plan(tuple(sorted(work, key=lambda w: w.name)), skipped)
+
+
+def control_name(scene: str) -> str:
+    """The name of the case that compares Mitsuba with itself."""
+    return f"{scene} (control)"
+
+
+def folder_name(case: str) -> str:
+    """The name of a case as that of a folder which no shell needs quotes for."""
+    return case.replace(" (control)", ".control")
+
+
+def _scenes(folder: Path) -> dict[str, tuple[Path, Scene]]:
+    """The scenes of a folder by name."""
+    if not folder.is_dir():
+        raise UsageError(f"--scenes: there is no folder '{folder}'; expected one with scenes in it")
+    found: dict[str, tuple[Path, Scene]] = {}
+    for path in sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES):
+        if path.stem in found:
+            other = found[path.stem][0].name
+            raise SceneError(f"has the name of {other}; expected one of its own", file=str(path))
+        found[path.stem] = path, Scene.load(path)
+    if not found:
+        raise UsageError(f"--scenes: '{folder}' holds no scene; expected .yaml or .json files")
+    return found
+
+
+def _check_names(
+    part: Part, scenes: dict[str, tuple[Path, Scene]], source: Source, *place: str
+) -> None:
+    """Raise SceneError for a scene that is named but not there."""
+    named: list[tuple[str, tuple[str | int, ...]]] = [(n, ("scenes", n)) for n in part.scenes]
+    named += [(name, ("only", k)) for k, name in enumerate(part.only or ())]
+    for name, keys in named:
+        if name not in scenes:
+            raise source.error(f"there is no scene '{name}' in the folder", *place, *keys)

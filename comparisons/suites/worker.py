@@ -1,0 +1,154 @@
+"""`python -m comparisons.suites.worker`: compares one case after another, as a pool tells it.
+
+A process, since a fault of a native library ends the one it is in.  Each line of standard input is
+a JSON object that asks for a case (`Request`); each line of standard output one that answers:
+
+    {"say": text}          any number of times, what is being done
+    {"done": true}         the case is in its folder
+    {"failed": text}       it could not be run, and why
+    {"unavailable": text}  no case can be run here, and why
+
+`--runner module:function` puts another function in the place of `compare` (for tests: one that
+crashes, say); `--threads` is how many threads it may use.
+"""
+
+import argparse
+import dataclasses
+import faulthandler
+import importlib
+import json
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TextIO
+
+from pydantic import BaseModel, ConfigDict
+
+from comparisons.budget import Budget
+from comparisons.record import write_case
+from comparisons.results import Case
+from reference_rt.errors import ReferenceRtError, ReferenceUnavailableError
+from reference_rt.scene import Scene
+
+Runner = Callable[..., Case]
+"""Called as `compare` is."""
+
+
+class Request(BaseModel):
+    """A case to run.
+
+    name: of the case;  scene: the scene's file;  folder: where the record goes;  key: what the
+    record says it was made with;  again: the command that repeats the case.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: str
+    scene: Path
+    budget: Budget
+    rungs: tuple[str, ...] = ()
+    folder: Path
+    key: str = ""
+    again: str = ""
+
+
+def main() -> None:
+    """Answer until standard input ends."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--runner", default="comparisons.suites.worker:compare")
+    parser.add_argument("--threads", type=int, default=None)
+    options = parser.parse_args()
+    faulthandler.enable()
+    answers = private_stdout()
+    module, _, name = options.runner.partition(":")
+    try:
+        runner: Runner = getattr(importlib.import_module(module), name)
+    except ModuleNotFoundError as error:
+        tell(answers, unavailable=f"comparing needs {error.name}")
+        return
+    for line in sys.stdin:
+        answer(Request.model_validate_json(line), runner, options.threads, answers)
+
+
+def private_stdout() -> TextIO:
+    """Standard output, of which nobody else knows from now on: what anyone prints, in Python or
+    not, goes to standard error."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    return answers
+
+
+def answer(request: Request, runner: Runner, threads: int | None, answers: TextIO) -> None:
+    """Run one case, write its record, and say how it went."""
+    start = time.perf_counter()
+    try:
+        case = runner(
+            Scene.load(request.scene),
+            request.budget,
+            lambda text: tell(answers, say=text),
+            threads=threads,
+            rungs=request.rungs,
+        )
+        case = dataclasses.replace(
+            case,
+            scene=request.name,
+            again=request.again,
+            notes=(*case.notes, described(request.budget)),
+        )
+        write_case(request.folder, case, request.key, time.perf_counter() - start)
+    except BrokenPipeError:  # nobody listens any more
+        raise
+    except ReferenceUnavailableError as error:
+        tell(answers, unavailable=str(error))
+    except ReferenceRtError as error:
+        tell(answers, failed=str(error))
+    except (Exception, SystemExit) as error:
+        traceback.print_exc()
+        tell(answers, failed=f"{type(error).__name__}: {' '.join(str(error).split())}")
+    else:
+        tell(answers, done=True)
+
+
+def tell(answers: TextIO, **message: Any) -> None:
+    """Write one line of the protocol."""
+    print(json.dumps(message), file=answers, flush=True)
+
+
+def described(budget: Budget) -> str:
+    """A budget as a note for people."""
+    told = [f"limit {100.0 * budget.limit:g} %", f"{budget.replicates} replicates"]
+    if budget.spp is not None:
+        told.append(f"{budget.spp} samples a pixel")
+    if budget.reference_spp is not None:
+        told.append(f"{budget.reference_spp} of the reference")
+    if budget.size is not None:
+        told.append(f"{budget.size[0]} x {budget.size[1]} pixels")
+    if not budget.control:
+        told.append(f"{budget.pixels} and {budget.light_pixels} camera rays")
+    return "budget: " + ", ".join(told)
+
+
+def compare(
+    scene: Scene,
+    budget: Budget,
+    say: Callable[[str], None],
+    threads: int | None,
+    rungs: tuple[str, ...],
+) -> Case:
+    """`comparisons.compare.compare_scene`, Mitsuba with `threads` threads too."""
+    from comparisons.compare import Subject, compare_scene
+    from comparisons.mitsuba_backend import mitsuba
+
+    mitsuba()
+    if threads is not None:
+        import drjit
+
+        drjit.set_thread_count(threads)
+    return compare_scene(Subject(scene), budget, say, threads, rungs)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""Mitsuba's side of direct light: its value, and where its epsilons make it dark."""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba_backend import mitsuba
+from comparisons.mitsuba_plugins.whitted import emitted, without
+from comparisons.mitsuba_scene import for_rays, light_id
+from comparisons.tiers import arbiter
+from comparisons.tiers.bounds import largest
+from comparisons.tiers.rays import RAY_EPSILON, SHADOW_EPSILON, Rays
+from comparisons.tiers.setting import POINT_LIKE, Setting, kind_of, number_of
+from reference_rt import query
+from reference_rt.lights import DIRECTIONAL, ENVIRONMENT
+from reference_rt.query import Intersections
+from reference_rt.shapes.shape import FloatArray
+
+
+def mitsuba_direct(
+    setting: Setting, light: int, rays: Rays, target: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """f cos L (n, 3) and the cosine at the surface (n,): Mitsuba's hit, BSDF, visibility, light."""
+    import drjit as dr
+
+    mi, scene, kind = mitsuba(), setting.twin.mi_scene, kind_of(setting, light)
+    emitter = _point_emitter(setting, light) if kind in POINT_LIKE else None
+    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+
+    def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
+        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(o), d))
+        active = si.is_valid()
+        if not dr.any(active):
+            return mi.Color3f(0.0), mi.Float(0.0)
+        wi = at if is_far else dr.normalize(at - si.p)
+        ray = si.spawn_ray(wi) if is_far else si.spawn_ray_to(mi.Point3f(at))
+        visible = without(active, scene.ray_test(ray, active))
+        if emitter is not None:
+            sample, radiance = emitter.sample_direction(si, mi.Point2f(0.5, 0.5), active)
+            wi = sample.d
+        else:
+            ray.maxt = dr.inf
+            # Behind the shadow test's end there must be the light itself, its front towards us.
+            found = scene.ray_intersect(ray, visible)
+            radiance = emitted(mi, scene, found, visible)
+        local = si.to_local(wi)
+        f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
+        return dr.select(visible, f_cos * radiance, 0.0), local.z
+
+    contribution, cosine = for_rays(value, rays.o, rays.d, target)
+    return contribution, cosine
+
+
+def _point_emitter(setting: Setting, light: int) -> Any:
+    """Mitsuba's emitter of such a light."""
+    wanted = light_id(number_of(setting, light))
+    for emitter in setting.twin.mi_scene.emitters():
+        if emitter.id() == wanted:
+            return emitter
+    raise LookupError(f"Mitsuba's scene has no emitter {wanted}")
+
+
+def is_dark(
+    setting: Setting, light: int, hits: Intersections, target: FloatArray, offsets: FloatArray
+) -> arbiter.BoolArray:
+    """Whether ours finds Mitsuba's shadow ray dark: begun and ended as Mitsuba does it."""
+    kind = kind_of(setting, light)
+    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+    w = target if is_far else target - hits.p
+    side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
+    height = side * (1.0 + largest(hits.p)) * RAY_EPSILON
+    o = hits.p + hits.n * height[:, None] + offsets
+    if is_far:
+        return query.occluded(setting.tables, o, w)
+    if kind in POINT_LIKE:
+        return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)
+    # Seen from the moved origin a light may turn its back, or its rim be missed.
+    met = query.intersect(setting.tables, o, target - o)
+    facing = np.sum(met.n * (target - o), axis=1) < 0.0
+    return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | ~facing)

@@ -1,0 +1,106 @@
+"""The statistics of a single picture and of a known mean."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from planted import (
+    FAULTS,
+    MARGINS,
+    STILL,
+    replicates,
+    scene,
+)
+
+from comparisons.statistics import Known, compare, standard_error
+from comparisons.statistics.decide import findings
+
+
+def test_a_single_picture_says_what_it_presumes():
+    rng = np.random.default_rng(0)
+    one, many = replicates(rng, scene(), 1), replicates(rng, scene())
+    for tier in (compare(one, many), compare(many, one), compare(one, many[:1])):
+        assert tier.status == "inconclusive"
+        assert "with a single picture on a side the noise is estimated" in tier.reason
+        assert "presuming that of neighbouring blocks independent" in tier.reason
+        assert "it takes about" in tier.reason
+        json.dumps(tier.numbers, allow_nan=False)
+    assert "single" not in compare(many, many).reason
+
+
+def test_a_single_picture_of_little_noise_agrees():
+    rng = np.random.default_rng(0)
+    assert compare(replicates(rng, scene(), 1, 0.01), replicates(rng, scene())).status == "agree"
+
+
+@pytest.mark.parametrize("law", ["normal", "filtered"])
+def test_standard_error_of_a_single_picture_is_right(law):
+    """As the spread of the difference over many runs; with noise that is not the same all over."""
+    rng = np.random.default_rng(0)
+    noise = np.linspace(0.05, 1.0, 64)[:, None, None] * np.ones(3)
+    found, differences = [], []
+    for _ in range(60):
+        a, b = rng.standard_normal((2, 1, 64, 64, 3))
+        if law == "filtered":
+            a, b = (0.5 * (x + np.roll(x, 1, axis=2)) for x in (a, b))
+        image = findings(5.0 + noise * a, 5.0 + noise * b, 16, MARGINS).image
+        found.append(image.standard_error)
+        differences.append(image.difference)
+    ratio = np.mean(found) / np.std(differences)
+    assert 0.9 < ratio < 1.25
+
+
+def test_standard_error_of_a_tile_knows_of_noise_that_blocks_share():
+    rng = np.random.default_rng(0)
+    found, differences = [], []
+    for _ in range(40):
+        a, b = rng.standard_normal((2, 1, 64, 64, 3))
+        a = sum(np.roll(a, shift, axis=2) for shift in range(4)) / 4.0
+        tiles = findings(5.0 + a, 5.0 + 0.01 * b, 16, MARGINS).tiles
+        found.append(tiles.standard_error)
+        differences.append(tiles.difference)
+    assert 0.88 < np.sqrt(np.mean(np.square(found))) / np.std(differences) < 1.1
+
+
+def test_a_firefly_leaves_a_single_picture_few_degrees_of_freedom():
+    rng = np.random.default_rng(0)
+    a, b = rng.random((2, 1, 64, 64, 3))
+    assert np.all(findings(a, b, 16, MARGINS).image.errors[0].dof > 100)
+    a[0, 30, 30] = 1e4
+    found = findings(a, b, 16, MARGINS)
+    assert np.all(found.image.errors[0].dof < 3)
+    assert np.all(found.tiles.errors[0].dof[1, 1] < 3)
+    assert np.all(found.tiles.errors[0].dof[0, 0] > 8)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["gain", "one tile", "firefly tile", "lamp", "hue", "tile that keeps the mean"],
+)
+def test_faults_of_a_single_picture_of_little_noise(fault):
+    rng = np.random.default_rng(0)
+    candidate = replicates(rng, FAULTS[fault][0], 1, 0.02)
+    assert compare(candidate, replicates(rng, scene())).status == "differ"
+    many = replicates(rng, scene(), 64)
+    known = Known(many.mean(axis=0), many.var(axis=0, ddof=1) / 64)
+    assert compare(candidate, known).status == "differ"
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_against_a_known_mean(fault):
+    rng = np.random.default_rng(0)
+    many = replicates(rng, scene(), 64)
+    known = Known(many.mean(axis=0), many.var(axis=0, ddof=1) / 64)
+    tier = compare(replicates(rng, FAULTS[fault][0]), known)
+    assert tier.status == "differ"
+    assert compare(replicates(rng, scene()), known).status == "agree"
+
+
+def test_a_known_mean_without_certainty_is_inconclusive():
+    rng = np.random.default_rng(0)
+    candidate = replicates(rng, scene(), noise=0.01)
+    known = Known(scene(), np.where(STILL, 0.0, 0.1) * np.ones(3))
+    tier = compare(candidate, known)
+    assert tier.status == "inconclusive"
+    assert standard_error(candidate, known)[20:].min() == pytest.approx(math.sqrt(0.1), rel=0.01)

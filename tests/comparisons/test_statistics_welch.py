@@ -1,0 +1,219 @@
+"""The tests behind the statistical rung: their laws, levels and power."""
+
+import numpy as np
+import pytest
+from planted import HEIGHT, MARGINS, NONE, STILL, WIDTH, replicates, scene
+from scipy import stats
+
+from comparisons.statistics import Known, compare
+from comparisons.statistics.sides import known_side, side_of
+from comparisons.statistics.uniformity import uniformity
+from comparisons.statistics.welch import (
+    Error,
+    bias_test,
+    chance_of_parting,
+    image_test,
+    pixel_test,
+    quantiles,
+    satterthwaite,
+    tile_test,
+    welch_errors,
+)
+
+# Welch's test itself
+
+
+def test_statistic_is_welchs():
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(1.0, 0.1, (5, 4, 4, 3)), rng.normal(1.1, 0.3, (9, 4, 4, 3))
+    one, two = side_of(a), side_of(b)
+    own, pixels = welch_errors(one.of_image(), two.of_image(), one, two)
+    # The side of five is reckoned at least as noisy as that of nine.
+    noise_a, noise_b = (x.mean(axis=(1, 2)).var(axis=0, ddof=1) for x in (a, b))
+    assert own.value == pytest.approx(np.sqrt(np.maximum(noise_a, noise_b) / 5 + noise_b / 9))
+    summed_a, summed_b = (x.var(axis=0, ddof=1).sum(axis=(0, 1)) / 256 for x in (a, b))
+    assert pixels.value == pytest.approx(np.sqrt(np.maximum(summed_a, summed_b) / 5 + summed_b / 9))
+    assert np.all((own.dof >= 4) & (own.dof <= 12))
+    same = side_of(a[:4]), side_of(b[:4])
+    own, _ = welch_errors(same[0].of_image(), same[1].of_image(), *same)
+    expected = stats.ttest_ind(
+        a[:4].mean(axis=(1, 2)), b[:4].mean(axis=(1, 2)), equal_var=False
+    ).statistic
+    assert (a[:4].mean((0, 1, 2)) - b[:4].mean((0, 1, 2))) / own.value == pytest.approx(expected)
+
+
+def test_satterthwaite():
+    ones = np.ones(1)
+    assert satterthwaite(ones, ones, 7.0, 7.0) == pytest.approx(14.0)
+    assert satterthwaite(ones, 0.0 * ones, 7.0, 3.0) == pytest.approx(7.0)
+    assert satterthwaite(0.0 * ones, 0.0 * ones, 7.0, 3.0) == pytest.approx(3.0)
+    assert satterthwaite(ones, ones, 7.0, np.inf) == pytest.approx(28.0)
+
+
+@pytest.mark.parametrize(("count_a", "count_b"), [(4, 4), (8, 8), (4, 16)])
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 10.0])
+def test_level_holds_far_out_in_the_tail(count_a, count_b, ratio):
+    """At one in 1e4, where degrees of freedom from few replicates' variances promise too much."""
+    rng = np.random.default_rng(0)
+    tests = 300 * 300
+    a = ratio * rng.standard_normal((count_a, tests))
+    b = rng.standard_normal((count_b, tests))
+    variance = a.var(axis=0, ddof=1) / count_a + b.var(axis=0, ddof=1) / count_b
+    shares = np.array([ratio**2 / count_a]), np.array([1.0 / count_b])
+    dof = satterthwaite(*shares, count_a - 1.0, count_b - 1.0)
+    p = 2.0 * stats.t.sf(np.abs(a.mean(axis=0) - b.mean(axis=0)) / np.sqrt(variance), dof)
+    for level in (1e-2, 1e-3, 1e-4):
+        assert np.count_nonzero(p < level) <= stats.binom.isf(1e-4, tests, 1.15 * level)
+
+
+@pytest.mark.parametrize("dof", [1, 3, 15, 30])
+def test_detectable_bias_is_detected_that_often(dof):
+    """The power can be counted: 99 %, by the definition of the detectable bias."""
+    critical, reach = (values[dof] for values in quantiles(1e-3))
+    rng = np.random.default_rng(5)
+    estimated = np.sqrt(rng.chisquare(dof, 40_000) / dof)
+    power = np.mean(rng.normal(reach, 1.0, 40_000) > critical * estimated)
+    assert 0.985 < power < 0.997
+
+
+def test_degrees_of_freedom_are_the_noises():
+    """Of normal noise as many as pixels and replicates have; of one firefly about one."""
+    rng = np.random.default_rng(0)
+    quiet = rng.standard_normal((16, 32, 32, 3))
+    assert side_of(quiet).of_image().pixels_dof == pytest.approx(15 * 1024, rel=0.1)
+    assert np.median(side_of(quiet).of_tiles(16).pixels_dof) == pytest.approx(15 * 256, rel=0.1)
+    quiet[3, 8, 9] = 1e6
+    assert np.all(side_of(quiet).of_image().pixels_dof < 2.5)
+    assert np.all(side_of(quiet).of_tiles(16).pixels_dof[0, 0] < 2.5)
+    variance = np.ones((32, 32, 3))
+    known = known_side(Known(variance, variance))
+    assert known.of_image().pixels_dof == pytest.approx(1024)
+
+
+def test_means_and_noise_of_tiles_that_the_edges_cut():
+    rng = np.random.default_rng(0)
+    a, b = rng.random((2, 4, 5, 7, 3))
+    test = tile_test(side_of(a), side_of(b), 4, MARGINS)
+    assert test.difference.shape == (2, 2, 3)
+    corner = (a - b)[:, 4:, 4:].mean(axis=(0, 1, 2))
+    assert test.difference[1, 1] == pytest.approx(corner)
+    noise = [x[:, 4:, 4:].mean(axis=(1, 2)).var(axis=0, ddof=1) / 4 for x in (a, b)]
+    assert test.errors[0].value[1, 1] == pytest.approx(np.sqrt(noise[0] + noise[1]))
+
+
+def test_the_interval_is_the_widest_of_both_reckonings():
+    """Replicates that happen to have the same mean do not know it better than their pixels say."""
+    rng = np.random.default_rng(0)
+    a, b = rng.random((2, 4, 16, 16, 3))
+    a *= 0.6 / a.mean(axis=(1, 2), keepdims=True)
+    b *= 0.5 / b.mean(axis=(1, 2), keepdims=True)
+    b[:, ..., 0] *= 1.19
+    test = image_test(side_of(a), side_of(b), NONE)
+    assert test.errors[0].value == pytest.approx(0.0, abs=1e-6)
+    assert test.errors[1].value == pytest.approx(0.015, rel=0.2)
+    assert list(test.differs) == [False, True, True]
+
+
+@pytest.mark.parametrize(("a", "b", "chance"), [(4, 4, 2**-7), (16, 16, 2**-31), (1, 1, 0.5)])
+def test_chance_of_parting(a, b, chance):
+    assert chance_of_parting(a, b) == pytest.approx(chance)
+
+
+def test_chance_of_parting_is_that_of_the_worst_coin():
+    p = np.linspace(0.001, 0.999, 999)
+    worst = (p**4 * (1.0 - p) ** 12 + p**12 * (1.0 - p) ** 4).max()
+    assert worst < chance_of_parting(4, 12) < 2.0 * worst + 1e-12
+
+
+def test_a_bias_test_of_its_own():
+    """The pieces fit numbers by hand: 3 standard errors of 0.1 about a difference of 0.5."""
+    error = Error(np.array([0.1]), np.array([np.inf]))
+    test = bias_test(np.array([0.5]), np.array([2.0]), (error,), 0.05, 0.0027, 2.0)
+    assert test.half_width == pytest.approx(0.3, rel=0.01)
+    assert test.relative == pytest.approx(0.25)
+    assert test.differs.all()
+    assert test.strength == pytest.approx((0.5 - 0.1) / 0.3, rel=0.01)
+    assert test.p_value() == pytest.approx(2.0 * stats.norm.sf(4.0), rel=0.1)
+    assert test.within(0.41).all()
+    assert not test.within(0.39).any()
+
+
+def test_the_margin_of_a_pixel_follows_its_noise():
+    rng = np.random.default_rng(0)
+    a, b = (replicates(rng, scene(), noise=0.02) for _ in range(2))
+    margin = pixel_test(side_of(a), side_of(b), MARGINS).margin
+    assert np.all(margin[np.broadcast_to(STILL, margin.shape)] == pytest.approx(1e-5))
+    assert np.median(margin[20:]) == pytest.approx(0.01, rel=0.3)
+    a, b = (replicates(rng, scene(), noise=0.5) for _ in range(2))
+    margin = pixel_test(side_of(a), side_of(b), MARGINS).margin
+    assert margin.max() == pytest.approx(0.05, rel=1e-3)
+
+
+# Uniformity
+
+
+def test_ranks_are_uniform_whatever_the_noise():
+    rng = np.random.default_rng(0)
+    p = []
+    for _ in range(200):
+        a, b = np.exp(2.0 * rng.standard_normal((2, 8, 16, 16, 3)))
+        found = uniformity(side_of(a), side_of(b), NONE)
+        p.append(found.p_narrow)
+        assert found.p_wide == pytest.approx(1.0 - found.p_narrow)
+        assert found.blocks == 16
+    assert stats.kstest(p, "uniform").pvalue > 1e-3
+
+
+def test_blocks_may_depend_on_each_other():
+    """Noise that all blocks of a picture share: their ranks are one rank, and prove nothing."""
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        brightness = 1.0 + 0.3 * rng.standard_normal((2, 16, 1, 1, 1))
+        a, b = brightness + 0.01 * rng.standard_normal((2, 16, 16, 16, 3))
+        found = uniformity(side_of(a), side_of(b), NONE)
+        assert not found.wide
+        assert not found.narrow
+
+
+def test_differences_within_the_margin_are_not_too_wide():
+    """Blocks that differ by 0.8 %, four times their noise."""
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] // 4
+    pattern = np.where((x + y) % 2, 0.008, -0.008)[..., None]
+    a, b = 1.0 + 0.02 * rng.standard_normal((2, 16, HEIGHT, WIDTH, 3))
+    a += pattern
+    assert not uniformity(side_of(a), side_of(b), MARGINS).wide
+    assert uniformity(side_of(a), side_of(b), NONE).wide
+
+
+def test_replicates_that_depend_on_each_other_are_too_wide():
+    rng = np.random.default_rng(0)
+    shared = 0.2 * rng.standard_normal((2, HEIGHT, WIDTH, 3))  # of all replicates of a side
+    a, b = 1.0 + shared[:, None] + 0.2 * rng.standard_normal((2, 16, HEIGHT, WIDTH, 3))
+    found = uniformity(side_of(a), side_of(b), MARGINS)
+    assert found.wide
+    assert not found.narrow
+
+
+def test_sides_that_share_their_noise_are_invalid():
+    rng = np.random.default_rng(0)
+    pictures = replicates(rng, scene())
+    tier = compare(pictures, pictures)
+    assert tier.status == "invalid"
+    assert "not independent of each other: mean p-value of the blocks 0.7" in tier.reason
+    other = replicates(rng, scene())
+    half = scene() + (pictures - scene()) * 0.9 + (other - scene()) * 0.3
+    assert compare(half, pictures).status == "invalid"
+
+
+def test_too_few_replicates_have_no_ranks():
+    rng = np.random.default_rng(0)
+    a, b = replicates(rng, scene(), 3), replicates(rng, scene(), 16)
+    assert compare(a, b).numbers["uniformity"] is None
+    found = compare(replicates(rng, scene(), 13), b).numbers["uniformity"]
+    assert found["replicates"] == 8
+
+
+def test_nothing_is_ranked_where_there_is_no_noise():
+    still = side_of(np.stack([scene()] * 8))
+    assert uniformity(still, still, MARGINS) is None
