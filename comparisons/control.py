@@ -19,7 +19,6 @@ from reference_rt.render import render
 from reference_rt.scene import Scene
 from reference_rt.tables import build_tables
 
-
 MOST_PIXELS = 64 * 48
 """Of pictures without noise, whose rays scalar variants trace one by one in Python."""
 
