@@ -60,7 +60,7 @@ FAULTS = (
         "    return SurfacePoint(p, n, -n, error, spheres.material[i], spheres.light[i])\n",
     ),
     SourceFault(
-        "shadow rays begin 1 % late", BOX, "ray.py",
+        "shadow rays begin 1 % late", "soft_shadows", "ray.py",
         "    return Ray(o, target - o, 1.0)\n",
         "    return Ray(o + (target - o) * 0.01, (target - o) * 0.99, 1.0)\n",
     ),
