@@ -100,9 +100,4 @@ FAULTS = (
         "light of the back of lamps", BOX, "lights/area.py",
         "    if q.light < 0 or dot(q.n, w) <= 0.0:\n", "    if q.light < 0:\n",
     ),
-    SourceFault(
-        "boxes of the hierarchy without slack", KNOT, "traversal.py",
-        "    error = surface_error(ray.o, ray.o, reach)\n",
-        "    error = -1e-3 * reach\n",
-    ),
 )  # fmt: skip
