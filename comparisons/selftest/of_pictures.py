@@ -9,7 +9,7 @@ from reference_rt.image import srgb
 from reference_rt.textures.image_file import linear
 
 SCENE = "colour_bleeding"
-"""One without a noise-free background, where a gain of 0.05 % would be seen at once."""
+"""One without a background; of its pixels, those of the lamp alone have no noise."""
 
 
 def gain(factor: float, channel: int | None = None) -> PictureFault:

@@ -9,14 +9,16 @@ import numpy as np
 
 from comparisons.budget import Budget
 from comparisons.compare import Say, Subject, gather
-from comparisons.judge import Evidence, judge, of_replicates
+from comparisons.image_rung import images_tier
+from comparisons.judge import Evidence, of_replicates, picture_rungs
+from comparisons.metrics import image_metrics
 from comparisons.selftest.fault import PictureFault
 from comparisons.selftest.finding import CAUGHT
 from comparisons.selftest.of_pictures import SCENE, black_level, blurred, dark_tile, gain, shifted
 from reference_rt.scene import Scene
 
-RUNS = 20
-POOL = 4
+RUNS = 10
+POOL = 3
 """Times as many replicates are rendered as one run uses: runs draw from them at random."""
 
 CURVES: Mapping[str, tuple[Callable[[float], PictureFault], tuple[float, ...]]] = {
@@ -68,5 +70,7 @@ def _caught(pool: Evidence, fault: PictureFault, budget: Budget, rng: np.random.
         for side in pool.rendered.replicates
     )
     rendered = of_replicates(fault.change(ours), reference, {})
-    evidence = Evidence(pool.name, (), rendered, {})
-    return judge(evidence, budget.limit).verdict in CAUGHT
+    if any(tier.status in CAUGHT for tier in picture_rungs(rendered, budget.limit)):
+        return True
+    metrics = image_metrics(rendered.images)
+    return images_tier(rendered.images, metrics, rendered.replicates).status in CAUGHT
