@@ -1,0 +1,144 @@
+"""Solids: ever more operands, and faces that coincide.
+
+The coincident faces are planes of numbers of few bits under a shear by integers, whose inverse is
+one of integers too: the tables hold them exactly, and a film between them is rounding alone.
+"""
+
+from typing import Any
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.exact.dyadic import NEVER
+from comparisons.exact.referee import Referee
+from comparisons.methods.setting import (
+    Draw,
+    Family,
+    FloatArray,
+    Series,
+    Trial,
+    Truth,
+    powers,
+    unit_vectors,
+)
+from comparisons.sizes import ShapeSizes
+from reference_rt import methods, transform
+from reference_rt.methods import CsgParameters, Method, SceneParameters
+
+SHEAR = ((1.0, 1.0, -1.0, 0.0), (0.0, 1.0, 1.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+"""Rows of a matrix of determinant 1."""
+
+RENDERS = methods.METHODS["hierarchy.none"]
+
+CHECKED = 2000
+"""Rays of a setting that exact arithmetic is asked, at most: some 0.3 ms each."""
+
+
+def _prepare_renderer(parameters: CsgParameters) -> Any:
+    return RENDERS.prepare(SceneParameters(rt.Scene(shapes=(parameters.solid,))))
+
+
+EVENTS = Method(
+    "csg.renderer",
+    "T12",
+    "crossings one after another, near ones at once: what renders",
+    "reference_rt.csg.evaluate",
+    CsgParameters,
+    _prepare_renderer,
+    RENDERS.run,
+)
+
+
+def exact(parameters: CsgParameters, o: FloatArray, d: FloatArray) -> Truth:
+    truths = Referee(ShapeSizes(rt.Scene(shapes=(parameters.solid,)))).decide(o, d)
+    t = np.array([truth.t if truth.identities else int(NEVER) for truth in truths], dtype=object)
+    return Truth(t, np.array([truth.touching for truth in truths]))
+
+
+def _at(center: FloatArray) -> tuple[float, float, float]:
+    x, y, z = center.tolist()
+    return x, y, z
+
+
+def operands(draw: Draw, number: float) -> list[Trial]:
+    """Spheres and turned boxes in a unit ball: half of them together, without the other half."""
+    shapes: list[Any] = []
+    rng = draw.rng
+    for k in range(int(number)):
+        center = _at(unit_vectors(rng, 1)[0] * rng.uniform(0.2, 0.9))
+        size = float(number) ** (-1.0 / 3.0)
+        turn = transform.Rotate(
+            rotate=transform.Turn(axis=_at(unit_vectors(rng, 1)[0]), degrees=rng.uniform(0, 360))
+        )
+        steps = (transform.Scale(scale=size), turn, transform.Translate(translate=center))
+        shapes.append(
+            rt.Sphere(center=center, radius=1.2 * size) if k % 2 == 0 else rt.Box(transform=steps)
+        )
+    half = (len(shapes) + 1) // 2
+    solid = rt.Difference(of=(rt.Union(of=tuple(shapes[:half])), *shapes[half:]))
+    o = 3.0 * unit_vectors(rng, draw.rays)
+    d = rng.uniform(-0.8, 0.8, (draw.rays, 3)) - o
+    return [Trial((CsgParameters(solid),), o, d, 2.0)]
+
+
+def cut_box(overlap: float) -> Any:
+    """The cube without a slab on its +x side, half a unit thick, that stands out by `overlap`."""
+    shear = transform.Matrix(matrix=SHEAR)
+    aside = transform.Translate(translate=(0.5 + overlap, 0.0, 0.0))
+    halved = transform.Scale(scale=(0.5, 1.0, 1.0))
+    return rt.Box(transform=(shear,)) - rt.Box(transform=(halved, aside, shear))
+
+
+def rays_through_the_cut(draw: Draw) -> tuple[FloatArray, FloatArray]:
+    """At points of what was cut off, from its side, so that they pass the face that is gone."""
+    rng, n = draw.rng, draw.rays
+    o = rng.uniform((2.0, -0.8, -0.8), (3.0, 0.8, 0.8), (n, 3))
+    target = rng.uniform((0.2, -0.7, -0.7), (0.9, 0.7, 0.7), (n, 3))
+    m = np.array(SHEAR)[:, :3]
+    return o @ m.T, (target - o) @ m.T
+
+
+def overlapping(draw: Draw, inverse: float) -> list[Trial]:
+    overlap = 0.0 if np.isinf(inverse) else 1.0 / inverse
+    o, d = rays_through_the_cut(draw)
+    return [Trial((CsgParameters(cut_box(overlap)),), o, d, 2.0)]
+
+
+def coincident(draw: Draw, _: float) -> list[Trial]:
+    return overlapping(draw, np.inf)
+
+
+CSG = Family(
+    "csg",
+    {name: methods.METHODS[name] for name in methods.names("csg")} | {EVENTS.name: EVENTS},
+    (
+        Series(
+            "operands",
+            "operands",
+            "Spheres and turned boxes in a ball: half of them together, without the other half;"
+            " camera rays from all around.",
+            powers(1, 2, 3, 4, 5, 6, base=2.0),
+            32.0,
+            operands,
+        ),
+        Series(
+            "overlap",
+            "size / overlap",
+            "A sheared cube without a slab of one of its sides, which stands out by a little; rays"
+            " through what was cut off.",
+            powers(4, 16, 32, 44, 47, 50, 52, base=2.0),
+            2.0**32,
+            overlapping,
+        ),
+        Series(
+            "coincident",
+            "",
+            "The same without any overlap: both faces are in one plane.",
+            (1.0,),
+            0.0,
+            coincident,
+        ),
+    ),
+    exact,
+    lambda _, wanted: min(wanted, CHECKED),
+)

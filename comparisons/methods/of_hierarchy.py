@@ -1,0 +1,155 @@
+"""Hierarchies: triangles strewn in a cube, in clusters, and long thin ones."""
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.exact import first_hit
+from comparisons.exact.dyadic import NEVER
+from comparisons.exact.referee import MARGIN
+from comparisons.methods.setting import (
+    Draw,
+    Family,
+    FloatArray,
+    Series,
+    Trial,
+    Truth,
+    powers,
+    unit_vectors,
+)
+from reference_rt import methods
+from reference_rt.methods import SceneParameters
+
+PAIRS = 2e7
+"""Of rays and triangles that exact arithmetic is asked about, at most: floats find the few that
+come near each other at some 10 ns a pair."""
+
+LEAST = 64
+"""Rays that it is asked about in any case."""
+
+AT_ONCE = 4e6
+"""Pairs in memory."""
+
+
+def exact(parameters: SceneParameters, o: FloatArray, d: FloatArray) -> Truth:
+    """Of all triangles; those that a line passes by far, as floats see it, are left out."""
+    v = parameters.scene.tables.geometry.shapes.triangles.vertices
+    ray, triangle = _near(v.reshape(-1, 3, 3), o, d)
+    hit = first_hit("triangles", {"vertices": v[triangle]}, o[ray], d[ray])
+    t = np.full(len(o), NEVER, dtype=object)
+    np.minimum.at(t, ray, hit.fixed)
+    touching = np.zeros(len(o), bool)
+    np.logical_or.at(touching, ray, hit.touching)
+    return Truth(t, touching)
+
+
+def _near(v: FloatArray, o: FloatArray, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(ray, triangle) of all pairs whose line comes near the ball around the triangle."""
+    middle = v.mean(axis=1)
+    radius = np.linalg.norm(v - middle[:, None], axis=2).max(axis=1)
+    reach = radius + MARGIN * (np.abs(v).max() + np.abs(o).max())
+    unit = d / np.linalg.norm(d, axis=1, keepdims=True)
+    found = []
+    for begin in range(0, len(o), max(int(AT_ONCE / len(v)), 1)):
+        rays = slice(begin, begin + max(int(AT_ONCE / len(v)), 1))
+        # |c - o|² - (u·(c - o))², each as a product of matrices would be less precise: sums of
+        # squares of the cross product are not.
+        f = middle[None] - o[rays, None]
+        off = np.cross(f, unit[rays, None])
+        ray, triangle = np.nonzero(np.einsum("ijk,ijk->ij", off, off) <= reach**2)
+        found.append((ray + begin, triangle))
+    ray, triangle = (np.concatenate(part) for part in zip(*found, strict=True))
+    return ray, triangle
+
+
+def _write_ply(path: str, v: FloatArray) -> None:
+    """Triangles (n, 3, 3) as a file that the renderer reads, without loss."""
+    n = len(v)
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {3 * n}\nproperty double x\n"
+        f"property double y\nproperty double z\nelement face {n}\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    )
+    faces = np.zeros(n, dtype=[("size", "u1"), ("corners", "<i4", 3)])
+    faces["size"], faces["corners"] = 3, np.arange(3 * n).reshape(n, 3)
+    with open(path, "wb") as file:  # noqa: PTH123
+        file.write(header.encode() + v.astype("<f8").tobytes() + faces.tobytes())
+
+
+def _trial(draw: Draw, v: FloatArray) -> list[Trial]:
+    """Rays from all around at points among the triangles, anywhere in the cube [-1, 1]³."""
+    path = draw.folder / f"{len(v)}.ply"
+    _write_ply(str(path), v)
+    scene = rt.Scene(shapes=(rt.Mesh(file=str(path)),))
+    o = 3.0 * unit_vectors(draw.rng, draw.rays)
+    d = draw.rng.uniform(-1.0, 1.0, (draw.rays, 3)) - o
+    return [Trial((SceneParameters(scene),), o, d, 2.0)]
+
+
+def _triangles(draw: Draw, centers: FloatArray, sizes: FloatArray) -> FloatArray:
+    """(n, 3, 3): corners on spheres of these sizes around the centres."""
+    n = len(centers)
+    corners = unit_vectors(draw.rng, 3 * n).reshape(n, 3, 3)
+    return np.asarray(centers[:, None] + sizes.reshape(-1, 1, 1) * corners)
+
+
+def strewn(draw: Draw, number: float) -> list[Trial]:
+    n = int(number)
+    sizes = np.full(n, 0.5 * number ** (-1.0 / 3.0))
+    return _trial(draw, _triangles(draw, draw.rng.uniform(-1.0, 1.0, (n, 3)), sizes))
+
+
+def clustered(draw: Draw, number: float) -> list[Trial]:
+    """Nine in ten in ten clusters, each a hundredth as wide as the cube; the rest strewn."""
+    n = int(number)
+    middles = draw.rng.uniform(-0.9, 0.9, (10, 3))
+    centers = middles[draw.rng.integers(0, 10, n)] + 0.02 * draw.rng.normal(size=(n, 3))
+    apart = draw.rng.uniform(size=n) < 0.1
+    centers[apart] = draw.rng.uniform(-1.0, 1.0, (int(apart.sum()), 3))
+    scale = 0.5 * number ** (-1.0 / 3.0)
+    return _trial(draw, _triangles(draw, centers, np.where(apart, scale, 0.04 * scale)))
+
+
+def needles(draw: Draw, number: float) -> list[Trial]:
+    """From one random point to another, a thousandth as wide as the cube."""
+    n = int(number)
+    ends = draw.rng.uniform(-1.0, 1.0, (2, n, 3))
+    third = ends[1] + 0.002 * unit_vectors(draw.rng, n)
+    return _trial(draw, np.stack([*ends, third], axis=1))
+
+
+def _checked(number: float, wanted: int) -> int:
+    return max(min(wanted, int(PAIRS / number)), LEAST)
+
+
+HIERARCHY = Family(
+    "hierarchy",
+    {name: methods.METHODS[name] for name in methods.names("hierarchy")},
+    (
+        Series(
+            "strewn",
+            "triangles",
+            "Triangles strewn in a cube, the more the smaller; rays from all around into the cube.",
+            powers(1, 2, 3, 4, 5),
+            1e4,
+            strewn,
+        ),
+        Series(
+            "clustered",
+            "triangles",
+            "Nine triangles in ten in ten small clusters; rays as before, so that most pass by.",
+            powers(1, 2, 3, 4, 5),
+            1e4,
+            clustered,
+        ),
+        Series(
+            "needles",
+            "triangles",
+            "Triangles as long as the cube and a thousandth as wide.",
+            powers(1, 2, 3, 4),
+            1e3,
+            needles,
+        ),
+    ),
+    exact,
+    _checked,
+)
