@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from comparisons.exact.dyadic import FRACTION, NEVER, BoolArray, Fixed
-from comparisons.methods.setting import Family, FloatArray, Trial, Truth
+from comparisons.methods.setting import Family, FloatArray, Series, Trial, Truth
 
 U = 2.0**-53
 """Unit roundoff: half a unit in the last place of 1."""
@@ -32,9 +32,10 @@ class Errors:
     """Of `checked` rays, less those that run exactly through an edge (`touching`):
 
     lost: hits reported as misses;  false: misses reported as hits;  misplaced: hits off by more
-    than PIXEL of the size;  ties: of all these, rays whose exact answer is another for a ray within
-    a few units in the last place (`NEIGHBOURS`);  hits: exact ones;  median, p99, worst: |t - exact|
-    of rays that both hit, in u (|t| + size / |d|), None where there are none.
+    than PIXEL of the size;  ties: of all these, rays whose exact answer is another within a few
+    units in the last place (`NEIGHBOURS`);  hits: exact ones;  median, p99, worst: |t - exact| of
+    rays that both hit, in u (|t| + size / |d|), or u |t| where the series says so; None where there
+    are none.
     """
 
     checked: int
@@ -73,7 +74,7 @@ class Errors:
 
 def truth(family: Family, trial: Trial, o: FloatArray, d: FloatArray) -> Truth:
     """The first over all parts."""
-    found = [family.exact(part, o, d) for part in trial.parts]
+    found = [family.exact(part, o, d) for part in trial.ideal or trial.parts]
     t = np.min([np.asarray(f.t) for f in found], axis=0)
     touching = np.any([f.touching for f in found], axis=0)
     if len(found) > 1:
@@ -91,11 +92,12 @@ class Checked:
     o: FloatArray
     d: FloatArray
     truth: Truth
+    relative: bool
 
     @classmethod
-    def of(cls, family: Family, trial: Trial, rays: int) -> "Checked":
+    def of(cls, family: Family, series: Series, trial: Trial, rays: int) -> "Checked":
         o, d = trial.o[:rays], trial.d[:rays]
-        return cls(family, trial, o, d, truth(family, trial, o, d))
+        return cls(family, trial, o, d, truth(family, trial, o, d), series.relative)
 
     @property
     def length(self) -> FloatArray:
@@ -108,13 +110,14 @@ class Checked:
         both = there & found
         off = np.zeros(len(t))
         off[both] = _distance(t[both], self.truth.t[both])
-        scale = np.array([float_of(x) for x in np.where(there, self.truth.t, 0)]) + self.length
+        scale = np.array([float_of(x) for x in np.where(there, self.truth.t, 0)])
+        scale += 0.0 if self.relative else self.length
         misplaced = both & (off > PIXEL * self.length)
         return Judged(
             sure & there & ~found,
             sure & ~there & found,
             sure & misplaced,
-            (off / (U * scale))[both & sure],
+            off[both & sure] / (U * scale[both & sure]),
         )
 
     def ties(self, rays: BoolArray, rng: np.random.Generator) -> BoolArray:
@@ -156,8 +159,7 @@ def measure(
     rng = np.random.default_rng(seed)
     judged = [part.judge(answer(part.trial, len(part.o))) for part in checked]
     ties = sum(
-        int(part.ties(found.wrong, rng).sum())
-        for part, found in zip(checked, judged, strict=True)
+        int(part.ties(found.wrong, rng).sum()) for part, found in zip(checked, judged, strict=True)
     )
     units = np.concatenate([found.units for found in judged])
     quantiles = [float(q) for q in np.quantile(units, (0.5, 0.99, 1.0))] if len(units) else None

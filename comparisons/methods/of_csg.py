@@ -30,6 +30,9 @@ SHEAR = ((1.0, 1.0, -1.0, 0.0), (0.0, 1.0, 1.0, 0.0), (0.0, 0.0, 1.0, 0.0))
 
 RENDERS = methods.METHODS["hierarchy.none"]
 
+SHAPES = 8
+"""Rotations of the turned box."""
+
 CHECKED = 2000
 """Rays of a setting that exact arithmetic is asked, at most: some 0.3 ms each."""
 
@@ -55,9 +58,14 @@ def exact(parameters: CsgParameters, o: FloatArray, d: FloatArray) -> Truth:
     return Truth(t, np.array([truth.touching for truth in truths]))
 
 
-def _at(center: FloatArray) -> tuple[float, float, float]:
+def _vector(center: FloatArray) -> tuple[float, float, float]:
     x, y, z = center.tolist()
     return x, y, z
+
+
+def _turn(rng: np.random.Generator) -> transform.Rotate:
+    axis = _vector(unit_vectors(rng, 1)[0])
+    return transform.Rotate(rotate=transform.Turn(axis=axis, degrees=rng.uniform(0.0, 360.0)))
 
 
 def operands(draw: Draw, number: float) -> list[Trial]:
@@ -65,12 +73,9 @@ def operands(draw: Draw, number: float) -> list[Trial]:
     shapes: list[Any] = []
     rng = draw.rng
     for k in range(int(number)):
-        center = _at(unit_vectors(rng, 1)[0] * rng.uniform(0.2, 0.9))
+        center = _vector(unit_vectors(rng, 1)[0] * rng.uniform(0.2, 0.9))
         size = float(number) ** (-1.0 / 3.0)
-        turn = transform.Rotate(
-            rotate=transform.Turn(axis=_at(unit_vectors(rng, 1)[0]), degrees=rng.uniform(0, 360))
-        )
-        steps = (transform.Scale(scale=size), turn, transform.Translate(translate=center))
+        steps = (transform.Scale(scale=size), _turn(rng), transform.Translate(translate=center))
         shapes.append(
             rt.Sphere(center=center, radius=1.2 * size) if k % 2 == 0 else rt.Box(transform=steps)
         )
@@ -81,31 +86,48 @@ def operands(draw: Draw, number: float) -> list[Trial]:
     return [Trial((CsgParameters(solid),), o, d, 2.0)]
 
 
-def cut_box(overlap: float) -> Any:
-    """The cube without a slab on its +x side, half a unit thick, that stands out by `overlap`."""
-    shear = transform.Matrix(matrix=SHEAR)
-    aside = transform.Translate(translate=(0.5 + overlap, 0.0, 0.0))
+def half_box(middle: float, *steps: transform.Step) -> rt.Box:
+    """Half of the cube [-1, 1]³, around x = middle."""
     halved = transform.Scale(scale=(0.5, 1.0, 1.0))
-    return rt.Box(transform=(shear,)) - rt.Box(transform=(halved, aside, shear))
+    aside = transform.Translate(translate=(middle, 0.0, 0.0))
+    return rt.Box(transform=(halved, aside, *steps))
 
 
-def rays_through_the_cut(draw: Draw) -> tuple[FloatArray, FloatArray]:
+def cut_box(overlap: float, *steps: transform.Step) -> Any:
+    """The cube without its half on the +x side, which stands out by `overlap`."""
+    return rt.Box(transform=steps) - half_box(0.5 + overlap, *steps)
+
+
+def _rays_through_the_cut(
+    rng: np.random.Generator, n: int, m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """At points of what was cut off, from its side, so that they pass the face that is gone."""
-    rng, n = draw.rng, draw.rays
     o = rng.uniform((2.0, -0.8, -0.8), (3.0, 0.8, 0.8), (n, 3))
     target = rng.uniform((0.2, -0.7, -0.7), (0.9, 0.7, 0.7), (n, 3))
-    m = np.array(SHEAR)[:, :3]
     return o @ m.T, (target - o) @ m.T
 
 
 def overlapping(draw: Draw, inverse: float) -> list[Trial]:
-    overlap = 0.0 if np.isinf(inverse) else 1.0 / inverse
-    o, d = rays_through_the_cut(draw)
-    return [Trial((CsgParameters(cut_box(overlap)),), o, d, 2.0)]
+    shear = transform.Matrix(matrix=SHEAR)
+    solid = cut_box(0.0 if np.isinf(inverse) else 1.0 / inverse, shear)
+    o, d = _rays_through_the_cut(draw.rng, draw.rays, np.array(SHEAR)[:, :3])
+    return [Trial((CsgParameters(solid),), o, d, 2.0)]
 
 
 def coincident(draw: Draw, _: float) -> list[Trial]:
     return overlapping(draw, np.inf)
+
+
+def turned(draw: Draw, _: float) -> list[Trial]:
+    """Rotations round, and so do the tables: the truth is that of the half that is left."""
+    trials = []
+    for _shape in range(SHAPES):
+        turn = _turn(draw.rng)
+        m = transform.affine((turn,))[:, :3]
+        o, d = _rays_through_the_cut(draw.rng, draw.rays // SHAPES, m)
+        ideal = (CsgParameters(half_box(-0.5, turn)),)
+        trials.append(Trial((CsgParameters(cut_box(0.0, turn)),), o, d, 2.0, ideal))
+    return trials
 
 
 CSG = Family(
@@ -124,8 +146,8 @@ CSG = Family(
         Series(
             "overlap",
             "size / overlap",
-            "A sheared cube without a slab of one of its sides, which stands out by a little; rays"
-            " through what was cut off.",
+            "A sheared cube without one of its halves, which stands out by a little; rays through"
+            " what was cut off.",
             powers(4, 16, 32, 44, 47, 50, 52, base=2.0),
             2.0**32,
             overlapping,
@@ -137,6 +159,15 @@ CSG = Family(
             (1.0,),
             0.0,
             coincident,
+        ),
+        Series(
+            "turned",
+            "",
+            "The same under any rotation, whose roundings part the two faces; the truth is the half"
+            " that is left.",
+            (1.0,),
+            0.0,
+            turned,
         ),
     ),
     exact,

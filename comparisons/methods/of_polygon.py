@@ -170,6 +170,21 @@ def at_edges(draw: Draw, distance: float) -> list[Trial]:
     return trials
 
 
+def at_upright_edges(draw: Draw, _: float) -> list[Trial]:
+    """The same in z = 0 and from straight above, where all compute the same point."""
+    trials = []
+    flat = np.eye(2, 3)
+    for _shape in range(SHAPES):
+        rim, apex = _gear(draw, FAN) @ flat, draw.rng.uniform(-0.1, 0.1, 2) @ flat
+        parts = tuple(
+            PolygonParameters([np.stack([apex, rim[k], rim[(k + 1) % FAN]])]) for k in range(FAN)
+        )
+        along = draw.rng.uniform(0.05, 0.95, (draw.rays // SHAPES, 1))
+        o = apex + along * (rim[draw.rng.integers(0, FAN, len(along))] - apex) + (0.0, 0.0, 1.0)
+        trials.append(Trial(parts, o, np.tile((0.0, 0.0, -1.0), (len(o), 1)), 2.0))
+    return trials
+
+
 POLYGON = Family(
     "polygon",
     {name: methods.METHODS[name] for name in methods.names("polygon")},
@@ -222,6 +237,14 @@ POLYGON = Family(
             powers(0, 2, 4, 6),
             0.0,
             at_edges,
+        ),
+        Series(
+            "upright edges",
+            "",
+            "The same in the plane z = 0 from straight above, where all neighbours see one point.",
+            (1.0,),
+            0.0,
+            at_upright_edges,
         ),
     ),
     exact,

@@ -96,10 +96,11 @@ SPHERE = Family(
         Series(
             "surface",
             "radius / height of the origin above the surface",
-            "Rays inwards from just outside: the root near zero.",
-            powers(1, 3, 5, 7, 9, 11, 13, 15),
+            "Rays inwards from just outside: the root near zero, errors in units of t alone.",
+            powers(1, 4, 7, 10, 12, 14, 15, 16),
             1e7,
             from_the_surface,
+            relative=True,
         ),
     ),
     exact,

@@ -108,9 +108,7 @@ def _fan(draw: Draw, rim: int, distance: float, at_vertex: bool) -> Trial:
     center = rng.uniform(-1.0, 1.0, 3)
     base = center + np.cos(angles)[:, None] * x + np.sin(angles)[:, None] * y
     apex = center + 0.3 * axis[0]
-    parts = tuple(
-        TriangleParameters(apex, base[k], base[(k + 1) % rim]) for k in range(rim)
-    )
+    parts = tuple(TriangleParameters(apex, base[k], base[(k + 1) % rim]) for k in range(rim))
     along = np.zeros((n, 1)) if at_vertex else rng.uniform(0.05, 0.95, (n, 1))
     target = apex + along * (base[rng.integers(0, rim, n)] - apex)
     # Within 45 degrees of the axis all of the fan is seen from its outer side.

@@ -43,7 +43,7 @@ class Row:
     """One method in one setting.
 
     differs: rays of all, checked or not, whose t is not that of the family's first method, bit for
-    bit: for hierarchies, of which all should find the same.
+    bit: for hierarchies, of which all should find the same;  build: seconds.
     """
 
     family: str
@@ -55,6 +55,7 @@ class Row:
     errors: Errors
     time: Time
     differs: int
+    build: float | None
 
 
 def settings(families: Sequence[Family]) -> list[tuple[Family, Series, float]]:
@@ -62,7 +63,9 @@ def settings(families: Sequence[Family]) -> list[tuple[Family, Series, float]]:
     return [(f, series, x) for f in families for series in f.series for x in series.values]
 
 
-def draw_trials(series: Series, family: str, x: float, draw_from: int, rays: int, folder: Path) -> list[Trial]:
+def draw_trials(
+    series: Series, family: str, x: float, draw_from: int, rays: int, folder: Path
+) -> list[Trial]:
     """The same for the same seed, whatever else is measured."""
     name = zlib.crc32(f"{family} {series.name} {x!r}".encode())
     return series.make(Draw(np.random.default_rng((draw_from, name)), rays, folder), x)
@@ -77,7 +80,7 @@ def measure_setting(
         prepared = {name: Prepared(method, trials) for name, method in family.methods.items()}
         times = timing.measure(prepared, effort.runs)
         share = -(-family.checked(x, effort.checked) // len(trials))
-        checked = [Checked.of(family, trial, share) for trial in trials]
+        checked = [Checked.of(family, series, trial, share) for trial in trials]
         rows, first = [], None
         for name, method in prepared.items():
             shared = min(times[other].rays for other in prepared) // len(trials)
@@ -94,6 +97,7 @@ def measure_setting(
                     measure(checked, method.answer, seed),
                     times[name],
                     int(np.sum(answers != first)),
+                    family.build(name, trials[0].parts[0]) if family.build else None,
                 )
             )
     return rows

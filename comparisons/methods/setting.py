@@ -26,13 +26,16 @@ class Draw(NamedTuple):
 class Trial:
     """Rays at one shape, or at neighbours: what they meet is the first over all `parts`.
 
-    parts: parameters of the family;  o, d (n, 3), in no order;  size: the shape's largest extent.
+    parts: parameters of the family;  o, d (n, 3), in no order;  size: the shape's largest extent;
+    ideal: parameters of what the parts should be, where their own tables are rounded into something
+    else.
     """
 
     parts: tuple[Any, ...]
     o: FloatArray
     d: FloatArray
     size: float
+    ideal: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,8 @@ class Series:
     """Settings that become more extreme: `make(draw, x)` for x in `values`.
 
     name: "distance";  axis: what x is, "" where there is one setting alone;  about: one sentence;
-    extreme: from which x on a setting counts as extreme.
+    extreme: from which x on a setting counts as extreme;  relative: whether errors count in units
+    of t alone, not of t and the shape's size: where t near zero is what matters.
     """
 
     name: str
@@ -49,6 +53,7 @@ class Series:
     values: tuple[float, ...]
     extreme: float
     make: Callable[[Draw, float], list[Trial]]
+    relative: bool = False
 
 
 class Truth(NamedTuple):
@@ -63,8 +68,9 @@ class Truth(NamedTuple):
 class Family:
     """Methods that answer the same question.
 
-    exact(part, o, d): the truth about one part;  checked: rays of a setting that exact arithmetic
-    may be asked, where it is slow.
+    exact(part, o, d): the truth about one part;  checked(x, wanted): rays of a setting that exact
+    arithmetic is asked about, where it is slow;  build(method, part): seconds to build what the
+    method needs first, where that takes time.
     """
 
     name: str
@@ -72,6 +78,7 @@ class Family:
     series: tuple[Series, ...]
     exact: Callable[[Any, FloatArray, FloatArray], Truth]
     checked: Callable[[float, int], int] = lambda _x, wanted: wanted
+    build: Callable[[str, Any], float] | None = None
 
 
 def unit_vectors(rng: np.random.Generator, n: int) -> FloatArray:

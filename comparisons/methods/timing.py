@@ -55,7 +55,7 @@ class Prepared:
 
 @dataclass(frozen=True)
 class Time:
-    """Nanoseconds per ray and shape: the median of `runs` runs of `rays` rays, and the quartiles."""
+    """Nanoseconds per ray and shape: median and quartiles of `runs` runs of `rays` rays."""
 
     median: float
     low: float
