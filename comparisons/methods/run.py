@@ -2,9 +2,9 @@
 
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +18,12 @@ from comparisons.methods.of_sphere import SPHERE
 from comparisons.methods.of_triangle import TRIANGLE
 from comparisons.methods.setting import Draw, Family, Series, Trial
 from comparisons.methods.timing import Prepared, Time
+from reference_rt.render import Progress
 
 FAMILIES = {f.name: f for f in (SPHERE, TRIANGLE, BOX, POLYGON, CSG, HIERARCHY)}
 
-Say = Callable[[str, float], None]
 
-
-@dataclass(frozen=True)
-class Effort:
+class Effort(NamedTuple):
     """rays: of a setting;  checked: how many of them exact arithmetic is asked about;  runs: how
     often each is timed."""
 
@@ -42,25 +40,31 @@ FULL = Effort(rays=32768, checked=4096, runs=15)
 class Row:
     """One method in one setting.
 
-    differs: rays of all, checked or not, whose t is not that of the family's first method, bit for
-    bit: for hierarchies, of which all should find the same;  build: seconds.
+    extreme: whether the setting counts as such;  rays: of the setting, a share of which is checked
+    and timed;  hits: their share, of those checked;  differs: of `compared` rays, those whose t is
+    not that of the family's first method, bit for bit: hierarchies should all find the same;
+    build: seconds, where something must be built.
     """
 
     family: str
     series: str
+    axis: str
     x: float
     extreme: bool
+    relative: bool
     method: str
     rays: int
+    parts: int
     errors: Errors
     time: Time
+    compared: int
     differs: int
     build: float | None
 
 
-def settings(families: Sequence[Family]) -> list[tuple[Family, Series, float]]:
+def settings(family: Family) -> list[tuple[Series, float]]:
     """All, in the order in which they are measured."""
-    return [(f, series, x) for f in families for series in f.series for x in series.values]
+    return [(series, x) for series in family.series for x in series.values]
 
 
 def draw_trials(
@@ -90,12 +94,16 @@ def measure_setting(
                 Row(
                     family.name,
                     series.name,
+                    series.axis,
                     x,
                     x >= series.extreme,
+                    series.relative,
                     name,
                     sum(len(trial.o) for trial in trials),
+                    len(trials[0].parts),
                     measure(checked, method.answer, seed),
                     times[name],
+                    len(answers),
                     int(np.sum(answers != first)),
                     family.build(name, trials[0].parts[0]) if family.build else None,
                 )
@@ -103,10 +111,12 @@ def measure_setting(
     return rows
 
 
-def run(families: Sequence[Family], effort: Effort, seed: int, say: Say) -> Iterator[Row]:
-    """Rows, setting after setting."""
-    every = settings(families)
-    for done, (family, series, x) in enumerate(every):
-        say(family.name, done / len(every))
-        yield from measure_setting(family, series, x, effort, seed)
-    say("", 1.0)
+def run(family: Family, effort: Effort, seed: int, progress: Progress) -> list[Row]:
+    """All settings of a family."""
+    rows: list[Row] = []
+    every = settings(family)
+    progress(family.name, 0.0)
+    for done, (series, x) in enumerate(every, start=1):
+        rows += measure_setting(family, series, x, effort, seed)
+        progress(family.name, done / len(every))
+    return rows
