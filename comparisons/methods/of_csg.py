@@ -86,16 +86,16 @@ def operands(draw: Draw, number: float) -> list[Trial]:
     return [Trial((CsgParameters(solid),), o, d, 2.0)]
 
 
-def half_box(middle: float, *steps: transform.Step) -> rt.Box:
-    """Half of the cube [-1, 1]³, around x = middle."""
-    halved = transform.Scale(scale=(0.5, 1.0, 1.0))
+def slab(half_width: float, middle: float, *steps: transform.Step) -> rt.Box:
+    """The cube [-1, 1]³, of another width along x, around x = middle."""
+    narrow = transform.Scale(scale=(half_width, 1.0, 1.0))
     aside = transform.Translate(translate=(middle, 0.0, 0.0))
-    return rt.Box(transform=(halved, aside, *steps))
+    return rt.Box(transform=(narrow, aside, *steps))
 
 
-def cut_box(overlap: float, *steps: transform.Step) -> Any:
-    """The cube without its half on the +x side, which stands out by `overlap`."""
-    return rt.Box(transform=steps) - half_box(0.5 + overlap, *steps)
+def cut_box(half_width: float, overlap: float, *steps: transform.Step) -> Any:
+    """The cube without a slab on its +x side, which stands out by `overlap`."""
+    return rt.Box(transform=steps) - slab(half_width, 1.0 - half_width + overlap, *steps)
 
 
 def _rays_through_the_cut(
@@ -103,13 +103,13 @@ def _rays_through_the_cut(
 ) -> tuple[FloatArray, FloatArray]:
     """At points of what was cut off, from its side, so that they pass the face that is gone."""
     o = rng.uniform((2.0, -0.8, -0.8), (3.0, 0.8, 0.8), (n, 3))
-    target = rng.uniform((0.2, -0.7, -0.7), (0.9, 0.7, 0.7), (n, 3))
+    target = rng.uniform((0.45, -0.7, -0.7), (0.9, 0.7, 0.7), (n, 3))
     return o @ m.T, (target - o) @ m.T
 
 
 def overlapping(draw: Draw, inverse: float) -> list[Trial]:
     shear = transform.Matrix(matrix=SHEAR)
-    solid = cut_box(0.0 if np.isinf(inverse) else 1.0 / inverse, shear)
+    solid = cut_box(0.5, 0.0 if np.isinf(inverse) else 1.0 / inverse, shear)
     o, d = _rays_through_the_cut(draw.rng, draw.rays, np.array(SHEAR)[:, :3])
     return [Trial((CsgParameters(solid),), o, d, 2.0)]
 
@@ -119,14 +119,14 @@ def coincident(draw: Draw, _: float) -> list[Trial]:
 
 
 def turned(draw: Draw, _: float) -> list[Trial]:
-    """Rotations round, and so do the tables: the truth is that of the half that is left."""
+    """Rotations round, and so do the tables: the truth is that of the box that is left."""
     trials = []
     for _shape in range(SHAPES):
         turn = _turn(draw.rng)
         m = transform.affine((turn,))[:, :3]
         o, d = _rays_through_the_cut(draw.rng, draw.rays // SHAPES, m)
-        ideal = (CsgParameters(half_box(-0.5, turn)),)
-        trials.append(Trial((CsgParameters(cut_box(0.0, turn)),), o, d, 2.0, ideal))
+        ideal = (CsgParameters(slab(0.7, -0.3, turn)),)
+        trials.append(Trial((CsgParameters(cut_box(0.3, 0.0, turn)),), o, d, 2.0, ideal))
     return trials
 
 
@@ -146,8 +146,8 @@ CSG = Family(
         Series(
             "overlap",
             "size / overlap",
-            "A sheared cube without one of its halves, which stands out by a little; rays through"
-            " what was cut off.",
+            "A sheared cube without one of its halves, which stands out by a little; rays from"
+            " there at points of what was cut off.",
             powers(4, 16, 32, 44, 47, 50, 52, base=2.0),
             2.0**32,
             overlapping,
@@ -163,8 +163,8 @@ CSG = Family(
         Series(
             "turned",
             "",
-            "The same under any rotation, whose roundings part the two faces; the truth is the half"
-            " that is left.",
+            "A cube without 0.6 of its width under any rotation, whose roundings part the two faces;"
+            " the truth is the box that is left.",
             (1.0,),
             0.0,
             turned,

@@ -10,9 +10,11 @@ from PIL import Image
 
 from comparisons.exact.dyadic import NEVER
 from comparisons.methods import of_csg
+from comparisons.methods.errors import PIXEL
 from comparisons.methods.run import FAMILIES, Row
 from comparisons.methods.setting import FloatArray, unit_rows
 from comparisons.methods.summary import short
+from comparisons.report.values import power_of_ten
 from reference_rt import methods, transform
 from reference_rt.methods import CsgParameters, SphereParameters, TriangleParameters
 
@@ -68,7 +70,10 @@ def _shown(colours: FloatArray) -> str:
 
 
 def _sphere(rows: Sequence[Row]) -> Failure | None:
-    """From the first distance of the series at which a method answers wrongly."""
+    """From the first distance of the series at which a method answers wrongly.
+
+    Each method casts its own shadows, from 1/1000 of a radius above the point that it found.
+    """
     some = [row for row in rows if (row.family, row.series) == ("sphere", "distance")]
     failing = [row.x for row in some if row.errors.wrong > row.errors.ties]
     if not failing:
@@ -83,19 +88,26 @@ def _sphere(rows: Sequence[Row]) -> Failure | None:
     d = target - o
     truth = FAMILIES["sphere"].exact(shape, o, d)
     hit = np.asarray(truth.t != NEVER, dtype=bool)
+    lamp = unit_rows(back + 0.6 * right + np.array([0.0, 0.8, 0.0]))
     views = []
     for name in FAMILIES["sphere"].methods:
         t = methods.intersect(name, shape, o, d)
         found = np.isfinite(t)
-        n = unit_rows(o + np.where(found, t, 0.0)[:, None] * d - center)
-        light = np.clip(n @ unit_rows(back + 0.6 * right + np.array([0.0, 0.8, 0.0])), 0.05, 1.0)
+        p = o + np.where(found, t, 0.0)[:, None] * d
+        n = unit_rows(p - center)
+        lamps = np.tile(lamp, (len(p), 1))
+        dark = np.isfinite(methods.intersect(name, shape, p + PIXEL * n, lamps))
+        light = np.where(dark, 0.0, np.clip(n @ lamp, 0.0, 1.0)) + 0.1
         colours = np.where(found[:, None], light[:, None] * (PAINT + 0.3), GROUND)
         colours[found != hit] = WRONG
-        wrong = np.mean((found != hit)[hit])
-        views.append((short(name), _shown(colours), f"{wrong:.1%} lost" if wrong else ""))
+        lost, black = np.mean(~found[hit]), np.mean((dark & (n @ lamp > 0.1))[hit & found])
+        said = [f"{lost:.2g} of all hits lost"] if lost else []
+        said += [f"{black:.2g} falsely in shadow"] if black else []
+        views.append((short(name), _shown(colours), ", ".join(said)))
     return Failure(
-        f"A sphere seen from {distance:.0e} radii",
-        "Lit by the normal at the point found; red: a hit that is lost, or one that is none.",
+        f"A sphere seen from {power_of_ten(distance)} radii",
+        "Dark where a shadow ray from 1/1000 of a radius above the point that was found meets the"
+        " sphere; red: a hit that is lost, or one that is none.",
         views,
     )
 
@@ -158,11 +170,11 @@ def _in_square(
 
 
 def _film() -> Failure:
-    """A turned cube without one half, seen from the side that is gone."""
+    """A turned cube, seen from the side that is cut off."""
     turn = transform.Rotate(rotate=transform.Turn(axis=(1.0, 2.0, 3.0), degrees=71.0))
-    solid = CsgParameters(of_csg.cut_box(0.0, turn))
+    solid = CsgParameters(of_csg.cut_box(0.3, 0.0, turn))
     m = transform.affine((turn,))[:, :3]
-    grid = _grid() * 2.1
+    grid = _grid() * 1.75
     back = unit_rows(np.array([1.0, 0.45, 0.35]))
     right = unit_rows(np.cross([0.0, 1.0, 0.0], back))
     target = grid @ np.stack([right, np.cross(back, right)])
@@ -173,11 +185,11 @@ def _film() -> Failure:
         t = method.intersect(solid, o @ m.T, d @ m.T)
         found = np.isfinite(t)
         q = o + np.where(found, t, 0.0)[:, None] * d
-        # In the cube's own coordinates, where what is left is -1 <= x <= 0.
-        side = np.argmax(np.abs(q * (2.0, 1.0, 1.0) + (1.0, 0.0, 0.0)), axis=1)
+        # In the cube's own coordinates, where what is left is -1 <= x <= 0.4.
+        side = np.argmax(np.abs((q + (0.3, 0.0, 0.0)) / (0.7, 1.0, 1.0)), axis=1)
         shade = np.array([1.0, 0.75, 0.55])[side][:, None] * (PAINT + 0.3)
         colours = np.where(found[:, None], shade, GROUND)
-        film = found & (q[:, 0] > 0.01)
+        film = found & (q[:, 0] > 0.5)
         colours[film] = WRONG
         views.append(
             (
@@ -187,7 +199,7 @@ def _film() -> Failure:
             )
         )
     return Failure(
-        "A turned cube without one half: the faces of what is cut off coincide",
+        "A turned cube of which one side is cut off: faces of both coincide",
         "Red: a film is left where the ray should meet nothing.",
         views,
     )

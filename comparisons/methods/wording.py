@@ -13,6 +13,10 @@ from comparisons.report.values import power_of_ten
 GROWS = 0.2
 """The least exponent of an error's growth that is told: less is no growth over eight decades."""
 
+FEW = 0.1
+"""The share of wrong answers up to which errors are seen to grow: beyond, those that would be the
+largest are lost."""
+
 CHEAPER = 1.05
 """Times as fast; below, two costs count as the same."""
 
@@ -58,7 +62,7 @@ def _costs(rows: Sequence[Row]) -> str:
         parts.append(f"{short(row.method)} {_with_unit(row.time.median)}{times}")
     hits = first[0].errors.hits / first[0].errors.checked
     where = f"{rows[0].axis} {_x(rows[0].x)}" if rows[0].axis else rows[0].series
-    return f"An ordinary ray ({where}; {hits:.0%} hit) costs: {', '.join(parts)}."
+    return f"An ordinary ray ({where}; {percent(hits)} hit) costs: {', '.join(parts)}."
 
 
 def _with_unit(ns: float) -> str:
@@ -84,7 +88,7 @@ def _decisions(rows: Sequence[Row]) -> str:
             where = f" from {_x(surely[0].x)} on" if worst.axis and len(surely) > 1 else ""
             at = f" at {_x(worst.x)}" if worst.axis else ""
             wrong.append(
-                f"{short(method)} errs{where}, {percent(k / n)}{at} [{low:.2g}, {high:.2g}]"
+                f"{short(method)} errs{where}, {percent(k / n)}{at} [{low:.2g}, {high:.2g} %]"
             )
         elif any(row.errors.ties for row in some):
             only_ties.append(short(method))
@@ -127,9 +131,8 @@ def _errors(rows: Sequence[Row]) -> str:
 
 
 def _growth(rows: Sequence[Row]) -> float | None:
-    """The exponent of the median error as a power of x, over settings where most answers are
-    right: beyond, errors have nowhere to grow to."""
-    fit = [row for row in rows if row.errors.share < 0.5 and row.errors.median]
+    """The exponent of the median error as a power of x, where few answers are wrong."""
+    fit = [row for row in rows if row.errors.share < FEW and row.errors.median]
     if len(fit) < 3 or not fit[0].axis:
         return None
     x = np.log10([row.x for row in fit])
