@@ -163,7 +163,7 @@ CSG = Family(
         Series(
             "turned",
             "",
-            "A cube without 0.6 of its width under any rotation, whose roundings part the two faces;"
+            "A cube without 0.6 of its width under any rotation, whose roundings part the faces;"
             " the truth is the box that is left.",
             (1.0,),
             0.0,

@@ -14,6 +14,7 @@ from comparisons.methods.errors import PIXEL
 from comparisons.methods.run import FAMILIES, Row
 from comparisons.methods.setting import FloatArray, unit_rows
 from comparisons.methods.summary import short
+from comparisons.methods.wording import percent
 from comparisons.report.values import power_of_ten
 from reference_rt import methods, transform
 from reference_rt.methods import CsgParameters, SphereParameters, TriangleParameters
@@ -100,9 +101,10 @@ def _sphere(rows: Sequence[Row]) -> Failure | None:
         light = np.where(dark, 0.0, np.clip(n @ lamp, 0.0, 1.0)) + 0.1
         colours = np.where(found[:, None], light[:, None] * (PAINT + 0.3), GROUND)
         colours[found != hit] = WRONG
-        lost, black = np.mean(~found[hit]), np.mean((dark & (n @ lamp > 0.1))[hit & found])
-        said = [f"{lost:.2g} of all hits lost"] if lost else []
-        said += [f"{black:.2g} falsely in shadow"] if black else []
+        lost = float(np.mean(~found[hit]))
+        black = float(np.mean((dark & (n @ lamp > 0.1))[hit & found]))
+        said = [f"{percent(lost)} of the hits lost"] if lost else []
+        said += [f"{percent(black)} falsely in shadow"] if black else []
         views.append((short(name), _shown(colours), ", ".join(said)))
     return Failure(
         f"A sphere seen from {power_of_ten(distance)} radii",
@@ -120,11 +122,10 @@ CELL = 3
 
 def _wall() -> Failure:
     """Squares of two triangles; every third pixel lies on the edge between the two."""
-    rng = np.random.default_rng(1)
     n = SIDE // CELL
     axis = np.linspace(-1.0, 1.0, n + 1)
     x, y = np.meshgrid(axis, -axis)
-    corners = np.stack([x, y, 0.04 * rng.normal(size=x.shape)], axis=-1)
+    corners = np.stack([x, y, 0.1 * np.sin(4.0 * x + y) * np.cos(3.0 * y)], axis=-1)
     eye = np.array([0.3, 0.2, 4.0])
     light = unit_rows(np.array([0.5, 0.7, 1.0]))
     share = (np.arange(CELL) + 0.5) / CELL
@@ -186,7 +187,7 @@ def _film() -> Failure:
         found = np.isfinite(t)
         q = o + np.where(found, t, 0.0)[:, None] * d
         # In the cube's own coordinates, where what is left is -1 <= x <= 0.4.
-        side = np.argmax(np.abs((q + (0.3, 0.0, 0.0)) / (0.7, 1.0, 1.0)), axis=1)
+        side = np.argmax(np.abs((q - np.array([-0.3, 0.0, 0.0])) / (0.7, 1.0, 1.0)), axis=1)
         shade = np.array([1.0, 0.75, 0.55])[side][:, None] * (PAINT + 0.3)
         colours = np.where(found[:, None], shade, GROUND)
         film = found & (q[:, 0] > 0.5)

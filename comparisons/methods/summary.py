@@ -76,4 +76,15 @@ def of_method(rows: Sequence[Row], method: str) -> list[Row]:
 
 def short(method: str) -> str:
     """Without the family: "robust"."""
-    return method.partition(".")[2].replace("_", " ")
+    name = method.partition(".")[2]
+    return _SPELT.get(name, name.replace("_", " "))
+
+
+_SPELT = {
+    "cramer": "Cramer",
+    "lu": "LU",
+    "moller_trumbore": "Möller-Trumbore",
+    "sah": "SAH",
+    "slabs_ieee": "slabs, IEEE",
+    "slabs_parallel_test": "slabs, if parallel",
+}

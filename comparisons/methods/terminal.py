@@ -6,7 +6,7 @@ from rich.table import Table
 
 from comparisons.methods.run import Row
 from comparisons.methods.summary import Total, methods_of, of_method, series_of, short, total
-from comparisons.methods.wording import nanoseconds, percent, units
+from comparisons.methods.wording import nanoseconds, percent, units, with_unit
 
 
 def tables(rows: Sequence[Row]) -> list[Table]:
@@ -36,7 +36,8 @@ def _cells(some: Total | None) -> list[str]:
 
 
 def _series(rows: Sequence[Row]) -> Table:
-    """Wrong answers at the last x of each series, or where there are none the worst error."""
+    """At the last x of each: wrong answers, or where there are none the worst error, or where that
+    is the same for all the time."""
     table = Table(title="at the far end of each series", title_justify="left", box=None)
     table.add_column("series")
     table.add_column("x", justify="right")
@@ -45,11 +46,15 @@ def _series(rows: Sequence[Row]) -> Table:
         table.add_column(short(method), justify="right")
     for series, some in series_of(rows).items():
         last = max(row.x for row in some)
-        cells = []
-        for method in names:
-            (row,) = (r for r in some if r.method == method and r.x == last)
-            wrong = row.errors.wrong - row.errors.ties
-            share = wrong / max(row.errors.decided, 1)
-            cells.append(f"{percent(share)} wrong" if wrong else units(row.errors.worst) + " u")
-        table.add_row(series, f"{last:.0e}" if some[0].axis else "", *cells)
+        there = [row for method in names for row in of_method(some, method) if row.x == last]
+        same = len({row.errors.worst for row in there}) == 1
+        x = f"{last:.0e}" if some[0].axis else ""
+        table.add_row(series, x, *(_end(row, same) for row in there))
     return table
+
+
+def _end(row: Row, same_error: bool) -> str:
+    wrong = row.errors.wrong - row.errors.ties
+    if wrong:
+        return f"{percent(wrong / row.errors.decided)} wrong"
+    return with_unit(row.time.median) if same_error else f"{units(row.errors.worst)} u"

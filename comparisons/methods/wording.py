@@ -59,13 +59,14 @@ def _costs(rows: Sequence[Row]) -> str:
     for row in ranked:
         ratio = row.time.median / fastest
         times = "" if ratio < CHEAPER else f" ({ratio:.2g} times)"
-        parts.append(f"{short(row.method)} {_with_unit(row.time.median)}{times}")
+        parts.append(f"{short(row.method)} {with_unit(row.time.median)}{times}")
     hits = first[0].errors.hits / first[0].errors.checked
     where = f"{rows[0].axis} {_x(rows[0].x)}" if rows[0].axis else rows[0].series
     return f"An ordinary ray ({where}; {percent(hits)} hit) costs: {', '.join(parts)}."
 
 
-def _with_unit(ns: float) -> str:
+def with_unit(ns: float) -> str:
+    """The same as `nanoseconds`, and "ns" where no other unit is."""
     text = nanoseconds(ns)
     return text if text.endswith("s") else text + " ns"
 
