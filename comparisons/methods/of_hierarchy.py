@@ -1,6 +1,7 @@
 """Hierarchies: triangles strewn in a cube, in clusters, and long thin ones."""
 
 import time
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -23,23 +24,21 @@ from comparisons.methods.setting import (
 from reference_rt import bvh, methods
 from reference_rt.methods import SceneParameters
 
-PAIRS = 1e7
-"""Of rays and triangles that exact arithmetic is asked about, at most: floats find the few that
-come near each other at some 10 ns a pair."""
+AS_FAST = 5e3
+"""Triangles up to which exact arithmetic is asked about as many rays as elsewhere, and beyond about
+as many pairs of both: floats find the few that meet in some 0.1 to 0.6 µs a pair."""
 
 LEAST = 64
 """Rays that it is asked about in any case."""
 
-AT_ONCE = 4e6
-"""Pairs in memory."""
+AT_ONCE = 5e5
+"""Pairs in memory, at up to 500 bytes."""
 
 
 def exact(parameters: SceneParameters, o: FloatArray, d: FloatArray) -> Truth:
     """Of all triangles; those that a line is clearly beside, as floats see it, are left out."""
     v = _vertices(parameters)
     ray, triangle = _near(v, o, d)
-    beside = _clearly_beside(v[triangle] - o[ray, None], d[ray])
-    ray, triangle = ray[~beside], triangle[~beside]
     hit = first_hit("triangles", {"vertices": v[triangle].reshape(-1, 9)}, o[ray], d[ray])
     t = np.full(len(o), NEVER, dtype=object)
     np.minimum.at(t, ray, hit.fixed)
@@ -65,24 +64,26 @@ def _clearly_beside(corners: FloatArray, d: FloatArray) -> BoolArray:
 
 
 def _near(v: FloatArray, o: FloatArray, d: FloatArray) -> tuple[IntArray, IntArray]:
-    """(ray, triangle) of all pairs whose line comes near the ball around the triangle."""
+    """(ray, triangle) of all pairs that may meet."""
     middle = v.mean(axis=1)
     radius = np.linalg.norm(v - middle[:, None], axis=2).max(axis=1)
     reach = radius + MARGIN * (np.abs(v).max() + np.abs(o).max())
     unit = d / np.linalg.norm(d, axis=1, keepdims=True)
-    found = []
-    for begin in range(0, len(o), max(int(AT_ONCE / len(v)), 1)):
-        rays = slice(begin, begin + max(int(AT_ONCE / len(v)), 1))
-        # The cross product, since |c - o|² - (u·(c - o))² would cancel.
-        f = middle[None] - o[rays, None]
-        off = np.cross(f, unit[rays, None])
+    found, step = [], max(int(AT_ONCE / len(v)), 1)
+    for begin in range(0, len(o), step):
+        rays = slice(begin, begin + step)
+        # Balls around the triangles first.  By the cross product, since the difference of squares
+        # |c - o|² - (u·(c - o))² cancels.
+        off = np.cross(middle[None] - o[rays, None], unit[rays, None])
         ray, triangle = np.nonzero(np.einsum("ijk,ijk->ij", off, off) <= reach**2)
-        found.append((ray + begin, triangle))
+        ray += begin
+        beside = _clearly_beside(v[triangle] - o[ray, None], d[ray])
+        found.append((ray[~beside], triangle[~beside]))
     ray, triangle = (np.concatenate(part) for part in zip(*found, strict=True))
     return ray, triangle
 
 
-def _write_ply(path: str, v: FloatArray) -> None:
+def _write_ply(path: Path, v: FloatArray) -> None:
     """Triangles (n, 3, 3) as a file that the renderer reads, without loss."""
     n = len(v)
     header = (
@@ -92,14 +93,13 @@ def _write_ply(path: str, v: FloatArray) -> None:
     )
     faces = np.zeros(n, dtype=[("size", "u1"), ("corners", "<i4", 3)])
     faces["size"], faces["corners"] = 3, np.arange(3 * n).reshape(n, 3)
-    with open(path, "wb") as file:  # noqa: PTH123
-        file.write(header.encode() + v.astype("<f8").tobytes() + faces.tobytes())
+    path.write_bytes(header.encode() + v.astype("<f8").tobytes() + faces.tobytes())
 
 
 def _trial(draw: Draw, v: FloatArray) -> list[Trial]:
     """Rays from all around at points among the triangles, anywhere in the cube [-1, 1]³."""
     path = draw.folder / f"{len(v)}.ply"
-    _write_ply(str(path), v)
+    _write_ply(path, v)
     scene = rt.Scene(shapes=(rt.Mesh(file=str(path)),))
     o = 3.0 * unit_vectors(draw.rng, draw.rays)
     d = draw.rng.uniform(-1.0, 1.0, (draw.rays, 3)) - o
@@ -139,7 +139,7 @@ def needles(draw: Draw, number: float) -> list[Trial]:
 
 
 def _checked(number: float, wanted: int) -> int:
-    return max(min(wanted, int(PAIRS / number)), LEAST)
+    return max(int(wanted * min(1.0, AS_FAST / number)), LEAST)
 
 
 def build(method: str, parameters: SceneParameters) -> float:

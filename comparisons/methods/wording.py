@@ -17,6 +17,9 @@ FEW = 0.1
 """The share of wrong answers up to which errors are seen to grow: beyond, those that would be the
 largest are lost."""
 
+SLOWER = 3.0
+"""Times as slow at one end as at the other: what is told of times that depend on x."""
+
 CHEAPER = 1.05
 """Times as fast; below, two costs count as the same."""
 
@@ -72,7 +75,7 @@ def with_unit(ns: float) -> str:
 
 
 def _series(name: str, rows: Sequence[Row]) -> str:
-    said = [_decisions(rows), _errors(rows)]
+    said = [_decisions(rows), _errors(rows), _times(rows), _builds(rows)]
     return f"{name.capitalize()}: " + "; ".join(part for part in said if part) + "."
 
 
@@ -136,9 +139,38 @@ def _growth(rows: Sequence[Row]) -> float | None:
     fit = [row for row in rows if row.errors.share < FEW and row.errors.median]
     if len(fit) < 3 or not fit[0].axis:
         return None
-    x = np.log10([row.x for row in fit])
-    y = np.log10([row.errors.median or 1.0 for row in fit])
-    return float(np.polyfit(x, y, 1)[0])
+    return _power([row.x for row in fit], [row.errors.median or 1.0 for row in fit])
+
+
+def _power(x: Sequence[float], y: Sequence[float]) -> float:
+    """k of the nearest y = c x^k."""
+    return float(np.polyfit(np.log10(x), np.log10(y), 1)[0])
+
+
+def _times(rows: Sequence[Row]) -> str:
+    """Where they depend on x."""
+    said = []
+    for method in methods_of(rows):
+        some = of_method(rows, method)
+        times = [row.time.median for row in some]
+        if some[0].axis and max(times) > SLOWER * min(times):
+            power = _power([row.x for row in some], times)
+            said.append(
+                f"{short(method)} from {with_unit(times[0])} to {with_unit(times[-1])}"
+                f" (x^{power:.1f})"
+            )
+    return f"a ray costs {', '.join(said)}" if said else ""
+
+
+def _builds(rows: Sequence[Row]) -> str:
+    """Of hierarchies: what they take to build where the series ends, and whether all agree."""
+    last = [row for row in rows if row.x == rows[-1].x and row.build is not None]
+    if not last:
+        return ""
+    built = ", ".join(f"{short(row.method)} {1e3 * (row.build or 0.0):.2g} ms" for row in last)
+    differs = sum(row.differs for row in rows)
+    same = "all find the same to the last bit" if differs == 0 else f"{differs} t differ"
+    return f"{same}; built at {_x(rows[-1].x)} in: {built}"
 
 
 def _x(value: float) -> str:
