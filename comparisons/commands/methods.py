@@ -49,7 +49,9 @@ def methods(
         for name in names:
             rows += run(FAMILIES[name], effort, seed, progress)
             write(out, rows, effort, seed, about)
+        progress("page", 0.0)
         write_page(out / "methods.html", rows, effort, seed, about)
+        progress("page", 1.0)
     console = Console(highlight=False)
     for name in names:
         for table in tables([row for row in rows if row.family == name]):

@@ -6,6 +6,7 @@ import numpy as np
 
 from comparisons.methods.run import Row
 from comparisons.methods.summary import methods_of, of_method, short
+from comparisons.methods.wording import QUIET
 from comparisons.report.plots import Curve, log_log
 
 FLOOR = 0.1
@@ -52,11 +53,12 @@ def _points(some: Sequence[Row], every: Sequence[Row], y: Callable[[Row], float]
 
 
 def of_series(rows: Sequence[Row]) -> list[str]:
-    """Against x: errors, wrong answers where there are any, times where they change."""
+    """Against x: errors that are not all small, wrong answers where there are any, times where they
+    change."""
     if not rows[0].axis:
         return []
     axis, plots = rows[0].axis, []
-    if any(row.errors.worst is not None for row in rows):
+    if any((row.errors.worst or 0.0) > QUIET for row in rows):
         what = RELATIVE if rows[0].relative else ERROR
         curves = [
             curve

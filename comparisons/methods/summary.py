@@ -82,6 +82,7 @@ def short(method: str) -> str:
 
 _SPELT = {
     "cramer": "Cramer",
+    "even_odd": "even-odd",
     "lu": "LU",
     "moller_trumbore": "Möller-Trumbore",
     "sah": "SAH",

@@ -1,6 +1,5 @@
 """What a reader sees in the numbers, said in words that are made from them."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,6 +8,9 @@ from comparisons.methods.errors import share_interval
 from comparisons.methods.run import Row
 from comparisons.methods.summary import methods_of, of_method, series_of, short
 from comparisons.report.values import power_of_ten
+
+QUIET = 10.0
+"""Worst errors in u up to which a series has nothing to tell of them, nor to draw."""
 
 GROWS = 0.2
 """The least exponent of an error's growth that is told: less is no growth over eight decades."""
@@ -122,9 +124,12 @@ def _errors(rows: Sequence[Row]) -> str:
         said.append((some[-1].errors.median or 0.0, short(method)))
         power = _growth(some)
         if power is not None and power > GROWS:
-            growing.append(f"{short(method)} as x^{power:.1f}")
+            growing.append(f"{short(method)} {_law(power)}")
     if not said:
         return ""
+    worst = max(row.errors.worst or 0.0 for row in rows)
+    if worst <= QUIET:
+        return f"no error is above {units(worst)} u"
     values = [value for value, _ in said]
     end = f" at {_x(rows[-1].x)}" if rows[0].axis else ""
     if max(values) < 2.0 * min(values):
@@ -142,6 +147,12 @@ def _growth(rows: Sequence[Row]) -> float | None:
     return _power([row.x for row in fit], [row.errors.median or 1.0 for row in fit])
 
 
+def _law(power: float) -> str:
+    """Of growth with x, to a tenth."""
+    rounded = round(power, 1)
+    return {0.5: "as √x", 1.0: "as x", 2.0: "as x²"}.get(rounded, f"as x^{rounded:g}")
+
+
 def _power(x: Sequence[float], y: Sequence[float]) -> float:
     """k of the nearest y = c x^k."""
     return float(np.polyfit(np.log10(x), np.log10(y), 1)[0])
@@ -157,7 +168,7 @@ def _times(rows: Sequence[Row]) -> str:
             power = _power([row.x for row in some], times)
             said.append(
                 f"{short(method)} from {with_unit(times[0])} to {with_unit(times[-1])}"
-                f" (x^{power:.1f})"
+                f" ({_law(power)})"
             )
     return f"a ray costs {', '.join(said)}" if said else ""
 
@@ -174,8 +185,7 @@ def _builds(rows: Sequence[Row]) -> str:
 
 
 def _x(value: float) -> str:
-    exponent = math.log10(value)
-    return power_of_ten(value) if value >= 1e4 and exponent == round(exponent) else f"{value:.4g}"
+    return power_of_ten(value) if value >= 1e4 else f"{value:.4g}"
 
 
 def _list(names: Sequence[str]) -> str:

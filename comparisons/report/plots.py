@@ -163,7 +163,9 @@ def _ticks(axis: Any) -> None:
 
     low, high = axis.get_view_interval()
     decades = math.log10(high / low)
-    steps = (1.0, 2.0, 5.0) if decades < 2.0 else (1.0,)
+    steps = [1.0, 2.0, 5.0] if decades < 2.0 else [1.0]
+    if decades < 0.7:
+        steps += [1.2, 1.5, 2.5, 3.0, 4.0, 6.0, 7.0, 8.0, 9.0]
     axis.set_major_locator(LogLocator(subs=steps, numticks=12))
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
     axis.set_minor_formatter(NullFormatter())
