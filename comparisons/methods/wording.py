@@ -167,10 +167,9 @@ def _times(rows: Sequence[Row]) -> str:
         if some[0].axis and max(times) > SLOWER * min(times):
             power = _power([row.x for row in some], times)
             said.append(
-                f"{short(method)} from {with_unit(times[0])} to {with_unit(times[-1])}"
-                f" ({_law(power)})"
+                f"{short(method)} {with_unit(times[0])} to {with_unit(times[-1])} ({_law(power)})"
             )
-    return f"a ray costs {', '.join(said)}" if said else ""
+    return f"time from one end to the other: {', '.join(said)}" if said else ""
 
 
 def _builds(rows: Sequence[Row]) -> str:
@@ -178,7 +177,7 @@ def _builds(rows: Sequence[Row]) -> str:
     last = [row for row in rows if row.x == rows[-1].x and row.build is not None]
     if not last:
         return ""
-    built = ", ".join(f"{short(row.method)} {1e3 * (row.build or 0.0):.2g} ms" for row in last)
+    built = ", ".join(f"{short(row.method)} {1e3 * (row.build or 0.0):.3g} ms" for row in last)
     differs = sum(row.differs for row in rows)
     same = "all find the same to the last bit" if differs == 0 else f"{differs} t differ"
     return f"{same}; built at {_x(rows[-1].x)} in: {built}"
