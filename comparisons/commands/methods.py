@@ -1,5 +1,6 @@
 """`reference-rt methods`."""
 
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -32,6 +33,8 @@ def methods(
         from comparisons.methods.terminal import tables
         from comparisons.methods.written import write
         from comparisons.provenance import ours
+
+        import_module("matplotlib")  # before minutes of measuring that the page then cannot show
     except ModuleNotFoundError as error:
         raise ReferenceUnavailableError(
             f"measuring needs {error.name}: pip install 'reference-rt[compare]'"

@@ -86,6 +86,6 @@ _SPELT = {
     "lu": "LU",
     "moller_trumbore": "Möller-Trumbore",
     "sah": "SAH",
-    "slabs_ieee": "slabs, IEEE",
-    "slabs_parallel_test": "slabs, if parallel",
+    "slabs_ieee": "IEEE slabs",
+    "slabs_parallel_test": "slabs",
 }
