@@ -12,9 +12,15 @@ from reference_rt.filters import film_offset
 from reference_rt.geometry import closest_hit, surface
 from reference_rt.integrators import radiance
 from reference_rt.integrators.ray_cast import cast
-from reference_rt.kernel import entry_kernel, kernel
+from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
 from reference_rt.ray import Ray
-from reference_rt.sampling import draw_pair, start_sample
+from reference_rt.sampling import (
+    BLOCK_FLOATS,
+    BLOCK_INTEGERS,
+    draw_pair,
+    start_in_block,
+    start_sample,
+)
 from reference_rt.shading import texture_place
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.tables import SceneTables
@@ -60,11 +66,14 @@ def render_band(
 ) -> None:
     """Radiance, added to out (n, 3); with the last of all `spp` samples the sum becomes the mean,
     and spread (n, 3) the estimate of the mean's variance."""
+    pairs, made = local_floats(BLOCK_FLOATS), local_integers(BLOCK_INTEGERS)
+    for k in range(len(made)):
+        made[k] = -1
     for pixel in range(begin, end):
         y, x = pixel // shape[0], pixel % shape[0]
         total = row(out, pixel)
         for sample in range(first, last):
-            sampler = start_sample(sampler_setup, pixel, sample)
+            sampler = start_in_block(sampler_setup, pixel, sample, pairs, made)
             seen = _film_ray(view, film_filter, sampler, shape, x, y)
             one = radiance(integrator, scene, seen.ray, sampler) * seen.weight
             total = total + one
