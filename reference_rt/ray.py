@@ -10,6 +10,10 @@ UNIT_ROUNDOFF = 2.0**-53
 """u: a float64 operation returns its exact result times (1 + e) with |e| <= u."""
 
 
+BLOCK = 16
+"""The rays that are traced side by side, of as many samples of a pixel."""
+
+
 class Ray(NamedTuple):
     """p(t) = o + t d for 0 < t < t_max.  `d` may have any length: t counts in units of |d|."""
 

@@ -5,7 +5,7 @@ number of threads.  To add a sampler: its file with description, NamedTuples and
 below.
 """
 
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
@@ -54,6 +54,26 @@ start_in_block = _start_in_block.function
 one sample of a pixel after another: several are drawn at once.  pairs (BLOCK_FLOATS,) is scratch;
 made (BLOCK_INTEGERS,) too, -1 before the first sample."""
 
+
+class Samplers(NamedTuple):
+    """The samplers of a pixel's samples from `first` on: see `start_in_block`."""
+
+    setup: Any
+    pixel: int
+    first: int
+    pairs: FloatArray
+    made: IntArray
+
+
+@kernel
+def sampler_of(samplers: Samplers, k: int) -> Sample:
+    """That of sample first + k."""
+    made: Sample = start_in_block(
+        samplers.setup, samplers.pixel, samplers.first + k, samplers.pairs, samplers.made
+    )
+    return made
+
+
 _draw = ByClass("draw_pair")
 _draw.register(SobolSample, sobol.draw)
 _draw.register(BlockSample, blocks.draw)
@@ -69,8 +89,10 @@ __all__ = [
     "Grid",
     "Independent",
     "Sample",
+    "Samplers",
     "Sobol",
     "draw_pair",
+    "sampler_of",
     "start_in_block",
     "start_sample",
 ]

@@ -17,12 +17,10 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reference_rt.kernel import kernel
+from reference_rt.ray import BLOCK
 from reference_rt.sampling import sobol
 from reference_rt.sampling.sobol import SobolSetup, hash_of, pair, reverse_bits, seeds_of
 from reference_rt.shapes.shape import FloatArray, IntArray
-
-BLOCK = 16
-"""Samples of a block."""
 
 DIMENSIONS = 48
 """The first dimensions, whose pairs are made in blocks: those of eleven bounces.  6 KiB, which

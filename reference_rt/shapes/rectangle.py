@@ -8,6 +8,7 @@ import numpy as np
 from reference_rt.kernel import kernel
 from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
 from reference_rt.shapes import flat, spherical_rectangle
+from reference_rt.shapes.lanes import nearer_by, select
 from reference_rt.shapes.shape import (
     Bounds,
     FloatArray,
@@ -102,9 +103,11 @@ def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> fl
     # For a parallel ray this is ±inf or NaN: both fail the comparisons.
     t = -dot(from_center, normal) / dot(ray.d, normal)
     q = from_center + ray.d * t
-    if (t > 0.0) & (abs(dot(q, x_of)) <= 1.0) & (abs(dot(q, y_of)) <= 1.0):
-        return t
-    return math.inf
+    meets = (t > 0.0) & (abs(dot(q, x_of)) <= 1.0) & (abs(dot(q, y_of)) <= 1.0)
+    return select(meets, t, math.inf)
+
+
+nearer = nearer_by(distance)
 
 
 @kernel
