@@ -127,7 +127,8 @@ def distance(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> floa
     where it leaves."""
     t_in, t_out = inside(slabs(ray, center, x_of, y_of, z_of))
     t = select(t_in > 0.0, t_in, t_out)
-    return select((t_in <= t_out) & (t > 0.0), t, math.inf)
+    nearest: float = select((t_in <= t_out) & (t > 0.0), t, math.inf)
+    return nearest
 
 
 nearer = nearer_by(distance)

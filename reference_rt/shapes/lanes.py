@@ -165,6 +165,11 @@ class _Writer:
         number = self.builder.extract_value(value, at)
         return Lanes(self.builder, self.in_all_lanes(number, _REALS))
 
+    def vector(self, value: ir.Value, k: int) -> Vec3:
+        """Vector k of a tuple, the same in all lanes."""
+        components: list[Any] = [self.lanes(value, k, axis) for axis in range(3)]
+        return Vec3(*components)
+
     def column(self, array_type: Any, rays: ir.Value, column: int, at: ir.Value) -> Lanes:
         """A number of each of LANES rays."""
         place = self.builder.add(at, ir.IntType(64)(column * BLOCK))
@@ -187,9 +192,9 @@ def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             writer = _Writer(context, builder)
             rays_value, at_value, shape_value, code_value, t_value, codes_value = values
-            numbers = [writer.column(rays, rays_value, k, at_value) for k in range(6)]
+            numbers: list[Any] = [writer.column(rays, rays_value, k, at_value) for k in range(6)]
             arguments = [
-                Vec3(*(writer.lanes(shape_value, k, axis) for axis in range(3)))
+                writer.vector(shape_value, k)
                 if isinstance(part, types.BaseTuple)
                 else writer.lanes(shape_value, k)
                 for k, part in enumerate(shape)

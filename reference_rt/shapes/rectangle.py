@@ -104,7 +104,8 @@ def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> fl
     t = -dot(from_center, normal) / dot(ray.d, normal)
     q = from_center + ray.d * t
     meets = (t > 0.0) & (abs(dot(q, x_of)) <= 1.0) & (abs(dot(q, y_of)) <= 1.0)
-    return select(meets, t, math.inf)
+    nearest: float = select(meets, t, math.inf)
+    return nearest
 
 
 nearer = nearer_by(distance)

@@ -122,7 +122,8 @@ def distance(ray: Ray, center: Vec3, r: float) -> float:
     """The smallest t > 0 at which a ray meets a sphere, inf where it does not."""
     meets, near, far = roots(ray, center, r)
     t = select(near > 0.0, near, far)
-    return select(meets & (t > 0.0), t, math.inf)
+    nearest: float = select(meets & (t > 0.0), t, math.inf)
+    return nearest
 
 
 nearer = nearer_by(distance)
