@@ -12,14 +12,15 @@ from reference_rt.filters import film_offset
 from reference_rt.geometry import closest_hit, surface
 from reference_rt.integrators import radiances
 from reference_rt.integrators.ray_cast import cast
-from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch
+from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
 from reference_rt.ray import BLOCK, Ray
 from reference_rt.sampling import (
-    BLOCK_FLOATS,
-    BLOCK_INTEGERS,
+    PAIR_FLOATS,
+    PAIR_INTEGERS,
     Samplers,
     draw_pair,
+    forget_pairs,
     sampler_of,
     start_sample,
 )
@@ -88,28 +89,36 @@ def render_band(
         samples=local_integers(BLOCK),
     )
     weights = local_floats(BLOCK)
-    pairs, made = local_floats(BLOCK_FLOATS), local_integers(BLOCK_INTEGERS)
-    for k in range(len(made)):
-        made[k] = -1
-    for pixel in range(begin, end):
-        y, x = pixel // shape[0], pixel % shape[0]
-        total = row(out, pixel)
-        for start in range(first, last, BLOCK):
-            n = min(BLOCK, last - start)
-            samplers = Samplers(sampler_setup, pixel, start, pairs, made)
-            for k in range(n):
-                seen = _film_ray(view, film_filter, sampler_of(samplers, k), shape, x, y)
-                put_ray(scratch.rays, k, seen.ray)
-                weights[k] = seen.weight
-            radiances(integrator, scene, samplers, n, scratch)
-            for k in range(n):
-                one = vector_of(scratch.totals, 0, k) * weights[k]
-                total = total + one
-                _add_spread(spread, pixel, start + k, one, total)
-        if last == spp:
-            total = total / spp
-            _finish_spread(spread, pixel, spp)
-        out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
+    samplers = Samplers(
+        sampler_setup,
+        local_integers(BLOCK),
+        local_integers(BLOCK),
+        local_floats(PAIR_FLOATS),
+        local_integers(PAIR_INTEGERS),
+    )
+    prepare(scratch)
+    forget_pairs(samplers)
+    count = last - first
+    paths = (end - begin) * count
+    for start in range(0, paths, BLOCK):
+        n = min(BLOCK, paths - start)
+        for k in range(n):
+            pixel = begin + (start + k) // count
+            samplers.pixels[k], samplers.numbers[k] = pixel, first + (start + k) % count
+            y, x = pixel // shape[0], pixel % shape[0]
+            seen = _film_ray(view, film_filter, sampler_of(samplers, k), shape, x, y)
+            put_ray(scratch.rays, k, seen.ray)
+            weights[k] = seen.weight
+        radiances(integrator, scene, samplers, n, scratch)
+        for k in range(n):
+            pixel, sample = samplers.pixels[k], samplers.numbers[k]
+            one = vector_of(scratch.totals, 0, k) * weights[k]
+            total = row(out, pixel) + one
+            _add_spread(spread, pixel, sample, one, total)
+            if sample + 1 == spp:
+                total = total / spp
+                _finish_spread(spread, pixel, spp)
+            out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
 
 
 @kernel

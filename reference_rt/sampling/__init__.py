@@ -11,8 +11,8 @@ from pydantic import Field
 
 from reference_rt.kernel import ByClass, kernel
 from reference_rt.sampling import blocks, grid, independent, sobol
-from reference_rt.sampling.blocks import FLOATS as BLOCK_FLOATS
-from reference_rt.sampling.blocks import INTEGERS as BLOCK_INTEGERS
+from reference_rt.sampling.blocks import FLOATS as PAIR_FLOATS
+from reference_rt.sampling.blocks import INTEGERS as PAIR_INTEGERS
 from reference_rt.sampling.blocks import BlockSample
 from reference_rt.sampling.grid import Grid, GridSample, GridSetup
 from reference_rt.sampling.independent import Independent, IndependentSample, IndependentSetup
@@ -50,27 +50,35 @@ _start_in_block.register(SobolSetup, blocks.start)
 _start_in_block.register(IndependentSetup, _without_blocks)
 _start_in_block.register(GridSetup, _without_blocks)
 start_in_block = _start_in_block.function
-"""start_in_block(setup, pixel, sample, pairs, made) -> a sampler of the same numbers, for who takes
-one sample of a pixel after another: several are drawn at once.  pairs (BLOCK_FLOATS,) is scratch;
-made (BLOCK_INTEGERS,) too, -1 before the first sample."""
+"""start_in_block(setup, pixel, sample, pairs, made) -> a sampler of the same numbers, which draws
+those of several samples of the pixel at once: see `Samplers`."""
 
 
 class Samplers(NamedTuple):
-    """The samplers of a pixel's samples from `first` on: see `start_in_block`."""
+    """The samplers of some samples: their pixels (n,) and their numbers (n,) in these.
+
+    Scratch: pairs (PAIR_FLOATS,), and made (PAIR_INTEGERS,), -1 before the first is drawn.
+    """
 
     setup: Any
-    pixel: int
-    first: int
+    pixels: IntArray
+    numbers: IntArray
     pairs: FloatArray
     made: IntArray
 
 
 @kernel
+def forget_pairs(samplers: Samplers) -> None:
+    """Before the first sample."""
+    for k in range(PAIR_INTEGERS):
+        samplers.made[k] = -1
+
+
+@kernel
 def sampler_of(samplers: Samplers, k: int) -> Sample:
-    """That of sample first + k."""
-    made: Sample = start_in_block(
-        samplers.setup, samplers.pixel, samplers.first + k, samplers.pairs, samplers.made
-    )
+    """That of sample k, to be taken one after another: a pixel's are drawn several at once."""
+    pixel, number = samplers.pixels[k], samplers.numbers[k]
+    made: Sample = start_in_block(samplers.setup, pixel, number, samplers.pairs, samplers.made)
     return made
 
 
@@ -83,8 +91,8 @@ draw_pair = _draw.function
 """draw_pair(sampler, dimension) -> (u0, u1), each in [0, 1)."""
 
 __all__ = [
-    "BLOCK_FLOATS",
-    "BLOCK_INTEGERS",
+    "PAIR_FLOATS",
+    "PAIR_INTEGERS",
     "AnySampler",
     "Grid",
     "Independent",
@@ -92,6 +100,7 @@ __all__ = [
     "Samplers",
     "Sobol",
     "draw_pair",
+    "forget_pairs",
     "sampler_of",
     "start_in_block",
     "start_sample",

@@ -17,16 +17,18 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reference_rt.kernel import kernel
-from reference_rt.ray import BLOCK
 from reference_rt.sampling import sobol
 from reference_rt.sampling.sobol import SobolSetup, hash_of, pair, reverse_bits, seeds_of
 from reference_rt.shapes.shape import FloatArray, IntArray
+
+TOGETHER = 16
+"""Samples of a block."""
 
 DIMENSIONS = 48
 """The first dimensions, whose pairs are made in blocks: those of eleven bounces.  6 KiB, which
 leaves most of the fastest cache to the scene."""
 
-FLOATS, INTEGERS = 2 * BLOCK * DIMENSIONS, DIMENSIONS
+FLOATS, INTEGERS = 2 * TOGETHER * DIMENSIONS, DIMENSIONS
 """The sizes of `BlockSample.pairs` and `BlockSample.made`."""
 
 
@@ -47,7 +49,7 @@ def start(
     setup: SobolSetup, pixel: int, sample: int, pairs: FloatArray, made: IntArray
 ) -> BlockSample:
     # Samples are at most 2^31, and there are 16 in a block.
-    block = pixel * 2**27 + sample // BLOCK
+    block = pixel * 2**27 + sample // TOGETHER
     return BlockSample(sobol.start(setup, pixel, 0).key, sample, block, pairs, made)
 
 
@@ -58,13 +60,13 @@ def draw(sampler: BlockSample, dimension: int) -> tuple[float, float]:
     if dimension >= DIMENSIONS:
         seeds = seeds_of(hash_of(sampler.key, dimension))
         return pair(seeds, reverse_bits(np.uint64(sample)))
-    at = 2 * BLOCK * dimension
-    lane = sample % BLOCK
+    at = 2 * TOGETHER * dimension
+    lane = sample % TOGETHER
     if sampler.made[dimension] != sampler.block:
         order, x_seed, y_seed = seeds_of(hash_of(sampler.key, dimension))
         fill(order, x_seed, y_seed, sample - lane, pairs, at)
         sampler.made[dimension] = sampler.block
-    return pairs[at + lane], pairs[at + BLOCK + lane]
+    return pairs[at + lane], pairs[at + TOGETHER + lane]
 
 
 @kernel
@@ -76,23 +78,23 @@ def fill_plainly(
     pairs: FloatArray,
     at: int,
 ) -> None:
-    """The pairs of BLOCK samples from `first` on: u0 into pairs[at :], u1 after these."""
-    for lane in range(BLOCK):
+    """The pairs of TOGETHER samples from `first` on: u0 into pairs[at :], u1 after these."""
+    for lane in range(TOGETHER):
         u0, u1 = pair((order, x_seed, y_seed), reverse_bits(np.uint64(first + lane)))
-        pairs[at + lane], pairs[at + BLOCK + lane] = u0, u1
+        pairs[at + lane], pairs[at + TOGETHER + lane] = u0, u1
 
 
-_WORDS = ir.VectorType(ir.IntType(32), BLOCK)
-_REALS = ir.VectorType(ir.DoubleType(), BLOCK)
+_WORDS = ir.VectorType(ir.IntType(32), TOGETHER)
+_REALS = ir.VectorType(ir.DoubleType(), TOGETHER)
 
 
 def _all(value: int | float, of: ir.VectorType = _WORDS) -> ir.Constant:
-    return ir.Constant(of, [value] * BLOCK)
+    return ir.Constant(of, [value] * TOGETHER)
 
 
 def _reverse(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
     of_type = ir.FunctionType(_WORDS, [_WORDS])
-    name = f"llvm.bitreverse.v{BLOCK}i32"
+    name = f"llvm.bitreverse.v{TOGETHER}i32"
     return builder.call(cgutils.get_or_insert_function(builder.module, of_type, name), [x])
 
 
@@ -130,10 +132,10 @@ def _generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: An
         builder.store(u, builder.bitcast(place, _REALS.as_pointer()), align=8)
 
     order, x_seed, y_seed = (in_all_lanes(seed) for seed in seeds)
-    sample = builder.add(in_all_lanes(first), ir.Constant(_WORDS, list(range(BLOCK))))
+    sample = builder.add(in_all_lanes(first), ir.Constant(_WORDS, list(range(TOGETHER))))
     index = _reverse(builder, _scramble(builder, _reverse(builder, sample), order))
     store(_scramble(builder, index, x_seed), 0)
-    store(_scramble(builder, _pascal(builder, index), y_seed), BLOCK)
+    store(_scramble(builder, _pascal(builder, index), y_seed), TOGETHER)
     return context.get_dummy_value()
 
 

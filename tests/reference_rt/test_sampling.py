@@ -6,8 +6,8 @@ import pytest
 import reference_rt as rt
 from reference_rt.kernel import entry_kernel
 from reference_rt.sampling import (
-    BLOCK_FLOATS,
-    BLOCK_INTEGERS,
+    PAIR_FLOATS,
+    PAIR_INTEGERS,
     blocks,
     draw_pair,
     sobol,
@@ -83,7 +83,7 @@ def test_blocks_give_the_same_numbers(sampler):
     order = np.concatenate([order, order[::-1], rng.permutation(n)])
     pixels, samples, dimensions = pixels[order], samples[order], dimensions[order]
     setup = sampler(spp=1).setup() if sampler is rt.Grid else sampler(spp=1, seed=77).setup()
-    pairs, made = np.full(BLOCK_FLOATS, np.nan), np.full(BLOCK_INTEGERS, -1)
+    pairs, made = np.full(PAIR_FLOATS, np.nan), np.full(PAIR_INTEGERS, -1)
     found = np.empty((len(pixels), 2))
     _draw_in_blocks(setup, pixels, samples, dimensions, pairs, made, found)
     expected = np.empty_like(found)
@@ -103,10 +103,10 @@ def _fill_both(order, x_seed, y_seed, first, fast, plain):
 
 def test_vector_code_gives_the_bits_of_the_plain_kernel():
     rng = np.random.default_rng(63)
-    fast, plain = np.empty((2, 2 * blocks.BLOCK))
+    fast, plain = np.empty((2, 2 * blocks.TOGETHER))
     for _ in range(300):
         seeds = rng.integers(0, 2**32, 3, dtype=np.uint64)
-        first = int(rng.integers(0, 2**27)) * blocks.BLOCK
+        first = int(rng.integers(0, 2**27)) * blocks.TOGETHER
         _fill_both(*seeds, first, fast, plain)
         assert np.array_equal(fast, plain)
     # And of Python's.
@@ -115,7 +115,7 @@ def test_vector_code_gives_the_bits_of_the_plain_kernel():
     assert np.array_equal(fast, plain)
     assert [tuple(p) for p in plain.reshape(2, -1).T] == [
         sobol.pair(tuple(seeds), sobol.reverse_bits(np.uint64(first + k)))
-        for k in range(blocks.BLOCK)
+        for k in range(blocks.TOGETHER)
     ]
 
 
