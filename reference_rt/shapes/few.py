@@ -7,9 +7,9 @@ from reference_rt.ray import Crossing, Hit, Ray, miss, no_hit
 from reference_rt.shapes import box, rectangle, sphere
 from reference_rt.shapes.box import Boxes
 from reference_rt.shapes.dispatch import intersect_row
-from reference_rt.shapes.lanes import begin, end
 from reference_rt.shapes.rectangle import Rectangles
 from reference_rt.shapes.shape import LANES, FloatArray, IntArray, nearest_lane
+from reference_rt.shapes.side_by_side import begin, end
 from reference_rt.shapes.sphere import Spheres
 from reference_rt.shapes.tables import (
     BOX,

@@ -10,14 +10,6 @@ from reference_rt.description import Positive, Vector
 from reference_rt.kernel import kernel
 from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.sampling.warp import on_circle
-from reference_rt.shapes.lanes import (
-    larger,
-    nearer_by,
-    select,
-    smaller,
-    square_root,
-    with_sign,
-)
 from reference_rt.shapes.placement import local_vector, owners, world_covector
 from reference_rt.shapes.quadric import ellipsoid
 from reference_rt.shapes.quadrics import Quadrics
@@ -37,6 +29,14 @@ from reference_rt.shapes.shape import (
     one_span,
     outward,
     pack,
+)
+from reference_rt.shapes.side_by_side import (
+    larger,
+    nearer_by,
+    select,
+    smaller,
+    square_root,
+    with_sign,
 )
 from reference_rt.vec3 import Vec3, dot, frame_from_normal, length, normalize, row, to_world
 
