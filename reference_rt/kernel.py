@@ -75,7 +75,7 @@ CACHE_FOLDER = _prepare_cache()
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 
 # Nothing calls kernels from C: the wrappers for it took a fifth of the compile time (measured).
-_INSIDE = _OPTIONS | {"no_cfunc_wrapper": True}
+_INSIDE = _OPTIONS | {"no_cfunc_wrapper": True, "forceinline": True}
 
 
 def kernel(function: F) -> F:
@@ -85,7 +85,7 @@ def kernel(function: F) -> F:
     tables field by field, some 400 words a call: hence the inlining (measured: 1.5 times faster).
     Not giving each kernel a Python wrapper and a cache file of its own halves the compile time.
     """
-    inlined: F = register_jitable(**_INSIDE, forceinline=True)(function)
+    inlined: F = register_jitable(**_INSIDE)(function)
     return inlined
 
 
@@ -130,7 +130,7 @@ class ByClass:
         choose.__name__ = name
         self.function: Callable[..., Any] = choose
 
-        @overload(choose, strict=False)  # type: ignore[untyped-decorator]
+        @overload(choose, strict=False, jit_options=_INSIDE)  # type: ignore[untyped-decorator]
         def _compiled(first: Any, *rest: Any) -> Callable[..., Any] | None:
             for cls, function in self._kernels.items():
                 if is_named_tuple(first, cls) or (
