@@ -103,10 +103,12 @@ class Trees:
             return None
         order = [self._scene, *(k for k in range(len(self._wide)) if k != self._scene)]
         triangles = self.tables["triangles"]
-        wide, kinds, rows = (
-            [of_tree[k] for k in order] for of_tree in (self._wide, self._kinds, self._rows)
+        joined = bvh.joined(
+            [self._wide[k] for k in order],
+            [self._kinds[k] for k in order],
+            [self._rows[k] for k in order],
+            None if triangles is None else triangles.vertices,
         )
-        joined = bvh.joined(wide, kinds, rows, None if triangles is None else triangles.vertices)
         return joined._replace(unbounded=-1 if self._unbounded < 0 else self.start(self._unbounded))
 
     def start(self, tree: int) -> int:

@@ -99,19 +99,22 @@ def is_packet(code: int) -> bool:
 @kernel
 def child_of(bvh: Bvh, node: int, lane: int) -> int:
     """The code of a node's child."""
-    return np.int64(bvh.children[node, CHILDREN + lane])
+    code: int = np.int64(bvh.children[node, CHILDREN + lane])  # type: ignore[assignment]
+    return code
 
 
 @kernel
 def kind_of(bvh: Bvh, reference: int) -> int:
     """The kind of a reference."""
-    return np.int64(bvh.references[reference, 0])
+    kind: int = np.int64(bvh.references[reference, 0])  # type: ignore[assignment]
+    return kind
 
 
 @kernel
 def row_of(bvh: Bvh, reference: int) -> int:
     """The row of a reference in the table of its kind."""
-    return np.int64(bvh.references[reference, 1])
+    row: int = np.int64(bvh.references[reference, 1])  # type: ignore[assignment]
+    return row
 
 
 @kernel
