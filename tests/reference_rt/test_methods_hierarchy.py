@@ -71,4 +71,3 @@ def test_each_builds_what_it_says():
     assert not np.array_equal(median.boxes, sah.boxes)
     costs = [bvh.of_wide(tree).sah_cost for tree in (none, median, sah, spatial)]
     assert costs[0] > max(costs[1:])
-    assert costs[3] < min(costs[:3])
