@@ -14,7 +14,7 @@ from typing import Any
 
 from llvmlite import binding
 from numba import _dynfunc
-from numba.core import types
+from numba.core import cgutils, config, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -67,6 +67,30 @@ class _Entry(_Inlined):
         return JITCodeLibrary._get_module_for_linking(self)
 
 
+def _call(called: Any, library: Any) -> Any:
+    """What writes a call of a kernel: as Numba's own, without asking whether it raised anything,
+    which takes five blocks; but for indices out of bounds, where these are checked, none does."""
+
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        function = context.declare_function(builder.module, called)
+        if config.BOUNDSCHECK:
+            status, value = context.call_conv.call_function(
+                builder, function, called.restype, called.argtypes, arguments
+            )
+            with cgutils.if_unlikely(builder, status.is_error):
+                context.call_conv.return_status_propagate(builder, status)
+            return value
+        returned = cgutils.alloca_once(builder, function.args[0].type.pointee)
+        raised = builder.function.args[1]
+        packed = context.get_arg_packer(called.argtypes).as_arguments(builder, arguments)
+        builder.call(function, [returned, raised, *packed])
+        return context.get_returned_value(builder, called.restype, builder.load(returned))
+
+    write.signature = called.argtypes
+    write.libs = (library,)
+    return write
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _LowerInlined(NativeLowering):
     """Without an address: nothing but kernels calls the result."""
@@ -83,7 +107,8 @@ class _LowerInlined(NativeLowering):
         stands_for_it = _dynfunc.make_function(
             lowered.fndesc.lookup_module(), name, name, 0, lowered.env, (state.library,)
         )
-        state.targetctx.insert_user_function(stands_for_it, lowered.fndesc, [state.library])
+        call = _call(lowered.fndesc, state.library)
+        state.targetctx.insert_func_defn([(call, stands_for_it, call.signature)])
         state["cr"] = lowered._replace(cfunc=stands_for_it)
         return True
 
@@ -99,7 +124,8 @@ class _LowerEntry(NativeLowering):
 
 
 class _Whole:
-    """Mixed into the model of a kind of tuple: an argument is the tuple itself."""
+    """Mixed into the model of a kind of tuple: an argument, and what is returned, is the tuple
+    itself."""
 
     def get_argument_type(self) -> Any:
         return self.get_value_type()
@@ -108,6 +134,15 @@ class _Whole:
         return value
 
     def from_argument(self, builder: Any, value: Any) -> Any:
+        return value
+
+    def get_return_type(self) -> Any:
+        return self.get_value_type()
+
+    def as_return(self, builder: Any, value: Any) -> Any:
+        return value
+
+    def from_return(self, builder: Any, value: Any) -> Any:
         return value
 
 
