@@ -68,7 +68,7 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sa
     # the eye and for delta lobes, whose finds no light sample competes for.
     bsdf_pdf, previous, normal = 0.0, ray.o, ray.d
     lights = scene.lights
-    layers = local_floats(any_material.layer_floats(scene.materials))
+    kept = local_floats(any_material.kept_floats(scene.materials))
     for depth in range(path.max_depth):
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
@@ -78,7 +78,7 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sa
                 weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, light_pdf)
             total = total + throughput * any_light.background(lights.environment, ray.d) * weight
             break
-        shading = shade(scene, ray, hit, layers)
+        shading = shade(scene, ray, hit, kept)
         point = shading.point
         if point.light >= 0:
             weight = 1.0

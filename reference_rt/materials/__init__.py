@@ -35,10 +35,11 @@ from reference_rt.materials.rough_conductor import RoughConductor
 from reference_rt.materials.rough_dielectric import RoughDielectric
 from reference_rt.materials.rough_plastic import RoughPlastic
 from reference_rt.materials.shading import Shading
+from reference_rt.materials.textured import Textured, looked_floats
 from reference_rt.materials.thin_dielectric import ThinDielectric
 from reference_rt.materials.wrappers import Blend, Mask, TwoSided, Wrapper
 from reference_rt.shapes.shape import IntArray
-from reference_rt.textures import Colours
+from reference_rt.textures import At, Colours
 from reference_rt.vec3 import Vec3, to_local, to_world
 
 AnyMaterial = Annotated[
@@ -71,14 +72,15 @@ class Materials(NamedTuple):
     traits (n,), SMOOTH where lights can be sampled, CHOOSES where `sample` uses `u_lobe`, BEHIND
     where light from both sides of the surface counts; shown
     (n), its colour to ray casting.  oriented (1,) where any scatters differently along u and v, or
-    is tilted by a texture, else None;  layers, None where no material is made of others;  leaves,
-    the tables."""
+    is tilted by a texture, else None;  textured, None where none has a texture;  layers, None where
+    no material is made of others;  leaves, the tables."""
 
     kind: IntArray
     row: IntArray
     traits: IntArray
     shown: Colours
     oriented: IntArray | None
+    textured: Textured | None
     layers: Layers | None
     leaves: Leaves
 
@@ -231,15 +233,17 @@ def most_branches(materials: Materials) -> int:
 
 
 @kernel
-def layer_floats(materials: Materials) -> int:
-    """The size of the array that `Shading.layers` must be for this scene's materials."""
-    return any_layer.SIZE * any_layer.most(materials.layers)
+def kept_floats(materials: Materials) -> int:
+    """The size of the array that `shade` must have for this scene's materials."""
+    layers = any_layer.SIZE * any_layer.most(materials.layers)
+    return looked_floats(materials.textured) + layers
 
 
 @kernel
-def prepare(materials: Materials, shading: Shading) -> None:
-    """Fills `shading.layers`: before anything else is asked."""
-    any_layer.prepare(materials.layers, shading)
+def prepare(materials: Materials, shading: Shading, at: At) -> None:
+    """Fills `shading.layers`: before anything else is asked.  `at`: where to ask textures that were
+    not looked up."""
+    any_layer.prepare(materials.layers, shading, at)
 
 
 @kernel
@@ -331,7 +335,7 @@ __all__ = [
     "chooses",
     "evaluate",
     "is_smooth",
-    "layer_floats",
+    "kept_floats",
     "most_branches",
     "pdf",
     "prepare",

@@ -18,7 +18,7 @@ from reference_rt.materials.normal_map import NormalMap, NormalMaps
 from reference_rt.materials.shading import Shading
 from reference_rt.materials.wrappers import Blend, Mask, TwoSided, Wrapper
 from reference_rt.shapes.shape import IntArray, Tangents
-from reference_rt.textures import Numbers, Palette, number_at
+from reference_rt.textures import At, Numbers, Palette, number_at
 from reference_rt.textures.parameter import join
 from reference_rt.vec3 import Frame, Vec3, to_local, to_world
 
@@ -213,7 +213,7 @@ def most(layers: Layers | None) -> int:
 
 
 @kernel
-def prepare(layers: Layers | None, shading: Shading) -> None:
+def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
     """Keeps the layers of the material in `shading.layers`.
 
     They depend on the point and on the viewer, not on where light comes from: found once, they
@@ -223,7 +223,7 @@ def prepare(layers: Layers | None, shading: Shading) -> None:
         return
     m = shading.point.material
     for k in range(layers.number[m]):
-        found = _layer(layers, layers.first[m] + k, shading)
+        found = _layer(layers, layers.first[m] + k, shading, at)
         kept = shading.layers[SIZE * k : SIZE * (k + 1)]
         kept[0], kept[10] = found.weight, found.side
         kept[1], kept[2], kept[3] = found.basis.s
@@ -244,7 +244,7 @@ def layer_at(shading: Shading, k: int) -> Layer:
 
 
 @kernel
-def _layer(layers: Layers, k: int, shading: Shading) -> Layer:
+def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
     """Layer k of all at a point, seen from `shading.wo`."""
     weight, side, tilted = 1.0, 1.0, False
     basis = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
@@ -270,7 +270,7 @@ def _layer(layers: Layers, k: int, shading: Shading) -> Layer:
                 to_local(basis, shading.tangents.dpdu), to_local(basis, shading.tangents.dpdv)
             )
             if code == BUMP:
-                turned = _bumped(layers.bumps, i, shading, local)
+                turned = _bumped(layers.bumps, i, at, local)
             else:
                 turned = _mapped(layers.normal_maps, i, shading, local)
             basis = Frame(
@@ -292,10 +292,10 @@ def _identity() -> Frame:
 
 
 @kernel
-def _bumped(bumps: Bumps | None, i: int, shading: Shading, tangents: Tangents) -> Frame:
+def _bumped(bumps: Bumps | None, i: int, at: At, tangents: Tangents) -> Frame:
     if bumps is None:
         return _identity()
-    return bump.basis(bumps, i, shading.at, tangents)
+    return bump.basis(bumps, i, at, tangents)
 
 
 @kernel

@@ -37,9 +37,9 @@ def tables_of(**materials):
 def shading(tables, m, wo, u=0.1, v=0.1):
     point = SurfacePoint(Vec3(0.0, 0.0, 0.0), Z, Z, 0.0, m, -1)
     at = At(tables.textures, u, v, Vec3(-1.0, -1.0, -1.0))
-    kept = np.zeros(any_material.layer_floats(tables.materials))
+    kept = np.zeros(any_material.kept_floats(tables.materials))
     place = Shading(point, Frame(X, Y, Z), wo, at, Tangents(X, Y), kept)
-    any_material.prepare(tables.materials, place)
+    any_material.prepare(tables.materials, place, at)
     return place
 
 
