@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.extending import overload
 
-from reference_rt.kernel import is_named_tuple, kernel
+from reference_rt.kernel import is_named_tuple, kernel, overload_kernel
 
 
 class Vec3(NamedTuple):
@@ -49,7 +48,7 @@ def _compile_operator(symbols: tuple[Callable[..., Any], ...], scalar: Any, vect
     """Let compiled code use `symbols` on Vec3 with the very text that Python runs."""
     for symbol in symbols:
 
-        @overload(symbol, strict=False)  # type: ignore[untyped-decorator]
+        @overload_kernel(symbol)
         def _implementation(self: Any, other: Any) -> Any:
             if not is_named_tuple(self, Vec3):
                 return None
@@ -64,7 +63,7 @@ _compile_operator((operator.mul, operator.imul), _times_scalar, _times_vec3)
 _compile_operator((operator.truediv, operator.itruediv), Vec3.__truediv__, None)
 
 
-@overload(operator.neg, strict=False)  # type: ignore[untyped-decorator]
+@overload_kernel(operator.neg)
 def _negative(self: Any) -> Any:
     return Vec3.__neg__ if is_named_tuple(self, Vec3) else None
 

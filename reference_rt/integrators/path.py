@@ -107,10 +107,10 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sa
     """An estimate of the radiance that arrives along `ray` at its origin; its mean is exact."""
     total = Vec3(0.0, 0.0, 0.0)
     state = start(ray)
-    layers = local_floats(any_material.layer_floats(scene.materials))
+    kept = local_floats(any_material.kept_floats(scene.materials))
     for depth in range(path.max_depth):
         hit = closest_hit(scene.geometry, ray)
-        step = advance(path, scene, depth, ray, hit, state, sampler, layers)
+        step = advance(path, scene, depth, ray, hit, state, sampler, kept)
         total = total + step.emitted
         if not is_black(step.light):
             if not occluded(scene.geometry, step.shadow):
@@ -131,7 +131,7 @@ def radiances(
     for j in range(n):
         _put_state(scratch, j, j, start(ray_of(rays, j)))
         put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
-    layers = local_floats(any_material.layer_floats(scene.materials))
+    kept = local_floats(any_material.kept_floats(scene.materials))
     for depth in range(path.max_depth):
         if n == 0:
             break
@@ -142,7 +142,7 @@ def radiances(
             state = _state_of(scratch, j)
             sampler = sampler_of(samplers, k)
             step = advance(
-                path, scene, depth, ray_of(rays, j), hit_of(hits, j), state, sampler, layers
+                path, scene, depth, ray_of(rays, j), hit_of(hits, j), state, sampler, kept
             )
             put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + step.emitted)
             if not is_black(step.light):
@@ -195,7 +195,7 @@ def advance(
     hit: Hit,
     state: State,
     sampler: sampling.Sample,
-    layers: FloatArray,
+    kept: FloatArray,
 ) -> Step:
     """From what the ray that is edge number `depth` of a path has hit to the next ray."""
     lights = scene.lights
@@ -209,7 +209,7 @@ def advance(
             weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, light_pdf)
         emitted = throughput * any_light.background(lights.environment, ray.d) * weight
         return Step(emitted, black, ray, False, ray, state)
-    shading = shade(scene, ray, hit, layers)
+    shading = shade(scene, ray, hit, kept)
     point = shading.point
     emitted = black
     if point.light >= 0:

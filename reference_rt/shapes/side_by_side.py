@@ -17,8 +17,9 @@ import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
+from reference_rt.kernel import overload_kernel
 from reference_rt.ray import BLOCK, Ray
 from reference_rt.shapes.shape import LANES, FloatArray, IntArray
 from reference_rt.vec3 import Vec3
@@ -125,7 +126,7 @@ def with_sign(x: Any, sign: Any) -> Any:
 
 def _compiled_as(function: Callable[..., Any], one: Callable[..., Any]) -> None:
     """What compiled code calls for numbers."""
-    overload(function, strict=False, jit_options={"forceinline": True})(lambda *_: one)
+    overload_kernel(function)(lambda *_: one)
 
 
 _compiled_as(select, lambda condition, a, b: a if condition else b)
