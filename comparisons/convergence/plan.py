@@ -1,0 +1,91 @@
+"""How far each contestant climbs within the time, from what a few pictures of it take."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from comparisons.convergence.contestants import Renderer
+from comparisons.convergence.data import FIRST, Settings
+
+TRIALS = (FIRST, 4 * FIRST)
+"""Samples a pixel of the pictures that costs are estimated from."""
+
+TRIAL_SEED = 1 << 20
+"""Replicate number of these pictures, above all that count."""
+
+MOST_LANES = 1 << 27
+"""Samples of one picture: Mitsuba's llvm variant keeps some state of each in memory."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds of a picture are start + per_sample times the samples a pixel; those of the first
+    with a new number of samples, `first` more."""
+
+    start: float
+    per_sample: float
+    first: float
+
+    def picture(self, spp: int) -> float:
+        return self.start + self.per_sample * spp
+
+    def rung(self, spp: int, replicates: int) -> float:
+        return self.first + replicates * self.picture(spp)
+
+
+def estimate(renderer: Renderer) -> Cost:
+    """From two pictures each with two numbers of samples: the first of the two may compile."""
+    found = []
+    for spp in TRIALS:
+        first = renderer(spp, TRIAL_SEED).seconds
+        again = renderer(spp, TRIAL_SEED + 1)
+        found.append((again.spp, first, again.seconds))
+    (few, _, short), (many, first, long) = found
+    # Where noise hides the difference, all of the longer one counts as samples.
+    per_sample = (long - short) / (many - few) if long > short else long / many
+    start = max(0.0, short - per_sample * few)
+    return Cost(start, per_sample, max(0.0, first - long))
+
+
+def rungs(max_spp: int) -> tuple[int, ...]:
+    """FIRST, 2 FIRST, ... up to `max_spp`."""
+    return tuple(FIRST << k for k in range(max(0, (max_spp // FIRST).bit_length())))
+
+
+def affordable(cost: Cost, seconds: float, settings: Settings, pixels: int) -> tuple[int, ...]:
+    """The rungs that fit into `seconds`, the cheapest first."""
+    found: list[int] = []
+    for spp in rungs(settings.max_spp):
+        seconds -= cost.rung(spp, settings.replicates)
+        if seconds < 0.0 or spp * pixels > MOST_LANES:
+            break
+        found.append(spp)
+    return tuple(found)
+
+
+def why_left_out(
+    cost: Cost, planned: Sequence[int], share: float, settings: Settings, pixels: int
+) -> str:
+    """Why the rung after the last one is not climbed; empty where it was not asked for."""
+    following = [spp for spp in rungs(settings.max_spp) if spp not in planned]
+    if not following:
+        return ""
+    spp = following[0]
+    if spp * pixels > MOST_LANES:
+        return f"rungs from {spp} samples a pixel: more than {MOST_LANES:,} samples in a picture"
+    spent = sum(cost.rung(done, settings.replicates) for done in planned)
+    return (
+        f"rungs from {spp} samples a pixel: {settings.replicates} pictures would take "
+        f"{cost.rung(spp, settings.replicates):.2g} s, and {max(0.0, share - spent):.2g} s of its "
+        f"{share:.2g} s are left"
+    )
+
+
+__all__ = [
+    "MOST_LANES",
+    "TRIAL_SEED",
+    "Cost",
+    "affordable",
+    "estimate",
+    "rungs",
+    "why_left_out",
+]

@@ -1,0 +1,183 @@
+"""The convergence of one scene, from its files to its curves."""
+
+from collections.abc import Callable
+from functools import cache
+
+from comparisons.budget import Budget
+from comparisons.compare import budgeted
+from comparisons.convergence.contestants import (
+    CONTESTANTS,
+    AbsentError,
+    Contestant,
+    Renderer,
+    Stable,
+    chosen,
+    remarks,
+)
+from comparisons.convergence.crops import crops_of
+from comparisons.convergence.curves import Curves
+from comparisons.convergence.data import FIRST, WIDEST, Settings
+from comparisons.convergence.deterministic import grids_of
+from comparisons.convergence.findings import findings_of
+from comparisons.convergence.ladder import Climb, climb
+from comparisons.convergence.plan import Cost, affordable, estimate, rungs, why_left_out
+from comparisons.convergence.reference import COUNT, reference_of
+from comparisons.convergence.starts import starts_of
+from comparisons.convergence.store import Store
+from reference_rt.filters import BoxFilter
+from reference_rt.scene import Scene
+
+Say = Callable[[str, float], None]
+"""Is told what is being done, and the fraction of it that is done."""
+
+NOWHERE = Store(None, "")
+DEFAULTS = Settings()
+
+
+def silent(what: str, fraction: float) -> None:
+    """A `Say` that says nothing."""
+
+
+def prepared(scene: Scene, settings: Settings) -> Scene:
+    """The scene as it is rendered: through a box filter, whose pixels are independent, and at most
+    WIDEST pixels across where no size is asked for."""
+    film = scene.film
+    size = settings.size
+    if size is None and film.width > WIDEST:
+        size = (WIDEST, max(1, round(film.height * WIDEST / film.width)))
+    return budgeted(scene, Budget(size=size))
+
+
+def converge(
+    scene: Scene,
+    settings: Settings = DEFAULTS,
+    store: Store = NOWHERE,
+    threads: int | None = None,
+    say: Say = silent,
+) -> Curves:
+    """Error against time of ours and of Mitsuba's variants for one scene.
+
+    Finished rungs are taken from `store` and kept there.  Raises SceneError, UsageError for a name
+    in `settings.only` that is no contestant's, ReferenceUnavailableError without Mitsuba,
+    ImageError where the store cannot be written.
+    """
+    contestants = chosen(settings.only)
+    asked, scene = scene, prepared(scene, settings)
+    notes = []
+    if not isinstance(asked.film.filter, BoxFilter):
+        notes.append("rendered through a box filter")
+    if (asked.film.width, asked.film.height) != (scene.film.width, scene.film.height):
+        notes.append(
+            f"rendered at {scene.film.width} x {scene.film.height} pixels, where the scene has "
+            f"{asked.film.width} x {asked.film.height}"
+        )
+    size = (scene.film.width, scene.film.height)
+    if scene.integrator.deterministic:
+        grids, left_out = grids_of(scene, settings, store, threads, say)
+        return Curves(asked.name, size, grids=grids, left_out=tuple(left_out), notes=tuple(notes))
+    return _Run(scene, settings, store, threads, say).curves(contestants, tuple(notes))
+
+
+class _Run:
+    """One scene's ladder; renderers are made ready when they are first needed."""
+
+    def __init__(
+        self, scene: Scene, settings: Settings, store: Store, threads: int | None, say: Say
+    ) -> None:
+        self.scene, self.settings, self.store = scene, settings, store
+        self.threads, self.say = threads, say
+        self.stable = Stable(scene, threads)
+        self.left_out: list[str] = []
+        self.renderer = cache(self._renderer)
+
+    def _renderer(self, contestant: Contestant) -> Renderer:
+        def compiling(what: str, fraction: float) -> None:
+            if what == "compile":
+                self.say(what, fraction)
+
+        return self.stable.ready(contestant, compiling)
+
+    def curves(self, contestants: tuple[Contestant, ...], notes: tuple[str, ...]) -> Curves:
+        scene, settings = self.scene, self.settings
+        planned, reference_spp, self.left_out = self._plan(contestants)
+        reference = reference_of(scene, reference_spp, self.threads, self.say)
+        share = settings.time_limit / (len(planned) + 1)
+        by_name = {c.name: c for c in contestants if planned.get(c.name)}
+        climbs = {
+            name: Climb(lambda c=c: self.renderer(c), planned[name], share)  # type: ignore[misc]
+            for name, c in by_name.items()
+        }
+        climb(climbs, reference, settings.replicates, self.store, self.say)
+        left_out = [*self.left_out]
+        left_out += [f"{by_name[n].title}: {c.stopped}" for n, c in climbs.items() if c.stopped]
+        climbed = {name: one.rungs for name, one in climbs.items() if one.rungs}
+        renderers = {name: climbs[name].renderer for name in climbed}
+        starts = starts_of(scene, by_name.values(), self.store, self.say) if settings.starts else {}
+        if any(c.side != "ours" for c in by_name.values()):
+            notes += tuple(remarks(scene))
+        return Curves(
+            scene.name,
+            (scene.film.width, scene.film.height),
+            by_name,
+            {n: findings_of(r, reference, settings.targets) for n, r in climbed.items()},
+            reference,
+            starts=starts,
+            crops=crops_of(climbed, renderers, reference, self.store),
+            left_out=tuple(left_out),
+            notes=notes,
+        )
+
+    def _plan(
+        self, contestants: tuple[Contestant, ...]
+    ) -> tuple[dict[str, list[int]], int, list[str]]:
+        """Rungs by contestant, samples a pixel of the reference, and what is left out; as stored,
+        where the same was planned before."""
+        settings = self.settings
+        question = [settings.time_limit, settings.max_spp, settings.only]
+        stored = self.store.fact("plan", question)
+        if stored is not None:
+            return stored[0], int(stored[1]), stored[2]
+        costs, left_out = self._costs(contestants)
+        share = settings.time_limit / (len(costs) + 1)
+        pixels = self.scene.film.width * self.scene.film.height
+        planned = {}
+        for contestant, cost in costs.items():
+            fit = affordable(cost, share, settings, pixels)
+            if len(fit) < 2 and contestant.side == "ours":
+                fit = rungs(settings.max_spp)[:2]
+            if len(fit) < 2:
+                fit = ()
+            why = why_left_out(cost, fit, share, settings, pixels)
+            if why:
+                left_out.append(f"{contestant.title}: {why}")
+            planned[contestant.name] = list(fit)
+        ours = costs.get(CONTESTANTS[0]) or estimate(self.renderer(CONTESTANTS[0]))
+        spp = _reference_spp(ours, share, settings.max_spp)
+        self.store.keep_fact("plan", [planned, spp, left_out], question)
+        return planned, spp, left_out
+
+    def _costs(
+        self, contestants: tuple[Contestant, ...]
+    ) -> tuple[dict[Contestant, Cost], list[str]]:
+        """Of those that can render the scene, and why others cannot."""
+        found, left_out = {}, []
+        for number, contestant in enumerate(contestants):
+            self.say("trial pictures", number / len(contestants))
+            try:
+                found[contestant] = estimate(self.renderer(contestant))
+            except AbsentError as error:
+                left_out.append(f"{contestant.title}: {error}")
+        self.say("trial pictures", 1.0)
+        return found, left_out
+
+
+def _reference_spp(cost: Cost, share: float, max_spp: int) -> int:
+    """The most samples a pixel, a power of two, that the share of the time allows COUNT pictures;
+    no fewer than four times those of the first rung."""
+    spp = 4 * FIRST
+    while spp < 4 * max_spp and COUNT * cost.picture(2 * spp) <= share:
+        spp *= 2
+    return spp
+
+
+__all__ = ["converge", "prepared"]
