@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from comparisons.convergence.contestants import Renderer
-from comparisons.convergence.data import Reference, Rung
-from comparisons.convergence.estimates import errors, weights
+from comparisons.convergence.data import Reference, Rung, weights
+from comparisons.convergence.estimates import errors
 from comparisons.convergence.findings import points_of
 from comparisons.convergence.fits import linear_time, time_to
 from comparisons.convergence.store import Store
@@ -61,14 +61,18 @@ def crops_of(
     if not rungs:
         return ()
     corner, size = worst_part(rungs, reference)
+    levels: dict[Kind, tuple[float, dict[str, int]]] = {
+        "time": _at_equal_time(rungs),
+        "error": _at_equal_error(rungs),
+    }
     found = []
-    for kind, level, samples in (("time", *_at_equal_time(rungs)), ("error", *_at_error(rungs))):
+    for kind, (level, samples) in levels.items():
         shown = {
             name: _shown(f"{kind}-{name}", spp, renderers[name], reference, store)
             for name, spp in samples.items()
         }
         if shown:
-            found.append(Crops(kind, level, shown, corner, size))  # type: ignore[arg-type]
+            found.append(Crops(kind, level, shown, corner, size))
     return tuple(found)
 
 
@@ -84,7 +88,7 @@ def _at_equal_time(rungs: Mapping[str, list[Rung]]) -> tuple[float, dict[str, in
     return level, samples
 
 
-def _at_error(rungs: Mapping[str, list[Rung]]) -> tuple[float, dict[str, int]]:
+def _at_equal_error(rungs: Mapping[str, list[Rung]]) -> tuple[float, dict[str, int]]:
     squared = max(float(climbed[-1].relmse.mean()) for climbed in rungs.values())
     if not squared > 0.0:
         return 0.0, {}
@@ -119,17 +123,17 @@ def worst_part(
     """Left and upper edge, width and height of the part where the relative variance of the last
     rungs is largest, each contestant's relative to its own mean."""
     weight = weights(reference.mean)
-    total = np.zeros(reference.mean.shape[:2])
+    height, width = reference.mean.shape[:2]
+    total = np.zeros((height, width))
     for climbed in rungs.values():
         noise = (weight * climbed[-1].variance).mean(axis=-1)
         total += noise / (noise.mean() or 1.0)
-    height, width = total.shape
     size = max(1, width // SIDE), max(1, height // SIDE)
     sums = np.pad(total, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
     w, h = size
     boxes = sums[h:, w:] - sums[:-h, w:] - sums[h:, :-w] + sums[:-h, :-w]
-    y, x = np.unravel_index(int(boxes.argmax()), boxes.shape)
-    return (int(x), int(y)), size
+    y, x = divmod(int(boxes.argmax()), boxes.shape[1])
+    return (x, y), size
 
 
 __all__ = ["Crops", "Shown", "crops_of", "worst_part"]

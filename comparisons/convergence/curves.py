@@ -7,6 +7,7 @@ from typing import NamedTuple
 from comparisons.convergence.contestants import Contestant
 from comparisons.convergence.crops import Crops
 from comparisons.convergence.data import Reference
+from comparisons.convergence.estimates import Estimate
 from comparisons.convergence.findings import Findings, ratio
 from reference_rt.shapes.shape import FloatArray
 
@@ -70,7 +71,7 @@ class Curves:
     notes: tuple[str, ...] = ()
     again: str = ""
 
-    def ratios(self, name: str = "ours") -> dict[str, list[tuple[float, float, float] | None]]:
+    def ratios(self, name: str = "ours") -> dict[str, list[Estimate | None]]:
         """Times to the targets of contestant `name` over those of each other, with bands."""
         if name not in self.findings:
             return {}

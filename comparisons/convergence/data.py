@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from comparisons.metrics import RELMSE_EPSILON
 from reference_rt.shapes.shape import FloatArray
 
 FIRST = 4
@@ -33,6 +36,13 @@ class Settings:
     starts: bool = True
 
 
+def weights(reference: FloatArray) -> FloatArray:
+    """(height, width, 3): what squared errors are multiplied by to be relative ones: 1 / (r² +
+    epsilon m²), with m the reference's mean, as `comparisons.metrics` has it."""
+    scale = reference**2 + RELMSE_EPSILON * reference.mean() ** 2
+    return np.asarray(1.0 / np.where(scale > 0.0, scale, 1.0))
+
+
 @dataclass(frozen=True)
 class Reference:
     """What errors are measured against: our own picture, with other seeds than any contestant's.
@@ -47,6 +57,11 @@ class Reference:
     count: int
     spp: int
     seconds: float = 0.0
+
+    @property
+    def relmse(self) -> float:
+        """What its own noise is, as relative error squared."""
+        return float((weights(self.mean) * self.variance).mean())
 
 
 @dataclass(frozen=True)
@@ -77,4 +92,4 @@ class Rung:
         return self.seconds[1:] if len(self.seconds) > 1 else self.seconds
 
 
-__all__ = ["FIRST", "WIDEST", "Reference", "Rung", "Settings"]
+__all__ = ["FIRST", "WIDEST", "Reference", "Rung", "Settings", "weights"]

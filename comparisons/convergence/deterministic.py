@@ -7,8 +7,7 @@ import numpy as np
 
 from comparisons import pictures
 from comparisons.convergence.curves import GridPoint, Grids, GridStep
-from comparisons.convergence.data import Settings
-from comparisons.convergence.estimates import weights
+from comparisons.convergence.data import Settings, weights
 from comparisons.convergence.store import Store
 from comparisons.mitsuba_backend import backend
 from comparisons.translate import UntranslatableError, load
@@ -76,7 +75,7 @@ def grids_of(
 
 
 def timed(scene: Scene, n: int, threads: int | None) -> tuple[FloatArray, float]:
-    """The picture with n x n samples a pixel, as displayed if it shows no light, and its seconds."""
+    """The picture with n x n samples a pixel, displayed if it shows no light, and its seconds."""
     start = time.perf_counter()
     if isinstance(scene.integrator, RayCast):
         film = scene.film

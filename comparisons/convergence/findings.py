@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.convergence.data import Reference, Rung
+from comparisons.convergence.data import Reference, Rung, weights
 from comparisons.convergence.estimates import (
     Bias,
     Estimate,
@@ -15,7 +15,6 @@ from comparisons.convergence.estimates import (
     common_error,
     mean_of,
     standard_error,
-    weights,
 )
 from comparisons.convergence.fits import How, Line, Points, Reached, band, log_line, time_to
 from reference_rt.shapes.shape import FloatArray
@@ -34,6 +33,7 @@ class Step(NamedTuple):
 
     asked: int
     spp: int
+    replicates: int
     seconds: Estimate
     mse: Estimate
     relmse: Estimate
@@ -100,6 +100,7 @@ def _step(rung: Rung, reference: Reference, weight: FloatArray) -> Step:
     return Step(
         rung.asked,
         rung.spp,
+        rung.replicates,
         seconds,
         mean_of(rung.mse, common_error(reference, 1.0)),
         mean_of(rung.relmse, common_error(reference, weight)),

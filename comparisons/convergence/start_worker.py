@@ -8,6 +8,7 @@ imported before the side's own modules.
 import json
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 
@@ -66,7 +67,7 @@ def _mitsubas(side: str, path: Path, folder: Path, spp: int, begun: float) -> di
 
 
 def _named(marks: list[float], compiled: float, render: float) -> dict[str, float]:
-    start, load, build = (b - a for a, b in zip(marks, marks[1:], strict=False))
+    start, load, build = (b - a for a, b in pairwise(marks))
     return {"start": start, "load": load, "build": build, "compile": compiled, "render": render}
 
 

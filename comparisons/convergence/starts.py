@@ -18,9 +18,9 @@ from reference_rt.scene import Scene
 
 STAGES = ("start", "load", "build", "compile", "render")
 """start: the interpreter and what it imports;  load: the scene's file read, for Mitsuba also
-translated;  build: tables and hierarchy, or `mitsuba.load_dict`;  compile: kernels compiled, or read
-from the cache; of Mitsuba what the first picture takes more than the second;  render: the second
-picture, with 16 samples a pixel."""
+translated;  build: tables and hierarchy, or `mitsuba.load_dict`;  compile: kernels compiled, or
+read from the cache; of Mitsuba what the first picture takes more than the second;  render: the
+second picture, with 16 samples a pixel."""
 
 SPP = 16
 
