@@ -1,6 +1,5 @@
 """`reference-rt converge`."""
 
-import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -49,9 +48,6 @@ def converge(
         bool, typer.Option(help="Time the start of processes, with caches empty and full.")
     ] = True,
     fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="Of ours.  Default: all cores.")
-    ] = None,
 ) -> None:
     """Error against run time: ours and Mitsuba's; what is done is not done again."""
     # Imported here: `reference-rt render` must not wait for what only comparing needs.
@@ -63,6 +59,7 @@ def converge(
         from comparisons.convergence.run import converge as converge_scene
         from comparisons.convergence.run import prepared
         from comparisons.convergence.store import Store, run_key
+        from comparisons.convergence.summary import again, lines_of
         from comparisons.provenance import provenance
         from comparisons.suites.suite import folder_name
     except ModuleNotFoundError as error:
@@ -88,23 +85,23 @@ def converge(
     files = [out / name for name in ("results.json", "results.csv", "report.html")]
     for file in files:
         check_writable(file)
-    facts = provenance(threads=threads or "all cores")
+    facts = provenance()
     found = []
     for path, scene in zip(scenes, described, strict=True):
-        key = run_key(prepared(scene, settings), replicates, threads)
+        key = run_key(prepared(scene, settings), replicates)
         store = Store(out / "rungs" / folder_name(scene.name), key, fresh=fresh)
         with ProgressLine() as progress:
 
             def say(what: str, part: float, name: str = scene.name) -> None:
                 progress(what if what == "compile" else f"{name}: {what}", part)
 
-            curves = converge_scene(scene, settings, store, threads, say)
-        found.append(replace(curves, again=_again(path, out, settings, size, targets)))
+            curves = converge_scene(scene, settings, store, say)
+        found.append(replace(curves, again=again(path, out, settings)))
         # After each scene, so that an interruption loses none that is finished.
         write_results(files[0], found, settings, facts)
         write_table(files[1], found)
         write_page(files[2], found, settings, facts)
-        for line in _told(found[-1]):
+        for line in lines_of(found[-1]):
             typer.echo(line)
     typer.echo(", ".join(map(str, files)), err=True)
 
@@ -126,41 +123,3 @@ def _targets(text: str) -> tuple[float, ...]:
     if not found or not all(0.0 < target < 10.0 for target in found):
         raise UsageError(f"--targets: expected relative errors such as 0.1,0.01, got '{text}'")
     return found
-
-
-def _again(path: Path, out: Path, settings: object, size: str | None, targets: str) -> str:
-    from comparisons.convergence.data import Settings
-
-    assert isinstance(settings, Settings)
-    command = ["reference-rt", "converge", path.as_posix(), "-o", (out / "again").as_posix()]
-    command += ["--time-limit", f"{settings.time_limit:g}", "--max-spp", str(settings.max_spp)]
-    command += ["--replicates", str(settings.replicates), "--targets", targets]
-    command += ["--size", size] if size else []
-    for name in settings.only:
-        command += ["--only", name]
-    command += [] if settings.starts else ["--no-starts"]
-    return shlex.join(command)
-
-
-def _told(curves: object) -> list[str]:
-    """A line for each contestant."""
-    from comparisons.convergence.curves import Curves
-    from comparisons.report.values import percent
-
-    assert isinstance(curves, Curves)
-    lines = []
-    ratios = curves.ratios()
-    for name, found in curves.findings.items():
-        times = ", ".join(
-            f"{percent(t.error)} {'~' if t.how == 'extrapolated' else ''}{t.seconds.value:.3g} s"
-            for t in found.targets
-        )
-        known = [r.value for r in ratios.get(name, []) if r is not None]
-        against = f"; ours / this: {', '.join(f'{value:.2f}' for value in known)}" if known else ""
-        lines.append(f"{curves.scene}: {name}: {times}{against}")
-    if curves.grids is not None:
-        for step in curves.grids.steps:
-            error = percent(step.relmse**0.5)
-            lines.append(f"{curves.scene}: ours, {step.spp} samples: {error}, {step.seconds:.3g} s")
-    lines += [f"{curves.scene}: left out: {line}" for line in curves.left_out]
-    return lines

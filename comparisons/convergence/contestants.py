@@ -91,8 +91,8 @@ def remarks(scene: Scene) -> list[str]:
 class Stable:
     """Makes contestants ready, and keeps what several of them share."""
 
-    def __init__(self, scene: Scene, threads: int | None = None) -> None:
-        self._scene, self._threads = scene, threads
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
 
     def ready(self, contestant: Contestant, progress: Progress | None = None) -> Renderer:
         """Load and compile.  Raises SceneError, ReferenceUnavailableError, AbsentError."""
@@ -119,11 +119,11 @@ class Stable:
         def shot(spp: int, replicate: int) -> Shot:
             seeded = scene.changed(sampler=make(spp=spp, seed=first + replicate))
             start = time.perf_counter()
-            picture = render(seeded, tables=tables, threads=self._threads).colour
+            picture = render(seeded, tables=tables).colour
             return Shot(picture, spp, time.perf_counter() - start)
 
         small = scene.changed(sampler=make(spp=1, seed=first))
-        render(small, tables=tables, threads=self._threads, progress=progress)
+        render(small, tables=tables, progress=progress)
         return shot
 
     def _mitsubas(self, contestant: Contestant) -> Renderer:

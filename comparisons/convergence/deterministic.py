@@ -33,9 +33,7 @@ MOST_ACROSS = 64
 which pictures are looked at."""
 
 
-def grids_of(
-    scene: Scene, settings: Settings, store: Store, threads: int | None, say: Say
-) -> tuple[Grids, list[str]]:
+def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[Grids, list[str]]:
     """Our pictures on grids of 1, 4, 9, ... samples a pixel against the finest, and Mitsuba's.
 
     The finest grid takes at most half of the time limit.  Of ray casting, which sees the pixels'
@@ -43,14 +41,14 @@ def grids_of(
     out and why.  Raises SceneError, ReferenceUnavailableError.
     """
     left_out: list[str] = []
-    timed(scene, 2, threads)  # compiles
-    seconds = timed(scene, 2, threads)[1] / 4.0
+    timed(scene, 2)  # compiles
+    seconds = timed(scene, 2)[1] / 4.0
     across = int((0.5 * settings.time_limit / seconds) ** 0.5)
     across = min(max(across, 2), MOST_ACROSS, int(settings.max_spp**0.5))
     say("finest grid", 0.0)
     finest = store.picture(f"grid-{across}")
     if finest is None:
-        finest = timed(scene, across, threads)[0]
+        finest = timed(scene, across)[0]
         store.keep_picture(f"grid-{across}", finest)
     say("finest grid", 1.0)
     finest = np.asarray(finest, np.float64)
@@ -62,7 +60,7 @@ def grids_of(
         )
     steps = []
     for n in range(1, most + 1):
-        shots = [timed(scene, n, threads) for _ in range(REPEATS)]
+        shots = [timed(scene, n) for _ in range(REPEATS)]
         mse, relmse = differences(shots[0][0], finest)
         steps.append(GridStep(n * n, float(np.median([s for _, s in shots])), mse, relmse))
         say("grids", n / most)
@@ -74,18 +72,18 @@ def grids_of(
     return Grids(tuple(steps), tuple(points), across * across, finest), left_out
 
 
-def timed(scene: Scene, n: int, threads: int | None) -> tuple[FloatArray, float]:
+def timed(scene: Scene, n: int) -> tuple[FloatArray, float]:
     """The picture with n x n samples a pixel, displayed if it shows no light, and its seconds."""
     start = time.perf_counter()
     if isinstance(scene.integrator, RayCast):
         film = scene.film
         size = {"width": n * film.width, "height": n * film.height}
         larger = scene.changed(film=film.model_copy(update=size))
-        shown = display(render(larger, tables=scene.tables, threads=threads))
+        shown = display(render(larger, tables=scene.tables))
         picture = shown.reshape(film.height, n, film.width, n, 3).mean(axis=(1, 3))
     else:
         sampled = scene.changed(sampler=Grid(spp=n * n))
-        picture = render(sampled, tables=scene.tables, threads=threads).colour
+        picture = render(sampled, tables=scene.tables).colour
     return picture, time.perf_counter() - start
 
 

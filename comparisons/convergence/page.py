@@ -159,10 +159,7 @@ def _ladder_plots(one: Curves) -> list[Markup]:
                         colour=number,
                     )
                 )
-            # Ours by our SVG maker: not from outside.
-            plots.append(
-                Markup(log_log(curves, x_label, text, f"{text} over {label(over)}", marks))
-            )
+            plots.append(Markup(log_log(curves, x_label, text, levels=marks)))
     return plots
 
 

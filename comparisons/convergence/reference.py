@@ -33,9 +33,7 @@ def key_of(scene: Scene) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def reference_of(
-    scene: Scene, spp: int, threads: int | None = None, say: Say = lambda what, fraction: None
-) -> Reference:
+def reference_of(scene: Scene, spp: int, say: Say = lambda what, fraction: None) -> Reference:
     """COUNT pictures of at least `spp` Sobol' samples a pixel.
 
     What the cache has is taken, and added to where it is less.  Seeds are none of a contestant's.
@@ -52,7 +50,7 @@ def reference_of(
         for k in range(COUNT):
             seed = first + rounds * COUNT + k
             seeded = scene.changed(sampler=Sobol(spp=more, seed=seed))
-            picture = render(seeded, tables=scene.tables, threads=threads).colour
+            picture = render(seeded, tables=scene.tables).colour
             pictures[k] += (picture - pictures[k]) * (more / spp)
             say("reference", (k + 1) / COUNT)
         seconds = time.perf_counter() - start

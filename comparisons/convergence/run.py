@@ -52,7 +52,6 @@ def converge(
     scene: Scene,
     settings: Settings = DEFAULTS,
     store: Store = NOWHERE,
-    threads: int | None = None,
     say: Say = silent,
 ) -> Curves:
     """Error against time of ours and of Mitsuba's variants for one scene.
@@ -73,20 +72,17 @@ def converge(
         )
     size = (scene.film.width, scene.film.height)
     if scene.integrator.deterministic:
-        grids, left_out = grids_of(scene, settings, store, threads, say)
+        grids, left_out = grids_of(scene, settings, store, say)
         return Curves(asked.name, size, grids=grids, left_out=tuple(left_out), notes=tuple(notes))
-    return _Run(scene, settings, store, threads, say).curves(contestants, tuple(notes))
+    return _Run(scene, settings, store, say).curves(contestants, tuple(notes))
 
 
 class _Run:
     """One scene's ladder; renderers are made ready when they are first needed."""
 
-    def __init__(
-        self, scene: Scene, settings: Settings, store: Store, threads: int | None, say: Say
-    ) -> None:
-        self.scene, self.settings, self.store = scene, settings, store
-        self.threads, self.say = threads, say
-        self.stable = Stable(scene, threads)
+    def __init__(self, scene: Scene, settings: Settings, store: Store, say: Say) -> None:
+        self.scene, self.settings, self.store, self.say = scene, settings, store, say
+        self.stable = Stable(scene)
         self.left_out: list[str] = []
         self.renderer = cache(self._renderer)
 
@@ -100,7 +96,7 @@ class _Run:
     def curves(self, contestants: tuple[Contestant, ...], notes: tuple[str, ...]) -> Curves:
         scene, settings = self.scene, self.settings
         planned, reference_spp, self.left_out = self._plan(contestants)
-        reference = reference_of(scene, reference_spp, self.threads, self.say)
+        reference = reference_of(scene, reference_spp, self.say)
         share = settings.time_limit / (len(planned) + 1)
         by_name = {c.name: c for c in contestants if planned.get(c.name)}
         climbs = {

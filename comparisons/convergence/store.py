@@ -29,7 +29,7 @@ _ARRAYS = ("seconds", "mse", "relmse", "mean", "variance")
 _PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
 
 
-def run_key(scene: Scene, replicates: int, threads: int | None) -> str:
+def run_key(scene: Scene, replicates: int) -> str:
     """SHA-256 of all that rungs depend on: the scene as it is rendered and its files, our sources,
     the versions of what computes, the machine, and how many replicates there are."""
     chosen = backend()
@@ -41,7 +41,7 @@ def run_key(scene: Scene, replicates: int, threads: int | None) -> str:
         "reference": key_of(scene),
         "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
         "mitsuba": (chosen.variant, chosen.llvm_path),
-        "machine": (platform.node(), platform.machine(), os.cpu_count(), threads),
+        "machine": (platform.node(), platform.machine(), os.cpu_count()),
         "replicates": replicates,
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
