@@ -1,9 +1,11 @@
 """Who is timed: ours and Mitsuba's variants, each with its default sampler and its best one."""
 
 import time
+import warnings
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -49,6 +51,11 @@ class Contestant:
     side: str
     is_default: bool = True
 
+    @property
+    def slope(self) -> float | None:
+        """Of squared errors over samples, where theory has it."""
+        return -1.0 if self.sampler == "independent" else None
+
 
 CONTESTANTS = (
     Contestant("ours", "ours, Sobol' (default and best)", "sobol", "ours"),
@@ -89,10 +96,31 @@ def remarks(scene: Scene) -> list[str]:
 
 
 class Stable:
-    """Makes contestants ready, and keeps what several of them share."""
+    """Makes contestants ready, and keeps what several of them share; a context, which leaves
+    Mitsuba in the variant that it was in."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
+        self._entered = ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._entered.close()
+
+    def _in(self, side: str) -> Any:
+        """Mitsuba in this variant, until another is asked for: switching makes it define all of its
+        own plugins again."""
+        mi = mitsuba()
+        if mi.variant() != side:
+            with warnings.catch_warnings():
+                # Dr.Jit warns that this is slow, after a thousand definitions.
+                warnings.simplefilter("ignore", RuntimeWarning)
+                self._entered.close()
+                if mi.variant() != side:
+                    self._entered.enter_context(variant(side))
+        return mi
 
     def ready(self, contestant: Contestant, progress: Progress | None = None) -> Renderer:
         """Load and compile.  Raises SceneError, ReferenceUnavailableError, AbsentError."""
@@ -127,27 +155,25 @@ class Stable:
         return shot
 
     def _mitsubas(self, contestant: Contestant) -> Renderer:
-        mitsuba()
-        with variant(contestant.side) as mi:
-            description = to_mitsuba(self._scene, native=True)
-            description["sensor"]["sampler"] = {"type": contestant.sampler}
-            parts = [part for part in description.values() if isinstance(part, dict)]
-            instances = sum(part.get("type") == "instance" for part in parts)
-            if contestant.side == LLVM and instances > FEW:
-                raise AbsentError(
-                    f"{instances} instances, for which Mitsuba's llvm variant takes minutes to "
-                    "compile"
-                )
-            mi_scene = mi.load_dict(description)
-            sampler = mi_scene.sensors()[0].sampler()
+        mi = self._in(contestant.side)
+        description = to_mitsuba(self._scene, native=True)
+        description["sensor"]["sampler"] = {"type": contestant.sampler}
+        parts = [part for part in description.values() if isinstance(part, dict)]
+        instances = sum(part.get("type") == "instance" for part in parts)
+        if contestant.side == LLVM and instances > FEW:
+            raise AbsentError(
+                f"{instances} instances, for which Mitsuba's llvm variant takes minutes to compile"
+            )
+        mi_scene = mi.load_dict(description)
+        sampler = mi_scene.sensors()[0].sampler()
 
         def shot(spp: int, replicate: int) -> Shot:
-            with variant(contestant.side) as mi:
-                start = time.perf_counter()
-                # The array is what forces the lazy rendering to happen.
-                found = np.array(mi.render(mi_scene, spp=spp, seed=1 + replicate))
-                seconds = time.perf_counter() - start
-                return Shot(_three(found), int(sampler.sample_count()), seconds)
+            mi = self._in(contestant.side)
+            start = time.perf_counter()
+            # The array is what forces the lazy rendering to happen.
+            found = np.array(mi.render(mi_scene, spp=spp, seed=1 + replicate))
+            seconds = time.perf_counter() - start
+            return Shot(_three(found), int(sampler.sample_count()), seconds)
 
         return shot
 

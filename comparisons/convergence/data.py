@@ -24,7 +24,7 @@ class Settings:
     and height, none for the scene's, at most WIDEST pixels across;  max_spp: no rung has more
     samples a pixel;  replicates: independent pictures at each rung;  targets: relative errors, the
     time to which is asked for;  only: names of contestants, all if none;  starts: whether to time
-    the start of processes, with caches empty and full.
+    the start of processes, with caches empty and full;  crops: whether to render pictures to show.
     """
 
     time_limit: float = 60.0
@@ -34,6 +34,7 @@ class Settings:
     targets: tuple[float, ...] = (0.1, 0.03, 0.01, 0.003)
     only: tuple[str, ...] = ()
     starts: bool = True
+    crops: bool = True
 
 
 def weights(reference: FloatArray) -> FloatArray:

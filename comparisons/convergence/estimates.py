@@ -134,14 +134,25 @@ def against(rung: Rung, reference: Reference) -> Rung:
 
 class Accumulator:
     """Replicates as they come: Welford's running mean and sum of squares, so that no more than one
-    picture is held."""
+    picture is held.  done: those that are there already."""
 
-    def __init__(self, asked: int, reference: Reference) -> None:
+    def __init__(self, asked: int, reference: Reference, done: Rung | None = None) -> None:
         self.asked, self.spp = asked, asked
         self._reference = reference
         self._mean = np.zeros_like(reference.mean)
         self._squares = np.zeros_like(reference.mean)
         self._rows: list[tuple[float, float, float]] = []
+        if done is not None:
+            self.spp = done.spp
+            self._mean += done.mean
+            self._squares += done.variance * (done.replicates - 1)
+            columns = (done.seconds.tolist(), done.mse.tolist(), done.relmse.tolist())
+            self._rows.extend(zip(*columns, strict=True))
+
+    @property
+    def count(self) -> int:
+        """Of the replicates."""
+        return len(self._rows)
 
     def add(self, picture: FloatArray, spp: int, seconds: float) -> None:
         self.spp = spp
@@ -153,8 +164,8 @@ class Accumulator:
     def rung(self) -> Rung:
         """Of what was added so far, at least one picture."""
         seconds, mse, relmse = np.array(self._rows).T
-        variance = self._squares / max(len(self._rows) - 1, 1)
-        return Rung(self.asked, self.spp, seconds, mse, relmse, self._mean, variance)
+        variance = self._squares / max(self.count - 1, 1)
+        return Rung(self.asked, self.spp, seconds, mse, relmse, self._mean.copy(), variance)
 
 
 __all__ = [

@@ -16,7 +16,7 @@ from comparisons.convergence.estimates import (
     mean_of,
     standard_error,
 )
-from comparisons.convergence.fits import How, Line, Points, Reached, band, log_line, time_to
+from comparisons.convergence.fits import How, Line, Points, band, log_line, time_to
 from reference_rt.shapes.shape import FloatArray
 
 MEDIAN_ERROR = math.sqrt(math.pi / 2.0)
@@ -71,8 +71,11 @@ class Findings:
     targets: tuple[Target, ...]
 
 
-def findings_of(rungs: Sequence[Rung], reference: Reference, targets: Sequence[float]) -> Findings:
-    """Everything about a contestant that has at least one rung."""
+def findings_of(
+    rungs: Sequence[Rung], reference: Reference, targets: Sequence[float], slope: float | None
+) -> Findings:
+    """Everything about a contestant that has at least one rung; slope: of its errors over samples,
+    where that is known."""
     weight = weights(reference.mean)
     steps = tuple(_step(rung, reference, weight) for rung in rungs)
     points = {
@@ -89,7 +92,7 @@ def findings_of(rungs: Sequence[Rung], reference: Reference, targets: Sequence[f
         slopes,
         bias_of(rungs[-1], reference),
         relative_bias,
-        tuple(_target(points["relmse"], error, relative_bias) for error in targets),
+        tuple(_target(points["relmse"], error, relative_bias, slope) for error in targets),
     )
 
 
@@ -131,11 +134,9 @@ def _slope(points: Points, over: FloatArray) -> Line | None:
     return log_line(over, points.errors, points.log_errors_error, points.freedom)
 
 
-def _target(points: Points, error: float, bias: Bias) -> Target:
+def _target(points: Points, error: float, bias: Bias, slope: float | None) -> Target:
     never = Estimate(math.inf, math.inf, math.inf)
-    reached: Reached | None = None
-    if len(points.spp) > 0:
-        reached = time_to(points, error**2)
+    reached = time_to(points, error**2, slope)
     if bias.low > error**2 and (reached is None or reached.how == "extrapolated"):
         return Target(error, "bias", never, math.inf, np.array([math.inf]))
     if reached is None:

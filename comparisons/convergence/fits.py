@@ -4,6 +4,7 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy import optimize, stats
 
 from comparisons.convergence.estimates import LEVEL, Estimate
@@ -100,67 +101,63 @@ class Reached(NamedTuple):
         return band(np.exp(self.log_seconds))
 
 
-def time_to(points: Points, error: float) -> Reached | None:
+def time_to(points: Points, error: float, slope: float | None = None) -> Reached | None:
     """When the curve has come down to `error`; None where it is too short to tell, or rises.
 
-    Between rungs by a line through the logarithms; beyond the last by the line through the LAST
-    ones over samples, and seconds that grow in proportion to samples from a fixed start.
+    Between rungs by a line through the logarithms.  Beyond the last one by the line through the
+    LAST ones over samples, whose slope may be known (`slope`: -1 for independent samples), and by
+    seconds that are a start and a share for each sample, from all rungs.
     """
-    log_n = np.log(points.spp)
+    if len(points.spp) == 0:
+        return None
+    goal, log_n = math.log(error), np.log(points.spp)
     times, falls = drawn(points)
-    goal = math.log(error)
-    found = [_crossing(log_n, t, e, goal) for t, e in zip(times, falls, strict=True)]
-    last, measured_n = slice(-LAST, None), found[0]
-    how: How = "interpolated"
-    if goal >= falls[0, 0]:
-        how, measured_n = "below", (times[0, 0], log_n[0])
-    elif measured_n is None:
-        how = "extrapolated"
-    if how == "extrapolated" and len(log_n) < 2:
+    draws = np.arange(DRAWS)
+    under: npt.NDArray[np.bool_] = np.less_equal(falls, goal)
+    inside = under.any(axis=1)
+    k = np.where(inside, under.argmax(axis=1), 0)
+    before = np.maximum(k - 1, 0)
+    drop = falls[draws, k] - falls[draws, before]
+    part = np.where(k > 0, (goal - falls[draws, before]) / np.where(drop < 0.0, drop, -1.0), 1.0)
+    log_seconds = times[draws, before] + part * (times[draws, k] - times[draws, before])
+    log_spp = log_n[before] + part * (log_n[k] - log_n[before])
+    if not inside.all():
+        if len(log_n) < 2:
+            return None
+        far = _continued(points, times, falls, goal, slope)
+        log_seconds, log_spp = np.where(inside, (log_seconds, log_spp), far)
+    if not math.isfinite(log_seconds[0]):
         return None
+    how: How = "extrapolated" if not inside[0] else "interpolated" if k[0] > 0 else "below"
+    return Reached(log_seconds, how, math.exp(log_spp[0]))
+
+
+MOST_LOG_SPP = 60.0
+"""A curve that has not come down after e^60 samples does not fall."""
+
+
+def _continued(
+    points: Points, times: FloatArray, falls: FloatArray, goal: float, slope: float | None
+) -> tuple[FloatArray, FloatArray]:
+    """Logarithms of seconds and samples (DRAWS,) at which curves reach `goal` beyond their last
+    rung; infinite for those that rise."""
+    log_n = np.log(points.spp[-LAST:])
+    errors = points.log_errors_error[-LAST:]
+    weight = 1.0 / np.where(errors > 0.0, errors, 1.0) ** 2
+    weight /= weight.sum()
+    n0, e0 = weight @ log_n, falls[:, -LAST:] @ weight
+    if slope is None:
+        spread = weight @ (log_n - n0) ** 2
+        slopes = (falls[:, -LAST:] @ (weight * (log_n - n0))) / spread
+    else:
+        slopes = np.full(len(falls), slope)
+    falling = slopes < 0.0
+    log_spp = n0 + (goal - e0) / np.where(falling, slopes, -1.0)
+    log_spp = np.where(falling & (log_spp < MOST_LOG_SPP), np.maximum(log_spp, log_n[-1]), np.inf)
     start, per_sample = linear_time(points.spp, points.seconds)
-
-    def beyond(t: FloatArray, e: FloatArray) -> tuple[float, float] | None:
-        slope, height = np.polyfit(log_n[last], e[last], 1, w=1.0 / _positive(points)[last])
-        if slope >= 0.0:
-            return None
-        n = max((goal - height) / slope, log_n[-1])
-        if n > 60.0:  # e^60 samples: the curve does not fall
-            return None
-        later = math.log(start + per_sample * math.exp(n))
-        return later + float(t[-1]) - math.log(start + per_sample * points.spp[-1]), n
-
-    log_seconds = np.full(DRAWS, math.inf)
-    for k, crossing in enumerate(found):
-        if falls[k, 0] <= goal:
-            log_seconds[k] = times[k, 0]
-        else:
-            at = crossing or (beyond(times[k], falls[k]) if len(log_n) > 1 else None)
-            log_seconds[k] = at[0] if at else math.inf
-    if how == "extrapolated":
-        measured_n = beyond(times[0], falls[0])
-    if measured_n is None:
-        return None
-    return Reached(log_seconds, how, math.exp(measured_n[1]))
-
-
-def _positive(points: Points) -> FloatArray:
-    """Standard errors to weight by; all alike where nothing scatters."""
-    return np.where(points.log_errors_error > 0.0, points.log_errors_error, 1.0)
-
-
-def _crossing(
-    log_n: FloatArray, log_t: FloatArray, log_e: FloatArray, goal: float
-) -> tuple[float, float] | None:
-    """Logarithms of the time and the samples where the curve first comes down to `goal`."""
-    for k in range(1, len(log_n)):
-        if log_e[k] <= goal < log_e[k - 1]:
-            part = (goal - log_e[k - 1]) / (log_e[k] - log_e[k - 1])
-            return (
-                float(log_t[k - 1] + part * (log_t[k] - log_t[k - 1])),
-                float(log_n[k - 1] + part * (log_n[k] - log_n[k - 1])),
-            )
-    return None
+    seconds = start + per_sample * np.exp(np.minimum(log_spp, MOST_LOG_SPP))
+    log_seconds = np.log(seconds) + (times[:, -1] - times[0, -1])
+    return np.where(np.isfinite(log_spp), log_seconds, np.inf), log_spp
 
 
 def linear_time(spp: FloatArray, seconds: FloatArray) -> tuple[float, float]:

@@ -1,6 +1,8 @@
-"""The ladder: each rung's replicates, contestants in turn, and what is stored of them."""
+"""The ladder: replicates at each rung, contestants in turn, and what is stored of them."""
 
+import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from comparisons.convergence.contestants import Renderer
@@ -11,6 +13,9 @@ from comparisons.convergence.store import Store
 PATIENCE = 1.5
 """Times its share of the time that a contestant may take, where a trial promised too much."""
 
+STORED_EVERY = 15.0
+"""Seconds: what a kill can lose.  Ctrl-C loses no picture that is finished."""
+
 Say = Callable[[str, float], None]
 """Is told what is being done, and the fraction of it that is done."""
 
@@ -19,37 +24,34 @@ Say = Callable[[str, float], None]
 class Climb:
     """One contestant on the ladder.
 
-    planned: its rungs;  share: its seconds;  rungs: those that are done;  stopped: why not all.
+    renderer: makes it ready, when first needed;  planned: its rungs;  share: its seconds;  rungs:
+    by samples asked for, what is done of them;  stopped: why not all are.
     """
 
     renderer: Callable[[], Renderer]
     planned: Sequence[int]
     share: float
-    rungs: list[Rung] = field(default_factory=list)
+    gathered: dict[int, Accumulator] = field(default_factory=dict)
     stopped: str = ""
 
     @property
-    def spent(self) -> float:
-        """Seconds of rendering, those of former runs included."""
-        return sum(float(rung.seconds.sum()) for rung in self.rungs)
+    def rungs(self) -> list[Rung]:
+        """Those that are done, the lowest first."""
+        return [self.gathered[spp].rung() for spp in self.planned if self.gathered[spp].count]
 
-    def may_go_on(self, spp: int) -> bool:
-        """Whether the next rung, twice the last one's time, ends within PATIENCE; says so if not.
-
-        The first two rungs are always done: without two there is no curve.
-        """
-        if spp not in self.planned or self.stopped:
-            return False
-        if len(self.rungs) < 2:
-            return True
-        expected = 2.0 * float(self.rungs[-1].seconds.sum())
-        if self.spent + expected <= PATIENCE * self.share:
-            return True
-        self.stopped = (
-            f"rungs from {spp} samples a pixel: slower than its trial promised; {self.spent:.2g} s "
-            f"of its {self.share:.2g} s are spent"
-        )
-        return False
+    def shorten(self, replicates: int) -> None:
+        """Give up the highest rungs where the pictures so far say that all replicates would take
+        PATIENCE times the share; two rungs stay, without which there is no curve."""
+        rungs = {spp: self.gathered[spp].rung() for spp in self.planned}
+        taking = {spp: replicates * float(rung.warm.mean()) for spp, rung in rungs.items()}
+        while len(taking) > 2 and sum(taking.values()) > PATIENCE * self.share:
+            highest = max(taking)
+            self.stopped = (
+                f"rungs from {highest} samples a pixel: slower than the trial promised, "
+                f"{sum(taking.values()):.2g} s in all, and its share is {self.share:.2g} s"
+            )
+            del taking[highest]
+        self.planned = list(taking)
 
 
 def climb(
@@ -59,36 +61,51 @@ def climb(
     store: Store,
     say: Say = lambda what, fraction: None,
 ) -> None:
-    """Do the rungs that are planned and not stored, the lowest first.
+    """Do what is planned and not stored, in sweeps: one picture of every rung of every contestant,
+    then the next of each.
 
-    The contestants take turns, picture by picture, so that what disturbs the machine disturbs all.
-    A rung that is finished is stored at once.
+    So each rung's pictures are spread over the whole run, and what disturbs the machine for a while
+    disturbs all contestants, and no rung's median.  What is done is stored, also when interrupted.
     """
-    steps = sorted({spp for one in climbs.values() for spp in one.planned})
-    for spp in steps:
-        waiting: dict[str, tuple[Renderer, Accumulator]] = {}
-        for name, one in climbs.items():
-            if not one.may_go_on(spp):
-                continue
+    for name, one in climbs.items():
+        for spp in one.planned:
             done = store.rung(name, spp)
-            if done is not None:
-                one.rungs.append(against(done, reference))
-            else:
-                waiting[name] = (one.renderer(), Accumulator(spp, reference))
-        task = f"{spp} samples a pixel"
-        if waiting:
-            say(task, 0.0)
+            one.gathered[spp] = Accumulator(spp, reference, done and against(done, reference))
+    stored = time.monotonic()
+    changed: set[tuple[str, int]] = set()
+
+    def keep() -> None:
+        for name, spp in sorted(changed):
+            store.keep(name, climbs[name].gathered[spp].rung())
+        changed.clear()
+
+    try:
         for k in range(replicates):
-            for renderer, gathered in waiting.values():
+            for name, spp in _sweep(climbs):
+                gathered = climbs[name].gathered[spp]
+                if gathered.count > k:
+                    continue
                 # The numbers of other rungs' replicates are none of this one's.
-                shot = renderer(spp, spp * replicates + k)
-                gathered.add(shot.picture, shot.spp, shot.seconds)
-            if waiting:
-                say(task, (k + 1) / replicates)
-        for name, (_, gathered) in waiting.items():
-            rung = gathered.rung()
-            store.keep(name, rung)
-            climbs[name].rungs.append(rung)
+                gathered.add(*climbs[name].renderer()(spp, spp * replicates + k))
+                changed.add((name, spp))
+            say("ladder", (k + 1) / replicates)
+            if time.monotonic() - stored > STORED_EVERY:
+                keep()
+                stored = time.monotonic()
+            if k == 1:
+                for one in climbs.values():
+                    one.shorten(replicates)
+    except KeyboardInterrupt:
+        with suppress(KeyboardInterrupt):
+            keep()
+        raise
+    keep()
+
+
+def _sweep(climbs: Mapping[str, Climb]) -> list[tuple[str, int]]:
+    """(contestant, samples): rung by rung, contestants in turn."""
+    steps = sorted({spp for one in climbs.values() for spp in one.planned})
+    return [(name, spp) for spp in steps for name, one in climbs.items() if spp in one.planned]
 
 
 __all__ = ["Climb", "climb"]

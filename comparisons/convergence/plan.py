@@ -18,32 +18,29 @@ MOST_LANES = 1 << 27
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds of a picture are start + per_sample times the samples a pixel; those of the first
-    with a new number of samples, `first` more."""
+    """Seconds of a picture are start + per_sample times the samples a pixel."""
 
     start: float
     per_sample: float
-    first: float
 
     def picture(self, spp: int) -> float:
         return self.start + self.per_sample * spp
 
     def rung(self, spp: int, replicates: int) -> float:
-        return self.first + replicates * self.picture(spp)
+        return replicates * self.picture(spp)
 
 
 def estimate(renderer: Renderer) -> Cost:
     """From two pictures each with two numbers of samples: the first of the two may compile."""
     found = []
     for spp in TRIALS:
-        first = renderer(spp, TRIAL_SEED).seconds
+        renderer(spp, TRIAL_SEED)
         again = renderer(spp, TRIAL_SEED + 1)
-        found.append((again.spp, first, again.seconds))
-    (few, _, short), (many, first, long) = found
+        found.append((again.spp, again.seconds))
+    (few, short), (many, long) = found
     # Where noise hides the difference, all of the longer one counts as samples.
     per_sample = (long - short) / (many - few) if long > short else long / many
-    start = max(0.0, short - per_sample * few)
-    return Cost(start, per_sample, max(0.0, first - long))
+    return Cost(max(0.0, short - per_sample * few), per_sample)
 
 
 def rungs(max_spp: int) -> tuple[int, ...]:

@@ -24,6 +24,7 @@ from comparisons.convergence.plan import Cost, affordable, estimate, rungs, why_
 from comparisons.convergence.reference import COUNT, reference_of
 from comparisons.convergence.starts import starts_of
 from comparisons.convergence.store import Store
+from reference_rt.film import Film
 from reference_rt.filters import BoxFilter
 from reference_rt.scene import Scene
 
@@ -41,11 +42,14 @@ def silent(what: str, fraction: float) -> None:
 def prepared(scene: Scene, settings: Settings) -> Scene:
     """The scene as it is rendered: through a box filter, whose pixels are independent, and at most
     WIDEST pixels across where no size is asked for."""
-    film = scene.film
-    size = settings.size
-    if size is None and film.width > WIDEST:
-        size = (WIDEST, max(1, round(film.height * WIDEST / film.width)))
-    return budgeted(scene, Budget(size=size))
+    return budgeted(scene, Budget(size=settings.size or size_within(scene.film, WIDEST)))
+
+
+def size_within(film: Film, widest: int) -> tuple[int, int]:
+    """Width and height of a film, smaller in proportion where it is more than `widest` across."""
+    if film.width <= widest:
+        return film.width, film.height
+    return widest, max(1, round(film.height * widest / film.width))
 
 
 def converge(
@@ -74,15 +78,18 @@ def converge(
     if scene.integrator.deterministic:
         grids, left_out = grids_of(scene, settings, store, say)
         return Curves(asked.name, size, grids=grids, left_out=tuple(left_out), notes=tuple(notes))
-    return _Run(scene, settings, store, say).curves(contestants, tuple(notes))
+    with Stable(scene) as stable:
+        return _Run(scene, settings, store, say, stable).curves(contestants, tuple(notes))
 
 
 class _Run:
     """One scene's ladder; renderers are made ready when they are first needed."""
 
-    def __init__(self, scene: Scene, settings: Settings, store: Store, say: Say) -> None:
+    def __init__(
+        self, scene: Scene, settings: Settings, store: Store, say: Say, stable: Stable
+    ) -> None:
         self.scene, self.settings, self.store, self.say = scene, settings, store, say
-        self.stable = Stable(scene)
+        self.stable = stable
         self.left_out: list[str] = []
         self.renderer = cache(self._renderer)
 
@@ -115,10 +122,13 @@ class _Run:
             scene.name,
             (scene.film.width, scene.film.height),
             by_name,
-            {n: findings_of(r, reference, settings.targets) for n, r in climbed.items()},
+            {
+                name: findings_of(rungs, reference, settings.targets, by_name[name].slope)
+                for name, rungs in climbed.items()
+            },
             reference,
             starts=starts,
-            crops=crops_of(climbed, renderers, reference, self.store),
+            crops=crops_of(climbed, renderers, reference, self.store) if settings.crops else (),
             left_out=tuple(left_out),
             notes=notes,
         )
