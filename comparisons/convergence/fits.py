@@ -114,7 +114,7 @@ def time_to(points: Points, error: float, slope: float | None = None) -> Reached
     times, falls = drawn(points)
     draws = np.arange(DRAWS)
     under: npt.NDArray[np.bool_] = np.less_equal(falls, goal)
-    inside = under.any(axis=1)
+    inside = np.asarray(under.any(axis=1))
     k = np.where(inside, under.argmax(axis=1), 0)
     before = np.maximum(k - 1, 0)
     drop = falls[draws, k] - falls[draws, before]

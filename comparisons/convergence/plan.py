@@ -43,15 +43,22 @@ def estimate(renderer: Renderer) -> Cost:
     return Cost(max(0.0, short - per_sample * few), per_sample)
 
 
-def rungs(max_spp: int) -> tuple[int, ...]:
-    """FIRST, 2 FIRST, ... up to `max_spp`."""
-    return tuple(FIRST << k for k in range(max(0, (max_spp // FIRST).bit_length())))
+def rungs(max_spp: int, factor: int = 2) -> tuple[int, ...]:
+    """FIRST, `factor` times that, ... up to `max_spp`."""
+    found = []
+    spp = FIRST
+    while spp <= max_spp:
+        found.append(spp)
+        spp *= factor
+    return tuple(found)
 
 
-def affordable(cost: Cost, seconds: float, settings: Settings, pixels: int) -> tuple[int, ...]:
+def affordable(
+    cost: Cost, seconds: float, settings: Settings, pixels: int, factor: int = 2
+) -> tuple[int, ...]:
     """The rungs that fit into `seconds`, the cheapest first."""
     found: list[int] = []
-    for spp in rungs(settings.max_spp):
+    for spp in rungs(settings.max_spp, factor):
         seconds -= cost.rung(spp, settings.replicates)
         if seconds < 0.0 or spp * pixels > MOST_LANES:
             break
@@ -60,10 +67,15 @@ def affordable(cost: Cost, seconds: float, settings: Settings, pixels: int) -> t
 
 
 def why_left_out(
-    cost: Cost, planned: Sequence[int], share: float, settings: Settings, pixels: int
+    cost: Cost,
+    planned: Sequence[int],
+    share: float,
+    settings: Settings,
+    pixels: int,
+    factor: int = 2,
 ) -> str:
     """Why the rung after the last one is not climbed; empty where it was not asked for."""
-    following = [spp for spp in rungs(settings.max_spp) if spp not in planned]
+    following = [spp for spp in rungs(settings.max_spp, factor) if spp not in planned]
     if not following:
         return ""
     spp = following[0]

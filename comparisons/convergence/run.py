@@ -1,11 +1,13 @@
 """The convergence of one scene, from its files to its curves."""
 
 from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 
 from comparisons.budget import Budget
 from comparisons.compare import budgeted
 from comparisons.convergence.contestants import (
+    BEST,
     CONTESTANTS,
     AbsentError,
     Contestant,
@@ -13,6 +15,7 @@ from comparisons.convergence.contestants import (
     Stable,
     chosen,
     remarks,
+    with_sampler,
 )
 from comparisons.convergence.crops import crops_of
 from comparisons.convergence.curves import Curves
@@ -22,6 +25,7 @@ from comparisons.convergence.findings import findings_of
 from comparisons.convergence.ladder import Climb, climb
 from comparisons.convergence.plan import Cost, affordable, estimate, rungs, why_left_out
 from comparisons.convergence.reference import COUNT, reference_of
+from comparisons.convergence.samplers import SPP, merits
 from comparisons.convergence.starts import starts_of
 from comparisons.convergence.store import Store
 from reference_rt.film import Film
@@ -82,6 +86,24 @@ def converge(
         return _Run(scene, settings, store, say, stable).curves(contestants, tuple(notes))
 
 
+@dataclass(frozen=True)
+class Plan:
+    """rungs: by contestant;  reference_spp: samples a pixel of each picture of the reference;
+    merits: of Mitsuba's samplers, by the variant that was tried;  left_out: what, and why."""
+
+    rungs: dict[str, list[int]]
+    reference_spp: int
+    merits: dict[str, dict[str, float]]
+    left_out: list[str]
+
+    def resolved(self, contestant: Contestant) -> Contestant:
+        """The contestant with the best sampler, where it asks for that."""
+        if contestant.sampler != BEST:
+            return contestant
+        (found,) = self.merits.values()
+        return with_sampler(contestant, min(found, key=lambda name: found[name]))
+
+
 class _Run:
     """One scene's ladder; renderers are made ready when they are first needed."""
 
@@ -90,7 +112,6 @@ class _Run:
     ) -> None:
         self.scene, self.settings, self.store, self.say = scene, settings, store, say
         self.stable = stable
-        self.left_out: list[str] = []
         self.renderer = cache(self._renderer)
 
     def _renderer(self, contestant: Contestant) -> Renderer:
@@ -102,22 +123,23 @@ class _Run:
 
     def curves(self, contestants: tuple[Contestant, ...], notes: tuple[str, ...]) -> Curves:
         scene, settings = self.scene, self.settings
-        planned, reference_spp, self.left_out = self._plan(contestants)
-        reference = reference_of(scene, reference_spp, self.say)
-        share = settings.time_limit / (len(planned) + 1)
-        by_name = {c.name: c for c in contestants if planned.get(c.name)}
+        plan = self._plan(contestants)
+        reference = reference_of(scene, plan.reference_spp, self.say)
+        share = settings.time_limit / (len(plan.rungs) + 1)
+        by_name = {c.name: plan.resolved(c) for c in contestants if plan.rungs.get(c.name)}
         climbs = {
-            name: Climb(lambda c=c: self.renderer(c), planned[name], share)  # type: ignore[misc]
+            name: Climb(lambda c=c: self.renderer(c), plan.rungs[name], share)  # type: ignore[misc]
             for name, c in by_name.items()
         }
         climb(climbs, reference, settings.replicates, self.store, self.say)
-        left_out = [*self.left_out]
+        left_out = [*plan.left_out]
         left_out += [f"{by_name[n].title}: {c.stopped}" for n, c in climbs.items() if c.stopped]
-        climbed = {name: one.rungs for name, one in climbs.items() if one.rungs}
+        climbed = {name: one.rungs for name, one in climbs.items()}
         renderers = {name: climbs[name].renderer for name in climbed}
         starts = starts_of(scene, by_name.values(), self.store, self.say) if settings.starts else {}
         if any(c.side != "ours" for c in by_name.values()):
             notes += tuple(remarks(scene))
+        notes += tuple(_told(side, found) for side, found in plan.merits.items())
         return Curves(
             scene.name,
             (scene.film.width, scene.film.height),
@@ -133,48 +155,58 @@ class _Run:
             notes=notes,
         )
 
-    def _plan(
-        self, contestants: tuple[Contestant, ...]
-    ) -> tuple[dict[str, list[int]], int, list[str]]:
-        """Rungs by contestant, samples a pixel of the reference, and what is left out; as stored,
-        where the same was planned before."""
+    def _plan(self, contestants: tuple[Contestant, ...]) -> Plan:
+        """As stored, where the same was planned before."""
         settings = self.settings
         question = [settings.time_limit, settings.max_spp, settings.only]
         stored = self.store.fact("plan", question)
         if stored is not None:
-            return stored[0], int(stored[1]), stored[2]
-        costs, left_out = self._costs(contestants)
+            return Plan(**stored)
+        plan = Plan({}, 0, {}, [])
+        costs = self._costs(contestants, plan)
         share = settings.time_limit / (len(costs) + 1)
         pixels = self.scene.film.width * self.scene.film.height
-        planned = {}
         for contestant, cost in costs.items():
-            fit = affordable(cost, share, settings, pixels)
+            factor = contestant.factor
+            fit = affordable(cost, share, settings, pixels, factor)
             if len(fit) < 2 and contestant.side == "ours":
                 fit = rungs(settings.max_spp)[:2]
             if len(fit) < 2:
                 fit = ()
-            why = why_left_out(cost, fit, share, settings, pixels)
+            why = why_left_out(cost, fit, share, settings, pixels, factor)
             if why:
-                left_out.append(f"{contestant.title}: {why}")
-            planned[contestant.name] = list(fit)
+                plan.left_out.append(f"{contestant.title}: {why}")
+            plan.rungs[contestant.name] = list(fit)
         ours = costs.get(CONTESTANTS[0]) or estimate(self.renderer(CONTESTANTS[0]))
-        spp = _reference_spp(ours, share, settings.max_spp)
-        self.store.keep_fact("plan", [planned, spp, left_out], question)
-        return planned, spp, left_out
+        plan = replace(plan, reference_spp=_reference_spp(ours, share, settings.max_spp))
+        self.store.keep_fact("plan", asdict(plan), question)
+        return plan
 
-    def _costs(
-        self, contestants: tuple[Contestant, ...]
-    ) -> tuple[dict[Contestant, Cost], list[str]]:
-        """Of those that can render the scene, and why others cannot."""
-        found, left_out = {}, []
+    def _costs(self, contestants: tuple[Contestant, ...], plan: Plan) -> dict[Contestant, Cost]:
+        """Of those that can render the scene, their best samplers chosen; the plan is told why
+        others cannot, and how the samplers did."""
+        found = {}
         for number, contestant in enumerate(contestants):
             self.say("trial pictures", number / len(contestants))
             try:
-                found[contestant] = estimate(self.renderer(contestant))
+                if contestant.sampler == BEST and not plan.merits:
+                    # One trial for both variants, whose samples are alike.
+                    plan.merits[contestant.side] = merits(self.stable, contestant)
+                chosen_one = plan.resolved(contestant)
+                found[chosen_one] = estimate(self.renderer(chosen_one))
             except AbsentError as error:
-                left_out.append(f"{contestant.title}: {error}")
+                plan.left_out.append(f"{contestant.title}: {error}")
         self.say("trial pictures", 1.0)
-        return found, left_out
+        return found
+
+
+def _told(side: str, found: dict[str, float]) -> str:
+    """How Mitsuba's samplers did."""
+    unit = found["independent"]
+    told = ", ".join(f"{name} {merit / unit:.2f}" for name, merit in found.items())
+    return (
+        f"Mitsuba's best sampler, by variance times time of {SPP} samples a pixel ({side}): {told}"
+    )
 
 
 def _reference_spp(cost: Cost, share: float, max_spp: int) -> int:
