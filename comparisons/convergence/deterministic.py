@@ -44,7 +44,8 @@ def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[
     timed(scene, 2)  # compiles
     seconds = timed(scene, 2)[1] / 4.0
     across = int((0.5 * settings.time_limit / seconds) ** 0.5)
-    across = min(max(across, 2), MOST_ACROSS, int(settings.max_spp**0.5))
+    most_asked = FINER * int(settings.max_spp**0.5)
+    across = min(max(across, 2), MOST_ACROSS, most_asked)
     say("finest grid", 0.0)
     finest = store.picture(f"grid-{across}")
     if finest is None:
@@ -53,7 +54,7 @@ def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[
     say("finest grid", 1.0)
     finest = np.asarray(finest, np.float64)
     most = max(1, across // FINER)
-    if across < MOST_ACROSS:
+    if across < min(MOST_ACROSS, most_asked):
         left_out.append(
             f"grids of more than {most * most} samples a pixel: the one to judge them by, "
             f"{FINER} times finer, would take more than half of {settings.time_limit:g} s"

@@ -69,16 +69,15 @@ def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
     place = targets.index(0.01) if 0.01 in targets else len(targets) - 1
     names = list(dict.fromkeys(name for one in curves for name in one.ratios()))
     titles = {name: c.title for one in curves for name, c in one.contestants.items()}
-    rows, columns = [], []
+    rows = []
+    known: dict[str, list[float]] = {name: [] for name in names}
     for number, one in enumerate(curves, 1):
         found = {name: ratios[place] for name, ratios in one.ratios().items()}
-        cells = [_ratio(found.get(name)) for name in names]
-        rows.append((number, one.scene, _kind(one), cells))
-        columns.append([found[n].value if found.get(n) else math.nan for n in names])  # type: ignore[union-attr]
-    medians = []
-    for values in np.array(columns, dtype=np.float64).reshape(-1, len(names)).T:
-        known = values[np.isfinite(values)]
-        medians.append(shown(float(np.median(known))) if len(known) else "–")
+        rows.append((number, one.scene, _kind(one), [_ratio(found.get(name)) for name in names]))
+        for name, ratio in found.items():
+            if ratio is not None and math.isfinite(ratio.value):
+                known[name].append(ratio.value)
+    medians = [f"{np.median(values):.2f}" if values else "–" for values in known.values()]
     return {
         "target": percent(targets[place]),
         "columns": [titles[name] for name in names],

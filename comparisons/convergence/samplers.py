@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.convergence.contestants import Contestant, Stable, with_sampler
+from comparisons.convergence.contestants import Contestant, Shot, Stable, with_sampler
 from comparisons.convergence.data import weights
 
 CANDIDATES = ("independent", "multijitter", "ldsampler", "orthogonal")
@@ -12,15 +12,18 @@ CANDIDATES = ("independent", "multijitter", "ldsampler", "orthogonal")
 SPP = 64
 """Samples a pixel of the trial; orthogonal takes 121."""
 
-PICTURES = 5
-"""Of each: the first compiles, the others' variance is known to a few percent over all pixels."""
+PICTURES = 6
+"""Of each: the first compiles; the variance is known to a few percent over all pixels."""
 
 
 def merits(stable: Stable, contestant: Contestant) -> dict[str, float]:
     """Relative variance times seconds by sampler, of the contestant's side of Mitsuba; the least is
     the best.  Raises as `Stable.ready` does."""
     renderers = {name: stable.ready(with_sampler(contestant, name)) for name in CANDIDATES}
-    shots = {name: [r(SPP, k) for k in range(PICTURES)] for name, r in renderers.items()}
+    shots: dict[str, list[Shot]] = {name: [] for name in CANDIDATES}
+    for k in range(PICTURES):  # in turn: what disturbs the machine disturbs all
+        for name, renderer in renderers.items():
+            shots[name].append(renderer(SPP, k))
     mean = np.mean([shot.picture for taken in shots.values() for shot in taken], axis=0)
     weight = weights(mean)
     return {

@@ -1,0 +1,335 @@
+"""Error against time: estimators of known error, slope, bias and speed give these back."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from comparisons.convergence.contestants import Shot
+from comparisons.convergence.data import Reference, Rung, Settings, weights
+from comparisons.convergence.estimates import (
+    Accumulator,
+    against,
+    bias_of,
+    common_error,
+    effective_number,
+    errors,
+    mean_of,
+)
+from comparisons.convergence.findings import Target, findings_of, ratio
+from comparisons.convergence.fits import DRAWS, Points, linear_time, log_line, time_to
+from comparisons.convergence.plan import Cost, affordable, estimate, rungs, why_left_out
+from reference_rt.shapes.shape import FloatArray
+
+SHAPE = (24, 32, 3)
+
+
+def truth(rng: np.random.Generator) -> FloatArray:
+    """A picture without noise, of mean about 1, dark in places."""
+    return np.asarray(rng.uniform(0.0, 2.0, SHAPE))
+
+
+def reference(true: FloatArray, noise: float, rng: np.random.Generator, count: int = 16):
+    """As ours is made: the mean of independent pictures, and its variance from their scatter."""
+    pictures = true + noise * rng.standard_normal((count, *true.shape))
+    return Reference(pictures.mean(axis=0), pictures.var(axis=0, ddof=1) / count, count, 64)
+
+
+def rung(asked: int, pictures: FloatArray, against_: Reference, seconds: float = 0.1) -> Rung:
+    gathered = Accumulator(asked, against_)
+    for k, picture in enumerate(pictures):
+        gathered.add(picture, asked, seconds * (1.0 + 0.01 * k))
+    return gathered.rung()
+
+
+def points(spp, seconds, squared, log_error=0.02, freedom=7):
+    n = len(spp)
+    return Points(
+        np.array(spp, float),
+        np.array(seconds, float),
+        np.array(squared, float),
+        np.full(n, 0.01),
+        np.full(n, log_error),
+        freedom,
+    )
+
+
+# ---- errors -------------------------------------------------------------------------------------
+
+
+def test_reference_noise_is_subtracted_exactly_in_expectation():
+    """With a reference as noisy as the pictures, the mean over many pairs is the pictures' error
+    alone; without the subtraction it would be a quarter more."""
+    rng = np.random.default_rng(1)
+    true, bias, noise = truth(rng), 0.1, 0.4
+    found = np.array(
+        [
+            errors(true + bias + noise * rng.standard_normal(SHAPE), reference(true, 0.8, rng))
+            for _ in range(400)
+        ]
+    )[:, 0]
+    expected = bias**2 + noise**2
+    off = (found.mean() - expected) / (found.std(ddof=1) / math.sqrt(len(found)))
+    assert abs(off) < 4.0
+    assert 10.0 * found.std() / math.sqrt(len(found)) < 0.8**2 / 16  # it would have been seen
+
+
+def test_relative_error_is_the_metric_s():
+    from comparisons.metrics import image_metrics
+    from comparisons.results import Images
+
+    rng = np.random.default_rng(2)
+    true = truth(rng)
+    exact = Reference(true, np.zeros(SHAPE), 16, 64)
+    picture = true + 0.1 * rng.standard_normal(SHAPE)
+    mse, relmse = errors(picture, exact)
+    metrics = image_metrics(Images(picture, true))
+    assert relmse == pytest.approx(metrics.relmse, rel=1e-12)
+    assert math.sqrt(mse) == pytest.approx(metrics.rmse, rel=1e-12)
+
+
+def test_bands_hold_the_expectation():
+    """Student's band of eight replicates: in 95 % of 400 runs; 4 standard deviations of a binomial
+    are 4.4 %."""
+    rng = np.random.default_rng(3)
+    held = 0
+    for _ in range(400):
+        band = mean_of(rng.gamma(4.0, 0.25, 8))
+        held += band.low <= 1.0 <= band.high
+    assert abs(held / 400 - 0.95) < 0.044
+
+
+def test_common_error_is_that_of_the_reference():
+    """The errors of one good picture against many references scatter by what is foretold."""
+    rng = np.random.default_rng(4)
+    true = truth(rng)
+    weight = weights(true)
+    references = [reference(true, 0.3, rng) for _ in range(300)]
+    found = [float((weight * ((true - r.mean) ** 2 - r.variance)).mean()) for r in references]
+    foretold = np.mean([common_error(r, weight) for r in references])
+    # Channels are independent here, and foretold as if they erred together: up to sqrt(3) more.
+    assert np.std(found, ddof=1) < foretold < 2.0 * np.std(found, ddof=1)
+
+
+def test_accumulated_is_the_same_as_at_once():
+    rng = np.random.default_rng(5)
+    true = truth(rng)
+    ours = reference(true, 0.1, rng)
+    pictures = true + rng.standard_normal((8, *SHAPE))
+    found = rung(16, pictures, ours)
+    np.testing.assert_allclose(found.mean, pictures.mean(axis=0), rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(found.variance, pictures.var(axis=0, ddof=1), rtol=1e-11)
+    resumed = Accumulator(16, ours, rung(16, pictures[:3], ours))
+    for k in range(3, 8):
+        resumed.add(pictures[k], 16, 0.1 * (1.0 + 0.01 * k))
+    for name in ("seconds", "mse", "relmse", "mean", "variance"):
+        np.testing.assert_allclose(
+            getattr(resumed.rung(), name), getattr(found, name), rtol=1e-10, atol=1e-13
+        )
+
+
+def test_another_reference_changes_errors_as_if_it_had_been_used():
+    rng = np.random.default_rng(6)
+    true = truth(rng)
+    old, new = reference(true, 0.3, rng), reference(true, 0.05, rng)
+    pictures = true + rng.standard_normal((8, *SHAPE))
+    moved, direct = against(rung(16, pictures, old), new), rung(16, pictures, new)
+    assert moved.mse.mean() == pytest.approx(direct.mse.mean(), rel=1e-12)
+    assert moved.relmse.mean() == pytest.approx(direct.relmse.mean(), rel=1e-12)
+
+
+# ---- bias ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.1])
+def test_bias_is_found_where_there_is_one(bias):
+    """The estimate is unbiased, the bounds hold in 99 % of the runs each, and without bias none is
+    seen but in 1 %; binomials of 300 runs exceed 3.6 % and 3 % with a chance of 1e-4."""
+    rng = np.random.default_rng(7)
+    true = truth(rng)
+    found = []
+    for _ in range(300):
+        ours = reference(true, 0.3, rng)
+        pictures = true + bias + 0.5 * rng.standard_normal((8, *SHAPE))
+        found.append(bias_of(rung(16, pictures, ours), ours))
+    squared = np.array([one.squared for one in found])
+    off = (squared.mean() - bias**2) / (squared.std(ddof=1) / math.sqrt(300))
+    assert abs(off) < 4.0
+    assert np.mean([one.high < bias**2 for one in found]) < 0.036
+    assert np.mean([one.low > bias**2 for one in found]) < 0.036
+    seen = np.mean([one.is_seen for one in found])
+    assert seen < 0.03 if bias == 0.0 else seen > 0.9
+
+
+def test_few_bright_pixels_are_few():
+    values = np.zeros(1000)
+    values[:4] = 1.0
+    assert effective_number(values) == pytest.approx(4.0)
+    assert effective_number(np.ones(1000)) == pytest.approx(1000.0)
+    assert effective_number(np.zeros(10)) == 10.0
+
+
+def test_a_planted_bias_is_a_plateau():
+    """Errors stop falling, the bias is seen, and targets below it are never reached."""
+    rng = np.random.default_rng(8)
+    true = truth(rng) + 0.5
+    ours = reference(true, 0.02, rng)
+    biased, fair = [], []
+    for spp in (4, 16, 64, 256, 1024):
+        noise = rng.standard_normal((8, *SHAPE)) / math.sqrt(spp)
+        biased.append(rung(spp, true * 1.05 + noise, ours, 0.01 * spp))
+        fair.append(rung(spp, true + noise, ours, 0.01 * spp))
+    targets = (0.2, 0.03, 0.01)
+    plateau, falling = (findings_of(r, ours, targets, None) for r in (biased, fair))
+    assert plateau.relative_bias.is_seen
+    assert not falling.relative_bias.is_seen
+    # A picture 5 % too bright has a relative error a little below 5 %, for epsilon.
+    assert 0.04 < math.sqrt(plateau.relative_bias.squared) < 0.05
+    assert [target.how for target in plateau.targets] == ["interpolated", "bias", "bias"]
+    assert math.isinf(plateau.targets[1].seconds.value)
+    assert falling.targets[1].how == "interpolated"
+    assert plateau.slopes["relmse"]["spp"].slope > falling.slopes["relmse"]["spp"].slope + 0.1
+    assert ratio(falling.targets[1], plateau.targets[1]) == (0.0, 0.0, 0.0)
+
+
+# ---- slopes -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scatter", [0.03, 0.3])
+@pytest.mark.parametrize("slope", [-1.0, -1.3])
+def test_slope_lies_within_its_interval(slope, scatter):
+    """In 95 % of 400 runs of six rungs of eight replicates, as measured: scatters of errors are
+    those of gamma variates; four standard deviations of a binomial are 4.4 %."""
+    rng = np.random.default_rng(9)
+    spp = 4.0 * 2.0 ** np.arange(6)
+    held = []
+    for _ in range(400):
+        shape = 1.0 / scatter**2
+        replicates = rng.gamma(shape, scatter**2, (8, 6)) * spp**slope
+        mean = replicates.mean(axis=0)
+        error = replicates.std(axis=0, ddof=1) / math.sqrt(8) / mean
+        line = log_line(spp, mean, error, 7)
+        held.append(line.low <= slope <= line.high)
+    assert abs(np.mean(held) - 0.95) < 0.044
+
+
+def test_a_bent_curve_has_a_wider_interval():
+    """Points off a line by more than their scatter: the interval does not pretend."""
+    spp = 4.0 * 2.0 ** np.arange(6)
+    bent = 1.0 / spp * (1.0 + 0.3 * np.array([1, -1, 1, -1, 1, -1]))
+    straight, off = (log_line(spp, y, np.full(6, 1e-3), 7) for y in (1.0 / spp, bent))
+    assert off.high - off.low > 50.0 * (straight.high - straight.low)
+    assert log_line(spp[:1], spp[:1], np.ones(1), 7) is None
+
+
+# ---- times --------------------------------------------------------------------------------------
+
+
+def test_time_between_rungs():
+    """An error of 2 / n in 0.01 n seconds: 1/25 after 50 samples, half a second."""
+    spp = [4, 8, 16, 32, 64, 128]
+    curve = points(spp, [0.01 * n for n in spp], [2.0 / n for n in spp])
+    found = time_to(curve, 0.04)
+    assert found.how == "interpolated"
+    assert found.spp == pytest.approx(50.0, rel=1e-9)
+    assert found.seconds.value == pytest.approx(0.5, rel=1e-9)
+    assert found.seconds.low < 0.5 < found.seconds.high
+
+
+@pytest.mark.parametrize("slope", [None, -1.0])
+def test_time_beyond_the_last_rung(slope):
+    """Seconds have a start of 0.1 and grow by 0.01 a sample, also beyond."""
+    spp = [4, 8, 16, 32, 64, 128]
+    curve = points(spp, [0.1 + 0.01 * n for n in spp], [2.0 / n for n in spp])
+    found = time_to(curve, 2e-4, slope)
+    assert found.how == "extrapolated"
+    assert found.spp == pytest.approx(10_000.0, rel=1e-6)
+    assert found.seconds.value == pytest.approx(100.1, rel=1e-6)
+    widths = [
+        time_to(curve, 2e-4, s).seconds.high / time_to(curve, 2e-4, s).seconds.low
+        for s in (None, -1.0)
+    ]
+    assert widths[1] < widths[0]
+
+
+def test_times_that_cannot_be_told():
+    spp = [4, 8, 16]
+    curve = points(spp, [0.1, 0.2, 0.4], [0.5, 0.25, 0.125])
+    first = time_to(curve, 0.9)
+    assert (first.how, first.seconds.value) == ("below", pytest.approx(0.1))
+    rising = points(spp, [0.1, 0.2, 0.4], [0.5, 0.6, 0.7])
+    assert time_to(rising, 0.1) is None
+    assert time_to(points([4], [0.1], [0.5]), 0.1) is None
+    assert time_to(points([], [], []), 0.1) is None
+
+
+def test_time_lies_within_its_band():
+    """Measured curves of eight replicates, true slope -1.1: the band of the time to an error eight
+    times below the last rung holds the true time in 95 % of 200 runs (four standard deviations of a
+    binomial: 6.2 %)."""
+    rng = np.random.default_rng(10)
+    spp = 4.0 * 2.0 ** np.arange(6)
+    goal = float(spp[-1] ** -1.1) / 8.0
+    expected = 0.01 * goal ** (-1 / 1.1)
+    held = []
+    for _ in range(200):
+        replicates = rng.gamma(400.0, 1 / 400.0, (8, 6)) * spp**-1.1
+        mean = replicates.mean(axis=0)
+        error = replicates.std(axis=0, ddof=1) / math.sqrt(8) / mean
+        curve = Points(spp, 0.01 * spp, mean, np.zeros(6), error, 7)
+        band = time_to(curve, goal).seconds
+        held.append(band.low <= expected <= band.high)
+    assert abs(np.mean(held) - 0.95) < 0.062
+
+
+def test_seconds_are_a_start_and_a_share_of_each_sample():
+    spp = np.array([4.0, 8.0, 16.0, 64.0])
+    assert linear_time(spp, 0.2 + 0.03 * spp) == pytest.approx((0.2, 0.03))
+    start, share = linear_time(spp, 0.03 * spp)
+    assert (start, share) == pytest.approx((0.0, 0.03), abs=1e-12)
+
+
+def test_ratio_of_times():
+    spp = [4, 8, 16, 32]
+    mine = points(spp, [0.01 * n for n in spp], [1.0 / n for n in spp])
+    theirs = points(spp, [0.03 * n for n in spp], [1.0 / n for n in spp])
+    targets = []
+    for curve in (mine, theirs):
+        found = time_to(curve, 0.05)
+        targets.append(Target(0.2, found.how, found.seconds, found.spp, np.exp(found.log_seconds)))
+    found = ratio(*targets)
+    assert found.value == pytest.approx(1 / 3)
+    assert found.low < 1 / 3 < found.high
+    assert len(targets[0].drawn) == DRAWS
+    unknown = Target(0.2, "unknown", found, math.nan, np.array([math.nan]))
+    assert ratio(unknown, targets[0]) is None
+
+
+# ---- plans --------------------------------------------------------------------------------------
+
+
+def renderer(start: float, per_sample: float) -> Callable[[int, int], Shot]:
+    return lambda spp, replicate: Shot(np.zeros((2, 2, 3)), spp, start + per_sample * spp)
+
+
+def test_cost_is_estimated_from_trials():
+    cost = estimate(renderer(0.5, 0.01))
+    assert (cost.start, cost.per_sample) == (pytest.approx(0.5), pytest.approx(0.01))
+    # Where noise makes fewer samples slower, none of the cost is lost.
+    odd = estimate(lambda spp, k: Shot(np.zeros((2, 2, 3)), spp, 0.2 if spp == 4 else 0.1))
+    assert odd.picture(16) >= 0.1
+
+
+def test_rungs_fit_into_the_time():
+    settings = Settings(max_spp=64, replicates=8)
+    cost = Cost(0.0, 0.01)
+    assert rungs(64) == (4, 8, 16, 32, 64)
+    assert rungs(100, 4) == (4, 16, 64)
+    # 8 replicates of 4, 8, 16 samples are 2.24 s, of 32 another 2.56 s.
+    assert affordable(cost, 4.0, settings, 100) == (4, 8, 16)
+    assert "rungs from 32 samples" in why_left_out(cost, (4, 8, 16), 4.0, settings, 100)
+    assert affordable(cost, 100.0, settings, 100) == rungs(64)
+    assert why_left_out(cost, rungs(64), 100.0, settings, 100) == ""
+    assert affordable(cost, 100.0, replace(settings, max_spp=1 << 20), 1 << 22) == (4, 8, 16, 32)

@@ -1,0 +1,343 @@
+"""`reference-rt converge` as a whole, and what a second run does not do again."""
+
+import csv
+import json
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import comparisons.cli
+import comparisons.convergence
+from comparisons.convergence import ladder
+from comparisons.convergence.contestants import (
+    CONTESTANTS,
+    AbsentError,
+    Shot,
+    Stable,
+    chosen,
+    with_sampler,
+)
+from comparisons.convergence.curves import Curves
+from comparisons.convergence.data import Reference, Settings, weights
+from comparisons.convergence.findings import findings_of
+from comparisons.convergence.ladder import Climb, climb
+from comparisons.convergence.outputs import COLUMNS, write_results, write_table
+from comparisons.convergence.page import write_page
+from comparisons.convergence.reference import COUNT, reference_of
+from comparisons.convergence.run import converge, prepared, size_within
+from comparisons.convergence.store import Store, run_key
+from reference_rt.cli import app
+from reference_rt.errors import UsageError
+from reference_rt.film import Film
+from reference_rt.filters import BoxFilter
+from reference_rt.scene import Scene
+
+SCENES = Path(__file__).parents[2] / "scenes"
+SHAPE = (12, 16, 3)
+TRUE = np.random.default_rng(0).uniform(0.2, 2.0, SHAPE)
+EXACT = Reference(TRUE, np.full(SHAPE, 1e-8), 16, 1024)
+
+if not any(command.name == "converge" for command in app.registered_commands):
+    comparisons.cli.register(app)
+
+
+class Fake:
+    """A renderer of known noise and speed, which counts its pictures and may be interrupted."""
+
+    def __init__(self, noise: float = 1.0, speed: float = 1e-3, breaks_after: int = 10**9) -> None:
+        self.noise, self.speed, self.left, self.asked = noise, speed, breaks_after, []
+
+    def __call__(self, spp: int, replicate: int) -> Shot:
+        if self.left == 0:
+            raise KeyboardInterrupt
+        self.left -= 1
+        self.asked.append((spp, replicate))
+        rng = np.random.default_rng([spp, replicate])
+        picture = TRUE + self.noise / math.sqrt(spp) * rng.standard_normal(SHAPE)
+        return Shot(picture, spp, self.speed * spp)
+
+
+def climbs(**fakes: Fake) -> dict[str, Climb]:
+    return {name: Climb(lambda fake=fake: fake, (4, 8, 16), 100.0) for name, fake in fakes.items()}
+
+
+# ---- the ladder ---------------------------------------------------------------------------------
+
+
+def test_contestants_take_turns_and_numbers_are_used_once():
+    asked = []
+
+    class Told(Fake):
+        def __call__(self, spp: int, replicate: int) -> Shot:
+            asked.append((self, spp))
+            return super().__call__(spp, replicate)
+
+    a, b = Told(), Told()
+    climb(climbs(a=a, b=b), EXACT, 8, Store(None, ""))
+    assert asked[:6] == [(a, 4), (b, 4), (a, 8), (b, 8), (a, 16), (b, 16)]
+    assert len(asked) == 2 * 3 * 8
+    numbers = [replicate for _, replicate in a.asked]
+    assert len(set(numbers)) == len(numbers)
+
+
+def test_what_is_done_is_not_done_again(tmp_path):
+    first = climbs(a=Fake())
+    climb(first, EXACT, 8, Store(tmp_path / "s", "key"))
+    again, fake = climbs(a=Fake()), Fake()
+    again["a"].renderer = lambda: fake
+    climb(again, EXACT, 8, Store(tmp_path / "s", "key"))
+    assert fake.asked == []
+    for one, other in zip(first["a"].rungs, again["a"].rungs, strict=True):
+        np.testing.assert_array_equal(one.seconds, other.seconds)
+        # Pictures are stored as float32.
+        np.testing.assert_allclose(one.relmse, other.relmse, rtol=1e-5)
+    for store in (Store(tmp_path / "s", "other key"), Store(tmp_path / "s", "key", fresh=True)):
+        assert store.rung("a", 4) is None
+
+
+def test_an_interruption_loses_no_picture(tmp_path):
+    """Stopped in the third sweep: the second run does the rest, with the same result."""
+    broken = climbs(a=Fake(breaks_after=7))
+    with pytest.raises(KeyboardInterrupt):
+        climb(broken, EXACT, 8, Store(tmp_path / "s", "key"))
+    rest = Fake()
+    resumed = climbs(a=rest)
+    climb(resumed, EXACT, 8, Store(tmp_path / "s", "key"))
+    assert len(rest.asked) == 3 * 8 - 7
+    whole = climbs(a=Fake())
+    climb(whole, EXACT, 8, Store(None, ""))
+    for one, other in zip(whole["a"].rungs, resumed["a"].rungs, strict=True):
+        np.testing.assert_allclose(one.relmse, other.relmse, rtol=1e-4)
+        np.testing.assert_allclose(one.variance, other.variance, rtol=1e-4, atol=1e-7)
+
+
+def test_a_damaged_record_is_done_again(tmp_path):
+    store = Store(tmp_path / "s", "key")
+    climb(climbs(a=Fake()), EXACT, 8, store)
+    path = tmp_path / "s" / "a-8.npz"
+    path.write_bytes(path.read_bytes()[:100])
+    fake = Fake()
+    climb(climbs(a=fake), EXACT, 8, store)
+    assert {spp for spp, _ in fake.asked} == {8}
+
+
+def test_slower_than_promised_climbs_less():
+    fake = Fake(speed=1.0)
+    one = Climb(lambda: fake, (4, 8, 16, 32), 100.0)
+    climb({"a": one}, EXACT, 8, Store(None, ""))
+    # 8 pictures of 4 and 8 samples take 96 s; those of 16, another 128 s.
+    assert [rung.asked for rung in one.rungs] == [4, 8]
+    assert "rungs from 16 samples a pixel" in one.stopped
+
+
+def test_long_runs_are_stored_on_the_way(tmp_path, monkeypatch):
+    monkeypatch.setattr(ladder, "STORED_EVERY", -1.0)
+    kept = []
+    store = Store(tmp_path / "s", "key")
+    monkeypatch.setattr(store, "keep", lambda name, rung: kept.append(rung.replicates))
+    climb(climbs(a=Fake()), EXACT, 4, store)
+    assert kept == [1] * 3 + [2] * 3 + [3] * 3 + [4] * 3
+
+
+# ---- the reference ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        comparisons.convergence.reference, "cache_folder", lambda: tmp_path / "references"
+    )
+
+
+def test_reference_is_kept_and_added_to(own_cache):
+    scene = prepared(Scene.load(SCENES / "cornell_box.yaml"), Settings(size=(12, 12)))
+    few = reference_of(scene, 16)
+    kept = reference_of(scene, 8)
+    more = reference_of(scene, 64)
+    assert few.seconds > 0.0 == kept.seconds
+    np.testing.assert_array_equal(few.mean, kept.mean)
+    assert (few.spp, kept.spp, more.spp, more.count) == (16, 16, 64, COUNT)
+    # Four times the samples, more evenly placed: at most a third of the variance.
+    assert more.relmse < few.relmse / 3.0
+    assert not np.array_equal(few.mean, more.mean)
+    off = (few.mean - more.mean) / np.sqrt(few.variance + 1e-12)
+    assert 0.5 < np.sqrt((off**2).mean()) < 2.0  # of one picture, by its own standard error
+
+
+# ---- whole runs ---------------------------------------------------------------------------------
+
+
+def program(*arguments: object):
+    return CliRunner().invoke(app, ["converge", *map(str, arguments)])
+
+
+FAST = ("--size", "16x12", "--time-limit", "1", "--no-starts", "--max-spp", "16")
+
+
+def test_scenes_with_chance_and_without(tmp_path, own_cache):
+    """A ladder for one, a grid for the other; JSON, CSV and page agree; a second run is quick."""
+    scenes = [SCENES / f"{name}.yaml" for name in ("cornell_box", "whitted_classic")]
+    only = [x for name in ("ours", "mitsuba_llvm") for x in ("--only", name)]
+    result = program(*scenes, "-o", tmp_path, *FAST, *only)
+    assert result.exit_code == 0, result.output
+    found = json.loads((tmp_path / "results.json").read_text())
+    assert (found["schema"], found["kind"]) == (1, "convergence")
+    ladder_, grid = found["scenes"]
+    assert ladder_["size"] == [16, 12]
+    assert "converge" in ladder_["again"]
+    assert "16x12" in ladder_["again"]
+    ours = ladder_["contestants"]["ours"]
+    assert [rung["asked_spp"] for rung in ours["rungs"]][:2] == [4, 8]
+    assert all(rung["replicates"] == 8 for rung in ours["rungs"])
+    assert ladder_["reference"]["pictures"] == COUNT
+    assert not ours["relative_bias"]["seen"]
+    assert {crops["kind"] for crops in ladder_["crops"]} <= {"time", "error"}
+    assert grid["contestants"] == {}
+    errors = [step["relmse"] for step in grid["grids"]["steps"]]
+    assert errors[0] > errors[-1]
+    assert grid["grids"]["mitsuba"][0]["relmse"] < 1e-4  # float32, here and there an edge
+
+    rows = list(csv.DictReader((tmp_path / "results.csv").read_text().splitlines()))
+    assert tuple(rows[0]) == COLUMNS
+    told = {
+        (scene["scene"], name, rung["asked_spp"]): rung
+        for scene in found["scenes"]
+        for name, one in scene["contestants"].items()
+        for rung in one["rungs"]
+    }
+    of_rungs = [row for row in rows if row["sampler"] != "grid"]
+    assert len(of_rungs) == len(told)
+    assert len(rows) - len(of_rungs) == len(grid["grids"]["steps"])
+    for row in of_rungs:
+        rung = told[row["scene"], row["contestant"], int(row["asked_spp"])]
+        assert float(row["relmse"]) == rung["relmse"]["value"]
+        assert float(row["mse_high"]) == rung["mse"]["high"]
+        assert float(row["seconds"]) == rung["seconds"]["median"]
+
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("<svg") == 8
+    assert not re.search(r'(?:src|href)="(?!data:|#)', page)
+    assert "<script" not in page
+
+    again = program(*scenes, "-o", tmp_path, *FAST, *only)
+    assert again.exit_code == 0
+    same = json.loads((tmp_path / "results.json").read_text())
+    assert [r["seconds"] for r in same["scenes"][0]["contestants"]["ours"]["rungs"]] == [
+        r["seconds"] for r in ours["rungs"]
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--only", "mine"), "--only"),
+        (("--targets", "0.1,x"), "--targets"),
+        (("--targets", "-1"), "--targets"),
+        (("--size", "12"), "--size"),
+        (("--size", "0x4"), "--size"),
+    ],
+)
+def test_wrong_usage(arguments, said, tmp_path):
+    result = program(SCENES / "cornell_box.yaml", "-o", tmp_path / "out", *arguments)
+    assert result.exit_code == 2
+    assert said in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scene_that_is_none(tmp_path):
+    assert program(tmp_path / "none.yaml", "-o", tmp_path / "out").exit_code == 3
+    twice = (SCENES / "cornell_box.yaml", SCENES / "cornell_box.yaml")
+    assert program(*twice, "-o", tmp_path / "out").exit_code == 2
+
+
+def test_times_to_an_error(own_cache):
+    scene = Scene.load(SCENES / "cornell_box.yaml")
+    scene = scene.changed(film=Film(width=16, height=12))
+    times = comparisons.convergence.time_to_error(scene, 0.3, 1.0)
+    assert "ours" in times
+    assert set(times) <= {"ours", "mitsuba_llvm", "mitsuba_llvm_best", "mitsuba_scalar"}
+    assert all(0.0 < seconds < 10.0 for seconds in times.values())
+    with pytest.raises(ValueError, match="deterministic"):
+        comparisons.convergence.time_to_error(Scene.load(SCENES / "whitted_classic.yaml"), 0.1, 1.0)
+
+
+def test_solids_have_no_mitsuba():
+    scene = Scene.load(SCENES / "csg_dice.yaml")
+    with Stable(scene) as stable, pytest.raises(AbsentError, match="set operations"):
+        stable.ready(next(c for c in CONTESTANTS if c.name == "mitsuba_llvm"))
+
+
+# ---- parts --------------------------------------------------------------------------------------
+
+
+def test_scenes_are_rendered_small_and_through_a_box():
+    scene = Scene.load(SCENES / "filter_gaussian.yaml")
+    assert isinstance(prepared(scene, Settings()).film.filter, BoxFilter)
+    assert size_within(Film(width=320, height=240), 128) == (128, 96)
+    assert size_within(Film(width=96, height=72), 128) == (96, 72)
+
+
+def test_key_changes_with_what_matters():
+    scene = Scene.load(SCENES / "cornell_box.yaml")
+    small = prepared(scene, Settings(size=(12, 12)))
+    keys = [run_key(small, 8), run_key(small, 9), run_key(prepared(scene, Settings()), 8)]
+    assert len(set(keys)) == 3
+    assert run_key(small, 8) == keys[0]
+
+
+def test_contestants_by_name():
+    assert [c.name for c in chosen(("mitsuba_llvm", "ours"))] == ["ours", "mitsuba_llvm"]
+    assert chosen(()) == CONTESTANTS
+    with pytest.raises(UsageError, match="mine"):
+        chosen(("mine",))
+    best = with_sampler(CONTESTANTS[3], "ldsampler")
+    assert (best.title, best.factor, best.slope) == ("Mitsuba llvm, ldsampler (best)", 4, None)
+    assert CONTESTANTS[2].slope == -1.0
+
+
+def test_page_escapes_what_comes_from_outside(tmp_path):
+    one = Climb(lambda: Fake(), (4, 8), 100.0)
+    climb({"ours": one}, EXACT, 8, Store(None, ""))
+    found = {"ours": findings_of(one.rungs, EXACT, (0.1, 1e-6), None)}
+    curves = Curves(
+        "<script>alert(1)</script>",
+        (16, 12),
+        {"ours": CONTESTANTS[0]},
+        found,
+        EXACT,
+        left_out=("a & b",),
+    )
+    settings = Settings(targets=(0.1, 1e-6))
+    write_page(tmp_path / "page.html", [curves], settings, {"machine": "<b>"})
+    text = (tmp_path / "page.html").read_text()
+    assert "<script" not in text
+    assert "a &amp; b" in text
+    assert "&lt;b&gt;" in text
+    write_results(tmp_path / "results.json", [curves], settings, {})
+    write_table(tmp_path / "results.csv", [curves])
+    assert json.loads((tmp_path / "results.json").read_text())["scenes"][0]["left_out"] == ["a & b"]
+    assert EXACT.relmse == pytest.approx((weights(TRUE) * 1e-8).mean())
+
+
+@pytest.mark.slow
+def test_starts_are_timed(own_cache):
+    """Two processes: the first compiles, the second finds the kernels."""
+    settings = Settings(time_limit=0.5, size=(12, 12), max_spp=8, only=("ours",), crops=False)
+    found = converge(Scene.load(SCENES / "cornell_box.yaml"), settings).starts
+    cold, warm = found["ours"]["cold"], found["ours"]["warm"]
+    assert cold["compile"] > 3.0 * warm["compile"] > 0.0
+    assert warm["start"] > 0.1
+
+
+def test_other_commands_do_not_wait_for_it():
+    code = "import sys; from reference_rt.cli import main; import comparisons.cli; " + (
+        "print([m for m in ('mitsuba', 'matplotlib', 'comparisons.convergence') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
