@@ -51,16 +51,16 @@ class Contestant:
     side: str
 
     @property
-    def slope(self) -> float | None:
-        """Of squared errors over samples, where theory has it."""
-        return -1.0 if self.sampler == "independent" else None
+    def is_independent(self) -> bool:
+        """Whether samples are independent of each other: squared errors fall as 1 / n."""
+        return self.sampler == "independent"
 
     @property
     def factor(self) -> int:
         """Between the samples of one rung and the next.
 
         Powers of four alone where Mitsuba would take other numbers: multijitter takes 35 for 32,
-        which is no power of two, and needs 1.4 times as long for each; ldsampler takes 64.
+        which is no power of two, and a third longer for each (measured); ldsampler takes 64.
         """
         return 4 if self.sampler in ("multijitter", "ldsampler") else 2
 

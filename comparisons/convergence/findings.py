@@ -44,13 +44,12 @@ class Step(NamedTuple):
 class Target(NamedTuple):
     """When the relative error, the root of relMSE, is `error`.
 
-    how: "interpolated" between rungs, "extrapolated" by the fit, "below": by the first rung already
-    (seconds are that rung's), "bias": never, a bias larger than that is proven, "unknown": the
-    rungs are too few to tell.
+    how: see `How`; of "below", seconds are those of the first rung;  drawn: seconds of curves drawn
+    within the scatter, the measured one first.
     """
 
     error: float
-    how: How | str
+    how: How
     seconds: Estimate
     spp: float
     drawn: FloatArray
@@ -72,10 +71,10 @@ class Findings:
 
 
 def findings_of(
-    rungs: Sequence[Rung], reference: Reference, targets: Sequence[float], slope: float | None
+    rungs: Sequence[Rung], reference: Reference, targets: Sequence[float], independent: bool
 ) -> Findings:
-    """Everything about a contestant that has at least one rung; slope: of its errors over samples,
-    where that is known."""
+    """Everything about a contestant that has at least one rung; independent: whether its samples
+    are."""
     weight = weights(reference.mean)
     steps = tuple(_step(rung, reference, weight) for rung in rungs)
     points = {
@@ -92,7 +91,7 @@ def findings_of(
         slopes,
         bias_of(rungs[-1], reference),
         relative_bias,
-        tuple(_target(points["relmse"], error, relative_bias, slope) for error in targets),
+        tuple(_target(points["relmse"], error, relative_bias, independent) for error in targets),
     )
 
 
@@ -134,9 +133,9 @@ def _slope(points: Points, over: FloatArray) -> Line | None:
     return log_line(over, points.errors, points.log_errors_error, points.freedom)
 
 
-def _target(points: Points, error: float, bias: Bias, slope: float | None) -> Target:
+def _target(points: Points, error: float, bias: Bias, independent: bool) -> Target:
     never = Estimate(math.inf, math.inf, math.inf)
-    reached = time_to(points, error**2, slope)
+    reached = time_to(points, error**2, independent)
     if bias.low > error**2 and (reached is None or reached.how == "extrapolated"):
         return Target(error, "bias", never, math.inf, np.array([math.inf]))
     if reached is None:

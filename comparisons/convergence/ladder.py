@@ -46,6 +46,8 @@ class Climb:
         taking = {spp: replicates * float(rung.warm.mean()) for spp, rung in rungs.items()}
         while len(taking) > 2 and sum(taking.values()) > PATIENCE * self.share:
             highest = max(taking)
+            if self.gathered[highest].count >= replicates:
+                break
             self.stopped = (
                 f"rungs from {highest} samples a pixel: slower than the trial promised, "
                 f"{sum(taking.values()):.2g} s in all, and its share is {self.share:.2g} s"
@@ -79,16 +81,19 @@ def climb(
             store.keep(name, climbs[name].gathered[spp].rung())
         changed.clear()
 
+    say("ladder", 0.0)
     try:
         for k in range(replicates):
-            for name, spp in _sweep(climbs):
+            sweep = _sweep(climbs)
+            samples, all_samples = 0, sum(spp for _, spp in sweep)
+            for name, spp in sweep:
                 gathered = climbs[name].gathered[spp]
-                if gathered.count > k:
-                    continue
-                # The numbers of other rungs' replicates are none of this one's.
-                gathered.add(*climbs[name].renderer()(spp, spp * replicates + k))
-                changed.add((name, spp))
-            say("ladder", (k + 1) / replicates)
+                if gathered.count <= k:
+                    # The numbers of other rungs' replicates are none of this one's.
+                    gathered.add(*climbs[name].renderer()(spp, spp * replicates + k))
+                    changed.add((name, spp))
+                samples += spp
+                say("ladder", (k + samples / all_samples) / replicates)
             if time.monotonic() - stored > STORED_EVERY:
                 keep()
                 stored = time.monotonic()

@@ -137,6 +137,7 @@ class _Run:
         climbed = {name: one.rungs for name, one in climbs.items()}
         renderers = {name: climbs[name].renderer for name in climbed}
         starts = starts_of(scene, by_name.values(), self.store, self.say) if settings.starts else {}
+        left_out += [f"starts of {side}: a process failed" for side, t in starts.items() if not t]
         if any(c.side != "ours" for c in by_name.values()):
             notes += tuple(remarks(scene))
         notes += tuple(_told(side, found) for side, found in plan.merits.items())
@@ -145,7 +146,7 @@ class _Run:
             (scene.film.width, scene.film.height),
             by_name,
             {
-                name: findings_of(rungs, reference, settings.targets, by_name[name].slope)
+                name: findings_of(rungs, reference, settings.targets, by_name[name].is_independent)
                 for name, rungs in climbed.items()
             },
             reference,

@@ -34,7 +34,7 @@ Say = Callable[[str, float], None]
 def starts_of(
     scene: Scene, contestants: Iterable[Contestant], store: Store, say: Say
 ) -> dict[str, dict[str, dict[str, float]]]:
-    """Seconds by side, "cold" or "warm", and stage; sides that fail are left out.
+    """Seconds by side, "cold" or "warm", and stage; nothing of a side whose processes failed.
 
     Cold are the caches of compiled kernels alone: the system has the programs' files in memory.
     """
@@ -45,6 +45,7 @@ def starts_of(
         stored = store.fact(f"starts-{side}")
         times = stored if stored is not None else _start(scene, side)
         if times is None:
+            found[side] = {}
             continue
         store.keep_fact(f"starts-{side}", times)
         found[side] = times
