@@ -20,11 +20,12 @@ class Settings:
     """What is asked of a run.
 
     time_limit: seconds for the ladder and the reference of one scene, shared equally by the
-    contestants and the reference; starts of processes and compiling come in addition;  size: width
-    and height, none for the scene's, at most WIDEST pixels across;  max_spp: no rung has more
-    samples a pixel;  replicates: independent pictures at each rung;  targets: relative errors, the
-    time to which is asked for;  only: names of contestants, all if none;  starts: whether to time
-    the start of processes, with caches empty and full;  crops: whether to render pictures to show.
+    contestants and the reference; starts of processes, compiling and trials (of costs, of Mitsuba's
+    samplers) come in addition;  size: width and height, none for the scene's, at most WIDEST pixels
+    across;  max_spp: no rung has more samples a pixel;  replicates: independent pictures at each
+    rung;  targets: relative errors, the time to which is asked for;  only: names of contestants,
+    all if none;  starts: whether to time the start of processes, with caches empty and full;
+    crops: whether to render pictures to show.
     """
 
     time_limit: float = 60.0

@@ -24,13 +24,15 @@ Say = Callable[[str, float], None]
 class Climb:
     """One contestant on the ladder.
 
-    renderer: makes it ready, when first needed;  planned: its rungs;  share: its seconds;  rungs:
-    by samples asked for, what is done of them;  stopped: why not all are.
+    renderer: makes it ready, when first needed;  planned: its rungs;  share: its seconds;  apart:
+    whether its turn comes when the others are through with their rungs, since changing to it takes
+    time;  gathered: by samples asked for, what is done of them;  stopped: why not all are.
     """
 
     renderer: Callable[[], Renderer]
     planned: Sequence[int]
     share: float
+    apart: bool = False
     gathered: dict[int, Accumulator] = field(default_factory=dict)
     stopped: str = ""
 
@@ -109,8 +111,8 @@ def climb(
 
 def _sweep(climbs: Mapping[str, Climb]) -> list[tuple[str, int]]:
     """(contestant, samples): rung by rung, contestants in turn."""
-    steps = sorted({spp for one in climbs.values() for spp in one.planned})
-    return [(name, spp) for spp in steps for name, one in climbs.items() if spp in one.planned]
+    pairs = [(name, spp) for name, one in climbs.items() for spp in one.planned]
+    return sorted(pairs, key=lambda pair: (climbs[pair[0]].apart, pair[1]))
 
 
 __all__ = ["Climb", "climb"]

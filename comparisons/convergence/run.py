@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 from comparisons.budget import Budget
 from comparisons.compare import budgeted
@@ -28,6 +28,7 @@ from comparisons.convergence.reference import COUNT, reference_of
 from comparisons.convergence.samplers import SPP, merits
 from comparisons.convergence.starts import starts_of
 from comparisons.convergence.store import Store
+from comparisons.mitsuba_backend import SCALAR
 from reference_rt.film import Film
 from reference_rt.filters import BoxFilter
 from reference_rt.scene import Scene
@@ -128,7 +129,7 @@ class _Run:
         share = settings.time_limit / (len(plan.rungs) + 1)
         by_name = {c.name: plan.resolved(c) for c in contestants if plan.rungs.get(c.name)}
         climbs = {
-            name: Climb(lambda c=c: self.renderer(c), plan.rungs[name], share)  # type: ignore[misc]
+            name: Climb(partial(self.renderer, c), plan.rungs[name], share, c.side == SCALAR)
             for name, c in by_name.items()
         }
         climb(climbs, reference, settings.replicates, self.store, self.say)

@@ -12,7 +12,7 @@ CANDIDATES = ("independent", "multijitter", "ldsampler", "orthogonal")
 SPP = 64
 """Samples a pixel of the trial; orthogonal takes 121."""
 
-PICTURES = 6
+PICTURES = 4
 """Of each: the first compiles; the variance is known to a few percent over all pixels."""
 
 
