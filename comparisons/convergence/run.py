@@ -173,9 +173,9 @@ class _Run:
             fit = affordable(cost, share, settings, pixels, factor)
             if len(fit) < 2 and contestant.side == "ours":
                 fit = rungs(settings.max_spp)[:2]
-            if len(fit) < 2:
-                fit = ()
             why = why_left_out(cost, fit, share, settings, pixels, factor)
+            if len(fit) < 2:
+                fit, why = (), f"all: two rungs at least make a curve; {why}"
             if why:
                 plan.left_out.append(f"{contestant.title}: {why}")
             plan.rungs[contestant.name] = list(fit)
