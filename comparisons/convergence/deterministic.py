@@ -33,6 +33,14 @@ MOST_ACROSS = 64
 which pictures are looked at."""
 
 
+WHOSE = {
+    "ray_cast": "Mitsuba's picture is made of its hits of the rays through the pixels' middles",
+    "whitted": "Mitsuba's picture is made by our plugin, which it traces in Python: its time says "
+    "little of Mitsuba",
+}
+"""What a reader should know of Mitsuba's side, by integrator."""
+
+
 def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[Grids, list[str]]:
     """Our pictures on grids of 1, 4, 9, ... samples a pixel against the finest, and Mitsuba's.
 
@@ -40,19 +48,30 @@ def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[
     middles alone, a grid is a larger picture, averaged as displayed.  Returns also what was left
     out and why.  Raises SceneError, ReferenceUnavailableError.
     """
+    question = [settings.time_limit, settings.max_spp]
+    stored, finest = store.fact("grids", question), store.picture("grid")
+    if stored is not None and finest is not None:
+        steps = tuple(GridStep(*step) for step in stored["steps"])
+        points = tuple(GridPoint(*point) for point in stored["points"])
+        finest = np.asarray(finest, np.float64)
+        return Grids(steps, points, stored["finest"], finest), stored["left_out"]
+    grids, left_out = _made(scene, settings, say)
+    store.keep_picture("grid", grids.picture)
+    fact = {"steps": grids.steps, "points": grids.points, "finest": grids.finest}
+    store.keep_fact("grids", {**fact, "left_out": left_out}, question)
+    return grids, left_out
+
+
+def _made(scene: Scene, settings: Settings, say: Say) -> tuple[Grids, list[str]]:
     left_out: list[str] = []
+    say("finest grid", 0.0)
     timed(scene, 2)  # compiles
     seconds = timed(scene, 2)[1] / 4.0
-    across = int((0.5 * settings.time_limit / seconds) ** 0.5)
     most_asked = FINER * int(settings.max_spp**0.5)
+    across = int((0.5 * settings.time_limit / seconds) ** 0.5)
     across = min(max(across, 2), MOST_ACROSS, most_asked)
-    say("finest grid", 0.0)
-    finest = store.picture(f"grid-{across}")
-    if finest is None:
-        finest = timed(scene, across)[0]
-        store.keep_picture(f"grid-{across}", finest)
+    finest = timed(scene, across)[0]
     say("finest grid", 1.0)
-    finest = np.asarray(finest, np.float64)
     most = max(1, across // FINER)
     if across < min(MOST_ACROSS, most_asked):
         left_out.append(
@@ -60,6 +79,7 @@ def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[
             f"{FINER} times finer, would take more than half of {settings.time_limit:g} s"
         )
     steps = []
+    say("grids", 0.0)
     for n in range(1, most + 1):
         shots = [timed(scene, n) for _ in range(REPEATS)]
         mse, relmse = differences(shots[0][0], finest)
@@ -116,4 +136,4 @@ def _mitsubas(scene: Scene) -> GridPoint:
     return GridPoint(backend().variant, int(getattr(sampler, "spp", 1)), warm, mse, relmse)
 
 
-__all__ = ["grids_of"]
+__all__ = ["WHOSE", "grids_of"]

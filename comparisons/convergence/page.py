@@ -28,6 +28,9 @@ from reference_rt.shapes.shape import FloatArray
 SECONDS = "render time of a picture, s"
 SAMPLES = "samples a pixel"
 
+LOWEST = 1e-3
+"""Of the lowest point of a curve: what lies further below would leave no room for the curve."""
+
 
 class Cell(NamedTuple):
     """Of a table: what is said, what in small type beside it, and a class for its look."""
@@ -175,6 +178,8 @@ def _grid_plots(one: Curves) -> list[Markup]:
             for number, point in enumerate(one.grids.points, 2):
                 at = point.seconds if x_label == SECONDS else float(point.spp)
                 error = point.relmse if text == "relMSE" else point.mse
+                if error < min(values) * LOWEST:
+                    continue  # the table has it
                 title = f"Mitsuba {point.variant}, against ours on the same grid"
                 curves.append(Curve(title, [at], [error], colour=number))
             plots.append(Markup(log_log(curves, x_label, text)))

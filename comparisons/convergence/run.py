@@ -20,7 +20,7 @@ from comparisons.convergence.contestants import (
 from comparisons.convergence.crops import crops_of
 from comparisons.convergence.curves import Curves
 from comparisons.convergence.data import FIRST, WIDEST, Settings
-from comparisons.convergence.deterministic import grids_of
+from comparisons.convergence.deterministic import WHOSE, grids_of
 from comparisons.convergence.findings import findings_of
 from comparisons.convergence.ladder import Climb, climb
 from comparisons.convergence.plan import Cost, affordable, estimate, rungs, why_left_out
@@ -82,6 +82,7 @@ def converge(
     size = (scene.film.width, scene.film.height)
     if scene.integrator.deterministic:
         grids, left_out = grids_of(scene, settings, store, say)
+        notes += [WHOSE[scene.integrator.type]] if grids.points else []
         return Curves(asked.name, size, grids=grids, left_out=tuple(left_out), notes=tuple(notes))
     with Stable(scene) as stable:
         return _Run(scene, settings, store, say, stable).curves(contestants, tuple(notes))

@@ -231,6 +231,7 @@ def test_scenes_with_chance_and_without(tmp_path, own_cache):
     assert [r["seconds"] for r in same["scenes"][0]["contestants"]["ours"]["rungs"]] == [
         r["seconds"] for r in ours["rungs"]
     ]
+    assert same["scenes"][1]["grids"] == grid["grids"]
 
 
 @pytest.mark.parametrize(
