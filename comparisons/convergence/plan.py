@@ -12,8 +12,8 @@ TRIALS = (FIRST, 4 * FIRST)
 TRIAL_SEED = 1 << 20
 """Replicate number of these pictures, above all that count."""
 
-MOST_LANES = 1 << 27
-"""Samples of one picture: Mitsuba's llvm variant keeps some state of each in memory."""
+MOST_SAMPLES = (1 << 32) - 1
+"""Of one picture: Mitsuba numbers them with 32 bits."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def affordable(
     found: list[int] = []
     for spp in rungs(settings.max_spp, factor):
         seconds -= cost.rung(spp, settings.replicates)
-        if seconds < 0.0 or spp * pixels > MOST_LANES:
+        if seconds < 0.0 or spp * pixels > MOST_SAMPLES:
             break
         found.append(spp)
     return tuple(found)
@@ -79,8 +79,8 @@ def why_left_out(
     if not following:
         return ""
     spp = following[0]
-    if spp * pixels > MOST_LANES:
-        return f"rungs from {spp} samples a pixel: more than {MOST_LANES:,} samples in a picture"
+    if spp * pixels > MOST_SAMPLES:
+        return f"rungs from {spp} samples a pixel: more than {MOST_SAMPLES:,} samples in a picture"
     spent = sum(cost.rung(done, settings.replicates) for done in planned)
     return (
         f"rungs from {spp} samples a pixel: {settings.replicates} pictures would take "
@@ -90,7 +90,7 @@ def why_left_out(
 
 
 __all__ = [
-    "MOST_LANES",
+    "MOST_SAMPLES",
     "TRIAL_SEED",
     "Cost",
     "affordable",
