@@ -24,8 +24,8 @@ def time_to_error(scene: Scene, target: float, seconds: float) -> dict[str, floa
     Raises SceneError, ReferenceUnavailableError; ValueError for a deterministic scene.
     """
     # Imported here: the package's name is imported by its modules too.
-    from comparisons.convergence.data import Settings
-    from comparisons.convergence.run import converge, size_within
+    from comparisons.convergence.data import Settings, size_within
+    from comparisons.convergence.run import converge
 
     if scene.integrator.deterministic:
         raise ValueError(f"{scene.name}: is deterministic; expected an integrator with chance")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons.metrics import RELMSE_EPSILON
+from reference_rt.film import Film
 from reference_rt.shapes.shape import FloatArray
 
 FIRST = 4
@@ -36,6 +37,13 @@ class Settings:
     only: tuple[str, ...] = ()
     starts: bool = True
     crops: bool = True
+
+
+def size_within(film: Film, widest: int) -> tuple[int, int]:
+    """Width and height of a film, smaller in proportion where it is more than `widest` across."""
+    if film.width <= widest:
+        return film.width, film.height
+    return widest, max(1, round(film.height * widest / film.width))
 
 
 def weights(reference: FloatArray) -> FloatArray:
@@ -94,4 +102,4 @@ class Rung:
         return self.seconds[1:] if len(self.seconds) > 1 else self.seconds
 
 
-__all__ = ["FIRST", "WIDEST", "Reference", "Rung", "Settings", "weights"]
+__all__ = ["FIRST", "WIDEST", "Reference", "Rung", "Settings", "size_within", "weights"]

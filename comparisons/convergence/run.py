@@ -19,7 +19,7 @@ from comparisons.convergence.contestants import (
 )
 from comparisons.convergence.crops import crops_of
 from comparisons.convergence.curves import Curves
-from comparisons.convergence.data import FIRST, WIDEST, Settings
+from comparisons.convergence.data import FIRST, WIDEST, Settings, size_within
 from comparisons.convergence.deterministic import WHOSE, grids_of
 from comparisons.convergence.findings import findings_of
 from comparisons.convergence.ladder import Climb, climb
@@ -29,7 +29,6 @@ from comparisons.convergence.samplers import SPP, merits
 from comparisons.convergence.starts import starts_of
 from comparisons.convergence.store import Store
 from comparisons.mitsuba_backend import SCALAR
-from reference_rt.film import Film
 from reference_rt.filters import BoxFilter
 from reference_rt.scene import Scene
 
@@ -48,13 +47,6 @@ def prepared(scene: Scene, settings: Settings) -> Scene:
     """The scene as it is rendered: through a box filter, whose pixels are independent, and at most
     WIDEST pixels across where no size is asked for."""
     return budgeted(scene, Budget(size=settings.size or size_within(scene.film, WIDEST)))
-
-
-def size_within(film: Film, widest: int) -> tuple[int, int]:
-    """Width and height of a film, smaller in proportion where it is more than `widest` across."""
-    if film.width <= widest:
-        return film.width, film.height
-    return widest, max(1, round(film.height * widest / film.width))
 
 
 def converge(
@@ -194,7 +186,7 @@ class _Run:
             try:
                 if contestant.sampler == BEST and not plan.merits:
                     # One trial for both variants, whose samples are alike.
-                    plan.merits[contestant.side] = merits(self.stable, contestant)
+                    plan.merits[contestant.side] = merits(self.scene, contestant)
                 chosen_one = plan.resolved(contestant)
                 found[chosen_one] = estimate(self.renderer(chosen_one))
             except AbsentError as error:

@@ -24,13 +24,13 @@ from comparisons.convergence.contestants import (
     with_sampler,
 )
 from comparisons.convergence.curves import Curves
-from comparisons.convergence.data import Reference, Settings, weights
+from comparisons.convergence.data import Reference, Settings, size_within, weights
 from comparisons.convergence.findings import findings_of
 from comparisons.convergence.ladder import Climb, climb
 from comparisons.convergence.outputs import COLUMNS, write_results, write_table
 from comparisons.convergence.page import write_page
 from comparisons.convergence.reference import COUNT, reference_of
-from comparisons.convergence.run import converge, prepared, size_within
+from comparisons.convergence.run import converge, prepared
 from comparisons.convergence.store import Store, run_key
 from reference_rt.cli import app
 from reference_rt.errors import UsageError
