@@ -145,7 +145,7 @@ def _ladder_plots(one: Curves) -> list[Markup]:
         percent(t.error): t.error**2 for found in one.findings.values() for t in found.targets
     }
     plots = []
-    for name, text, marks in (("relmse", "relMSE", levels), ("mse", "MSE", {})):
+    for name, text, marks in (("relmse", "E[relMSE]", levels), ("mse", "E[MSE]", {})):
         for over, x_label in (("seconds", SECONDS), ("spp", SAMPLES)):
             curves = []
             for number, (contestant, found) in enumerate(one.findings.items()):

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import math
 import re
 import subprocess
 import sys
@@ -10,21 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from convergence_fakes import EXACT, TRUE, Fake
 from typer.testing import CliRunner
 
 import comparisons.cli
 import comparisons.convergence
-from comparisons.convergence import ladder
 from comparisons.convergence.contestants import (
     CONTESTANTS,
     AbsentError,
-    Shot,
     Stable,
     chosen,
     with_sampler,
 )
 from comparisons.convergence.curves import Curves
-from comparisons.convergence.data import Reference, Settings, size_within, weights
+from comparisons.convergence.data import Settings, size_within, weights
 from comparisons.convergence.findings import findings_of
 from comparisons.convergence.ladder import Climb, climb
 from comparisons.convergence.outputs import COLUMNS, write_results, write_table
@@ -39,110 +37,8 @@ from reference_rt.filters import BoxFilter
 from reference_rt.scene import Scene
 
 SCENES = Path(__file__).parents[2] / "scenes"
-SHAPE = (12, 16, 3)
-TRUE = np.random.default_rng(0).uniform(0.2, 2.0, SHAPE)
-EXACT = Reference(TRUE, np.full(SHAPE, 1e-8), 16, 1024)
-
 if not any(command.name == "converge" for command in app.registered_commands):
     comparisons.cli.register(app)
-
-
-class Fake:
-    """A renderer of known noise and speed, which counts its pictures and may be interrupted."""
-
-    def __init__(self, noise: float = 1.0, speed: float = 1e-3, breaks_after: int = 10**9) -> None:
-        self.noise, self.speed, self.left, self.asked = noise, speed, breaks_after, []
-
-    def __call__(self, spp: int, replicate: int) -> Shot:
-        if self.left == 0:
-            raise KeyboardInterrupt
-        self.left -= 1
-        self.asked.append((spp, replicate))
-        rng = np.random.default_rng([spp, replicate])
-        picture = TRUE + self.noise / math.sqrt(spp) * rng.standard_normal(SHAPE)
-        return Shot(picture, spp, self.speed * spp)
-
-
-def climbs(**fakes: Fake) -> dict[str, Climb]:
-    return {name: Climb(lambda fake=fake: fake, (4, 8, 16), 100.0) for name, fake in fakes.items()}
-
-
-# ---- the ladder ---------------------------------------------------------------------------------
-
-
-def test_contestants_take_turns_and_numbers_are_used_once():
-    asked = []
-
-    class Told(Fake):
-        def __call__(self, spp: int, replicate: int) -> Shot:
-            asked.append((self, spp))
-            return super().__call__(spp, replicate)
-
-    a, b = Told(), Told()
-    climb(climbs(a=a, b=b), EXACT, 8, Store(None, ""))
-    assert asked[:6] == [(a, 4), (b, 4), (a, 8), (b, 8), (a, 16), (b, 16)]
-    assert len(asked) == 2 * 3 * 8
-    numbers = [replicate for _, replicate in a.asked]
-    assert len(set(numbers)) == len(numbers)
-
-
-def test_what_is_done_is_not_done_again(tmp_path):
-    first = climbs(a=Fake())
-    climb(first, EXACT, 8, Store(tmp_path / "s", "key"))
-    again, fake = climbs(a=Fake()), Fake()
-    again["a"].renderer = lambda: fake
-    climb(again, EXACT, 8, Store(tmp_path / "s", "key"))
-    assert fake.asked == []
-    for one, other in zip(first["a"].rungs, again["a"].rungs, strict=True):
-        np.testing.assert_array_equal(one.seconds, other.seconds)
-        # Pictures are stored as float32.
-        np.testing.assert_allclose(one.relmse, other.relmse, rtol=1e-5)
-    for store in (Store(tmp_path / "s", "other key"), Store(tmp_path / "s", "key", fresh=True)):
-        assert store.rung("a", 4) is None
-
-
-def test_an_interruption_loses_no_picture(tmp_path):
-    """Stopped in the third sweep: the second run does the rest, with the same result."""
-    broken = climbs(a=Fake(breaks_after=7))
-    with pytest.raises(KeyboardInterrupt):
-        climb(broken, EXACT, 8, Store(tmp_path / "s", "key"))
-    rest = Fake()
-    resumed = climbs(a=rest)
-    climb(resumed, EXACT, 8, Store(tmp_path / "s", "key"))
-    assert len(rest.asked) == 3 * 8 - 7
-    whole = climbs(a=Fake())
-    climb(whole, EXACT, 8, Store(None, ""))
-    for one, other in zip(whole["a"].rungs, resumed["a"].rungs, strict=True):
-        np.testing.assert_allclose(one.relmse, other.relmse, rtol=1e-4)
-        np.testing.assert_allclose(one.variance, other.variance, rtol=1e-4, atol=1e-7)
-
-
-def test_a_damaged_record_is_done_again(tmp_path):
-    store = Store(tmp_path / "s", "key")
-    climb(climbs(a=Fake()), EXACT, 8, store)
-    path = tmp_path / "s" / "a-8.npz"
-    path.write_bytes(path.read_bytes()[:100])
-    fake = Fake()
-    climb(climbs(a=fake), EXACT, 8, store)
-    assert {spp for spp, _ in fake.asked} == {8}
-
-
-def test_slower_than_promised_climbs_less():
-    fake = Fake(speed=1.0)
-    one = Climb(lambda: fake, (4, 8, 16, 32), 100.0)
-    climb({"a": one}, EXACT, 8, Store(None, ""))
-    # 8 pictures of 4 and 8 samples take 96 s; those of 16, another 128 s.
-    assert [rung.asked for rung in one.rungs] == [4, 8]
-    assert "rungs from 16 samples a pixel" in one.stopped
-
-
-def test_long_runs_are_stored_on_the_way(tmp_path, monkeypatch):
-    monkeypatch.setattr(ladder, "STORED_EVERY", -1.0)
-    kept = []
-    store = Store(tmp_path / "s", "key")
-    monkeypatch.setattr(store, "keep", lambda name, rung: kept.append(rung.replicates))
-    climb(climbs(a=Fake()), EXACT, 4, store)
-    assert kept == [1] * 3 + [2] * 3 + [3] * 3 + [4] * 3
 
 
 # ---- the reference ------------------------------------------------------------------------------
