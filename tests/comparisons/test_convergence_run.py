@@ -30,6 +30,7 @@ from comparisons.convergence.page import write_page
 from comparisons.convergence.reference import COUNT, reference_of
 from comparisons.convergence.run import converge, prepared
 from comparisons.convergence.store import Store, run_key
+from comparisons.translate import to_mitsuba
 from reference_rt.cli import app
 from reference_rt.errors import UsageError
 from reference_rt.film import Film
@@ -241,3 +242,21 @@ def test_other_commands_do_not_wait_for_it():
     code = f"import sys, comparisons.cli; print([m for m in {names} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    "name", ["mask", "blend", "plastic", "rough_plastic", "rough_conductor_beckmann"]
+)
+def test_mitsuba_is_timed_with_its_own_materials(name):
+    """What is written in Python for exactness would be timed as Mitsuba's."""
+    scene = Scene.load(SCENES / f"material_{name}.yaml")
+    written = {"exact_beckmann", "exact_coat", "mixture_mask", "mixture_blend"}
+    assert not written & set(types_in(to_mitsuba(scene, native=True)))
+
+
+def types_in(part: object) -> list[str]:
+    """The values of all keys `type`, however deep."""
+    if not isinstance(part, dict):
+        return []
+    own = [part["type"]] if "type" in part else []
+    return own + [found for value in part.values() for found in types_in(value)]
