@@ -22,7 +22,11 @@ LEVEL = 0.95
 """Confidence of bands."""
 
 BIAS_LEVEL = 0.99
-"""Confidence of the bounds of a bias, each alone."""
+"""Confidence of the upper bound of a bias."""
+
+SEEN_LEVEL = 0.9999
+"""Confidence of the lower bound, above which a bias is said to be seen: that is asked of each
+contestant of each scene."""
 
 
 class Estimate(NamedTuple):
@@ -36,8 +40,8 @@ class Estimate(NamedTuple):
 class Bias(NamedTuple):
     """The mean squared bias, an error that no number of samples takes away.
 
-    squared: unbiased estimate, which may be negative;  low, high: one-sided bounds, each with a
-    confidence of BIAS_LEVEL.
+    squared: unbiased estimate, which may be negative;  low, high: one-sided bounds, with
+    confidences of SEEN_LEVEL and of BIAS_LEVEL.
     """
 
     squared: float
@@ -104,8 +108,8 @@ def bias_of(rung: Rung, reference: Reference, weight: FloatArray | float = 1.0) 
     if rung.replicates < 2 or len(products) < 2:
         return Bias(squared, -math.inf, math.inf)
     freedom = max(1.0, effective_number(products) - 1.0)
-    half = float(stats.t.ppf(BIAS_LEVEL, freedom)) * standard_error(products)
-    return Bias(squared, squared - half, squared + half)
+    below, above = stats.t.ppf([SEEN_LEVEL, BIAS_LEVEL], freedom) * standard_error(products)
+    return Bias(squared, float(squared - below), float(squared + above))
 
 
 def effective_number(values: FloatArray) -> float:
@@ -171,6 +175,7 @@ class Accumulator:
 __all__ = [
     "BIAS_LEVEL",
     "LEVEL",
+    "SEEN_LEVEL",
     "Accumulator",
     "Bias",
     "Estimate",

@@ -55,9 +55,9 @@ def write_results(
                                 "shown": {name: {"spp", "seconds", "error"}}}],
                      "left_out": [...], "notes": [...]}]}
 
-    Bands hold the value with a confidence of 95 %, "low" and "high" of a squared bias with 99 %
-    each.  "ratios" are ours over the contestant's.  Strict JSON (RFC 8259): NaN and the infinities
-    become null, so a null number says "undefined or unbounded".
+    Bands hold the value with a confidence of 95 %; a squared bias lies above "low" with 99.99 % and
+    below "high" with 99 %.  "ratios" are ours over the contestant's.  Strict JSON (RFC 8259): NaN
+    and the infinities become null, so a null number says "undefined or unbounded".
     """
     document = {
         "schema": SCHEMA,

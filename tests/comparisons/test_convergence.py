@@ -128,8 +128,9 @@ def test_another_reference_changes_errors_as_if_it_had_been_used():
 
 @pytest.mark.parametrize("bias", [0.0, 0.1])
 def test_bias_is_found_where_there_is_one(bias):
-    """The estimate is unbiased, the bounds hold in 99 % of the runs each, and without bias none is
-    seen but in 1 %; binomials of 300 runs exceed 3.6 % and 3 % with a chance of 1e-4."""
+    """The estimate is unbiased; the upper bound holds in 99 % of the runs, the lower in 99.99 %, so
+    that without bias none is seen.  Binomials of 300 runs exceed 3.6 % with a chance of 1e-4, and
+    one in 300 with 4e-4."""
     rng = np.random.default_rng(7)
     true = truth(rng)
     found = []
@@ -141,9 +142,9 @@ def test_bias_is_found_where_there_is_one(bias):
     off = (squared.mean() - bias**2) / (squared.std(ddof=1) / math.sqrt(300))
     assert abs(off) < 4.0
     assert np.mean([one.high < bias**2 for one in found]) < 0.036
-    assert np.mean([one.low > bias**2 for one in found]) < 0.036
+    assert sum(one.low > bias**2 for one in found) <= 1
     seen = np.mean([one.is_seen for one in found])
-    assert seen < 0.03 if bias == 0.0 else seen > 0.9
+    assert seen < 0.004 if bias == 0.0 else seen > 0.9
 
 
 def test_few_bright_pixels_are_few():
