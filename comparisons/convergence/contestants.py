@@ -181,7 +181,7 @@ class Stable:
             mi = self._in(contestant.side)
             start = time.perf_counter()
             # The array is what forces the lazy rendering to happen.
-            found = np.array(mi.render(mi_scene, spp=spp, seed=1 + replicate))
+            found = np.array(mi.render(mi_scene, spp=spp, seed=seed_of(replicate)))
             seconds = time.perf_counter() - start
             return Shot(_three(found), int(sampler.sample_count()), seconds)
 
@@ -189,6 +189,12 @@ class Stable:
 
 
 FIRST_SEED = 1 << 40
+
+
+def seed_of(replicate: int) -> int:
+    """Mitsuba's 32-bit seeds, far apart (multiples of the golden ratio modulo 1): it numbers the
+    pixels from a seed on, so that near ones may give one picture's numbers to another's pixels."""
+    return (1 + replicate) * 0x9E3779B1 % (1 << 32)
 
 
 def _three(picture: Any) -> FloatArray:
