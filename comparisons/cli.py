@@ -4,6 +4,7 @@ import typer
 
 from comparisons.commands.accept import accept
 from comparisons.commands.compare import compare
+from comparisons.commands.converge import converge
 from comparisons.commands.gate import gate
 from comparisons.commands.methods import methods
 from comparisons.commands.report import report
@@ -13,5 +14,5 @@ from comparisons.commands.suite import suite
 
 def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
-    for command in (compare, suite, gate, accept, report, selftest, methods):
+    for command in (compare, suite, gate, accept, report, selftest, converge, methods):
         app.command()(command)

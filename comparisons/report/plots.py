@@ -105,7 +105,7 @@ def log_log(
         named = sum(bool(curve.name) for curve in curves)
         if named:
             figure.legend(
-                loc="outside lower left", ncols=min(named, 3), frameon=False, fontsize=9.0
+                loc="outside lower left", ncols=min(named, 2), frameon=False, fontsize=9.0
             )
         stream = io.StringIO()
         figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)

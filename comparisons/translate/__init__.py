@@ -35,15 +35,16 @@ class _Translated(NamedTuple):
     solids: list[SolidTwin]
 
 
-def to_mitsuba(scene: Scene) -> dict[str, Any]:
+def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
     """The scene as a dict for `mitsuba.load_dict`, without its solids; shape i of ours has the id
     "shape_<i>", or several such with suffixes.
 
     Meshes are Mitsuba objects already, made of the very triangles of our tables.  There is no
-    integrator where ours is ray casting.  Raises UntranslatableError, SceneError for a file that
-    cannot be used, ReferenceUnavailableError without Mitsuba.
+    integrator where ours is ray casting.  native: with Mitsuba's own materials also where ours are
+    more exact, whose speed would not be Mitsuba's.  Raises UntranslatableError, SceneError for a
+    file that cannot be used, ReferenceUnavailableError without Mitsuba.
     """
-    found = _translated(scene)
+    found = _translated(scene, native)
     return {**_groups(found.pieces), **found.plain}
 
 
@@ -82,7 +83,7 @@ def _groups(pieces: Mapping[str, Piece]) -> dict[str, Any]:
     }
 
 
-def _translated(scene: Scene) -> _Translated:
+def _translated(scene: Scene, native: bool = False) -> _Translated:
     sensor = translate_camera(scene.camera, scene.film)
     sensor["film"] = translate_film(scene.film)
     sensor["sampler"] = translate_sampler(scene.resolved_sampler)
@@ -94,7 +95,7 @@ def _translated(scene: Scene) -> _Translated:
     copies = copies_of(scene)
     count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
     shared: dict[Any, Any] = {}
-    around = Surroundings.of(scene)
+    around = Surroundings.of(scene, native)
     reach = _reach(scene, copies)
     for copy in copies:
         try:

@@ -95,7 +95,7 @@ def _rough(
     along_u, along_v = (alpha, alpha) if isinstance(alpha, str) else alpha
     alphas = {"alpha_u": number(along_u, around), "alpha_v": number(along_v, around)}
     bsdf = {"type": plugin, "distribution": material.distribution, **alphas, **values}
-    if material.distribution == "ggx":
+    if material.distribution == "ggx" or around.native:
         return bsdf
     # See the plugin for why the normals are not drawn from the visible ones.
     return {"type": "exact_beckmann", "nested": {**bsdf, "sample_visible": False}, **alphas}
@@ -125,6 +125,8 @@ def _coated(
         **_indices(material),
         **rough,
     }
+    if around.native:
+        return nested
     if rough:
         nested["sample_visible"] = rough["distribution"] == "ggx"
     return {

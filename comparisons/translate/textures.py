@@ -25,17 +25,19 @@ VERTEX_COLOUR, VERTEX_LUMINANCE = "vertex_color", "vertex_luminance"
 class Surroundings:
     """What materials are translated with: those of the scene and its textures, by name; the folder
     of its files;  has_colours: whether what wears them is a mesh with colours of its vertices;
-    images: Mitsuba's, by texture so far."""
+    native: Mitsuba's own materials, also where one written for it would be more exact;  images:
+    Mitsuba's, by texture so far."""
 
     materials: Mapping[str, Material]
     textures: Mapping[str, Texture]
     folder: Path
     has_colours: bool = False
+    native: bool = False
     images: dict[Any, Any] = field(default_factory=dict)
 
     @staticmethod
-    def of(scene: Scene) -> "Surroundings":
-        return Surroundings(scene.materials, scene.textures, scene.folder)
+    def of(scene: Scene, native: bool = False) -> "Surroundings":
+        return Surroundings(scene.materials, scene.textures, scene.folder, native=native)
 
 
 def rgb(colour: tuple[float, float, float]) -> dict[str, Any]:

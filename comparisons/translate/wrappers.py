@@ -35,14 +35,15 @@ def _(material: Emissive, around: Surroundings) -> dict[str, Any]:
 @translate_material.register
 def _(material: Mask, around: Surroundings) -> dict[str, Any]:
     base = _named(material.base, around)
-    return {"type": "mixture_mask", "opacity": number(material.opacity, around), "base": base}
+    name = "mask" if around.native else "mixture_mask"
+    return {"type": name, "opacity": number(material.opacity, around), "base": base}
 
 
 @translate_material.register
 def _(material: Blend, around: Surroundings) -> dict[str, Any]:
     first, second = _named(material.first, around), _named(material.second, around)
     weight = number(material.weight, around)
-    if has_delta(material, around):
+    if has_delta(material, around) and not around.native:
         return {"type": "mixture_blend", "weight": weight, "first": first, "second": second}
     return {"type": "blendbsdf", "weight": weight, "0_first": first, "1_second": second}
 

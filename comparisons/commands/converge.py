@@ -1,0 +1,125 @@
+"""`reference-rt converge`."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from reference_rt.cli import guarded
+from reference_rt.console import ProgressLine
+from reference_rt.errors import ReferenceUnavailableError, UsageError
+from reference_rt.scene import Scene
+
+
+@guarded
+def converge(
+    scenes: Annotated[
+        list[Path], typer.Argument(metavar="SCENE...", help=".yaml or .json scenes.")
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", metavar="DIR", help="For results.json, .csv and report.html."),
+    ] = Path("out/converge"),
+    time_limit: Annotated[
+        float,
+        typer.Option(
+            min=0.1, metavar="SECONDS", help="For the rungs and the reference of one scene."
+        ),
+    ] = 60.0,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WIDTHxHEIGHT", help="In pixels.  [default: the scene's, at most 128 across]"
+        ),
+    ] = None,
+    max_spp: Annotated[
+        int, typer.Option(min=4, help="Samples a pixel of the last rung at most.")
+    ] = 4096,
+    replicates: Annotated[int, typer.Option(min=2, help="Pictures at each rung.")] = 8,
+    targets: Annotated[
+        str, typer.Option(metavar="LIST", help="Relative errors, the time to which is told.")
+    ] = "0.1,0.03,0.01,0.003",
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CONTESTANT", help="ours, mitsuba_llvm, ...: repeat for several."),
+    ] = None,
+    starts: Annotated[
+        bool, typer.Option(help="Time the start of processes, with caches empty and full.")
+    ] = True,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
+) -> None:
+    """Error against run time: ours and Mitsuba's; what is done is not done again."""
+    # Imported here: `reference-rt render` must not wait for what only comparing needs.
+    try:
+        from comparisons.convergence.contestants import chosen
+        from comparisons.convergence.data import Settings
+        from comparisons.convergence.outputs import write_results, write_table
+        from comparisons.convergence.page import write_page
+        from comparisons.convergence.run import converge as converge_scene
+        from comparisons.convergence.run import prepared
+        from comparisons.convergence.store import Store, run_key
+        from comparisons.convergence.summary import again, lines_of
+        from comparisons.provenance import provenance
+        from comparisons.suites.suite import folder_name
+    except ModuleNotFoundError as error:
+        raise ReferenceUnavailableError(
+            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
+        ) from None
+    from reference_rt.files import check_writable
+
+    settings = Settings(
+        time_limit=time_limit,
+        size=_size(size),
+        max_spp=max_spp,
+        replicates=replicates,
+        targets=_targets(targets),
+        only=tuple(only or ()),
+        starts=starts,
+    )
+    chosen(settings.only)
+    described = [Scene.load(path) for path in scenes]
+    names = [scene.name for scene in described]
+    if double := [name for name in names if names.count(name) > 1]:
+        raise UsageError(f"two scenes are called '{double[0]}'; expected each once")
+    files = [out / name for name in ("results.json", "results.csv", "report.html")]
+    for file in files:
+        check_writable(file)
+    facts = provenance()
+    found = []
+    for path, scene in zip(scenes, described, strict=True):
+        key = run_key(prepared(scene, settings), replicates)
+        store = Store(out / "rungs" / folder_name(scene.name), key, fresh=fresh)
+        with ProgressLine() as progress:
+
+            def say(what: str, part: float, name: str = scene.name) -> None:
+                progress(what if what == "compile" else f"{name}: {what}", part)
+
+            curves = converge_scene(scene, settings, store, say)
+        found.append(replace(curves, again=again(path, out, settings)))
+        # After each scene, so that an interruption loses none that is finished.
+        write_results(files[0], found, settings, facts)
+        write_table(files[1], found)
+        write_page(files[2], found, settings, facts)
+        for line in lines_of(found[-1]):
+            typer.echo(line)
+    typer.echo(", ".join(map(str, files)), err=True)
+
+
+def _size(size: str | None) -> tuple[int, int] | None:
+    if size is None:
+        return None
+    width, _, height = size.lower().partition("x")
+    if not all(n.isdecimal() and 0 < len(n) < 6 and int(n) > 0 for n in (width, height)):
+        raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 96x72, got '{size}'")
+    return int(width), int(height)
+
+
+def _targets(text: str) -> tuple[float, ...]:
+    try:
+        found = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if not found or not all(0.0 < target < 10.0 for target in found):
+        raise UsageError(f"--targets: expected relative errors such as 0.1,0.01, got '{text}'")
+    return found

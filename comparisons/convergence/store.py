@@ -1,0 +1,134 @@
+"""Finished rungs in a folder: what is done is not done again."""
+
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+import shutil
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.convergence.data import Rung
+from comparisons.convergence.reference import key_of
+from comparisons.mitsuba_backend import backend
+from comparisons.suites.keys import files_digest, sources_digest
+from reference_rt.files import replacing
+from reference_rt.scene import Scene
+
+SCHEMA = 1
+"""Raised whenever what is stored, or what it means, changes."""
+
+_ARRAYS = ("seconds", "mse", "relmse", "mean", "variance")
+"""Of a rung, in the order of its fields, after the two numbers."""
+
+_PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
+
+
+def run_key(scene: Scene, replicates: int) -> str:
+    """SHA-256 of all that rungs depend on: the scene as it is rendered and its files, our sources,
+    the versions of what computes, the machine, and how many replicates there are."""
+    chosen = backend()
+    parts = {
+        "schema": SCHEMA,
+        "scene": scene.digest(),
+        "files": files_digest(scene),
+        "sources": sources_digest(),
+        "reference": key_of(scene),
+        "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
+        "mitsuba": (chosen.variant, chosen.llvm_path),
+        "machine": (platform.node(), platform.machine(), os.cpu_count()),
+        "replicates": replicates,
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+class Store:
+    """Rungs, and small facts by name, of one scene; everything of another key is deleted.
+
+    folder: None keeps nothing.
+    """
+
+    def __init__(self, folder: Path | None, key: str, *, fresh: bool = False) -> None:
+        self._folder, self._key = folder, key
+        if folder is not None and (fresh or self._read("key") != key):
+            shutil.rmtree(folder, ignore_errors=True)
+            self._write("key", key)
+
+    # ---- rungs ----------------------------------------------------------------------------------
+
+    def rung(self, contestant: str, asked: int) -> Rung | None:
+        """The stored one; None where there is none, or none that can be read."""
+        if self._folder is None:
+            return None
+        path = self._rung_path(contestant, asked)
+        damaged = suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError)
+        # Opened here, since NumPy leaves a file that is no archive open.
+        with damaged, path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            arrays = [np.asarray(file[name], np.float64) for name in _ARRAYS]
+            return Rung(int(file["asked"]), int(file["spp"]), *arrays)
+        return None
+
+    def keep(self, contestant: str, rung: Rung) -> None:
+        """Store a rung, whole or not at all; its pictures as float32, whose rounding is far below
+        their noise.  Raises ImageError where the folder cannot be written."""
+        if self._folder is None:
+            return
+        arrays: dict[str, Any] = {name: getattr(rung, name) for name in _ARRAYS}
+        for name in ("mean", "variance"):
+            arrays[name] = arrays[name].astype(np.float32)
+        with replacing(self._rung_path(contestant, rung.asked)) as temporary:
+            np.savez(temporary, asked=rung.asked, spp=rung.spp, **arrays)
+
+    def _rung_path(self, contestant: str, asked: int) -> Path:
+        assert self._folder is not None
+        return self._folder / f"{contestant}-{asked}.npz"
+
+    # ---- pictures -------------------------------------------------------------------------------
+
+    def picture(self, name: str) -> Any:
+        """An array kept by `keep_picture`; None where there is none."""
+        if self._folder is None:
+            return None
+        path = self._folder / f"{name}.npy"
+        with suppress(OSError, ValueError, EOFError), path.open("rb") as stream:
+            return np.load(stream, allow_pickle=False)
+        return None
+
+    def keep_picture(self, name: str, picture: Any) -> None:
+        """Store an array as float32."""
+        if self._folder is not None:
+            with replacing(self._folder / f"{name}.npy") as temporary:
+                np.save(temporary, np.asarray(picture, np.float32), allow_pickle=False)
+
+    # ---- facts ----------------------------------------------------------------------------------
+
+    def fact(self, name: str, settings: Any = None) -> Any:
+        """What `keep_fact` stored, if it was for the same settings; else None."""
+        found = self._read(name)
+        if isinstance(found, dict) and found.get("settings") == json.loads(json.dumps(settings)):
+            return found.get("fact")
+        return None
+
+    def keep_fact(self, name: str, fact: Any, settings: Any = None) -> None:
+        """Store what JSON can hold."""
+        self._write(name, {"settings": settings, "fact": fact})
+
+    def _read(self, name: str) -> Any:
+        if self._folder is None:
+            return None
+        with suppress(OSError, ValueError):
+            return json.loads((self._folder / f"{name}.json").read_text(encoding="utf-8"))
+        return None
+
+    def _write(self, name: str, value: Any) -> None:
+        if self._folder is not None:
+            with replacing(self._folder / f"{name}.json") as temporary:
+                temporary.write_text(json.dumps(value), encoding="utf-8")
+
+
+__all__ = ["Store", "run_key"]
