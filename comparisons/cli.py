@@ -3,6 +3,7 @@
 import typer
 
 from comparisons.commands.accept import accept
+from comparisons.commands.bench import bench
 from comparisons.commands.compare import compare
 from comparisons.commands.gate import gate
 from comparisons.commands.report import report
@@ -12,5 +13,5 @@ from comparisons.commands.suite import suite
 
 def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
-    for command in (compare, suite, gate, accept, report, selftest):
+    for command in (compare, suite, gate, accept, report, selftest, bench):
         app.command()(command)
