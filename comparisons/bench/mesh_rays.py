@@ -36,12 +36,11 @@ Rays = tuple[FloatArray, FloatArray]
 
 
 class Subject(NamedTuple):
-    """A mesh file, its name for people, the tables of a scene of it alone, and its triangles."""
+    """A mesh file, its name for people, and the tables of a scene of it alone."""
 
     path: Path
     title: str
     tables: SceneTables
-    triangles: int
 
 
 def measure(setting: Setting) -> list[Row]:
@@ -49,7 +48,7 @@ def measure(setting: Setting) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         subject = _subject(setting, Path(folder))
         width = WIDTH // 2 if setting.quick else WIDTH
-        vertices = _vertices(subject)
+        vertices = _corners(subject.tables)
         rays = {"incoherent": incoherent(vertices, width**2), "coherent": coherent(vertices, width)}
         rows = [_against_mitsuba(kind, rays[kind], subject, setting) for kind in GOALS]
         return [*rows, _any_hit(rays["incoherent"], subject, setting)]
@@ -63,20 +62,15 @@ def _subject(setting: Setting, folder: Path) -> Subject:
     elif path.suffix.lower() not in (".obj", ".ply"):
         raise UsageError(f"--mesh: expected an .obj or .ply file, got '{path}'")
     shape = Mesh(file=str(path.resolve()), material="clay")
-    scene = Scene(
-        shapes=(shape,), materials={"clay": Diffuse()}, integrator=RayCast()
-    )
-    triangles = len(_vertices_of(scene.tables))
-    return Subject(path, f"{title or path.stem} of {triangles:,} triangles", scene.tables, triangles)
+    scene = Scene(shapes=(shape,), materials={"clay": Diffuse()}, integrator=RayCast())
+    title = f"{title or path.stem} of {len(_corners(scene.tables)) // 3:,} triangles"
+    return Subject(path, title, scene.tables)
 
 
-def _vertices_of(tables: SceneTables) -> FloatArray:
+def _corners(tables: SceneTables) -> FloatArray:
+    """(3 n, 3) vertices of all triangles."""
     triangles: Any = tables.geometry.shapes.triangles
-    return np.asarray(triangles.vertices)
-
-
-def _vertices(subject: Subject) -> FloatArray:
-    return _vertices_of(subject.tables).reshape(-1, 3)
+    return np.asarray(triangles.vertices).reshape(-1, 3)
 
 
 def _sphere_around(vertices: FloatArray) -> tuple[FloatArray, float]:
@@ -133,14 +127,17 @@ def _against_mitsuba(kind: str, rays: Rays, subject: Subject, setting: Setting) 
             f"Mitsuba, coherent={hint}": _mitsuba_rate(mi, robust[True], rays, hint)
             for hint in (True, False)
         }
-        runs |= {"ours": lambda: _rate(len(o), lambda: query.closest(subject.tables, o, d))}
+        runs |= {
+            "ours": lambda: _rate(
+                len(o), lambda: query.closest(subject.tables, o, d, setting.threads)
+            )
+        }
         runs["Mitsuba, not robust"] = _mitsuba_rate(mi, robust[False], rays, kind == "coherent")
         for run in runs.values():
             run()  # compile
         rates = alternate(runs, say=setting.say)
-    best = max(
-        (name for name in rates if "coherent=" in name), key=lambda name: float(np.median(rates[name]))
-    )
+    medians = {name: float(np.median(rate)) for name, rate in rates.items()}
+    best = max((name for name in rates if "coherent=" in name), key=lambda name: medians[name])
     hits = query.closest(subject.tables, o, d).kind >= 0
     return against(
         f"rays_{kind}",
@@ -156,7 +153,7 @@ def _against_mitsuba(kind: str, rays: Rays, subject: Subject, setting: Setting) 
             "hit_share": float(hits.mean()),
             "threads": setting.threads,
             "rates": rates,
-            "median_rates": {name: float(np.median(rate)) for name, rate in rates.items()},
+            "median_rates": medians,
         },
     )
 
@@ -164,9 +161,7 @@ def _against_mitsuba(kind: str, rays: Rays, subject: Subject, setting: Setting) 
 def _mitsuba_scene(mi: Any, path: Path, robust: bool) -> Any:
     """The mesh alone; `robust` as in all comparisons, without it rays may slip through edges."""
     mesh = {"type": path.suffix[1:].lower(), "filename": str(path), "face_normals": True}
-    return mi.load_dict(
-        {"type": "scene", "embree_use_robust_intersections": robust, "mesh": mesh}
-    )
+    return mi.load_dict({"type": "scene", "embree_use_robust_intersections": robust, "mesh": mesh})
 
 
 def _mitsuba_rate(mi: Any, scene: Any, rays: Rays, hint: bool) -> Callable[[], float]:
@@ -195,13 +190,14 @@ def _rate(count: int, run: Callable[[], object]) -> float:
 
 def _any_hit(rays: Rays, subject: Subject, setting: Setting) -> Row:
     n = len(rays[0])
-    o, d, length = chords(_vertices(subject), n)
-    runs = {
-        "any hit": lambda: _rate(n, lambda: query.occluded(subject.tables, o, d, length)),
-        "closest hit": lambda: _rate(n, lambda: query.closest(subject.tables, o, d)),
+    o, d, length = chords(_corners(subject.tables), n)
+    threads = setting.threads
+    runs: dict[str, Callable[[], float]] = {
+        "any hit": lambda: _rate(n, lambda: query.occluded(subject.tables, o, d, length, threads)),
+        "closest hit": lambda: _rate(n, lambda: query.closest(subject.tables, o, d, threads)),
     }
     for run in runs.values():
-        run()
+        run()  # compile
     rates = alternate(runs, say=setting.say)
     occluded = query.occluded(subject.tables, o, d, length)
     return against(

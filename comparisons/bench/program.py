@@ -57,7 +57,8 @@ class Program:
         told = self._run(["render", str(scene), "--size", SIZE, "-o", str(picture)], cache)
         found = {"wall": time.perf_counter() - start}
         if match := _TOLD.search(told):
-            found |= dict(zip(("build", "compile", "render"), map(float, match.groups()), strict=True))
+            names = ("build", "compile", "render")
+            found |= dict(zip(names, map(float, match.groups()), strict=True))
         return found
 
     def _run(self, arguments: Sequence[str], cache: str) -> str:

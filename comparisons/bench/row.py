@@ -1,4 +1,4 @@
-"""A row of the table: a number of ours, what it is measured against, and the goal of their ratio."""
+"""A row of the table: a number of ours, another beside it, and the goal of their ratio."""
 
 import math
 from collections.abc import Sequence
@@ -92,8 +92,8 @@ def within(
 def row_from(document: dict[str, Any]) -> Row:
     """The row that `Row.as_json` wrote.  Raises TypeError for another document."""
     fields = {key: value for key, value in document.items() if key != "met"}
-    numbers = {k: math.nan if fields.get(k) is None else fields[k] for k in ("ours", "peer", "ratio")}
-    return Row(**fields | numbers)
+    missing = {k: math.nan for k in ("ours", "peer", "ratio") if fields.get(k) is None}
+    return Row(**fields | missing)
 
 
 def _around(found: Spread) -> list[float]:

@@ -27,8 +27,9 @@ from reference_rt.ray import Hit, Ray, ray_from
 from reference_rt.sampling import Sobol, sobol
 from reference_rt.sampling.warp import cosine_hemisphere, uniform_sphere
 from reference_rt.scene import Scene
-from reference_rt.shapes import SPHERE, Sphere, Spheres, sphere
+from reference_rt.shapes import SPHERE, Sphere, sphere
 from reference_rt.shapes.shape import LANES, FloatArray, nearest_lane
+from reference_rt.shapes.sphere import Spheres
 from reference_rt.vec3 import (
     Vec3,
     frame_from_normal,
@@ -41,7 +42,8 @@ from reference_rt.vec3 import (
 
 
 class World(NamedTuple):
-    """spheres: their table, and as packets;  reflectance (n, 3) of the materials;  sky: radiance."""
+    """spheres, packets: their table, and side by side;  reflectance (n, 3) of the materials;  sky:
+    its radiance."""
 
     spheres: Spheres
     packets: FloatArray
@@ -108,11 +110,9 @@ def _radiance(
         wi = to_local(frame, towards)
         if wo.z > 0.0 and wi.z > 0.0:
             f_cos = reflectance * (wi.z * INV_PI)
-            if not is_black(f_cos):
-                if _nearest(world, ray_from(point, towards)).row < 0:
-                    light = f_cos * world.sky
-                    weight = power_heuristic(PDF, wi.z * INV_PI)
-                    total = total + throughput * (light * (weight / PDF))
+            if not is_black(f_cos) and _nearest(world, ray_from(point, towards)).row < 0:
+                weight = power_heuristic(PDF, wi.z * INV_PI)
+                total = total + throughput * (f_cos * world.sky * (weight / PDF))
         u_roulette = 0.5
         if depth + 1 >= rr_depth:
             _, u_roulette = sobol.draw(sampler, dimension + sampling.LOBE_AND_ROULETTE)

@@ -1,5 +1,7 @@
 """What features cost that a scene does not use: nothing, if they are pruned as well as by hand."""
 
+import os
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,8 +14,8 @@ from reference_rt.cameras import Perspective
 from reference_rt.film import BoxFilter, Film
 from reference_rt.integrators import Path
 from reference_rt.lights import Constant
-from reference_rt.materials import Diffuse
-from reference_rt.render import Picture, render, run_bands
+from reference_rt.materials import AnyMaterial, Diffuse
+from reference_rt.render import Picture, _run_bands, render
 from reference_rt.sampling import Sobol
 from reference_rt.scene import Scene
 from reference_rt.shapes import Sphere
@@ -39,7 +41,7 @@ materials:
   rough_dielectric: {type: rough_dielectric}
   rough_plastic: {type: rough_plastic}
   principled: {type: principled}
-  phong: {type: phong}
+  phong: {type: phong, diffuse: 0.2}
   thin_dielectric: {type: thin_dielectric}
   mask: {type: mask, base: diffuse, opacity: 0.5}
   two_sided: {type: two_sided, base: diffuse}
@@ -50,7 +52,10 @@ shapes:
   - {type: disk, material: conductor, transform: [{translate: [0, -150, 0]}]}
   - {type: rectangle, material: dielectric, transform: [{translate: [0, -150, 0]}]}
   - {type: triangle, material: diffuse, v0: [0, -150, 0], v1: [1, -150, 0], v2: [0, -151, 0]}
-  - {type: polygon, material: plastic, rings: [[[0, 0], [1, 0], [0, 1]]], transform: [{translate: [0, -150, 0]}]}
+  - type: polygon
+    material: plastic
+    rings: [[[0, 0], [1, 0], [0, 1]]]
+    transform: [{translate: [0, -150, 0]}]
   - {type: box, material: rough_conductor, transform: [{translate: [0, -150, 0]}]}
   - {type: cylinder, material: rough_dielectric, transform: [{translate: [0, -150, 0]}]}
   - {type: torus, material: rough_plastic, transform: [{translate: [0, -150, 0]}]}
@@ -69,7 +74,7 @@ def spheres() -> Scene:
     radii = [0.7, 0.5, 0.6, 0.4, 0.45, 0.35]
     angles = np.linspace(0.0, 2.0 * np.pi, len(radii), endpoint=False)
     colours = rng.uniform(0.3, 0.8, (len(radii), 3))
-    materials = {"ground": Diffuse(reflectance=(0.5, 0.5, 0.5))}
+    materials: dict[str, AnyMaterial] = {"ground": Diffuse(reflectance=(0.5, 0.5, 0.5))}
     shapes = [Sphere(center=(0.0, -_GROUND, 0.0), radius=_GROUND, material="ground")]
     for k, (r, angle) in enumerate(zip(radii, angles, strict=True)):
         materials[f"clay{k}"] = Diffuse(reflectance=tuple(colours[k].tolist()))
@@ -113,15 +118,20 @@ def render_pruned(scene: Scene, threads: int | None = None) -> Picture:
         sampler.spp,
         out.reshape(-1, 3),
     )
-    run_bands(spheres_only.render_band, arguments, out[..., 0].size, sampler.spp, threads)
+    pixels, threads = out[..., 0].size, threads or os.cpu_count() or 1
+    _run_bands(spheres_only.render_band, arguments, pixels, sampler.spp, threads, _silent)
     return Picture({"colour": out})
+
+
+def _silent(what: str, fraction: float) -> None:
+    pass
 
 
 def measure(setting: Setting) -> list[Row]:
     """The renderer against the kernels pruned by hand; among the details, with nothing pruned."""
     scene = spheres()
     everything = with_everything(scene)
-    runs = {
+    runs: dict[str, Callable[[], float]] = {
         "ours": lambda: seconds(
             lambda: render(scene, tables=scene.tables, threads=setting.threads)
         ),

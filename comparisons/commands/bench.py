@@ -62,9 +62,7 @@ def bench(
         outcome = run(groups, setting, out, display, fresh)
     Console().print(table.terminal(outcome.rows))
     if markdown is not None:
-        table.rewrite(
-            markdown, table.markdown(outcome.rows, outcome.machine, outcome.not_measured)
-        )
+        table.rewrite(markdown, table.markdown(outcome.rows, outcome.machine, outcome.not_measured))
     for name, why in outcome.not_measured.items():
         typer.echo(f"{name}: not measured: {why}", err=True)
     typer.echo(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)
