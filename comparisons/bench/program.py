@@ -33,7 +33,7 @@ _TOLD = re.compile(r"([\d.]+) s to build, ([\d.]+) s to compile.*?, ([\d.]+) s t
 
 
 class Program:
-    """Renders scenes in processes of their own, which have `folder` for their kernels and pictures.
+    """Renders scenes in processes of their own, which have `folder` for their pictures.
 
     The byte code of our sources is kept there too, as pip does when it installs: where it is told
     not to be written (PYTHONDONTWRITEBYTECODE) every process would read all sources anew.
@@ -47,11 +47,11 @@ class Program:
 
     def prepare(self) -> None:
         """Writes the byte code."""
-        self._run(["--help"], "none")
+        self._run(["--help"], None)
 
-    def render(self, scene: Path, cache: str) -> dict[str, float]:
+    def render(self, scene: Path, cache: str | None = None) -> dict[str, float]:
         """Seconds of the whole process ("wall"), and what it tells itself, with the kernels of the
-        folder `cache`.  Raises ReferenceRtError where it fails."""
+        folder `cache`, or with those of the user.  Raises ReferenceRtError where it fails."""
         picture = self.folder / "picture.png"
         start = time.perf_counter()
         told = self._run(["render", str(scene), "--size", SIZE, "-o", str(picture)], cache)
@@ -61,10 +61,11 @@ class Program:
             found |= dict(zip(names, map(float, match.groups()), strict=True))
         return found
 
-    def _run(self, arguments: Sequence[str], cache: str) -> str:
+    def _run(self, arguments: Sequence[str], cache: str | None) -> str:
+        own = {} if cache is None else {"REFERENCE_RT_CACHE": str(self.folder / cache)}
         run = subprocess.run(
             [sys.executable, "-m", "reference_rt.cli", *arguments],
-            env=self.environment | {"REFERENCE_RT_CACHE": str(self.folder / cache)},
+            env=self.environment | own,
             capture_output=True,
             text=True,
             timeout=_TIMEOUT,
@@ -108,11 +109,11 @@ def measure_warm(setting: Setting) -> list[Row]:
         program = Program(Path(folder))
         for name in names:
             setting.say(f"{name}, compiling", 0.0)
-            program.render(setting.file(name), "warm")
+            program.render(setting.file(name))
         for k in range(ROUNDS):
             for i, name in enumerate(names):
                 setting.say(name, (k + i / len(names)) / ROUNDS)
-                found[name].append(program.render(setting.file(name), "warm"))
+                found[name].append(program.render(setting.file(name)))
     walls = {name: [t["wall"] for t in times] for name, times in found.items()}
     medians = {name: float(np.median(wall)) for name, wall in walls.items()}
     worst = max(medians, key=lambda name: medians[name])
