@@ -17,7 +17,7 @@ TARGET = 0.01
 SECONDS = 15.0
 """Budget of a scene, all contestants together."""
 
-QUICK = ("cornell_box", "veach_mis", "mesh_knot", "textured_room")
+QUICK = ("cornell_box", "many_lights", "mesh_knot", "textured_room")
 
 DEFAULT, BEST = "mitsuba_llvm", "mitsuba_llvm_best"
 MEDIAN_GOAL, WORST_GOAL, BEST_GOAL = 0.5, 1.5, 1.0

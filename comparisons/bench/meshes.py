@@ -62,7 +62,7 @@ def write_ply(path: Path, mesh: Blob) -> None:
 
 
 def write_obj(path: Path, mesh: Blob) -> None:
-    """A text file with the same positions to float32's nine digits."""
+    """A text file with the same positions, in the nine digits that float32 takes."""
     with replacing(path) as temporary, temporary.open("w", encoding="ascii") as file:
-        np.savetxt(file, mesh.vertices, fmt="v %.9g %.9g %.9g")
+        np.savetxt(file, mesh.vertices.astype("<f4"), fmt="v %.9g %.9g %.9g")
         np.savetxt(file, mesh.faces + 1, fmt="f %d %d %d")
