@@ -89,11 +89,14 @@ def rows(found: dict[str, dict[str, float]], left_out: dict[str, str]) -> list[R
 
 
 def _ratios(found: dict[str, dict[str, float]], peer: str) -> dict[str, float]:
-    """Ours over the peer's, by scene; of scenes that both have reached."""
+    """Ours over the peer's, by scene; of scenes that at least one of both reaches: an infinite time
+    is that of who never does."""
     return {
         name: times["ours"] / times[peer]
         for name, times in found.items()
-        if "ours" in times and times.get(peer, 0.0) > 0.0
+        if times.get(peer, 0.0) > 0.0
+        and min(times.get("ours", math.inf), times[peer]) < math.inf
+        and "ours" in times
     }
 
 

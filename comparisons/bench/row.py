@@ -93,7 +93,11 @@ def row_from(document: dict[str, Any]) -> Row:
     """The row that `Row.as_json` wrote.  Raises TypeError for another document."""
     fields = {key: value for key, value in document.items() if key != "met"}
     missing = {k: math.nan for k in ("ours", "peer", "ratio") if fields.get(k) is None}
-    return Row(**fields | missing)
+    around = {
+        key: [math.nan if x is None else x for x in values]
+        for key, values in fields.get("spread", {}).items()
+    }
+    return Row(**fields | missing | {"spread": around})
 
 
 def _around(found: Spread) -> list[float]:

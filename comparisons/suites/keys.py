@@ -15,7 +15,7 @@ from comparisons.budget import Budget
 from comparisons.mitsuba_backend import Backend
 from reference_rt.scene import Scene
 
-_APART = ("report", "ci", "commands", "gate", "selftest", "bench", "pytest_plugin.py", "cli.py")
+_APART = ("report", "ci", "commands", "gate", "selftest", "pytest_plugin.py", "cli.py")
 """Parts of `comparisons` that no verdict of a suite depends on."""
 
 _PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")

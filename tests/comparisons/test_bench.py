@@ -156,6 +156,22 @@ def test_equal_error_takes_the_median_of_the_scenes_ratios() -> None:
     assert median.details["left_out"] == {"e": "why"}
 
 
+def test_who_never_reaches_the_error_takes_infinitely_long() -> None:
+    never = math.inf
+    times = {
+        "a": {"ours": 1.0, "mitsuba_llvm": never, "mitsuba_llvm_best": never},
+        "b": {"ours": never, "mitsuba_llvm": 1.0, "mitsuba_llvm_best": never},
+        "c": {"ours": never, "mitsuba_llvm": never, "mitsuba_llvm_best": 1.0},
+    }
+    median, worst, best = equal_error.rows(times, {})
+    assert median.details["ratios"] == {"a": 0.0, "b": never}
+    assert not worst.met
+    assert best.details["ratios"] == {"a": 0.0, "c": never}
+    for row in (median, worst, best):
+        again = row_from(json.loads(json.dumps(row.as_json(), allow_nan=False)))
+        assert again.name in a_table([again]) or again.title in a_table([again])
+
+
 def test_equal_error_of_nothing_meets_no_goal() -> None:
     assert not any(row.met for row in equal_error.rows({}, {}))
 
