@@ -114,7 +114,11 @@ def _row(
     low, median, high = (math.nan,) * 3
     ours = theirs = math.nan
     if ratios:
-        low, median, high = np.quantile(list(ratios.values()), [0.25, 0.5, 0.75]).tolist()
+        values = list(ratios.values())
+        # Quartiles that are among the scenes: between an infinite one and another there is none.
+        low = float(np.quantile(values, 0.25, method="lower"))
+        median = float(np.median(values))
+        high = float(np.quantile(values, 0.75, method="higher"))
         ours = float(np.median([found[scene]["ours"] for scene in ratios]))
         theirs = float(np.median([found[scene][peer] for scene in ratios]))
     return Row(
