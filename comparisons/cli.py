@@ -6,6 +6,7 @@ from comparisons.commands.accept import accept
 from comparisons.commands.bench import bench
 from comparisons.commands.compare import compare
 from comparisons.commands.gate import gate
+from comparisons.commands.methods import methods
 from comparisons.commands.report import report
 from comparisons.commands.selftest import selftest
 from comparisons.commands.suite import suite
@@ -13,5 +14,5 @@ from comparisons.commands.suite import suite
 
 def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
-    for command in (compare, suite, gate, accept, report, selftest, bench):
+    for command in (compare, suite, gate, accept, report, selftest, methods, bench):
         app.command()(command)

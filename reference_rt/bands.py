@@ -10,13 +10,31 @@ from reference_rt import sampling
 from reference_rt.cameras import LENS_CENTRE, camera_ray, lens_sample
 from reference_rt.filters import film_offset
 from reference_rt.geometry import closest_hit, surface
-from reference_rt.integrators import radiance
+from reference_rt.integrators import radiances
 from reference_rt.integrators.ray_cast import cast
-from reference_rt.kernel import entry_kernel, kernel
-from reference_rt.ray import Ray
-from reference_rt.sampling import draw_pair, start_sample
+from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
+from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
+from reference_rt.ray import BLOCK, Ray
+from reference_rt.sampling import (
+    PAIR_FLOATS,
+    PAIR_INTEGERS,
+    Samplers,
+    draw_pair,
+    forget_pairs,
+    sampler_of,
+    start_sample,
+)
 from reference_rt.shading import texture_place
 from reference_rt.shapes.shape import FloatArray
+from reference_rt.streams import (
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    Hits,
+    Rays,
+    put_ray,
+    vector_of,
+)
 from reference_rt.tables import SceneTables
 from reference_rt.textures import colour_at
 from reference_rt.vec3 import Vec3, row
@@ -60,19 +78,47 @@ def render_band(
 ) -> None:
     """Radiance, added to out (n, 3); with the last of all `spp` samples the sum becomes the mean,
     and spread (n, 3) the estimate of the mean's variance."""
-    for pixel in range(begin, end):
-        y, x = pixel // shape[0], pixel % shape[0]
-        total = row(out, pixel)
-        for sample in range(first, last):
-            sampler = start_sample(sampler_setup, pixel, sample)
-            seen = _film_ray(view, film_filter, sampler, shape, x, y)
-            one = radiance(integrator, scene, seen.ray, sampler) * seen.weight
-            total = total + one
+    scratch = Scratch(
+        rays=Rays(local_floats(RAY_FLOATS)),
+        totals=local_floats(VECTOR_FLOATS),
+        shadows=Rays(local_floats(RAY_FLOATS)),
+        lights=local_floats(VECTOR_FLOATS),
+        lit=local_integers(BLOCK),
+        hits=Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
+        states=local_floats(STATE_FLOATS),
+        samples=local_integers(BLOCK),
+    )
+    weights = local_floats(BLOCK)
+    samplers = Samplers(
+        sampler_setup,
+        local_integers(BLOCK),
+        local_integers(BLOCK),
+        local_floats(PAIR_FLOATS),
+        local_integers(PAIR_INTEGERS),
+    )
+    prepare(scratch)
+    forget_pairs(samplers)
+    count = last - first
+    paths = (end - begin) * count
+    for start in range(0, paths, BLOCK):
+        n = min(BLOCK, paths - start)
+        for k in range(n):
+            pixel = begin + (start + k) // count
+            samplers.pixels[k], samplers.numbers[k] = pixel, first + (start + k) % count
+            y, x = pixel // shape[0], pixel % shape[0]
+            seen = _film_ray(view, film_filter, sampler_of(samplers, k), shape, x, y)
+            put_ray(scratch.rays, k, seen.ray)
+            weights[k] = seen.weight
+        radiances(integrator, scene, samplers, n, scratch)
+        for k in range(n):
+            pixel, sample = samplers.pixels[k], samplers.numbers[k]
+            one = vector_of(scratch.totals, 0, k) * weights[k]
+            total = row(out, pixel) + one
             _add_spread(spread, pixel, sample, one, total)
-        if last == spp:
-            total = total / spp
-            _finish_spread(spread, pixel, spp)
-        out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
+            if sample + 1 == spp:
+                total = total / spp
+                _finish_spread(spread, pixel, spp)
+            out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
 
 
 @kernel

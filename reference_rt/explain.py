@@ -78,10 +78,11 @@ def _hierarchy(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) 
         reason = f"{count} primitives: testing a few one after another is faster"
         left_out.append(("hierarchy", reason))
         return
-    size = hierarchy.nodes.nbytes + hierarchy.references.nbytes
-    nodes = hierarchy.nodes[: _nodes_of_the_scene(tables)]
-    first, count_of = nodes[:, 6].astype(np.int64), nodes[:, 7].astype(np.int64)
-    found = bvh.statistics(bvh.Nodes(nodes[:, :6], first, count_of))
+    # The three views of the nodes are of the same memory.
+    size = hierarchy.boxes.nbytes + hierarchy.references.nbytes
+    if hierarchy.corners is not None:
+        size += hierarchy.corners.nbytes
+    found = bvh.of_wide(hierarchy)
     used.append(
         (
             "hierarchy",
@@ -93,19 +94,6 @@ def _hierarchy(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) 
     )
     total = size + sum(a.nbytes for table in shapes if table for a in table if a is not None)
     used.append(("memory", f"{total / count:.0f} bytes per primitive, hierarchy included"))
-
-
-def _nodes_of_the_scene(tables: SceneTables) -> int:
-    """How many nodes the first of all hierarchies has: those of groups and meshes come after."""
-    geometry = tables.geometry
-    assert geometry.bvh is not None
-    starts = [np.array([len(geometry.bvh.nodes), geometry.bvh.unbounded])]
-    if geometry.instances is not None:
-        starts.append(geometry.instances.root)
-    if geometry.solids is not None:
-        starts.append(geometry.solids.root)
-    after = np.concatenate(starts)
-    return int(after[after > 0].min())
 
 
 def _materials(tables: SceneTables, used: Lines, left_out: Lines) -> None:

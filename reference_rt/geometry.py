@@ -1,27 +1,27 @@
 """What a ray can hit: the closest-hit and the any-hit query over all shapes of a scene."""
 
-import math
 from typing import NamedTuple
 
 from reference_rt import shapes as any_shape
-from reference_rt.bvh import STACK_SIZE, Bvh, first_of, size_of
+from reference_rt.bvh import NOTHING, WIDE_STACK, Bvh, first_of, is_packet, kind_of, row_of, size_of
 from reference_rt.csg import evaluate
 from reference_rt.csg.tables import Parts, Solids
 from reference_rt.groups import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.kernel import kernel, local_floats, local_integers
-from reference_rt.ray import Hit, Ray, SurfacePoint, no_hit
+from reference_rt.lanes import LANES, lowest
+from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, no_hit
 from reference_rt.shapes import TRIANGLE, Packets, Shapes, triangle
-from reference_rt.shapes.shape import Tangents
-from reference_rt.shapes.watertight import shear_of
-from reference_rt.traversal import can_be_nearer, entry, view_of
+from reference_rt.shapes.shape import FloatArray, Tangents
+from reference_rt.shapes.watertight import Shear, maybe_met, shear_of
+from reference_rt.traversal import any_child, can_be_nearer, enter, nearest_child, view_of
 from reference_rt.vec3 import Vec3
 
 SOLID, INSTANCE = 100, 101
 """Codes of references that are not rows of a shape's table, but of `Solids` or `Instances`.  Rays
 hit the primitives in these: no `Hit` has such a kind."""
 
-STACK = 2 * STACK_SIZE + 2
-"""A hierarchy of instances, one of a group, a leaf that waits, and what is infinite."""
+STACK = 2 * WIDE_STACK + LANES + 1
+"""A hierarchy of instances, one of a group, the instances of a leaf, and what is infinite."""
 
 
 class Geometry(NamedTuple):
@@ -64,81 +64,103 @@ def _traverse(
     ray: Ray,
     any_hit: bool,
 ) -> Hit:
-    """Nearer child first; the other waits on a stack with the distance of its box, and with the
-    instance in whose coordinates it stands."""
-    stack, distance = local_integers(STACK), local_floats(STACK)
-    space = local_integers(STACK)
+    """The nearest child first; the others wait on a stack with the distances of their boxes, and
+    with the instance in whose coordinates they stand."""
+    stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
+    distances = local_floats(LANES)
     closest = no_hit(ray)
     local, instance = ray, -1
     view, shear = view_of(bvh, 0, local), shear_of(local)
     node, top = 0, 0
-    # A leaf that waits for the instance in it, and where it goes on.
-    held, held_at = -1, 0
     if bvh.unbounded >= 0:
-        stack[0], distance[0], space[0] = bvh.unbounded, 0.0, -1
+        stack[0], waiting[0], space[0] = bvh.unbounded, 0.0, -1
         top = 1
     while True:
-        begin, size = first_of(bvh, node), size_of(bvh, node)
-        if size > 0:
-            end = begin + size
+        while node >= 0:
+            met = enter(bvh, node, view, closest.t, distances)
+            bottom = top
+            if met == 0:
+                node = NOTHING
+            elif any_hit:
+                node, top = any_child(bvh, node, met, stack, top)
+            else:
+                node, top = nearest_child(bvh, node, met, distances, stack, waiting, top)
             if instances is not None:
-                if node == held:
-                    begin, held = held_at, -1
-            for k in range(begin, end):
-                kind, row = bvh.references[k, 0], bvh.references[k, 1]
+                for k in range(bottom, top):
+                    space[k] = instance
+        if is_packet(node):
+            closest = _nearest_of_packet(bvh.corners, bvh, shapes, node, shear, instance, closest)
+        else:
+            first = first_of(node)
+            for k in range(first, first + size_of(node)):
+                kind, row = kind_of(bvh, k), row_of(bvh, k)
                 if instances is not None:
                     if kind == INSTANCE:
-                        held, held_at = node, k + 1
-                        stack[top], distance[top], space[top] = node, 0.0, instance
+                        stack[top], waiting[top], space[top] = instances.root[row], 0.0, row
                         top += 1
-                        stack[top], distance[top], space[top] = instances.root[row], 0.0, row
-                        top += 1
-                        break
+                        continue
                 if solids is not None:
                     if kind == SOLID:
                         hit = evaluate.intersect(solids, shapes, bvh, row, local, closest.t)
-                        kind, row, t, u, v = hit.kind, hit.row, hit.t, hit.u, hit.v
+                        found = Crossing(hit.t, hit.u, hit.v)
+                        kind, row = hit.kind, hit.row
                     else:
-                        t, u, v = any_shape.intersect(shapes, kind, row, local, shear)
+                        found = any_shape.intersect(shapes, kind, row, local, shear)
                 else:
-                    t, u, v = any_shape.intersect(shapes, kind, row, local, shear)
-                if t <= closest.t:
-                    hit = Hit(t, kind, row, u, v, instance)
-                    if t < closest.t or _precedes(shapes, hit, closest):
-                        closest = hit
-            # Asked once a leaf: asked for each primitive it costs a quarter of the speed.
-            if any_hit and closest.kind >= 0:
-                return closest
-        else:
-            left = begin
-            t_left = entry(bvh, left, view, closest.t)
-            t_right = entry(bvh, left + 1, view, closest.t)
-            if t_left < math.inf or t_right < math.inf:
-                node = left if t_left <= t_right else left + 1
-                if t_left < math.inf and t_right < math.inf:
-                    stack[top] = left + 1 if t_left <= t_right else left
-                    distance[top], space[top] = max(t_left, t_right), instance
-                    top += 1
-                continue
+                    found = any_shape.intersect(shapes, kind, row, local, shear)
+                closest = _nearer(shapes, found, kind, row, instance, closest)
+        # Asked once a leaf: asked for each primitive it costs a quarter of the speed.
+        if any_hit and closest.kind >= 0:
+            return closest
         while True:
             if top == 0:
                 return closest
             top -= 1
-            if can_be_nearer(distance[top], closest.t):
-                node = stack[top]
-                if instances is None:
-                    break
-                if space[top] == instance:
-                    break
+            if any_hit or can_be_nearer(waiting[top], closest.t):
+                break
+        node = stack[top]
+        if instances is not None:
+            if space[top] != instance:
                 instance = space[top]
                 local = ray_in(instances, instance, ray)
                 shear = shear_of(local)
-                if instance < 0:
-                    view = view_of(bvh, 0, local)
-                    break
-                view = view_of(bvh, instances.root[instance], local)
-                if entry(bvh, node, view, closest.t) < math.inf:
-                    break
+                view = view_of(bvh, 0 if instance < 0 else instances.root[instance], local)
+
+
+@kernel
+def _nearest_of_packet(
+    corners: FloatArray | None,
+    bvh: Bvh,
+    shapes: Shapes,
+    node: int,
+    shear: Shear,
+    instance: int,
+    closest: Hit,
+) -> Hit:
+    """The nearest of `closest` and the triangles of a leaf."""
+    if corners is None:
+        return closest
+    first, size = first_of(node), size_of(node)
+    met = maybe_met(corners, first, size, shear)
+    while met != 0:
+        lane = lowest(met)
+        met &= met - 1
+        found = triangle.intersect_lane(corners, first, size, lane, shear)
+        row = row_of(bvh, first + lane)
+        closest = _nearer(shapes, found, TRIANGLE, row, instance, closest)
+    return closest
+
+
+@kernel
+def _nearer(
+    shapes: Shapes, found: Crossing, kind: int, row: int, instance: int, closest: Hit
+) -> Hit:
+    """The nearer of what was found and the closest so far."""
+    if found.t <= closest.t:
+        hit = Hit(found.t, kind, row, found.u, found.v, instance)
+        if found.t < closest.t or _precedes(shapes, hit, closest):
+            return hit
+    return closest
 
 
 @kernel

@@ -19,7 +19,7 @@ from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
 from reference_rt.kernel import entry_kernel, local_floats
-from reference_rt.materials import layer_floats
+from reference_rt.materials import kept_floats
 from reference_rt.ray import Ray
 from reference_rt.sampling.grid import GridSample
 from reference_rt.shading import shade
@@ -127,13 +127,13 @@ def _occluded(
 def _direct(
     scene: SceneTables, o: FloatArray, d: FloatArray, k: int, u: float, v: float, out: FloatArray
 ) -> None:
-    layers = local_floats(layer_floats(scene.materials))
+    kept = local_floats(kept_floats(scene.materials))
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
             continue
-        found = direct(scene, shade(scene, ray, hit, layers), k, u, v)
+        found = direct(scene, shade(scene, ray, hit, kept), k, u, v)
         out[i, 0], out[i, 1], out[i, 2] = found.light.target
         out[i, 3] = found.light.pdf
         out[i, 4], out[i, 5], out[i, 6] = found.contribution

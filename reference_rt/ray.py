@@ -10,6 +10,11 @@ UNIT_ROUNDOFF = 2.0**-53
 """u: a float64 operation returns its exact result times (1 + e) with |e| <= u."""
 
 
+BLOCK = 64
+"""Rays that are traced side by side, of as many samples (measured on the Cornell box: 16 take 8 %
+longer, 32 take 3 %; their paths need 35 KiB)."""
+
+
 class Ray(NamedTuple):
     """p(t) = o + t d for 0 < t < t_max.  `d` may have any length: t counts in units of |d|."""
 

@@ -26,7 +26,7 @@ from reference_rt.integrators import AnyIntegrator
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import AnyLight, Constant, EnvironmentMap
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
-from reference_rt.materials.layers import ways
+from reference_rt.materials.ways import ways
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.shapes import Shape
 from reference_rt.textures import AnyTexture, texture_names

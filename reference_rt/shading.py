@@ -3,6 +3,7 @@
 from reference_rt.geometry import Geometry, coordinates, surface, tangents
 from reference_rt.kernel import kernel
 from reference_rt.materials import Shading, prepare
+from reference_rt.materials.textured import look, looked_floats
 from reference_rt.ray import Hit, Ray
 from reference_rt.shading_frame import oriented_frame
 from reference_rt.shapes.shape import FloatArray, IntArray, Tangents
@@ -14,18 +15,20 @@ _NO_COLOUR = Vec3(-1.0, -1.0, -1.0)
 
 
 @kernel
-def shade(scene: SceneTables, ray: Ray, hit: Hit, layers: FloatArray) -> Shading:
+def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
     """What the material at a hit (which must be one) is asked about, seen along the ray.
 
-    `layers` (`materials.layer_floats`,) is scratch that the answer lives in.
+    `kept` (`materials.kept_floats`,) is scratch that the answer lives in.
     """
     point = surface(scene.geometry, ray, hit)
     world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
     frame = _frame(scene.materials.oriented, point.ns, world)
     local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))
     at = texture_place(scene.textures, scene.geometry, ray, hit)
-    shading = Shading(point, frame, to_local(frame, -ray.d), at, local, layers)
-    prepare(scene.materials, shading)
+    looked = look(scene.materials.textured, point.material, at, kept)
+    layers = kept[looked_floats(scene.materials.textured) :]
+    shading = Shading(point, frame, to_local(frame, -ray.d), looked, local, layers)
+    prepare(scene.materials, shading, at)
     return shading
 
 

@@ -48,7 +48,8 @@ class Trees:
         bounds: dict[int, Bounds],
     ) -> None:
         self.method, self.tables, self.bounds = method, tables, bounds
-        self._nodes: list[bvh.Nodes] = []
+        self._wide: list[bvh.Wide] = []
+        self._boxes: list[FloatArray] = []
         self._kinds: list[IntArray] = []
         self._rows: list[IntArray] = []
         self._unbounded = -1
@@ -89,9 +90,8 @@ class Trees:
                     ]
                 )
             if not finite.all():
-                leaf = bvh.Nodes(
-                    np.zeros((1, 6)), np.zeros(1, np.int64), np.array([(~finite).sum()])
-                )
+                everywhere = np.repeat([-np.inf, np.inf], 3)[None]
+                leaf = bvh.Nodes(everywhere, np.zeros(1, np.int64), np.array([(~finite).sum()]))
                 self._unbounded = self._append(leaf, kinds_of[1], rows_of[1])
                 if self._scene is None:
                     self._scene, self._unbounded = self._unbounded, -1
@@ -101,30 +101,22 @@ class Trees:
         """All hierarchies, the scene's first; None where a few shapes are better tested in turn."""
         if self._scene is None:
             return None
-        order = [self._scene, *(k for k in range(len(self._nodes)) if k != self._scene)]
-        first = []
-        references = 0
-        for k in order:
-            nodes = self._nodes[k]
-            inner = nodes.size == 0
-            first.append(nodes.first + np.where(inner, self.start(k), references))
-            references += len(self._kinds[k])
-        nodes = bvh.Nodes(
-            boxes=np.concatenate([self._nodes[k].boxes for k in order]),
-            first=np.concatenate(first),
-            size=np.concatenate([self._nodes[k].size for k in order]),
+        order = [self._scene, *(k for k in range(len(self._wide)) if k != self._scene)]
+        triangles = self.tables["triangles"]
+        joined = bvh.joined(
+            [self._wide[k] for k in order],
+            [self._kinds[k] for k in order],
+            [self._rows[k] for k in order],
+            None if triangles is None else triangles.vertices,
         )
-        kinds = np.concatenate([self._kinds[k] for k in order])
-        rows = np.concatenate([self._rows[k] for k in order])
-        unbounded = -1 if self._unbounded < 0 else self.start(self._unbounded)
-        return Bvh(bvh.packed(nodes), np.column_stack([kinds, rows]), unbounded)
+        return joined._replace(unbounded=-1 if self._unbounded < 0 else self.start(self._unbounded))
 
     def start(self, tree: int) -> int:
         """The first node of a tree among all nodes."""
         if tree == self._scene:
             return 0
-        before = sum(len(self._nodes[k].size) for k in range(tree) if k != self._scene)
-        return before + (0 if self._scene is None else len(self._nodes[self._scene].size))
+        before = sum(len(self._wide[k].codes) for k in range(tree) if k != self._scene)
+        return before + (0 if self._scene is None else len(self._wide[self._scene].codes))
 
     def packets(self) -> Packets:
         """The tables side by side, where nothing else leads to their rows."""
@@ -142,7 +134,7 @@ class Trees:
     def instances(self) -> Instances | None:
         if self._instances is None:
             return None
-        starts = np.array([self.start(k) for k in range(len(self._nodes))])
+        starts = np.array([self.start(k) for k in range(len(self._wide))])
         return self._instances._replace(root=starts[self._instances.root])
 
     def new_row(self, kind: int, row: int) -> int:
@@ -152,13 +144,14 @@ class Trees:
     # ---- how ------------------------------------------------------------------------------------
 
     def _append(self, nodes: bvh.Nodes, kinds: IntArray, rows: IntArray) -> int:
-        self._nodes.append(nodes)
+        self._wide.append(bvh.widened(nodes, kinds == TRIANGLE))
+        self._boxes.append(nodes.boxes[0].copy())
         self._kinds.append(kinds)
         self._rows.append(rows)
-        return len(self._nodes) - 1
+        return len(self._wide) - 1
 
     def _is_few(self, kinds: IntArray) -> bool:
-        if self._nodes or np.any(kinds >= SOLID):
+        if self._wide or np.any(kinds >= SOLID):
             return False
         side_by_side = [code for code, field, _, _ in TABLES if field in Packets._fields]
         work = np.where(np.isin(kinds, side_by_side), 1, ONE_BY_ONE)
@@ -196,7 +189,7 @@ class Trees:
             owner=np.repeat([c.owner for c in copies], counts),
             copy=np.concatenate([np.arange(n) for n in counts]),
         )
-        boxes = np.array([nodes.boxes[0] for nodes in self._nodes])[trees]
+        boxes = np.array(self._boxes)[trees]
         self.bounds[INSTANCE] = placed_bounds(table.center, edges, boxes[:, :3], boxes[:, 3:])
         return table
 

@@ -5,10 +5,10 @@ import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba import types
-from numba.extending import overload
 
-from reference_rt.kernel import is_named_tuple, kernel
+from reference_rt.kernel import is_named_tuple, kernel, overload_kernel
 
 
 class Vec3(NamedTuple):
@@ -48,7 +48,7 @@ def _compile_operator(symbols: tuple[Callable[..., Any], ...], scalar: Any, vect
     """Let compiled code use `symbols` on Vec3 with the very text that Python runs."""
     for symbol in symbols:
 
-        @overload(symbol, strict=False)  # type: ignore[untyped-decorator]
+        @overload_kernel(symbol)
         def _implementation(self: Any, other: Any) -> Any:
             if not is_named_tuple(self, Vec3):
                 return None
@@ -63,21 +63,27 @@ _compile_operator((operator.mul, operator.imul), _times_scalar, _times_vec3)
 _compile_operator((operator.truediv, operator.itruediv), Vec3.__truediv__, None)
 
 
-@overload(operator.neg, strict=False)  # type: ignore[untyped-decorator]
+@overload_kernel(operator.neg)
 def _negative(self: Any) -> Any:
     return Vec3.__neg__ if is_named_tuple(self, Vec3) else None
 
 
 @kernel
 def row(array: Any, i: int) -> Vec3:
-    """Row `i` of an (n, 3) array."""
-    return Vec3(array[i, 0], array[i, 1], array[i, 2])
+    """Row `i` of an (n, 3) array.
+
+    Unsigned: where numbers may be negative, NumPy's way to count from the end is asked for each
+    time (measured: 4 % of the Cornell box).
+    """
+    k = np.uint64(i)
+    return Vec3(array[k, 0], array[k, 1], array[k, 2])
 
 
 @kernel
 def triple(array: Any, i: int, k: int) -> Vec3:
     """Vector k of the three in row `i` of an (n, 9) array."""
-    return Vec3(array[i, 3 * k], array[i, 3 * k + 1], array[i, 3 * k + 2])
+    r = np.uint64(i)
+    return Vec3(array[r, 3 * k], array[r, 3 * k + 1], array[r, 3 * k + 2])
 
 
 @kernel

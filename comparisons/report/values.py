@@ -50,5 +50,17 @@ def _real(value: float, format_: str = ".4g") -> str:
     mantissa, _, exponent = f"{value:{format_}}".replace("-", "−").partition("e")
     if not exponent:
         return mantissa
-    digits = str(int(exponent.replace("−", "-")))
-    return f"{mantissa} × 10{digits.translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+    return f"{mantissa} × 10{_raised(int(exponent.replace('−', '-')))}"
+
+
+def _raised(exponent: int) -> str:
+    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def power_of_ten(value: float) -> str:
+    """A positive tick of a logarithmic axis: 0.01, 200, 10⁵, 2 × 10⁻⁴."""
+    if 1e-3 <= value < 1e4:
+        return f"{value:g}"
+    exponent = math.floor(math.log10(value) + 1e-9)  # a tick is a round number, to rounding
+    mantissa = f"{value / 10.0**exponent:.2g}"
+    return f"10{_raised(exponent)}" if mantissa == "1" else f"{mantissa} × 10{_raised(exponent)}"

@@ -1,7 +1,7 @@
 """Bounding volume hierarchies over any mix of primitives, from their boxes alone.
 
 `build` makes one by any of four methods, each in its file; `statistics` says how good it is.  What
-follows a ray through it is `reference_rt.geometry`.
+follows a ray through it is `reference_rt.geometry`, which takes it `widened`.
 """
 
 from typing import Literal
@@ -13,30 +13,53 @@ from reference_rt.bvh.nodes import (
     FAR_SLACK,
     LEAF_SIZE,
     STACK_SIZE,
-    Bvh,
     Nodes,
-    first_of,
     half_area,
-    packed,
-    size_of,
 )
-from reference_rt.bvh.statistics import Statistics, statistics
+from reference_rt.bvh.statistics import Statistics, of_wide, statistics
+from reference_rt.bvh.wide import (
+    CENTER,
+    CHILDREN,
+    NOTHING,
+    WIDE_STACK,
+    Bvh,
+    Wide,
+    child_of,
+    first_of,
+    is_packet,
+    joined,
+    kind_of,
+    row_of,
+    size_of,
+    widened,
+)
 from reference_rt.shapes.shape import FloatArray, IntArray
 
 __all__ = [
+    "CENTER",
+    "CHILDREN",
     "FAR_SLACK",
     "LEAF_SIZE",
+    "NOTHING",
     "STACK_SIZE",
+    "WIDE_STACK",
     "Bvh",
     "Method",
     "Nodes",
     "Statistics",
+    "Wide",
     "build",
+    "child_of",
     "first_of",
     "half_area",
-    "packed",
+    "is_packet",
+    "joined",
+    "kind_of",
+    "of_wide",
+    "row_of",
     "size_of",
     "statistics",
+    "widened",
 ]
 
 Method = Literal["sah", "median", "spatial", "none"]

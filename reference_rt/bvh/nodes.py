@@ -36,42 +36,6 @@ class Nodes(NamedTuple):
     size: IntArray
 
 
-class Bvh(NamedTuple):
-    """`Nodes`, of one hierarchy or several one after another, as a traversal takes them.
-
-    nodes (n, 8): box, first and size: a cache line each, and siblings in a pair of lines;
-    references (m, 2): kind and row of what each is, leaf after leaf;  unbounded: the leaf of what
-    has no finite box, -1 for none.
-    """
-
-    nodes: FloatArray
-    references: IntArray
-    unbounded: int
-
-
-def packed(nodes: Nodes) -> FloatArray:
-    """The array `Bvh.nodes`: in memory, node 0 ends where a pair of cache lines does."""
-    n, line = len(nodes.size), 8
-    memory = np.empty((n + 2) * line)
-    pair = 2 * line * memory.itemsize
-    start = (-(memory.ctypes.data + line * memory.itemsize) % pair) // memory.itemsize
-    rows = memory[start : start + n * line].reshape(n, line)
-    rows[:, :6], rows[:, 6], rows[:, 7] = nodes.boxes, nodes.first, nodes.size
-    return rows
-
-
-@kernel
-def first_of(bvh: Bvh, node: int) -> int:
-    """The left child of an inner node, the first reference of a leaf."""
-    return int(bvh.nodes[node, 6])
-
-
-@kernel
-def size_of(bvh: Bvh, node: int) -> int:
-    """How many references a leaf has; 0 for an inner node."""
-    return int(bvh.nodes[node, 7])
-
-
 @kernel
 def clear(box: FloatArray) -> None:
     """Make `box` empty."""

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_rt.bvh.nodes import Nodes
+from reference_rt.bvh.wide import CHILDREN, NOTHING, Bvh
+from reference_rt.lanes import LANES
 from reference_rt.shapes.shape import FloatArray
 
 
@@ -42,6 +44,38 @@ def statistics(nodes: Nodes) -> Statistics:
         mean_leaf=references / leaves,
         largest_leaf=int(size.max()),
         sah_cost=float((tests * _chances(nodes.boxes[reached])).sum()),
+    )
+
+
+def of_wide(bvh: Bvh) -> Statistics:
+    """The same of the wide hierarchy whose root is node 0, where others may follow: its nodes' and
+    leaves' counts, and for the cost a node's boxes or a leaf of triangles as one test each."""
+    boxes, codes = [], []
+    level = np.zeros(1, np.int64)
+    depth = -1
+    while len(level) > 0:
+        depth += 1
+        children = bvh.children[level, CHILDREN : CHILDREN + LANES].astype(np.int64)
+        planes = bvh.boxes[level, :CHILDREN].reshape(-1, 6, LANES).transpose(0, 2, 1)
+        there = children != NOTHING
+        codes.append(children[there])
+        boxes.append(planes[there].astype(np.float64))
+        level = children[there & (children >= 0)]
+    code, box = np.concatenate(codes), np.concatenate(boxes)
+    leaf = code < 0
+    sizes = ((-1 - code[leaf]) >> 1) & 15
+    is_packet = (-1 - code[leaf]) & 1 == 1
+    root = np.concatenate([boxes[0][:, :3].min(axis=0), boxes[0][:, 3:].max(axis=0)])
+    tests = np.ones(len(code) + 1)
+    tests[1:][leaf] = np.where(is_packet, 1, sizes)
+    return Statistics(
+        nodes=1 + int((~leaf).sum()),
+        leaves=int(leaf.sum()),
+        references=int(sizes.sum()),
+        depth=depth + 1,
+        mean_leaf=float(sizes.mean()),
+        largest_leaf=int(sizes.max()),
+        sah_cost=float((tests * _chances(np.vstack([root, box]))).sum()),
     )
 
 

@@ -3,13 +3,14 @@
 import math
 from typing import NamedTuple
 
-from reference_rt.bvh import STACK_SIZE, Bvh, first_of, size_of
-from reference_rt.kernel import kernel, local_integers
+from reference_rt.bvh import NOTHING, WIDE_STACK, Bvh, first_of, row_of, size_of
+from reference_rt.kernel import kernel, local_floats, local_integers
+from reference_rt.lanes import LANES
 from reference_rt.ray import Ray
 from reference_rt.shapes import triangle
 from reference_rt.shapes.triangle import Triangles
 from reference_rt.shapes.watertight import shear_of
-from reference_rt.traversal import entry, view_of
+from reference_rt.traversal import enter, nearest_child, view_of
 
 
 class Step(NamedTuple):
@@ -48,30 +49,26 @@ def _walk(
     found, balance = Step(math.inf, -1, 0.0, 0.0, 0), 0
     if triangles is None:
         return found, balance
-    stack = local_integers(STACK_SIZE)
+    stack, waiting = local_integers(WIDE_STACK), local_floats(WIDE_STACK)
+    distances = local_floats(LANES)
     view, shear = view_of(bvh, root, ray), shear_of(ray)
     node, top = root, 0
     while True:
-        begin, size = first_of(bvh, node), size_of(bvh, node)
-        if size > 0:
-            for k in range(begin, begin + size):
-                i = bvh.references[k, 1]
-                t, u, v = triangle.intersect(triangles, i, shear)
-                if t < math.inf and (t > after or (t == after and i > row)):
-                    if t < found.t or (t == found.t and i < found.row):
-                        found = Step(t, i, u, v, triangle.enters(triangles, i, shear))
-                    if total:
-                        balance += triangle.enters(triangles, i, shear)
-        else:
-            limit = math.inf if total else found.t
-            left = begin
-            t_left, t_right = entry(bvh, left, view, limit), entry(bvh, left + 1, view, limit)
-            if t_left < math.inf or t_right < math.inf:
-                node = left if t_left <= t_right else left + 1
-                if t_left < math.inf and t_right < math.inf:
-                    stack[top] = left + 1 if t_left <= t_right else left
-                    top += 1
-                continue
+        while node >= 0:
+            met = enter(bvh, node, view, math.inf if total else found.t, distances)
+            if met == 0:
+                node = NOTHING
+            else:
+                node, top = nearest_child(bvh, node, met, distances, stack, waiting, top)
+        begin = first_of(node)
+        for k in range(begin, begin + size_of(node)):
+            i = row_of(bvh, k)
+            t, u, v = triangle.intersect(triangles, i, shear)
+            if t < math.inf and (t > after or (t == after and i > row)):
+                if t < found.t or (t == found.t and i < found.row):
+                    found = Step(t, i, u, v, triangle.enters(triangles, i, shear))
+                if total:
+                    balance += triangle.enters(triangles, i, shear)
         if top == 0:
             return found, balance
         top -= 1

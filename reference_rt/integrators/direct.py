@@ -56,8 +56,8 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: sampling
     if hit.kind < 0:
         behind: Vec3 = any_light.background(lights.environment, ray.d)
         return behind
-    layers = local_floats(any_material.layer_floats(scene.materials))
-    shading = shade(scene, ray, hit, layers)
+    kept = local_floats(any_material.kept_floats(scene.materials))
+    shading = shade(scene, ray, hit, kept)
     total = area.emitted(lights.areas, shading.point, shading.at, -ray.d)
     normal = receiver(scene, shading)
     if any_material.is_smooth(scene.materials, shading.point.material):

@@ -31,15 +31,24 @@ def direct(scene: SceneTables, shading: Shading, k: int, u0: float, u1: float) -
 @kernel
 def direct_from(scene: SceneTables, shading: Shading, light: LightSample) -> Direct:
     """A light sample at a surface; the result's `wi` is local."""
-    point = shading.point
+    found = unshadowed(scene, shading, light)
     black = Vec3(0.0, 0.0, 0.0)
+    # Most shadow rays to the wrong side of a surface are spared here.
+    if is_black(found.contribution):
+        return found
+    if occluded(scene.geometry, shadow_ray(shading.point, light)):
+        return Direct(light, found.wi, black)
+    return found
+
+
+@kernel
+def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Direct:
+    """The same, whatever may be in the way."""
     if light.pdf == 0.0:
+        black = Vec3(0.0, 0.0, 0.0)
         return Direct(light, black, black)
     wi = to_local(shading.frame, light.wi)
     f_cos = any_material.evaluate(scene.materials, shading, wi)
-    # Most shadow rays to the wrong side of a surface are spared here.
-    if is_black(f_cos) or occluded(scene.geometry, shadow_ray(point, light)):
-        return Direct(light, wi, black)
     return Direct(light, wi, f_cos * light.radiance)
 
 

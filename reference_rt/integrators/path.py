@@ -8,16 +8,19 @@ from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
 from reference_rt.description import Description
-from reference_rt.geometry import closest_hit
-from reference_rt.integrators.integrator import direct, power_heuristic, receiver
+from reference_rt.geometry import closest_hit, occluded
+from reference_rt.integrators.integrator import power_heuristic, receiver, unshadowed
+from reference_rt.integrators.scratch import Scratch, any_hits, closest_hits
 from reference_rt.kernel import kernel, local_floats
-from reference_rt.lights import area
+from reference_rt.lights import area, shadow_ray
 from reference_rt.materials import Shading
-from reference_rt.ray import Ray, ray_from
-from reference_rt.sampling import draw_pair
+from reference_rt.ray import BLOCK, Hit, Ray, ray_from
+from reference_rt.sampling import Samplers, draw_pair, sampler_of
 from reference_rt.shading import shade
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.streams import hit_of, put_ray, put_vector, ray_of, vector_of
 from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3, max_component, to_world
+from reference_rt.vec3 import Vec3, is_black, max_component, to_world
 
 UNLIMITED = 2**31
 ROULETTE_CAP = 0.999
@@ -58,63 +61,192 @@ class PathSetup(NamedTuple):
     sampling: int
 
 
+class State(NamedTuple):
+    """What a path is when it goes on.
+
+    throughput: the weight of what it finds;  eta: of the product of the media's it has entered;
+    how its ray was chosen: with density bsdf_pdf, 0 for the eye and for delta lobes, whose finds no
+    light sample competes for, from `previous`, for a light-picking normal.
+    """
+
+    throughput: Vec3
+    eta: float
+    bsdf_pdf: float
+    previous: Vec3
+    normal: Vec3
+
+
+class Step(NamedTuple):
+    """What a path finds at a hit: emitted, the light that is sent towards the eye;  light, what
+    comes by way of the surface if nothing is on the ray `shadow`, 0 where nothing can;  both
+    weighted;  goes_on, whether it does, along `ray` with `state`."""
+
+    emitted: Vec3
+    light: Vec3
+    shadow: Ray
+    goes_on: bool
+    ray: Ray
+    state: State
+
+
+class Lit(NamedTuple):
+    """Light from one point of a light, if nothing is on the ray `shadow`."""
+
+    light: Vec3
+    shadow: Ray
+
+
+@kernel
+def start(ray: Ray) -> State:
+    """A path at the eye."""
+    return State(Vec3(1.0, 1.0, 1.0), 1.0, 0.0, ray.o, ray.d)
+
+
 @kernel
 def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
     """An estimate of the radiance that arrives along `ray` at its origin; its mean is exact."""
     total = Vec3(0.0, 0.0, 0.0)
-    throughput = Vec3(1.0, 1.0, 1.0)
-    eta = 1.0
-    # How the ray was chosen: from `previous`, for a light-picking normal, with this density; 0 for
-    # the eye and for delta lobes, whose finds no light sample competes for.
-    bsdf_pdf, previous, normal = 0.0, ray.o, ray.d
-    lights = scene.lights
-    layers = local_floats(any_material.layer_floats(scene.materials))
+    state = start(ray)
+    kept = local_floats(any_material.kept_floats(scene.materials))
     for depth in range(path.max_depth):
         hit = closest_hit(scene.geometry, ray)
-        if hit.kind < 0:
-            weight = 1.0
-            if bsdf_pdf > 0.0:
-                light_pdf = any_light.environment_pdf(lights, previous, normal, ray.d)
-                weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, light_pdf)
-            total = total + throughput * any_light.background(lights.environment, ray.d) * weight
+        step = advance(path, scene, depth, ray, hit, state, sampler, kept)
+        total = total + step.emitted
+        if not is_black(step.light):
+            if not occluded(scene.geometry, step.shadow):
+                total = total + step.light
+        if not step.goes_on:
             break
-        shading = shade(scene, ray, hit, layers)
-        point = shading.point
-        if point.light >= 0:
-            weight = 1.0
-            if bsdf_pdf > 0.0:
-                shapes = scene.geometry.shapes
-                light_pdf = any_light.area_pdf(lights, shapes, previous, normal, point)
-                weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, light_pdf)
-            emitted = area.emitted(lights.areas, point, shading.at, -ray.d)
-            total = total + throughput * emitted * weight
-        if depth + 1 >= path.max_depth:
-            break
-        dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * depth
-        normal = receiver(scene, shading)
-        if any_material.is_smooth(scene.materials, point.material):
-            light = _next_event(path, scene, shading, normal, sampler, dimension)
-            total = total + throughput * light
-        u_lobe, u_roulette = 0.5, 0.5
-        chooses = any_material.chooses(scene.materials, point.material)
-        if chooses or depth + 1 >= path.rr_depth:
-            u_lobe, u_roulette = draw_pair(sampler, dimension + sampling.LOBE_AND_ROULETTE)
-        u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
-        scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
-        if scattered.pdf == 0.0:
-            break
-        throughput = throughput * scattered.weight
-        eta *= scattered.eta
-        if depth + 1 >= path.rr_depth:
-            # eta² undoes the change of radiance in glass: what counts is the power that is left.
-            survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)
-            if u_roulette >= survival:
-                break
-            throughput = throughput * (1.0 / survival)
-        bsdf_pdf = 0.0 if scattered.is_delta else scattered.pdf
-        previous = point.p
-        ray = ray_from(point, to_world(shading.frame, scattered.wi))
+        ray, state = step.ray, step.state
     return total
+
+
+@kernel
+def radiances(
+    path: PathSetup, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
+) -> None:
+    """`radiance` of the first n of `scratch.rays`, into `scratch.totals`: all paths at once, edge
+    by edge, so that rays are traced side by side and no path waits for another."""
+    rays, shadows, hits = scratch.rays, scratch.shadows, scratch.hits
+    for j in range(n):
+        _put_state(scratch, j, j, start(ray_of(rays, j)))
+        put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
+    kept = local_floats(any_material.kept_floats(scene.materials))
+    for depth in range(path.max_depth):
+        if n == 0:
+            break
+        closest_hits(scene.geometry, rays, hits, n)
+        alive, lit = 0, 0
+        for j in range(n):
+            k = scratch.samples[j]
+            state = _state_of(scratch, j)
+            sampler = sampler_of(samplers, k)
+            step = advance(
+                path, scene, depth, ray_of(rays, j), hit_of(hits, j), state, sampler, kept
+            )
+            put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + step.emitted)
+            if not is_black(step.light):
+                put_ray(shadows, lit, step.shadow)
+                put_vector(scratch.lights, 0, lit, step.light)
+                scratch.lit[lit] = k
+                lit += 1
+            if step.goes_on:
+                put_ray(rays, alive, step.ray)
+                _put_state(scratch, alive, k, step.state)
+                alive += 1
+        any_hits(scene.geometry, shadows, hits, lit)
+        for j in range(lit):
+            if hits.codes[j] < 0:
+                k = scratch.lit[j]
+                light = vector_of(scratch.lights, 0, j)
+                put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + light)
+        n = alive
+
+
+@kernel
+def _state_of(scratch: Scratch, j: int) -> State:
+    numbers = scratch.states
+    return State(
+        vector_of(numbers, 0, j),
+        numbers[9 * BLOCK + j],
+        numbers[10 * BLOCK + j],
+        vector_of(numbers, 3, j),
+        vector_of(numbers, 6, j),
+    )
+
+
+@kernel
+def _put_state(scratch: Scratch, j: int, k: int, state: State) -> None:
+    """As number j of the paths that go on, the path of sample k."""
+    scratch.samples[j] = k
+    numbers = scratch.states
+    put_vector(numbers, 0, j, state.throughput)
+    put_vector(numbers, 3, j, state.previous)
+    put_vector(numbers, 6, j, state.normal)
+    numbers[9 * BLOCK + j], numbers[10 * BLOCK + j] = state.eta, state.bsdf_pdf
+
+
+@kernel
+def advance(
+    path: PathSetup,
+    scene: SceneTables,
+    depth: int,
+    ray: Ray,
+    hit: Hit,
+    state: State,
+    sampler: sampling.Sample,
+    kept: FloatArray,
+) -> Step:
+    """From what the ray that is edge number `depth` of a path has hit to the next ray."""
+    lights = scene.lights
+    throughput, bsdf_pdf = state.throughput, state.bsdf_pdf
+    previous, normal = state.previous, state.normal
+    black = Vec3(0.0, 0.0, 0.0)
+    if hit.kind < 0:
+        weight = 1.0
+        if bsdf_pdf > 0.0:
+            light_pdf = any_light.environment_pdf(lights, previous, normal, ray.d)
+            weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, light_pdf)
+        emitted = throughput * any_light.background(lights.environment, ray.d) * weight
+        return Step(emitted, black, ray, False, ray, state)
+    shading = shade(scene, ray, hit, kept)
+    point = shading.point
+    emitted = black
+    if point.light >= 0:
+        weight = 1.0
+        if bsdf_pdf > 0.0:
+            shapes = scene.geometry.shapes
+            light_pdf = any_light.area_pdf(lights, shapes, previous, normal, point)
+            weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, light_pdf)
+        emitted = throughput * area.emitted(lights.areas, point, shading.at, -ray.d) * weight
+    if depth + 1 >= path.max_depth:
+        return Step(emitted, black, ray, False, ray, state)
+    dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * depth
+    normal = receiver(scene, shading)
+    lit = Lit(black, ray)
+    if any_material.is_smooth(scene.materials, point.material):
+        lit = _next_event(path, scene, shading, normal, sampler, dimension)
+    light = throughput * lit.light
+    u_lobe, u_roulette = 0.5, 0.5
+    chooses = any_material.chooses(scene.materials, point.material)
+    if chooses or depth + 1 >= path.rr_depth:
+        u_lobe, u_roulette = draw_pair(sampler, dimension + sampling.LOBE_AND_ROULETTE)
+    u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
+    scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
+    if scattered.pdf == 0.0:
+        return Step(emitted, light, lit.shadow, False, ray, state)
+    throughput = throughput * scattered.weight
+    eta = state.eta * scattered.eta
+    if depth + 1 >= path.rr_depth:
+        # eta² undoes the change of radiance in glass: what counts is the power that is left.
+        survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)
+        if u_roulette >= survival:
+            return Step(emitted, light, lit.shadow, False, ray, state)
+        throughput = throughput * (1.0 / survival)
+    bsdf_pdf = 0.0 if scattered.is_delta else scattered.pdf
+    state = State(throughput, eta, bsdf_pdf, point.p, normal)
+    ray = ray_from(point, to_world(shading.frame, scattered.wi))
+    return Step(emitted, light, lit.shadow, True, ray, state)
 
 
 @kernel
@@ -134,24 +266,29 @@ def _next_event(
     normal: Vec3,
     sampler: sampling.Sample,
     dimension: int,
-) -> Vec3:
+) -> Lit:
     """Direct light from one light picked at random, weighted against the BSDF's own sampling."""
-    lights = any_light.count(scene.lights)
-    if lights == 0:
-        return Vec3(0.0, 0.0, 0.0)
+    point = shading.point
+    nothing = Lit(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
+    count = any_light.count(scene.lights)
+    if count == 0:
+        return nothing
     u_pick = 0.5
-    if lights > 1:
+    if count > 1:
         u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_PICK)
-    picked = any_light.pick(scene.lights, shading.point.p, normal, u_pick)
+    picked = any_light.pick(scene.lights, point.p, normal, u_pick)
     if picked.probability == 0.0:
-        return Vec3(0.0, 0.0, 0.0)
+        return nothing
     u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
-    sample = direct(scene, shading, picked.light, u0, u1)
-    if max_component(sample.contribution) == 0.0:
-        return sample.contribution
-    pdf = sample.light.pdf * picked.probability
-    if sample.light.is_delta:
-        return sample.contribution * (1.0 / pdf)
+    shapes, textures = scene.geometry.shapes, scene.textures
+    light = any_light.sample_one(scene.lights, picked.light, shapes, textures, point.p, u0, u1)
+    sample = unshadowed(scene, shading, light)
+    if is_black(sample.contribution):
+        return nothing
+    shadow = shadow_ray(point, light)
+    pdf = light.pdf * picked.probability
+    if light.is_delta:
+        return Lit(sample.contribution * (1.0 / pdf), shadow)
     bsdf_pdf = any_material.pdf(scene.materials, shading, sample.wi)
     weight = _weight(path.sampling == _BSDF, path.sampling, pdf, bsdf_pdf)
-    return sample.contribution * (weight / pdf)
+    return Lit(sample.contribution * (weight / pdf), shadow)

@@ -65,7 +65,7 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampl
     each level leaves all its branches but one waiting at most."""
     waiting = 2 * any_material.most_branches(scene.materials) - 1
     stack = local_floats(10 * (waiting * whitted.max_depth + 2))
-    layers = local_floats(any_material.layer_floats(scene.materials))
+    kept = local_floats(any_material.kept_floats(scene.materials))
     _push(stack, 0, ray, Vec3(1.0, 1.0, 1.0), 0)
     top = 1
     total = Vec3(0.0, 0.0, 0.0)
@@ -79,7 +79,7 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampl
             background = any_light.background(scene.lights.environment, ray.d)
             total = total + weight * background
             continue
-        shading = shade(scene, ray, hit, layers)
+        shading = shade(scene, ray, hit, kept)
         point = shading.point
         total = total + weight * area.emitted(scene.lights.areas, point, shading.at, -ray.d)
         ambient = any_material.ambient(scene.materials, shading) * any_light.ambient(scene.lights)

@@ -1,4 +1,4 @@
-"""All materials: one file each; here, what is asked of them.
+"""All materials: one file each; here, their names.  What is asked of them is in `dispatch.py`.
 
 To add a material: its file with description, table and kernels; in `leaves.py` a code, a field of
 `Leaves`, a line in `TABLES` and a branch in the dispatchers; below, `AnyMaterial`; a translator
@@ -6,25 +6,38 @@ function in `comparisons.translate`; a scene; a row in the tests' tuple.  One th
 (`wrappers.py`) needs a step in `layers.py` instead.
 """
 
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from pydantic import Field
 
-from reference_rt.kernel import kernel
-from reference_rt.materials import layers as any_layer
-from reference_rt.materials import leaves as any_leaf
 from reference_rt.materials.bump import Bump
 from reference_rt.materials.conductor import Conductor
 from reference_rt.materials.dielectric import Dielectric
 from reference_rt.materials.diffuse import Diffuse
+from reference_rt.materials.dispatch import (
+    BEHIND,
+    CHOOSES,
+    SMOOTH,
+    Materials,
+    ambient,
+    branch_count,
+    branches,
+    chooses,
+    evaluate,
+    is_smooth,
+    kept_floats,
+    most_branches,
+    pdf,
+    prepare,
+    sample,
+    takes_light_from_behind,
+)
 from reference_rt.materials.emissive import Emissive
-from reference_rt.materials.layers import Layer, Layers, layer_at, lets
-from reference_rt.materials.leaves import BLACK, Leaves
+from reference_rt.materials.leaves import BLACK
 from reference_rt.materials.material import (
     Branches,
     BsdfSample,
     Material,
-    no_sample,
 )
 from reference_rt.materials.mirror import Mirror
 from reference_rt.materials.normal_map import NormalMap
@@ -37,9 +50,6 @@ from reference_rt.materials.rough_plastic import RoughPlastic
 from reference_rt.materials.shading import Shading
 from reference_rt.materials.thin_dielectric import ThinDielectric
 from reference_rt.materials.wrappers import Blend, Mask, TwoSided, Wrapper
-from reference_rt.shapes.shape import IntArray
-from reference_rt.textures import Colours
-from reference_rt.vec3 import Vec3, to_local, to_world
 
 AnyMaterial = Annotated[
     Diffuse
@@ -62,245 +72,11 @@ AnyMaterial = Annotated[
     Field(discriminator="type"),
 ]
 
-# Bits of `Materials.traits`.
-SMOOTH, CHOOSES, BEHIND = 1, 2, 4
-
-
-class Materials(NamedTuple):
-    """Of each material: kind (n,) and row (n,), which table it is a row of, where it is no layers;
-    traits (n,), SMOOTH where lights can be sampled, CHOOSES where `sample` uses `u_lobe`, BEHIND
-    where light from both sides of the surface counts; shown
-    (n), its colour to ray casting.  oriented (1,) where any scatters differently along u and v, or
-    is tilted by a texture, else None;  layers, None where no material is made of others;  leaves,
-    the tables."""
-
-    kind: IntArray
-    row: IntArray
-    traits: IntArray
-    shown: Colours
-    oriented: IntArray | None
-    layers: Layers | None
-    leaves: Leaves
-
-
-@kernel
-def is_smooth(materials: Materials, m: int) -> bool:
-    """Whether the material scatters to a continuum of directions, so that lights can be sampled."""
-    return bool(materials.traits[m] & SMOOTH)
-
-
-@kernel
-def chooses(materials: Materials, m: int) -> bool:
-    """Whether `sample` uses its number for the choice of a lobe."""
-    return bool(materials.traits[m] & CHOOSES)
-
-
-@kernel
-def takes_light_from_behind(materials: Materials, m: int) -> bool:
-    """Whether light that comes from both sides of the surface may reach the viewer."""
-    return bool(materials.traits[m] & BEHIND)
-
-
-@kernel
-def evaluate(materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi|, without what is mirrored or refracted perfectly."""
-    return _evaluate(materials.layers, materials, shading, wi)
-
-
-@kernel
-def _evaluate(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
-    m = shading.point.material
-    if layers is None:
-        kind, i = materials.kind[m], materials.row[m]
-        return any_leaf.evaluate(materials.leaves, kind, i, shading.at, shading.wo, wi)
-    total = Vec3(0.0, 0.0, 0.0)
-    first = layers.first[m]
-    for k in range(layers.number[m]):
-        layer = layer_at(shading, k)
-        if layer.weight > 0.0 and lets(layer, wi):
-            wo_in, wi_in = to_local(layer.basis, shading.wo), to_local(layer.basis, wi)
-            kind, i = layers.kind[first + k], layers.row[first + k]
-            value = any_leaf.evaluate(materials.leaves, kind, i, shading.at, wo_in, wi_in)
-            total = total + value * layer.weight
-    return total
-
-
-@kernel
-def pdf(materials: Materials, shading: Shading, wi: Vec3) -> float:
-    """The density per solid angle with which `sample` picks `wi`; discrete directions apart."""
-    return _pdf(materials.layers, materials, shading, wi)
-
-
-@kernel
-def _pdf(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> float:
-    m = shading.point.material
-    if layers is None:
-        kind, i = materials.kind[m], materials.row[m]
-        return any_leaf.pdf(materials.leaves, kind, i, shading.at, shading.wo, wi)
-    density, total = 0.0, 0.0
-    first = layers.first[m]
-    for k in range(layers.number[m]):
-        layer = layer_at(shading, k)
-        if layer.weight > 0.0:
-            total += layer.weight
-            wo_in, wi_in = to_local(layer.basis, shading.wo), to_local(layer.basis, wi)
-            kind, i = layers.kind[first + k], layers.row[first + k]
-            one = any_leaf.pdf(materials.leaves, kind, i, shading.at, wo_in, wi_in)
-            density += one * layer.weight
-    return density / total if total > 0.0 else 0.0
-
-
-@kernel
-def sample(
-    materials: Materials, shading: Shading, u_lobe: float, u0: float, u1: float
-) -> BsdfSample:
-    """A direction drawn for `shading.wo`; pdf = 0 where the material scatters nothing."""
-    return _sample(materials.layers, materials, shading, u_lobe, u0, u1)
-
-
-@kernel
-def _sample(
-    layers: Layers | None,
-    materials: Materials,
-    shading: Shading,
-    u_lobe: float,
-    u0: float,
-    u1: float,
-) -> BsdfSample:
-    m = shading.point.material
-    if layers is None:
-        kind, i = materials.kind[m], materials.row[m]
-        return any_leaf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
-    first, count = layers.first[m], layers.number[m]
-    total = 0.0
-    for k in range(count):
-        total += layer_at(shading, k).weight
-    if not total > 0.0:
-        return no_sample()
-    # The layer whose stretch of the sum of the weights holds u_lobe; its place there, stretched,
-    # is the number for the layer's own choice.
-    rest, chosen = u_lobe * total, 0
-    layer = layer_at(shading, 0)
-    while rest >= layer.weight and chosen + 1 < count:
-        rest -= layer.weight
-        chosen += 1
-        layer = layer_at(shading, chosen)
-    if not layer.weight > 0.0:
-        return no_sample()
-    u_inner = min(rest / layer.weight, 1.0 - 2.0**-53)
-    wo_in = to_local(layer.basis, shading.wo)
-    kind, i = layers.kind[first + chosen], layers.row[first + chosen]
-    drawn = any_leaf.sample(materials.leaves, kind, i, shading.at, wo_in, u_inner, u0, u1)
-    wi = to_world(layer.basis, drawn.wi)
-    if drawn.pdf == 0.0:
-        return no_sample()
-    if drawn.is_delta or count == 1:
-        if not lets(layer, wi):
-            return no_sample()
-    if drawn.is_delta:
-        # Its share of the whole over the chance of the layer, weight / total.
-        probability = drawn.pdf * (layer.weight / total)
-        return BsdfSample(wi, drawn.weight * total, probability, drawn.eta, True)
-    if count == 1:
-        return BsdfSample(wi, drawn.weight * total, drawn.pdf, drawn.eta, False)
-    # All layers could have drawn it.
-    density = _pdf(layers, materials, shading, wi)
-    if not density > 0.0:
-        return no_sample()
-    value = _evaluate(layers, materials, shading, wi)
-    return BsdfSample(wi, value * (1.0 / density), density, drawn.eta, False)
-
-
-@kernel
-def branch_count(materials: Materials, m: int) -> int:
-    """How many `branches` a material has."""
-    return _branch_count(materials.layers, m)
-
-
-@kernel
-def _branch_count(layers: Layers | None, m: int) -> int:
-    if layers is None:
-        return 1
-    return int(layers.number[m])
-
-
-@kernel
-def most_branches(materials: Materials) -> int:
-    """The largest `branch_count`."""
-    return max(1, any_layer.most(materials.layers))
-
-
-@kernel
-def layer_floats(materials: Materials) -> int:
-    """The size of the array that `Shading.layers` must be for this scene's materials."""
-    return any_layer.SIZE * any_layer.most(materials.layers)
-
-
-@kernel
-def prepare(materials: Materials, shading: Shading) -> None:
-    """Fills `shading.layers`: before anything else is asked."""
-    any_layer.prepare(materials.layers, shading)
-
-
-@kernel
-def ambient(materials: Materials, shading: Shading) -> Vec3:
-    """The text-book's k_a, of what has it."""
-    return _ambient(materials.layers, materials, shading)
-
-
-@kernel
-def _ambient(layers: Layers | None, materials: Materials, shading: Shading) -> Vec3:
-    m = shading.point.material
-    if layers is None:
-        return any_leaf.ambient(materials.leaves, materials.kind[m], materials.row[m], shading.at)
-    total = Vec3(0.0, 0.0, 0.0)
-    first = layers.first[m]
-    for k in range(layers.number[m]):
-        weight = layer_at(shading, k).weight
-        kind, i = layers.kind[first + k], layers.row[first + k]
-        value = any_leaf.ambient(materials.leaves, kind, i, shading.at)
-        total = total + value * weight
-    return total
-
-
-@kernel
-def branches(materials: Materials, shading: Shading, k: int) -> Branches:
-    """The perfectly mirrored and refracted directions number k of a material."""
-    return _branches(materials.layers, materials, shading, k)
-
-
-@kernel
-def _branches(layers: Layers | None, materials: Materials, shading: Shading, k: int) -> Branches:
-    m = shading.point.material
-    if layers is None:
-        kind, i = materials.kind[m], materials.row[m]
-        return any_leaf.branches(materials.leaves, kind, i, shading.at, shading.wo)
-    layer = layer_at(shading, k)
-    k += layers.first[m]
-    wo_in = to_local(layer.basis, shading.wo)
-    kind, i = layers.kind[k], layers.row[k]
-    found = any_leaf.branches(materials.leaves, kind, i, shading.at, wo_in)
-    reflected = to_world(layer.basis, found.reflected)
-    refracted = to_world(layer.basis, found.refracted)
-    return Branches(
-        reflected,
-        _let(layer, reflected, found.reflectance),
-        refracted,
-        _let(layer, refracted, found.transmittance),
-        found.share,
-        found.eta,
-    )
-
-
-@kernel
-def _let(layer: Layer, wi: Vec3, factor: Vec3) -> Vec3:
-    if not lets(layer, wi):
-        return Vec3(0.0, 0.0, 0.0)
-    return factor * layer.weight
-
-
 __all__ = [
+    "BEHIND",
     "BLACK",
+    "CHOOSES",
+    "SMOOTH",
     "AnyMaterial",
     "Blend",
     "Branches",
@@ -331,7 +107,7 @@ __all__ = [
     "chooses",
     "evaluate",
     "is_smooth",
-    "layer_floats",
+    "kept_floats",
     "most_branches",
     "pdf",
     "prepare",

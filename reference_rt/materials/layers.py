@@ -5,29 +5,21 @@ such a material down to one that scatters by itself, a leaf, is a layer: a list 
 its share and turn its frame.  What the material scatters is the sum of its layers.
 """
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from reference_rt.kernel import kernel
 from reference_rt.materials import bump, normal_map
-from reference_rt.materials.bump import Bump, Bumps
+from reference_rt.materials.bump import Bumps
 from reference_rt.materials.material import Material
-from reference_rt.materials.normal_map import NormalMap, NormalMaps
+from reference_rt.materials.normal_map import NormalMaps
 from reference_rt.materials.shading import Shading
-from reference_rt.materials.wrappers import Blend, Mask, TwoSided, Wrapper
+from reference_rt.materials.ways import BACK, BUMP, FRONT, REST, TAKE, TURN, Way
 from reference_rt.shapes.shape import IntArray, Tangents
-from reference_rt.textures import Numbers, Palette, number_at
+from reference_rt.textures import At, Numbers, Palette, number_at
 from reference_rt.textures.parameter import join
 from reference_rt.vec3 import Frame, Vec3, to_local, to_world
-
-# Codes of steps.  TAKE, REST: the share w, 1 - w, of a number of `weights`; FRONT, BACK: nothing
-# when seen from the other side; TURN: the frame turned to the viewer; BUMP, NORMAL_MAP: tilted.
-TAKE, REST, FRONT, BACK, TURN, BUMP, NORMAL_MAP = range(7)
-
-MOST_LAYERS = 64
-"""That a material may have: a blend doubles them."""
 
 
 class Layers(NamedTuple):
@@ -56,83 +48,6 @@ class Layer(NamedTuple):
     weight: float
     basis: Frame
     side: float
-
-
-class Step(NamedTuple):
-    """A step of a way down, as described."""
-
-    code: int
-    parameter: Any
-
-
-class Way(NamedTuple):
-    """A layer as described: its steps and the name of its leaf, None for what is not there."""
-
-    steps: tuple[Step, ...]
-    leaf: str | None
-
-    @property
-    def turns(self) -> bool:
-        """Whether it is seen from behind too."""
-        return any(step.code in (TURN, BACK) for step in self.steps)
-
-
-def ways(name: str, materials: Mapping[str, Material]) -> list[Way]:
-    """The layers of a material.  Raises ValueError (what is wrong, what was expected)."""
-    return _ways(name, materials, ())
-
-
-def _ways(name: str, materials: Mapping[str, Material], above: tuple[str, ...]) -> list[Way]:
-    if name in above:
-        raise ValueError(f"contains itself: {' -> '.join([*above, name])}")
-    above = (*above, name)
-    if len(above) > MOST_LAYERS:
-        raise ValueError(f"is nested too deeply; expected at most {MOST_LAYERS} materials")
-    material = materials[name]
-
-    def below(base: str, *steps: Step) -> list[Way]:
-        return [Way((*steps, *way.steps), way.leaf) for way in _ways(base, materials, above)]
-
-    found = [Way((), name)]
-    if isinstance(material, Mask):
-        clear = Way((Step(REST, material.opacity),), None)
-        found = [*below(material.base, Step(TAKE, material.opacity)), clear]
-    elif isinstance(material, Blend):
-        rest, take = Step(REST, material.weight), Step(TAKE, material.weight)
-        found = [*below(material.first, rest), *below(material.second, take)]
-    elif isinstance(material, TwoSided):
-        found = below(material.base, Step(TURN if material.back is None else FRONT, None))
-        _check_one_sided(material.base, found, materials)
-        if material.back is not None:
-            behind = below(material.back, Step(BACK, None), Step(TURN, None))
-            _check_one_sided(material.back, behind, materials)
-            found += behind
-    elif isinstance(material, Bump | NormalMap):
-        code = BUMP if isinstance(material, Bump) else NORMAL_MAP
-        found = below(material.base, Step(code, material))
-        if any(sum(s.code in (BUMP, NORMAL_MAP) for s in way.steps) > 1 for way in found):
-            raise ValueError(f"'{material.base}' is tilted already; expected one map at most")
-    if len(found) > MOST_LAYERS:
-        raise ValueError(f"'{name}' has {len(found)} layers; expected at most {MOST_LAYERS}")
-    return found
-
-
-def _check_one_sided(name: str, found: list[Way], materials: Mapping[str, Material]) -> None:
-    if any(transmits(way, materials) for way in found):
-        raise ValueError(
-            f"'{name}' lets light pass; expected materials with one side to make two of"
-        )
-
-
-def transmits(way: Way, materials: Mapping[str, Material]) -> bool:
-    """Whether a layer lets light pass."""
-    return way.leaf is None or materials[way.leaf].transmits
-
-
-def needs_tangents(way: Way, materials: Mapping[str, Material]) -> bool:
-    """Whether what a layer scatters depends on where u and v point."""
-    tilted = any(step.code in (BUMP, NORMAL_MAP) for step in way.steps)
-    return tilted or (way.leaf is not None and materials[way.leaf].oriented)
 
 
 class LayerTables:
@@ -213,7 +128,7 @@ def most(layers: Layers | None) -> int:
 
 
 @kernel
-def prepare(layers: Layers | None, shading: Shading) -> None:
+def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
     """Keeps the layers of the material in `shading.layers`.
 
     They depend on the point and on the viewer, not on where light comes from: found once, they
@@ -223,7 +138,7 @@ def prepare(layers: Layers | None, shading: Shading) -> None:
         return
     m = shading.point.material
     for k in range(layers.number[m]):
-        found = _layer(layers, layers.first[m] + k, shading)
+        found = _layer(layers, layers.first[m] + k, shading, at)
         kept = shading.layers[SIZE * k : SIZE * (k + 1)]
         kept[0], kept[10] = found.weight, found.side
         kept[1], kept[2], kept[3] = found.basis.s
@@ -244,7 +159,7 @@ def layer_at(shading: Shading, k: int) -> Layer:
 
 
 @kernel
-def _layer(layers: Layers, k: int, shading: Shading) -> Layer:
+def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
     """Layer k of all at a point, seen from `shading.wo`."""
     weight, side, tilted = 1.0, 1.0, False
     basis = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
@@ -270,7 +185,7 @@ def _layer(layers: Layers, k: int, shading: Shading) -> Layer:
                 to_local(basis, shading.tangents.dpdu), to_local(basis, shading.tangents.dpdv)
             )
             if code == BUMP:
-                turned = _bumped(layers.bumps, i, shading, local)
+                turned = _bumped(layers.bumps, i, at, local)
             else:
                 turned = _mapped(layers.normal_maps, i, shading, local)
             basis = Frame(
@@ -292,10 +207,10 @@ def _identity() -> Frame:
 
 
 @kernel
-def _bumped(bumps: Bumps | None, i: int, shading: Shading, tangents: Tangents) -> Frame:
+def _bumped(bumps: Bumps | None, i: int, at: At, tangents: Tangents) -> Frame:
     if bumps is None:
         return _identity()
-    return bump.basis(bumps, i, shading.at, tangents)
+    return bump.basis(bumps, i, at, tangents)
 
 
 @kernel
@@ -319,11 +234,8 @@ __all__ = [
     "Layer",
     "LayerTables",
     "Layers",
-    "Way",
-    "Wrapper",
     "layer_at",
     "lets",
     "most",
     "prepare",
-    "ways",
 ]

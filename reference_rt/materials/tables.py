@@ -8,10 +8,12 @@ import numpy as np
 from reference_rt.materials import BEHIND, CHOOSES, SMOOTH, Materials
 from reference_rt.materials.diffuse import Diffuse
 from reference_rt.materials.emissive import Emissive
-from reference_rt.materials.layers import LayerTables, Way, needs_tangents, transmits, ways
+from reference_rt.materials.layers import LayerTables
 from reference_rt.materials.leaves import BLACK, CLEAR, TABLES, Leaves
 from reference_rt.materials.material import Material
 from reference_rt.materials.phong import Phong
+from reference_rt.materials.textured import textured_table
+from reference_rt.materials.ways import Way, needs_tangents, transmits, ways
 from reference_rt.materials.wrappers import Wrapper
 from reference_rt.textures import Palette
 from reference_rt.textures.parameter import join
@@ -57,6 +59,7 @@ def material_tables(scene: "Scene", palette: Palette, default: bool) -> Material
         traits=np.array(traits),
         shown=join(shown),
         oriented=np.zeros(1, np.int64) if oriented else None,
+        textured=textured_table(materials, palette),
         layers=layers.tables(),
         leaves=leaves.tables(),
     )

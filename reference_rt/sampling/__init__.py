@@ -5,19 +5,23 @@ number of threads.  To add a sampler: its file with description, NamedTuples and
 below.
 """
 
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from reference_rt.kernel import ByClass
-from reference_rt.sampling import grid, independent, sobol
+from reference_rt.kernel import ByClass, kernel
+from reference_rt.sampling import blocks, grid, independent, sobol
+from reference_rt.sampling.blocks import FLOATS as PAIR_FLOATS
+from reference_rt.sampling.blocks import INTEGERS as PAIR_INTEGERS
+from reference_rt.sampling.blocks import BlockSample
 from reference_rt.sampling.grid import Grid, GridSample, GridSetup
 from reference_rt.sampling.independent import Independent, IndependentSample, IndependentSetup
 from reference_rt.sampling.sobol import Sobol, SobolSample, SobolSetup
+from reference_rt.shapes.shape import FloatArray, IntArray
 
 AnySampler = Annotated[Sobol | Independent | Grid, Field(discriminator="type")]
 
-Sample = SobolSample | IndependentSample | GridSample
+Sample = SobolSample | BlockSample | IndependentSample | GridSample
 """The numbers of one sample of one pixel."""
 
 # Dimensions are fixed, so that what one decision draws never shifts another's numbers. A pair
@@ -35,19 +39,69 @@ _start.register(GridSetup, grid.start)
 start_sample = _start.function
 """start_sample(setup, pixel, sample) -> the sampler of one sample of one pixel."""
 
+
+@kernel
+def _without_blocks(setup: Any, pixel: int, sample: int, pairs: FloatArray, made: IntArray) -> Any:
+    return start_sample(setup, pixel, sample)
+
+
+_start_in_block = ByClass("start_in_block")
+_start_in_block.register(SobolSetup, blocks.start)
+_start_in_block.register(IndependentSetup, _without_blocks)
+_start_in_block.register(GridSetup, _without_blocks)
+start_in_block = _start_in_block.function
+"""start_in_block(setup, pixel, sample, pairs, made) -> a sampler of the same numbers, which draws
+those of several samples of the pixel at once: see `Samplers`."""
+
+
+class Samplers(NamedTuple):
+    """The samplers of some samples: their pixels (n,) and their numbers (n,) in these.
+
+    Scratch: pairs (PAIR_FLOATS,), and made (PAIR_INTEGERS,), -1 before the first is drawn.
+    """
+
+    setup: Any
+    pixels: IntArray
+    numbers: IntArray
+    pairs: FloatArray
+    made: IntArray
+
+
+@kernel
+def forget_pairs(samplers: Samplers) -> None:
+    """Before the first sample."""
+    for k in range(PAIR_INTEGERS):
+        samplers.made[k] = -1
+
+
+@kernel
+def sampler_of(samplers: Samplers, k: int) -> Sample:
+    """That of sample k, to be taken one after another: a pixel's are drawn several at once."""
+    pixel, number = samplers.pixels[k], samplers.numbers[k]
+    made: Sample = start_in_block(samplers.setup, pixel, number, samplers.pairs, samplers.made)
+    return made
+
+
 _draw = ByClass("draw_pair")
 _draw.register(SobolSample, sobol.draw)
+_draw.register(BlockSample, blocks.draw)
 _draw.register(IndependentSample, independent.draw)
 _draw.register(GridSample, grid.draw)
 draw_pair = _draw.function
 """draw_pair(sampler, dimension) -> (u0, u1), each in [0, 1)."""
 
 __all__ = [
+    "PAIR_FLOATS",
+    "PAIR_INTEGERS",
     "AnySampler",
     "Grid",
     "Independent",
     "Sample",
+    "Samplers",
     "Sobol",
     "draw_pair",
+    "forget_pairs",
+    "sampler_of",
+    "start_in_block",
     "start_sample",
 ]

@@ -20,8 +20,11 @@ _EVEN_1, _ODD_1 = np.uint64(0x55555555), np.uint64(0xAAAAAAAA)
 _EVEN_2, _ODD_2 = np.uint64(0x33333333), np.uint64(0xCCCCCCCC)
 _EVEN_4, _ODD_4 = np.uint64(0x0F0F0F0F), np.uint64(0xF0F0F0F0)
 _EVEN_8, _ODD_8 = np.uint64(0x00FF00FF), np.uint64(0xFF00FF00)
-_K0, _K1, _K2 = np.uint64(0x3D20ADEA), np.uint64(0x05526C56), np.uint64(0x53A22864)
+K0, K1, K2 = np.uint64(0x3D20ADEA), np.uint64(0x05526C56), np.uint64(0x53A22864)
 _STEP = np.uint64(0x9E3779B97F4A7C15)
+
+PASCAL_MASKS = (np.uint64(0xFFFF0000), _ODD_8, _ODD_4, _ODD_2, _ODD_1)
+"""The bits that `pascal` moves down by 16, 8, 4, 2 and 1."""
 
 
 class Sobol(Description):
@@ -61,11 +64,11 @@ def reverse_bits(x: np.uint64) -> np.uint64:
 def scramble_low_to_high(x: np.uint64, seed: np.uint64) -> np.uint64:
     """A hash of 32 bits in which each bit depends on those below it alone (Laine & Karras 2011,
     with Vegdahl's constants): Owen scrambling of the bit-reversed number."""
-    x ^= x * _K0 & LOW32
+    x ^= x * K0 & LOW32
     x = (x + seed) & LOW32
     x = x * ((seed >> _16) | _ODD) & LOW32
-    x ^= x * _K1 & LOW32
-    x ^= x * _K2 & LOW32
+    x ^= x * K1 & LOW32
+    x ^= x * K2 & LOW32
     return x
 
 
@@ -86,12 +89,29 @@ def start(setup: SobolSetup, pixel: int, sample: int) -> SobolSample:
 
 
 @kernel
-def draw(sampler: SobolSample, dimension: int) -> tuple[float, float]:
+def hash_of(key: np.uint64, dimension: int) -> np.uint64:
+    """Of seed, pixel and dimension."""
+    return mix(key + np.uint64(dimension + 1) * _STEP)
+
+
+@kernel
+def seeds_of(h: np.uint64) -> tuple[np.uint64, np.uint64, np.uint64]:
+    """For the order of a pixel's samples and for the digits of x and of y."""
+    return h & LOW32, h >> _32, mix(h) & LOW32
+
+
+@kernel
+def pair(
+    seeds: tuple[np.uint64, np.uint64, np.uint64], reversed_index: np.uint64
+) -> tuple[float, float]:
     """Two numbers of 32 bits, in the middle of their cells: never 0, never 1."""
-    h = mix(sampler.key + np.uint64(dimension + 1) * _STEP)
-    order_seed, seed0 = h & LOW32, h >> _32
-    seed1 = mix(h) & LOW32
-    index = reverse_bits(scramble_low_to_high(sampler.reversed_index, order_seed))
-    x = reverse_bits(scramble_low_to_high(index, seed0))
-    y = reverse_bits(scramble_low_to_high(pascal(index), seed1))
+    order, x_seed, y_seed = seeds
+    index = reverse_bits(scramble_low_to_high(reversed_index, order))
+    x = reverse_bits(scramble_low_to_high(index, x_seed))
+    y = reverse_bits(scramble_low_to_high(pascal(index), y_seed))
     return (float(x) + 0.5) * 2.0**-32, (float(y) + 0.5) * 2.0**-32
+
+
+@kernel
+def draw(sampler: SobolSample, dimension: int) -> tuple[float, float]:
+    return pair(seeds_of(hash_of(sampler.key, dimension)), sampler.reversed_index)

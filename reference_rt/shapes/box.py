@@ -24,6 +24,7 @@ from reference_rt.shapes.shape import (
     pack,
     solid_angle_pdf,
 )
+from reference_rt.shapes.side_by_side import larger, nearer_by, select, smaller
 from reference_rt.vec3 import Vec3, dot, row, triple
 
 
@@ -99,12 +100,12 @@ def slabs(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> Slabs:
     z0, z1 = (-1.0 - oz) * iz, (1.0 - oz) * iz
     x_up, y_up, z_up = ix > 0.0, iy > 0.0, iz > 0.0
     return Slabs(
-        x0 if x_up else x1,
-        x1 if x_up else x0,
-        y0 if y_up else y1,
-        y1 if y_up else y0,
-        z0 if z_up else z1,
-        z1 if z_up else z0,
+        select(x_up, x0, x1),
+        select(x_up, x1, x0),
+        select(y_up, y0, y1),
+        select(y_up, y1, y0),
+        select(z_up, z0, z1),
+        select(z_up, z1, z0),
         x_up,
         y_up,
         z_up,
@@ -114,9 +115,9 @@ def slabs(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> Slabs:
 @kernel
 def inside(s: Slabs) -> tuple[float, float]:
     """Where a ray enters and leaves all three slabs; enters after it leaves where it misses."""
-    # max(a, NaN) is a: begun with a number, neither bound can become NaN.
-    t_in = max(max(max(-math.inf, s.x_in), s.y_in), s.z_in)
-    t_out = min(min(min(math.inf, s.x_out), s.y_out), s.z_out)
+    # larger(a, NaN) is a: begun with a number, neither bound can become NaN.
+    t_in = larger(larger(larger(-math.inf, s.x_in), s.y_in), s.z_in)
+    t_out = smaller(smaller(smaller(math.inf, s.x_out), s.y_out), s.z_out)
     return t_in, t_out
 
 
@@ -125,8 +126,12 @@ def distance(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> floa
     """The smallest t > 0 at which a ray meets a box's surface, inf where it does not: from inside,
     where it leaves."""
     t_in, t_out = inside(slabs(ray, center, x_of, y_of, z_of))
-    t = t_in if t_in > 0.0 else t_out
-    return t if (t_in <= t_out) & (t > 0.0) else math.inf
+    t = select(t_in > 0.0, t_in, t_out)
+    nearest: float = select((t_in <= t_out) & (t > 0.0), t, math.inf)
+    return nearest
+
+
+nearer = nearer_by(distance)
 
 
 @kernel

@@ -2,10 +2,15 @@
 
 from typing import Any, NamedTuple
 
-from reference_rt.kernel import kernel, local_floats
-from reference_rt.ray import Crossing, Hit, Ray, miss
+from reference_rt.kernel import kernel, local_floats, local_integers
+from reference_rt.ray import Crossing, Hit, Ray, miss, no_hit
+from reference_rt.shapes import box, rectangle, sphere
+from reference_rt.shapes.box import Boxes
 from reference_rt.shapes.dispatch import intersect_row
-from reference_rt.shapes.shape import LANES, FloatArray, nearest_lane
+from reference_rt.shapes.rectangle import Rectangles
+from reference_rt.shapes.shape import LANES, FloatArray, IntArray, nearest_lane
+from reference_rt.shapes.side_by_side import begin, end
+from reference_rt.shapes.sphere import Spheres
 from reference_rt.shapes.tables import (
     BOX,
     DISK,
@@ -21,6 +26,8 @@ from reference_rt.shapes.tables import (
 )
 from reference_rt.shapes.triangle import Triangles
 from reference_rt.shapes.watertight import shear_of
+from reference_rt.streams import Hits, Rays, put_hit, ray_of
+from reference_rt.vec3 import row, triple
 
 
 class Packets(NamedTuple):
@@ -32,7 +39,14 @@ class Packets(NamedTuple):
 
 
 _lane_distance = of_table("lane_distance", miss)
-_found = of_table("found", miss)
+
+
+@kernel
+def _not_found(table: Any, i: int, ray: Ray, t: float) -> Crossing:
+    return miss()
+
+
+_found = of_table("found", _not_found)
 
 
 @kernel
@@ -76,6 +90,12 @@ def nearest(shapes: Shapes, packets: Packets, ray: Ray) -> Hit:
     closest = _nearest_in_packets(SPHERE, shapes.spheres, packets.spheres, ray, closest)
     closest = _nearest_in_packets(RECTANGLE, shapes.rectangles, packets.rectangles, ray, closest)
     closest = _nearest_in_packets(BOX, shapes.boxes, packets.boxes, ray, closest)
+    return _nearest_of_others(shapes, ray, closest)
+
+
+@kernel
+def _nearest_of_others(shapes: Shapes, ray: Ray, closest: Hit) -> Hit:
+    """The nearest of `closest` and what has no packets."""
     closest = _nearest_triangle(shapes.triangles, ray, closest)
     closest = _nearest_in_table(DISK, shapes.disks, ray, closest)
     closest = _nearest_in_table(PLANE, shapes.planes, ray, closest)
@@ -89,3 +109,67 @@ def _nearest_triangle(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hi
     if triangles is None:
         return closest
     return _nearest_in_table(TRIANGLE, triangles, shear_of(ray), closest)
+
+
+_KIND = 2**40
+"""The code of a primitive that a ray among several has found is kind * _KIND + row."""
+
+
+@kernel
+def nearest_of_rays(shapes: Shapes, rays: Rays, hits: Hits, n: int, any_hit: bool) -> None:
+    """`nearest` for the first n of `rays`; where `any_hit`, only whether there is any."""
+    t, codes = local_floats(LANES), local_integers(LANES)
+    for at in range(0, n, LANES):
+        begin(rays.numbers, at, t, codes)
+        _nearer_spheres(shapes.spheres, rays, at, t, codes)
+        _nearer_rectangles(shapes.rectangles, rays, at, t, codes)
+        _nearer_boxes(shapes.boxes, rays, at, t, codes)
+        end(t, codes, at, hits.numbers, hits.codes)
+    for j in range(n):
+        ray = ray_of(rays, j)
+        closest = _hit_of_code(shapes, ray, hits.codes[j], hits.numbers[j], any_hit)
+        put_hit(hits, j, _nearest_of_others(shapes, ray, closest))
+
+
+@kernel
+def _hit_of_code(shapes: Shapes, ray: Ray, code: int, t: float, any_hit: bool) -> Hit:
+    if code < 0:
+        return no_hit(ray)
+    kind, i = code // _KIND, code % _KIND
+    found = Crossing(t, 0.0, 0.0)
+    if not any_hit:
+        if kind == RECTANGLE:
+            found = _found(shapes.rectangles, i, ray, t)
+        elif kind == BOX:
+            found = _found(shapes.boxes, i, ray, t)
+    return Hit(found.t, kind, i, found.u, found.v, -1)
+
+
+@kernel
+def _nearer_spheres(
+    spheres: Spheres | None, rays: Rays, at: int, t: FloatArray, codes: IntArray
+) -> None:
+    if spheres is not None:
+        for i in range(len(spheres.owner)):
+            shape = (row(spheres.center, i), spheres.radius[i])
+            sphere.nearer(rays.numbers, at, shape, SPHERE * _KIND + i, t, codes)
+
+
+@kernel
+def _nearer_rectangles(
+    table: Rectangles | None, rays: Rays, at: int, t: FloatArray, codes: IntArray
+) -> None:
+    if table is not None:
+        for i in range(len(table.owner)):
+            place = (row(table.center, i), row(table.normal, i))
+            shape = (*place, row(table.x_of, i), row(table.y_of, i))
+            rectangle.nearer(rays.numbers, at, shape, RECTANGLE * _KIND + i, t, codes)
+
+
+@kernel
+def _nearer_boxes(boxes: Boxes | None, rays: Rays, at: int, t: FloatArray, codes: IntArray) -> None:
+    if boxes is not None:
+        for i in range(len(boxes.owner)):
+            of = boxes.to_local
+            shape = (row(boxes.center, i), triple(of, i, 0), triple(of, i, 1), triple(of, i, 2))
+            box.nearer(rays.numbers, at, shape, BOX * _KIND + i, t, codes)

@@ -21,6 +21,7 @@ from reference_rt.shapes.shape import (
     pack,
     solid_angle_pdf,
 )
+from reference_rt.shapes.side_by_side import nearer_by, select
 from reference_rt.shapes.spherical_rectangle import Seen
 from reference_rt.vec3 import Vec3, dot, max_abs, row
 
@@ -102,9 +103,12 @@ def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> fl
     # For a parallel ray this is ±inf or NaN: both fail the comparisons.
     t = -dot(from_center, normal) / dot(ray.d, normal)
     q = from_center + ray.d * t
-    if (t > 0.0) & (abs(dot(q, x_of)) <= 1.0) & (abs(dot(q, y_of)) <= 1.0):
-        return t
-    return math.inf
+    meets = (t > 0.0) & (abs(dot(q, x_of)) <= 1.0) & (abs(dot(q, y_of)) <= 1.0)
+    nearest: float = select(meets, t, math.inf)
+    return nearest
+
+
+nearer = nearer_by(distance)
 
 
 @kernel

@@ -30,6 +30,14 @@ from reference_rt.shapes.shape import (
     outward,
     pack,
 )
+from reference_rt.shapes.side_by_side import (
+    larger,
+    nearer_by,
+    select,
+    smaller,
+    square_root,
+    with_sign,
+)
 from reference_rt.vec3 import Vec3, dot, frame_from_normal, length, normalize, row, to_world
 
 
@@ -103,18 +111,22 @@ def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
     b = -dot(f, ray.d)
     approach = f + ray.d * (b / a)
     discriminant = r * r - dot(approach, approach)
-    q = b + math.copysign(math.sqrt(a * max(discriminant, 0.0)), b)
+    q = b + with_sign(square_root(a * larger(discriminant, 0.0)), b)
     t0 = (dot(f, f) - r * r) / q
     t1 = q / a
-    return discriminant >= 0.0, min(t0, t1), max(t0, t1)
+    return discriminant >= 0.0, smaller(t0, t1), larger(t0, t1)
 
 
 @kernel
 def distance(ray: Ray, center: Vec3, r: float) -> float:
     """The smallest t > 0 at which a ray meets a sphere, inf where it does not."""
     meets, near, far = roots(ray, center, r)
-    t = near if near > 0.0 else far
-    return t if meets & (t > 0.0) else math.inf
+    t = select(near > 0.0, near, far)
+    nearest: float = select(meets & (t > 0.0), t, math.inf)
+    return nearest
+
+
+nearer = nearer_by(distance)
 
 
 @kernel

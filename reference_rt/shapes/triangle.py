@@ -21,7 +21,7 @@ from reference_rt.shapes.shape import (
     any_tangents,
     solid_angle_pdf,
 )
-from reference_rt.shapes.watertight import Shear, project
+from reference_rt.shapes.watertight import Projection, Shear, project, project_lane
 from reference_rt.vec3 import Vec3, cross, dot, length, max_abs, normalize, triple
 
 
@@ -132,7 +132,17 @@ def bounds(triangles: Triangles) -> Bounds:
 @kernel
 def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
     """Where the ray meets triangle i; u, v are the barycentrics of v1 and v2."""
-    seen = project(triangles.vertices, i, shear)
+    return _crossing(project(triangles.vertices, i, shear), shear)
+
+
+@kernel
+def intersect_lane(corners: FloatArray, first: int, size: int, lane: int, shear: Shear) -> Crossing:
+    """The same of a triangle of a leaf, see `watertight.maybe_met`."""
+    return _crossing(project_lane(corners, first, size, lane, shear), shear)
+
+
+@kernel
+def _crossing(seen: Projection, shear: Shear) -> Crossing:
     if seen.side == 0:
         return miss()
     inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)

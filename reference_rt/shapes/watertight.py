@@ -1,8 +1,9 @@
 """A triangle as a ray sees it: edge functions that decide every ray, those through edges too."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from reference_rt.kernel import kernel
+from reference_rt.lanes import both, either, lane_kernel, opposite
 from reference_rt.ray import Ray
 from reference_rt.shapes.rounding import product_error
 from reference_rt.shapes.shape import FloatArray
@@ -64,23 +65,36 @@ class Projection(NamedTuple):
 
 @kernel
 def project(vertices: FloatArray, i: int, shear: Shear) -> Projection:
-    """The triangle in row i of `vertices` (n, 9), seen along a ray (Woop, Benthin & Wald 2013).
+    """The triangle in row i of `vertices` (n, 9), seen along a ray."""
+    return _project(vertices.reshape(-1), 9 * i, 1, shear)
+
+
+@kernel
+def project_lane(corners: FloatArray, first: int, size: int, lane: int, shear: Shear) -> Projection:
+    """A triangle of a leaf, see `maybe_met`, seen along a ray."""
+    return _project(corners, 9 * first + lane, size, shear)
+
+
+@kernel
+def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection:
+    """The triangle whose nine coordinates are v[start], v[start + stride], ... (Woop, Benthin &
+    Wald 2013).
 
     Each vertex is projected by arithmetic of its own, and two neighbours' edge functions differ in
     sign alone.  Products round monotonically: a difference that is not 0 has the right sign.  Where
     it is 0, `exactly` decides: of the triangles around an edge or a vertex that a ray passes
     through, it passes through exactly those that it would pass through a hair beside it.
     """
-    v = vertices
-    a_z = v[i, shear.z] - shear.o_z
-    b_z = v[i, 3 + shear.z] - shear.o_z
-    c_z = v[i, 6 + shear.z] - shear.o_z
-    a_x = v[i, shear.x] - shear.o_x - shear.s_x * a_z
-    b_x = v[i, 3 + shear.x] - shear.o_x - shear.s_x * b_z
-    c_x = v[i, 6 + shear.x] - shear.o_x - shear.s_x * c_z
-    a_y = v[i, shear.y] - shear.o_y - shear.s_y * a_z
-    b_y = v[i, 3 + shear.y] - shear.o_y - shear.s_y * b_z
-    c_y = v[i, 6 + shear.y] - shear.o_y - shear.s_y * c_z
+    x, y, z = start + stride * shear.x, start + stride * shear.y, start + stride * shear.z
+    a_z = v[z] - shear.o_z
+    b_z = v[z + 3 * stride] - shear.o_z
+    c_z = v[z + 6 * stride] - shear.o_z
+    a_x = v[x] - shear.o_x - shear.s_x * a_z
+    b_x = v[x + 3 * stride] - shear.o_x - shear.s_x * b_z
+    c_x = v[x + 6 * stride] - shear.o_x - shear.s_x * c_z
+    a_y = v[y] - shear.o_y - shear.s_y * a_z
+    b_y = v[y + 3 * stride] - shear.o_y - shear.s_y * b_z
+    c_y = v[y + 6 * stride] - shear.o_y - shear.s_y * c_z
     e0 = c_x * b_y - c_y * b_x
     e1 = a_x * c_y - a_y * c_x
     e2 = b_x * a_y - b_y * a_x
@@ -95,6 +109,65 @@ def project(vertices: FloatArray, i: int, shear: Shear) -> Projection:
         e2, s2 = exactly(b_x, b_y, a_x, a_y)
         side = s0 if s0 == s1 and s1 == s2 else 0
     return Projection(side, e0, e1, e2, a_z, b_z, c_z)
+
+
+@lane_kernel
+def _maybe_met(
+    corners: Any,
+    start: Any,
+    size: Any,
+    x: Any,
+    y: Any,
+    z: Any,
+    o_x: Any,
+    o_y: Any,
+    o_z: Any,
+    s_x: Any,
+    s_y: Any,
+) -> Any:
+    """`_project`'s edge functions of the triangles of a leaf, by the same operations: those that
+    do not differ in sign."""
+    x, y, z = start + x * size, start + y * size, start + z * size
+    a_z = corners.load(z) - o_z
+    b_z = corners.load(z + 3 * size) - o_z
+    c_z = corners.load(z + 6 * size) - o_z
+    a_x = corners.load(x) - o_x - s_x * a_z
+    b_x = corners.load(x + 3 * size) - o_x - s_x * b_z
+    c_x = corners.load(x + 6 * size) - o_x - s_x * c_z
+    a_y = corners.load(y) - o_y - s_y * a_z
+    b_y = corners.load(y + 3 * size) - o_y - s_y * b_z
+    c_y = corners.load(y + 6 * size) - o_y - s_y * c_z
+    e0 = c_x * b_y - c_y * b_x
+    e1 = a_x * c_y - a_y * c_x
+    e2 = b_x * a_y - b_y * a_x
+    below = either(e0 < 0.0, either(e1 < 0.0, e2 < 0.0))
+    above = either(e0 > 0.0, either(e1 > 0.0, e2 > 0.0))
+    return opposite(both(below, above))
+
+
+@kernel
+def maybe_met(corners: FloatArray, first: int, size: int, shear: Shear) -> int:
+    """The triangles of a leaf, as bits, that `project_lane` may find met: all that are, and some on
+    whose edges the ray passes.
+
+    The vertices of references first .. first + size, LANES at most, lie in `corners` from 9 first
+    on: the first coordinate of each, the second of each, and so on.  What follows the last one's
+    takes up the lanes that are left.
+    """
+    met = _maybe_met(
+        corners,
+        9 * first,
+        size,
+        shear.x,
+        shear.y,
+        shear.z,
+        shear.o_x,
+        shear.o_y,
+        shear.o_z,
+        shear.s_x,
+        shear.s_y,
+    )
+    return met & ((1 << size) - 1)
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from reference_rt.kernel import kernel
+from reference_rt.kernel import ByClass, kernel
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.textures import bitmap, checker
 from reference_rt.textures.bitmap import Bitmaps
@@ -24,12 +24,19 @@ class Textures(NamedTuple):
     vertex_colours: VertexColourTable | None
 
 
+class Looked(NamedTuple):
+    """Answers in place of textures: values (3 n,), the colours of those of all n that the material
+    at hand has, where it is."""
+
+    values: FloatArray
+
+
 class At(NamedTuple):
     """Where on a surface textures are asked: its coordinates u, v, and the interpolated colour of a
     mesh's vertices, negative where there is none;  textures: None where the scene has no texture,
     and the rest then means nothing."""
 
-    textures: Textures | None
+    textures: Textures | Looked | None
     u: float
     v: float
     colour: Vec3
@@ -38,13 +45,23 @@ class At(NamedTuple):
 @kernel
 def lookup(k: int, at: At) -> Vec3:
     """The colour of texture k."""
-    return _lookup(at.textures, k, at)
+    found: Vec3 = _lookup(at.textures, k, at)
+    return found
 
 
 @kernel
-def _lookup(textures: Textures | None, k: int, at: At) -> Vec3:
-    if textures is None:
-        return Vec3(0.0, 0.0, 0.0)
+def _no_colour(textures: None, k: int, at: At) -> Vec3:
+    return Vec3(0.0, 0.0, 0.0)
+
+
+@kernel
+def _looked(looked: Looked, k: int, at: At) -> Vec3:
+    values = looked.values
+    return Vec3(values[3 * k], values[3 * k + 1], values[3 * k + 2])
+
+
+@kernel
+def _ask(textures: Textures, k: int, at: At) -> Vec3:
     kind, i = textures.kind[k], textures.row[k]
     u, v = map_uv(textures.uv, k, at.u, at.v)
     if kind == CHECKER:
@@ -52,6 +69,13 @@ def _lookup(textures: Textures | None, k: int, at: At) -> Vec3:
     if kind == BITMAP:
         return _bitmap(textures.bitmaps, i, u, v)
     return _vertex_colours(textures.vertex_colours, i, at)
+
+
+_choice = ByClass("lookup")
+_choice.register(type(None), _no_colour)
+_choice.register(Looked, _looked)
+_choice.register(Textures, _ask)
+_lookup = _choice.function
 
 
 @kernel
@@ -71,20 +95,30 @@ def _bitmap(bitmaps: Bitmaps | None, i: int, u: float, v: float) -> Vec3:
 @kernel
 def lookup_gradient(k: int, at: At) -> tuple[float, float]:
     """The derivatives of texture k's luminance by the surface coordinates u and v; (0, 0) for all
-    but bitmaps."""
-    return _gradient(at.textures, k, at)
+    but bitmaps.  They are not among what is `Looked`."""
+    found: tuple[float, float] = _slopes(at.textures, k, at)
+    return found
 
 
 @kernel
-def _gradient(textures: Textures | None, k: int, at: At) -> tuple[float, float]:
-    if textures is None:
-        return 0.0, 0.0
+def _flat(textures: None, k: int, at: At) -> tuple[float, float]:
+    return 0.0, 0.0
+
+
+@kernel
+def _gradient(textures: Textures, k: int, at: At) -> tuple[float, float]:
     if textures.kind[k] != BITMAP:
         return 0.0, 0.0
     m = textures.uv[k]
     u, v = map_uv(textures.uv, k, at.u, at.v)
     along_u, along_v = _bitmap_gradient(textures.bitmaps, textures.row[k], u, v)
     return m[0] * along_u + m[3] * along_v, m[1] * along_u + m[4] * along_v
+
+
+_by_class = ByClass("lookup_gradient")
+_by_class.register(type(None), _flat)
+_by_class.register(Textures, _gradient)
+_slopes = _by_class.function
 
 
 @kernel

@@ -9,9 +9,11 @@ from builders import U
 import reference_rt as rt
 from reference_rt import materials as any_material
 from reference_rt.materials import Shading
+from reference_rt.materials.textured import look
 from reference_rt.ray import SurfacePoint
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At
+from reference_rt.textures.lookup import lookup
 from reference_rt.vec3 import Frame, Vec3, length
 
 X, Y, Z = Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0)
@@ -37,9 +39,9 @@ def tables_of(**materials):
 def shading(tables, m, wo, u=0.1, v=0.1):
     point = SurfacePoint(Vec3(0.0, 0.0, 0.0), Z, Z, 0.0, m, -1)
     at = At(tables.textures, u, v, Vec3(-1.0, -1.0, -1.0))
-    kept = np.zeros(any_material.layer_floats(tables.materials))
+    kept = np.zeros(any_material.kept_floats(tables.materials))
     place = Shading(point, Frame(X, Y, Z), wo, at, Tangents(X, Y), kept)
-    any_material.prepare(tables.materials, place)
+    any_material.prepare(tables.materials, place, at)
     return place
 
 
@@ -220,3 +222,33 @@ def test_a_tilted_normal():
 def test_what_cannot_be_a_material(materials, message):
     with pytest.raises(rt.SceneError, match=message):
         tables_of(**materials)
+
+
+def test_a_materials_textures_are_those_of_all_that_it_is_made_of():
+    scene = rt.Scene(
+        textures={
+            name: rt.Checker(first=(value,) * 3, second=(value,) * 3)
+            for name, value in (("a", 0.1), ("b", 0.2), ("c", 0.3), ("d", 0.4))
+        },
+        materials={
+            "plain": rt.Diffuse(reflectance=(0.5, 0.5, 0.5)),
+            "inner": rt.Diffuse(reflectance="c"),
+            "bumpy": rt.Bump(base="inner", height="b"),
+            "mixed": rt.Blend(first="bumpy", second="inner", weight="a"),
+            "lamp": rt.Emissive(radiance="d", base="mixed"),
+        },
+        shapes=(rt.Sphere(material="lamp"),),
+    )
+    tables = rt.build_tables(scene)
+    textured = tables.materials.textured
+    found = [
+        textured.texture[first : first + number].tolist()
+        for first, number in zip(textured.first, textured.number, strict=True)
+    ]
+    # Of heights, slopes are asked instead of colours.
+    assert found == [[], [2], [2], [0, 2], [0, 2, 3], []]
+    at, colours = At(tables.textures, 0.3, 0.6, Vec3(-1.0, -1.0, -1.0)), np.full(12, np.nan)
+    looked = look(textured, 4, at, colours)
+    for k in (0, 2, 3):
+        assert lookup(k, looked) == lookup(k, at)
+    assert np.isnan(colours[3:6]).all()

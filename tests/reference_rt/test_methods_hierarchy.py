@@ -5,7 +5,7 @@ import pytest
 from builders import icosphere, placed, random_shape, unit_vectors, write_obj
 
 import reference_rt as rt
-from reference_rt import methods, transform
+from reference_rt import bvh, methods, transform
 
 
 def crowd(rng, n):
@@ -63,8 +63,11 @@ def test_each_builds_what_it_says():
         methods.METHODS[f"hierarchy.{name}"].prepare(scene).bvh
         for name in ("none", "median", "sah", "spatial")
     )
-    assert len(none.nodes) == 1
-    assert all(len(tree.nodes) > 100 for tree in (median, sah, spatial))
+    # 63 leaves of eight in 8 nodes under a root, all with the same box.
+    assert len(none.children) == 9
+    assert len(np.unique(none.boxes[1:, :6], axis=0)) == 1
     assert all(len(tree.references) == 500 for tree in (none, median, sah))
     assert 500 < len(spatial.references) <= 1000
-    assert not np.array_equal(median.nodes, sah.nodes)
+    assert not np.array_equal(median.boxes, sah.boxes)
+    costs = [bvh.of_wide(tree).sah_cost for tree in (none, median, sah, spatial)]
+    assert costs[0] > max(costs[1:])

@@ -5,7 +5,15 @@ import pytest
 
 import reference_rt as rt
 from reference_rt.kernel import entry_kernel
-from reference_rt.sampling import draw_pair, start_sample
+from reference_rt.sampling import (
+    PAIR_FLOATS,
+    PAIR_INTEGERS,
+    blocks,
+    draw_pair,
+    sobol,
+    start_in_block,
+    start_sample,
+)
 
 SAMPLERS = [rt.Sobol, rt.Independent]
 
@@ -54,6 +62,61 @@ def test_numbers_are_a_pure_function(sampler):
         for i in range(50):
             twin = draw_pair(start_sample(made.setup(), int(pixels[i]), int(samples[i])), 5)
             assert twin == tuple(u[i])
+
+
+@entry_kernel
+def _draw_in_blocks(setup, pixels, samples, dimensions, pairs, made, out):
+    for i in range(len(pixels)):
+        sampler = start_in_block(setup, pixels[i], samples[i], pairs, made)
+        out[i, 0], out[i, 1] = draw_pair(sampler, dimensions[i])
+
+
+@pytest.mark.parametrize("sampler", [*SAMPLERS, rt.Grid])
+def test_blocks_give_the_same_numbers(sampler):
+    """Pixel after pixel and back, from any sample on, beyond the dimensions of blocks too."""
+    rng = np.random.default_rng(62)
+    n = 20000
+    pixels = rng.choice(rng.integers(0, 2**36, 5), n)
+    samples = rng.choice([0, 15, 16, 12345, 2**31 - 40], n) + rng.integers(0, 40, n)
+    dimensions = rng.choice([0, 1, 3, blocks.DIMENSIONS - 1, blocks.DIMENSIONS, 1000], n)
+    order = np.lexsort((dimensions, samples, pixels))
+    order = np.concatenate([order, order[::-1], rng.permutation(n)])
+    pixels, samples, dimensions = pixels[order], samples[order], dimensions[order]
+    setup = sampler(spp=1).setup() if sampler is rt.Grid else sampler(spp=1, seed=77).setup()
+    pairs, made = np.full(PAIR_FLOATS, np.nan), np.full(PAIR_INTEGERS, -1)
+    found = np.empty((len(pixels), 2))
+    _draw_in_blocks(setup, pixels, samples, dimensions, pairs, made, found)
+    expected = np.empty_like(found)
+    for dimension in np.unique(dimensions):
+        which = dimensions == dimension
+        each = np.empty((which.sum(), 2))
+        _draw_all(setup, pixels[which], samples[which], dimension, each)
+        expected[which] = each
+    assert np.array_equal(found, expected)
+
+
+@entry_kernel
+def _fill_both(order, x_seed, y_seed, first, fast, plain):
+    blocks.fill(order, x_seed, y_seed, first, fast, 0)
+    blocks.fill_plainly(order, x_seed, y_seed, first, plain, 0)
+
+
+def test_vector_code_gives_the_bits_of_the_plain_kernel():
+    rng = np.random.default_rng(63)
+    fast, plain = np.empty((2, 2 * blocks.TOGETHER))
+    for _ in range(300):
+        seeds = rng.integers(0, 2**32, 3, dtype=np.uint64)
+        first = int(rng.integers(0, 2**27)) * blocks.TOGETHER
+        _fill_both(*seeds, first, fast, plain)
+        assert np.array_equal(fast, plain)
+    # And of Python's.
+    with np.errstate(over="ignore"):
+        blocks.fill_plainly(*seeds, first, plain, 0)
+    assert np.array_equal(fast, plain)
+    assert [tuple(p) for p in plain.reshape(2, -1).T] == [
+        sobol.pair(tuple(seeds), sobol.reverse_bits(np.uint64(first + k)))
+        for k in range(blocks.TOGETHER)
+    ]
 
 
 @pytest.mark.parametrize("dimension", [0, 1, 7, 1000])

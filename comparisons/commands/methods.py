@@ -1,0 +1,63 @@
+"""`reference-rt methods`."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from reference_rt.cli import guarded
+from reference_rt.errors import ReferenceUnavailableError, UsageError
+
+
+@guarded
+def methods(
+    out: Annotated[
+        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for what is measured.")
+    ] = Path("out/methods"),
+    family: Annotated[
+        list[str] | None,
+        typer.Option(help="Only these: sphere, triangle, box, polygon, csg, hierarchy."),
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("--full/--quick", help="More rays and runs: minutes, not one.")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of shapes and rays.")] = 1,
+) -> None:
+    """Measure the text-book's ways to intersect: error against nanoseconds per ray."""
+    # Imported here: `reference-rt render` must not wait for what only measuring needs.
+    try:
+        from comparisons.methods.page import write_page
+        from comparisons.methods.run import FAMILIES, FULL, QUICK, run
+        from comparisons.methods.terminal import tables
+        from comparisons.methods.written import write
+        from comparisons.provenance import ours
+
+        import_module("matplotlib")  # before minutes of measuring that the page then cannot show
+    except ModuleNotFoundError as error:
+        raise ReferenceUnavailableError(
+            f"measuring needs {error.name}: pip install 'reference-rt[compare]'"
+        ) from None
+    from reference_rt.console import ProgressLine
+    from reference_rt.files import check_writable
+
+    names = list(dict.fromkeys(family or FAMILIES))
+    if unknown := [name for name in names if name not in FAMILIES]:
+        raise UsageError(f"--family: expected one of {', '.join(FAMILIES)}, got '{unknown[0]}'")
+    check_writable(out / "results.json")
+    effort, about = FULL if full else QUICK, ours()
+    rows = []
+    with ProgressLine() as progress:
+        for name in names:
+            rows += run(FAMILIES[name], effort, seed, progress)
+            write(out, rows, effort, seed, about)
+        progress("page", 0.0)
+        write_page(out / "methods.html", rows, effort, seed, about)
+        progress("page", 1.0)
+    console = Console(highlight=False)
+    for name in names:
+        for table in tables([row for row in rows if row.family == name]):
+            console.print(table)
+            console.print()
+    typer.echo(f"{out / 'results.json'}, results.csv, methods.html", err=True)

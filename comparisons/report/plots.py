@@ -1,0 +1,185 @@
+"""Log-log plots as inline SVG, in the colours of the page that they stand in."""
+
+import hashlib
+import io
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from comparisons.report.values import power_of_ten
+
+PALETTE = ("#3b8ed0", "#d9662b", "#2f9e77", "#b65fbf", "#c9920e", "#d4527a", "#7a8794", "#5b6ee1")
+"""Colours of curves in turn; of a lightness that shows on white and on black alike."""
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+"""Beside the colour, so that no curve is told by that alone."""
+
+_INK = "#010203"
+"""Stands for the page's own colour of text while matplotlib draws."""
+
+_STYLE: dict[str, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "reference_rt",
+    "font.family": "sans-serif",
+    "font.size": 10.0,
+    "axes.edgecolor": _INK,
+    "axes.labelcolor": _INK,
+    "axes.titlesize": 11.0,
+    "text.color": _INK,
+    "xtick.color": _INK,
+    "ytick.color": _INK,
+    "grid.color": _INK,
+    "grid.alpha": 0.13,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
+
+_NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points joined by a line, with a band.
+
+    x, y (n,);  low, high (n,): of the band, where there is one;  dashed: for what is a fit, not
+    measured;  colour: number in `PALETTE`, by default the curve's place in the plot;  marked:
+    whether the points have markers.  Points where x or y is not positive and finite are left out; a
+    band whose lower end is not positive goes down to the plot's edge.
+    """
+
+    name: str
+    x: npt.ArrayLike
+    y: npt.ArrayLike
+    low: npt.ArrayLike | None = None
+    high: npt.ArrayLike | None = None
+    dashed: bool = False
+    colour: int | None = None
+    marked: bool = True
+
+
+def log_log(
+    curves: Sequence[Curve],
+    x_label: str,
+    y_label: str,
+    title: str = "",
+    levels: Mapping[str, float] | None = None,
+    size: tuple[float, float] = (6.4, 4.6),
+) -> str:
+    """An <svg> element with both axes logarithmic; the same arguments give the same text.
+
+    levels: horizontal lines by their names;  size: width and height in inches of 72 px; the element
+    shrinks with its parent.  Text stays text, in the colour of the surrounding page; ids are unique
+    among plots that differ.  A curve with an empty name has no place in the legend.
+    """
+    import matplotlib.style
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    with matplotlib.style.context(["default", _STYLE]):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        drawn = [_draw(axes, curve, k) for k, curve in enumerate(curves)]
+        _limit(axes, [points for points in drawn if len(points[0])], levels or {})
+        bottom, top = axes.get_ylim()
+        for name, y in (levels or {}).items():
+            if bottom <= y <= top:
+                axes.axhline(y, color=_INK, linewidth=0.8, linestyle=":", alpha=0.7)
+                place = ((0.0, y), (3, 2), axes.get_yaxis_transform(), "offset points")
+                axes.annotate(name, *place, fontsize=8.5).set_in_layout(False)
+        for axis in (axes.xaxis, axes.yaxis):
+            _ticks(axis)
+        axes.grid(visible=True, which="major")
+        axes.set_xlabel(x_label)
+        axes.set_ylabel(y_label)
+        if title:
+            axes.set_title(title, loc="left")
+        named = sum(bool(curve.name) for curve in curves)
+        if named:
+            figure.legend(
+                loc="outside lower left", ncols=min(named, 3), frameon=False, fontsize=9.0
+            )
+        stream = io.StringIO()
+        figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
+    return _inline(stream.getvalue(), title or f"{y_label} against {x_label}")
+
+
+def _draw(axes: Any, curve: Curve, place: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Draws a curve; the points that can be shown."""
+    x, y = (np.asarray(values, dtype=np.float64) for values in (curve.x, curve.y))
+    number = place if curve.colour is None else curve.colour
+    colour = PALETTE[number % len(PALETTE)]
+    fits = np.isfinite(x) & (x > 0.0)
+    if curve.low is not None and curve.high is not None:
+        low, high = (np.asarray(values, dtype=np.float64) for values in (curve.low, curve.high))
+        banded = fits & np.isfinite(high) & (high > 0.0)
+        floor = np.finfo(np.float32).tiny  # below all that is shown
+        low = np.where(low > floor, low, floor)
+        axes.fill_between(
+            x[banded], low[banded], high[banded], color=colour, alpha=0.18, linewidth=0.0
+        )
+    fits &= np.isfinite(y) & (y > 0.0)
+    axes.plot(
+        x[fits],
+        y[fits],
+        color=colour,
+        linewidth=1.1 if curve.dashed else 1.6,
+        linestyle="--" if curve.dashed else "-",
+        marker=MARKERS[number % len(MARKERS)] if curve.marked else None,
+        markersize=4.5,
+        label=curve.name or "_",
+    )
+    return x[fits], y[fits]
+
+
+def _limit(
+    axes: Any,
+    drawn: Sequence[tuple[npt.NDArray[Any], npt.NDArray[Any]]],
+    levels: Mapping[str, float],
+) -> None:
+    """Limits from the points alone: a band that is open below would take all the room."""
+    if not drawn:
+        return
+    for k, set_limits in enumerate((axes.set_xlim, axes.set_ylim)):
+        values = np.concatenate([points[k] for points in drawn])
+        low, high = math.log10(values.min()), math.log10(values.max())
+        margin = max(0.05 * (high - low), 0.08)
+        set_limits(10.0 ** (low - margin), 10.0 ** (high + margin))
+    low, high = axes.get_ylim()
+    near = [y for y in levels.values() if low / 10.0 <= y <= high * 10.0]
+    axes.set_ylim(min([low, *(y / 1.2 for y in near)]), max([high, *(y * 1.5 for y in near)]))
+
+
+def _ticks(axis: Any) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    decades = math.log10(high / low)
+    steps = [1.0, 2.0, 5.0] if decades < 2.0 else [1.0]
+    if decades < 0.7:
+        steps += [1.2, 1.5, 2.5, 3.0, 4.0, 6.0, 7.0, 8.0, 9.0]
+    axis.set_major_locator(LogLocator(subs=steps, numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _inline(svg: str, title: str) -> str:
+    """The <svg> element alone, its colours those of the page, its ids and its style its own."""
+    svg = svg[svg.index("<svg") :].strip().replace(_INK, "currentColor")
+    own = "p" + hashlib.sha256(svg.encode()).hexdigest()[:10] + "-"
+    svg = re.sub(r'(\bid="|xlink:href="#|url\(#)', rf"\g<1>{own}", svg)
+    svg = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", svg, count=1, flags=re.DOTALL)
+    style = "max-width: 100%; height: auto; stroke-linejoin: round; stroke-linecap: butt"
+    attributes = f'role="img" aria-label="{escape(title)}" style="{style}"'
+    return svg.replace("<svg ", f"<svg {attributes} ", 1)
+
+
+__all__ = ["PALETTE", "Curve", "log_log"]

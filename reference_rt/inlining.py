@@ -1,0 +1,193 @@
+"""How kernels become machine code: linked as they are, then optimised once, as a whole.
+
+Numba optimises every function and makes machine code of it before it is linked into its callers,
+which do both again.  Kernels are inlined without exception, so that this work is for nothing: of
+the 33 s that a scene of many materials took to compile, two thirds (measured).  Here a kernel stays
+as it was lowered until an entry kernel links all that it calls.
+
+Nor are arguments taken apart.  Numba passes every number in a tuple by itself: some 400 for the
+tables of a scene, with an instruction for each at both ends of every call.  Inlining removes them
+all, but they are to be written, read and removed: a third of the time that was left.
+"""
+
+from typing import Any
+
+from llvmlite import binding
+from numba import _dynfunc
+from numba.core import cgutils, config, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.datamodel import DataModelManager, default_manager
+from numba.core.datamodel.models import TupleModel, UniTupleModel
+from numba.core.typed_passes import NativeLowering
+
+# Numba's classes have no types that mypy knows.
+# mypy: disable-error-code="attr-defined, misc, untyped-decorator"
+
+
+class _Inlined(JITCodeLibrary):
+    """The code of a kernel: as it was lowered, without that of what it calls."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        for function in self._final_module.functions:
+            if function.linkage == binding.Linkage.external and not function.is_declaration:
+                function.linkage = "linkonce_odr"  # may go where it is inlined
+        self._finalized = True
+
+    def _get_module_for_linking(self) -> Any:
+        return self._final_module
+
+    def _called(self, found: dict[Any, None]) -> dict[Any, None]:
+        """All that is called from here, added to `found`, each once (a dict keeps the order)."""
+        for library in self._linking_libraries:
+            if library not in found:
+                found[library] = None
+                if isinstance(library, _Inlined):
+                    library._called(found)
+        return found
+
+
+class _Entry(_Inlined):
+    """The code of an entry kernel, with all that it calls."""
+
+    def finalize(self) -> None:
+        for library in self._called({}):
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        # Numba's cheap passes, which come before these, are for reference counts; there are none.
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+        self._final_module.verify()
+        self._finalize_final_module()
+
+    def _get_module_for_linking(self) -> Any:
+        return JITCodeLibrary._get_module_for_linking(self)
+
+
+def _call(called: Any, library: Any) -> Any:
+    """What writes a call of a kernel: as Numba's own, without asking whether it raised anything,
+    which takes five blocks; but for indices out of bounds, where these are checked, none does."""
+
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        function = context.declare_function(builder.module, called)
+        if config.BOUNDSCHECK:
+            status, value = context.call_conv.call_function(
+                builder, function, called.restype, called.argtypes, arguments
+            )
+            with cgutils.if_unlikely(builder, status.is_error):
+                context.call_conv.return_status_propagate(builder, status)
+            return value
+        returned = cgutils.alloca_once(builder, function.args[0].type.pointee)
+        raised = builder.function.args[1]
+        packed = context.get_arg_packer(called.argtypes).as_arguments(builder, arguments)
+        builder.call(function, [returned, raised, *packed])
+        return context.get_returned_value(builder, called.restype, builder.load(returned))
+
+    write.signature = called.argtypes
+    write.libs = (library,)
+    return write
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LowerInlined(NativeLowering):
+    """Without an address: nothing but kernels calls the result."""
+
+    _name = "lower_inlined"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _Inlined(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        lowered = state["cr"]
+        # Calls find code by an object that stands for it.
+        name = lowered.fndesc.qualname
+        stands_for_it = _dynfunc.make_function(
+            lowered.fndesc.lookup_module(), name, name, 0, lowered.env, (state.library,)
+        )
+        call = _call(lowered.fndesc, state.library)
+        state.targetctx.insert_func_defn([(call, stands_for_it, call.signature)])
+        state["cr"] = lowered._replace(cfunc=stands_for_it)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LowerEntry(NativeLowering):
+    _name = "lower_entry"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _Entry(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
+
+
+class _Whole:
+    """Mixed into the model of a kind of tuple: an argument, and what is returned, is the tuple
+    itself."""
+
+    def get_argument_type(self) -> Any:
+        return self.get_value_type()
+
+    def as_argument(self, builder: Any, value: Any) -> Any:
+        return value
+
+    def from_argument(self, builder: Any, value: Any) -> Any:
+        return value
+
+    def get_return_type(self) -> Any:
+        return self.get_value_type()
+
+    def as_return(self, builder: Any, value: Any) -> Any:
+        return value
+
+    def from_return(self, builder: Any, value: Any) -> Any:
+        return value
+
+
+class _WholeTuple(_Whole, TupleModel):
+    pass
+
+
+class _WholeUniTuple(_Whole, UniTupleModel):
+    pass
+
+
+_MODELS = DataModelManager().chain(default_manager)
+_MODELS.register(types.NamedTuple, _WholeTuple)
+_MODELS.register(types.NamedUniTuple, _WholeUniTuple)
+
+_INTERNAL: dict[Any, Any] = {}
+"""Numba's own functions that kernels call, compiled for these models."""
+
+
+class _Compiler(CompilerBase):
+    """Numba's compiler with another lowering, and tuples as above."""
+
+    lowering: type[NativeLowering]
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.state.targetctx = self.state.targetctx.subtarget(
+            data_model_manager=_MODELS, cached_internal_func=_INTERNAL
+        )
+
+    def define_pipelines(self) -> list[Any]:
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(self.lowering, NativeLowering)
+        passes.passes = [p for p in passes.passes if p[0] is not NativeLowering]
+        passes.finalize()
+        return [passes]
+
+
+class InlinedCompiler(_Compiler):
+    """Of kernels."""
+
+    lowering = _LowerInlined
+
+
+class EntryCompiler(_Compiler):
+    """Of entry kernels."""
+
+    lowering = _LowerEntry

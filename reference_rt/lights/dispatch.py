@@ -1,0 +1,265 @@
+"""What is asked of the lights of a scene."""
+
+from typing import Any, NamedTuple
+
+from reference_rt.kernel import ByClass, kernel
+from reference_rt.lights import area, choice, constant, directional, environment_map, point, spot
+from reference_rt.lights.area import Areas
+from reference_rt.lights.choice import Choice
+from reference_rt.lights.constant import Environment
+from reference_rt.lights.directional import Directionals
+from reference_rt.lights.environment_map import EnvironmentMaps
+from reference_rt.lights.light import (
+    AREA,
+    DIRECTIONAL,
+    ENVIRONMENT,
+    POINT,
+    SPOT,
+    LightSample,
+    no_light,
+)
+from reference_rt.lights.light_tree import LightTree, Pick
+from reference_rt.lights.point import Points
+from reference_rt.lights.spot import Spots
+from reference_rt.ray import SurfacePoint
+from reference_rt.shapes import Shapes
+from reference_rt.shapes.shape import FloatArray
+from reference_rt.textures import Textures
+from reference_rt.vec3 import Vec3, row
+
+
+class Lights(NamedTuple):
+    """The tables of each kind, None for absent ones;  ambient (1, 3);  choice, None without any
+    light that can be picked;  tree, None where there are few.
+
+    The choice lists all areas, then points, spots, directional lights, then the environment: area
+    light i is entry i.
+    """
+
+    points: Points | None
+    spots: Spots | None
+    directionals: Directionals | None
+    areas: Areas | None
+    environment: Environment | EnvironmentMaps | None
+    ambient: FloatArray | None
+    choice: Choice | None
+    tree: LightTree | None
+
+
+@kernel
+def _black(environment: None, d: Vec3) -> Vec3:
+    return Vec3(0.0, 0.0, 0.0)
+
+
+@kernel
+def _never(environment: None, d: Vec3) -> float:
+    return 0.0
+
+
+@kernel
+def _nothing(environment: None, u0: float, u1: float) -> LightSample:
+    return no_light()
+
+
+def _of_environment(name: str, without: Any) -> Any:
+    kernels = ByClass(name)
+    kernels.register(type(None), without)
+    kernels.register(Environment, getattr(constant, name))
+    kernels.register(EnvironmentMaps, getattr(environment_map, name))
+    return kernels.function
+
+
+background = _of_environment("radiance", _black)
+"""background(environment, d) -> the radiance of a ray that hits nothing."""
+
+_environment_pdf = _of_environment("pdf", _never)
+_environment_sample = _of_environment("sample", _nothing)
+
+
+@kernel
+def pick(lights: Lights, p: Vec3, n: Vec3, u: float) -> Pick:
+    """A light for a surface at `p` with normal `n`, 0 for light from all sides; its probability is
+    0 where there is none."""
+    return _pick(lights.choice, lights.tree, p, n, u)
+
+
+@kernel
+def _pick(lights: Choice | None, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> Pick:
+    if lights is None:
+        return Pick(0, 0.0)
+    return choice.pick(lights, tree, p, n, u)
+
+
+@kernel
+def pick_probability(lights: Lights, p: Vec3, n: Vec3, k: int) -> float:
+    """The probability that `pick` gives light k."""
+    return _pick_probability(lights.choice, lights.tree, p, n, k)
+
+
+@kernel
+def _pick_probability(
+    lights: Choice | None, tree: LightTree | None, p: Vec3, n: Vec3, k: int
+) -> float:
+    if lights is None:
+        return 0.0
+    return choice.probability(lights, tree, p, n, k)
+
+
+@kernel
+def count(lights: Lights) -> int:
+    """How many lights can be picked."""
+    return _count(lights.choice)
+
+
+@kernel
+def _count(lights: Choice | None) -> int:
+    if lights is None:
+        return 0
+    return len(lights.kind)
+
+
+@kernel
+def sample_one(
+    lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3, u0: float, u1: float
+) -> LightSample:
+    """Light from entry k of the choice at `p`; the pdf does not count the choice."""
+    return _sample_one(lights.choice, lights, k, shapes, textures, p, u0, u1)
+
+
+@kernel
+def middle(
+    lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3
+) -> LightSample:
+    """The same without numbers: from the one point that stands for all of an area light."""
+    if _is_area(lights.choice, k):
+        return _middle_of_area(lights.areas, k, shapes, textures, p)
+    return sample_one(lights, k, shapes, textures, p, 0.5, 0.5)
+
+
+@kernel
+def _is_area(entries: Choice | None, k: int) -> bool:
+    if entries is None:
+        return False
+    return bool(entries.kind[k] == AREA)
+
+
+@kernel
+def _middle_of_area(
+    areas: Areas | None, i: int, shapes: Shapes, textures: Textures | None, p: Vec3
+) -> LightSample:
+    if areas is None:
+        return no_light()
+    return area.middle(areas, i, shapes, textures, p)
+
+
+@kernel
+def _sample_one(
+    entries: Choice | None,
+    lights: Lights,
+    k: int,
+    shapes: Shapes,
+    textures: Textures | None,
+    p: Vec3,
+    u0: float,
+    u1: float,
+) -> LightSample:
+    if entries is None:
+        return no_light()
+    kind, i = entries.kind[k], entries.row[k]
+    found: LightSample = no_light()
+    if kind == AREA:
+        found = _from_area(lights.areas, i, shapes, textures, p, u0, u1)
+    elif kind == POINT:
+        found = _from_point(lights.points, i, p)
+    elif kind == SPOT:
+        found = _from_spot(lights.spots, i, p)
+    elif kind == DIRECTIONAL:
+        found = _from_directional(lights.directionals, i)
+    elif kind == ENVIRONMENT:
+        found = _environment_sample(lights.environment, u0, u1)
+    return found
+
+
+@kernel
+def _from_area(
+    areas: Areas | None,
+    i: int,
+    shapes: Shapes,
+    textures: Textures | None,
+    p: Vec3,
+    u0: float,
+    u1: float,
+) -> LightSample:
+    if areas is None:
+        return no_light()
+    return area.sample(areas, i, shapes, textures, p, u0, u1)
+
+
+@kernel
+def _from_point(points: Points | None, i: int, p: Vec3) -> LightSample:
+    if points is None:
+        return no_light()
+    return point.sample(points, i, p)
+
+
+@kernel
+def _from_spot(spots: Spots | None, i: int, p: Vec3) -> LightSample:
+    if spots is None:
+        return no_light()
+    return spot.sample(spots, i, p)
+
+
+@kernel
+def _from_directional(directionals: Directionals | None, i: int) -> LightSample:
+    if directionals is None:
+        return no_light()
+    return directional.sample(directionals, i)
+
+
+@kernel
+def area_pdf(lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint) -> float:
+    """The density per solid angle, choice included, with which light sampling for a surface at `p`
+    with normal `n` finds `q`."""
+    return _area_pdf(lights.areas, lights, shapes, p, n, q)
+
+
+@kernel
+def _area_pdf(
+    areas: Areas | None, lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint
+) -> float:
+    if areas is None:
+        return 0.0
+    if q.light < 0:
+        return 0.0
+    chance = pick_probability(lights, p, n, q.light)
+    return area.pdf(areas, q.light, shapes, p, q) * chance
+
+
+@kernel
+def environment_pdf(lights: Lights, p: Vec3, n: Vec3, d: Vec3) -> float:
+    """The same for a direction `d` in which nothing is hit."""
+    return _surrounding_pdf(lights.environment, lights, p, n, d)
+
+
+@kernel
+def _surrounding_pdf(
+    environment: Environment | EnvironmentMaps | None, lights: Lights, p: Vec3, n: Vec3, d: Vec3
+) -> float:
+    if environment is None:
+        return 0.0
+    chance = pick_probability(lights, p, n, count(lights) - 1)
+    density: float = _environment_pdf(environment, d)
+    return density * chance
+
+
+@kernel
+def ambient(lights: Lights) -> Vec3:
+    """The text-book's I_a."""
+    return _ambient(lights.ambient)
+
+
+@kernel
+def _ambient(radiance: FloatArray | None) -> Vec3:
+    if radiance is None:
+        return Vec3(0.0, 0.0, 0.0)
+    return row(radiance, 0)

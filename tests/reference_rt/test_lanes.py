@@ -1,0 +1,126 @@
+"""Lane kernels: the vector code that is emitted gives NumPy's bits, whatever the numbers."""
+
+import math
+
+import numpy as np
+import pytest
+
+from reference_rt.kernel import entry_kernel
+from reference_rt.lanes import (
+    LANES,
+    both,
+    either,
+    lane_kernel,
+    larger,
+    lowest,
+    opposite,
+    plain,
+    smaller,
+)
+from reference_rt.ray import Ray
+from reference_rt.shapes import watertight
+from reference_rt.shapes.watertight import shear_of
+from reference_rt.vec3 import row
+
+SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, 1.7e308, -1.7e308, 1.0, -1.0]
+
+
+def _text(doubles, singles, start, factor, out):
+    a = doubles.load(start)
+    b = singles.load(2 * start + 1) * factor - a
+    c = 1.0 - smaller(a, larger(b, 0.5)) + a * b
+    out.store(0, c)
+    return either(c <= a, both(b > 0.0, opposite(c >= factor)))
+
+
+_emitted = lane_kernel(_text)
+
+
+@entry_kernel
+def _run(doubles, singles, start, factor, out):
+    return _emitted(doubles, singles, start, factor, out)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_emitted_code_gives_the_bits_of_numpy(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        doubles = np.where(
+            rng.random(40) < 0.3,
+            rng.choice(SPECIAL, 40),
+            rng.normal(size=40) * 10.0 ** rng.integers(-9, 9, 40),
+        )
+        with np.errstate(over="ignore"):
+            singles = rng.permutation(np.resize(doubles, 80)).astype(np.float32)
+        factor = float(rng.choice([*SPECIAL, rng.normal()]))
+        start = int(rng.integers(0, 32))
+        there, here = np.empty(LANES), np.empty(LANES)
+        with np.errstate(all="ignore"):
+            assert _run(doubles, singles, start, factor, there) == plain(_text)(
+                doubles, singles, start, factor, here
+            )
+        assert np.array_equal(np.isnan(there), np.isnan(here))
+        numbers = ~np.isnan(here)
+        assert there[numbers].tobytes() == here[numbers].tobytes()
+
+
+def test_comparisons_say_which_lane():
+    doubles = np.arange(LANES) - 3.0
+    singles = np.zeros(2 * LANES + 1, np.float32)
+    out = np.empty(LANES)
+    # b = -a, c = 1 - min(a, max(-a, 1/2)) - a².
+    a = doubles
+    c = 1.0 - np.minimum(a, np.maximum(-a, 0.5)) - a * a
+    first = (c <= a) | ((-a > 0.0) & ~(c >= 1.0))
+    expected = sum(int(f) << k for k, f in enumerate(first))
+    assert 0 < expected < 255
+    assert _run(doubles, singles, 0, 1.0, out) == expected
+    assert np.array_equal(out, c)
+
+
+@entry_kernel
+def _lowest(bits, out):
+    for k in range(len(bits)):
+        out[k] = lowest(bits[k])
+
+
+def test_lowest_bit():
+    given = np.array([1, 2, 3, 12, 128, 255, 1 << 40], np.int64)
+    out = np.empty(len(given), np.int64)
+    _lowest(given, out)
+    assert out.tolist() == [0, 1, 0, 2, 7, 0, 40]
+
+
+@entry_kernel
+def _met(corners, size, origins, directions, maybe, met):
+    for i in range(len(origins)):
+        shear = shear_of(Ray(row(origins, i), row(directions, i), math.inf))
+        maybe[i] = watertight.maybe_met(corners, 0, size, shear)
+        for lane in range(size):
+            if watertight.project_lane(corners, 0, size, lane, shear).side != 0:
+                met[i] |= 1 << lane
+
+
+@pytest.mark.parametrize("size", [1, 5, 8])
+@pytest.mark.parametrize("on_a_lattice", [False, True])
+def test_no_triangle_that_is_met_is_passed_by(size, on_a_lattice):
+    """On a lattice half the rays go through vertices and edges."""
+    rng = np.random.default_rng(size)
+    n = 20000
+    if on_a_lattice:
+        vertices = rng.integers(-2, 3, (size, 9)).astype(float)
+        targets = rng.integers(-4, 5, (n, 3)) / 2.0
+        o = rng.integers(-6, 7, (n, 3)).astype(float)
+    else:
+        vertices = rng.normal(size=(size, 9))
+        targets, o = rng.normal(size=(n, 3)), 3.0 * rng.normal(size=(n, 3))
+    d = targets - o
+    d[~d.any(axis=1)] = 1.0
+    corners = np.zeros(9 * size + LANES)
+    corners[: 9 * size] = vertices.T.reshape(-1)
+    maybe, met = np.zeros((2, n), np.int64)
+    _met(corners, size, o, d, maybe, met)
+    assert np.array_equal(met & ~maybe, np.zeros(n))
+    assert np.count_nonzero(met) > n / 100
+    # Only rays through an edge are sent on in vain.
+    assert on_a_lattice or np.array_equal(met, maybe)
