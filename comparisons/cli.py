@@ -3,6 +3,7 @@
 import typer
 
 from comparisons.commands.accept import accept
+from comparisons.commands.bench import bench
 from comparisons.commands.compare import compare
 from comparisons.commands.converge import converge
 from comparisons.commands.gate import gate
@@ -14,5 +15,6 @@ from comparisons.commands.suite import suite
 
 def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
-    for command in (compare, suite, gate, accept, report, selftest, converge, methods):
+    commands = (compare, suite, gate, accept, report, selftest, converge, methods, bench)
+    for command in commands:
         app.command()(command)

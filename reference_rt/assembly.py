@@ -46,8 +46,8 @@ def assemble(scene: "Scene", materials: dict[str | None, int]) -> Geometry:
     bounds: dict[int, Bounds] = {}
     for code, field, _, module in TABLES:
         tables[field] = None
-        if work.tables[code]:
-            table = tables[field] = _concatenate(work.tables[code])
+        if work.tables[code]:  # taken out: of a large mesh no two copies are kept
+            table = tables[field] = _concatenate(work.tables.pop(code))
             work.check_finite(table)
             bounds[code] = module.bounds(table)
     if work.solids:
@@ -257,10 +257,15 @@ def _concatenate(parts: Sequence[Any]) -> Any:
     if align is not None:
         parts = align(parts)
     columns = [
-        None if column[0] is None else np.ascontiguousarray(np.concatenate(column))
+        None if column[0] is None else np.ascontiguousarray(_joined(column))
         for column in zip(*parts, strict=True)
     ]
     return table(*columns)
+
+
+def _joined(arrays: Sequence[Any]) -> Any:
+    """The arrays one after another; of a single one no copy."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def _solid_bounds(steps: Sequence[int], boxes: Sequence[Bounds]) -> tuple[Bounds, int]:

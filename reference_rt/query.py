@@ -5,6 +5,9 @@ units; directions need not have unit length: t counts in units of |d|.
 """
 
 import math
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +51,21 @@ class Intersections:
 
 
 @dataclass(frozen=True)
+class Closest:
+    """Where n rays hit first, without what is known of the surface there.
+
+    t (n,): inf for a miss;  kind, row (n,): the table of `SceneTables.geometry.shapes` by the code
+    that `reference_rt.shapes` gives it, and the row in it, -1 for a miss;  uv (n, 2): the
+    coordinates that the test itself found, of a triangle its barycentrics.
+    """
+
+    t: FloatArray
+    kind: IntArray
+    row: IntArray
+    uv: FloatArray
+
+
+@dataclass(frozen=True)
 class DirectLight:
     """Direct light of one light at what n rays hit first.
 
@@ -79,6 +97,22 @@ def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray
         out[i, 8], out[i, 9], out[i, 10] = point.n
         out[i, 11], out[i, 12], out[i, 13] = point.ns
         out[i, 14], out[i, 15] = whose.u, whose.v
+
+
+@entry_kernel
+def _closest(
+    scene: SceneTables,
+    o: FloatArray,
+    d: FloatArray,
+    t: FloatArray,
+    kind: IntArray,
+    rows: IntArray,
+    uv: FloatArray,
+) -> None:
+    for i in range(len(o)):
+        hit = closest_hit(scene.geometry, Ray(row(o, i), row(d, i), math.inf))
+        t[i], kind[i], rows[i] = hit.t, hit.kind, hit.row
+        uv[i, 0], uv[i, 1] = hit.u, hit.v
 
 
 @entry_kernel
@@ -116,7 +150,8 @@ def _radiance(
 
 
 def _rays(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    o, d = (np.array(a, dtype=np.float64, order="C") for a in (origins, directions))
+    # Kernels are compiled for writable arrays: those that are so already are not copied.
+    o, d = (np.require(a, np.float64, ("C", "A", "W")) for a in (origins, directions))
     if o.shape != d.shape or o.ndim != 2 or o.shape[1] != 3:
         raise ValueError(f"expected two (n, 3) arrays, got {o.shape} and {d.shape}")
     return o, d
@@ -144,18 +179,64 @@ def intersect(
     )
 
 
+def closest(
+    scene: SceneTables,
+    origins: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    threads: int | None = None,
+) -> Closest:
+    """The closest hit of each ray and no more, on `threads` threads (default: all cores)."""
+    o, d = _rays(origins, directions)
+    n = len(o)
+    found = Closest(np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64), np.empty((n, 2)))
+    t, kind, rows, uv = found.t, found.kind, found.row, found.uv
+
+    def trace(k: slice) -> None:
+        _closest(scene, o[k], d[k], t[k], kind[k], rows[k], uv[k])
+
+    _in_blocks(trace, n, threads)
+    return found
+
+
 def occluded(
     scene: SceneTables,
     origins: npt.ArrayLike,
     directions: npt.ArrayLike,
     t_max: npt.ArrayLike = math.inf,
+    threads: int | None = None,
 ) -> npt.NDArray[np.bool_]:
-    """Whether anything lies on each ray at 0 < t < t_max (a number, or one for each ray)."""
+    """Whether anything lies on each ray at 0 < t < t_max (a number, or one for each ray); on
+    `threads` threads (default: all cores)."""
     o, d = _rays(origins, directions)
     out = np.zeros(len(o), np.bool_)
-    with np.errstate(all="ignore"):
-        _occluded(scene, o, d, np.full(len(o), t_max, dtype=np.float64), out)
+    ends = np.full(len(o), t_max, dtype=np.float64)
+
+    def trace(k: slice) -> None:
+        _occluded(scene, o[k], d[k], ends[k], out[k])
+
+    _in_blocks(trace, len(o), threads)
     return out
+
+
+_BLOCK = 1 << 14
+"""Rays that a thread takes at once: some 10 ms, long against what handing them over costs."""
+
+
+def _in_blocks(trace: Callable[[slice], None], n: int, threads: int | None) -> None:
+    """`trace` of all of n rays, on threads: kernels release the GIL."""
+
+    def run(k: slice) -> None:
+        with np.errstate(all="ignore"):
+            trace(k)
+
+    blocks = [slice(k, min(k + _BLOCK, n)) for k in range(0, n, _BLOCK)]
+    if len(blocks) < 2:
+        for k in blocks:
+            run(k)
+        return
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        for _ in pool.map(run, blocks):
+            pass
 
 
 def direct_light(

@@ -32,12 +32,15 @@ class Mesh(Shape):
         if data.normals is not None and not self.face_normals:
             normals = transform.apply_normals(m, data.normals)
         # Without area there is no normal, but rounding alone makes rays hit: left out.
-        has_area = np.linalg.norm(triangle.geometric_normals(vertices), axis=1) > 0.0
+        n = triangle.geometric_normals(vertices)
+        has_area = np.einsum("ij,ij->i", n, n) > 0.0
         if not has_area.any():
             raise ValueError(f"mesh {path}: no triangle has any area")
-        faces = data.faces[has_area]
+        faces = data.faces
+        if not has_area.all():
+            vertices, faces = vertices[has_area], faces[has_area]
         return triangle.soup(
-            np.ascontiguousarray(vertices[has_area]),
+            np.ascontiguousarray(vertices),
             place,
             normals=_at_corners(normals, faces),
             uvs=_at_corners(data.uv, faces),

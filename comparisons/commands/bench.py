@@ -1,0 +1,69 @@
+"""`reference-rt bench`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from reference_rt.cli import guarded
+from reference_rt.errors import ReferenceUnavailableError, UsageError
+
+
+@guarded
+def bench(
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for results.json and bench.md.")
+    ] = Path("out/bench"),
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ROW", help="Only these rows, and what is measured with them."),
+    ] = None,
+    mesh: Annotated[
+        Path | None,
+        typer.Option(help="An .obj or .ply file to trace rays in.  [default: one made here]"),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Smaller pictures and fewer scenes.")
+    ] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is measured.")] = False,
+    markdown: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Put the table between the lines '<!-- bench -->' and '<!-- end -->' of a file.",
+        ),
+    ] = None,
+    scenes: Annotated[Path, typer.Option(metavar="DIR", help="The folder of scenes.")] = Path(
+        "scenes"
+    ),
+) -> None:
+    """Measure the speed of the renderer beside Mitsuba's; takes about half an hour."""
+    # Imported here: `reference-rt render` must not wait for what only comparing needs.
+    try:
+        from rich.console import Console
+
+        from comparisons.bench import table
+        from comparisons.bench.display import Display
+        from comparisons.bench.groups import chosen
+        from comparisons.bench.run import run
+        from comparisons.bench.setting import Setting
+    except ModuleNotFoundError as error:
+        raise ReferenceUnavailableError(
+            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
+        ) from None
+
+    groups = chosen(only or ())
+    if mesh is not None and not mesh.is_file():
+        raise UsageError(f"--mesh: there is no file '{mesh}'")
+    if markdown is not None:
+        table.around_markers(markdown)  # now, rather than after half an hour
+    with Display() as display:
+        setting = Setting(scenes=scenes, mesh=mesh, quick=quick, say=display.say)
+        outcome = run(groups, setting, out, display, fresh)
+    Console().print(table.terminal(outcome.rows))
+    if markdown is not None:
+        table.rewrite(markdown, table.markdown(outcome.rows, outcome.machine, outcome.not_measured))
+    for name, why in outcome.not_measured.items():
+        typer.echo(f"{name}: not measured: {why}", err=True)
+    typer.echo(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)
+    raise typer.Exit(0 if outcome.met else 1)
