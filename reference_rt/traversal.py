@@ -80,12 +80,12 @@ def _entered(
     only be NaN, which `larger` and `smaller` pass over: such a plane does not limit the ray.
     """
     first = node * _SINGLES
-    t_in = larger((boxes.load(first + x * LANES) - near_x) * inverse_x, 0.0)
-    t_in = larger((boxes.load(first + y * LANES) - near_y) * inverse_y, t_in)
-    t_in = larger((boxes.load(first + z * LANES) - near_z) * inverse_z, t_in)
-    t_out = smaller((boxes.load(first + (3 - x) * LANES) - far_x) * inverse_x, t_max)
-    t_out = smaller((boxes.load(first + (5 - y) * LANES) - far_y) * inverse_y, t_out)
-    t_out = smaller((boxes.load(first + (7 - z) * LANES) - far_z) * inverse_z, t_out)
+    t_in = larger(0.0, (boxes.load(first + x * LANES) - near_x) * inverse_x)
+    t_in = larger(t_in, (boxes.load(first + y * LANES) - near_y) * inverse_y)
+    t_in = larger(t_in, (boxes.load(first + z * LANES) - near_z) * inverse_z)
+    t_out = smaller(t_max, (boxes.load(first + (3 - x) * LANES) - far_x) * inverse_x)
+    t_out = smaller(t_out, (boxes.load(first + (5 - y) * LANES) - far_y) * inverse_y)
+    t_out = smaller(t_out, (boxes.load(first + (7 - z) * LANES) - far_z) * inverse_z)
     distances.store(0, t_in)
     return t_in <= t_out * FAR_SLACK
 

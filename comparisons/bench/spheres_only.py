@@ -19,6 +19,7 @@ from reference_rt.integrators import Path
 from reference_rt.integrators.integrator import power_heuristic
 from reference_rt.integrators.path import ROULETTE_CAP
 from reference_rt.kernel import entry_kernel, kernel, local_floats
+from reference_rt.lanes import LANES
 from reference_rt.lights import Constant
 from reference_rt.lights.constant import PDF
 from reference_rt.materials import Diffuse
@@ -28,7 +29,7 @@ from reference_rt.sampling import Sobol, sobol
 from reference_rt.sampling.warp import cosine_hemisphere, uniform_sphere
 from reference_rt.scene import Scene
 from reference_rt.shapes import SPHERE, Sphere, sphere
-from reference_rt.shapes.shape import LANES, FloatArray, nearest_lane
+from reference_rt.shapes.shape import FloatArray, nearest_lane
 from reference_rt.shapes.sphere import Spheres
 from reference_rt.vec3 import (
     Vec3,

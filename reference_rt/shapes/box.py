@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt.kernel import kernel
+from reference_rt.lanes import larger, select, smaller
 from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at
 from reference_rt.shapes import placement
 from reference_rt.shapes.placement import columns, local_point, world_surface
@@ -24,7 +25,7 @@ from reference_rt.shapes.shape import (
     pack,
     solid_angle_pdf,
 )
-from reference_rt.shapes.side_by_side import larger, nearer_by, select, smaller
+from reference_rt.shapes.side_by_side import nearer_by
 from reference_rt.vec3 import Vec3, dot, row, triple
 
 

@@ -3,12 +3,13 @@
 from typing import Any, NamedTuple
 
 from reference_rt.kernel import kernel, local_floats, local_integers
+from reference_rt.lanes import LANES
 from reference_rt.ray import Crossing, Hit, Ray, miss, no_hit
 from reference_rt.shapes import box, rectangle, sphere
 from reference_rt.shapes.box import Boxes
 from reference_rt.shapes.dispatch import intersect_row
 from reference_rt.shapes.rectangle import Rectangles
-from reference_rt.shapes.shape import LANES, FloatArray, IntArray, nearest_lane
+from reference_rt.shapes.shape import FloatArray, IntArray, nearest_lane
 from reference_rt.shapes.side_by_side import begin, end
 from reference_rt.shapes.sphere import Spheres
 from reference_rt.shapes.tables import (

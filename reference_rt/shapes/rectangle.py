@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt.kernel import kernel
+from reference_rt.lanes import select
 from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
 from reference_rt.shapes import flat, spherical_rectangle
 from reference_rt.shapes.shape import (
@@ -21,7 +22,7 @@ from reference_rt.shapes.shape import (
     pack,
     solid_angle_pdf,
 )
-from reference_rt.shapes.side_by_side import nearer_by, select
+from reference_rt.shapes.side_by_side import nearer_by
 from reference_rt.shapes.spherical_rectangle import Seen
 from reference_rt.vec3 import Vec3, dot, max_abs, row
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from reference_rt.description import Description
 from reference_rt.kernel import kernel
+from reference_rt.lanes import LANES
 from reference_rt.transform import IDENTITY, Affine, Transform, affine, compose, invert
 from reference_rt.vec3 import Vec3, dot, frame_from_normal
 
@@ -71,12 +72,6 @@ def _solid(name: str, *operands: Shape) -> Shape:
 
     made: Shape = getattr(csg, name)(of=operands)
     return made
-
-
-LANES = 8
-"""Primitives that are tested side by side where there is no hierarchy: the loop over them has no
-branches, and LLVM makes vector code of it (measured on the Cornell box: 16 ns against 35 ns a ray
-for its rectangles one by one)."""
 
 
 def pack(*columns: FloatArray) -> FloatArray:

@@ -1,12 +1,6 @@
 """Rays side by side: the plain kernels of shapes' distances, made into vector code.
 
-The kernel `distance` of such a shape is one text for three uses: plain Python, compiled code for
-one ray, and, called with `Lanes` in place of the ray's numbers, the writing of LLVM code for LANES
-rays at once.  The operations are the same, in the same order, each rounded as IEEE says: the bits
-are the same too.  LLVM makes narrower vectors of it for a processor that has no such wide ones.
-
-Such a kernel has no branches.  Where it chooses, it calls `select`, `smaller` and `larger`; and the
-square root and the sign are those below.
+The kernel `distance` of such a shape is a text for LANES rays at once too: see `lanes`.
 """
 
 import math
@@ -16,124 +10,15 @@ from typing import Any
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
-from reference_rt.kernel import overload_kernel
+from reference_rt.lanes import I64, LANES, REALS, Lanes, in_all_lanes
 from reference_rt.ray import BLOCK, Ray
-from reference_rt.shapes.shape import LANES, FloatArray, IntArray
+from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.vec3 import Vec3
 
-_REALS = ir.VectorType(ir.DoubleType(), LANES)
-_WORDS = ir.VectorType(ir.IntType(64), LANES)
-_FIRST = ir.IntType(64)(0)
-
-
-class Mask:
-    """Which lanes fulfil a condition."""
-
-    def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
-        self.builder, self.value = builder, value
-
-    def __and__(self, other: "Mask") -> "Mask":
-        return Mask(self.builder, self.builder.and_(self.value, other.value))
-
-
-class Lanes:
-    """A number in each lane, computed by code that is being written."""
-
-    def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
-        self.builder, self.value = builder, value
-
-    def of(self, x: Any) -> ir.Value:
-        """The value of `x`: of lanes, or the same number in all."""
-        return x.value if isinstance(x, Lanes) else ir.Constant(_REALS, [float(x)] * LANES)
-
-    def call(self, name: str, *others: Any) -> "Lanes":
-        """An instruction that LLVM writes as a function."""
-        values = [self.value, *map(self.of, others)]
-        of_type = ir.FunctionType(_REALS, [_REALS] * len(values))
-        name = f"llvm.{name}.v{LANES}f64"
-        function = cgutils.get_or_insert_function(self.builder.module, of_type, name)
-        return Lanes(self.builder, self.builder.call(function, values))
-
-    def compared(self, how: str, other: Any) -> Mask:
-        return Mask(self.builder, self.builder.fcmp_ordered(how, self.value, self.of(other)))
-
-    def __add__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fadd(self.value, self.of(other)))
-
-    def __sub__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fsub(self.value, self.of(other)))
-
-    def __rsub__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fsub(self.of(other), self.value))
-
-    def __mul__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fmul(self.value, self.of(other)))
-
-    def __truediv__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fdiv(self.value, self.of(other)))
-
-    def __rtruediv__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fdiv(self.of(other), self.value))
-
-    def __neg__(self) -> "Lanes":
-        return Lanes(self.builder, self.builder.fneg(self.value))
-
-    def __abs__(self) -> "Lanes":
-        return self.call("fabs")
-
-    def __lt__(self, other: Any) -> Mask:
-        return self.compared("<", other)
-
-    def __le__(self, other: Any) -> Mask:
-        return self.compared("<=", other)
-
-    def __gt__(self, other: Any) -> Mask:
-        return self.compared(">", other)
-
-    def __ge__(self, other: Any) -> Mask:
-        return self.compared(">=", other)
-
-
-def select(condition: Any, a: Any, b: Any) -> Any:
-    """`a` where the condition is fulfilled, else `b`."""
-    if not isinstance(condition, Mask):
-        return a if condition else b
-    builder = condition.builder
-    lanes = Lanes(builder, condition.value)
-    return Lanes(builder, builder.select(condition.value, lanes.of(a), lanes.of(b)))
-
-
-def smaller(a: Any, b: Any) -> Any:
-    """Python's min(a, b): `a` where they do not compare."""
-    return select(b < a, b, a)
-
-
-def larger(a: Any, b: Any) -> Any:
-    """Python's max(a, b): `a` where they do not compare."""
-    return select(b > a, b, a)
-
-
-def square_root(x: Any) -> Any:
-    return x.call("sqrt") if isinstance(x, Lanes) else math.sqrt(x)
-
-
-def with_sign(x: Any, sign: Any) -> Any:
-    return x.call("copysign", sign) if isinstance(x, Lanes) else math.copysign(x, sign)
-
-
-def _compiled_as(function: Callable[..., Any], one: Callable[..., Any]) -> None:
-    """What compiled code calls for numbers."""
-    overload_kernel(function)(lambda *_: one)
-
-
-_compiled_as(select, lambda condition, a, b: a if condition else b)
-_compiled_as(smaller, lambda a, b: b if b < a else a)
-_compiled_as(larger, lambda a, b: b if b > a else a)
-_compiled_as(square_root, lambda x: math.sqrt(x))
-_compiled_as(with_sign, lambda x, sign: math.copysign(x, sign))
+_WORDS = ir.VectorType(I64, LANES)
+_FIRST = I64(0)
 
 
 class _Writer:
@@ -155,16 +40,10 @@ class _Writer:
     ) -> None:
         self.builder.store(value, self._place(array_type, array, value.type, at), align=8)
 
-    def in_all_lanes(self, x: ir.Value, of: ir.Type) -> ir.Value:
-        undefined = ir.Constant(of, ir.Undefined)
-        one = self.builder.insert_element(undefined, x, ir.IntType(32)(0))
-        which = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-        return self.builder.shuffle_vector(one, undefined, which)
-
     def lanes(self, value: ir.Value, *at: int) -> Lanes:
         """A number of a tuple, the same in all lanes."""
         number = self.builder.extract_value(value, at)
-        return Lanes(self.builder, self.in_all_lanes(number, _REALS))
+        return Lanes(self.builder, in_all_lanes(self.builder, number))
 
     def vector(self, value: ir.Value, k: int) -> Vec3:
         """Vector k of a tuple, the same in all lanes."""
@@ -173,8 +52,8 @@ class _Writer:
 
     def column(self, array_type: Any, rays: ir.Value, column: int, at: ir.Value) -> Lanes:
         """A number of each of LANES rays."""
-        place = self.builder.add(at, ir.IntType(64)(column * BLOCK))
-        return Lanes(self.builder, self.load(array_type, rays, _REALS, place))
+        place = self.builder.add(at, I64(column * BLOCK))
+        return Lanes(self.builder, self.load(array_type, rays, REALS, place))
 
 
 def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
@@ -202,10 +81,10 @@ def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
             ]
             ray = Ray(Vec3(*numbers[:3]), Vec3(*numbers[3:]), math.inf)
             found = distance(ray, *arguments).value
-            best = writer.load(t, t_value, _REALS)
+            best = writer.load(t, t_value, REALS)
             which = writer.load(codes, codes_value, _WORDS)
             is_nearer = builder.fcmp_ordered("<", found, best)
-            own = writer.in_all_lanes(code_value, _WORDS)
+            own = in_all_lanes(builder, code_value, _WORDS)
             writer.store(t, t_value, builder.select(is_nearer, found, best))
             writer.store(codes, codes_value, builder.select(is_nearer, own, which))
             return context.get_dummy_value()
@@ -257,7 +136,7 @@ def _begin_lanes(typing_context: Any, rays: Any, at: Any, t: Any, codes: Any) ->
 def _end_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_codes: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         writer = _Writer(context, builder)
-        writer.store(to, values[3], writer.load(t, values[0], _REALS), values[2])
+        writer.store(to, values[3], writer.load(t, values[0], REALS), values[2])
         writer.store(to_codes, values[4], writer.load(codes, values[1], _WORDS), values[2])
         return context.get_dummy_value()
 

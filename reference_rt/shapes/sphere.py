@@ -8,6 +8,7 @@ import numpy as np
 from reference_rt import transform
 from reference_rt.description import Positive, Vector
 from reference_rt.kernel import kernel
+from reference_rt.lanes import larger, select, smaller, square_root, with_sign
 from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.sampling.warp import on_circle
 from reference_rt.shapes.placement import local_vector, owners, world_covector
@@ -30,14 +31,7 @@ from reference_rt.shapes.shape import (
     outward,
     pack,
 )
-from reference_rt.shapes.side_by_side import (
-    larger,
-    nearer_by,
-    select,
-    smaller,
-    square_root,
-    with_sign,
-)
+from reference_rt.shapes.side_by_side import nearer_by
 from reference_rt.vec3 import Vec3, dot, frame_from_normal, length, normalize, row, to_world
 
 

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from reference_rt.kernel import kernel
-from reference_rt.lanes import both, either, lane_kernel, opposite
+from reference_rt.lanes import lane_kernel
 from reference_rt.ray import Ray
 from reference_rt.shapes.rounding import product_error
 from reference_rt.shapes.shape import FloatArray
@@ -140,9 +140,9 @@ def _maybe_met(
     e0 = c_x * b_y - c_y * b_x
     e1 = a_x * c_y - a_y * c_x
     e2 = b_x * a_y - b_y * a_x
-    below = either(e0 < 0.0, either(e1 < 0.0, e2 < 0.0))
-    above = either(e0 > 0.0, either(e1 > 0.0, e2 > 0.0))
-    return opposite(both(below, above))
+    below = (e0 < 0.0) | (e1 < 0.0) | (e2 < 0.0)
+    above = (e0 > 0.0) | (e1 > 0.0) | (e2 > 0.0)
+    return ~(below & above)
 
 
 @kernel

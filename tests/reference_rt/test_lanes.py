@@ -8,12 +8,9 @@ import pytest
 from reference_rt.kernel import entry_kernel
 from reference_rt.lanes import (
     LANES,
-    both,
-    either,
     lane_kernel,
     larger,
     lowest,
-    opposite,
     plain,
     smaller,
 )
@@ -28,9 +25,9 @@ SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, 1.7e308, -1.7e308, 
 def _text(doubles, singles, start, factor, out):
     a = doubles.load(start)
     b = singles.load(2 * start + 1) * factor - a
-    c = 1.0 - smaller(a, larger(b, 0.5)) + a * b
+    c = 1.0 - smaller(a, larger(0.5, b)) + a * b
     out.store(0, c)
-    return either(c <= a, both(b > 0.0, opposite(c >= factor)))
+    return (c <= a) | ((b > 0.0) & ~(c >= factor))
 
 
 _emitted = lane_kernel(_text)

@@ -12,10 +12,10 @@ from reference_rt.geometry import closest_hit, occluded
 from reference_rt.integrators import radiance
 from reference_rt.integrators.scratch import any_hits, closest_hits
 from reference_rt.kernel import entry_kernel
+from reference_rt.lanes import LANES
 from reference_rt.ray import BLOCK, Ray
 from reference_rt.sampling import start_sample
 from reference_rt.shapes import box, rectangle, sphere
-from reference_rt.shapes.shape import LANES
 from reference_rt.shapes.side_by_side import nearer_plainly
 from reference_rt.streams import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, Hits, Rays, hit_of
 from reference_rt.vec3 import Vec3
