@@ -80,13 +80,14 @@ class Trees:
         if len(kinds) > 0 and not (self.method == "auto" and self._is_few(kinds)):
             lower, upper = self._bounds_of(kinds, rows)
             finite = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
+            del lower, upper  # `add` asks again: of a million triangles two copies count
             kinds_of = kinds[finite], kinds[~finite]
             rows_of = rows[finite], rows[~finite]
             if finite.any():
                 self._scene = self.add(
                     [
                         Reference(int(k), rows_of[0][kinds_of[0] == k])
-                        for k in np.unique(kinds_of[0])
+                        for k in _distinct(kinds_of[0])
                     ]
                 )
             if not finite.all():
@@ -158,8 +159,12 @@ class Trees:
         return bool(work.sum() < BVH_FROM)
 
     def _bounds_of(self, kinds: IntArray, rows: IntArray) -> Bounds:
+        present = _distinct(kinds)
+        if len(present) == 1:
+            low, high = self.bounds[present[0]]
+            return low[rows], high[rows]
         lower, upper = np.empty((2, len(kinds), 3))
-        for kind in np.unique(kinds).tolist():
+        for kind in present:
             mine = kinds == kind
             lower[mine], upper[mine] = (side[rows[mine]] for side in self.bounds[kind])
         return lower, upper
@@ -203,10 +208,7 @@ class Trees:
             if table is None:
                 continue
             ragged = getattr(module, "RAGGED", ())
-            named, first = np.unique(rows[kinds == code], return_index=True)
-            order = named[np.argsort(first)]
-            rest = np.setdiff1d(np.arange(len(table.owner)), order)
-            order = np.concatenate([order, rest])
+            order = _first_named(rows[kinds == code], len(table.owner))
             new_row = np.empty_like(order)
             new_row[order] = np.arange(len(order))
             self._new_rows[code] = new_row
@@ -219,6 +221,20 @@ class Trees:
             for tree_kinds, tree_rows in zip(self._kinds, self._rows, strict=True):
                 mine = tree_kinds == code
                 tree_rows[mine] = new_row[tree_rows[mine]]
+
+
+def _distinct(kinds: IntArray) -> list[int]:
+    """The codes among kinds (n,), which are small numbers: np.unique takes 0.2 s for a million."""
+    return np.flatnonzero(np.bincount(kinds)).tolist()
+
+
+def _first_named(rows: IntArray, count: int) -> IntArray:
+    """All of 0 to count - 1 once: those of rows (m,) in the order of their first mention, then the
+    rest."""
+    first = np.full(count, len(rows))
+    # Backwards, so that of several mentions the first is what stays.
+    first[rows[::-1]] = np.arange(len(rows))[::-1]
+    return np.argsort(first, kind="stable")
 
 
 def _joined(references: Sequence[Reference]) -> tuple[IntArray, IntArray]:

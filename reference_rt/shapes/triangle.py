@@ -125,8 +125,9 @@ def areas(triangles: Triangles) -> FloatArray:
 
 def bounds(triangles: Triangles) -> Bounds:
     """Boxes (n, 3), (n, 3): minima and maxima of vertices are exact."""
-    v = triangles.vertices.reshape(-1, 3, 3)
-    return v.min(axis=1), v.max(axis=1)
+    a, b, c = triangles.vertices.reshape(-1, 3, 3).transpose(1, 0, 2)
+    # Two at a time: along an axis of three NumPy takes ten times as long.
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 @kernel
