@@ -269,7 +269,7 @@ if numba.config.DISABLE_JIT:
 
     def lowest(bits: int) -> int:
         """The number of the lowest bit that is set (one must be)."""
-        return (bits & -bits).bit_length() - 1
+        return int(bits & -bits).bit_length() - 1
 
     def prefetch(array: Any, start: int) -> None:
         """Ask for a number of an array, which will be read soon."""
