@@ -11,16 +11,16 @@ METAL, SKY = "material_rough_conductor", "environment"
 FAULTS = (
     SourceFault(
         "direct light counted twice", BOX, "integrators/path.py",
-        "                weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, "
-        "light_pdf)\n            emitted",
-        "            emitted",
+        "            weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, "
+        "light_pdf)\n        emitted = throughput * area",
+        "        emitted = throughput * area",
     ),
     SourceFault(
         "cosine missing after the first bounce", BOX, "integrators/path.py",
-        "        throughput = throughput * scattered.weight\n",
-        "        throughput = throughput * scattered.weight\n"
-        "        if depth == 0 and scattered.wi.z > 0.0:\n"
-        "            throughput = throughput * (0.6666666666666666 / scattered.wi.z)\n",
+        "    throughput = throughput * scattered.weight\n",
+        "    throughput = throughput * scattered.weight\n"
+        "    if depth == 0 and scattered.wi.z > 0.0:\n"
+        "        throughput = throughput * (0.6666666666666666 / scattered.wi.z)\n",
     ),
     SourceFault(
         "MIS weights that do not sum to one", "veach_mis", "integrators/integrator.py",
@@ -29,7 +29,7 @@ FAULTS = (
     ),
     SourceFault(
         "roulette without compensation", BOX, "integrators/path.py",
-        "            throughput = throughput * (1.0 / survival)\n", "",
+        "        throughput = throughput * (1.0 / survival)\n", "",
     ),
     SourceFault(
         "1/eta² forgotten", GLASS, "materials/dielectric.py",
@@ -48,11 +48,9 @@ FAULTS = (
     ),
     SourceFault(
         "one leaf missing from the hierarchy", KNOT, "geometry.py",
-        "            end = begin + size\n            if instances is not None:\n"
-        "                if node == held:",
-        "            end = begin + size\n            if begin <= 5000 < end:\n"
-        "                end = begin\n            if instances is not None:\n"
-        "                if node == held:",
+        "    met = maybe_met(corners, first, size, shear)\n",
+        "    met = maybe_met(corners, first, size, shear)\n"
+        "    if first <= 5000 < first + size:\n        met = 0\n",
     ),
     SourceFault(
         "normals of spheres flipped", GLASS, "shapes/sphere.py",

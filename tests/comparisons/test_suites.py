@@ -353,7 +353,7 @@ def test_an_interruption_keeps_what_is_done(tmp_path, number):
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         workers = children.read_text().split() if children.exists() else []
         process.send_signal(number)
-        process.communicate(timeout=30.0)
+        process.communicate(timeout=120.0)
     finally:
         process.kill()
     assert process.returncode != 0
