@@ -9,7 +9,6 @@ import pytest
 from bench_rows import FIELDS, a_table, made_up
 
 from comparisons.bench import equal_error, table
-from comparisons.bench import timing as timing_module
 from comparisons.bench.machine import machine
 from comparisons.bench.row import LIMIT, against, row_from, within
 from comparisons.bench.setting import Setting
@@ -65,7 +64,7 @@ def test_a_linear_drift_favours_nobody() -> None:
 
 def test_seconds_are_those_of_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter([10.0, 12.5])
-    monkeypatch.setattr(timing_module.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr("comparisons.bench.timing.time.perf_counter", lambda: next(clock))
     assert seconds(lambda: None) == 2.5
 
 
