@@ -2,11 +2,12 @@
 
 What is left of `reference_rt`'s kernels when everything that such a scene does not use is deleted
 by hand: no table that may be absent, no choice among shapes, materials, lights, cameras, samplers
-or filters, no textures, no hierarchy.  It gives the same picture bit for bit (its test), and its
-time is what the renderer's own pruning is measured against.
+or filters, no textures, no hierarchy, and of rays, hits and paths only the numbers that are read.
+The structure is the renderer's: blocks of paths, edge by edge, rays side by side.  It gives the
+same picture bit for bit (its test), and its time is what the renderer's own pruning is measured
+against.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,19 +19,24 @@ from reference_rt.film import BoxFilter
 from reference_rt.integrators import Path
 from reference_rt.integrators.integrator import power_heuristic
 from reference_rt.integrators.path import ROULETTE_CAP
-from reference_rt.kernel import entry_kernel, kernel, local_floats
+from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
 from reference_rt.lanes import LANES
 from reference_rt.lights import Constant
 from reference_rt.lights.constant import PDF
 from reference_rt.materials import Diffuse
 from reference_rt.materials.material import INV_PI
-from reference_rt.ray import Hit, Ray, ray_from
-from reference_rt.sampling import Sobol, sobol
+from reference_rt.ray import BLOCK, Hit, Ray, ray_from
+from reference_rt.sampling import PAIR_FLOATS, PAIR_INTEGERS, Samplers, Sobol, blocks, forget_pairs
+from reference_rt.sampling.blocks import BlockSample
+from reference_rt.sampling.sobol import SobolSetup
 from reference_rt.sampling.warp import cosine_hemisphere, uniform_sphere
 from reference_rt.scene import Scene
 from reference_rt.shapes import SPHERE, Sphere, sphere
-from reference_rt.shapes.shape import FloatArray, nearest_lane
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.shapes.side_by_side import begin as begin_lanes
+from reference_rt.shapes.side_by_side import end as end_lanes
 from reference_rt.shapes.sphere import Spheres
+from reference_rt.streams import RAY_FLOATS, Rays, put_ray, put_vector, ray_of, vector_of
 from reference_rt.vec3 import (
     Vec3,
     frame_from_normal,
@@ -41,15 +47,49 @@ from reference_rt.vec3 import (
     to_world,
 )
 
+VECTOR_FLOATS = 3 * BLOCK
+STATE_FLOATS = 4 * BLOCK
+
 
 class World(NamedTuple):
-    """spheres, packets: their table, and side by side;  reflectance (n, 3) of the materials;  sky:
-    its radiance."""
+    """spheres: their table;  reflectance (n, 3) of the materials;  sky: its radiance."""
 
     spheres: Spheres
-    packets: FloatArray
     reflectance: FloatArray
     sky: Vec3
+
+
+class Scratch(NamedTuple):
+    """As `reference_rt.integrators.scratch.Scratch`;  hits: distances (BLOCK,), and the spheres
+    (BLOCK,), -1 for none;  states (STATE_FLOATS,): throughput and pdf of paths."""
+
+    rays: Rays
+    totals: FloatArray
+    shadows: Rays
+    lights: FloatArray
+    lit: IntArray
+    distances: FloatArray
+    hits: IntArray
+    states: FloatArray
+    samples: IntArray
+
+
+class State(NamedTuple):
+    """What a path is when it goes on: see `reference_rt.integrators.path.State`."""
+
+    throughput: Vec3
+    bsdf_pdf: float
+
+
+class Step(NamedTuple):
+    """What a path finds at a hit: see `reference_rt.integrators.path.Step`."""
+
+    emitted: Vec3
+    light: Vec3
+    shadow: Ray
+    goes_on: bool
+    ray: Ray
+    state: State
 
 
 def world_of(scene: Scene) -> World:
@@ -66,72 +106,135 @@ def world_of(scene: Scene) -> World:
     ):
         raise ValueError("expected diffuse spheres under a constant sky, path traced")
     geometry = scene.tables.geometry
-    spheres, packets = geometry.shapes.spheres, geometry.packets.spheres
-    if spheres is None or packets is None:
+    spheres = geometry.shapes.spheres
+    if spheres is None or geometry.bvh is not None:
         raise ValueError("expected spheres, so few that no hierarchy leads to them")
     colours = [m.reflectance for m in scene.materials.values() if isinstance(m, Diffuse)]
-    return World(spheres, packets, np.array(colours), Vec3(*environment.radiance))
+    return World(spheres, np.array(colours), Vec3(*environment.radiance))
 
 
 @kernel
-def _nearest(world: World, ray: Ray) -> Hit:
-    distances = local_floats(LANES)
-    best, t = -1, math.inf
-    for k in range(len(world.packets)):
-        for lane in range(LANES):
-            distances[lane] = sphere.lane_distance(world.spheres, world.packets, k, lane, ray)
-        best, t = nearest_lane(distances, k, best, t)
-    return Hit(t, SPHERE, best, 0.0, 0.0, -1)
+def _nearest(spheres: Spheres, rays: Rays, distances: FloatArray, hits: IntArray, n: int) -> None:
+    """The nearest sphere to each of the first n rays."""
+    t, codes = local_floats(LANES), local_integers(LANES)
+    for at in range(0, n, LANES):
+        begin_lanes(rays.numbers, at, t, codes)
+        for i in range(len(spheres.radius)):
+            shape = (row(spheres.center, i), spheres.radius[i])
+            sphere.nearer(rays.numbers, at, shape, i, t, codes)
+        end_lanes(t, codes, at, distances, hits)
 
 
 @kernel
-def _radiance(
-    max_depth: int, rr_depth: int, world: World, ray: Ray, sampler: sobol.SobolSample
-) -> Vec3:
-    total = Vec3(0.0, 0.0, 0.0)
-    throughput = Vec3(1.0, 1.0, 1.0)
-    bsdf_pdf = 0.0
+def _sampler_of(samplers: Samplers, k: int) -> BlockSample:
+    pixel, number = samplers.pixels[k], samplers.numbers[k]
+    return blocks.start(samplers.setup, pixel, number, samplers.pairs, samplers.made)
+
+
+@kernel
+def _state_of(scratch: Scratch, j: int) -> State:
+    return State(vector_of(scratch.states, 0, j), scratch.states[3 * BLOCK + j])
+
+
+@kernel
+def _put_state(scratch: Scratch, j: int, k: int, state: State) -> None:
+    scratch.samples[j] = k
+    put_vector(scratch.states, 0, j, state.throughput)
+    scratch.states[3 * BLOCK + j] = state.bsdf_pdf
+
+
+@kernel
+def _advance(
+    max_depth: int,
+    rr_depth: int,
+    world: World,
+    depth: int,
+    ray: Ray,
+    t: float,
+    i: int,
+    state: State,
+    sampler: BlockSample,
+) -> Step:
+    """From what the ray has hit, sphere i at t, to the next ray."""
+    throughput, black = state.throughput, Vec3(0.0, 0.0, 0.0)
+    if i < 0:
+        weight = 1.0
+        if state.bsdf_pdf > 0.0:
+            weight = power_heuristic(state.bsdf_pdf, PDF)
+        return Step(throughput * world.sky * weight, black, ray, False, ray, state)
+    point = sphere.surface(world.spheres, ray, Hit(t, SPHERE, i, 0.0, 0.0, -1))
+    frame = frame_from_normal(point.ns)
+    wo = to_local(frame, -ray.d)
+    if depth + 1 >= max_depth:
+        return Step(black, black, ray, False, ray, state)
+    reflectance = row(world.reflectance, point.material)
+    dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * depth
+    u0, u1 = blocks.draw(sampler, dimension + sampling.LIGHT_POINT)
+    towards = uniform_sphere(u0, u1)
+    wi = to_local(frame, towards)
+    light, shadow = black, ray
+    if wo.z > 0.0 and wi.z > 0.0:
+        weight = power_heuristic(PDF, wi.z * INV_PI)
+        light = throughput * (reflectance * (wi.z * INV_PI) * world.sky * (weight / PDF))
+        shadow = ray_from(point, towards)
+    u_roulette = 0.5
+    if depth + 1 >= rr_depth:
+        _, u_roulette = blocks.draw(sampler, dimension + sampling.LOBE_AND_ROULETTE)
+    u0, u1 = blocks.draw(sampler, dimension + sampling.BSDF_DIRECTION)
+    if wo.z <= 0.0:
+        return Step(black, light, shadow, False, ray, state)
+    wi = cosine_hemisphere(u0, u1)
+    bsdf_pdf = wi.z * INV_PI
+    if bsdf_pdf == 0.0:
+        return Step(black, light, shadow, False, ray, state)
+    throughput = throughput * reflectance
+    if depth + 1 >= rr_depth:
+        survival = min(max_component(throughput), ROULETTE_CAP)
+        if u_roulette >= survival:
+            return Step(black, light, shadow, False, ray, state)
+        throughput = throughput * (1.0 / survival)
+    ray = ray_from(point, to_world(frame, wi))
+    return Step(black, light, shadow, True, ray, State(throughput, bsdf_pdf))
+
+
+@kernel
+def _radiances(
+    max_depth: int, rr_depth: int, world: World, samplers: Samplers, n: int, scratch: Scratch
+) -> None:
+    """As `reference_rt.integrators.path.radiances`."""
+    rays, shadows = scratch.rays, scratch.shadows
+    for j in range(n):
+        _put_state(scratch, j, j, State(Vec3(1.0, 1.0, 1.0), 0.0))
+        put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
     for depth in range(max_depth):
-        hit = _nearest(world, ray)
-        if hit.row < 0:
-            weight = 1.0
-            if bsdf_pdf > 0.0:
-                weight = power_heuristic(bsdf_pdf, PDF)
-            total = total + throughput * world.sky * weight
+        if n == 0:
             break
-        point = sphere.surface(world.spheres, ray, hit)
-        frame = frame_from_normal(point.ns)
-        wo = to_local(frame, -ray.d)
-        reflectance = row(world.reflectance, point.material)
-        if depth + 1 >= max_depth:
-            break
-        dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * depth
-        u0, u1 = sobol.draw(sampler, dimension + sampling.LIGHT_POINT)
-        towards = uniform_sphere(u0, u1)
-        wi = to_local(frame, towards)
-        if wo.z > 0.0 and wi.z > 0.0:
-            f_cos = reflectance * (wi.z * INV_PI)
-            if not is_black(f_cos) and _nearest(world, ray_from(point, towards)).row < 0:
-                weight = power_heuristic(PDF, wi.z * INV_PI)
-                total = total + throughput * (f_cos * world.sky * (weight / PDF))
-        u_roulette = 0.5
-        if depth + 1 >= rr_depth:
-            _, u_roulette = sobol.draw(sampler, dimension + sampling.LOBE_AND_ROULETTE)
-        u0, u1 = sobol.draw(sampler, dimension + sampling.BSDF_DIRECTION)
-        if wo.z <= 0.0:
-            break
-        wi = cosine_hemisphere(u0, u1)
-        bsdf_pdf = wi.z * INV_PI
-        if bsdf_pdf == 0.0:
-            break
-        throughput = throughput * reflectance
-        if depth + 1 >= rr_depth:
-            survival = min(max_component(throughput), ROULETTE_CAP)
-            if u_roulette >= survival:
-                break
-            throughput = throughput * (1.0 / survival)
-        ray = ray_from(point, to_world(frame, wi))
-    return total
+        _nearest(world.spheres, rays, scratch.distances, scratch.hits, n)
+        alive, lit = 0, 0
+        for j in range(n):
+            k = scratch.samples[j]
+            t, i = scratch.distances[j], scratch.hits[j]
+            state, sampler = _state_of(scratch, j), _sampler_of(samplers, k)
+            step = _advance(
+                max_depth, rr_depth, world, depth, ray_of(rays, j), t, i, state, sampler
+            )
+            put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + step.emitted)
+            if not is_black(step.light):
+                put_ray(shadows, lit, step.shadow)
+                put_vector(scratch.lights, 0, lit, step.light)
+                scratch.lit[lit] = k
+                lit += 1
+            if step.goes_on:
+                put_ray(rays, alive, step.ray)
+                _put_state(scratch, alive, k, step.state)
+                alive += 1
+        _nearest(world.spheres, shadows, scratch.distances, scratch.hits, lit)
+        for j in range(lit):
+            if scratch.hits[j] < 0:
+                k = scratch.lit[j]
+                light = vector_of(scratch.lights, 0, j)
+                put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + light)
+        n = alive
 
 
 @entry_kernel
@@ -140,7 +243,7 @@ def render_band(
     rr_depth: int,
     world: World,
     view: PerspectiveView,
-    setup: sobol.SobolSetup,
+    setup: SobolSetup,
     shape: tuple[int, int],
     spp: int,
     out: FloatArray,
@@ -150,16 +253,39 @@ def render_band(
     last: int,
 ) -> None:
     """As `reference_rt.bands.render_band`."""
+    scratch = Scratch(
+        rays=Rays(local_floats(RAY_FLOATS)),
+        totals=local_floats(VECTOR_FLOATS),
+        shadows=Rays(local_floats(RAY_FLOATS)),
+        lights=local_floats(VECTOR_FLOATS),
+        lit=local_integers(BLOCK),
+        distances=local_floats(BLOCK),
+        hits=local_integers(BLOCK),
+        states=local_floats(STATE_FLOATS),
+        samples=local_integers(BLOCK),
+    )
+    pixels, numbers = local_integers(BLOCK), local_integers(BLOCK)
+    pairs, made = local_floats(PAIR_FLOATS), local_integers(PAIR_INTEGERS)
+    samplers = Samplers(setup, pixels, numbers, pairs, made)
+    for k in range(RAY_FLOATS):  # see `reference_rt.integrators.scratch.prepare`
+        scratch.rays.numbers[k] = scratch.shadows.numbers[k] = 1.0
+    forget_pairs(samplers)
     width, height = shape
-    for pixel in range(begin, end):
-        y, x = pixel // width, pixel % width
-        total = row(out, pixel)
-        for sample in range(first, last):
-            sampler = sobol.start(setup, pixel, sample)
-            u0, u1 = sobol.draw(sampler, sampling.FILM)
+    count = last - first
+    paths = (end - begin) * count
+    for start in range(0, paths, BLOCK):
+        n = min(BLOCK, paths - start)
+        for k in range(n):
+            pixel = begin + (start + k) // count
+            pixels[k], numbers[k] = pixel, first + (start + k) % count
+            y, x = pixel // width, pixel % width
+            u0, u1 = blocks.draw(_sampler_of(samplers, k), sampling.FILM)
             at = (x + 0.5 + (u0 - 0.5)) / width, (y + 0.5 + (u1 - 0.5)) / height
-            ray = camera_ray(view, at[0], at[1], LENS_CENTRE)
-            total = total + _radiance(max_depth, rr_depth, world, ray, sampler)
-        if last == spp:
-            total = total / spp
-        out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
+            put_ray(scratch.rays, k, camera_ray(view, at[0], at[1], LENS_CENTRE))
+        _radiances(max_depth, rr_depth, world, samplers, n, scratch)
+        for k in range(n):
+            pixel = pixels[k]
+            total = row(out, pixel) + vector_of(scratch.totals, 0, k)
+            if numbers[k] + 1 == spp:
+                total = total / spp
+            out[pixel, 0], out[pixel, 1], out[pixel, 2] = total

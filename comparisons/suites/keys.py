@@ -16,7 +16,8 @@ from comparisons.mitsuba_backend import Backend
 from reference_rt.scene import Scene
 
 _APART = (
-    "report", "ci", "commands", "convergence", "gate", "selftest", "pytest_plugin.py", "cli.py",
+    "bench", "report", "ci", "commands", "convergence", "gate", "selftest", "pytest_plugin.py",
+    "cli.py",
 )  # fmt: skip
 """Parts of `comparisons` that no verdict of a suite depends on."""
 
