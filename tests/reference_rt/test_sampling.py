@@ -14,6 +14,7 @@ from reference_rt.sampling import (
     start_in_block,
     start_sample,
 )
+from reference_rt.sampling.orders import GROUP
 
 SAMPLERS = [rt.Sobol, rt.Independent]
 
@@ -96,25 +97,25 @@ def test_blocks_give_the_same_numbers(sampler):
 
 
 @entry_kernel
-def _fill_both(order, x_seed, y_seed, first, fast, plain):
-    blocks.fill(order, x_seed, y_seed, first, fast, 0)
-    blocks.fill_plainly(order, x_seed, y_seed, first, plain, 0)
+def _fill_both(order, x_seed, y_seed, place, first, fast, plain):
+    blocks.fill(order, x_seed, y_seed, place, first, fast, 0)
+    blocks.fill_plainly(order, x_seed, y_seed, place, first, plain, 0)
 
 
 def test_vector_code_gives_the_bits_of_the_plain_kernel():
     rng = np.random.default_rng(63)
     fast, plain = np.empty((2, 2 * blocks.TOGETHER))
-    for _ in range(300):
+    for k in range(300):
         seeds = rng.integers(0, 2**32, 3, dtype=np.uint64)
-        first = int(rng.integers(0, 2**27)) * blocks.TOGETHER
-        _fill_both(*seeds, first, fast, plain)
+        first, place = int(rng.integers(0, 2**27)) * blocks.TOGETHER, k % GROUP
+        _fill_both(*seeds, place, first, fast, plain)
         assert np.array_equal(fast, plain)
     # And of Python's.
     with np.errstate(over="ignore"):
-        blocks.fill_plainly(*seeds, first, plain, 0)
+        blocks.fill_plainly(*seeds, place, first, plain, 0)
     assert np.array_equal(fast, plain)
     assert [tuple(p) for p in plain.reshape(2, -1).T] == [
-        sobol.pair(tuple(seeds), sobol.reverse_bits(np.uint64(first + k)))
+        sobol.pair(tuple(seeds), place, sobol.reverse_bits(np.uint64(first + k)))
         for k in range(blocks.TOGETHER)
     ]
 
