@@ -60,12 +60,8 @@ def after(first: list[int], then: list[int]) -> list[int]:
 
 
 def _columns() -> IntArray:
-    unit, quarter, sixteenth = (
-        (1 << np.arange(32)).tolist(),
-        pascal_columns(2, 2),
-        pascal_columns(2, 4),
-    )
-    orders = [unit, quarter, sixteenth, after(sixteenth, quarter), pascal_columns(4, 4)]
+    four, sixteen = pascal_columns(2, 2), pascal_columns(2, 4)
+    orders = [pascal_columns(0, 2), four, sixteen, after(sixteen, four), pascal_columns(8, 4)]
     return np.array(orders, np.uint64)
 
 
