@@ -10,8 +10,7 @@ Pascal's triangle, are another two: C_1 after C_a is C_(a + 1).  Ahmed, Skopenko
 """
 
 import numpy as np
-
-from reference_rt.shapes.shape import IntArray
+import numpy.typing as npt
 
 GROUP = 5
 """Pairs of a group: dimensions 5 k to 5 k + 4."""
@@ -59,7 +58,7 @@ def after(first: list[int], then: list[int]) -> list[int]:
     return columns
 
 
-def _columns() -> IntArray:
+def _columns() -> npt.NDArray[np.uint64]:
     four, sixteen = pascal_columns(2, 2), pascal_columns(2, 4)
     orders = [pascal_columns(0, 2), four, sixteen, after(sixteen, four), pascal_columns(8, 4)]
     return np.array(orders, np.uint64)
