@@ -59,9 +59,9 @@ def after(first: list[int], then: list[int]) -> list[int]:
 
 
 def _columns() -> npt.NDArray[np.uint64]:
-    """The first two pairs together are a (0, 4)-sequence in base 4, and so are the next two; all
-    four are a net of 16 points in base 16.  Of the orders tried for the others (fields, Sobol's
-    further matrices, random ones) these gave the least noise in scenes of direct light."""
+    """The first two pairs together are a (0, 4)-sequence in base 4, and so are the next two.  How
+    the halves and the last pair lie to each other is measured: of the orders tried (of both fields,
+    Sobol's further matrices, random ones) one with the least noise in scenes of direct light."""
     four, sixteen = pascal_columns(2, 2), pascal_columns(2, 4)
     orders = [pascal_columns(0, 2), four, sixteen, after(sixteen, four), pascal_columns(8, 4)]
     return np.array(orders, np.uint64)
