@@ -81,8 +81,8 @@ def _from_light(
     black = Vec3(0.0, 0.0, 0.0)
     if any_light.count(scene.lights) == 0:
         return black
-    dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * k
-    u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_PICK)
+    dimension = sampling.PER_BOUNCE * k
+    u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
     picked = any_light.pick(scene.lights, shading.point.p, normal, u_pick)
     if picked.probability == 0.0:
         return black
@@ -111,8 +111,8 @@ def _from_bsdf(
     """Sample k of m of the material, as its share of the estimate."""
     black = Vec3(0.0, 0.0, 0.0)
     lights = scene.lights
-    dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * k
-    u_lobe, _ = draw_pair(sampler, dimension + sampling.LOBE_AND_ROULETTE)
+    dimension = sampling.PER_BOUNCE * k
+    _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
     u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
     scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
     if scattered.pdf == 0.0:

@@ -221,16 +221,15 @@ def advance(
         emitted = throughput * area.emitted(lights.areas, point, shading.at, -ray.d) * weight
     if depth + 1 >= path.max_depth:
         return Step(emitted, black, ray, False, ray, state)
-    dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * depth
+    dimension = sampling.PER_BOUNCE * depth
     normal = receiver(scene, shading)
     lit = Lit(black, ray)
     if any_material.is_smooth(scene.materials, point.material):
         lit = _next_event(path, scene, shading, normal, sampler, dimension)
     light = throughput * lit.light
-    u_lobe, u_roulette = 0.5, 0.5
-    chooses = any_material.chooses(scene.materials, point.material)
-    if chooses or depth + 1 >= path.rr_depth:
-        u_lobe, u_roulette = draw_pair(sampler, dimension + sampling.LOBE_AND_ROULETTE)
+    u_lobe = 0.5
+    if any_material.chooses(scene.materials, point.material):
+        _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
     u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
     scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
     if scattered.pdf == 0.0:
@@ -240,6 +239,7 @@ def advance(
     if depth + 1 >= path.rr_depth:
         # eta² undoes the change of radiance in glass: what counts is the power that is left.
         survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)
+        u_roulette, _ = draw_pair(sampler, dimension + sampling.ROULETTE)
         if u_roulette >= survival:
             return Step(emitted, light, lit.shadow, False, ray, state)
         throughput = throughput * (1.0 / survival)
@@ -275,7 +275,7 @@ def _next_event(
         return nothing
     u_pick = 0.5
     if count > 1:
-        u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_PICK)
+        u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
     picked = any_light.pick(scene.lights, point.p, normal, u_pick)
     if picked.probability == 0.0:
         return nothing

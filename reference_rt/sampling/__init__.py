@@ -16,6 +16,7 @@ from reference_rt.sampling.blocks import INTEGERS as PAIR_INTEGERS
 from reference_rt.sampling.blocks import BlockSample
 from reference_rt.sampling.grid import Grid, GridSample, GridSetup
 from reference_rt.sampling.independent import Independent, IndependentSample, IndependentSetup
+from reference_rt.sampling.orders import GROUP
 from reference_rt.sampling.sobol import Sobol, SobolSample, SobolSetup
 from reference_rt.shapes.shape import FloatArray, IntArray
 
@@ -25,12 +26,12 @@ Sample = SobolSample | BlockSample | IndependentSample | GridSample
 """The numbers of one sample of one pixel."""
 
 # Dimensions are fixed, so that what one decision draws never shifts another's numbers. A pair
-# takes one number: (u0, u1) of dimension k are stratified in the unit square.
-FILM = 0
-LENS = 1
-FIRST_BOUNCE = 2
-PER_BOUNCE = 4
-LIGHT_PICK, LIGHT_POINT, LOBE_AND_ROULETTE, BSDF_DIRECTION = 0, 1, 2, 3
+# takes one number: (u0, u1) of dimension k are stratified in the unit square. Those of a bounce,
+# from PER_BOUNCE times its number on, are so jointly: the first's with the film and the lens.
+PER_BOUNCE = GROUP
+FILM, LIGHT_AND_LOBE, LIGHT_POINT, BSDF_DIRECTION, LENS = range(PER_BOUNCE)
+ROULETTE = PER_BOUNCE
+"""Whether there is a next bounce: in the place that the film has in the first."""
 
 _start = ByClass("start_sample")
 _start.register(SobolSetup, sobol.start)

@@ -18,15 +18,16 @@ from numba.extending import intrinsic
 
 from reference_rt.kernel import kernel
 from reference_rt.sampling import sobol
-from reference_rt.sampling.sobol import SobolSetup, hash_of, pair, reverse_bits, seeds_of
+from reference_rt.sampling.orders import COLUMNS, GROUP
+from reference_rt.sampling.sobol import SobolSetup, pair, reverse_bits, seeds_of
 from reference_rt.shapes.shape import FloatArray, IntArray
 
 TOGETHER = 16
 """Samples of a block."""
 
-DIMENSIONS = 48
-"""The first dimensions, whose pairs are made in blocks: those of eleven bounces.  6 KiB, which
-leaves most of the fastest cache to the scene."""
+DIMENSIONS = 11 * GROUP
+"""The first dimensions, whose pairs are made in blocks: those of eleven bounces.  11 KiB of
+it are ever used, which leaves most of the fastest cache to the scene."""
 
 FLOATS, INTEGERS = 2 * TOGETHER * DIMENSIONS, DIMENSIONS
 """The sizes of `BlockSample.pairs` and `BlockSample.made`."""
@@ -58,13 +59,13 @@ def draw(sampler: BlockSample, dimension: int) -> tuple[float, float]:
     """As `sobol.draw`."""
     sample, pairs = sampler.sample, sampler.pairs
     if dimension >= DIMENSIONS:
-        seeds = seeds_of(hash_of(sampler.key, dimension))
-        return pair(seeds, reverse_bits(np.uint64(sample)))
+        seeds = seeds_of(sampler.key, dimension)
+        return pair(seeds, dimension % GROUP, reverse_bits(np.uint64(sample)))
     at = 2 * TOGETHER * dimension
     lane = sample % TOGETHER
     if sampler.made[dimension] != sampler.block:
-        order, x_seed, y_seed = seeds_of(hash_of(sampler.key, dimension))
-        fill(order, x_seed, y_seed, sample - lane, pairs, at)
+        order, x_seed, y_seed = seeds_of(sampler.key, dimension)
+        fill(order, x_seed, y_seed, dimension % GROUP, sample - lane, pairs, at)
         sampler.made[dimension] = sampler.block
     return pairs[at + lane], pairs[at + TOGETHER + lane]
 
@@ -74,13 +75,14 @@ def fill_plainly(
     order: np.uint64,
     x_seed: np.uint64,
     y_seed: np.uint64,
+    place: int,
     first: int,
     pairs: FloatArray,
     at: int,
 ) -> None:
     """The pairs of TOGETHER samples from `first` on: u0 into pairs[at :], u1 after these."""
     for lane in range(TOGETHER):
-        u0, u1 = pair((order, x_seed, y_seed), reverse_bits(np.uint64(first + lane)))
+        u0, u1 = pair((order, x_seed, y_seed), place, reverse_bits(np.uint64(first + lane)))
         pairs[at + lane], pairs[at + TOGETHER + lane] = u0, u1
 
 
@@ -117,23 +119,44 @@ def _pascal(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
     return x
 
 
+def _reordered(builder: ir.IRBuilder, x: ir.Value, place: ir.Value, lanes: Any) -> ir.Value:
+    """`sobol.reordered`: the columns where bits are set, summed."""
+    table_type = ir.ArrayType(ir.IntType(32), COLUMNS.size)
+    columns = ir.Constant(table_type, [int(column) for column in COLUMNS.ravel()])
+    table = cgutils.global_constant(builder, "sampling_orders", columns)
+    number = place.type
+    total = cgutils.alloca_once_value(builder, x)
+    with builder.if_then(builder.icmp_signed(">", place, number(0))):
+        row = builder.mul(place, number(COLUMNS.shape[1]))
+        builder.store(_all(0), total)
+        with cgutils.for_range(builder, number(COLUMNS.shape[1])) as loop:
+            column = builder.load(builder.gep(table, [number(0), builder.add(row, loop.index)]))
+            bit = builder.and_(builder.lshr(x, lanes(loop.index)), _all(1))
+            kept = builder.and_(builder.sub(_all(0), bit), lanes(column))
+            builder.store(builder.xor(builder.load(total), kept), total)
+    return builder.load(total)
+
+
 def _generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-    *seeds, first, pairs, at = arguments
+    *seeds, place, first, pairs, at = arguments
 
     def in_all_lanes(x: ir.Value) -> ir.Value:
-        one = builder.insert_element(_all(0), builder.trunc(x, ir.IntType(32)), ir.IntType(32)(0))
+        word = ir.IntType(32)
+        low = x if x.type == word else builder.trunc(x, word)
+        one = builder.insert_element(_all(0), low, word(0))
         return builder.shuffle_vector(one, _all(0), _all(0))
 
     def store(x: ir.Value, offset: int) -> None:
         u = builder.uitofp(_reverse(builder, x), _REALS)
         u = builder.fmul(builder.fadd(u, _all(0.5, _REALS)), _all(2.0**-32, _REALS))
-        array = context.make_array(signature.args[4])(context, builder, pairs)
+        array = context.make_array(signature.args[5])(context, builder, pairs)
         place = builder.gep(array.data, [builder.add(at, at.type(offset))])
         builder.store(u, builder.bitcast(place, _REALS.as_pointer()), align=8)
 
     order, x_seed, y_seed = (in_all_lanes(seed) for seed in seeds)
     sample = builder.add(in_all_lanes(first), ir.Constant(_WORDS, list(range(TOGETHER))))
     index = _reverse(builder, _scramble(builder, _reverse(builder, sample), order))
+    index = _reordered(builder, index, place, in_all_lanes)
     store(_scramble(builder, index, x_seed), 0)
     store(_scramble(builder, _pascal(builder, index), y_seed), TOGETHER)
     return context.get_dummy_value()
@@ -141,10 +164,17 @@ def _generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: An
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _fill(
-    typing_context: Any, order: Any, x_seed: Any, y_seed: Any, first: Any, pairs: Any, at: Any
+    typing_context: Any,
+    order: Any,
+    x_seed: Any,
+    y_seed: Any,
+    place: Any,
+    first: Any,
+    pairs: Any,
+    at: Any,
 ) -> Any:
     seed, number = types.uint64, types.int64
-    return types.void(seed, seed, seed, number, pairs, number), _generate
+    return types.void(seed, seed, seed, number, number, pairs, number), _generate
 
 
 fill: Callable[..., None] = fill_plainly if numba.config.DISABLE_JIT else _fill

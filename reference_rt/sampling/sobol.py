@@ -1,8 +1,10 @@
-"""Sobol': padded two-dimensional (0, 2)-sequences with hashed Owen scrambling.
+"""Sobol': padded groups of (0, 2)-sequences with hashed Owen scrambling.
 
 Each pair of dimensions is the first two of Sobol's sequence, its order and its digits scrambled by
 hashes (Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4)): the first 2^k samples of a
-pixel are stratified in every pair, pairs and pixels are independent, and every number is uniform.
+pixel are stratified in every pair, and every number is uniform.  Groups of pairs and pixels are
+independent; the pairs of a group take their points in different orders, which stratify them
+against each other (`orders.py`).
 """
 
 from typing import Annotated, Literal, NamedTuple
@@ -13,6 +15,7 @@ from pydantic import Field
 from reference_rt.description import Description
 from reference_rt.kernel import kernel
 from reference_rt.sampling.hashing import LOW32, combine, mix
+from reference_rt.sampling.orders import COLUMNS, GROUP
 
 _1, _2, _4, _8, _16, _32 = (np.uint64(n) for n in (1, 2, 4, 8, 16, 32))
 _ODD = np.uint64(1)
@@ -95,18 +98,31 @@ def hash_of(key: np.uint64, dimension: int) -> np.uint64:
 
 
 @kernel
-def seeds_of(h: np.uint64) -> tuple[np.uint64, np.uint64, np.uint64]:
-    """For the order of a pixel's samples and for the digits of x and of y."""
-    return h & LOW32, h >> _32, mix(h) & LOW32
+def seeds_of(key: np.uint64, dimension: int) -> tuple[np.uint64, np.uint64, np.uint64]:
+    """For the order of a pixel's samples, which a group shares, and for the digits of x and y."""
+    h = hash_of(key, dimension)
+    return hash_of(key, dimension - dimension % GROUP) & LOW32, h >> _32, mix(h) & LOW32
+
+
+@kernel
+def reordered(index: np.uint64, place: int) -> np.uint64:
+    """Which point of its sequence the pair at a place of its group takes with number `index`."""
+    if place == 0:
+        return index
+    total = np.uint64(0)
+    for j in range(32):
+        if (index >> np.uint64(j)) & _1:
+            total ^= COLUMNS[place, j]
+    return total
 
 
 @kernel
 def pair(
-    seeds: tuple[np.uint64, np.uint64, np.uint64], reversed_index: np.uint64
+    seeds: tuple[np.uint64, np.uint64, np.uint64], place: int, reversed_index: np.uint64
 ) -> tuple[float, float]:
     """Two numbers of 32 bits, in the middle of their cells: never 0, never 1."""
     order, x_seed, y_seed = seeds
-    index = reverse_bits(scramble_low_to_high(reversed_index, order))
+    index = reordered(reverse_bits(scramble_low_to_high(reversed_index, order)), place)
     x = reverse_bits(scramble_low_to_high(index, x_seed))
     y = reverse_bits(scramble_low_to_high(pascal(index), y_seed))
     return (float(x) + 0.5) * 2.0**-32, (float(y) + 0.5) * 2.0**-32
@@ -114,4 +130,4 @@ def pair(
 
 @kernel
 def draw(sampler: SobolSample, dimension: int) -> tuple[float, float]:
-    return pair(seeds_of(hash_of(sampler.key, dimension)), sampler.reversed_index)
+    return pair(seeds_of(sampler.key, dimension), dimension % GROUP, sampler.reversed_index)

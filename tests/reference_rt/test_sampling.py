@@ -1,5 +1,7 @@
 """Samplers: uniform, stratified where promised, and functions of their arguments alone."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from reference_rt.sampling import (
     start_in_block,
     start_sample,
 )
+from reference_rt.sampling.orders import COLUMNS, GROUP, after, pascal_columns, product
 
 SAMPLERS = [rt.Sobol, rt.Independent]
 
@@ -96,30 +99,30 @@ def test_blocks_give_the_same_numbers(sampler):
 
 
 @entry_kernel
-def _fill_both(order, x_seed, y_seed, first, fast, plain):
-    blocks.fill(order, x_seed, y_seed, first, fast, 0)
-    blocks.fill_plainly(order, x_seed, y_seed, first, plain, 0)
+def _fill_both(order, x_seed, y_seed, place, first, fast, plain):
+    blocks.fill(order, x_seed, y_seed, place, first, fast, 0)
+    blocks.fill_plainly(order, x_seed, y_seed, place, first, plain, 0)
 
 
 def test_vector_code_gives_the_bits_of_the_plain_kernel():
     rng = np.random.default_rng(63)
     fast, plain = np.empty((2, 2 * blocks.TOGETHER))
-    for _ in range(300):
+    for k in range(300):
         seeds = rng.integers(0, 2**32, 3, dtype=np.uint64)
-        first = int(rng.integers(0, 2**27)) * blocks.TOGETHER
-        _fill_both(*seeds, first, fast, plain)
+        first, place = int(rng.integers(0, 2**27)) * blocks.TOGETHER, k % GROUP
+        _fill_both(*seeds, place, first, fast, plain)
         assert np.array_equal(fast, plain)
     # And of Python's.
     with np.errstate(over="ignore"):
-        blocks.fill_plainly(*seeds, first, plain, 0)
+        blocks.fill_plainly(*seeds, place, first, plain, 0)
     assert np.array_equal(fast, plain)
     assert [tuple(p) for p in plain.reshape(2, -1).T] == [
-        sobol.pair(tuple(seeds), sobol.reverse_bits(np.uint64(first + k)))
+        sobol.pair(tuple(seeds), place, sobol.reverse_bits(np.uint64(first + k)))
         for k in range(blocks.TOGETHER)
     ]
 
 
-@pytest.mark.parametrize("dimension", [0, 1, 7, 1000])
+@pytest.mark.parametrize("dimension", [0, 1, 2, 3, 4, 7, 1000])
 def test_sobol_samples_are_nets(dimension):
     """The first 2^k: one in each elementary interval of area 2^-k, whatever its shape."""
     for seed, pixel in ((0, 0), (0, 1), (7, 12345), (2**63 - 1, 2**40)):
@@ -128,6 +131,51 @@ def test_sobol_samples_are_nets(dimension):
             for a in range(k + 1):
                 x, y = (u[: 2**k] * [2**a, 2 ** (k - a)]).astype(int).T
                 assert len(set(zip(x, y, strict=True))) == 2**k
+
+
+def boxes(points, exponents):
+    """In how many boxes there are points (n, d), of 4^exponents[k] to the unit along axis k."""
+    return len(np.unique((points * 4 ** np.array(exponents)).astype(int), axis=0))
+
+
+@pytest.mark.parametrize("first", [0, 2, 5, 7, 1000, 1002])
+def test_two_pairs_of_a_group_are_nets_in_base_4(first):
+    """Film with light pick and lobe, light point with direction: the first 4^m samples, one in each
+    box of volume 4^-m with sides that are powers of 4."""
+    for seed, pixel in ((0, 0), (7, 12345), (2**63 - 1, 2**40)):
+        both = [draw(rt.Sobol(seed=seed), pixel, np.arange(256), first + k) for k in range(2)]
+        u = np.concatenate(both, axis=1)
+        for m in range(1, 5):
+            for exponents in itertools.product(range(m + 1), repeat=4):
+                if sum(exponents) == m:
+                    assert boxes(u[: 4**m], exponents) == 4**m
+
+
+def test_orders_rearrange_blocks():
+    """Upper triangular with ones on the diagonal: the first 2^k points stay the first 2^k."""
+    for row in COLUMNS:
+        for j, column in enumerate(row.tolist()):
+            assert column >> j == 1
+
+
+@pytest.mark.parametrize("bits", [2, 4])
+def test_orders_add_up(bits):
+    """C_a after C_b is C_(a + b): a wrong product of the field would show."""
+    for a in range(2**bits):
+        for b in range(2**bits):
+            total = after(pascal_columns(b, bits), pascal_columns(a, bits))
+            assert total == pascal_columns(a ^ b, bits)
+
+
+@pytest.mark.parametrize("bits", [2, 4])
+def test_fields_are_fields(bits):
+    """The multiples of any element but zero are all; products distribute over sums."""
+    elements = range(2**bits)
+    for a in elements[1:]:
+        assert sorted(product(a, b, bits) for b in elements) == list(elements)
+        for b, c in itertools.product(elements, repeat=2):
+            total = product(a, b, bits) ^ product(a, c, bits)
+            assert product(a, b ^ c, bits) == total
 
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
@@ -171,10 +219,10 @@ def test_no_pixel_repeats_another_seeds_pixel(sampler):
 
 
 def test_sobol_dimensions_are_shuffled_against_each_other():
-    """Within a pixel, sample k of one pair says nothing of sample k of the next."""
+    """Within a pixel, sample k of one pair says nothing of sample k of another group's."""
     u = np.array(
         [
-            [draw(rt.Sobol(spp=1), p, np.arange(256), k)[:, 0] - 0.5 for k in (2, 3)]
+            [draw(rt.Sobol(spp=1), p, np.arange(256), k)[:, 0] - 0.5 for k in (2, 2 + GROUP)]
             for p in range(400)
         ]
     )
