@@ -168,7 +168,7 @@ def _advance(
     if depth + 1 >= max_depth:
         return Step(black, black, ray, False, ray, state)
     reflectance = row(world.reflectance, point.material)
-    dimension = sampling.FIRST_BOUNCE + sampling.PER_BOUNCE * depth
+    dimension = sampling.PER_BOUNCE * depth
     u0, u1 = blocks.draw(sampler, dimension + sampling.LIGHT_POINT)
     towards = uniform_sphere(u0, u1)
     wi = to_local(frame, towards)
@@ -177,9 +177,6 @@ def _advance(
         weight = power_heuristic(PDF, wi.z * INV_PI)
         light = throughput * (reflectance * (wi.z * INV_PI) * world.sky * (weight / PDF))
         shadow = ray_from(point, towards)
-    u_roulette = 0.5
-    if depth + 1 >= rr_depth:
-        _, u_roulette = blocks.draw(sampler, dimension + sampling.LOBE_AND_ROULETTE)
     u0, u1 = blocks.draw(sampler, dimension + sampling.BSDF_DIRECTION)
     if wo.z <= 0.0:
         return Step(black, light, shadow, False, ray, state)
@@ -190,6 +187,7 @@ def _advance(
     throughput = throughput * reflectance
     if depth + 1 >= rr_depth:
         survival = min(max_component(throughput), ROULETTE_CAP)
+        u_roulette, _ = blocks.draw(sampler, dimension + sampling.ROULETTE)
         if u_roulette >= survival:
             return Step(black, light, shadow, False, ray, state)
         throughput = throughput * (1.0 / survival)
