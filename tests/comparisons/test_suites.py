@@ -327,7 +327,9 @@ def test_where_no_case_can_run_nothing_is_said_of_any(tmp_path):
 
 
 INTERRUPTED = """
+import signal
 import sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are deaf to it
 from pathlib import Path
 from comparisons.mitsuba_backend import Backend
 from comparisons.suites import run, suite

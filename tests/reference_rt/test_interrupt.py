@@ -14,6 +14,8 @@ def start(folder, *extra):
     """A render that would take minutes, after it has begun to render."""
     # Loading kernels takes seconds or none: only the child itself knows when it has begun.
     code = (
+        # A shell's background jobs, and their children, are born deaf to Ctrl-C.
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "import sys, reference_rt.console as c\n"
         "call = c.ProgressLine.__call__\n"
         "def say(self, what, fraction):\n"
