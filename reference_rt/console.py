@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import (
     BarColumn,
     Progress,
+    ProgressColumn,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
@@ -22,22 +23,21 @@ _PATIENCE = 0.4
 """Seconds before compiling is mentioned: kernels from the cache load faster than that."""
 
 
-class ProgressLine:
-    """A `render.Progress`: call it with what is being done and the fraction that is done."""
+class Bar:
+    """A bar on a terminal, nothing without one: what every display of progress begins with.
 
-    def __init__(self) -> None:
-        self._console = Console(stderr=True)
+    columns: what stands behind the bar.
+    """
+
+    def __init__(self, *columns: ProgressColumn, console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True, highlight=False)
         self._bar = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
-            TextColumn("{task.percentage:>3.0f}%"),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
+            *columns,
             console=self._console,
             transient=True,
         )
-        self._tasks: dict[str, TaskID] = {}
-        self._started: dict[str, float] = {}
 
     def __enter__(self) -> Self:
         if self._console.is_terminal:
@@ -53,6 +53,20 @@ class ProgressLine:
         if self._console.is_terminal:
             self._bar.stop()
 
+    def line(self, text: str) -> None:
+        """One line that stays."""
+        self._console.print(text, markup=False, soft_wrap=True)
+
+
+class ProgressLine(Bar):
+    """A `render.Progress`: call it with what is being done and the fraction that is done."""
+
+    def __init__(self) -> None:
+        percentage = TextColumn("{task.percentage:>3.0f}%")
+        super().__init__(percentage, TimeElapsedColumn(), TimeRemainingColumn())
+        self._tasks: dict[str, TaskID] = {}
+        self._started: dict[str, float] = {}
+
     def __call__(self, what: str, fraction: float) -> None:
         words = _WORDS.get(what, what)
         if what not in self._tasks:
@@ -67,4 +81,4 @@ class ProgressLine:
             self._bar.update(task, visible=False)
             seconds = time.perf_counter() - self._started[what]
             if not self._console.is_terminal and seconds > _PATIENCE:
-                self._console.print(f"{words}: {seconds:.1f} s", highlight=False)
+                self.line(f"{words}: {seconds:.1f} s")

@@ -105,7 +105,7 @@ def render(
         def say_part(what: str, fraction: float, k: int = k) -> None:
             say(what, (k + fraction) / len(jobs))
 
-        _run_bands(job.band, job.arguments, pixels, job.spp, threads, say_part)
+        run_bands(job.band, job.arguments, pixels, job.spp, threads, say_part)
     clock.append(time.perf_counter())
     seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
     return Picture(layers, shown, seconds)
@@ -175,7 +175,7 @@ def _check(scene: Scene) -> None:
         )
 
 
-def _run_bands(
+def run_bands(
     band: Any, arguments: Sequence[Any], pixels: int, spp: int, threads: int, say: Progress
 ) -> None:
     """Bands on a pool.  Kernels release the GIL; the main thread reports and listens to Ctrl-C."""

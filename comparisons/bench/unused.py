@@ -15,7 +15,7 @@ from reference_rt.film import BoxFilter, Film
 from reference_rt.integrators import Path
 from reference_rt.lights import Constant
 from reference_rt.materials import AnyMaterial, Diffuse
-from reference_rt.render import Picture, _run_bands, render
+from reference_rt.render import Picture, render, run_bands
 from reference_rt.sampling import Sobol
 from reference_rt.scene import Scene
 from reference_rt.shapes import Sphere
@@ -119,7 +119,7 @@ def render_pruned(scene: Scene, threads: int | None = None) -> Picture:
         out.reshape(-1, 3),
     )
     pixels, threads = out[..., 0].size, threads or os.cpu_count() or 1
-    _run_bands(spheres_only.render_band, arguments, pixels, sampler.spp, threads, _silent)
+    run_bands(spheres_only.render_band, arguments, pixels, sampler.spp, threads, _silent)
     return Picture({"colour": out})
 
 

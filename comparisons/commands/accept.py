@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from comparisons.commands.extra import compare_extra
 from reference_rt.cli import guarded
-from reference_rt.errors import ReferenceUnavailableError, SceneError, UsageError
+from reference_rt.errors import SceneError, UsageError
 from reference_rt.scene import Scene
 
 if TYPE_CHECKING:
@@ -45,17 +46,12 @@ def accept(
     ] = None,
 ) -> None:
     """Accept pictures as a baseline for `gate --baseline`; never in CI."""
-    # Imported here: `reference-rt render` must not wait for what only comparing needs.
-    try:
+    with compare_extra("accepting"):
         from comparisons.gate import baselines as store
         from comparisons.gate.digest import scene_digest
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import check_sizes, is_noise_free
         from comparisons.provenance import ours
-    except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"accepting needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
 
     if listed or unused is not None:
         if candidates or name:

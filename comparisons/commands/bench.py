@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from comparisons.commands.extra import compare_extra
 from reference_rt.cli import guarded
-from reference_rt.errors import ReferenceUnavailableError, UsageError
+from reference_rt.errors import UsageError
 
 
 @guarded
@@ -38,8 +39,7 @@ def bench(
     ),
 ) -> None:
     """Measure the speed of the renderer beside Mitsuba's; takes about half an hour."""
-    # Imported here: `reference-rt render` must not wait for what only comparing needs.
-    try:
+    with compare_extra():
         from rich.console import Console
 
         from comparisons.bench import table
@@ -47,10 +47,6 @@ def bench(
         from comparisons.bench.groups import chosen
         from comparisons.bench.run import run
         from comparisons.bench.setting import Setting
-    except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
 
     groups = chosen(only or ())
     if mesh is not None and not mesh.is_file():

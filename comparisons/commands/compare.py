@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from comparisons.commands.extra import compare_extra
 from reference_rt.cli import adjusted, guarded
-from reference_rt.errors import ReferenceUnavailableError
 from reference_rt.scene import Scene
 
 
@@ -30,17 +30,12 @@ def compare(
     threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
 ) -> None:
     """Render scenes here and in Mitsuba, and say whether they agree."""
-    # Imported here: `reference-rt render` must not wait for what only comparing needs.
-    try:
+    with compare_extra():
         from comparisons.budget import Budget
         from comparisons.compare import Subject, compare_scene
         from comparisons.provenance import provenance
         from comparisons.report import write_report, write_results
         from comparisons.verdict import exit_code
-    except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
 
     console = Console(stderr=True, highlight=False)
     described = [adjusted(Scene.load(path), spp, size, None, seed) for path in scenes]

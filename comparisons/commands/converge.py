@@ -6,9 +6,10 @@ from typing import Annotated
 
 import typer
 
+from comparisons.commands.extra import compare_extra
 from reference_rt.cli import guarded
 from reference_rt.console import ProgressLine
-from reference_rt.errors import ReferenceUnavailableError, UsageError
+from reference_rt.errors import UsageError
 from reference_rt.scene import Scene
 
 
@@ -50,8 +51,7 @@ def converge(
     fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
 ) -> None:
     """Error against run time: ours and Mitsuba's; what is done is not done again."""
-    # Imported here: `reference-rt render` must not wait for what only comparing needs.
-    try:
+    with compare_extra():
         from comparisons.convergence.contestants import chosen
         from comparisons.convergence.data import Settings
         from comparisons.convergence.outputs import write_results, write_table
@@ -62,10 +62,6 @@ def converge(
         from comparisons.convergence.summary import again, lines_of
         from comparisons.provenance import provenance
         from comparisons.suites.suite import folder_name
-    except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
     from reference_rt.files import check_writable
 
     settings = Settings(

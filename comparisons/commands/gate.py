@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from comparisons.commands.extra import compare_extra
 from reference_rt.cli import guarded
 from reference_rt.console import ProgressLine
-from reference_rt.errors import ReferenceRtError, ReferenceUnavailableError, UsageError
+from reference_rt.errors import ReferenceRtError, UsageError
 from reference_rt.scene import Scene
 
 if TYPE_CHECKING:
@@ -87,18 +88,13 @@ def gate(
     Exit codes: 0 they agree, 1 they differ or are too noisy to tell, 2 usage, 3 invalid picture,
     scene or baseline, 4 the renderer could not run, or the baseline is missing or stale.
     """
-    # Imported here: `reference-rt render` must not wait for what only comparing needs.
-    try:
+    with compare_extra("the gate"):
         from comparisons.gate import outputs
         from comparisons.gate.driver import Command, drive
         from comparisons.gate.gate import not_run
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import is_noise_free
         from comparisons.gate.request import Request, gated
-    except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"the gate needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
 
     if (command is None) == (not candidates):
         raise UsageError("expected either candidates or --command")

@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from comparisons.commands.extra import compare_extra
 from reference_rt.cli import guarded
-from reference_rt.errors import ReferenceUnavailableError, UsageError
+from reference_rt.errors import UsageError
 
 
 @guarded
@@ -27,7 +28,7 @@ def methods(
 ) -> None:
     """Measure the text-book's ways to intersect: error against nanoseconds per ray."""
     # Imported here: `reference-rt render` must not wait for what only measuring needs.
-    try:
+    with compare_extra("measuring"):
         from comparisons.methods.page import write_page
         from comparisons.methods.run import FAMILIES, FULL, QUICK, run
         from comparisons.methods.terminal import tables
@@ -35,10 +36,6 @@ def methods(
         from comparisons.provenance import ours
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
-    except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"measuring needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
     from reference_rt.console import ProgressLine
     from reference_rt.files import check_writable
 

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
+from comparisons.commands.extra import compare_extra
 from reference_rt.cli import guarded
-from reference_rt.errors import ReferenceUnavailableError
 
 
 @guarded
@@ -17,14 +17,9 @@ def report(
     ] = None,
 ) -> None:
     """Write results.json and the page again, from the records of a suite."""
-    # Imported here: `reference-rt render` must not wait for what only comparing needs.
-    try:
+    with compare_extra():
         from comparisons.report import write_report, write_results
         from comparisons.suites.archive import read_archive
-    except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
 
     archive = read_archive(folder)
     page = out or folder / "report.html"

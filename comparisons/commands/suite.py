@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
+from comparisons.commands.extra import compare_extra
 from comparisons.results import RUNGS
 from reference_rt.cli import guarded
-from reference_rt.errors import ReferenceUnavailableError, UsageError
+from reference_rt.errors import UsageError
 
 MOST_JOBS = 4
 """At once, where nobody says: each takes up to 2 GB."""
@@ -42,18 +43,13 @@ def suite(
     ),
 ) -> None:
     """Compare all scenes of a folder with Mitsuba; what is done is not done again."""
-    # Imported here: `reference-rt render` must not wait for what only comparing needs.
-    try:
+    with compare_extra():
         from comparisons.ci import github as github_actions
         from comparisons.ci import junit as junit_xml
         from comparisons.suites.display import summarise
         from comparisons.suites.run import Options, run_suite
         from comparisons.suites.suite import load_suite, plan
         from comparisons.verdict import exit_code
-    except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"comparing needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
 
     rungs = tuple(tier or ())
     if unknown := [rung for rung in rungs if rung not in RUNGS[2:]]:

@@ -3,11 +3,9 @@ standard error only."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from types import TracebackType
-from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -15,6 +13,7 @@ from comparisons.ci.ranking import ranked
 from comparisons.results import Case
 from comparisons.suites.worker import Request
 from comparisons.verdict import PASSING
+from reference_rt.console import Bar
 
 _STYLES = {
     "agree": "green",
@@ -28,38 +27,13 @@ _STYLES = {
 _SLOWEST = 3
 
 
-class Display:
+class Display(Bar):
     """Told of each case as it begins and ends."""
 
     def __init__(self, cases: int) -> None:
-        self._console = Console(stderr=True, highlight=False)
-        self._bar = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            console=self._console,
-            transient=True,
-        )
+        super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
         self._task = self._bar.add_task("", total=cases)
         self._running: dict[str, str] = {}
-
-    def __enter__(self) -> Self:
-        if self._console.is_terminal:
-            self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._console.is_terminal:
-            self._bar.stop()
-
-    def line(self, text: str) -> None:
-        self._console.print(text, markup=False, soft_wrap=True)
 
     def doing(self, request: Request, step: str) -> None:
         """A case begins, or is at `step`."""

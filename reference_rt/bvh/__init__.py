@@ -31,8 +31,8 @@ from reference_rt.bvh.wide import (
     kind_of,
     row_of,
     size_of,
-    widened,
 )
+from reference_rt.bvh.widening import widened
 from reference_rt.shapes.shape import FloatArray, IntArray
 
 __all__ = [

@@ -82,7 +82,7 @@ def test_an_interrupt_while_bands_are_handed_out(monkeypatch):
 
     monkeypatch.setattr(module, "ThreadPoolExecutor", Pool)
     with pytest.raises(KeyboardInterrupt):
-        module._run_bands(band, (), 1000, module.SAMPLES_PER_BAND, 1, lambda what, fraction: None)
+        module.run_bands(band, (), 1000, module.SAMPLES_PER_BAND, 1, lambda what, fraction: None)
     assert len(ran) < 50
 
 
