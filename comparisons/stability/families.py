@@ -1,7 +1,7 @@
 """All families, in order.
 
-To add one: a file beside this one that states its law, ranges, counts and what passes at its top and
-defines a `Family`, and a line here.
+To add one: a file beside this one that states its law, ranges, counts and what passes at its top
+and defines a `Family`, and a line here.
 """
 
 import importlib
