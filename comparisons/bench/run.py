@@ -15,6 +15,7 @@ from comparisons.bench.machine import machine
 from comparisons.bench.row import Row, row_from
 from comparisons.bench.setting import Setting
 from comparisons.bench.table import markdown
+from comparisons.sources import sources_digest
 from reference_rt.errors import ReferenceUnavailableError
 from reference_rt.files import check_writable, replacing
 
@@ -78,15 +79,7 @@ def run(
 
 def key_of(setting: Setting, facts: dict[str, Any]) -> str:
     """What rows are measured with: they are read again only where all of this is the same."""
-    import comparisons
-    import reference_rt
-
-    digest = hashlib.sha256()
-    for package in (reference_rt, comparisons):
-        root = Path(package.__path__[0])
-        for source in sorted(root.rglob("*.py")):
-            digest.update(source.relative_to(root).as_posix().encode() + b"\0")
-            digest.update(hashlib.sha256(source.read_bytes()).digest())
+    digest = hashlib.sha256(sources_digest().encode())
     for path in sorted(p for p in setting.scenes.rglob("*") if p.is_file()):
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     if setting.mesh is not None:

@@ -1,16 +1,11 @@
-"""The rows as tables: for a terminal, and as Markdown between two markers of a file."""
+"""The rows as tables: for a terminal, and as Markdown."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
 from comparisons.bench.row import LIMIT, Row
-from reference_rt.errors import UsageError
-from reference_rt.files import replacing
-
-BEGIN, END = "<!-- bench -->", "<!-- end -->"
 
 _COLUMNS = ("what", "ours", "against", "ratio", "quartiles", "goal", "met")
 
@@ -55,31 +50,6 @@ def described(machine: Mapping[str, Any]) -> str:
     return "Measured: " + ", ".join(p for p in parts if "None" not in p) + "."
 
 
-def rewrite(path: Path, table: str) -> None:
-    """Put the table between the markers of a file, in the place of what is there.
-
-    Raises UsageError where the file cannot be read, or has not both markers.
-    """
-    before, after = around_markers(path)
-    with replacing(path) as temporary:
-        temporary.write_text(f"{before}{BEGIN}\n{table}{END}{after}", encoding="utf-8")
-
-
-def around_markers(path: Path) -> tuple[str, str]:
-    """What stands before and after the markers of a file.  Raises UsageError."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise UsageError(f"{path}: is not text; expected UTF-8") from None
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise UsageError(f"{path}: has no place for the table; expected '{BEGIN}' and '{END}'")
-    return before, after
-
-
 def _cells(row: Row) -> list[str]:
     around = row.spread.get("ratio")
     sign = "≤" if row.better == "lower" else "≥"
@@ -97,15 +67,3 @@ def _cells(row: Row) -> list[str]:
 def amount(value: float, unit: str) -> str:
     """A number with three digits that count, and its unit."""
     return f"{value:.0f} {unit}" if value >= 1000.0 else f"{value:.3g} {unit}"
-
-
-__all__ = [
-    "BEGIN",
-    "END",
-    "amount",
-    "around_markers",
-    "described",
-    "markdown",
-    "rewrite",
-    "terminal",
-]

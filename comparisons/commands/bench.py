@@ -42,6 +42,7 @@ def bench(
     with compare_extra():
         from rich.console import Console
 
+        from comparisons import marked
         from comparisons.bench import table
         from comparisons.bench.display import Display
         from comparisons.bench.groups import chosen
@@ -52,13 +53,14 @@ def bench(
     if mesh is not None and not mesh.is_file():
         raise UsageError(f"--mesh: there is no file '{mesh}'")
     if markdown is not None:
-        table.around_markers(markdown)  # now, rather than after half an hour
+        marked.around(markdown, "bench")  # now, rather than after half an hour
     with Display() as display:
         setting = Setting(scenes=scenes, mesh=mesh, quick=quick, say=display.say)
         outcome = run(groups, setting, out, display, fresh)
     Console().print(table.terminal(outcome.rows))
     if markdown is not None:
-        table.rewrite(markdown, table.markdown(outcome.rows, outcome.machine, outcome.not_measured))
+        written = table.markdown(outcome.rows, outcome.machine, outcome.not_measured)
+        marked.rewrite(markdown, "bench", written)
     for name, why in outcome.not_measured.items():
         typer.echo(f"{name}: not measured: {why}", err=True)
     typer.echo(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)

@@ -1,6 +1,5 @@
 """What a case is made with, as one number: where that is unchanged, it need not be run again."""
 
-import functools
 import hashlib
 import importlib.metadata
 import json
@@ -9,15 +8,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-import comparisons
-import reference_rt
+from comparisons import sources
 from comparisons.budget import Budget
 from comparisons.mitsuba_backend import Backend
 from reference_rt.scene import Scene
 
 _APART = (
-    "bench", "report", "ci", "commands", "convergence", "gate", "selftest", "pytest_plugin.py",
-    "cli.py",
+    "bench", "report", "ci", "commands", "convergence", "gate", "selftest", "stability",
+    "pytest_plugin.py", "cli.py", "marked.py",
 )  # fmt: skip
 """Parts of `comparisons` that no verdict of a suite depends on."""
 
@@ -79,16 +77,6 @@ def _with_parts(path: Path) -> list[Path]:
     return [path, *(path.parent / unquote(u) for u in uris if not u.startswith("data:"))]
 
 
-@functools.cache
 def sources_digest() -> str:
-    """SHA-256 of the sources of both packages: a change of any line may change a verdict."""
-    digest = hashlib.sha256()
-    for package in (reference_rt, comparisons):
-        root = Path(package.__path__[0])
-        for source in sorted(root.rglob("*.py")):
-            name = source.relative_to(root)
-            if package is comparisons and name.parts[0] in _APART:
-                continue
-            digest.update(name.as_posix().encode() + b"\0")
-            digest.update(hashlib.sha256(source.read_bytes()).digest())
-    return digest.hexdigest()
+    """Of the sources that verdicts depend on."""
+    return sources.sources_digest(*_APART)

@@ -11,11 +11,11 @@ from types import FrameType
 from typing import Any
 
 from comparisons.mitsuba_backend import backend
+from comparisons.processes import pool
 from comparisons.provenance import provenance
 from comparisons.record import read_case, read_record, write_case
 from comparisons.report import write_report, write_results
 from comparisons.results import Case, Tier
-from comparisons.suites import pool
 from comparisons.suites.display import Display
 from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Plan, Source, Work, folder_name
@@ -135,19 +135,19 @@ def _done(request: Request) -> tuple[Case, float] | None:
 
 def _outcomes(
     requests: Sequence[Request], seconds: float, options: Options, display: Display
-) -> Iterator[pool.Outcome]:
-    arguments: list[str] = []
+) -> Iterator[pool.Outcome[Request]]:
+    worker = ["comparisons.suites.worker"]
     if options.threads is not None:
-        arguments += ["--threads", str(options.threads)]
+        worker += ["--threads", str(options.threads)]
     if options.runner is not None:
-        arguments += ["--runner", options.runner]
-    running = pool.run(requests, options.jobs, seconds, display.doing, arguments)
+        worker += ["--runner", options.runner]
+    running = pool.run(requests, options.jobs, seconds, display.doing, worker)
     # Closed at once if the caller is interrupted: no process outlives this one.
     with contextlib.closing(running):
         yield from running
 
 
-def _case(outcome: pool.Outcome) -> Case:
+def _case(outcome: pool.Outcome[Request]) -> Case:
     """The case as its worker recorded it, or one that says why there is none; that one has no key,
     so that it is run again next time."""
     request = outcome.request

@@ -1,12 +1,7 @@
 """`python -m comparisons.suites.worker`: compares one case after another, as a pool tells it.
 
-A process, since a fault of a native library ends the one it is in.  Each line of standard input is
-a JSON object that asks for a case (`Request`); each line of standard output one that answers:
-
-    {"say": text}          any number of times, what is being done
-    {"done": true}         the case is in its folder
-    {"failed": text}       it could not be run, and why
-    {"unavailable": text}  no case can be run here, and why
+It keeps to `comparisons.processes.protocol`; what it is asked for is a `Request`, and the case is
+put in its folder.
 
 `--runner module:function` puts another function in the place of `compare` (for tests: one that
 crashes, say); `--threads` is how many threads it may use.
@@ -16,21 +11,18 @@ import argparse
 import dataclasses
 import faulthandler
 import importlib
-import json
-import os
 import sys
 import time
-import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 from pydantic import BaseModel, ConfigDict
 
 from comparisons.budget import Budget
+from comparisons.processes.protocol import carry_out, private_stdout, tell
 from comparisons.record import write_case
 from comparisons.results import Case
-from reference_rt.errors import ReferenceRtError, ReferenceUnavailableError
 from reference_rt.scene import Scene
 
 Runner = Callable[..., Case]
@@ -73,18 +65,11 @@ def main() -> None:
         answer(Request.model_validate_json(line), runner, options.threads, answers)
 
 
-def private_stdout() -> TextIO:
-    """Standard output, of which nobody else knows from now on: what anyone prints, in Python or
-    not, goes to standard error."""
-    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)
-    return answers
-
-
 def answer(request: Request, runner: Runner, threads: int | None, answers: TextIO) -> None:
     """Run one case, write its record, and say how it went."""
-    start = time.perf_counter()
-    try:
+
+    def run() -> None:
+        start = time.perf_counter()
         case = runner(
             Scene.load(request.scene),
             request.budget,
@@ -99,22 +84,8 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
             notes=(*case.notes, described(request.budget)),
         )
         write_case(request.folder, case, request.key, time.perf_counter() - start)
-    except BrokenPipeError:  # nobody listens any more
-        raise
-    except ReferenceUnavailableError as error:
-        tell(answers, unavailable=str(error))
-    except ReferenceRtError as error:
-        tell(answers, failed=str(error))
-    except (Exception, SystemExit) as error:
-        traceback.print_exc()
-        tell(answers, failed=f"{type(error).__name__}: {' '.join(str(error).split())}")
-    else:
-        tell(answers, done=True)
 
-
-def tell(answers: TextIO, **message: Any) -> None:
-    """Write one line of the protocol."""
-    print(json.dumps(message), file=answers, flush=True)
+    carry_out(run, answers)
 
 
 def described(budget: Budget) -> str:

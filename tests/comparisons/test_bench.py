@@ -8,12 +8,11 @@ from typing import Any
 import pytest
 from bench_rows import FIELDS, a_table, made_up
 
-from comparisons.bench import equal_error, table
+from comparisons.bench import equal_error
 from comparisons.bench.machine import machine
 from comparisons.bench.row import LIMIT, against, row_from, within
 from comparisons.bench.setting import Setting
 from comparisons.bench.timing import alternate, ratios, seconds, spread
-from reference_rt.errors import UsageError
 
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -171,31 +170,3 @@ def test_the_table_says_what_when_and_where() -> None:
     assert "| the row one | 0.5 s | 1 s (another) | 0.50 | 0.50 to 0.50 | ≤ 0.8 | yes |" in text
     assert "two\\|three" in text
     assert "Not measured: cold (no time)" in text
-
-
-def test_rewriting_a_file_is_idempotent(tmp_path: Path) -> None:
-    path = tmp_path / "README.md"
-    path.write_text(f"before\n{table.BEGIN}\nformer\n{table.END}\nafter\n<!-- end -->\n")
-    text = a_table([made_up()])
-    table.rewrite(path, text)
-    once = path.read_text()
-    table.rewrite(path, text)
-    assert path.read_text() == once
-    assert once.startswith(f"before\n{table.BEGIN}\n")
-    assert once.endswith(f"{table.END}\nafter\n<!-- end -->\n")
-    assert "former" not in once
-    assert "the row one" in once
-
-
-@pytest.mark.parametrize("text", ["", f"{table.BEGIN}\n", f"{table.END}\n{table.BEGIN}\n"])
-def test_a_file_without_markers_is_refused_and_kept(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "README.md"
-    path.write_text(text)
-    with pytest.raises(UsageError, match="no place for the table"):
-        table.rewrite(path, "x\n")
-    assert path.read_text() == text
-
-
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="cannot be read"):
-        table.rewrite(tmp_path / "README.md", "x\n")

@@ -18,8 +18,9 @@ from comparisons.budget import Budget
 from comparisons.commands.report import report
 from comparisons.commands.suite import suite as suite_command
 from comparisons.mitsuba_backend import Backend
+from comparisons.processes import pool
 from comparisons.record import read_case, read_record
-from comparisons.suites import pool, run
+from comparisons.suites import run
 from comparisons.suites.archive import read_archive
 from comparisons.suites.keys import case_key, files_digest
 from comparisons.suites.run import Options, run_suite
@@ -321,9 +322,9 @@ def test_where_no_case_can_run_nothing_is_said_of_any(tmp_path):
     with pytest.raises(ReferenceUnavailableError, match="no reference here"):
         run_in(tmp_path / "out", folder)
     request = Request(name="a", scene=folder / "a.yaml", budget=Budget(), folder=tmp_path)
-    options = ("--runner", "no_such_module:f")
+    worker = ("comparisons.suites.worker", "--runner", "no_such_module:f")
     with pytest.raises(ReferenceUnavailableError, match="no_such_module"):
-        list(pool.run([request], 1, 60.0, lambda *_: None, options))
+        list(pool.run([request], 1, 60.0, lambda *_: None, worker))
 
 
 INTERRUPTED = """

@@ -1,4 +1,5 @@
-"""Worker processes that run cases: one that dies or hangs is replaced, and the others go on."""
+"""Worker processes that carry out requests: one that dies or hangs is replaced, and the others go
+on."""
 
 import contextlib
 import json
@@ -12,9 +13,8 @@ import threading
 import time
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
-from comparisons.suites.worker import Request
 from reference_rt.errors import ReferenceUnavailableError
 
 MOST_CASES = 40
@@ -31,46 +31,53 @@ _PATIENCE = 5.0
 """Seconds in which a process that has closed its pipe should have ended."""
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """How a case ended.  failure: why there is no record of it, None if there is one;  log: what
-    its process wrote to standard error meanwhile;  wall: seconds."""
+class Request(Protocol):
+    """What is asked for, as one line of JSON."""
 
-    request: Request
+    def model_dump_json(self) -> str: ...
+
+
+R = TypeVar("R", bound=Request)
+
+
+@dataclass(frozen=True)
+class Outcome(Generic[R]):
+    """How a request ended.  failure: why nothing came of it, None if something did;  log: what its
+    process wrote to standard error meanwhile;  wall: seconds."""
+
+    request: R
     failure: str | None
     log: str
     wall: float
 
 
-Progress = Callable[[Request, str], None]
-"""Is told what is being done for a case, "" when it begins."""
-
-
 def run(
-    requests: Sequence[Request],
+    requests: Sequence[R],
     workers: int,
     seconds: float,
-    progress: Progress,
-    options: Sequence[str] = (),
-) -> Generator[Outcome, None, None]:
-    """Run cases in as many processes at once, and give outcomes as they come.
+    progress: Callable[[R, str], None],
+    module: Sequence[str],
+) -> Generator[Outcome[R], None, None]:
+    """Have requests carried out by as many processes at once, and give outcomes as they come.
 
-    seconds: how long a case may take;  options: of the worker's command line.  Closing the iterator
-    ends the processes.  Raises ReferenceUnavailableError where no case can be run.
+    seconds: how long a request may take;  progress: is told what is being done for one, "" when it
+    begins;  module: of a worker that keeps to `protocol`, and options of its command line.  Closing
+    the iterator ends the processes.  Raises ReferenceUnavailableError where none can be carried
+    out.
     """
-    command = [sys.executable, "-m", "comparisons.suites.worker", *options]
+    command = [sys.executable, "-m", *module]
     left = list(reversed(requests))
-    inbox: queue.Queue[tuple[_Worker, bytes]] = queue.Queue()
-    busy: list[_Worker] = []
+    inbox: queue.Queue[tuple[_Worker[R], bytes]] = queue.Queue()
+    busy: list[_Worker[R]] = []
     with contextlib.ExitStack() as cleanup:
 
         def employ() -> None:
-            worker = _Worker(command, inbox)
+            worker = _Worker[R](command, inbox)
             cleanup.callback(worker.close)
             busy.append(worker)
             give(worker)
 
-        def give(worker: _Worker) -> None:
+        def give(worker: _Worker[R]) -> None:
             request = left.pop()
             worker.begin(request, time.monotonic() + seconds)
             progress(request, "")
@@ -105,8 +112,8 @@ def run(
 
 
 def _next(
-    inbox: "queue.Queue[tuple[_Worker, bytes]]", busy: "list[_Worker]"
-) -> "tuple[_Worker, dict[str, Any] | None]":
+    inbox: "queue.Queue[tuple[_Worker[R], bytes]]", busy: "list[_Worker[R]]"
+) -> "tuple[_Worker[R], dict[str, Any] | None]":
     """What a worker says, nothing if it has died, None if its time is up."""
     late = min(busy, key=lambda worker: worker.deadline)
     try:
@@ -116,10 +123,12 @@ def _next(
     return worker, json.loads(line) if line else {}
 
 
-class _Worker:
+class _Worker(Generic[R]):
     """A process that runs one case at a time."""
 
-    def __init__(self, command: Sequence[str], inbox: "queue.Queue[tuple[_Worker, bytes]]") -> None:
+    def __init__(
+        self, command: Sequence[str], inbox: "queue.Queue[tuple[_Worker[R], bytes]]"
+    ) -> None:
         self._inbox = inbox
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `end`)
         # A session of its own: Ctrl-C is for the pool, which then ends the workers.
@@ -134,7 +143,7 @@ class _Worker:
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
-    def begin(self, request: Request, deadline: float) -> None:
+    def begin(self, request: R, deadline: float) -> None:
         """Ask for a case that must end before `deadline`, as time.monotonic counts."""
         self.request, self.deadline = request, deadline
         self._start, self._log_start = time.perf_counter(), os.fstat(self._log.fileno()).st_size
@@ -145,7 +154,7 @@ class _Worker:
             self._process.stdin.write(request.model_dump_json().encode() + b"\n")
             self._process.stdin.flush()
 
-    def outcome(self, failure: str | None) -> Outcome:
+    def outcome(self, failure: str | None) -> Outcome[R]:
         """How the case ended."""
         wall = time.perf_counter() - self._start
         return Outcome(self.request, failure, self._log_of_case(), wall)
