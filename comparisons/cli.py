@@ -10,11 +10,12 @@ from comparisons.commands.gate import gate
 from comparisons.commands.methods import methods
 from comparisons.commands.report import report
 from comparisons.commands.selftest import selftest
+from comparisons.commands.stability import stability
 from comparisons.commands.suite import suite
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
-    commands = (compare, suite, gate, accept, report, selftest, converge, methods, bench)
+    commands = (compare, suite, gate, accept, report, selftest, converge, methods, bench, stability)
     for command in commands:
         app.command()(command)

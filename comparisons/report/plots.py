@@ -70,11 +70,12 @@ def log_log(
     title: str = "",
     levels: Mapping[str, float] | None = None,
     size: tuple[float, float] = (6.4, 4.6),
+    uprights: Mapping[str, float] | None = None,
 ) -> str:
     """An <svg> element with both axes logarithmic; the same arguments give the same text.
 
-    levels: horizontal lines by their names;  size: width and height in inches of 72 px; the element
-    shrinks with its parent.  Text stays text, in the colour of the surrounding page; ids are unique
+    levels, uprights: horizontal and vertical lines by their names;  size: width and height in
+    inches of 72 px; the element shrinks with its parent.  Text stays text, in the colour of the surrounding page; ids are unique
     among plots that differ.  A curve with an empty name has no place in the legend.
     """
     import matplotlib.style
@@ -95,6 +96,13 @@ def log_log(
                 axes.axhline(y, color=_INK, linewidth=0.8, linestyle=":", alpha=0.7)
                 place = ((0.0, y), (3, 2), axes.get_yaxis_transform(), "offset points")
                 axes.annotate(name, *place, fontsize=8.5).set_in_layout(False)
+        left, right = axes.get_xlim()
+        for name, x in (uprights or {}).items():
+            if left <= x <= right:
+                axes.axvline(x, color=_INK, linewidth=0.8, linestyle=":", alpha=0.7)
+                place = ((x, 1.0), (-3, -3), axes.get_xaxis_transform(), "offset points")
+                told = axes.annotate(name, *place, fontsize=8.5, rotation=90, ha="right", va="top")
+                told.set_in_layout(False)
         for axis in (axes.xaxis, axes.yaxis):
             _ticks(axis)
         axes.grid(visible=True, which="major")

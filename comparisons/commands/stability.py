@@ -1,0 +1,101 @@
+"""`reference-rt stability`."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from comparisons.commands.extra import compare_extra
+from reference_rt.cli import guarded
+from reference_rt.errors import UsageError
+
+
+@guarded
+def stability(
+    out: Annotated[
+        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for what is found.")
+    ] = Path("out/stability"),
+    family: Annotated[
+        list[str] | None, typer.Option(help="Only these, F1 to F14; several times for several.")
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("--full/--quick", help="All of it: half an hour, not two minutes.")
+    ] = False,
+    series: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Only this series of the one family.")
+    ] = None,
+    at: Annotated[
+        float | None, typer.Option(metavar="X", help="Only this setting of the one series.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of all that is drawn.")] = 1,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes at once.  [default: all cores]")
+    ] = None,
+    mitsuba: Annotated[
+        bool, typer.Option("--mitsuba/--no-mitsuba", help="Whether Mitsuba takes part.")
+    ] = True,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is measured.")] = False,
+    markdown: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Put the table between '<!-- stability -->' and '<!-- end -->' of a file.",
+        ),
+    ] = None,
+) -> None:
+    """Find where ours and Mitsuba fail as scenes become extreme; exact arithmetic decides."""
+    with compare_extra():
+        from rich.console import Console
+
+        from comparisons import marked
+        from comparisons.provenance import ours, provenance
+        from comparisons.stability import table
+        from comparisons.stability.display import Display
+        from comparisons.stability.families import MODULES
+        from comparisons.stability.families import family as family_of
+        from comparisons.stability.family import Effort
+        from comparisons.stability.page import write_page
+        from comparisons.stability.run import Choice, mitsuba_is_there, run, shoot
+        from comparisons.stability.written import again, write
+    from reference_rt.files import check_writable
+
+    names = tuple(dict.fromkeys(family or MODULES))
+    if unknown := [name for name in names if name not in MODULES]:
+        raise UsageError(f"--family: expected one of {', '.join(MODULES)}, got '{unknown[0]}'")
+    if series is not None:
+        if len(names) > 1:
+            raise UsageError("--series: expected one --family with it")
+        known = family_of(names[0]).by_name
+        if series not in known:
+            raise UsageError(f"--series: expected one of {', '.join(known)}, got '{series}'")
+    if at is not None and series is None:
+        raise UsageError("--at: expected a --series with it")
+    if markdown is not None:
+        marked.around(markdown, "stability")  # now, rather than after half an hour
+    check_writable(out / "results.json")
+    missing = mitsuba_is_there() if mitsuba else "not asked"
+    effort: Effort = "full" if full else "quick"
+    choice = Choice(names, effort, seed, series, at, not missing)
+    facts = provenance() if not missing else ours() | {"mitsuba": f"takes no part: {missing}"}
+    processes = jobs or os.cpu_count() or 1
+    with Display(len(choice.settings())) as display:
+        display.line(f"seed {seed}; Mitsuba {facts['mitsuba']}")
+        found = run(choice, out, processes, display.done, fresh).found
+        write(out, found, effort, seed, facts)
+        display.line("pictures and page")
+        pictures = shoot(choice, found, out, processes)
+        write_page(out / "stability.html", found, pictures, effort, seed, facts)
+    Console(highlight=False).print(table.terminal(found))
+    if markdown is not None:
+        marked.rewrite(markdown, "stability", table.markdown(found, effort, seed, facts))
+    holds = True
+    for one in (s for some in table.summaries(found).values() for s in some):
+        holds &= one.holds
+        for f in one.found:
+            if f.broken or f.x in one.failed:
+                typer.echo(f"again: {again(f, effort, seed)}", err=True)
+                for example in f.ours.examples if f.ours else ():
+                    typer.echo(f"  {dict(example)}", err=True)
+    typer.echo(f"{out / 'results.json'}, results.csv, stability.html", err=True)
+    raise typer.Exit(0 if holds else 1)
