@@ -75,8 +75,9 @@ def log_log(
     """An <svg> element with both axes logarithmic; the same arguments give the same text.
 
     levels, uprights: horizontal and vertical lines by their names;  size: width and height in
-    inches of 72 px; the element shrinks with its parent.  Text stays text, in the colour of the surrounding page; ids are unique
-    among plots that differ.  A curve with an empty name has no place in the legend.
+    inches of 72 px; the element shrinks with its parent.  Text stays text, in the colour of the
+    surrounding page; ids are unique among plots that differ.  A curve with an empty name has no
+    place in the legend.
     """
     import matplotlib.style
     from matplotlib.backends.backend_svg import FigureCanvasSVG

@@ -17,6 +17,9 @@ from reference_rt.files import replacing
 SCHEMA = 1
 """Raised whenever a reader of the former layout would misread the new one."""
 
+COLUMNS = ("family", "series", "x", "contestant", "cases", "failures", "worst", "open")
+"""Of `results.csv`."""
+
 MEANING = {
     "cases": "put to a contestant and decided",
     "failures": "cases that break the law",
@@ -64,9 +67,7 @@ def write(
         temporary.open("w", encoding="utf-8", newline="") as file,
     ):
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ("family", "series", "x", "contestant", "cases", "failures", "worst", "open")
-        )
+        writer.writerow(COLUMNS)
         for f in found:
             for name, some in f.outcomes.items():
                 row = _flat(some)
