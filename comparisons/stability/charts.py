@@ -3,8 +3,7 @@
 import math
 
 from comparisons.report.plots import Curve, log_log
-from comparisons.stability.family import OURS
-from comparisons.stability.summary import SeriesSummary, contestants
+from comparisons.stability.summary import SeriesSummary, contestants, named
 
 SIZE = (4.8, 3.7)
 """Inches."""
@@ -38,7 +37,7 @@ def of_series(one: SeriesSummary) -> list[str]:
 def _rates(one: SeriesSummary, name: str, colour: int) -> Curve:
     some = [(f.x, f.outcomes[name]) for f in one.found if name in f.outcomes]
     y = [max(o.failures / max(o.cases, 1), _least(one)) for _, o in some]
-    return Curve(_named(name), [x for x, _ in some], y, colour=colour)
+    return Curve(named(name), [x for x, _ in some], y, colour=colour)
 
 
 def _least(one: SeriesSummary) -> float:
@@ -50,7 +49,7 @@ def _errors(one: SeriesSummary, name: str, colour: int) -> Curve:
     some = [(f.x, f.outcomes[name].worst) for f in one.found if name in f.outcomes]
     known = [(x, worst) for x, worst in some if worst is not None]
     return Curve(
-        _named(name), [x for x, _ in known], [max(w, LEAST) for _, w in known], colour=colour
+        named(name), [x for x, _ in known], [max(w, LEAST) for _, w in known], colour=colour
     )
 
 

@@ -14,7 +14,7 @@ from comparisons.stability.families import family
 from comparisons.stability.family import OURS, Effort
 from comparisons.stability.found import Found
 from comparisons.stability.run import Picture
-from comparisons.stability.summary import SeriesSummary, contestants, total
+from comparisons.stability.summary import SeriesSummary, contestants, named, total
 from comparisons.stability.written import again
 from reference_rt.files import replacing
 
@@ -37,7 +37,7 @@ def write_page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"shown": shown, "label": label, "number": table.number}
+    environment.filters |= {"shown": shown, "label": label, "number": table.number, "named": named}
     everything = table.summaries(found)
     page = environment.get_template("stability.html.jinja").render(
         provenance=provenance,

@@ -79,12 +79,14 @@ def terminal(found: Sequence[Found]) -> Table:
     """For people at a terminal."""
     table = Table(show_edge=False, pad_edge=False)
     for name in COLUMNS:
-        right = name in ("cases", "failures")
-        table.add_column(name, overflow="fold", justify="right" if right else "left")
+        if name != "failures":  # where each fails is told
+            table.add_column(name, overflow="fold", justify="right" if name == "cases" else "left")
     for name, series in summaries(found).items():
         for one in series:
             style = None if one.holds else "bold red"
-            table.add_row(*map(Text, cells(name, one)), style=style)
+            _, series_name, to, cases, _, *rest = cells(name, one)
+            row = (name, series_name, to, cases, *rest)
+            table.add_row(*map(Text, row), style=style)
     return table
 
 
