@@ -51,7 +51,3 @@ def _errors(one: SeriesSummary, name: str, colour: int) -> Curve:
     return Curve(
         named(name), [x for x, _ in known], [max(w, LEAST) for _, w in known], colour=colour
     )
-
-
-def _named(name: str) -> str:
-    return {OURS: "ours", "mitsuba": "Mitsuba"}.get(name, name.replace("_", " "))

@@ -20,6 +20,11 @@ def contestants(found: Sequence[Found]) -> list[str]:
     return sorted(names, key=lambda name: (name != OURS, name != MITSUBA))
 
 
+def named(contestant: str) -> str:
+    """For people."""
+    return "Mitsuba" if contestant == MITSUBA else contestant.replace("_", " ")
+
+
 def first_failure(found: Iterable[Found], contestant: str) -> float | None:
     """The smallest x at which a case of this series failed; None where none did."""
     failing = [

@@ -16,6 +16,7 @@ from comparisons.stability.summary import (
     contestants,
     first_failure,
     found_of,
+    named,
     summarise,
     total,
 )
@@ -33,7 +34,7 @@ def cells(name: str, one: SeriesSummary) -> list[str]:
     """Of one series, as text."""
     ours = total(one.found, OURS)
     others = [c for c in contestants(one.found) if c not in (OURS, MITSUBA)]
-    told = [f"{c} {where(one, c)}" for c in others]
+    told = [f"{named(c)} {where(one, c)}" for c in others]
     return [
         f"{name} {family(name).name}",
         one.series.name,
@@ -72,7 +73,9 @@ def number(value: float) -> str:
     """Two digits, powers of ten as such."""
     if value == 0.0 or math.isinf(value):
         return "0" if value == 0.0 else "∞"
-    return f"{value:.2g}" if 1e-3 <= value < 1e4 else power_of_ten(value)
+    if 1e-3 <= value < 1e4:
+        return f"{value:.2g}" if value < 100.0 else f"{value:,.0f}"
+    return power_of_ten(value)
 
 
 def terminal(found: Sequence[Found]) -> Table:
