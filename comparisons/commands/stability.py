@@ -1,6 +1,7 @@
 """`reference-rt stability`."""
 
 import os
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -58,6 +59,8 @@ def stability(
         from comparisons.stability.page import write_page
         from comparisons.stability.run import Choice, mitsuba_is_there, run, shoot
         from comparisons.stability.written import again, write
+
+        import_module("matplotlib")  # before minutes of measuring that the page then cannot show
     from reference_rt.files import check_writable
 
     names = tuple(dict.fromkeys(family or MODULES))

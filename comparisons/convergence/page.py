@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
@@ -21,8 +20,8 @@ from comparisons.convergence.fits import Line
 from comparisons.convergence.starts import STAGES
 from comparisons.metrics import encode, white_level
 from comparisons.report.plots import Curve, log_log
-from comparisons.report.values import label, percent, shown
-from reference_rt.files import replacing
+from comparisons.report.templates import template, write
+from comparisons.report.values import percent, shown
 from reference_rt.shapes.shape import FloatArray
 
 SECONDS = "render time of a picture, s"
@@ -44,15 +43,7 @@ def write_page(
     path: Path, curves: Sequence[Curves], settings: Settings, provenance: Mapping[str, Any]
 ) -> None:
     """Write the page about `curves`, at once or not at all; all text is escaped."""
-    environment = Environment(
-        loader=PackageLoader("comparisons", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"shown": shown, "label": label}
-    page = environment.get_template("convergence.html.jinja").render(
+    page = template("convergence.html.jinja").render(
         provenance=provenance,
         settings=settings,
         targets=[percent(target) for target in settings.targets],
@@ -60,8 +51,7 @@ def write_page(
         scenes=[_view(one) for one in curves],
         stages=STAGES,
     )
-    with replacing(path) as temporary:
-        temporary.write_bytes(page.encode(errors="xmlcharrefreplace"))
+    write(path, page)
 
 
 def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from comparisons.methods.charts import of_family, of_series
@@ -21,34 +20,24 @@ from comparisons.methods.summary import (
     total,
 )
 from comparisons.methods.wording import nanoseconds, percent, sentences, units
-from comparisons.report.values import label, power_of_ten, shown
-from reference_rt.files import replacing
+from comparisons.report.templates import template, write
+from comparisons.report.values import power_of_ten
 
 
 def write_page(
     path: Path, rows: Sequence[Row], effort: Effort, seed: int, provenance: Mapping[str, Any]
 ) -> None:
     """Write the page about `rows`, at once or not at all."""
-    environment = Environment(
-        loader=ChoiceLoader(
-            [PackageLoader("comparisons", "methods"), PackageLoader("comparisons", "report")]
-        ),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
-        "shown": shown,
-        "label": label,
-        "short": short,
-        "ns": nanoseconds,
-        "units": units,
-        "percent": percent,
-        "power": power_of_ten,
-    }
     pictures = failures(rows)
-    page = environment.get_template("methods.html.jinja").render(
+    page = template(
+        "methods.html.jinja",
+        "methods",
+        short=short,
+        ns=nanoseconds,
+        units=units,
+        percent=percent,
+        power=power_of_ten,
+    ).render(
         provenance=provenance,
         effort=effort,
         seed=seed,
@@ -60,8 +49,7 @@ def write_page(
             for name, some in families_of(rows).items()
         ],
     )
-    with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write(path, page)
 
 
 def _family(name: str, rows: Sequence[Row]) -> dict[str, Any]:

@@ -13,14 +13,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from comparisons.report.fitting import Fitted, fitted
+from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, thumbnails
-from comparisons.report.values import label, shown
+from comparisons.report.values import shown
 from comparisons.results import RUNGS, Case, Metrics, Status
-from reference_rt.files import replacing
 
 MOST_BYTES = 15_000_000
 """Of a page, unless the caller says otherwise: what is still mailed and opened without a wait."""
@@ -80,15 +79,7 @@ def write_report(
     """
     ranked = sorted(cases, key=lambda case: ORDER.index(case.verdict))
     views = [_view(case) for case in ranked]
-    environment = Environment(
-        loader=PackageLoader("comparisons", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"shown": shown, "label": label}
-    template = environment.get_template("page.html.jinja")
+    filled = template("page.html.jinja").render
     script = Markup(_script())  # our own, not from outside
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
     counts = Counter(case.verdict for case in cases)
@@ -98,7 +89,7 @@ def write_report(
             # JSON without <, > and & by its maker.
             view["data"] = Markup(data.data) if data else ""
             view["factor"] = data.factor if data else 1
-        return template.render(
+        return filled(
             counts=[(status, counts[status]) for status in ORDER if counts[status]],
             signs=SIGNS,
             modes=MODES,
@@ -110,19 +101,13 @@ def write_report(
             script_digest=digest,
         )
 
-    left = most_bytes - len(_encoded(rendered([None] * len(views))))
+    left = most_bytes - len(encoded(rendered([None] * len(views))))
     # What stands around float data, or tells that it was left out, takes room, too.
     left -= 4000 * len(views)
     failed = [case.verdict in FAILED for case in ranked]
     pictures = [view["case"].images if view["pictures"] else None for view in views]
     page = rendered(fitted(pictures, failed, max(left, 0)))
-    with replacing(path) as temporary:
-        temporary.write_bytes(_encoded(page))
-
-
-def _encoded(page: str) -> bytes:
-    # A lone surrogate, of a file name that is not UTF-8, becomes a reference to no character.
-    return page.encode(errors="xmlcharrefreplace")
+    write(path, page)
 
 
 def _script() -> str:

@@ -5,10 +5,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from comparisons.report.values import label, shown
+from comparisons.report.templates import template, write
 from comparisons.stability import charts, table
 from comparisons.stability.families import family
 from comparisons.stability.family import OURS, Effort
@@ -16,7 +15,6 @@ from comparisons.stability.found import Found
 from comparisons.stability.run import Picture
 from comparisons.stability.summary import SeriesSummary, contestants, named, total
 from comparisons.stability.written import again
-from reference_rt.files import replacing
 
 
 def write_page(
@@ -28,18 +26,8 @@ def write_page(
     provenance: Mapping[str, Any],
 ) -> None:
     """Write the page, at once or not at all; all text is escaped."""
-    environment = Environment(
-        loader=ChoiceLoader(
-            [PackageLoader("comparisons", "stability"), PackageLoader("comparisons", "report")]
-        ),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"shown": shown, "label": label, "number": table.number, "named": named}
     everything = table.summaries(found)
-    page = environment.get_template("stability.html.jinja").render(
+    page = template("stability.html.jinja", "stability", number=table.number, named=named).render(
         provenance=provenance,
         effort=effort,
         seed=seed,
@@ -59,8 +47,7 @@ def write_page(
             for name, series in everything.items()
         ],
     )
-    with replacing(path) as temporary:
-        temporary.write_bytes(page.encode(errors="xmlcharrefreplace"))
+    write(path, page)
 
 
 def _all(series: Sequence[SeriesSummary]) -> list[Found]:
