@@ -18,6 +18,7 @@ from reference_rt.shapes.placement import (
     world_vector,
 )
 from reference_rt.shapes.quadratic import gradient, noise, roots, short, slabs, value
+from reference_rt.shapes.rounding import along_from
 from reference_rt.shapes.shape import (
     Bounds,
     FloatArray,
@@ -72,11 +73,12 @@ def is_solid(quadrics: Quadrics) -> bool:
 
 @kernel
 def _nearby(quadrics: Quadrics, i: int, ray: Ray) -> tuple[Ray, float, float]:
-    """(the ray in local coordinates, shift, unit): the world's t is (t + shift) unit.
+    """(the ray in local coordinates, begin, unit): the world's t is begin + t unit.
 
-    A ray from afar begins next to the local origin: the coefficients of f along it then round as
-    numbers of the shape's size.  One that begins within the box must not be moved: see `roots`.
-    Directions whose powers would overflow or vanish are made 1 long.
+    A ray from afar begins next to the local origin, found in the world without rounding off what is
+    small beside the distance: f along it then rounds as numbers of the shape's size.  One that
+    begins within the box must not be moved: see `roots`.  Directions whose powers would overflow or
+    vanish are made 1 long.
     """
     local = local_ray(quadrics, i, ray)
     size = max_abs(local.d)
@@ -86,8 +88,9 @@ def _nearby(quadrics: Quadrics, i: int, ray: Ray) -> tuple[Ray, float, float]:
     d = local.d * unit
     if max_abs(local.o) <= 2.0:
         return Ray(local.o, d, local.t_max), 0.0, unit
-    shift = short(-dot(local.o, d) / dot(d, d), 0.0625, d)
-    return Ray(local.o + d * shift, d, local.t_max), shift, unit
+    begin = short(-dot(local.o, d) / dot(d, d), 0.0625, d) * unit
+    near = along_from(ray.o, ray.d, row(quadrics.center, i), begin)
+    return Ray(local_vector(quadrics, i, near), d, local.t_max), begin, unit
 
 
 class Line(NamedTuple):
@@ -104,16 +107,16 @@ class Line(NamedTuple):
 
 @kernel
 def _line(quadrics: Quadrics, i: int, ray: Ray) -> Line:
-    near, shift, unit = _nearby(quadrics, i, ray)
+    near, begin, unit = _nearby(quadrics, i, ray)
     r = roots(quadrics.coefficients[i], near)
     s = slabs(quadrics.lower[i], quadrics.upper[i], quadrics.clipped[i], near)
     t_in, t_out = inside(s)
     return Line(
-        (r.t0 + shift) * unit,
-        (r.t1 + shift) * unit,
+        begin + r.t0 * unit,
+        begin + r.t1 * unit,
         r.between,
-        (t_in + shift) * unit,
-        (t_out + shift) * unit,
+        begin + t_in * unit,
+        begin + t_out * unit,
         1.0 + face_entered(s, t_in),
         1.0 + face_left(s, t_out),
     )
