@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.exact.dyadic import Dyadic, nearest
+from comparisons.exact.dyadic import Dyadic
 from comparisons.methods.setting import across, unit_vectors
-from comparisons.stability.f01_far_law import Rays, judge_by_moving
+from comparisons.mitsuba_backend import scalar
+from comparisons.stability.f01_far_law import U_SINGLE, Rays, judge_by_moving
 from comparisons.stability.f01_far_spheres import (
     RAYS,
     SCENES,
-    clear_gaps,
     in_mitsuba,
     single,
     tangent_gaps,
@@ -21,7 +21,9 @@ from reference_rt.kernel import entry_kernel
 from reference_rt.methods.method import ray_of
 from reference_rt.shapes import Cone, Cylinder, Quadric, Sphere, Torus
 from reference_rt.shapes.dispatch import intersect_row
+from reference_rt.shapes.quadrics import Quadrics
 from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.torus import Tori
 from reference_rt.transform import Matrix, Transform, rotate
 
 MINOR = 0.25
@@ -144,7 +146,7 @@ def draw_rays(
     normal = np.einsum("nji,nj->ni", np.linalg.inv(linear), local_n)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     tangent = rng.random(n) < 0.5
-    gap = np.where(tangent, tangent_gaps(rng, n), np.abs(clear_gaps(rng, n)) * 0.0)
+    gap = np.where(tangent, tangent_gaps(rng, n), 0.0)
     # From the shape's middle to the point that the ray passes through.
     reach = np.where(tangent[:, None], q, q * rng.uniform(0.0, 1.2, (n, 1)))
     passed = np.einsum("nij,nj->ni", linear, reach) + normal * (gap * size)[:, None]
@@ -169,9 +171,6 @@ def _columns(shape: Shape) -> dict[str, Any]:
 
 def answer(rays: Rays) -> FloatArray:
     """What our kernel finds."""
-    from reference_rt.shapes.quadrics import Quadrics
-    from reference_rt.shapes.torus import Tori
-
     t = np.empty(len(rays.o))
     of = Quadrics if rays.kind == "quadrics" else Tori
     table = of(**{name: np.ascontiguousarray(column) for name, column in rays.row.items()})
@@ -194,15 +193,16 @@ def compete(
     draw: Draw, name: str, distance: FloatArray, offset: float = 0.0, size: float = 1.0
 ) -> Mapping[str, Outcome]:
     """Ours; and Mitsuba on some of the rays, rounded to float32 with their shapes, against the
-    exact answer for these."""
+    exact answer for these and the law in float32's u."""
     rays, maps = draw_rays(draw.rng, name, distance, offset, size)
     found = {OURS: judge_by_moving(rays, answer(rays))}
     if draw.mitsuba and name in IN_MITSUBA:
         rounded, shapes = _for_mitsuba(name, rays, maps)
         t = np.empty(len(rounded.o))
-        for k, shape in enumerate(shapes):
-            t[k::SCENES] = in_mitsuba(shape, rounded.o[k::SCENES], rounded.d[k::SCENES])
-        found[MITSUBA] = judge_by_moving(rounded, t)
+        with scalar():
+            for k, shape in enumerate(shapes):
+                t[k::SCENES] = in_mitsuba(shape, rounded.o[k::SCENES], rounded.d[k::SCENES])
+        found[MITSUBA] = judge_by_moving(rounded, t, U_SINGLE)
     return found
 
 
@@ -215,6 +215,3 @@ def _for_mitsuba(name: str, rays: Rays, maps: list[FloatArray]) -> tuple[Rays, l
     rows = [_columns(shape) for shape in shapes]
     columns = {key: np.concatenate([r[key] for r in rows])[which] for key in rows[0]}
     return Rays(rays.kind, columns, few.size, o, single(few.d)), shapes
-
-
-__all__ = ["KINDS", "answer", "compete", "draw_rays", "nearest"]

@@ -1,6 +1,5 @@
 """What F1 holds hits against: the exact answer, and bounds of the errors around it."""
 
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,13 +10,16 @@ from comparisons.exact.dyadic import FRACTION, NEVER, BoolArray, Dyadic, Fixed, 
 from comparisons.methods.errors import U
 from comparisons.stability.family import EXAMPLES, FloatArray, Outcome
 
-BAND = 5.0 * U
-"""Of the radius: what the sphere's line may pass the rim by for its answer to be open.
+BAND = 5.0
+"""u r by which a sphere's line may pass the rim for its answer to be open.
 
 The closest approach p rounds twice in each coordinate, |p|² and r² as numbers of their own size:
 r² - |p|² + (p·d)²/a is off by 2·2 u r² + 3 u r² + u r² + 2 u r², and r - |p| by half of that over
 r.  Nothing here grows with the distance, nor with the offset.
 """
+
+U_SINGLE = 2.0**-24
+"""u of float32: what answers in float32 is held to the same law with this."""
 
 ROUNDINGS = 16.0
 """u (|t| |d| + D) that t |d| may be off by besides: the issue's number.  c / q rounds by some 10 u
@@ -67,20 +69,21 @@ def gaps(rays: Rays) -> FloatArray:
 class Truth:
     """Of the rays of spheres, found once for all who answer.
 
-    near the rim (a gap within `band`) either answer is right; t |d| may be off by ROUNDINGS u (|t|
-    |d| + D) and by what the band makes of half the chord h: BAND r² / h.
+    u: the unit roundoff of who answers.  Within BAND u of the rim either answer is right, unless
+    `strict`; t |d| may be off by ROUNDINGS u (|t| |d| + D) and by what the band makes of half the
+    chord h: BAND u r² / h.
     """
 
-    def __init__(self, rays: Rays, band: float = BAND) -> None:
-        self.rays, self.band = rays, band
+    def __init__(self, rays: Rays, u: float = U, strict: bool = False) -> None:
+        self.rays, band = rays, BAND * u
         crossings = KINDS["spheres"](rays.row, Dyadic.of(rays.o), Dyadic.of(rays.d))
         self.hit = first_of(crossings)
         self.gap = gaps(rays)
-        self.open = (np.abs(self.gap) <= band) | self.hit.touching
+        self.open = (np.abs(self.gap) <= (0.0 if strict else band)) | self.hit.touching
         t = np.where(np.isfinite(self.hit.t), self.hit.t, 0.0)
-        chord = rays.size * np.sqrt(np.maximum(self.gap * (2.0 - self.gap), BAND))
-        self.bound = ROUNDINGS * U * (t * rays.speed() + rays.distance())
-        self.bound += BAND * rays.size**2 / chord
+        chord = rays.size * np.sqrt(np.maximum(self.gap * (2.0 - self.gap), band))
+        self.bound = ROUNDINGS * u * (t * rays.speed() + rays.distance())
+        self.bound += band * rays.size**2 / chord
 
     def judge(self, t: FloatArray) -> Outcome:
         return _outcome(self.rays, self.hit.t, self.hit.fixed, t, self.open, self.bound, self.gap)
@@ -131,31 +134,31 @@ def _hex(values: Any) -> list[str]:
 DIRECTIONS = 8
 """Across a ray in which it is moved: one is within 22.5 degrees of a surface's normal."""
 
-MOVED = 64.0 * U
-"""Of the size of a shape that is not a sphere: a ray's answer is right if it is that of a ray which
-passes no further beside it.
+MOVED = 64.0
+"""u times the size of a shape that is not a sphere: a ray's answer is right if it is that of a ray
+which passes no further beside it.
 
 Where the ray is next to the shape, in its own coordinates, 3 products round there and back (8 u for
 a map that stretches by 4), the ten terms of f 9 times each, on numbers up to 4 times the size.
 """
 
 
-def judge_by_moving(rays: Rays, t: FloatArray) -> Outcome:
-    """Backward: right is what is exact for a ray that passes at most MOVED sizes beside this one,
-    but for ROUNDINGS u (|t| |d| + D) in t |d|.
+def judge_by_moving(rays: Rays, t: FloatArray, u: float = U) -> Outcome:
+    """Backward: right is what is exact for a ray that passes at most MOVED u sizes beside this
+    one, but for ROUNDINGS u (|t| |d| + D) in t |d|.
 
     Open are the hits and misses that are so, but not without moving.
     """
     hit = first_of(KINDS[rays.kind](rays.row, Dyadic.of(rays.o), Dyadic.of(rays.d)))
     speed = rays.speed()
-    bound = ROUNDINGS * U * (np.where(np.isfinite(hit.t), hit.t, 0.0) * speed + rays.distance())
+    bound = ROUNDINGS * u * (np.where(np.isfinite(hit.t), hit.t, 0.0) * speed + rays.distance())
     t = np.where(np.isnan(t) | (t < 0.0), -1.0, t)
     both = np.isfinite(hit.t) & np.isfinite(t)
     off = np.zeros(len(t))
     off[both] = apart(t[both], hit.fixed[both]) * speed[both]
     doubtful = np.flatnonzero((np.isfinite(hit.t) != np.isfinite(t)) | (off > bound))
     is_open = hit.touching.copy()
-    low, high, some_miss = _moved(rays.only(doubtful))
+    low, high, some_miss = _moved(rays.only(doubtful), MOVED * u)
     for k, i in enumerate(doubtful.tolist()):
         if both[i]:
             spread = max(high[k] - hit.fixed[i], hit.fixed[i] - low[k]) if high[k] > 0 else 0
@@ -169,12 +172,11 @@ def judge_by_moving(rays: Rays, t: FloatArray) -> Outcome:
 
 
 def _within(t: float, low: int, high: int, slack: float) -> bool:
-    found = int(Dyadic.of(np.array([t])).to(-2 * FRACTION).n[0]) >> FRACTION
-    margin = int(slack * 2.0**64) << (FRACTION - 64)
+    found, margin = (int(n) >> FRACTION for n in Dyadic.of([t, slack]).to(-2 * FRACTION).n)
     return low - margin <= found <= high + margin
 
 
-def _moved(rays: Rays) -> tuple[list[int], list[int], BoolArray]:
+def _moved(rays: Rays, by: float) -> tuple[list[int], list[int], BoolArray]:
     """(the least and the largest t, 0 without hits, whether some miss) over all ways to move."""
     n = len(rays.o)
     low, high, some_miss = [int(NEVER)] * n, [0] * n, np.zeros(n, bool)
@@ -186,8 +188,8 @@ def _moved(rays: Rays) -> tuple[list[int], list[int], BoolArray]:
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(unit, first)
     o, d = Dyadic.of(rays.o), Dyadic.of(rays.d)
-    for angle in _angles():
-        step = (first * np.cos(angle) + second * np.sin(angle)) * (MOVED * rays.size)[:, None]
+    for angle in 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
+        step = (first * np.cos(angle) + second * np.sin(angle)) * (by * rays.size)[:, None]
         found = first_of(KINDS[rays.kind](rays.row, o + Dyadic.of(step), d))
         for k, (fixed, t) in enumerate(zip(found.fixed.tolist(), found.t, strict=True)):
             if np.isfinite(t):
@@ -195,7 +197,3 @@ def _moved(rays: Rays) -> tuple[list[int], list[int], BoolArray]:
             else:
                 some_miss[k] = True
     return low, high, some_miss
-
-
-def _angles() -> Iterable[float]:
-    return (2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS).tolist()

@@ -8,7 +8,7 @@ from comparisons import translate, twin
 from comparisons.exact.dyadic import Dyadic, dot
 from comparisons.methods.setting import across, unit_vectors
 from comparisons.mitsuba_backend import scalar
-from comparisons.stability.f01_far_law import BAND, Rays, Truth
+from comparisons.stability.f01_far_law import U_SINGLE, Rays, Truth
 from comparisons.stability.family import MITSUBA, OURS, Draw, FloatArray, Outcome
 from reference_rt import methods
 from reference_rt.kernel import entry_kernel
@@ -116,9 +116,8 @@ def single(values: FloatArray) -> FloatArray:
 
 
 def in_mitsuba(shape: Shape, o: FloatArray, d: FloatArray) -> FloatArray:
-    """t (n,) in its scalar variant, where no mesh stands in for what is small."""
-    with scalar():
-        return twin.trace(translate.load(Scene(shapes=(shape,))), o, d).t
+    """t (n,); in its scalar variant no mesh stands in for what is small."""
+    return twin.trace(translate.load(Scene(shapes=(shape,))), o, d).t
 
 
 def for_mitsuba(rays: Rays) -> Rays:
@@ -133,19 +132,20 @@ def for_mitsuba(rays: Rays) -> Rays:
 
 def mitsubas(rays: Rays) -> FloatArray:
     t = np.empty(len(rays.o))
-    for k in range(min(SCENES, len(t))):
-        center, radius = rays.row["center"][k], float(rays.row["radius"][k])
-        shape = Sphere(center=(center[0], center[1], center[2]), radius=radius)
-        t[k::SCENES] = in_mitsuba(shape, rays.o[k::SCENES], rays.d[k::SCENES])
+    with scalar():
+        for k in range(min(SCENES, len(t))):
+            center, radius = rays.row["center"][k].tolist(), float(rays.row["radius"][k])
+            shape = Sphere(center=tuple(center), radius=radius)
+            t[k::SCENES] = in_mitsuba(shape, rays.o[k::SCENES], rays.d[k::SCENES])
     return t
 
 
-def compete(draw: Draw, rays: Rays, band: float = BAND) -> Mapping[str, Outcome]:
+def compete(draw: Draw, rays: Rays, strict: bool = False) -> Mapping[str, Outcome]:
     """All on the same rays; Mitsuba on some of them, rounded to float32 with their spheres, against
-    the exact answer for these."""
-    truth = Truth(rays, band)
+    the exact answer for these and the law in float32's u.  strict: see `Truth`."""
+    truth = Truth(rays, strict=strict)
     found = {name: truth.judge(t) for name, t in answers(rays).items()}
     if draw.mitsuba:
         rounded = for_mitsuba(rays)
-        found[MITSUBA] = Truth(rounded, band).judge(mitsubas(rounded))
+        found[MITSUBA] = Truth(rounded, U_SINGLE, strict).judge(mitsubas(rounded))
     return found
