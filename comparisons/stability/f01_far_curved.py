@@ -113,7 +113,11 @@ KINDS: Mapping[str, Kind] = {
     "torus": Kind("tori", lambda m: Torus(minor_radius=MINOR, transform=m), _ring),
 }
 
-STRETCH = (0.5, 2.0)
+REACH = 2.0
+"""No point of a shape of size 1, stretched by up to this, is further from its middle than sqrt(2)
+times it: what distances are counted in."""
+
+STRETCH = (0.5, REACH)
 """Of an ellipsoid's axes, and of all others' but a cylinder's, which Mitsuba has only round."""
 
 
@@ -152,16 +156,17 @@ def draw_rays(
     passed = np.einsum("nij,nj->ni", linear, reach) + normal * (gap * size)[:, None]
     d = np.where(tangent[:, None], across(rng, normal), unit_vectors(rng, n))
     center = offset * size * unit_vectors(rng, n) + size * rng.uniform(-1.0, 1.0, (n, 3))
-    o = center + passed - d * (distance * size)[:, None]
+    far = REACH * size * distance
+    o = center + passed - d * far[:, None]
     d = d * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1))
-    at = distance * size / np.linalg.norm(d, axis=1)
+    at = far / np.linalg.norm(d, axis=1)
     foot = Dyadic.of(o) + Dyadic.of(d) * Dyadic.of(at[:, None])
     center = foot.floats() - passed
     rows = [_columns(_shape(kind, m, np.zeros(3))) for m in maps]
     columns = {key: np.concatenate([r[key] for r in rows])[which] for key in rows[0]}
     # Where the table has its origin is not where the shape has its own: a bowl's, a frustum's.
     moved = center + columns["center"]
-    return Rays(kind.table, columns | {"center": moved}, np.full(n, 2.0 * size), o, d), maps
+    return Rays(kind.table, columns | {"center": moved}, np.full(n, REACH * size), o, d), maps
 
 
 def _columns(shape: Shape) -> dict[str, Any]:
@@ -214,4 +219,4 @@ def _for_mitsuba(name: str, rays: Rays, maps: list[FloatArray]) -> tuple[Rays, l
     shapes = [_shape(KINDS[name], m, c) for m, c in zip(maps, centers, strict=True)]
     rows = [_columns(shape) for shape in shapes]
     columns = {key: np.concatenate([r[key] for r in rows])[which] for key in rows[0]}
-    return Rays(rays.kind, columns, few.size, o, single(few.d)), shapes
+    return Rays(rays.kind, columns, few.size, o, single(few.d / few.speed()[:, None])), shapes

@@ -121,13 +121,14 @@ def in_mitsuba(shape: Shape, o: FloatArray, d: FloatArray) -> FloatArray:
 
 
 def for_mitsuba(rays: Rays) -> Rays:
-    """As many as it takes, SCENES different spheres among them, in numbers that float32 has."""
+    """As many as it takes, SCENES different spheres among them, in numbers that float32 has;
+    directions are of unit length, as Mitsuba's own are."""
     few = rays.only(np.arange(min(RAYS, len(rays.o))))
     which = np.arange(len(few.o)) % SCENES
     center = few.row["center"][which]
-    o, d = few.o - few.row["center"] + center, single(few.d)
+    o, d = few.o - few.row["center"] + center, few.d / few.speed()[:, None]
     size = single(few.size[which])
-    return Rays("spheres", {"center": single(center), "radius": size}, size, single(o), d)
+    return Rays("spheres", {"center": single(center), "radius": size}, size, single(o), single(d))
 
 
 def mitsubas(rays: Rays) -> FloatArray:

@@ -42,14 +42,13 @@ def ferrari(coefficients: FloatArray) -> FloatArray:
     q = d - b * c / 2.0 + b * b * b / 8.0
     r = e - b * d / 4.0 + b * b * c / 16.0 - 3.0 * b * b * b * b / 256.0
     with np.errstate(all="ignore"):
-        w2 = _largest_root(2.0 * p, p * p - 4.0 * r, -q * q)
+        # Without q it is a quadratic in y², and there is nothing to split by.
+        w2 = np.where(q == 0.0, 0.0, _largest_root(2.0 * p, p * p - 4.0 * r, -q * q))
         w = np.sqrt(np.maximum(w2, 0.0))
-        odd = np.where(w > 0.0, q / w, 0.0)
-        # Without q there is nothing to split by w = 0: it is a quadratic in y².
-        flat = np.where(w > 0.0, 0.0, np.sqrt(np.maximum(p * p - 4.0 * r, 0.0)))
+        odd = np.where(w > 0.0, q / w, np.sqrt(p * p - 4.0 * r))
         halves = [
-            _quadratic(w, 0.5 * (p + w2 - odd - flat)),
-            _quadratic(-w, 0.5 * (p + w2 + odd + flat)),
+            _quadratic(w, 0.5 * (p + w2 - odd)),
+            _quadratic(-w, 0.5 * (p + w2 + odd)),
         ]
         y = np.concatenate(halves, axis=1)
         return np.sort(np.where(np.isfinite(y), y - b[:, None] / 4.0, np.inf), axis=1)

@@ -77,7 +77,7 @@ def _nearby(quadrics: Quadrics, i: int, ray: Ray) -> tuple[Ray, float, float]:
 
     A ray from afar begins next to the local origin, found in the world without rounding off what is
     small beside the distance: f along it then rounds as numbers of the shape's size.  One that
-    begins within the box must not be moved: see `roots`.  Directions whose powers would overflow or
+    begins within the box, or next to it, must not be moved: see `roots`.  Directions whose powers would overflow or
     vanish are made 1 long.
     """
     local = local_ray(quadrics, i, ray)
@@ -86,7 +86,7 @@ def _nearby(quadrics: Quadrics, i: int, ray: Ray) -> tuple[Ray, float, float]:
     if size > 0.0 and not 2.0**-200 < size < 2.0**200:
         unit = 1.0 / size
     d = local.d * unit
-    if max_abs(local.o) <= 2.0:
+    if max_abs(local.o) <= 1.25:
         return Ray(local.o, d, local.t_max), 0.0, unit
     begin = short(-dot(local.o, d) / dot(d, d), 0.0625, d) * unit
     near = along_from(ray.o, ray.d, row(quadrics.center, i), begin)
