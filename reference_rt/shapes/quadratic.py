@@ -68,6 +68,21 @@ def short(t: float, step: float, d: Vec3) -> float:
     return (t + large) - large
 
 
+@kernel
+def _discriminant(k: FloatArray, ray: Ray, a: float, b: float, c: float) -> float:
+    """b² - a c, the same for any origin on the line.
+
+    Where the roots are close together, seen from this one, the products cancel and c has rounded
+    off what is between the roots: there the origin is moved next to both, and b and c are small.
+    """
+    found = b * b - a * c
+    if not abs(found) < 0.0625 * (b * b):
+        return found
+    between = ray.o + ray.d * short(-b / a, 2.0**-16, ray.d)
+    b = 0.5 * dot(gradient(k, between), ray.d)
+    return b * b - a * value(k, between)
+
+
 class Roots(NamedTuple):
     """Where f <= 0 on a line: between t0 and t1 (nowhere where t0 > t1), or else up to t0 and from
     t1 on."""
@@ -83,10 +98,6 @@ def roots(k: FloatArray, ray: Ray) -> Roots:
 
     The sign of c says on which side the ray begins, and those of the roots follow from it without
     rounding: a ray that leaves the surface is not seen to meet it where it begins.
-
-    Where the roots are close together, seen from there, the products cancel, and c has rounded off
-    what is between the roots: then they are found from a point next to both, where b and c are
-    small.  The ray begins on neither, as c is about b² / a.
     """
     nowhere, everywhere = Roots(math.inf, -math.inf, True), Roots(-math.inf, math.inf, True)
     a = second_degree(k, ray.d)
@@ -94,20 +105,14 @@ def roots(k: FloatArray, ray: Ray) -> Roots:
     c = value(k, ray.o)
     if a == 0.0 and b == 0.0:
         return everywhere if c <= 0.0 else nowhere
-    rest, begin = b * b - a * c, 0.0
-    if abs(rest) < 0.0625 * (b * b):
-        begin = short(-b / a, 2.0**-16, ray.d)
-        near = ray.o + ray.d * begin
-        b = 0.5 * dot(gradient(k, near), ray.d)
-        c = value(k, near)
-        rest = b * b - a * c
+    rest = _discriminant(k, ray, a, b, c)
     if not rest >= 0.0:
         return everywhere if rest < 0.0 and a < 0.0 else nowhere
     q = -(b + math.copysign(math.sqrt(rest), b))
     # A line along which f has no quadratic term meets it there at ±inf, as IEEE says.
     t0 = q / a if a != 0.0 else q * math.inf
     t1 = c / q if q != 0.0 else t0
-    return Roots(begin + min(t0, t1), begin + max(t0, t1), a >= 0.0)
+    return Roots(min(t0, t1), max(t0, t1), a >= 0.0)
 
 
 @kernel
