@@ -101,7 +101,7 @@ def test_faults_at_other_kinds_are_seen(name):
     rays, _ = curved.draw_rays(rng, name, np.full(60, 1e3), 0.0, 1.0)
     t = curved.answer(rays)
     assert judge_by_moving(rays, t).failures == 0
-    # At 2^-40 from tangency h is 1e-6 sizes, and 64 u / h still less than this at a distance of 1e3.
+    # At 2^-40 from tangency h is 1e-6 sizes, and 64 u / h still less than this from 1e3 away.
     assert judge_by_moving(rays, t * (1.0 + 1e-9)).failures == np.isfinite(t).sum()
     assert judge_by_moving(rays, np.where(np.isfinite(t), np.inf, 1.0)).failures > 50
 
