@@ -15,6 +15,7 @@ import functools
 import inspect
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numba
@@ -136,6 +137,29 @@ def with_sign(x: Any, sign: Any) -> Any:
     return x.call("copysign", sign) if isinstance(x, Lanes) else math.copysign(x, sign)
 
 
+def product_error(x: Any, y: Any, product: Any) -> Any:
+    """x y - product, exactly, for product = fl(x y): one instruction on most processors, which
+    rounds the difference alone ("fused multiply-add"), here in rational numbers."""
+    if isinstance(x, Lanes):
+        return x.call("fma", y, -product)
+    if not (math.isfinite(x) and math.isfinite(y)):
+        return math.nan
+    if math.isinf(product):
+        return -product
+    return float(Fraction(x) * Fraction(y) - Fraction(product))
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _fused(typing_context: Any, x: Any, y: Any, z: Any) -> Any:
+    """x y + z, rounded once."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.fma(*values)
+
+    number = types.float64
+    return number(number, number, number), generate
+
+
 def _compiled_as(function: Callable[..., Any], one: Callable[..., Any]) -> None:
     """What compiled code calls for single numbers."""
     overload_kernel(function)(lambda *_: one)
@@ -146,6 +170,7 @@ _compiled_as(smaller, lambda a, b: b if b < a else a)
 _compiled_as(larger, lambda a, b: b if b > a else a)
 _compiled_as(square_root, lambda x: math.sqrt(x))
 _compiled_as(with_sign, lambda x, sign: math.copysign(x, sign))
+_compiled_as(product_error, lambda x, y, product: _fused(x, y, -product))
 
 
 def in_all_lanes(builder: ir.IRBuilder, x: ir.Value, of: ir.Type = REALS) -> ir.Value:

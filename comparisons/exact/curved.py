@@ -14,6 +14,7 @@ from comparisons.exact.dyadic import (
     BoolArray,
     Dyadic,
     Fixed,
+    Integers,
     dot,
     quotient,
     roots,
@@ -135,8 +136,9 @@ def _total(terms: list[Dyadic]) -> Dyadic:
     return total
 
 
-def tori(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """Roots of the quartic, isolated and certified by FLINT (fmpz_poly_complex_roots)."""
+def torus_quartic(row: Row, o: Dyadic, d: Dyadic) -> Integers:
+    """Up to a factor, the coefficients (n, 5) of (|p|² + R² - r²)² - 4 R² (x² + y²) along the rays,
+    the constant term first."""
     q, e = in_local(row, o, d)
     major, minor = column(row, "major"), column(row, "minor")
     alpha, beta = dot(e, e), Dyadic.of(2.0) * dot(q, e)
@@ -156,10 +158,16 @@ def tori(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
         alpha * alpha,
     ]
     exponent = min(c.e for c in coefficients)
-    integers = np.stack([np.broadcast_to(c.to(exponent).n, len(q.n)) for c in coefficients], axis=1)
+    return np.stack([np.broadcast_to(c.to(exponent).n, len(q.n)) for c in coefficients], axis=1)
+
+
+def tori(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
+    """Roots of the quartic, isolated and certified by FLINT (fmpz_poly_complex_roots)."""
+    q, e = in_local(row, o, d)
+    integers = torus_quartic(row, o, d)
     # Rays that stay off the ball around the torus meet nothing.
-    size = major + minor
-    ball, _, _ = roots(alpha, dot(q, e), dot(q, q) - size * size)
+    size = column(row, "major") + column(row, "minor")
+    ball, _, _ = roots(dot(e, e), dot(q, e), dot(q, q) - size * size)
     t = np.full((len(q.n), 4), NEVER, dtype=object)
     touching = np.zeros(len(q.n), bool)
     for i in np.flatnonzero(ball > 0).tolist():
@@ -186,4 +194,4 @@ def _real_roots(coefficients: list[int]) -> list[tuple[int, int]]:
 
 EXACT: dict[str, Any] = {"spheres": spheres, "boxes": boxes, "quadrics": quadrics, "tori": tori}
 
-__all__ = ["EXACT", "Fixed", "boxes", "quadrics", "spheres", "tori"]
+__all__ = ["EXACT", "Fixed", "boxes", "quadrics", "spheres", "tori", "torus_quartic"]

@@ -92,7 +92,8 @@ def geometric(ray: Ray, center: Vec3, r: float) -> float:
 
 @kernel
 def robust(ray: Ray, center: Vec3, r: float) -> float:
-    """The quadratic without its two cancellations; the form that renders.
+    """The quadratic without its two cancellations; the form that renders, there with a closest
+    approach that does not round by its distance (`shapes.rounding.along_from`).
 
     r² - |f + t_ca d|², the closest approach as a vector, stands for the discriminant: it is small
     where the ray is near the centre, and its error is u |f| r in place of u |f|².  The root of
@@ -100,7 +101,7 @@ def robust(ray: Ray, center: Vec3, r: float) -> float:
     Cost: 17 +, 18 *, 3 /, 1 sqrt.
     Fails: near the surface, as the others do.  c = f·f - r² rounds by u r² there, whatever is done
     with it, so a root near zero is off by some u r and may have the wrong sign: leave a surface
-    by more than that.
+    by more than that.  Near the rim, from far away: it is lost within some u |f|.
     """
     f = ray.o - center
     a = dot(ray.d, ray.d)

@@ -238,7 +238,8 @@ def exceeds(a: float, b: float, c: float, d: float) -> bool:
     p, q = a * b, c * d
     if p != q:
         return p > q
-    return product_error(a, b, p) > product_error(c, d, q)
+    larger: bool = product_error(a, b, p) > product_error(c, d, q)
+    return larger
 
 
 @kernel

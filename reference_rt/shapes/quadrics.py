@@ -8,16 +8,16 @@ import numpy as np
 from reference_rt.kernel import kernel
 from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, miss
 from reference_rt.shapes import placement
-from reference_rt.shapes.box import face_entered, face_left, face_normal, inside, on_face
+from reference_rt.shapes.box import face_normal, on_face
 from reference_rt.shapes.placement import (
     local_point,
-    local_ray,
     local_vector,
     world_covector,
     world_surface,
     world_vector,
 )
-from reference_rt.shapes.quadratic import gradient, noise, roots, short, slabs, value
+from reference_rt.shapes.quadratic import gradient, noise, value
+from reference_rt.shapes.quadric_line import in_world, line_of, solid_along
 from reference_rt.shapes.shape import (
     Bounds,
     FloatArray,
@@ -25,8 +25,6 @@ from reference_rt.shapes.shape import (
     Spans,
     Tangents,
     any_tangents,
-    no_spans,
-    one_span,
 )
 from reference_rt.vec3 import (
     Vec3,
@@ -71,75 +69,21 @@ def is_solid(quadrics: Quadrics) -> bool:
 
 
 @kernel
-def _nearby(quadrics: Quadrics, i: int, ray: Ray) -> tuple[Ray, float, float]:
-    """(the ray in local coordinates, shift, unit): the world's t is (t + shift) unit.
-
-    A ray from afar begins next to the local origin: the coefficients of f along it then round as
-    numbers of the shape's size.  One that begins within the box must not be moved: see `roots`.
-    Directions whose powers would overflow or vanish are made 1 long.
-    """
-    local = local_ray(quadrics, i, ray)
-    size = max_abs(local.d)
-    unit = 1.0
-    if size > 0.0 and not 2.0**-200 < size < 2.0**200:
-        unit = 1.0 / size
-    d = local.d * unit
-    if max_abs(local.o) <= 2.0:
-        return Ray(local.o, d, local.t_max), 0.0, unit
-    shift = short(-dot(local.o, d) / dot(d, d), 0.0625, d)
-    return Ray(local.o + d * shift, d, local.t_max), shift, unit
-
-
-class Line(NamedTuple):
-    """A line's roots, where it enters and leaves the clip box, and the codes of the caps there."""
-
-    t0: float
-    t1: float
-    between: bool
-    t_in: float
-    t_out: float
-    cap_in: float
-    cap_out: float
-
-
-@kernel
-def _line(quadrics: Quadrics, i: int, ray: Ray) -> Line:
-    near, shift, unit = _nearby(quadrics, i, ray)
-    r = roots(quadrics.coefficients[i], near)
-    s = slabs(quadrics.lower[i], quadrics.upper[i], quadrics.clipped[i], near)
-    t_in, t_out = inside(s)
-    return Line(
-        (r.t0 + shift) * unit,
-        (r.t1 + shift) * unit,
-        r.between,
-        (t_in + shift) * unit,
-        (t_out + shift) * unit,
-        1.0 + face_entered(s, t_in),
-        1.0 + face_left(s, t_out),
-    )
-
-
-@kernel
 def spans(quadrics: Quadrics, i: int, ray: Ray) -> Spans:
     """Where the line runs in the solid: f <= 0 within the box.  An end's u is 0 on f's surface, and
     1 + the box's face (axis, + 3 on the positive side) on a cap."""
-    t0, t1, between, t_in, t_out, cap_in, cap_out = _line(quadrics, i, ray)
-    if not t_in <= t_out:
-        return no_spans()
-    if not between and t0 >= t1:
-        t0, t1, between = -math.inf, math.inf, True  # f touches 0 from below
-    if between:
-        if t0 <= t1 and t0 <= t_out and t_in <= t1:
-            u0, u1 = 0.0 if t0 >= t_in else cap_in, 0.0 if t1 <= t_out else cap_out
-            return one_span(max(t_in, t0), u0, min(t1, t_out), u1)
-        return no_spans()
-    if t_in <= t0 and t1 <= t_out:
-        return Spans(t_in, cap_in, t0, 0.0, t1, 0.0, t_out, cap_out)
-    if t_in <= t0:
-        return one_span(t_in, cap_in, min(t0, t_out), 0.0 if t0 <= t_out else cap_out)
-    if t1 <= t_out:
-        return one_span(max(t_in, t1), 0.0 if t1 >= t_in else cap_in, t_out, cap_out)
-    return no_spans()
+    line = line_of(quadrics, i, ray)
+    s = solid_along(line)
+    return Spans(
+        in_world(line, s.t0),
+        s.u0,
+        in_world(line, s.t1),
+        s.u1,
+        in_world(line, s.t2),
+        s.u2,
+        in_world(line, s.t3),
+        s.u3,
+    )
 
 
 @kernel
@@ -157,11 +101,12 @@ def intersect(quadrics: Quadrics, i: int, ray: Ray) -> Crossing:
         if s.t2 > 0.0:
             return Crossing(s.t2, s.u2, 0.0)
         return Crossing(s.t3 if s.t3 > 0.0 else math.inf, s.u3, 0.0)
-    line = _line(quadrics, i, ray)
-    if line.t0 > 0.0 and line.t_in <= line.t0 and line.t0 <= line.t_out:
-        return Crossing(line.t0, 0.0, 0.0)
-    if line.t1 > 0.0 and line.t_in <= line.t1 and line.t1 <= line.t_out:
-        return Crossing(line.t1, 0.0, 0.0)
+    line = line_of(quadrics, i, ray)
+    t0, t1 = in_world(line, line.t0), in_world(line, line.t1)
+    if t0 > 0.0 and line.t_in <= line.t0 and line.t0 <= line.t_out:
+        return Crossing(t0, 0.0, 0.0)
+    if t1 > 0.0 and line.t_in <= line.t1 and line.t1 <= line.t_out:
+        return Crossing(t1, 0.0, 0.0)
     return miss()
 
 

@@ -1,14 +1,36 @@
 """What rounding takes away, exactly."""
 
+from typing import Any
+
 from reference_rt.kernel import kernel
+from reference_rt.lanes import product_error
+from reference_rt.vec3 import Vec3
 
 
 @kernel
-def product_error(x: float, y: float, product: float) -> float:
-    """x y - product, exactly, for product = fl(x y) (Dekker 1971, Veltkamp's splitting)."""
-    x_high = x * 134217729.0  # 2^27 + 1
-    x_high = x_high - (x_high - x)
-    y_high = y * 134217729.0
-    y_high = y_high - (y_high - y)
-    x_low, y_low = x - x_high, y - y_high
-    return ((x_high * y_high - product) + x_high * y_low + x_low * y_high) + x_low * y_low
+def difference_error(a: Any, b: Any, difference: Any) -> Any:
+    """a - b - difference, exactly, for difference = fl(a - b) (Knuth 1969, "The Art of Computer
+    Programming" 2, 4.2.2)."""
+    minus_b = difference - a
+    return (a - (difference - minus_b)) - (b + minus_b)
+
+
+@kernel
+def _along(o: Any, d: Any, c: Any, t: Any) -> Any:
+    """o + t d - c of one coordinate."""
+    off, step = o - c, d * t
+    return (off + step) + (difference_error(o, c, off) + product_error(d, t, step))
+
+
+@kernel
+def along_from(o: Vec3, d: Vec3, c: Vec3, t: float) -> Vec3:
+    """o + t d - c, as if it were rounded only once or twice, at the end.
+
+    For c near the line and o far away (D) the plain sum is off by u D, which is more than a small
+    shape around c is wide; this by 2 u times the result, and 2 u² D (`rounding` keeps what the
+    difference and the product lose, and where their sum is small it does not round: Sterbenz).
+    """
+    return Vec3(_along(o.x, d.x, c.x, t), _along(o.y, d.y, c.y, t), _along(o.z, d.z, c.z, t))
+
+
+__all__ = ["along_from", "difference_error", "product_error"]

@@ -14,6 +14,7 @@ from reference_rt.sampling.warp import on_circle
 from reference_rt.shapes.placement import local_vector, owners, world_covector
 from reference_rt.shapes.quadric import ellipsoid
 from reference_rt.shapes.quadrics import Quadrics
+from reference_rt.shapes.rounding import along_from
 from reference_rt.shapes.shape import (
     Bounds,
     FloatArray,
@@ -99,12 +100,16 @@ def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
 
     The quadratic in a form without cancellation for far or small spheres (Haines et al. 2019, "Ray
     Tracing Gems", ch. 7): the discriminant from the closest approach, the second root from c / q.
+    There the closest approach is off by u D for an origin D away; here it is found without that
+    (`along_from`), and what its t was off by along d is taken out again: D is of no account.
     """
     f = ray.o - center
     a = dot(ray.d, ray.d)
     b = -dot(f, ray.d)
-    approach = f + ray.d * (b / a)
-    discriminant = r * r - dot(approach, approach)
+    per_a = 1.0 / a
+    approach = along_from(ray.o, ray.d, center, b * per_a)
+    past = dot(approach, ray.d)
+    discriminant = r * r - dot(approach, approach) + past * past * per_a
     q = b + with_sign(square_root(a * larger(discriminant, 0.0)), b)
     t0 = (dot(f, f) - r * r) / q
     t1 = q / a

@@ -13,9 +13,11 @@ from reference_rt.shapes.placement import (
     columns,
     local_point,
     local_ray,
+    local_vector,
     world_surface,
     world_vector,
 )
+from reference_rt.shapes.rounding import along_from
 from reference_rt.shapes.shape import (
     Bounds,
     FloatArray,
@@ -25,7 +27,7 @@ from reference_rt.shapes.shape import (
     Spans,
     Tangents,
 )
-from reference_rt.vec3 import Vec3, dot, length
+from reference_rt.vec3 import Vec3, dot, length, row
 
 
 class Torus(Shape):
@@ -155,8 +157,8 @@ def _crossings(tori: Tori, i: int, ray: Ray, t: FloatArray) -> int:
     size = major + minor
     speed = length(local.d)
     d = local.d * (1.0 / speed)
-    middle = -dot(local.o, d)
-    m = local.o + d * middle
+    middle = -dot(local.o, d) / speed
+    m = local_vector(tori, i, along_from(ray.o, ray.d, row(tori.center, i), middle))
     # Once more: what rounding left along d is of no account far away, and m is small.
     rest = -dot(m, d)
     m = m + d * rest
@@ -186,7 +188,7 @@ def _crossings(tori: Tori, i: int, ray: Ray, t: FloatArray) -> int:
         is_out = piece == found or excess(m + d * high, major, minor) > 0.0
         if is_out != was_out:
             s = _root(m, d, major, minor, low, high, is_out)
-            t[count] = (middle + (rest + s)) / speed
+            t[count] = middle + (rest + s) / speed
             count += 1
         low, was_out = high, is_out
     return count
