@@ -60,7 +60,7 @@ would be off by up to the whole of it."""
 
 class Projection(NamedTuple):
     """A triangle as a ray sees it: its edge functions, whose sum is twice its area, and the depths
-    of its vertices; side, 0 where the ray passes by, else the sign of the area."""
+    of its vertices; side, 0 where the ray passes by, else 1 at the front and -1 from behind."""
 
     side: int
     e0: float
