@@ -150,9 +150,16 @@ def from_inside(
     return o, d
 
 
-def write(mesh: Closed, file: Path) -> Path:
-    """As .obj, with every bit of the vertices."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
-    file.write_text("\n".join(lines) + "\n", encoding="ascii")
+def write(vertices: FloatArray, faces: IntArray, file: Path) -> Path:
+    """Vertices (n, 3) and triangles (m, 3) as .ply, with every bit of the vertices."""
+    header = (
+        "ply\nformat binary_little_endian 1.0\n"
+        f"element vertex {len(vertices)}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    rows = np.empty(len(faces), [("n", "u1"), ("corners", "<i4", 3)])
+    rows["n"], rows["corners"] = 3, faces
+    body = np.ascontiguousarray(vertices, "<f8").tobytes() + rows.tobytes()
+    file.write_bytes(header.encode("ascii") + body)
     return file
