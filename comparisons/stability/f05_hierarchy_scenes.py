@@ -62,8 +62,13 @@ def hard_rays(
     return o, d
 
 
+MOST_FLAT = 1e70
+"""Larger rectangles, disks and boxes are refused: the squares of their areas are no floats."""
+
+
 def assorted(rng: np.random.Generator, n: int, scale: float, at: FloatArray) -> tuple[Any, ...]:
-    """n spheres, boxes, rectangles, disks and triangles within 10 of a point, all times scale."""
+    """n spheres, triangles, boxes, rectangles and disks, as long as these are accepted, within 10
+    of a point, all times scale."""
     shapes: list[Any] = []
     for k in range(n):
         x, y, z = (at + scale * rng.uniform(-10.0, 10.0, 3)).tolist()
@@ -81,11 +86,11 @@ def assorted(rng: np.random.Generator, n: int, scale: float, at: FloatArray) -> 
         shapes.append(
             (
                 lambda x=x, y=y, z=z, size=size: rt.Sphere(center=(x, y, z), radius=size),
+                lambda a=a, b=b, c=c: rt.Triangle(v0=a, v1=b, v2=c),
                 lambda steps=steps: rt.Box(transform=steps),
                 lambda steps=steps: rt.Rectangle(transform=steps),
                 lambda steps=steps: rt.Disk(transform=steps),
-                lambda a=a, b=b, c=c: rt.Triangle(v0=a, v1=b, v2=c),
-            )[k % 5]()
+            )[k % (5 if scale <= MOST_FLAT else 2)]()
         )
     return tuple(shapes)
 
