@@ -4,14 +4,14 @@ Law: the same shape, the same face, the same bits of t and of the coordinates th
 the four hierarchies (sah, median, spatial, none) leads to it; and the any-hit query says that
 something is there before infinity and just beyond t, and nothing before t.
 
-Range: 1 to 1e6 triangles, a third of them on a lattice; 1 to 1e4 copies in one place; assorted
-shapes at offsets of 1 to 1e12; sizes of 1e-70 to 1e300
-(spheres and triangles alone from 1e80 on: the others are refused); slivers of aspect 1 to 1e15, with rays in
-their planes; and a scene with everything.  Rays: anywhere, through vertices, along axes and
-diagonals with both zeros in the planes of boxes, from vertices.  Counts: quick 4,000 rays, full
-1,000,000, fewer where rays times primitives exceed 4e9.  Each ray is a case for each hierarchy.
-Passes: no difference.  The quick run leaves out the scene with
-everything, whose kernels take half a minute to compile.
+Range: 1 to 1e6 triangles, a third of them on a lattice; 1 to 1e4 copies in one place; slivers of
+aspect 1 to 1e15, with rays in their planes; assorted shapes at offsets of 1 to 1e15 and of sizes of
+1e-70 to 1e300 (spheres and triangles alone from 1e80 on, where the others are refused; from 1e160
+on nothing is hit); and a scene with everything, which the quick run leaves out, as its kernels take
+half a minute to compile.  Rays: anywhere, through vertices, along axes and diagonals with both
+zeros in the planes of boxes, from vertices.  Counts: quick 4,000 rays, full 1,000,000, fewer where
+rays times primitives exceed 4e8, eight at once 4e9.  Each ray is a case for each hierarchy.
+Passes: no difference.
 
 Above 2,000 primitives "none" stands for all of them: it tests every triangle, eight at once, and is
 itself compared with single tests below that.  Mitsuba does not take part: it cannot trace without

@@ -43,18 +43,16 @@ def hard_rays(
         np.maximum(0.5 * high - 0.5 * low, 1e-3 * np.abs(high).max()),
     )
     o = middle + 1.5 * half * rng.uniform(-1.0, 1.0, (n, 3))
-    d = half.max() * unit_vectors(rng, n)
+    d = unit_vectors(rng, n)
     what = rng.integers(0, 4, n)
     at, other = points[rng.integers(0, len(points), (2, n))]
     straight = rng.choice([-1.0, -0.0, 0.0, 0.0, 1.0], (n, 3))
     straight[~straight.any(axis=1)] = (1.0, 0.0, -0.0)
     through, level, on = what == 1, what == 2, what == 3
-    # An extent of half exactly keeps the directions' zeros and diagonals.
-    straight *= half.max()
     apart = (at != other).any(axis=1)
     o[through] = other[through]
     d[through & apart] = (at - other)[through & apart]
-    o[level] = (at - 2.0 * straight)[level]
+    o[level] = (at - 2.0 * half.max() * straight)[level]
     d[level] = straight[level]
     o[on] = at[on]
     some = on & (rng.uniform(size=n) < 0.5)
