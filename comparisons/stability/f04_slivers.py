@@ -22,6 +22,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.stability import f04_slivers_drawn as drawn
+from comparisons.stability import f04_slivers_shots as shots
 from comparisons.stability.f04_slivers_drawn import SHAPES, Trial
 from comparisons.stability.f04_slivers_judge import Judge, Question
 from comparisons.stability.family import (
@@ -33,6 +34,7 @@ from comparisons.stability.family import (
     FloatArray,
     Outcome,
     Series,
+    Shot,
     decades,
 )
 from reference_rt import methods, query
@@ -80,6 +82,20 @@ def measured(make: Make) -> Callable[[Draw, float], Mapping[str, Outcome]]:
     return measure
 
 
+def map_of(make: Callable[..., Trial]) -> Callable[[str, float], Shot]:
+    """A series' `shoot`: a triangle of float32 numbers, with a ray aimed at each point."""
+
+    def shoot(contestant: str, x: float) -> Shot:
+        aim = shots.targets()
+        trial = make(np.random.default_rng(1), x, len(aim), True, turned=True, aim=aim)
+        question, found = answers(trial, contestant == MITSUBA)
+        judge = Judge(question)
+        t = found[contestant]
+        return shots.picture(judge.t, t, judge.wrong(t), "Rays at the points of a triangle")
+
+    return shoot
+
+
 def _series(
     name: str,
     axis: str,
@@ -88,6 +104,7 @@ def _series(
     values: tuple[float, ...],
     quick: int,
     explained: str = "",
+    shoot: Callable[[str, float], Shot] | None = None,
 ) -> Series:
     return Series(
         name=name,
@@ -99,6 +116,7 @@ def _series(
         measure=measured(make),
         unit="u (|o| + size)",
         explained=explained,
+        shoot=shoot,
     )
 
 
@@ -123,6 +141,7 @@ FAMILY = Family(
             partial(drawn.thin_triangle, turned=True),
             ASPECTS,
             0,
+            shoot=map_of(drawn.thin_triangle),
         ),
         _series(
             "aspect, aligned",
@@ -140,6 +159,7 @@ FAMILY = Family(
             partial(drawn.grazed_triangle, turned=True),
             ANGLES,
             2,
+            shoot=map_of(drawn.grazed_triangle),
         ),
         _series(
             "grazing, aligned",

@@ -53,14 +53,14 @@ def _turn(rng: np.random.Generator, turned: bool) -> FloatArray:
     return np.asarray(np.eye(3)[rng.permutation(3)])
 
 
-def _targets(rng: np.random.Generator, v: FloatArray, n: int) -> FloatArray:
-    """Points of a triangle's plane, some beyond the edge across from a vertex."""
+def barycentrics(rng: np.random.Generator, n: int) -> FloatArray:
+    """Of points (n, 3) of a triangle's plane, some beyond the edge across from a vertex."""
     inside = rng.dirichlet((1.0, 1.0, 1.0), n)
     beyond, share = -rng.uniform(0.0, 0.5, n), rng.uniform(0.0, 1.0, n)
     outside = np.stack([beyond, (1.0 - beyond) * share, (1.0 - beyond) * (1.0 - share)], axis=1)
     which = rng.uniform(size=(n, 1)) < OUTSIDE
     turn = rng.integers(0, 3)
-    return np.asarray(np.where(which, np.roll(outside, turn, axis=1), inside) @ v)
+    return np.asarray(np.where(which, np.roll(outside, turn, axis=1), inside))
 
 
 def _triangle(v: FloatArray, o: FloatArray, d: FloatArray, singles: bool) -> Trial:
@@ -72,16 +72,22 @@ def _triangle(v: FloatArray, o: FloatArray, d: FloatArray, singles: bool) -> Tri
 
 
 def thin_triangle(
-    rng: np.random.Generator, aspect: float, n: int, singles: bool, turned: bool
+    rng: np.random.Generator,
+    aspect: float,
+    n: int,
+    singles: bool,
+    turned: bool,
+    aim: FloatArray | None = None,
 ) -> Trial:
     """Height 1 / aspect over an edge of length 2, met at up to 70 degrees from the normal.
 
     Aligned, rays run along the edge and down: across it they start and move by heights alone.
+    aim (n, 3): barycentrics of what rays are aimed at, any by default.
     """
     foot = rng.uniform(-0.8, 0.8)
     v = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [foot, 1.0 / aspect, 0.0]])
     turn = _turn(rng, turned)
-    targets = _targets(rng, v, n)
+    targets = (barycentrics(rng, n) if aim is None else aim) @ v
     sideways = np.array([1.0, 1.0 if turned else 1.0 / aspect, 0.0])
     slant = 2.0 * rng.uniform(-1.0, 1.0, (n, 3)) * sideways + rng.choice([-1, 1], (n, 1)) * [
         0,
@@ -93,14 +99,20 @@ def thin_triangle(
 
 
 def grazed_triangle(
-    rng: np.random.Generator, inverse_angle: float, n: int, singles: bool, turned: bool
+    rng: np.random.Generator,
+    inverse_angle: float,
+    n: int,
+    singles: bool,
+    turned: bool,
+    aim: FloatArray | None = None,
 ) -> Trial:
-    """A triangle that is nowhere thin, and rays at an angle to its plane."""
+    """A triangle that is nowhere thin, and rays at an angle to its plane;  aim: as above."""
     angles = 2.0 * np.pi * (np.arange(3) / 3.0) + rng.uniform(-0.4, 0.4, 3)
     v = np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
     turn = _turn(rng, turned)
     d = _grazing(rng, inverse_angle, n)
-    return _triangle(v @ turn.T, (_targets(rng, v, n) - d) @ turn.T, d @ turn.T, singles)
+    targets = (barycentrics(rng, n) if aim is None else aim) @ v
+    return _triangle(v @ turn.T, (targets - d) @ turn.T, d @ turn.T, singles)
 
 
 def _grazing(rng: np.random.Generator, inverse_angle: float, n: int) -> FloatArray:

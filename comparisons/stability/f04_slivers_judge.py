@@ -76,16 +76,9 @@ class Judge:
 
     def outcome(self, t: FloatArray) -> Outcome:
         """Of answers t (n,), inf for a miss.  `worst`: how far from the shape hits are, in u D."""
-        q = self.question
-        found, there = np.isfinite(t), np.isfinite(self.t)
-        length = np.linalg.norm(q.d, axis=1)
-        # inf - inf of misses is of no interest.
-        with np.errstate(invalid="ignore"):
-            near = found & there & (np.abs(t - self.t) * length <= PIXEL * q.size)
+        q, found = self.question, np.isfinite(t)
         off = self._distances(found, t)
-        wrong = found & ~near & (off > q.band)
-        asked = np.flatnonzero((found & ~near & ~wrong) | (~found & there))
-        wrong[asked] = self._is_certain(asked, t)
+        wrong = self._wrong(t, off)
         open_ = wrong & self.touching
         wrong &= ~self.touching
         worst = float((off[found] / (U * q.reach)).max()) if found.any() else None
@@ -97,6 +90,21 @@ class Judge:
             open=int(open_.sum()),
             examples=tuple(self._example(int(k), float(t[k])) for k in shown),
         )
+
+    def wrong(self, t: FloatArray) -> BoolArray:
+        """Which of answers t (n,) are."""
+        return self._wrong(t, self._distances(np.isfinite(t), t)) & ~self.touching
+
+    def _wrong(self, t: FloatArray, off: FloatArray) -> BoolArray:
+        q, found, there = self.question, np.isfinite(t), np.isfinite(self.t)
+        # inf - inf of misses is of no interest.
+        with np.errstate(invalid="ignore"):
+            apart = np.abs(t - self.t) * np.linalg.norm(q.d, axis=1)
+        near = found & there & (apart <= PIXEL * q.size)
+        wrong = found & ~near & (off > q.band)
+        asked = np.flatnonzero((found & ~near & ~wrong) | (~found & there))
+        wrong[asked] = self._is_certain(asked, t)
+        return np.asarray(wrong)
 
     def _distances(self, found: BoolArray, t: FloatArray) -> FloatArray:
         """Of the points that were found from the shape; 0 for none."""
