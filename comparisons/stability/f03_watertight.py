@@ -166,7 +166,6 @@ FAMILY = Family(
             quick=(1.0, 148376.0, 1e9),
             cases=CASES,
             measure=measure_offset,
-            explained="Mitsuba takes part where float32 still has the mesh: up to 1e6",
             shoot=shot,
         ),
         Series(
@@ -177,6 +176,8 @@ FAMILY = Family(
             quick=(20.0, 20.0 * 4.0**4),
             cases=CASES,
             measure=measure_triangles,
+            explained="the range ends at 81,920 triangles, ours does not: Embree's robust test"
+            " leaks where a ray passes a vertex with many thin neighbours",
         ),
         Series(
             name="seams",
