@@ -147,16 +147,18 @@ def _crossing(seen: Projection, shear: Shear) -> Crossing:
     if seen.side == 0:
         return miss()
     inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
-    t = (seen.e0 * seen.a_z + seen.e1 * seen.b_z + seen.e2 * seen.c_z) * shear.s_z * inverse
+    u, v = seen.e1 * inverse, seen.e2 * inverse
+    # Edge functions times depths would overflow from sizes of 1e102 on, barycentrics do not.
+    t = (seen.e0 * inverse * seen.a_z + u * seen.b_z + v * seen.c_z) * shear.s_z
     if t > 0.0:
-        return Crossing(t, seen.e1 * inverse, seen.e2 * inverse)
+        return Crossing(t, u, v)
     return miss()
 
 
 @kernel
 def enters(triangles: Triangles, i: int, shear: Shear) -> int:
     """+1 where the ray comes to the front of triangle i, -1 where it comes from behind."""
-    return -project(triangles.vertices, i, shear).side
+    return project(triangles.vertices, i, shear).side
 
 
 @kernel

@@ -121,8 +121,8 @@ def rendered(*triangles):
 
 
 def test_watertight_is_what_renders():
-    """The same hits, and t to five roundings: of two products and the inverse of the sum, in place
-    of a product and a quotient."""
+    """The same hits, and t to eleven roundings: six of barycentrics times depths, and five of edge
+    functions times depths, divided by their sum."""
     rng = np.random.default_rng(16)
     for _ in range(20):
         v = rng.uniform(-1, 1, (3, 3))
@@ -133,7 +133,7 @@ def test_watertight_is_what_renders():
         hit = np.isfinite(t)
         assert np.array_equal(np.isfinite(found), hit)
         assert 50 < hit.sum() < 500
-        assert np.all(np.abs(found[hit] - t[hit]) <= 5.01 * U * t[hit])
+        assert np.all(np.abs(found[hit] - t[hit]) <= 11.01 * U * t[hit])
 
 
 def test_edges_belong_to_both_here_and_to_one_where_it_renders():
