@@ -182,7 +182,7 @@ def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
     # `intersect` rounds edge functions relative to longest², divides by twice the area and gets t
     # in units of the longest edge: on a sliver that is a large error, and rays hit it again.
     sliver = longest2 * math.sqrt(longest2) / length(cross(a, b))
-    return surface_error(p, v0, max(max_abs(v1), max_abs(v2)) + sliver)
+    return surface_error(p, v0, math.sqrt(longest2) + sliver)
 
 
 @kernel
