@@ -50,6 +50,14 @@ def shear_of(ray: Ray) -> Shear:
     )
 
 
+CANCELLED = 16.0
+"""How many times larger than a triangle's area the products may be that it is the sum of.
+
+They round by u each, and so barycentrics by CANCELLED u: the point that they name is off by that
+share of the triangle as the ray sees it.  Where more is cancelled, on slivers and grazing rays, it
+would be off by up to the whole of it."""
+
+
 class Projection(NamedTuple):
     """A triangle as a ray sees it: its edge functions, whose sum is twice its area, and the depths
     of its vertices; side, 0 where the ray passes by, else the sign of the area."""
@@ -95,14 +103,21 @@ def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection
     a_y = v[y] - shear.o_y - shear.s_y * a_z
     b_y = v[y + 3 * stride] - shear.o_y - shear.s_y * b_z
     c_y = v[y + 6 * stride] - shear.o_y - shear.s_y * c_z
-    e0 = c_x * b_y - c_y * b_x
-    e1 = a_x * c_y - a_y * c_x
-    e2 = b_x * a_y - b_y * a_x
+    left0, right0 = c_x * b_y, c_y * b_x
+    left1, right1 = a_x * c_y, a_y * c_x
+    left2, right2 = b_x * a_y, b_y * a_x
+    e0, e1, e2 = left0 - right0, left1 - right1, left2 - right2
     side = 0
     if e0 > 0.0 and e1 > 0.0 and e2 > 0.0:
         side = 1
     elif e0 < 0.0 and e1 < 0.0 and e2 < 0.0:
         side = -1
+    if side != 0:
+        size = abs(left0) + abs(right0) + abs(left1) + abs(right1) + abs(left2) + abs(right2)
+        if size > CANCELLED * abs(e0 + e1 + e2):
+            e0, _ = exactly(c_x, c_y, b_x, b_y)
+            e1, _ = exactly(a_x, a_y, c_x, c_y)
+            e2, _ = exactly(b_x, b_y, a_x, a_y)
     elif e0 == 0.0 or e1 == 0.0 or e2 == 0.0:
         e0, s0 = exactly(c_x, c_y, b_x, b_y)
         e1, s1 = exactly(a_x, a_y, c_x, c_y)
