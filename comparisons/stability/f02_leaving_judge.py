@@ -52,7 +52,11 @@ def exact_of(placed: Placed, subject: Subject) -> Exact:
 
 
 def _rowwise(table: Any) -> dict[str, Any]:
-    return {name: column for name, column in table._asdict().items() if name != "outline" and column is not None}
+    return {
+        name: column
+        for name, column in table._asdict().items()
+        if name != "outline" and column is not None
+    }
 
 
 @dataclass
@@ -99,7 +103,9 @@ class Judge:
         self.kind = KINDS[placed.kind]
         self.exact = exact_of(placed, subject)
 
-    def __call__(self, tally: Tally, rays: Rays, outer: BoolArray, found: Departures, bounded: bool) -> None:
+    def __call__(
+        self, tally: Tally, rays: Rays, outer: BoolArray, found: Departures, bounded: bool
+    ) -> None:
         """bounded: whether the offset has to keep to the stated bound."""
         left = np.isfinite(found.t)
         note = self._noted(rays, found)

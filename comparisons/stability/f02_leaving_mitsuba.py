@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from comparisons import translate
-from comparisons.mitsuba_backend import scalar
+from comparisons.mitsuba_backend import mitsuba
 from comparisons.stability.f02_leaving_shapes import Placed, Rays
 from comparisons.stability.f02_leaving_tracer import COLUMNS, Departures, Ways, scene_of
 
@@ -14,13 +14,13 @@ KINDS = ("sphere", "rectangle", "disk", "triangle", "box", "cylinder", "mesh", "
 
 
 def depart(placed: Placed, rays: Rays, ways: Ways) -> Departures:
-    """The same rays, in float32."""
+    """The same rays, in float32; in a scalar variant, which must be set: `scalar`."""
     out = np.zeros((len(rays.o), COLUMNS))
     out[:, 0] = out[:, 13] = np.inf
-    with scalar() as mi:
-        mi_scene = translate.load(scene_of(placed)).mi_scene
-        for k, (o, d, way) in enumerate(zip(*(a.tolist() for a in (*rays, *ways)), strict=True)):
-            _depart(mi, mi_scene, o, d, way, out[k])
+    mi = mitsuba()
+    mi_scene = translate.load(scene_of(placed)).mi_scene
+    for k, (o, d, way) in enumerate(zip(*(a.tolist() for a in (*rays, *ways)), strict=True)):
+        _depart(mi, mi_scene, o, d, way, out[k])
     return Departures.of(out)
 
 

@@ -174,10 +174,10 @@ KINDS = {
     ),
     "disk": Kind(_placed(rt.Disk), lambda r, n: _flat(_in_disk(r, n)), False, True),
     "triangle": Kind(_triangle, _in_triangle, False, True),
-    "polygon": Kind(_placed(rt.Polygon, rings=(_ELL,)), lambda r, n: _flat(_in_ell(r, n)), False, True),
-    "plane": Kind(
-        _placed(rt.Plane), lambda r, n: _flat(r.uniform(-0.9, 0.9, (n, 2))), False, True
+    "polygon": Kind(
+        _placed(rt.Polygon, rings=(_ELL,)), lambda r, n: _flat(_in_ell(r, n)), False, True
     ),
+    "plane": Kind(_placed(rt.Plane), lambda r, n: _flat(r.uniform(-0.9, 0.9, (n, 2))), False, True),
     "box": Kind(_placed(rt.Box), lambda r, n: r.uniform(-0.9, 0.9, (n, 3)), True, True),
     "ellipsoid": Kind(_placed(rt.Sphere), _in_ball, True, True),
     "cylinder": Kind(
@@ -202,9 +202,7 @@ KINDS = {
     "torus": Kind(_torus, _in_ring, True, False),
     "mesh": Kind(_mesh, _in_ball, True, True),
     "solid": Kind(
-        _placed(
-            rt.Difference, of=(rt.Box(), rt.Sphere(center=(0.0, 0.0, 1.0), radius=0.75))
-        ),
+        _placed(rt.Difference, of=(rt.Box(), rt.Sphere(center=(0.0, 0.0, 1.0), radius=0.75))),
         _below_the_hollow,
         True,
         False,
