@@ -109,11 +109,6 @@ ALL = tuple(KINDS)
 
 BOUND = "B = 17 sqrt(3) u (2 |c| + 6 s) reaches a hundredth of the size s at |c| = 1.5e12 s"
 
-EXPLAINED = (
-    "float32 rounds by 5e8 u, so that ours goes 5e8 times further: to the B that is "
-    "a hundredth of the size"
-)
-
 
 def _single(draw: Draw, x: float) -> bool:
     """Whether Mitsuba takes part: beyond, float32 cannot say where the shape is."""

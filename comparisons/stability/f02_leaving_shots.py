@@ -7,8 +7,8 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons import translate
-from comparisons.mitsuba_backend import scalar
 from comparisons.methods.setting import FloatArray
+from comparisons.mitsuba_backend import scalar
 from comparisons.stability.f02_leaving_shapes import Extent, Placed, place
 from comparisons.stability.f02_leaving_tracer import EPSILON, scene_of
 from comparisons.stability.family import MITSUBA, OURS, Draw, Shot

@@ -18,302 +18,24 @@ Mitsuba begins rays (1 + max |p|) RayEpsilon off, RayEpsilon = 8.9e-5 in its flo
 are predicted to be skipped, from x = 1.1e4 on, and far away from x = 11.
 """
 
-import math
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable
 
-import numpy as np
-
-import reference_rt as rt
-from comparisons import translate
-from comparisons.mitsuba_backend import scalar
-from comparisons.methods.errors import U
-from comparisons.methods.setting import FloatArray
-from comparisons.stability.f02_leaving_judge import CONTACT, hexed
-from comparisons.stability.f02_leaving_shapes import matrix
-from comparisons.stability.f02_leaving_shots import PIXELS, lit, picture
-from comparisons.stability.family import (
-    EXAMPLES,
-    MITSUBA,
-    OURS,
-    Draw,
-    Effort,
-    Family,
-    Outcome,
-    Series,
-    Shot,
-    decades,
+from comparisons.stability.f13_contact_light import shadow, shoot, transmitted
+from comparisons.stability.f13_contact_stacks import (
+    COUNT,
+    FAR,
+    Stack,
+    ordered,
+    plates,
+    shells,
+    slots,
 )
-from reference_rt.geometry import Geometry, closest_hit, owner, surface
-from reference_rt.kernel import entry_kernel
-from reference_rt.query import whitted_radiance
-from reference_rt.ray import Ray, ray_from
-from reference_rt.shapes.shape import IntArray
-from reference_rt.tables import SceneTables
-from reference_rt.vec3 import row
-
-COUNT = 8
-"""Surfaces in a stack."""
-
-FAR = 1000.0
-"""Scales between the origin and the scenes that are far away."""
-
-THEIRS = 40
-"""Rays of a setting that Mitsuba is asked about, in its scalar variant."""
-
-
-@entry_kernel
-def _follow(geometry: Geometry, o: FloatArray, d: FloatArray, out: IntArray) -> None:
-    """Into out (n, steps): the shapes that a ray meets, one after another; -1 after the last."""
-    for i in range(len(o)):
-        ray = Ray(row(o, i), row(d, i), math.inf)
-        for k in range(out.shape[1]):
-            hit = closest_hit(geometry, ray)
-            if hit.kind < 0:
-                break
-            out[i, k] = owner(geometry, ray, hit).shape
-            ray = ray_from(surface(geometry, ray, hit), ray.d)
-
-
-class Stack(NamedTuple):
-    """A scene, rays (n, 3) and the shapes that each meets, in order (n, steps)."""
-
-    scene: rt.Scene
-    o: FloatArray
-    d: FloatArray
-    expected: IntArray
-
-
-def bound(distance: float) -> float:
-    """B of scenes of half width 1."""
-    return 17.0 * math.sqrt(3.0) * U * (2.0 * distance + 6.0)
-
-
-def follow(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int) -> IntArray:
-    """The shapes that rays meet on their way straight through, -1 after the last."""
-    out = np.full((len(o), steps), -1)
-    _follow(rt.build_tables(scene).geometry, o, d, out)
-    return out
-
-
-def follow_in_mitsuba(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int) -> IntArray:
-    """The same in Mitsuba, by `si.spawn_ray`."""
-    out = np.full((len(o), steps), -1)
-    with scalar() as mi:
-        twin = translate.load(scene)
-        for i in range(len(o)):
-            ray = mi.Ray3f(mi.Point3f(o[i].tolist()), mi.Vector3f(d[i].tolist()))
-            for k in range(steps):
-                si = twin.mi_scene.ray_intersect(ray)
-                if not si.is_valid():
-                    break
-                out[i, k] = twin.pieces[si.shape.id()].shape
-                ray = si.spawn_ray(mi.Vector3f(d[i].tolist()))
-    return out
-
-
-def _axes(rng: np.random.Generator) -> FloatArray:
-    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    return np.asarray(q * np.sign(np.linalg.det(q)))
-
-
-def _rays(rng: np.random.Generator, n: int, steepest: float = 0.4) -> tuple[FloatArray, FloatArray]:
-    """(o, d) from above through the middle of the square [-1, 1]², at up to this tangent."""
-    middle = np.column_stack([rng.uniform(-0.2, 0.2, (n, 2)), np.zeros(n)])
-    d = np.column_stack([rng.uniform(-steepest, steepest, (n, 2)), -np.ones(n)])
-    d /= np.linalg.norm(d, axis=1, keepdims=True)
-    return middle - 1.5 * d, d
-
-
-def plates(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
-    """Parallel squares, tilted."""
-    axes, center = _axes(rng), _axes(rng)[0] * distance
-    squares = tuple(
-        rt.Rectangle(transform=matrix(axes, center - axes[:, 2] * (k * gap))) for k in range(COUNT)
-    )
-    o, d = _rays(rng, n, 0.3)
-    o, d = o @ axes.T + center, d @ axes.T
-    return Stack(rt.Scene(shapes=squares), o, d, np.tile(np.arange(COUNT), (n, 1)))
-
-
-def shells(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
-    """Spheres in spheres; rays pass near enough to the middle to meet all, twice."""
-    center = _axes(rng)[0] * distance
-    balls = tuple(
-        rt.Sphere(center=tuple(center.tolist()), radius=1.0 - k * gap) for k in range(COUNT)
-    )
-    o, d = _rays(rng, n)
-    numbers = np.arange(COUNT)
-    expected = np.tile(np.concatenate([numbers, numbers[::-1]]), (n, 1))
-    return Stack(rt.Scene(shapes=balls), o + center, d, expected)
-
-
-def slots(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
-    """A cube cut in two by a slot, and a square in the middle of that: in, out, the square, in,
-    out."""
-    axes, center = _axes(rng), _axes(rng)[0] * distance
-    cut = rt.Box(transform=matrix(np.diag([4.0, 4.0, gap]), np.zeros(3)))
-    cube = rt.Difference(of=(rt.Box(), cut), transform=matrix(axes, center))
-    square = rt.Rectangle(transform=matrix(axes, center))
-    o, d = _rays(rng, n)
-    o, d = (o - 1.5 * d) @ axes.T + center, d @ axes.T
-    expected = np.tile([0, 0, 1, 0, 0], (n, 1))
-    return Stack(rt.Scene(shapes=(cube, square)), o, d, expected)
-
-
-def _judged(expected: IntArray, found: IntArray, note: Callable[[int], dict[str, Any]]) -> Outcome:
-    """Each ray is a case."""
-    bad = np.flatnonzero((expected != found).reshape(len(expected), -1).any(axis=1))
-    examples = tuple(
-        note(i) | {"expected": expected[i].tolist(), "found": found[i].tolist()}
-        for i in bad[:EXAMPLES].tolist()
-    )
-    return Outcome(len(expected), len(bad), examples=examples)
-
-
-def ordered(
-    make: Callable[..., Stack], distance: float = 0.0, theirs: bool = True
-) -> Callable[[Draw, float], Mapping[str, Outcome]]:
-    """Rays straight through a stack with gaps of 1 / x."""
-
-    def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
-        stacks = 4
-        outcomes: dict[str, Outcome] = {}
-        for _ in range(stacks):
-            stack = make(draw.rng, draw.cases // stacks, 1.0 / x, distance)
-            found = {OURS: follow(stack.scene, stack.o, stack.d, stack.expected.shape[1])}
-            if draw.mitsuba and theirs:
-                few = slice(0, THEIRS)
-                found[MITSUBA] = follow_in_mitsuba(
-                    stack.scene, stack.o[few], stack.d[few], stack.expected.shape[1]
-                )
-            for name, met in found.items():
-                outcome = _judged(stack.expected[: len(met)], met, _of_rays(stack, x))
-                outcomes[name] = outcomes[name] + outcome if name in outcomes else outcome
-        return outcomes
-
-    return measure
-
-
-def _of_rays(stack: Stack, x: float) -> Callable[[int], dict[str, Any]]:
-    return lambda i: {"gap": (1.0 / x).hex(), "o": hexed(stack.o[i]), "d": hexed(stack.d[i])}
-
-
-# ---- light ---------------------------------------------------------------------------------------
-
-
-def shadow_scene(gap: float) -> rt.Scene:
-    """A cube over a floor z = 0, from x = -1 to 1 and from z = gap on."""
-    floor = rt.Rectangle(transform=matrix(np.diag([4.0, 4.0, 1.0]), np.zeros(3)))
-    cube = rt.Box(transform=matrix(np.eye(3), np.array([0.0, 0.0, 1.0 + gap])))
-    return rt.Scene(shapes=(floor, cube))
-
-
-def shadow(draw: Draw, x: float) -> Mapping[str, Outcome]:
-    """Points under the cube, `deep` from its edge x = 1, towards a sun at 45°: in the light where
-    that comes in under the edge, deep < gap.  The floor is seen from below."""
-    gap, n, rng = 1.0 / x, draw.cases, draw.rng
-    deep = gap * 2.0 ** rng.uniform(-4.0, 4.0, n)
-    # Near the edge of the shadow: what the law leaves to either answer.
-    slope = np.sqrt(0.5)
-    at = np.column_stack([1.0 - deep, rng.uniform(-0.5, 0.5, n), np.zeros(n)])
-    d = np.tile([0.0, 0.0, 1.0], (n, 1))
-    o, w = at - d, np.tile([slope, 0.0, slope], (n, 1))
-    dark = (1.0 - at[:, 0] > gap).astype(np.int64)
-    sure = (np.abs(deep - gap) > CONTACT * bound(0.0)) & (deep < 1.5)
-    scene = shadow_scene(gap)
-    answers = {OURS: lit(OURS, scene, o, d, w)}
-    if draw.mitsuba:
-        answers[MITSUBA] = lit(MITSUBA, scene, *(a[: 4 * THEIRS] for a in (o, d, w)))
-    outcomes = {}
-    for name, answer in answers.items():
-        met = (1.0 - answer[:, 0]).astype(np.int64)
-        decided = np.flatnonzero(sure[: len(met)])
-
-        def note(i: int, decided: IntArray = decided) -> dict[str, Any]:
-            return {"gap": gap.hex(), "point": hexed(at[decided[i]])}
-
-        outcome = _judged(dark[decided], met[decided], note)
-        outcomes[name] = outcome + Outcome(0, 0, open=len(met) - len(decided))
-    return outcomes
-
-
-GLASS = 1.5
-"""Index of refraction."""
-
-TRANSMITTED = 64.0 * COUNT * U
-"""Of the relative error: each of Fresnel's equations, some thirty operations whose result changes
-by less than twice what the cosine does, below 30°."""
-
-
-def panes(gap: float) -> SceneTables:
-    """Slabs of glass, `gap` thick and as much apart, before a lamp of radiance 1."""
-    slabs = tuple(
-        rt.Box(
-            material="glass",
-            transform=matrix(np.diag([2.0, 2.0, gap / 2.0]), np.array([0.0, 0.0, -2.0 * k * gap])),
-        )
-        for k in range(COUNT // 2)
-    )
-    lamp = rt.Rectangle(
-        material="lamp", transform=matrix(np.diag([9.0, 9.0, 1.0]), np.array([0.0, 0.0, -3.0]))
-    )
-    materials = {
-        "glass": rt.Dielectric(int_ior=GLASS, ext_ior=1.0),
-        "lamp": rt.Emissive(radiance=(1.0, 1.0, 1.0)),
-    }
-    return rt.build_tables(rt.Scene(shapes=(*slabs, lamp), materials=materials))
-
-
-def fresnel(cosine: FloatArray) -> FloatArray:
-    """Transmitted by one surface, of unpolarised light (both ways the same)."""
-    inner = np.sqrt(1.0 - (1.0 - cosine**2) / GLASS**2)
-    across = (cosine - GLASS * inner) / (cosine + GLASS * inner)
-    along = (GLASS * cosine - inner) / (GLASS * cosine + inner)
-    return np.asarray(1.0 - 0.5 * (across**2 + along**2))
-
-
-def transmitted(draw: Draw, x: float) -> Mapping[str, Outcome]:
-    """As many surfaces as Whitted may follow: what is mirrored to and fro needs more, so that the
-    lamp is seen through all of them alone: (1 - F)^COUNT."""
-    o, d = _rays(draw.rng, draw.cases)
-    setup = rt.Whitted(max_depth=COUNT, min_contribution=0.0).setup()
-    found = whitted_radiance(panes(1.0 / x), setup, o + np.array([0.0, 0.0, 0.5]), d)[:, 0]
-    expected = fresnel(-d[:, 2]) ** COUNT
-    error = np.abs(found - expected) / expected
-    bad = np.flatnonzero(~(error <= TRANSMITTED))
-    examples = tuple(
-        {"o": hexed(o[i]), "d": hexed(d[i]), "expected": expected[i].hex(), "found": found[i].hex()}
-        for i in bad[:EXAMPLES].tolist()
-    )
-    worst = float(error.max() / (COUNT * U))
-    return {OURS: Outcome(len(o), len(bad), worst, examples=examples)}
-
-
-def shoot(contestant: str, x: float) -> Shot:
-    """The strip of the floor beside and under the edge, twelve gaps wide."""
-    gap = 1.0 / x
-    ticks = (np.arange(PIXELS) + 0.5) / PIXELS * 12.0 - 6.0
-    across, along = np.meshgrid(ticks, np.linspace(-0.5, 0.5, PIXELS))
-    at = np.column_stack([1.0 + across.ravel() * gap, along.ravel(), np.zeros(across.size)])
-    d = np.tile([0.0, 0.0, 1.0], (len(at), 1))
-    w = np.tile([math.sqrt(0.5), 0.0, math.sqrt(0.5)], (len(at), 1))
-    found = lit(contestant, shadow_scene(gap), at - d, d, w)
-    share = float((found[:, 0] > 0.0).mean())
-    caption = (
-        f"{contestant}: the floor at a cube's edge (in the middle), {gap:.0e} under it; light comes "
-        f"in under the cube by one gap in twelve: 58 % are lit, here {100.0 * share:.0f} %"
-    )
-    return Shot(picture(found), caption)
-
+from comparisons.stability.family import Effort, Family, Series, decades
 
 CASES: dict[Effort, int] = {"quick": 400, "full": 20_000}
 NEAR_LAW = "a gap is kept apart where it is more than 4 B = 4 · 17 sqrt(3) u · 6 s = 7.8e-14 s"
 FAR_LAW = (
     "a gap is kept apart where it is more than 4 B = 4 · 17 sqrt(3) u (2 |c| + 6 s) = 2.6e-11 s"
-)
-EXPLAINED = (
-    "float64 has 5e8 times the digits, and the gap of Mitsuba's ray epsilon is 800 roundings wide"
 )
 
 
@@ -342,7 +64,7 @@ FAMILY = Family(
     id="F13",
     name="contact gaps",
     law="What lies in a gap is not skipped: order, shadows and light are those of closed forms.",
-    anchors="Mitsuba: open reports of lost contact shadows (mitsuba3#1871, #219); others test none.",
+    anchors="lost contact shadows are reported of Mitsuba (mitsuba3#1871, #219); none is tested.",
     series=(
         *(
             _series(name, about, make, far, theirs)
