@@ -6,9 +6,9 @@ side of a flat one, it meets nothing; what it meets else, exact arithmetic on th
 (o', w) meets too, within a factor of 2 in t, so that it is another place.
 (2) Nothing is lost: into a closed shape it meets the far wall, through its outer side, and
 
-    |o' - p| <= B = 16 sqrt(3) u (2 |c| + 6 s),  u = 2^-53,
+    |o' - p| <= B = 17 sqrt(3) u (2 |c| + 6 s),  u = 2^-53,
 
-c being the middle of the shape (largest coordinate) and s its longest half axis, however thin it is.
+c being the middle of the shape (largest coordinate) and s its longest half axis, however thin.
 (3) The first ray, aimed at what is well inside, meets the shape wherever exact arithmetic says so.
 
 Where the shape is thinner than 4 B at p, along the normal or along w, its walls are one: such cases
@@ -39,7 +39,7 @@ import numpy as np
 from comparisons.mitsuba_backend import scalar
 from comparisons.stability import f02_leaving_mitsuba as theirs
 from comparisons.stability.f02_leaving_judge import Judge, Tally
-from comparisons.stability.f02_leaving_shapes import KINDS, Extent, Rays, aim, place
+from comparisons.stability.f02_leaving_shapes import KINDS, WHOLE, Extent, Rays, aim, place
 from comparisons.stability.f02_leaving_shots import shoot
 from comparisons.stability.f02_leaving_tracer import EPSILON, Ways, depart, subjects
 from comparisons.stability.family import MITSUBA, OURS, Draw, Family, Outcome, Series, Shot, decades
@@ -59,7 +59,8 @@ FEW_SHAPES = {"quick": 1, "full": 8}
 """Of a kind in a setting, those that they are asked about."""
 
 SAMPLE = 4
-"""Of the departures from a shape, those that exact arithmetic is asked about however they look."""
+"""Of the departures from a shape, those that exact arithmetic is asked about however they look; of those whose
+exact answers come ray by ray, one."""
 
 FLATTEST = -15.0
 """The least cosine of departures to the normal, as a power of ten."""
@@ -89,7 +90,7 @@ def measure(
         for kind in kinds:
             placed = [place(kind, extent, draw) for _ in range(shapes)]
             for k, (one, subject) in enumerate(zip(placed, subjects(kind, placed), strict=True)):
-                judge = Judge(one, subject, sample=SAMPLE)
+                judge = Judge(one, subject, sample=1 if kind in WHOLE else SAMPLE)
                 first, away = aim(one, rays, extent.single, draw.rng), ways(draw.rng, rays, cosine)
                 judge(tallies[OURS], first, away.outer, depart(subject, first, away), True)
                 if k >= FEW_SHAPES[draw.effort]:
@@ -99,7 +100,7 @@ def measure(
                 judge(tallies[FIXED], first, away.outer, found, False)
                 if MITSUBA in tallies and kind in theirs.KINDS:
                     found = theirs.depart(one, first, away)
-                    judge(tallies[MITSUBA], first, away.outer, found, False)
+                    judge(tallies[MITSUBA], first, theirs.outer(away, found), found, False)
     return {name: tally.outcome() for name, tally in tallies.items()}
 
 
@@ -171,7 +172,7 @@ def _series(
         about=about,
         values=values,
         quick=quick,
-        cases={"quick": 200 * len(kinds), "full": cases or PER_KIND // len(values)},
+        cases={"quick": 500 * len(kinds), "full": cases or PER_KIND // len(values)},
         measure=run,
         unit="B",
         holds_to=holds_to,

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from comparisons import translate
+from comparisons.exact.dyadic import BoolArray
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.stability.f02_leaving_shapes import Placed, Rays
 from comparisons.stability.f02_leaving_tracer import COLUMNS, Departures, Ways, scene_of
@@ -35,3 +36,10 @@ def _depart(mi: Any, mi_scene: Any, o: list[float], d: list[float], way: Any, ou
     out[1:4], out[4:7], out[7:10], out[10:13] = si.p, si.n, leaving.o, leaving.d
     if met.is_valid():
         out[13], out[14] = met.t, float(np.dot(leaving.d, met.n))
+
+
+def outer(ways: Ways, found: Departures) -> BoolArray:
+    """To which side rays were asked to leave; of those that float32 cannot tell, to which they
+    began: their cosines are below some hundred roundings of it."""
+    begun = np.sum((found.start - found.p) * found.n, axis=1) > 0.0
+    return np.asarray(np.where(np.abs(ways.local[:, 2]) < 1e-5, begun, ways.outer))

@@ -1,8 +1,8 @@
 """F13: surfaces that are close to each other.
 
-Law.  What lies between two surfaces is not skipped: rays that go straight on from surface to surface
-meet them in their order, light gets into the gap and no further than it should, and glass after glass
-lets through what Fresnel says, as long as the gap is more than
+Law.  What lies between two surfaces is not skipped: rays that go straight on from surface to
+surface meet them in their order, light gets into the gap and no further than it should, and glass
+after glass lets through what Fresnel says, as long as the gap is more than
 
     4 B,  B = 17 sqrt(3) u (2 |c| + 6 s),  u = 2^-53,
 
@@ -14,8 +14,8 @@ Range: gaps from 1e-1 to 1e-14 of the scale, about the origin and 1000 scales aw
 the origin, 1e-10 far away.  Answers are known in closed form; open are points of a contact shadow
 that lie within 4 B of its edge.
 
-Mitsuba begins rays (1 + max |p|) RayEpsilon off, RayEpsilon = 8.9e-5 in its float32: gaps below that
-are predicted to be skipped, from x = 1.1e4 on, and far away from x = 11.
+Mitsuba begins rays (1 + max |p|) RayEpsilon off, RayEpsilon = 8.9e-5 in its float32: gaps below
+that are predicted to be skipped, from x = 1.1e4 on at the latest, and far away from x = 11.
 """
 
 from collections.abc import Callable
