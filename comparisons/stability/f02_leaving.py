@@ -22,10 +22,11 @@ Every departure is traced; exact arithmetic is asked about those that do not loo
 the sign of w · n where they meet something again, and about a sample of all others.
 
 Mitsuba leaves by `si.spawn_ray(w)`: an offset of (1 + max |p|) RayEpsilon along the normal, and
-RayEpsilon is 8.9e-5 in its float32.  It is predicted to fail (2) where the shape is smaller than
-that, and (1) where what float32 rounds is larger.  While it takes part, all numbers of shapes and
-rays are rounded to float32 first, for everyone.  The law on |o' - p| is not put to it.
-The text-book's ray begins at o + t d, what is nearer than 1e-4 not counting.
+RayEpsilon is 8.9e-5 in its float32.  In place of B it is put the size: a ray that begins more than
+s / 100 off has lost neighbours that are as near, as predicted from |c| = 112 s on, and for shapes
+smaller than 8.9e-3.  While it takes part, all numbers of shapes and rays are rounded to float32
+first, for everyone.  So is the text-book's ray judged, which begins at o + t d, what is nearer than
+1e-4 not counting.
 """
 
 import contextlib
@@ -59,8 +60,8 @@ FEW_SHAPES = {"quick": 1, "full": 8}
 """Of a kind in a setting, those that they are asked about."""
 
 SAMPLE = 4
-"""Of the departures from a shape, those that exact arithmetic is asked about however they look; of those whose
-exact answers come ray by ray, one."""
+"""Of the departures from a shape, those that exact arithmetic is asked about however they look; one
+of those where it answers ray by ray."""
 
 FLATTEST = -15.0
 """The least cosine of departures to the normal, as a power of ten."""

@@ -19,6 +19,9 @@ from reference_rt.shapes.shape import IntArray
 CONTACT = 4.0
 """Bounds: what is thicker must not be lost, nor a neighbour that is farther away."""
 
+CLOSE = 0.01
+"""Sizes: how near a neighbour is that others than ours must not lose."""
+
 NEAR = 100.0
 """Bounds: a closed shape that is met again within these is looked into, whatever it is."""
 
@@ -106,17 +109,16 @@ class Judge:
     def __call__(
         self, tally: Tally, rays: Rays, outer: BoolArray, found: Departures, bounded: bool
     ) -> None:
-        """bounded: whether the offset has to keep to the stated bound."""
+        """bounded: whether rays have to begin within the stated bound, else within `CLOSE` sizes."""
         left = np.isfinite(found.t)
         note = self._noted(rays, found)
         self._primary(tally, rays, np.flatnonzero(~left), note)
         tally.cases += int(left.sum())
         moved = np.where(left, np.linalg.norm(found.start - found.p, axis=1), 0.0)
         tally.worst = max(tally.worst, float(moved.max(initial=0.0)) / self.placed.bound)
-        failed = np.zeros(len(left), bool)
-        if bounded:
-            failed |= moved > self.placed.bound
-            tally.fail("offset beyond the bound", np.flatnonzero(failed), note)
+        allowed = self.placed.bound if bounded else max(self.placed.bound, CLOSE * self.placed.size)
+        failed = moved > allowed
+        tally.fail("begins too far off", np.flatnonzero(failed), note)
         asked = left & ~failed & (self._doubtful(outer, found) | self._sampled(left))
         for leaves, decide in ((True, self._outside), (False, self._inside)):
             which = np.flatnonzero(asked & (outer == leaves))
@@ -186,7 +188,11 @@ class Judge:
             for axis in (found.n[which], np.cross(found.n[which], w)):
                 there, _ = self.exact(start + step * axis, w)
                 open_ |= differs & _alike(again, there)
-        self._put_open(tally, open_ & ~wrong)
+        # A hole that is thinner than a few bounds cannot be entered.
+        begin = found.p[which] + found.n[which] * (bound / 16.0)
+        open_ |= wrong & (self.exact(begin, found.n[which])[0] < CONTACT * bound)
+        wrong &= ~open_
+        self._put_open(tally, open_)
         tally.fail("begins inside", which[wrong], note)
         tally.fail("lost", which[lost & ~open_], note)
         tally.fail("met again", which[differs & ~lost & ~open_], note)
