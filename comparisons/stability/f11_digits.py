@@ -120,7 +120,7 @@ def _edge(draw: Draw, x: float) -> dict[str, Outcome]:
     n = round32(draw.rng.uniform(1.01, 4.0, draw.cases))
     outside = draw.rng.random(draw.cases) < 0.5
     n = np.where(outside, round32(1.0 / n), n)
-    critical = np.where(outside, np.sqrt((1.0 - n) * (1.0 + n)), np.sqrt((n - 1.0) * (n + 1.0)) / n)
+    critical = np.sqrt(np.abs(n - 1.0) * (n + 1.0)) / np.where(outside, 1.0, n)
     off = draw.rng.uniform(1.0, 2.0, draw.cases) / x * draw.rng.choice([-1.0, 1.0, 1.0], draw.cases)
     cosines = np.minimum(critical * (1.0 + off), 1.0) * np.where(outside, 1.0, -1.0)
     if 1.0 / x > 2.0**-22:
@@ -176,7 +176,10 @@ def _densities(draw: Draw, x: float) -> dict[str, Outcome]:
             seen = exact.density > (1e-19 if who == MITSUBA else 1e-280)
             errors = np.where(seen, relative(value, exact.density), 0.0) / condition
 
-            def ask(i: int, kind: str = kind, value: FloatArray = value, e: Any = exact) -> Any:
+            def ask(
+                i: int, kind: str = kind, value: FloatArray = value, e: Any = exact,
+                wo: FloatArray = wo, wi: FloatArray = wi,
+            ) -> Any:  # fmt: skip
                 told = {"distribution": kind, "alpha": hexed(alpha), "wo": hexed(wo[i])}
                 told |= {"wi": hexed(wi[i]), "D": float(e.density[i])}
                 return {**told, "found": float(value[i])}

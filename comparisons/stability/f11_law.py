@@ -86,6 +86,9 @@ def masking(kind: str, alpha: float, v: FloatArray) -> FloatArray:
     with ctx.workprec(BITS):
         for x, y, z in v.tolist():
             s = arb(alpha) * (arb(x) * arb(x) + arb(y) * arb(y)).sqrt()
+            if not s > 0:
+                found.append(1.0)
+                continue
             a = arb(z) / s
             if kind == "ggx":
                 rest = ((1 + 1 / (a * a)).sqrt() - 1) / 2

@@ -34,10 +34,9 @@ def outcome(errors: FloatArray, allowed: FloatArray | float, ask: Ask) -> Outcom
 
 def relative(value: FloatArray, exact: FloatArray) -> FloatArray:
     """|value - exact| / |exact|; 0 where both are 0, inf where one alone is."""
-    off, size = np.abs(value - exact), np.abs(exact)
-    return np.where(
-        off == 0.0, 0.0, off / np.where(size > 0.0, size, np.nan_to_num(off) * 0.0 + 1e-320)
-    )
+    off = np.abs(value - exact)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(off == 0.0, 0.0, off / np.abs(exact))
 
 
 def hexed(values: Sequence[float] | FloatArray | float) -> Any:

@@ -14,8 +14,8 @@ Laws:
   quadrature differ by.
 - digits: Fresnel's R and T, the distribution D and the masking G1 are the exact formulae of the
   very floats, evaluated in 300 bits, to 64 u of their value, plus what moving the cosine by 4 u
-  moves them (as at the critical angle); of Beckmann's D times 1 + slope², as its exponent is rounded.
-  Mitsuba gets the same in its own u, and numbers that float32 holds.
+  moves them (as at the critical angle); of Beckmann's D times 1 + slope², as its exponent is
+  rounded.  Mitsuba gets the same in its own u, and numbers that float32 holds.
 
 Ranges: cosines to 1e-12, alpha 1e-4 to 1, indices 1 ± 1e-8 to 4, the critical angle to 1e-15 of it;
 1e5 pairs of directions a material and setting in full.  Mitsuba takes no part where its float32

@@ -137,8 +137,8 @@ CONSISTENCY = Series(
     "weights",
     "1 / alpha",
     "Samples of all materials for directions down to a cosine of 1e-6: weight times density "
-    "against evaluate(), density against pdf(), nothing infinite, no weight above 1 where power is only "
-    "divided.",
+    "against evaluate(), density against pdf(), nothing infinite, no weight above 1 "
+    "where power is only divided.",
     (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
     (1.0, 1e2, 1e4),
     {"quick": 2_000, "full": 100_000},
