@@ -99,11 +99,12 @@ class Ours:
             if isinstance(material, cls):
                 row_of = {field: material.tabulate(NO_TEXTURES)}
                 return Ours(_plain()._replace(**row_of), code)
-        raise TypeError(f"{material.type} does not scatter by itself")
+        raise TypeError(f"{type(material).__name__} does not scatter by itself")
 
     def _both(self, wo: FloatArray, wi: FloatArray) -> tuple[FloatArray, FloatArray]:
         values, densities = np.empty((len(wo), 3)), np.empty(len(wo))
-        _evaluate(self.table, self.kind, *_rows(wo, wi), values, densities)
+        o, i = _rows(wo, wi)
+        _evaluate(self.table, self.kind, o, i, values, densities)
         return values, densities
 
     def evaluate(self, wo: FloatArray, wi: FloatArray) -> FloatArray:
@@ -114,7 +115,8 @@ class Ours:
 
     def sample(self, wo: FloatArray, u: FloatArray) -> Samples:
         out = np.empty((len(wo), 9))
-        _sample(self.table, self.kind, *_rows(wo, u), out)
+        o, numbers = _rows(wo, u)
+        _sample(self.table, self.kind, o, numbers, out)
         return Samples(out[:, :3], out[:, 3:6], out[:, 6], out[:, 7], out[:, 8] != 0.0)
 
 
@@ -172,7 +174,7 @@ LOSSLESS: dict[str, Any] = {"eta": 1.0, "k": 1e9}
 WHITE = (1.0, 1.0, 1.0)
 
 
-def _rough(cls: type[Material], **fields: Any) -> Callable[[float], Material]:
+def _rough(cls: Any, **fields: Any) -> Callable[[float], Material]:
     return lambda alpha: cls(**fields, alpha=alpha)
 
 

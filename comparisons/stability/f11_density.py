@@ -76,7 +76,8 @@ def _cell_of(wo: FloatArray, wi: FloatArray, alpha: float, eta: float) -> IntArr
     s2 = x * x + y * y
     turn = np.arctan2(y, x) / (2.0 * math.pi) % 1.0
     row = np.minimum((s2 / (1.0 + s2) * CELLS).astype(int), CELLS - 1)
-    return row * CELLS + np.minimum((turn * CELLS).astype(int), CELLS - 1)
+    column = np.minimum((turn * CELLS).astype(int), CELLS - 1)
+    return np.asarray(row * CELLS + column)
 
 
 def _cells(

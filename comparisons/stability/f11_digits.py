@@ -77,7 +77,7 @@ def _boundary(
     if draw.mitsuba and mitsuba_too:
         asked[MITSUBA] = _theirs
     exact = fresnel(cosines, n)
-    found = {}
+    found: dict[str, Outcome] = {}
     for who, method in asked.items():
         unit = unit_of(who)
         near = fresnel_near(cosines, n, 4.0 * unit, 0.0)

@@ -17,10 +17,29 @@ from comparisons.stability.f11_density import fit
 from comparisons.stability.f11_outcomes import hexed, outcome, together, unit_of
 from comparisons.stability.f11_pairs import contestants
 from comparisons.stability.family import Draw, FloatArray, Outcome, Series
-from reference_rt.materials import Material
+from reference_rt.materials import (
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Material,
+    Mirror,
+    RoughConductor,
+    RoughDielectric,
+    ThinDielectric,
+)
 
 PURE = tuple(name for name in ROUGH if name.startswith(("metal", "glass", "bubble")))
 """Microfacets alone, of one roughness: what the chart of half vectors is made for."""
+
+POWER = (
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    RoughConductor,
+    RoughDielectric,
+    ThinDielectric,
+)
 
 FALSE_ALARM = 1e-6
 """The chance that a setting without fault fails."""
@@ -44,8 +63,7 @@ def conditions(n: float, alpha: float, wo: FloatArray, wi: FloatArray) -> FloatA
 
 def _powers(material: Material) -> bool:
     """Whether no sample weighs more than 1 in power."""
-    return material.type in ("rough_conductor", "rough_dielectric", "mirror", "conductor",
-                             "dielectric", "thin_dielectric", "diffuse")  # fmt: skip
+    return isinstance(material, POWER)
 
 
 def inconsistency(

@@ -213,7 +213,7 @@ def _shares(s: Surface, wo: Vec3) -> _Shares:
 def _value(s: Surface, wo: Vec3, wi: Vec3) -> Vec3:
     """f |cos wi| with wo above."""
     if wi.z < 0.0:
-        bent = bend(wo, wi, s.index, s.front)
+        bent = bend(wo, wi, s.relative_ior, s.front)
         refracted = facet(s, bent.refraction).refracted
         return refracted * (visible_normals(s.m, wo, bent.h) * bent.spread * g1(s.m, wi))
     h, cos_d = half_vector(wo, wi)
@@ -234,7 +234,7 @@ def _density(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> float:
     if not total > 0.0:
         return 0.0
     if wi.z < 0.0:
-        bent = bend(wo, wi, s.index, s.front)
+        bent = bend(wo, wi, s.relative_ior, s.front)
         passing = facet(s, bent.refraction).passing
         normals = visible_normals(s.m, wo, bent.h) * bent.spread * (s.eta * s.eta)
         return shares.main / total * passing * normals

@@ -28,7 +28,7 @@ class Surface(NamedTuple):
 
     diffuse, transmitting: the shares (1 - metallic) (1 - spec_trans) and (1 - metallic)
     spec_trans;  coat_alpha: roughness of the clear coat;  eta: index of refraction on the other
-    side over that on wo's;  index: inside over outside;  front: whether wo is outside;  m: the
+    side over that on wo's;  relative_ior: inside over outside;  front: whether wo is outside;  m: the
     main lobe's microfacets."""
 
     base: Vec3
@@ -43,7 +43,7 @@ class Surface(NamedTuple):
     diffuse: float
     transmitting: float
     eta: float
-    index: float
+    relative_ior: float
     front: bool
     m: Microfacets
 
@@ -70,7 +70,7 @@ def schlick_weight(cosine: float) -> float:
 @kernel
 def meet(s: Surface, cosine: float) -> Refraction:
     """What Fresnel says of light at this angle, from wo's side."""
-    return fresnel(cosine if s.front else -cosine, s.index)
+    return fresnel(cosine if s.front else -cosine, s.relative_ior)
 
 
 @kernel
