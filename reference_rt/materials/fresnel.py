@@ -21,8 +21,8 @@ class Refraction(NamedTuple):
 
     reflectance, transmittance: the fractions of power, each to its last digits, (1, 0) for total
     internal reflection;  cos_t: the cosine of the refracted direction;  eta: index on its side over
-    that on wo's;  gap: cos_o - eta cos_t, without cancellation: the refracted direction is
-    (gap n - wo) / eta;  thin: the cosine on the side of the smaller index.
+    that on wo's;  gap: cos_o / eta - cos_t, without cancellation: the refracted direction is
+    gap n - wo / eta;  thin: the cosine on the side of the smaller index.
     """
 
     reflectance: float
@@ -54,7 +54,7 @@ def fresnel(cos_o: float, n: float) -> Refraction:
         eta, g = 1.0 / n, n * cosine
         other2 = g * g - k
     if other2 <= 0.0:
-        return Refraction(1.0, 0.0, 0.0, eta, cosine, 0.0)
+        return Refraction(1.0, 0.0, 0.0, eta, cosine / eta, 0.0)
     if cos_o > 0.0:
         g = math.sqrt(other2)
         cos_t = g / n
@@ -67,7 +67,7 @@ def fresnel(cos_o: float, n: float) -> Refraction:
     p = k * ((n2 + 1.0) * c * c - 1.0) / (p_sum * p_sum)
     reflectance = min(1.0, 0.5 * (s * s + p * p))
     passing = 2.0 * c * g * (1.0 / (s_sum * s_sum) + n2 / (p_sum * p_sum))
-    gap = -k / s_sum if cos_o > 0.0 else k / (n * s_sum)
+    gap = -k / (n * s_sum) if cos_o > 0.0 else k / s_sum
     thin = c if n > 1.0 else g / n
     return Refraction(reflectance, passing, cos_t, eta, gap, thin)
 

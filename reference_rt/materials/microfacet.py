@@ -260,6 +260,17 @@ def _slope_seen(cosine: float, sine: float, u: float) -> float:
     return min(x, most)
 
 
+@kernel
+def refract(wo: Vec3, h: Vec3, refraction: Refraction) -> Vec3:
+    """wo refracted by a normal, for what `fresnel` says of the two.
+
+    Rounding leaves its length off by some 10 u times the index; a step of Newton's method for
+    1 / sqrt(x) at 1 puts that right.
+    """
+    wi = h * refraction.gap - wo * (1.0 / refraction.eta)
+    return wi * (1.5 - 0.5 * dot(wi, wi))
+
+
 class Bend(NamedTuple):
     """A refraction: its normal, and how much solid angle of wi there is to one of normals, times
     wo·h / eta²;  0 where no microfacet refracts wo to wi;  refraction: by it, as it is seen from

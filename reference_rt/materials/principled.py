@@ -21,6 +21,7 @@ from pydantic import Field, model_validator
 
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
+from reference_rt.materials.fresnel import Refraction, relative_index
 from reference_rt.materials.material import INV_PI, BsdfSample, Material, no_sample
 from reference_rt.materials.microfacet import (
     GGX,
@@ -28,6 +29,7 @@ from reference_rt.materials.microfacet import (
     bend,
     g1,
     half_vector,
+    refract,
     sample_visible,
 )
 from reference_rt.materials.principled_lobes import (
@@ -122,7 +124,8 @@ class Principled(Material):
     def relative_ior(self) -> float:
         """Inside over outside: of specular s, ((eta - 1) / (eta + 1))² = 0.08 s."""
         if self.eta is not None:
-            return 1.001 if self.eta == 1.0 and self.spec_trans != 0.0 else self.eta
+            eta = 1.001 if self.eta == 1.0 and self.spec_trans != 0.0 else self.eta
+            return relative_index(eta, 1.0)
         specular = 0.5 if self.specular is None else self.specular
         if specular == 0.0 and self.spec_trans != 0.0:
             specular = 1e-3
@@ -267,11 +270,11 @@ def pdf(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
 
 
 @kernel
-def _main(s: Surface, f: Facet, gap: float, wo: Vec3, h: Vec3, u: float) -> Vec3:
+def _main(f: Facet, refraction: Refraction, wo: Vec3, h: Vec3, u: float) -> Vec3:
     """wo mirrored, or refracted, by a microfacet."""
     if u < f.share:
         return reflect(wo, h)
-    return (h * gap - wo) * (1.0 / s.eta)
+    return refract(wo, h, refraction)
 
 
 @kernel
@@ -298,7 +301,7 @@ def sample(
         refraction = meet(s, max(0.0, dot(wo, h)))
         f = facet(s, refraction)
         u = (u - shares.cosine - shares.coat) / shares.main
-        wi = _main(s, f, refraction.gap, wo, h, u)
+        wi = _main(f, refraction, wo, h, u)
         is_through = u >= f.share
     if wi.z == 0.0 or (wi.z < 0.0) != is_through:
         return no_sample()

@@ -28,8 +28,8 @@ class Surface(NamedTuple):
 
     diffuse, transmitting: the shares (1 - metallic) (1 - spec_trans) and (1 - metallic)
     spec_trans;  coat_alpha: roughness of the clear coat;  eta: index of refraction on the other
-    side over that on wo's;  relative_ior: inside over outside;  front: whether wo is outside;  m: the
-    main lobe's microfacets."""
+    side over that on wo's;  relative_ior: inside over outside;  front: whether wo is outside;
+    m: the main lobe's microfacets."""
 
     base: Vec3
     roughness: float

@@ -33,6 +33,7 @@ from reference_rt.materials.microfacet import (
     half_vector,
     is_anisotropic,
     microfacets_at,
+    refract,
     roughnesses,
     sample_visible,
     visible_density,
@@ -195,8 +196,8 @@ def sample(
         weight = facet.mirrored * (g1(m, wi) / facet.share)
         return BsdfSample(_upwards(wi, side), weight, density_of_wi, 1.0, False)
     eta, gap = refraction.eta, refraction.gap
-    wi = (h * gap - wo) * (1.0 / eta)
-    spread = eta * eta * refraction.cos_t / (gap * gap)  # wo + eta wi is gap h
+    wi = refract(wo, h, refraction)
+    spread = refraction.cos_t / (gap * gap)  # wo + eta wi is eta gap h
     density_of_wi = facet.passing * visible_density(m, wo, h) * spread
     if wi.z >= 0.0 or not density_of_wi > 0.0:
         return no_sample()

@@ -37,6 +37,7 @@ from reference_rt.materials.microfacet import (
     g1_over_cos,
     half_vector,
     microfacets_at,
+    refract,
     roughnesses,
     sample_visible,
 )
@@ -122,12 +123,11 @@ def _scatter(
         for a in range(len(nodes)):
             for b in range(len(nodes)):
                 h = sample_visible(m, wo, nodes[a], nodes[b])
-                cos_o = dot(wo, h)
-                refraction = fresnel(cos_o, eta)
+                refraction = fresnel(max(0.0, dot(wo, h)), eta)
                 share, wi = refraction.reflectance, reflect(wo, h)
                 if through:
                     share = refraction.transmittance
-                    wi = (wo - h * refraction.gap) * (1.0 / eta)
+                    wi = refract(wo, h, refraction) * -1.0
                 if wi.z > 0.0:
                     total += weights[a] * weights[b] * share * g1(m, wi)
         out[k] = total
