@@ -7,6 +7,7 @@ side over wo's (Walter et al. 2007, eq. 14 and 17).
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,9 @@ CELLS = 16
 
 RULES = (10, 7)
 """Nodes along either side of a cell; where the two differ, the finer is not to be relied on."""
+
+
+Density = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 class Fit(NamedTuple):
@@ -81,18 +85,36 @@ def _cell_of(wo: FloatArray, wi: FloatArray, alpha: float, eta: float) -> IntArr
 
 
 def _cells(
-    bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float, through: bool, rule: int
+    function: Density, wo: FloatArray, alpha: float, eta: float, through: bool, rule: int
 ) -> FloatArray:
-    """What the density says that each cell of one side holds, (CELLS²,)."""
+    """What a function of directions, of one side, integrates to in each cell, (CELLS²,)."""
     t, phi, weights = _nodes(rule)
     h, measure = _normals(t, phi, alpha)
     wi, spread = _directions(wo, h, eta, through)
     there = (spread > 0.0) & ((wi[:, 2] < 0.0) == through)
-    density = np.zeros(len(h))
+    values = np.zeros(len(h))
     if there.any():
         wi = np.ascontiguousarray(wi[there])
-        density[there] = bsdf.pdf(np.tile(wo, (len(wi), 1)), wi)
-    return np.asarray((density * spread * measure).reshape(CELLS**2, -1) @ weights)
+        values[there] = function(np.tile(wo, (len(wi), 1)), wi)
+    return np.asarray((values * spread * measure).reshape(CELLS**2, -1) @ weights)
+
+
+def integral(bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float) -> tuple[float, float]:
+    """What comes back of a white sky, in power and in the brightest channel, by f cos alone, and
+    how far two rules differ."""
+    both = []
+    for rule in RULES:
+        total = 0.0
+        for through in (False, True) if eta != 1.0 else (False,):
+            scale = eta * eta if through else 1.0
+
+            def power(o: FloatArray, i: FloatArray, scale: float = scale) -> FloatArray:
+                return np.asarray(bsdf.evaluate(o, i).max(axis=1) * scale)
+
+            cells = _cells(power, wo, alpha, eta, through, rule)
+            total += float(cells.sum())
+        both.append(total)
+    return both[0], 2.0 * abs(both[0] - both[1])
 
 
 def fit(bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float, u: FloatArray) -> Fit:
@@ -103,8 +125,8 @@ def fit(bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float, u: FloatArray) -> 
     kept = (drawn.pdf > 0.0) & (drawn.weight.max(axis=1) > 0.0) & ~drawn.is_delta
     fine, coarse, count = [], [], []
     for through in (False, True) if eta != 1.0 else (False,):
-        fine.append(_cells(bsdf, wo, alpha, eta, through, RULES[0]))
-        coarse.append(_cells(bsdf, wo, alpha, eta, through, RULES[1]))
+        fine.append(_cells(bsdf.pdf, wo, alpha, eta, through, RULES[0]))
+        coarse.append(_cells(bsdf.pdf, wo, alpha, eta, through, RULES[1]))
         mine = kept & ((drawn.wi[:, 2] < 0.0) == through)
         index = _cell_of(wo, drawn.wi[mine], alpha, eta if through else 1.0)
         count.append(np.bincount(index, minlength=CELLS**2))
