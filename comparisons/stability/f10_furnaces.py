@@ -152,8 +152,8 @@ CLOSED = Series(
 OPEN = Series(
     "open furnace",
     "1 / alpha",
-    "White metals, glasses, plastics and principled materials under a white sky, seen at cosines of "
-    "1 to 1e-3: no more comes back than arrives, and what evaluate() says.  A case is a material "
+    "White metals, glasses, plastics and principled materials under a white sky, seen at cosines "
+    "of 1 to 1e-3: no more comes back than arrives, and what evaluate() says.  A case is a material "
     "seen from a direction.",
     (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
     (1.0, 1e2, 1e4),
@@ -175,8 +175,8 @@ SHELLS = Series(
 FAMILY = Family(
     id="F10",
     name="furnaces",
-    law="where everything shines equally, 1 / (1 - albedo) arrives in a closed room, no more than all "
-    "comes back from a surface, and lossless bodies are invisible",
+    law="where everything shines equally, 1 / (1 - albedo) arrives in a closed room, no more than "
+    "all comes back from a surface, and lossless bodies are invisible",
     anchors="Nori: albedos 0.5 and 0.8; pbrt: to 2.5 %, switched off for microfacets",
     series=(CLOSED, OPEN, SHELLS),
 )

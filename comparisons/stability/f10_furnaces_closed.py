@@ -3,7 +3,7 @@
 from typing import Any
 
 import reference_rt as rt
-from comparisons.stability.f10_worlds import World, at, facing
+from comparisons.stability.f10_worlds import World, at, facing, grey
 
 WALLS = tuple(
     rt.Rectangle(material="wall", transform=(at(0, 0, -1), facing(axis, degrees)))
@@ -24,8 +24,8 @@ def closed(albedo: float, edges: int | None = None, rr_depth: int = 5) -> World:
     return World(
         WALLS,
         {
-            "scattering": rt.Diffuse(reflectance=albedo),
-            "wall": rt.Emissive(radiance=1.0, base="scattering"),
+            "scattering": rt.Diffuse(reflectance=grey(albedo)),
+            "wall": rt.Emissive(radiance=grey(1.0), base="scattering"),
         },
         rt.Orthographic(eye=(0.1, 0.2, 0.3), target=(-1, -0.9, -0.8), width=1e-9),
         (1.0 - lost) / (1.0 - albedo),

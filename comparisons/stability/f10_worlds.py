@@ -28,6 +28,10 @@ def facing(axis: tuple[float, float, float], degrees: float) -> transform.Rotate
     return transform.Rotate(rotate=transform.Turn(axis=axis, degrees=degrees))
 
 
+def grey(x: float) -> tuple[float, float, float]:
+    return x, x, x
+
+
 _HIDDEN = (
     rt.Rectangle(material="nothing", transform=(_TINY, at(0.01, -900.0, 0.01))),
     rt.Sphere(material="glass", center=(0.02, -900.0, 0.01), radius=1e-30),
@@ -40,9 +44,9 @@ _HIDDEN = (
     ),
 )
 _MATERIALS: Mapping[str, Any] = {
-    "black": rt.Diffuse(reflectance=0.0),
+    "black": rt.Diffuse(reflectance=grey(0.0)),
     "glass": rt.Dielectric(),
-    "nothing": rt.Emissive(radiance=0.0),
+    "nothing": rt.Emissive(radiance=grey(0.0)),
 }
 
 
@@ -61,10 +65,10 @@ class World(NamedTuple):
 
 def scene_of(world: World, pixels: int, spp: int, seed: int, hidden: bool) -> rt.Scene:
     """pixels: along either side of the picture."""
-    lights = (rt.Constant(radiance=world.sky),) if hidden or world.sky > 0.0 else ()
+    lights = (rt.Constant(radiance=grey(world.sky)),) if hidden or world.sky > 0.0 else ()
     return rt.Scene(
         camera=world.camera,
-        film=rt.Film(width=pixels, height=pixels, filter={"type": "box"}),
+        film=rt.Film(width=pixels, height=pixels, filter=rt.BoxFilter()),
         sampler=rt.Sobol(spp=spp, seed=seed) if hidden else rt.Independent(spp=spp, seed=seed),
         integrator=rt.Path(**world.path),
         hierarchy="sah",

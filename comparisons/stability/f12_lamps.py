@@ -7,7 +7,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.stability.f10_furnaces_closed import closed
-from comparisons.stability.f10_worlds import World, at, facing, measure
+from comparisons.stability.f10_worlds import World, at, facing, grey, measure
 from comparisons.stability.f11_outcomes import together, unit_of
 from comparisons.stability.family import Draw, Outcome, Series, decades
 from reference_rt import transform
@@ -57,7 +57,7 @@ def lit_floor(kind: str, size: float, radiance: float) -> World:
     )
     return World(
         (floor, lamp),
-        {"floor": rt.Diffuse(reflectance=RHO), "lamp": rt.Emissive(radiance=radiance)},
+        {"floor": rt.Diffuse(reflectance=grey(RHO)), "lamp": rt.Emissive(radiance=grey(radiance))},
         camera,
         RHO / math.pi * radiance * irradiance,
         {"max_depth": 2},
@@ -96,8 +96,8 @@ def _roulette(draw: Draw, x: float) -> dict[str, Outcome]:
 AREA = Series(
     "light area",
     "area, or 1 / area",
-    "Disks, spheres, rectangles and triangles of areas x and 1 / x light a floor two of their sizes "
-    "below; all is scaled with them.  A case is a picture, all of whose pixels see one point.",
+    "Disks, spheres, rectangles and triangles of areas x and 1 / x light a floor two of their "
+    "sizes below; all is scaled with them.  A case is a picture, all of whose pixels see one point.",
     decades(0, 12, 2),
     (1.0, 1e6, 1e12),
     {"quick": 8, "full": 8},
@@ -117,8 +117,8 @@ RADIANCE = Series(
 ROULETTE = Series(
     "roulette",
     "edges of a path",
-    "A closed furnace of albedo 0.5, 0.9 and 0.99, paths of up to x edges, Russian roulette at each "
-    "of them.  A case is a picture.",
+    "A closed furnace of albedo 0.5, 0.9 and 0.99, paths of up to x edges, Russian roulette at "
+    "each of them.  A case is a picture.",
     (1.0, 2.0, 5.0, 10.0, 30.0, 1e2, 3e2, 1e3),
     (2.0, 30.0, 1e3),
     {"quick": 3, "full": 3},

@@ -18,7 +18,6 @@ from reference_rt.shapes.rectangle import Rectangle
 from reference_rt.shapes.shape import Place
 from reference_rt.shapes.sphere import Sphere
 from reference_rt.shapes.triangle import Triangle
-from reference_rt.transform import IDENTITY
 from reference_rt.vec3 import row
 
 TEXTBOOK = "sphere.cosine"
@@ -51,7 +50,7 @@ def _of_triangle(table: Any, area: float, p: Any, u: Any, out: Any) -> None:
 
 
 def _table(shape: Any) -> Any:
-    return shape.tabulate(Place(0, 0, IDENTITY))
+    return shape.tabulate(Place())
 
 
 def _theirs(shape: dict[str, Any] | Any, p: FloatArray, u: FloatArray) -> FloatArray:
@@ -203,15 +202,16 @@ def _flat(draw: Draw, x: float) -> dict[str, Outcome]:
     n = draw.cases // 2
     p = np.concatenate([_points(draw.rng, n, x), _over(draw.rng, n, min(x, 1e12))])
     square = ((-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0))
-    out = np.empty((len(p), SAMPLES))
 
     def of_rectangle(p: FloatArray, u: FloatArray) -> FloatArray:
+        out = np.empty(u.shape[:2])
         _of_rectangle(_table(Rectangle()), 4.0, p, u, out)
-        return out.copy()
+        return out
 
     def of_triangle(p: FloatArray, u: FloatArray) -> FloatArray:
+        out = np.empty(u.shape[:2])
         _of_triangle(_table(Triangle(v0=CORNERS[0], v1=CORNERS[1], v2=CORNERS[2])), 2.0, p, u, out)
-        return out.copy()
+        return out
 
     # By area alone, a triangle right above has no variance: what fills the sky is for rectangles.
     return together(
