@@ -37,7 +37,9 @@ FALSE_ALARM = 1e-6
 
 def _closed(draw: Draw, x: float) -> dict[str, Outcome]:
     albedo = 1.0 - 1.0 / x
-    spp = {"quick": 16, "full": 256}[draw.effort]
+    # Paths are some x long.
+    least, most, edges = (2, 16, 2e3) if draw.effort == "quick" else (16, 256, 16e3)
+    spp = int(min(max(edges / x, least), most))
     told = {"albedo": albedo}
     return measure(
         closed(albedo), draw, spp, lambda who: 256.0 * unit_of(who), told,
@@ -153,8 +155,8 @@ OPEN = Series(
     "open furnace",
     "1 / alpha",
     "White metals, glasses, plastics and principled materials under a white sky, seen at cosines "
-    "of 1 to 1e-3: no more comes back than arrives, and what evaluate() says.  A case is a material "
-    "seen from a direction.",
+    "of 1 to 1e-3: no more comes back than arrives, and what evaluate() says.  A case is a "
+    "material seen from a direction.",
     (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
     (1.0, 1e2, 1e4),
     {"quick": 10_000, "full": 200_000},

@@ -97,7 +97,7 @@ AREA = Series(
     "light area",
     "area, or 1 / area",
     "Disks, spheres, rectangles and triangles of areas x and 1 / x light a floor two of their "
-    "sizes below; all is scaled with them.  A case is a picture, all of whose pixels see one point.",
+    "sizes below; all is scaled with them.  A case is a picture whose pixels see one point.",
     decades(0, 12, 2),
     (1.0, 1e6, 1e12),
     {"quick": 8, "full": 8},
