@@ -102,19 +102,17 @@ def _cells(
 def integral(bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float) -> tuple[float, float]:
     """What comes back of a white sky, in power and in the brightest channel, by f cos alone, and
     how far two rules differ."""
-    both = []
-    for rule in RULES:
-        total = 0.0
-        for through in (False, True) if eta != 1.0 else (False,):
-            scale = eta * eta if through else 1.0
+    total, doubt = 0.0, 0.0
+    for through in (False, True) if eta != 1.0 else (False,):
+        scale = eta * eta if through else 1.0
 
-            def power(o: FloatArray, i: FloatArray, scale: float = scale) -> FloatArray:
-                return np.asarray(bsdf.evaluate(o, i).max(axis=1) * scale)
+        def power(o: FloatArray, i: FloatArray, scale: float = scale) -> FloatArray:
+            return np.asarray(bsdf.evaluate(o, i).max(axis=1) * scale)
 
-            cells = _cells(power, wo, alpha, eta, through, rule)
-            total += float(cells.sum())
-        both.append(total)
-    return both[0], 2.0 * abs(both[0] - both[1])
+        fine, coarse = (_cells(power, wo, alpha, eta, through, rule) for rule in RULES)
+        total += float(fine.sum())
+        doubt += float(np.abs(fine - coarse).sum())
+    return total, doubt
 
 
 def fit(bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float, u: FloatArray) -> Fit:
