@@ -1,9 +1,12 @@
 """Whether samples of rough surfaces have the density that is said, at any roughness.
 
-The chart is that of half vectors: with t = s² / (1 + s²), s the slope over alpha, and phi, the
-lobes of all roughnesses look alike, and fixed cells hold them.  A direction wi mirrored about h has
-dwi = 4 (wo·h) dh;  one refracted dwi = (wo·h + eta wi·h)² / (eta² |wi·h|) dh, eta the index on wi's
-side over wo's (Walter et al. 2007, eq. 14 and 17).
+The chart is that of half vectors: with t = 1 - 1 / sqrt(1 + s²), s the slope over alpha, and phi,
+the lobes of all roughnesses look alike, and fixed cells hold them; visible normals of GGX, of
+a density of s / (1 + s²)² at most, are bounded there up to t = 1.
+
+A direction wi mirrored about h has dwi = 4 (wo·h) dh;  one refracted
+dwi = (wo·h + eta wi·h)² / (eta² |wi·h|) dh, eta the index on wi's side over wo's (Walter et al.
+2007, eq. 14 and 17).
 """
 
 import math
@@ -50,11 +53,11 @@ def _nodes(rule: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _normals(t: FloatArray, phi: FloatArray, alpha: float) -> tuple[FloatArray, FloatArray]:
-    """h (n, 3) and dh / (dt dphi): dh = cos³ dslopes, dslopes = alpha² / (2 (1 - t)²) dt dphi."""
-    s = alpha * np.sqrt(t / (1.0 - t))
+    """h (n, 3) and dh / (dt dphi): dh = cos³ dslopes, dslopes = alpha² / (1 - t)³ dt dphi."""
+    s = alpha * np.sqrt(t * (2.0 - t)) / (1.0 - t)
     z = 1.0 / np.sqrt(1.0 + s * s)
     h = np.stack([s * z * np.cos(phi), s * z * np.sin(phi), z], axis=1)
-    return h, z**3 * alpha**2 * 0.5 / (1.0 - t) ** 2
+    return h, z**3 * alpha**2 / (1.0 - t) ** 3
 
 
 def _directions(
@@ -79,7 +82,7 @@ def _cell_of(wo: FloatArray, wi: FloatArray, alpha: float, eta: float) -> IntArr
     x, y = h[:, 0] / (alpha * h[:, 2]), h[:, 1] / (alpha * h[:, 2])
     s2 = x * x + y * y
     turn = np.arctan2(y, x) / (2.0 * math.pi) % 1.0
-    row = np.minimum((s2 / (1.0 + s2) * CELLS).astype(int), CELLS - 1)
+    row = np.minimum(((1.0 - 1.0 / np.sqrt(1.0 + s2)) * CELLS).astype(int), CELLS - 1)
     column = np.minimum((turn * CELLS).astype(int), CELLS - 1)
     return np.asarray(row * CELLS + column)
 
