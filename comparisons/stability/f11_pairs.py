@@ -122,8 +122,8 @@ def glass(index: float, alpha: float, distribution: str) -> Material:
 
 
 def matched(x: float) -> tuple[float, ...]:
-    """Indices 1 + 1 / x and, where it is one, 1 - 1 / x."""
-    return (1.0 + 1.0 / x, 1.0 - 1.0 / x) if x > 2.0 else (1.0 + 1.0 / x,)
+    """Indices 1 + 1 / x and, below 1, 1 - 1 / x or, for large ones, the inverse."""
+    return 1.0 + 1.0 / x, 1.0 - 1.0 / x if x > 2.0 else 1.0 / (1.0 + 1.0 / x)
 
 
 def in_float32(index: float) -> bool:

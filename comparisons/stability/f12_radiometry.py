@@ -17,7 +17,7 @@ Laws, u = 2^-53 (Mitsuba: its own u = 2^-24, and numbers that float32 holds):
 
 from comparisons.stability.f12_lamps import AREA, RADIANCE, ROULETTE
 from comparisons.stability.f12_lights import DISTANCE, SPOT
-from comparisons.stability.f12_solid_angles import CLOSE_SPHERE, FLAT, SMALL_SPHERE
+from comparisons.stability.f12_solid_angles import CLOSE_SPHERE, FLAT, SKY, SMALL_SPHERE
 from comparisons.stability.family import Family
 
 FAMILY = Family(
@@ -25,5 +25,5 @@ FAMILY = Family(
     name="radiometry at extremes",
     law="light of any size, distance, brightness, cone and depth arrives as closed forms say",
     anchors="no other project is known to test these",
-    series=(AREA, RADIANCE, DISTANCE, SPOT, SMALL_SPHERE, CLOSE_SPHERE, FLAT, ROULETTE),
+    series=(AREA, RADIANCE, DISTANCE, SPOT, SMALL_SPHERE, CLOSE_SPHERE, FLAT, SKY, ROULETTE),
 )

@@ -41,9 +41,10 @@ def fresnel(cos_o: float, n: float) -> Refraction:
     With c the cosine outside and g n times the one inside, g² - c² = n² - 1 = k, and the amplitudes
     (c - g) / (c + g) and (n² c - g) / (n² c + g) become
 
-        -k / (c + g)²   and   k ((n² + 1) c² - 1) / (n² c + g)²:
+        -k / (c + g)²   and   k ((n² + 1) c² - 1) / (n² c + g)²,
 
-    no digits are lost where indices are nearly equal, nor, where little passes, by 1 - R.
+    or with (n² + 1) g² - n⁴, which is the same: no digits are lost where indices are nearly equal,
+    nor, where little passes, by 1 - R.
     """
     k = (n - 1.0) * (n + 1.0)
     cosine = abs(cos_o)
@@ -64,7 +65,8 @@ def fresnel(cos_o: float, n: float) -> Refraction:
     n2 = n * n
     s_sum, p_sum = c + g, n2 * c + g
     s = k / (s_sum * s_sum)
-    p = k * ((n2 + 1.0) * c * c - 1.0) / (p_sum * p_sum)
+    beyond = (n2 + 1.0) * c * c - 1.0 if n > 1.0 else (n2 + 1.0) * g * g - n2 * n2
+    p = k * beyond / (p_sum * p_sum)
     reflectance = min(1.0, 0.5 * (s * s + p * p))
     passing = 2.0 * c * g * (1.0 / (s_sum * s_sum) + n2 / (p_sum * p_sum))
     gap = -k / (n * s_sum) if cos_o > 0.0 else k / s_sum
@@ -78,11 +80,14 @@ def conductor_reflectance(cos_o: float, eta: float, k: float) -> float:
     medium outside, for 0 <= cos_o <= 1 (PBR 4ed, 9.3.6, in real arithmetic: Lazányi &
     Szirmay-Kalos 2005, eq. 2-3).
 
-    a² + b² = |(eta + ik)² - sin²|, a the real part of its root.
+    a² + b² = |(eta + ik)² - sin²|, a the real part of its root.  As the root's square is cos² + e,
+    e = (eta + ik)² - 1, what is not mirrored much is |e|² / |cos + root|⁴, without cancellation.
     """
     cos2 = cos_o * cos_o
     sin2 = (1.0 - cos_o) * (1.0 + cos_o)
-    p = (eta - k) * (eta + k) - sin2
+    e = (eta - 1.0) * (eta + 1.0) - k * k
+    # The same, of smaller terms.
+    p = cos2 + e if cos2 < 0.5 else (eta - k) * (eta + k) - sin2
     q = 2.0 * eta * k
     modulus = math.sqrt(p * p + q * q)
     a2 = 0.5 * (modulus + p)
@@ -96,7 +101,10 @@ def conductor_reflectance(cos_o: float, eta: float, k: float) -> float:
     p_low = cos2 * modulus + sin2 * sin2 - 2.0 * a * cos_o * sin2
     if s_high == 0.0:
         return 1.0
-    s = max(0.0, s_low / s_high)
+    s = s_low / s_high
+    if s < 0.5:
+        e, f = e / s_high, q / s_high
+        s = e * e + f * f
     ratio = 1.0 if p_high == 0.0 else max(0.0, p_low / p_high)
     return 0.5 * s * (1.0 + ratio)
 
