@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import BeforeValidator, Strict, WithJsonSchema
 
 from reference_rt.kernel import kernel
+from reference_rt.materials.fresnel import Refraction, fresnel
 from reference_rt.sampling.warp import on_circle
 from reference_rt.shapes.shape import IntArray
 from reference_rt.textures import At, Numbers, Palette, number_at
@@ -122,14 +123,23 @@ def microfacets_at(table: Roughnesses, i: int, at: At) -> Microfacets:
     )
 
 
+class Half(NamedTuple):
+    """h: the normal that mirrors wo to wi, 0 for opposite directions;  cosine: wo·h = wi·h, the
+    same bits for both, and not lost where all are grazing."""
+
+    h: Vec3
+    cosine: float
+
+
 @kernel
-def half_vector(wo: Vec3, wi: Vec3) -> Vec3:
-    """The normal that mirrors `wo` to `wi`; zero, where D is 0, for opposite directions."""
-    h = wo + wi
-    length2 = dot(h, h)
+def half_vector(wo: Vec3, wi: Vec3) -> Half:
+    """Between unit vectors, whose sum is 2 wo·h long."""
+    total = wo + wi
+    length2 = dot(total, total)
     if length2 < 1e-280:  # a root of what underflows
-        return Vec3(0.0, 0.0, 0.0)
-    return h * (1.0 / math.sqrt(length2))
+        return Half(Vec3(0.0, 0.0, 0.0), 0.0)
+    length = math.sqrt(length2)
+    return Half(total * (1.0 / length), min(1.0, 0.5 * length))
 
 
 @kernel
@@ -250,22 +260,47 @@ def _slope_seen(cosine: float, sine: float, u: float) -> float:
     return min(x, most)
 
 
+@kernel
+def refract(wo: Vec3, h: Vec3, refraction: Refraction) -> Vec3:
+    """wo refracted by a normal, for what `fresnel` says of the two.
+
+    Rounding leaves its length off by some 10 u times the index; a step of Newton's method for
+    1 / sqrt(x) at 1 puts that right.
+    """
+    wi = h * refraction.gap - wo * (1.0 / refraction.eta)
+    return wi * (1.5 - 0.5 * dot(wi, wi))
+
+
 class Bend(NamedTuple):
     """A refraction: its normal, and how much solid angle of wi there is to one of normals, times
-    wo·h / eta²;  0 where no microfacet refracts wo to wi."""
+    wo·h / eta²;  0 where no microfacet refracts wo to wi;  refraction: by it, as it is seen from
+    the side of the smaller index, where nothing cancels."""
 
     h: Vec3
     spread: float
+    refraction: Refraction
 
 
 @kernel
-def bend(wo: Vec3, wi: Vec3, eta: float) -> Bend:
-    """Walter et al. 2007, eq. 16 and 17; eta is wi's side over wo's."""
-    scaled = wo + wi * eta  # at least |eta - 1| long
-    h = half_vector(wo, wi * eta)
+def bend(wo: Vec3, wi: Vec3, n: float, is_outside: bool) -> Bend:
+    """Walter et al. 2007, eq. 16 and 17; n is the index inside over that outside, where wo is or
+    is not.
+
+    From either side by the same operations, so that light goes either way alike: the normal is
+    along outer + n inner, as (outer + inner) + (n - 1) inner, which for n near 1 loses nothing.
+    """
+    outer, inner = (wo, wi) if is_outside else (wi, wo)
+    scaled = (outer + inner) + inner * (n - 1.0)  # at least |n - 1| long
+    length2 = dot(scaled, scaled)
+    if length2 < 1e-280:
+        return Bend(Vec3(0.0, 0.0, 0.0), 0.0, fresnel(0.0, n))
+    h = scaled * (1.0 / math.sqrt(length2))
     if h.z < 0.0:
         h = -h
     cos_o, cos_i = dot(wo, h), dot(wi, h)
+    thin = dot(outer, h) if n > 1.0 else dot(inner, h)
+    refraction = fresnel(math.copysign(thin, n - 1.0), n)
     if cos_o <= 0.0 or cos_i >= 0.0:
-        return Bend(h, 0.0)
-    return Bend(h, cos_o * -cos_i / dot(scaled, scaled))
+        return Bend(h, 0.0, refraction)
+    scale = 1.0 if is_outside else n * n  # |wo + eta wi| is |outer + n inner| / n from inside
+    return Bend(h, cos_o * -cos_i * scale / length2, refraction)

@@ -200,7 +200,7 @@ def test_everything_is_finite(kind, alpha):
         for h in edges():
             assert 0.0 <= density(m, h) < math.inf
             assert math.isfinite(visible_density(m, v, h))
-    assert half_vector(Vec3(1.0, 0.0, 0.0), Vec3(-1.0, 0.0, 0.0)) == (0.0, 0.0, 0.0)
+    assert half_vector(Vec3(1.0, 0.0, 0.0), Vec3(-1.0, 0.0, 0.0)).h == (0.0, 0.0, 0.0)
     assert density(m, Vec3(0.0, 0.0, 0.0)) == density(m, Vec3(0.0, 0.0, -1.0)) == 0.0
 
 
