@@ -142,7 +142,7 @@ def in_folder(folder: Path, **parts: Any) -> rt.Scene:
 
 
 def things(folder: Path) -> rt.Scene:
-    """What Mitsuba has exactly: balls, boxes, flat shapes, a mesh, a cylinder, solids, instances."""
+    """What Mitsuba has too: balls, boxes, flat shapes, a mesh, a cylinder, instances."""
     return in_folder(
         folder,
         integrator=rt.RayCast(),
@@ -163,14 +163,6 @@ def things(folder: Path) -> rt.Scene:
             rt.Triangle(v0=(-3, -1, -2), v1=(3, -1, -2.5), v2=(0.25, 3, -2.25)),
             rt.Disk(transform=(_turned(50.0, (2, 1, 0)), _at(-2.5, 1.5, 0.5))),
             rt.Cylinder(radius=0.25, transform=(_turned(70.0), _at(0.75, 1.25, 0.5))),
-            rt.Difference(
-                of=(
-                    rt.Box(transform=(_scaled(0.5),)),
-                    rt.Sphere(radius=0.625),
-                    rt.Sphere(radius=0.25, center=(0.5, 0.5, 0.5)),
-                ),
-                transform=(_turned(20.0, (3, 1, 2)), _at(-1, -0.5, 2.5)),
-            ),
             rt.Instance(group="pair", transform=(_turned(40.0), _at(1.5, 1.5, 0))),
             rt.Instance(group="pair", transform=(_scaled(1, 2, 1), _at(-2.5, -0.25, 1.5))),
         ),
@@ -178,7 +170,7 @@ def things(folder: Path) -> rt.Scene:
 
 
 def curves(folder: Path) -> rt.Scene:
-    """What Mitsuba has not: cones, quadrics, tori, ellipsoids, polygons, and solids of these."""
+    """What Mitsuba has not: cones, quadrics, tori, ellipsoids, planes without end, polygons."""
     saddle = (1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
     bowl = (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0)
     star = ((0.0, 1.0), (0.625, -0.75), (-1.0, 0.25), (1.0, 0.25), (-0.625, -0.75))
@@ -188,7 +180,7 @@ def curves(folder: Path) -> rt.Scene:
         hierarchy="sah",
         shapes=(
             rt.Plane(transform=(_turned(-90.0), _at(0.0, -1.0, 0.0))),
-            rt.Cone(transform=(_turned(-80.0), _at(-2, -0.5, 0))),
+            rt.Cone(transform=(_turned(-90.0), _at(-2, -0.5, 0))),
             rt.Torus(
                 major_radius=0.75,
                 minor_radius=0.25,
@@ -210,15 +202,40 @@ def curves(folder: Path) -> rt.Scene:
             rt.Sphere(transform=(_scaled(0.25, 0.5, 1.0), _turned(60.0), _at(1.5, -0.5, 1.5))),
             rt.Polygon(rings=(star,), fill="even_odd", transform=(_turned(15.0), _at(-2, 1.5, 1))),
             rt.Cylinder(radius=0.25, transform=(_turned(70.0), _at(0.75, 1.25, 0.5))),
-            rt.Intersection(
-                of=(
-                    rt.Cylinder(radius=0.5, capped=True, transform=(_scaled(1, 1, 2),)),
-                    rt.Torus(major_radius=0.5, minor_radius=0.25),
-                    rt.Box(transform=(_scaled(0.5, 0.75, 0.75), _turned(30.0))),
-                ),
-                transform=(_turned(45.0), _at(-1, -0.25, 2.5)),
-            ),
         ),
+    )
+
+
+def solids(folder: Path) -> rt.Scene:
+    """Set operations: a hollow box, a ring cut by a box, a bite out of a mesh."""
+    dice = rt.Difference(
+        of=(
+            rt.Box(transform=(_scaled(0.5),)),
+            rt.Sphere(radius=0.625),
+            rt.Sphere(radius=0.25, center=(0.5, 0.5, 0.5)),
+        ),
+        transform=(_scaled(2.0), _turned(90.0), _at(-1, 0, 1.5)),
+    )
+    ring = rt.Intersection(
+        of=(
+            rt.Torus(major_radius=0.5, minor_radius=0.25),
+            rt.Box(transform=(_scaled(0.5, 0.75, 0.75), _turned(30.0))),
+        ),
+        transform=(_scaled(1.5), _turned(45.0), _at(1.5, 0, 1)),
+    )
+    apple = rt.Difference(
+        of=(
+            rt.Mesh(file=BALL),
+            rt.Sphere(center=(0.75, 0.5, 0.75), radius=0.75),
+            rt.Cylinder(radius=0.25, capped=True, transform=(_scaled(1, 1, 4), _at(0, 0, -2))),
+        ),
+        transform=(_at(0.5, 1, -1.5),),
+    )
+    return in_folder(
+        folder,
+        integrator=rt.RayCast(),
+        hierarchy="sah",
+        shapes=(rt.Rectangle(transform=FLOOR), dice, ring, apple),
     )
 
 
