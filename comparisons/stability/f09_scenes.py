@@ -136,7 +136,9 @@ def write_ball(folder: Path) -> None:
 
 
 def in_folder(folder: Path, **parts: Any) -> rt.Scene:
-    """A scene whose files lie in `folder`."""
+    """A scene whose files lie in `folder`, where the ball is put."""
+    if not (folder / BALL).exists():
+        write_ball(folder)
     empty = rt.Scene.parse("{}", folder=folder)
     return empty.changed(camera=CAMERA, film=FILM, **parts)
 
