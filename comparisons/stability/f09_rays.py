@@ -11,10 +11,12 @@ from comparisons.mitsuba_backend import scalar
 from comparisons.sizes import ShapeSizes
 from comparisons.stability.f09_scenes import GRID, Motion
 from comparisons.stability.family import EXAMPLES, FloatArray, Outcome
+from comparisons.tiers.arbiter import directions
 from comparisons.translate import load
 from comparisons.twin import trace
 from reference_rt import query
 from reference_rt.query import Intersections
+from reference_rt.ray import UNIT_ROUNDOFF
 from reference_rt.tables import SceneTables
 
 BoolArray = npt.NDArray[np.bool_]
@@ -154,18 +156,34 @@ def judged(before: Asked, after: Asked, factor: float, exact: bool) -> Outcome:
     )
 
 
+BAND = 8.0
+"""Roundings, of the largest coordinate, by which a ray may have been moved relative to the scene:
+transforming a point is three products and three sums, of the ray's origin and of the surface's."""
+
+AROUND = np.concatenate([np.zeros((1, 3)), directions(24), 0.3 * directions(24)])
+"""Moves, of that size, that a differing ray is asked with."""
+
+
 def _both_right(
     before: Asked, after: Asked, rows: npt.NDArray[np.int64]
 ) -> tuple[BoolArray, BoolArray]:
-    """Of some rays: whether both answers are right, and whether the arbiter leaves one open."""
+    """Of some rays: whether both answers are those of exact arithmetic, for a ray within BAND; and
+    whether the arbiter leaves one open."""
     right, touching = np.ones(len(rows), bool), np.zeros(len(rows), bool)
     if len(rows) == 0:
         return right, touching
     for asked in (before, after):
-        truths = Referee(ShapeSizes(asked.scene)).decide(asked.o[rows], asked.d[rows])
-        for k, (row, truth) in enumerate(zip(rows.tolist(), truths, strict=True)):
-            right[k] &= _is_right(asked.found.identities[row], truth)
-            touching[k] |= truth.touching
+        sizes = ShapeSizes(asked.scene)
+        o, d = asked.o[rows], asked.d[rows]
+        # An infinite plane counts as far as the ray goes.
+        extent = np.maximum(np.abs(o).max(axis=1), np.abs([sizes.lower, sizes.upper]).max())
+        moves = BAND * UNIT_ROUNDOFF * extent[:, None, None] * AROUND
+        origins = (o[:, None] + moves).reshape(-1, 3)
+        truths = Referee(sizes).decide(origins, np.repeat(d, len(AROUND), axis=0))
+        for k, row in enumerate(rows.tolist()):
+            some = truths[k * len(AROUND) : (k + 1) * len(AROUND)]
+            right[k] &= any(_is_right(asked.found.identities[row], truth) for truth in some)
+            touching[k] |= some[0].touching
     return right, touching
 
 
