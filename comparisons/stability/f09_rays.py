@@ -127,7 +127,20 @@ def _changed(before: Asked, after: Asked) -> BoolArray:
     return differ(before.found, Found(after.found.t, names))
 
 
-def judged(before: Asked, after: Asked, factor: float, exact: bool) -> Outcome:
+BAND = 8.0
+"""Roundings, of the largest coordinate, by which a ray may have been moved relative to the scene:
+transforming a point is three products and three sums, of the ray's origin and of the surface's."""
+
+AROUND = np.concatenate([np.zeros((1, 3)), directions(24), 0.3 * directions(24)])
+"""Moves, of that size, that a differing ray is asked with."""
+
+
+SOLID_BAND = 128.0
+"""The same for solids: crossings of operands count as one where they lie within the bounds of both,
+16 sqrt(3) u (anchor + point) and as much for the ray, of each operand (`csg.evaluate`): 111 u."""
+
+
+def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float = BAND) -> Outcome:
     """Ours.  exact: the transformed numbers are the numbers meant, and the answers must be the
     same to the last bit of t;  else where answers differ each must be right in its own scene, by
     exact arithmetic: where rounding the scene has really changed what is there, both are.
@@ -143,7 +156,7 @@ def judged(before: Asked, after: Asked, factor: float, exact: bool) -> Outcome:
     else:
         wrong = changed.copy()
         rows = np.flatnonzero(changed)
-        right, open_[rows] = _both_right(before, after, rows)
+        right, open_[rows] = _both_right(before, after, rows, band)
         wrong[rows[right]] = False
     wrong &= ~open_
     rows = np.flatnonzero(wrong)[:EXAMPLES]
@@ -156,18 +169,10 @@ def judged(before: Asked, after: Asked, factor: float, exact: bool) -> Outcome:
     )
 
 
-BAND = 8.0
-"""Roundings, of the largest coordinate, by which a ray may have been moved relative to the scene:
-transforming a point is three products and three sums, of the ray's origin and of the surface's."""
-
-AROUND = np.concatenate([np.zeros((1, 3)), directions(24), 0.3 * directions(24)])
-"""Moves, of that size, that a differing ray is asked with."""
-
-
 def _both_right(
-    before: Asked, after: Asked, rows: npt.NDArray[np.int64]
+    before: Asked, after: Asked, rows: npt.NDArray[np.int64], band: float
 ) -> tuple[BoolArray, BoolArray]:
-    """Of some rays: whether both answers are those of exact arithmetic, for a ray within BAND; and
+    """Of some rays: whether both answers are those of exact arithmetic, for a ray within `band`; and
     whether the arbiter leaves one open."""
     right, touching = np.ones(len(rows), bool), np.zeros(len(rows), bool)
     if len(rows) == 0:
@@ -177,7 +182,7 @@ def _both_right(
         o, d = asked.o[rows], asked.d[rows]
         # An infinite plane counts as far as the ray goes.
         extent = np.maximum(np.abs(o).max(axis=1), np.abs([sizes.lower, sizes.upper]).max())
-        moves = BAND * UNIT_ROUNDOFF * extent[:, None, None] * AROUND
+        moves = band * UNIT_ROUNDOFF * extent[:, None, None] * AROUND
         origins = (o[:, None] + moves).reshape(-1, 3)
         truths = Referee(sizes).decide(origins, np.repeat(d, len(AROUND), axis=0))
         for k, row in enumerate(rows.tolist()):
@@ -231,5 +236,3 @@ class Bench:
         if mitsuba:
             o, d = o[coarse], d[coarse]
             self.mitsuba = Asked(scene, o, d, mitsubas(scene, o, d))
-
-

@@ -150,5 +150,3 @@ def _baked_names(found: Identities) -> Identities:
     hit = found[:, 0] >= 0
     named[hit, 0], named[hit, 1], named[hit, 2] = found[hit, 2], -1, 0
     return named
-
-

@@ -295,7 +295,9 @@ def _lit_shapes(lamp: bool) -> tuple[Any, ...]:
         rt.Sphere(material="silver", center=(-1.5, 0, -0.5), radius=1.0),
         rt.Sphere(material="glass", center=(0.5, -0.25, 1.5), radius=0.75),
         rt.Sphere(material="gold", center=(2.25, -0.25, 0.25), radius=0.75),
-        rt.Box(material="clay", transform=(_scaled(0.5), _turned(30.0, (0, 1, 0)), _at(-1, -0.5, 2))),
+        rt.Box(
+            material="clay", transform=(_scaled(0.5), _turned(30.0, (0, 1, 0)), _at(-1, -0.5, 2))
+        ),
         rt.Mesh(material="clay", file=BALL, transform=(_scaled(0.75), _at(0.5, 0.75, -1.5))),
     )
     if not lamp:

@@ -27,7 +27,9 @@ def shoot_light(motion: Callable[[float], Motion], contestant: str, x: float) ->
         scene = scenes.path(Path(folder)).changed(
             film=rt.Film(width=WIDTH, height=HEIGHT), sampler=rt.Sobol(spp=SPP, seed=3)
         )
-        first, found = (light.colours(contestant, s) for s in (scene, scenes.moved(scene, motion(x))))
+        first, found = (
+            light.colours(contestant, s) for s in (scene, scenes.moved(scene, motion(x)))
+        )
     visible = np.abs(found - first).max(axis=-1) > 0.1 * first.max(axis=-1) + 0.02
     visible |= ~np.isfinite(found).all(axis=-1)
     said = f"{contestant} at {x:g}: {_percent(visible)} of the pixels visibly other than at 1"
