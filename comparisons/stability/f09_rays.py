@@ -131,13 +131,14 @@ BAND = 8.0
 """Roundings, of the largest coordinate, by which a ray may have been moved relative to the scene:
 transforming a point is three products and three sums, of the ray's origin and of the surface's."""
 
-AROUND = np.concatenate([np.zeros((1, 3)), directions(24), 0.3 * directions(24)])
+AROUND = np.concatenate([np.zeros((1, 3)), directions(16), 0.3 * directions(8)])
 """Moves, of that size, that a differing ray is asked with."""
 
 
-SOLID_BAND = 128.0
+SOLID_BAND = 1024.0
 """The same for solids: crossings of operands count as one where they lie within the bounds of both,
-16 sqrt(3) u (anchor + point) and as much for the ray, of each operand (`csg.evaluate`): 111 u."""
+16 sqrt(3) u (anchor + point) and as much for the ray, of each operand (`csg.evaluate`), 111 u, over
+the cosine at which they are met, down to 1/8 here."""
 
 
 def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float = BAND) -> Outcome:
@@ -172,7 +173,7 @@ def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float 
 def _both_right(
     before: Asked, after: Asked, rows: npt.NDArray[np.int64], band: float
 ) -> tuple[BoolArray, BoolArray]:
-    """Of some rays: whether both answers are those of exact arithmetic, for a ray within `band`; and
+    """Of some rays: whether both answers are those of exact arithmetic for a ray within `band`, and
     whether the arbiter leaves one open."""
     right, touching = np.ones(len(rows), bool), np.zeros(len(rows), bool)
     if len(rows) == 0:
