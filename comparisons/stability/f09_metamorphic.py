@@ -1,20 +1,20 @@
 """F9: a scene that is moved, scaled, turned, mirrored, reordered or grouped looks the same.
 
 Law, ids: rays moved with the scene hit the same (shape, copy, part, face or triangle).  Where the
-transformed numbers are exact - whole-number offsets, factors 2^k, another order - t is the
-same to the last bit, up to the factor.  Where they are rounded - factors 10^k, turns, offsets beyond
-2^53 - a ray that differs is a failure unless both answers are right, each in its own scene as it is
-in float64, by exact arithmetic (`comparisons.exact.referee`).  A third of the rays goes anywhere, a
-third towards edges at 2^-4 to 2^-14 of the way, a third towards edges down to float64's rounding;
-Mitsuba gets the first two, rounded to float32 beforehand for both.
+transformed numbers are exact - whole-number offsets, factors 2^k, another order - t is the same to
+the last bit, up to the factor.  Where they are rounded - factors 10^k, turns, offsets beyond 2^53 -
+a ray that differs is a failure unless both answers are right, each in its own scene as it is in
+float64, by exact arithmetic (`comparisons.exact.referee`), for a ray as near as rounding moves it.
+A third of the rays goes anywhere, a third towards edges at 2^-4 to 2^-14 of the way, a third
+towards edges down to float64's rounding, which Mitsuba is not asked.
 
 Law, light: a pixel changes by at most 4 times what it changes by when the eye, or each shape and
 light by itself, moves by 64 u (offset + size), with the roundoff u of each contestant, 2^-53 or
-2^-24, plus (512 u + 64 u (offset + size) / size) of itself (`f09_light`).  Under 2^k, and in another
-order, pictures are the same to the last bit.
+2^-24, plus (512 u + 64 u (offset + size) / size) of itself (`f09_light`).  Under 2^k, and in
+another order, pictures are the same to the last bit.
 
-Ranges: offset / size 1 to 1e14, factors 1e-50 to 1e50 and 2^-160 to 2^160, all mirrors and exchanges
-of axes, any rotation, groups nested up to 16 deep.  Counts: rays of a setting as in `_CASES`; a
+Ranges: offset / size 1 to 1e14, factors 1e-50 to 1e50 and 2^-160 to 2^160, all mirrors and
+exchanges of axes, any rotation, groups nested up to 16 deep.  Counts: rays of a setting as in `_CASES`; a
 picture has 48 x 36 pixels.
 """
 
@@ -216,16 +216,16 @@ FAMILY = Family(
         Series(
             name="translated solids",
             axis="offset / size",
-            about="The same of set operations.  What is thinner than 1024 u (offset + size) may go: "
-            "crossings of operands that close are passed at once, so that faces that coincide "
+            about="The same of set operations.  What is thinner than 1024 u (offset + size) may "
+            "go: crossings of operands that close are passed at once, so that faces that coincide "
             "leave no film.",
             values=decades(0, 12),
             quick=(1.0, 1e4),
             cases={"quick": 240, "full": 1000},
             measure=_translated_solids,
             holds_to=1e8,
-            law="crossings closer than 128 u (offset + size) / cos count as one: at 1e10 sizes that "
-            "is 5e-4 of the size, as thin as parts of these solids",
+            law="crossings closer than 128 u (offset + size) / cos count as one: at 1e10 sizes "
+            "that is 5e-4 of the size, as thin as parts of these solids",
             unit=_CHANGE,
         ),
         Series(

@@ -16,6 +16,7 @@ import reference_rt as rt
 from comparisons.stability.family import FloatArray
 from reference_rt import transform
 from reference_rt.shapes.shape import Shape
+from reference_rt.textures.texture import UvMap
 
 SIZE = 4.0
 """About the radius of each scene about the origin, its eye included."""
@@ -106,7 +107,8 @@ def _turned(degrees: float, axis: tuple[float, float, float] = UP) -> transform.
 
 
 def _scaled(*factors: float) -> transform.Scale:
-    return transform.Scale(scale=factors[0] if len(factors) == 1 else factors)
+    x, y, z = factors * 3 if len(factors) == 1 else factors
+    return transform.Scale(scale=(x, y, z))
 
 
 FLOOR = (_scaled(4.0, 4.0, 1.0), _turned(-90.0), _at(0.0, -1.0, 0.0))
@@ -175,7 +177,7 @@ def curves(folder: Path) -> rt.Scene:
     """What Mitsuba has not: cones, quadrics, tori, ellipsoids, planes without end, polygons."""
     saddle = (1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
     bowl = (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0)
-    star = ((0.0, 1.0), (0.625, -0.75), (-1.0, 0.25), (1.0, 0.25), (-0.625, -0.75))
+    star = ((0, 1, 0), (0.625, -0.75, 0), (-1, 0.25, 0), (1, 0.25, 0), (-0.625, -0.75, 0))
     return in_folder(
         folder,
         integrator=rt.RayCast(),
@@ -244,14 +246,14 @@ def solids(folder: Path) -> rt.Scene:
 _LAMP = (_scaled(0.75, 0.75, 1.0), _turned(90.0), _at(0.5, 3.0, 0.5))
 
 _TEXTURES = {
-    "squares": rt.Checker(first=(0.8, 0.7, 0.2), second=(0.2, 0.3, 0.5), uv={"scale": (8, 8)})
+    "squares": rt.Checker(first=(0.8, 0.7, 0.2), second=(0.2, 0.3, 0.5), uv=UvMap(scale=(8, 8)))
 }
 _MATERIALS = {
     "floor": rt.Diffuse(reflectance="squares"),
     "clay": rt.Diffuse(reflectance=(0.7, 0.4, 0.3)),
     "silver": rt.Mirror(reflectance=(0.9, 0.9, 0.9)),
     "glass": rt.Dielectric(),
-    "gold": rt.RoughConductor(eta=(0.14, 0.37, 1.44), k=(3.98, 2.38, 1.6), alpha=0.25),
+    "gold": rt.RoughConductor(eta=(0.14, 0.37, 1.44), k=(3.98, 2.38, 1.6), alpha=(0.25, 0.25)),
     "lamp": rt.Emissive(radiance=(9, 8, 7)),
 }
 
