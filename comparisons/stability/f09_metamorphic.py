@@ -14,8 +14,8 @@ light by itself, moves by 64 u (offset + size), with the roundoff u of each cont
 another order, pictures are the same to the last bit.
 
 Ranges: offset / size 1 to 1e14, factors 1e-50 to 1e50 and 2^-160 to 2^160, all mirrors and
-exchanges of axes, any rotation, groups nested up to 16 deep.  Counts: rays of a setting as in `_CASES`; a
-picture has 48 x 36 pixels.
+exchanges of axes, any rotation, groups nested up to 16 deep.  Counts: rays of a setting as in
+`_CASES`; a picture has 48 x 36 pixels.
 """
 
 from collections.abc import Callable, Mapping
@@ -46,8 +46,9 @@ from comparisons.stability.family import (
 
 Outcomes = dict[str, Outcome]
 
-EXACT_TO = 1e13
-"""The largest offset / size at which all coordinates are exact: 4e13 and multiples of 1/64."""
+EXACT_TO = 1e12
+"""The largest offset / size at which all coordinates are exact: 4e12 and multiples of 1/256, which
+vertices of scaled meshes are."""
 
 
 def added(one: Mapping[str, Outcome], other: Mapping[str, Outcome]) -> Outcomes:
@@ -231,8 +232,8 @@ FAMILY = Family(
         Series(
             name="translated light",
             axis="offset / size",
-            about="Pictures, path-traced and by Whitted, of scenes moved by whole numbers.  A pixel "
-            "that changes by more than its condition times u (offset + size) breaks the law.",
+            about="Pictures, path-traced and by Whitted, of scenes moved by whole numbers.  A pixel"
+            " that changes by more than its condition times u (offset + size) breaks the law.",
             values=decades(0, 13),
             quick=(1.0, 1e3, 1e9),
             cases={"quick": 1, "full": 1},

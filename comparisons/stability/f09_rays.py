@@ -141,6 +141,11 @@ SOLID_BAND = 1024.0
 the cosine at which they are met, down to 1/8 here."""
 
 
+MOST = 60
+"""Differing rays of a setting that are put to exact arithmetic, which takes some 3 ms each; others
+are left open.  Beyond 2^53 there are thousands."""
+
+
 def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float = BAND) -> Outcome:
     """Ours.  exact: the transformed numbers are the numbers meant, and the answers must be the
     same to the last bit of t;  else where answers differ each must be right in its own scene, by
@@ -157,6 +162,8 @@ def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float 
     else:
         wrong = changed.copy()
         rows = np.flatnonzero(changed)
+        open_[rows[MOST:]] = True
+        rows = rows[:MOST]
         right, open_[rows] = _both_right(before, after, rows, band)
         wrong[rows[right]] = False
     wrong &= ~open_

@@ -23,7 +23,7 @@ def measured(name, series, x, folder, **parts):
     return family(name).by_name[series].measure(draw(folder, **parts), x)
 
 
-RAYS = [("translated", 1e4), ("translated", 1e13), ("shrunk", 1e9), ("grown", 1e12)]
+RAYS = [("translated", 1e4), ("translated", 1e12), ("shrunk", 1e9), ("grown", 1e12)]
 RAYS += [("translated solids", 1.0), ("rearranged", 1.0), ("rearranged", 3.0), ("nested", 2.0)]
 
 
@@ -69,7 +69,8 @@ def test_an_epsilon_is_seen_by_rays(tmp_path, monkeypatch):
 
     monkeypatch.setattr(f09_rays, "ours", with_epsilon)
     assert measured("F9", "shrunk", 1e3, tmp_path)[OURS].failures == 0
-    assert measured("F9", "shrunk", 1e6, tmp_path)[OURS].failures > 50
+    found = measured("F9", "shrunk", 1e6, tmp_path)[OURS]
+    assert found.failures > 50
 
 
 def test_an_epsilon_is_seen_in_pictures(tmp_path, monkeypatch):
@@ -103,8 +104,10 @@ def test_exact_arithmetic_judges_both_answers(tmp_path):
     wrong[:, 3] += 1
     after = bench.ours._replace(found=f09_rays.Found(bench.ours.found.t, wrong))
     outcome = f09_rays.judged(bench.ours, after, 1.0, exact=False)
+    hits = np.count_nonzero(np.isfinite(bench.ours.found.t))
     # Of two triangles beside an edge both may be right.
-    assert outcome.failures + outcome.open >= 55
+    assert outcome.failures + outcome.open >= hits - 3
+    assert hits > 40
 
 
 def test_edges_are_found(tmp_path):
@@ -128,7 +131,7 @@ def test_mitsuba_takes_part(tmp_path):
     """Its float32 holds what is near, and not what is far."""
     near = measured("F9", "translated", 1.0, tmp_path, mitsuba=True)[MITSUBA]
     far = measured("F9", "translated", 1e8, tmp_path, mitsuba=True)[MITSUBA]
-    assert near.failures <= 1
+    assert near.failures <= 2
     assert far.failures > near.cases // 2
 
 

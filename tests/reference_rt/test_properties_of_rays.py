@@ -218,7 +218,7 @@ def test_occluded_is_hit_before_the_end(seed, part):
     scene, (o, d) = scene_of(seed), rays_of(seed)
     t = scene.intersect(o, d).t
     assert np.array_equal(scene.occluded(o, d), np.isfinite(t))
-    end = np.where(np.isfinite(t), t * part, part)
+    end = np.where(np.isfinite(t), t, 1.0) * part
     assert np.array_equal(scene.occluded(o, d, end), t < end)
     assert not scene.occluded(o, d, t)[np.isfinite(t)].any()
     assert scene.occluded(o, d, np.nextafter(t, np.inf))[np.isfinite(t)].all()
