@@ -91,6 +91,11 @@ def invert(m: Affine) -> Affine:
     return np.column_stack([inverse, -inverse @ m[:, 3]])
 
 
+def mirrors(m: Affine) -> bool:
+    """Whether the map turns right-handed into left-handed."""
+    return bool(np.linalg.slogdet(m[:, :3])[0] < 0.0)  # determinants of extreme scales overflow
+
+
 def apply_points(m: Affine, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """(n, 3) points, mapped: each by the same operations, so that equal points stay equal.
 

@@ -13,7 +13,8 @@ from reference_rt.shapes.shape import FloatArray, IntArray, Place, Shape
 class Mesh(Shape):
     """The triangles of a file, with its vertex normals, texture coordinates and vertex colours.
 
-    Geometric normals follow the winding.
+    Geometric normals follow the winding in the file: under a transform that mirrors space the front
+    stays the front, and what is closed does not turn inside out.
     """
 
     type: Literal["mesh"] = "mesh"
@@ -39,13 +40,14 @@ class Mesh(Shape):
         faces = data.faces
         if not has_area.all():
             vertices, faces = vertices[has_area], faces[has_area]
-        return triangle.soup(
+        triangles = triangle.soup(
             np.ascontiguousarray(vertices),
             place,
             normals=_at_corners(normals, faces),
             uvs=_at_corners(data.uv, faces),
             colours=_at_corners(data.colours, faces),
         )
+        return triangle.facing(m, triangles)
 
 
 def _at_corners(values: FloatArray | None, faces: IntArray) -> FloatArray | None:

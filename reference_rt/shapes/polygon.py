@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, WithJsonSchema, WrapValidator
 
+from reference_rt import transform
 from reference_rt.description import Vector
 from reference_rt.kernel import kernel
 from reference_rt.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
@@ -71,9 +72,9 @@ class Polygon(Shape):
     """What rings enclose; all their points in one plane, those of two numbers at z = 0.
 
     Normal: the area that the rings go round counter-clockwise, less that which they go round
-    clockwise, is positive seen against it where the transform takes them (as for a triangle, a
-    transform that mirrors space turns it over).  Where these are equal, as in a figure eight, the
-    first turn of the first ring is counter-clockwise.
+    clockwise, is positive seen against it before the transform (as for a triangle, the front stays
+    the front under one that mirrors space).  Where these are equal, as in a figure eight, the first
+    turn of the first ring is counter-clockwise.
     """
 
     type: Literal["polygon"] = "polygon"
@@ -106,7 +107,7 @@ class Polygon(Shape):
             (linear[:, k] - s * linear[:, axis]) * scale for k, s in zip(kept, slopes, strict=True)
         ]
         made = flat.columns(linear[:, axis] * origin + m[:, 3], edges[0], edges[1], place)
-        if clockwise:
+        if clockwise != transform.mirrors(m):
             made["normal"] = -made["normal"]
         return Polygons(
             lower=outline[:, :2].min(axis=0)[None],

@@ -26,7 +26,8 @@ from reference_rt.vec3 import Vec3, cross, dot, max_abs, normalize, triple
 
 
 class Triangle(Shape):
-    """A triangle; its normal is (v1 - v0) x (v2 - v0)."""
+    """A triangle; its normal is (v1 - v0) x (v2 - v0), before the transform: under one that mirrors
+    space its front stays its front."""
 
     type: Literal["triangle"] = "triangle"
     v0: Vector
@@ -36,7 +37,7 @@ class Triangle(Shape):
     def tabulate(self, place: Place) -> "Triangles":
         m = self.map_in(place)
         vertices = transform.apply_points(m, np.array([self.v0, self.v1, self.v2]))
-        triangles = soup(vertices.reshape(1, 9), place)
+        triangles = facing(m, soup(vertices.reshape(1, 9), place))
         if areas(triangles)[0] == 0.0:
             raise ValueError("the triangle has no area; expected three points not on a line")
         return triangles
@@ -78,6 +79,32 @@ def soup(
     )
 
 
+def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
+    """The triangles, whose vertices the map m has taken where they are, with their fronts where it
+    takes those: a mirror turns the corners' order round, and they are turned back."""
+    if not transform.mirrors(m):
+        return triangles
+    uvs = _barycentrics(triangles) if triangles.uvs is None else triangles.uvs
+    return triangles._replace(
+        vertices=_exchanged(triangles.vertices),
+        normals=None if triangles.normals is None else _exchanged(triangles.normals),
+        uvs=_exchanged(uvs),
+        colours=None if triangles.colours is None else _exchanged(triangles.colours),
+    )
+
+
+def _exchanged(corners: FloatArray) -> FloatArray:
+    """(n, 3 k): the second corner and the third in each other's place."""
+    return np.ascontiguousarray(
+        corners.reshape(len(corners), 3, -1)[:, [0, 2, 1]].reshape(corners.shape)
+    )
+
+
+def _barycentrics(triangles: Triangles) -> FloatArray:
+    """The coordinates of triangles that have none of their own (n, 6)."""
+    return np.repeat([[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]], len(triangles.face), axis=0)
+
+
 def align(parts: Sequence[Triangles]) -> list[Triangles]:
     """Tables with the same columns: what one has, the others get."""
     parts = list(parts)
@@ -87,13 +114,8 @@ def align(parts: Sequence[Triangles]) -> list[Triangles]:
             for part in parts
         ]
     if any(part.uvs is not None for part in parts):
-        # The barycentrics, which are the coordinates of a triangle without any.
-        corners = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]])
         parts = [
-            part._replace(uvs=np.repeat(corners, len(part.face), axis=0))
-            if part.uvs is None
-            else part
-            for part in parts
+            part._replace(uvs=_barycentrics(part)) if part.uvs is None else part for part in parts
         ]
     if any(part.colours is not None for part in parts):
         parts = [

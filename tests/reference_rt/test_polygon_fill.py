@@ -91,8 +91,8 @@ def test_the_normal_is_by_the_winding():
     assert normal_of([square(0, 1, clockwise=True)]) == [0, 0, -1]
     assert normal_of([square(0, 1, clockwise=True), square(2, 5)]) == [0, 0, 1]
     mirror = transform.Scale(scale=(-1, 1, 1))
-    assert normal_of([square(0, 1)], mirror) == [0, 0, -1]
-    assert normal_of([square(0, 1)], transform.Scale(scale=(1, 1, -1))) == [0, 0, 1]
+    assert normal_of([square(0, 1)], mirror) == [0, 0, 1]
+    assert normal_of([square(0, 1)], transform.Scale(scale=(1, 1, -1))) == [0, 0, -1]
     # As a triangle of the same points.
     rng = np.random.default_rng(8)
     for _ in range(30):
@@ -100,7 +100,7 @@ def test_the_normal_is_by_the_winding():
         step = random_map(rng)
         m = transform.affine((step,))
         a, b, c = np.array(v) @ m[:, :3].T
-        n = np.cross(b - a, c - a)
+        n = np.cross(b - a, c - a) * np.sign(np.linalg.det(m[:, :3]))
         assert normal_of([v], step) == pytest.approx(n / np.linalg.norm(n), abs=1e-12)
 
 

@@ -1,0 +1,246 @@
+"""What rays hit in a scene and in the same scene transformed."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+import reference_rt as rt
+from comparisons.exact.referee import Referee, Truth
+from comparisons.mitsuba_backend import scalar
+from comparisons.sizes import ShapeSizes
+from comparisons.stability.f09_scenes import GRID, Motion
+from comparisons.stability.family import EXAMPLES, FloatArray, Outcome
+from comparisons.tiers.arbiter import directions
+from comparisons.translate import load
+from comparisons.twin import trace
+from reference_rt import query
+from reference_rt.query import Intersections
+from reference_rt.ray import UNIT_ROUNDOFF
+from reference_rt.tables import SceneTables
+
+BoolArray = npt.NDArray[np.bool_]
+Identities = npt.NDArray[np.int64]
+
+HALVINGS = 50
+"""Steps that close in on an edge: until two rays differ by float64's rounding."""
+
+
+class Rays(NamedTuple):
+    """o, d (n, 3): dyadic origins, directions of about unit length;  coarse (n,): those that
+    float32 holds and that pass every edge at 2^-14 of the way or more, which Mitsuba is asked."""
+
+    o: FloatArray
+    d: FloatArray
+    coarse: BoolArray
+
+
+class Found(NamedTuple):
+    """t (n,), inf for a miss, and identities (n, 4): shape, instance, part, primitive; -1 in the
+    first for a miss."""
+
+    t: FloatArray
+    identities: Identities
+
+
+def found_of(hits: Intersections) -> Found:
+    columns = (hits.shape, hits.instance, hits.part, hits.primitive)
+    return Found(hits.t, np.where(hits.shape[:, None] < 0, -1, np.column_stack(columns)))
+
+
+def ours(tables: SceneTables, o: FloatArray, d: FloatArray) -> Found:
+    return found_of(query.intersect(tables, o, d))
+
+
+def mitsubas(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Found:
+    """Mitsuba's scalar variant, which solves spheres and cylinders in float64; -2 for every shape
+    where it refuses the scene."""
+    try:
+        with scalar(), np.errstate(over="ignore", invalid="ignore"):
+            # What float32 cannot hold becomes infinite.
+            return found_of(trace(load(scene), o, d))
+    except RuntimeError:
+        return Found(np.full(len(o), np.inf), np.full((len(o), 4), -2))
+
+
+def aimed(tables: SceneTables, n: int, rng: np.random.Generator) -> Rays:
+    """A third anywhere, a third at edges (silhouettes, borders of faces and triangles), at 2^-4 to
+    2^-14 of the way to them, a third at edges down to float64's rounding.
+
+    An edge is where two rays from one origin hit different things: between them by bisection.
+    """
+    o = (1.0, 2.0, 7.0) + np.rint(rng.uniform(-1.0, 1.0, (n, 3)) * GRID) / GRID
+    ends = rng.uniform(-3.0, 3.0, (2, n, 3)) - o
+    a, b = (round32(unit(end)) for end in ends)
+    kind = np.arange(n) % 3
+    pairs = np.flatnonzero((kind > 0) & differ(ours(tables, o, a), ours(tables, o, b)))
+    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    p, q, e = a[pairs], b[pairs], o[pairs]
+    first = ours(tables, e, p)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        other = differ(ours(tables, e, p + middle[:, None] * (q - p)), first)
+        low, high = np.where(other, low, middle), np.where(other, middle, high)
+    far = kind[pairs] == 1
+    depth = np.where(far, rng.uniform(4, 14, len(pairs)), rng.uniform(14, HALVINGS, len(pairs)))
+    side = rng.choice([-1.0, 1.0], len(pairs))
+    d = p + (0.5 * (low + high) + side * 2.0**-depth)[:, None] * (q - p)
+    a[pairs] = np.where(far[:, None], round32(d), d)
+    coarse = np.ones(n, bool)
+    coarse[pairs[~far]] = False
+    return Rays(o, a, coarse)
+
+
+def unit(v: FloatArray) -> FloatArray:
+    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
+
+
+def round32(v: FloatArray) -> FloatArray:
+    return v.astype(np.float32).astype(np.float64)
+
+
+def differ(a: Found, b: Found) -> BoolArray:
+    """Which rays do not hit the same thing."""
+    return np.asarray((a.identities != b.identities).any(axis=1))
+
+
+def through(motion: Motion, rays: Rays) -> tuple[FloatArray, FloatArray]:
+    """Origins and directions, transformed as the scene is; t grows by the factor."""
+    o = np.array([motion.point(p) for p in rays.o.tolist()]).reshape(-1, 3)
+    d = np.array([motion.vector(v) for v in rays.d.tolist()]).reshape(-1, 3)
+    return o, d
+
+
+class Asked(NamedTuple):
+    """Rays, and what they found in a scene;  names: the identities in terms of the scene that this
+    one is compared with, where shapes have other numbers there."""
+
+    scene: rt.Scene
+    o: FloatArray
+    d: FloatArray
+    found: Found
+    names: Identities | None = None
+
+
+def _changed(before: Asked, after: Asked) -> BoolArray:
+    names = after.found.identities if after.names is None else after.names
+    return differ(before.found, Found(after.found.t, names))
+
+
+BAND = 8.0
+"""Roundings, of the largest coordinate, by which a ray may have been moved relative to the scene:
+transforming a point is three products and three sums, of the ray's origin and of the surface's."""
+
+AROUND = np.concatenate([np.zeros((1, 3)), directions(16), 0.3 * directions(8)])
+"""Moves, of that size, that a differing ray is asked with."""
+
+
+SOLID_BAND = 1024.0
+"""The same for solids: crossings of operands count as one where they lie within the bounds of both,
+16 sqrt(3) u (anchor + point) and as much for the ray, of each operand (`csg.evaluate`), 111 u, over
+the cosine at which they are met, down to 1/8 here."""
+
+
+MOST = 60
+"""Differing rays of a setting that are put to exact arithmetic, which takes some 3 ms each; others
+are left open.  Beyond 2^53 there are thousands."""
+
+
+def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float = BAND) -> Outcome:
+    """Ours.  exact: the transformed numbers are the numbers meant, and the answers must be the
+    same to the last bit of t;  else where answers differ each must be right in its own scene, by
+    exact arithmetic: where rounding the scene has really changed what is there, both are.
+    """
+    changed = _changed(before, after)
+    t0, t1 = before.found.t, after.found.t / factor
+    same = np.isfinite(t0) & ~changed
+    off = np.abs(t1[same] - t0[same]) / t0[same]
+    worst = float(off.max(initial=0.0))
+    open_ = np.zeros(len(t0), bool)
+    if exact:
+        wrong = changed | (same & (t0 != t1))
+    else:
+        wrong = changed.copy()
+        rows = np.flatnonzero(changed)
+        open_[rows[MOST:]] = True
+        rows = rows[:MOST]
+        right, open_[rows] = _both_right(before, after, rows, band)
+        wrong[rows[right]] = False
+    wrong &= ~open_
+    rows = np.flatnonzero(wrong)[:EXAMPLES]
+    return Outcome(
+        int(len(t0) - np.count_nonzero(open_)),
+        int(np.count_nonzero(wrong)),
+        worst,
+        int(np.count_nonzero(open_)),
+        tuple(_example(before, after, int(k)) for k in rows),
+    )
+
+
+def _both_right(
+    before: Asked, after: Asked, rows: npt.NDArray[np.int64], band: float
+) -> tuple[BoolArray, BoolArray]:
+    """Of some rays: whether both answers are those of exact arithmetic for a ray within `band`, and
+    whether the arbiter leaves one open."""
+    right, touching = np.ones(len(rows), bool), np.zeros(len(rows), bool)
+    if len(rows) == 0:
+        return right, touching
+    for asked in (before, after):
+        sizes = ShapeSizes(asked.scene)
+        o, d = asked.o[rows], asked.d[rows]
+        # An infinite plane counts as far as the ray goes.
+        extent = np.maximum(np.abs(o).max(axis=1), np.abs([sizes.lower, sizes.upper]).max())
+        moves = band * UNIT_ROUNDOFF * extent[:, None, None] * AROUND
+        origins = (o[:, None] + moves).reshape(-1, 3)
+        truths = Referee(sizes).decide(origins, np.repeat(d, len(AROUND), axis=0))
+        for k, row in enumerate(rows.tolist()):
+            some = truths[k * len(AROUND) : (k + 1) * len(AROUND)]
+            right[k] &= any(_is_right(asked.found.identities[row], truth) for truth in some)
+            touching[k] |= some[0].touching
+    return right, touching
+
+
+def _is_right(identity: Identities, truth: Truth) -> bool:
+    if identity[0] < 0:
+        return not truth.identities
+    return tuple(identity.tolist()) in truth.identities
+
+
+def judged_mitsuba(before: Asked, after: Asked, factor: float) -> Outcome:
+    """Its rays pass every edge at more than 1e-5 of the way: what float64's rounding of the scene
+    moves, 1e-16 of its size, changes none of them."""
+    wrong = _changed(before, after)
+    t0, t1 = before.found.t, after.found.t / factor
+    same = np.isfinite(t0) & ~wrong
+    worst = float((np.abs(t1[same] - t0[same]) / t0[same]).max(initial=0.0))
+    rows = np.flatnonzero(wrong)[:EXAMPLES]
+    examples = tuple(_example(before, after, int(k)) for k in rows)
+    return Outcome(len(wrong), int(np.count_nonzero(wrong)), worst, 0, examples)
+
+
+def _example(before: Asked, after: Asked, k: int) -> dict[str, Any]:
+    def told(asked: Asked) -> dict[str, Any]:
+        return {
+            "o": [x.hex() for x in asked.o[k].tolist()],
+            "d": [x.hex() for x in asked.d[k].tolist()],
+            "t": float(asked.found.t[k]).hex(),
+            "shape, instance, part, primitive": asked.found.identities[k].tolist(),
+        }
+
+    return {"before": told(before), "after": told(after)}
+
+
+class Bench:
+    """A scene, its rays, and what they find in it before it is transformed."""
+
+    def __init__(
+        self, scene: rt.Scene, cases: int, rng: np.random.Generator, mitsuba: bool = False
+    ) -> None:
+        tables = rt.build_tables(scene)
+        self.rays = aimed(tables, cases, rng)
+        o, d, coarse = self.rays
+        self.ours = Asked(scene, o, d, ours(tables, o, d))
+        self.mitsuba = None
+        if mitsuba:
+            o, d = o[coarse], d[coarse]
+            self.mitsuba = Asked(scene, o, d, mitsubas(scene, o, d))
