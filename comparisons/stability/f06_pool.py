@@ -62,8 +62,6 @@ def answers(
 class _Worker:
     def __init__(self, module: str, plain: bool) -> None:
         environment = os.environ | ({"NUMBA_DISABLE_JIT": "1"} if plain else {})
-        # Hashes of types must be the same in all workers.
-        environment["PYTHONHASHSEED"] = "0"
         self.process = subprocess.Popen(
             [sys.executable, "-m", module],
             stdin=subprocess.PIPE,

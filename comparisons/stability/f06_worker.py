@@ -6,6 +6,7 @@ may ends the process: by SIGPROF where it computes, by SIGALRM where it waits.
 """
 
 import contextlib
+import hashlib
 import io
 import json
 import resource
@@ -20,7 +21,7 @@ import numpy as np
 import typer
 
 from reference_rt import image
-from reference_rt.cli import adjusted, guarded
+from reference_rt.cli import adjusted, guarded, provenance
 from reference_rt.errors import ImageError
 from reference_rt.integrators import RayCast
 from reference_rt.render import Picture, render
@@ -99,6 +100,7 @@ def _render(path: Path, wanted: str | None, found: dict[str, Any], clock: _Clock
         if what == "compile":
             (clock.stop if fraction == 0.0 else clock.start)()
 
+    provenance(scene)
     picture = render(scene, threads=1, tables=tables, progress=progress)
     found["rendered"] = True
     found["nonfinite"] = count_nonfinite(picture)
@@ -125,7 +127,8 @@ def signature_of(scene: Scene, tables: SceneTables) -> str:
     parts: list[Any] = [tables, scene.camera.setup(film.width, film.height), film.filter.setup()]
     if not isinstance(scene.integrator, RayCast):
         parts += [scene.integrator.setup(), scene.resolved_sampler.setup()]
-    return f"{scene.integrator.type} {film.layers} {hash(numba.typeof(tuple(parts)))}"
+    names = f"{scene.integrator.type} {film.layers} {numba.typeof(tuple(parts))}"
+    return hashlib.sha256(names.encode()).hexdigest()
 
 
 if __name__ == "__main__":
