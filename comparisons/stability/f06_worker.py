@@ -9,10 +9,12 @@ import contextlib
 import hashlib
 import io
 import json
+import os
 import resource
 import signal
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -37,15 +39,19 @@ WAITING = 12.0
 """Times as long a case may take when it does not compute, on a machine that is busy."""
 
 
-def main() -> None:
+def serve(outcome: Callable[[Path, str | None, "Clock"], dict[str, Any]]) -> None:
+    """Answers cases until there are none."""
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     warnings.simplefilter("ignore")
-    answers, sys.stdout = sys.stdout, io.StringIO()
+    answers = os.fdopen(os.dup(1), "w")
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)  # what libraries print is no answer
     seconds = float(json.loads(sys.stdin.readline())["seconds"])
-    clock = _Clock(seconds)
+    clock = Clock(seconds)
     for line in sys.stdin:
         case = json.loads(line)
-        _say(answers, _outcome(Path(case["scene"]), case.get("signature"), clock))
+        answer = outcome(Path(case["scene"]), case.get("signature"), clock)
+        _say(answers, answer)
 
 
 def _say(answers: TextIO, answer: dict[str, Any]) -> None:
@@ -53,7 +59,7 @@ def _say(answers: TextIO, answer: dict[str, Any]) -> None:
     answers.flush()
 
 
-class _Clock:
+class Clock:
     """Ends the process when a case takes too long; compiling does not count."""
 
     def __init__(self, seconds: float) -> None:
@@ -68,7 +74,7 @@ class _Clock:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
-def _outcome(path: Path, signature: str | None, clock: _Clock) -> dict[str, Any]:
+def _outcome(path: Path, signature: str | None, clock: Clock) -> dict[str, Any]:
     """exit: the code that the command would return;  said: what it would write to standard error;
     nonfinite: the pixels that files would show as not finite;  signature: of the kernels;
     rendered: whether it came to a picture."""
@@ -87,7 +93,7 @@ def _outcome(path: Path, signature: str | None, clock: _Clock) -> dict[str, Any]
 
 
 @guarded
-def _render(path: Path, wanted: str | None, found: dict[str, Any], clock: _Clock) -> None:
+def _render(path: Path, wanted: str | None, found: dict[str, Any], clock: Clock) -> None:
     """As the command of the same name, without a file.  Where `wanted` is another combination of
     kernels, stops before they are compiled."""
     scene = adjusted(Scene.load(path), SAMPLES, SIZE)
@@ -132,4 +138,4 @@ def signature_of(scene: Scene, tables: SceneTables) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    serve(_outcome)
