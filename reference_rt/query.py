@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.geometry import closest_hit, owner, surface
+from reference_rt.csg.evaluate import crossings as solid_crossings
+from reference_rt.geometry import Geometry, closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
@@ -50,6 +51,21 @@ class Intersections:
     n: FloatArray
     ns: FloatArray
     uv: FloatArray
+
+
+@dataclass(frozen=True)
+class SolidCrossings:
+    """Where n rays go in and out of a solid, in order, over all t > 0.
+
+    t (n, k): inf where there are fewer than k;  width (n, k): how far rounding may have moved t:
+    crossings closer together than the sum of theirs are passed at once, and what is between them,
+    material or gap, is not told;  part (n, k): number of the operand that shows;  count (n,).
+    """
+
+    t: FloatArray
+    width: FloatArray
+    part: IntArray
+    count: IntArray
 
 
 @dataclass(frozen=True)
@@ -160,6 +176,24 @@ def _closest(
 
 
 @entry_kernel
+def _crossings(
+    geometry: Geometry,
+    solid: int,
+    o: FloatArray,
+    d: FloatArray,
+    t: FloatArray,
+    width: FloatArray,
+    part: IntArray,
+    count: IntArray,
+) -> None:
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        count[i] = solid_crossings(
+            geometry.solids, geometry.shapes, geometry.bvh, solid, ray, t[i], width[i], part[i]
+        )
+
+
+@entry_kernel
 def _occluded(
     scene: SceneTables, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
 ) -> None:
@@ -241,6 +275,28 @@ def closest(
 
     _in_blocks(trace, n, threads)
     return found
+
+
+def crossings(
+    scene: SceneTables,
+    solid: int,
+    origins: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    most: int = 64,
+) -> SolidCrossings:
+    """All crossings of each ray with the solid of that number, in the scene's order; `most` of
+    them, though `count` counts all."""
+    solids = scene.geometry.solids
+    if solids is None or not 0 <= solid < len(solids.first):
+        known = 0 if solids is None else len(solids.first)
+        raise ValueError(f"there is no solid {solid}; expected one of the scene's {known}")
+    o, d = _rays(origins, directions)
+    t, width = np.full((2, len(o), most), math.inf)
+    part = np.full((len(o), most), -1)
+    count = np.zeros(len(o), np.int64)
+    with np.errstate(all="ignore"):
+        _crossings(scene.geometry, solid, o, d, t, width, part, count)
+    return SolidCrossings(t, width, part, count)
 
 
 def occluded(
