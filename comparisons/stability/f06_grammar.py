@@ -77,7 +77,11 @@ class _Writer:
         found: dict[str, Any] = {}
         for key, part in schema.get("properties", {}).items():
             optional = key not in needed and key != "type"
-            if optional and key not in _SHAPES_OF and (depth > DEEPEST or self.rng.random() > _OPTIONAL):
+            if (
+                optional
+                and key not in _SHAPES_OF
+                and (depth > DEEPEST or self.rng.random() > _OPTIONAL)
+            ):
                 continue
             found[key] = self.value(part, depth + 1, key)
         return found

@@ -54,6 +54,9 @@ from comparisons.stability.family import (
     Series,
 )
 
+FOR_MITSUBA = {"quick": 8, "full": 60}
+"""Scenes of a setting that Mitsuba is given: each takes it some 0.1 s, after 2 s to start."""
+
 LONGEST = 2000
 """Characters of a scene that an example quotes."""
 
@@ -144,7 +147,9 @@ def values(draw: Draw, x: float) -> dict[str, Outcome]:
     known = _signatures(draw, BASES)
     found = {OURS: judged([path for path, _ in made], False, [known[name] for _, name in made])}
     if draw.mitsuba:
-        found[MITSUBA] = judged_of_mitsuba([path for path, _ in made][: 40 if x < 4 else 10])
+        # The others have solids, or what Mitsuba has no twin of.
+        lit = [path for path, name in made if name in ("light", "recursive")]
+        found[MITSUBA] = judged_of_mitsuba(lit[: FOR_MITSUBA[draw.effort]])
     return found
 
 

