@@ -194,7 +194,9 @@ class _Assembly:
     def expand(self, name: str, path: Sequence[str] = ()) -> tuple[IntArray, FloatArray]:
         """Trees (k,) and maps (k, 3, 4) of all that an instance of a group stands for."""
         if name in path:
-            raise ValueError(f"the group contains itself: {' -> '.join([*path, name])}")
+            raise ValueError(
+                f"the group contains itself: {' -> '.join([*path, name])}; expected no circle"
+            )
         if name not in self.expansions:
             self.expansions[name] = self._expansion(name, (*path, name))
         return self.expansions[name]

@@ -37,6 +37,12 @@ def first_problem(model: type[Description], error: ValidationError, data: Any) -
     elif first["type"] == "union_tag_invalid":
         known_types = _types(_models_at(model, location))
         message = f"unknown type '{first['ctx']['tag']}'; expected one of: {known_types}"
+    elif first["type"] == "too_long":
+        message = f"expected at most {first['ctx']['max_length']} items"
+    elif first["type"] == "too_short":
+        message = f"expected at least {first['ctx']['min_length']} items"
+    elif first["type"] == "recursion_loop":
+        message = "nested too deeply; expected fewer levels"
     elif first["type"] in _PLAIN:
         message = f"expected {_PLAIN[first['type']]}"
     elif first["type"] != "value_error" and not isinstance(first["input"], dict | list):
@@ -91,7 +97,7 @@ def line_of(text: str, keys: Keys) -> int | None:
     """The line, from 1, of the part at `keys`, or of the closest part around it."""
     try:
         node: Node | None = YAML(typ="safe", pure=True).compose(text)
-    except YAMLError:
+    except (YAMLError, RecursionError):
         return None
     line = 1
     for key in keys:

@@ -3,10 +3,22 @@
 from collections.abc import Sequence
 
 
+def _one_line(text: str) -> str:
+    """The text with escapes for what would break or hide it, as names of files may have."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+_MOST_KEYS = 16
+"""Of a way through a scene that a message spells out."""
+
+
 class ReferenceRtError(Exception):
     """An error with one clear line for people; `exit_code` is what `reference-rt` returns."""
 
     exit_code = 5
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(_one_line(message))
 
 
 class UsageError(ReferenceRtError):
@@ -36,7 +48,10 @@ class SceneError(ReferenceRtError):
 
     def _text(self) -> str:
         where = "" if self.file is None else self.file + (f":{self.line}" if self.line else "")
-        keys = "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in self.path).lstrip(".")
+        names = [f"[{k}]" if isinstance(k, int) else f".{k}" for k in self.path]
+        if len(names) > _MOST_KEYS:
+            names[_MOST_KEYS // 2 : -_MOST_KEYS // 2] = ["..."]
+        keys = "".join(names).lstrip(".")
         return ": ".join(part for part in (where, keys, self.message) if part)
 
 

@@ -1,7 +1,9 @@
 """The tracer as an oracle on arrays of rays: intersections, occlusion, light, radiance.
 
 All arrays are float64 or int64; origins and directions are (n, 3) in world coordinates and scene
-units; directions need not have unit length: t counts in units of |d|.
+units; directions need not have unit length: t counts in units of |d|.  A ray of which a number is
+not finite, or whose direction is 0, meets nothing; neither does one that would at a point, or a t,
+beyond float64's range.
 """
 
 import math
@@ -9,23 +11,24 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.geometry import closest_hit, owner, surface
+from reference_rt.csg.evaluate import crossings as solid_crossings
+from reference_rt.geometry import Geometry, closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
-from reference_rt.kernel import entry_kernel, local_floats
+from reference_rt.kernel import entry_kernel, kernel, local_floats
 from reference_rt.materials import kept_floats
-from reference_rt.ray import Ray
+from reference_rt.ray import Ray, at
 from reference_rt.sampling.grid import GridSample
 from reference_rt.shading import shade
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3, row
+from reference_rt.vec3 import Vec3, is_finite, max_abs, row
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,21 @@ class Intersections:
     n: FloatArray
     ns: FloatArray
     uv: FloatArray
+
+
+@dataclass(frozen=True)
+class SolidCrossings:
+    """Where n rays go in and out of a solid, in order, over all t > 0.
+
+    t (n, k): inf where there are fewer than k;  width (n, k): how far rounding may have moved t:
+    crossings closer together than the sum of theirs are passed at once, and what is between them,
+    material or gap, is not told;  part (n, k): number of the operand that shows;  count (n,).
+    """
+
+    t: FloatArray
+    width: FloatArray
+    part: IntArray
+    count: IntArray
 
 
 @dataclass(frozen=True)
@@ -79,19 +97,55 @@ class DirectLight:
     contribution: FloatArray
 
 
+class _Scaled(NamedTuple):
+    """A ray whose direction is 1 / unit times as long as what was asked with, so that t counts in
+    units `unit` times as large;  valid: whether it is a ray, of finite numbers and d != 0."""
+
+    ray: Ray
+    unit: float
+    valid: bool
+
+
+@kernel
+def _scaled(o: Vec3, d: Vec3, t_max: float) -> _Scaled:
+    """By a power of two, which changes no bit of what is computed: squares of directions that are
+    very long or short would leave the range of float64."""
+    unit, valid = 1.0, is_finite(o) and is_finite(d) and max_abs(d) > 0.0
+    if valid and not _SHORT <= max_abs(d) <= 1.0 / _SHORT:
+        _, exponent = math.frexp(max_abs(d))
+        unit = math.ldexp(1.0, -min(max(exponent, -1000), 1000))
+        d = d * unit
+    return _Scaled(Ray(o, d, t_max / unit), unit, valid)
+
+
+_SHORT = 2.0**-64
+"""Of a direction: its square, and that of the same of an instance 2^400 times as large, are not 0.
+What is neither shorter nor longer than the inverse is left alone."""
+
+
+@kernel
+def _is_told(t: float, p: Vec3) -> bool:
+    """Whether float64 has numbers for a hit."""
+    return 0.0 < t < math.inf and is_finite(p)
+
+
 @entry_kernel
 def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
     for i in range(len(o)):
-        ray = Ray(row(o, i), row(d, i), math.inf)
+        out[i, 0] = math.inf
+        for k in range(1, 5):
+            out[i, k] = -1.0
+        ray, unit, valid = _scaled(row(o, i), row(d, i), math.inf)
+        if not valid:
+            continue
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
-            out[i, 0] = math.inf
-            for k in range(1, 5):
-                out[i, k] = -1.0
             continue
         point = surface(scene.geometry, ray, hit)
+        if not _is_told(hit.t * unit, point.p):
+            continue
         whose = owner(scene.geometry, ray, hit)
-        out[i, 0], out[i, 1], out[i, 2] = hit.t, whose.shape, whose.face
+        out[i, 0], out[i, 1], out[i, 2] = hit.t * unit, whose.shape, whose.face
         out[i, 3], out[i, 4] = whose.part, whose.instance
         out[i, 5], out[i, 6], out[i, 7] = point.p
         out[i, 8], out[i, 9], out[i, 10] = point.n
@@ -110,9 +164,33 @@ def _closest(
     uv: FloatArray,
 ) -> None:
     for i in range(len(o)):
-        hit = closest_hit(scene.geometry, Ray(row(o, i), row(d, i), math.inf))
-        t[i], kind[i], rows[i] = hit.t, hit.kind, hit.row
+        t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
+        ray, unit, valid = _scaled(row(o, i), row(d, i), math.inf)
+        if not valid:
+            continue
+        hit = closest_hit(scene.geometry, ray)
+        if hit.kind < 0 or not _is_told(hit.t * unit, at(ray, hit.t)):
+            continue
+        t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
         uv[i, 0], uv[i, 1] = hit.u, hit.v
+
+
+@entry_kernel
+def _crossings(
+    geometry: Geometry,
+    solid: int,
+    o: FloatArray,
+    d: FloatArray,
+    t: FloatArray,
+    width: FloatArray,
+    part: IntArray,
+    count: IntArray,
+) -> None:
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        count[i] = solid_crossings(
+            geometry.solids, geometry.shapes, geometry.bvh, solid, ray, t[i], width[i], part[i]
+        )
 
 
 @entry_kernel
@@ -120,7 +198,8 @@ def _occluded(
     scene: SceneTables, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
 ) -> None:
     for i in range(len(o)):
-        out[i] = is_occluded(scene.geometry, Ray(row(o, i), row(d, i), t_max[i]))
+        ray, _, valid = _scaled(row(o, i), row(d, i), t_max[i])
+        out[i] = valid and is_occluded(scene.geometry, ray)
 
 
 @entry_kernel
@@ -196,6 +275,28 @@ def closest(
 
     _in_blocks(trace, n, threads)
     return found
+
+
+def crossings(
+    scene: SceneTables,
+    solid: int,
+    origins: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    most: int = 64,
+) -> SolidCrossings:
+    """All crossings of each ray with the solid of that number, in the scene's order; `most` of
+    them, though `count` counts all."""
+    solids = scene.geometry.solids
+    if solids is None or not 0 <= solid < len(solids.first):
+        known = 0 if solids is None else len(solids.first)
+        raise ValueError(f"there is no solid {solid}; expected one of the scene's {known}")
+    o, d = _rays(origins, directions)
+    t, width = np.full((2, len(o), most), math.inf)
+    part = np.full((len(o), most), -1)
+    count = np.zeros(len(o), np.int64)
+    with np.errstate(all="ignore"):
+        _crossings(scene.geometry, solid, o, d, t, width, part, count)
+    return SolidCrossings(t, width, part, count)
 
 
 def occluded(

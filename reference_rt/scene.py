@@ -36,6 +36,11 @@ if TYPE_CHECKING:
     from reference_rt.tables import SceneTables
 
 
+MOST_NESTED = 100
+"""Set operations in each other: pydantic writes 255 levels of lists and keys at most, of which each
+takes two."""
+
+
 class Scene(Description):
     """Everything that determines a picture.  Right-handed world; linear sRGB; scene units."""
 
@@ -116,6 +121,12 @@ class Scene(Description):
     def _check_shape(self, shape: Shape, *path: str | int) -> None:
         self._check_material(shape.material, *path, "material")
         if isinstance(shape, Solid):
+            if path.count("of") >= MOST_NESTED:
+                raise SceneError(
+                    f"set operations in each other, deeper than {MOST_NESTED}; expected fewer: one "
+                    "may have any number of operands",
+                    path,
+                )
             for k, operand in enumerate(shape.of):
                 self._check_shape(operand, *path, "of", k)
         if isinstance(shape, Instance):

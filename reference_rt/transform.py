@@ -18,6 +18,9 @@ Affine = npt.NDArray[np.float64]
 
 IDENTITY: Affine = np.eye(3, 4)
 
+FLAT = "the transform is singular: it flattens space; expected one that can be undone"
+"""What is said of a map that has no inverse."""
+
 
 def identity() -> Affine:
     return IDENTITY.copy()
@@ -84,9 +87,9 @@ def invert(m: Affine) -> Affine:
     # means that the rows are dependent to within float64's own rounding.
     norms = np.abs(linear).max(axis=1)
     if not (np.all(np.isfinite(m)) and np.all(norms > 0.0)):
-        raise ValueError("the transform is singular: it flattens space")
+        raise ValueError(FLAT)
     if np.linalg.cond(linear / norms[:, None]) > 2.0**52:
-        raise ValueError("the transform is singular: it flattens space")
+        raise ValueError(FLAT)
     inverse = np.linalg.inv(linear)
     return np.column_stack([inverse, -inverse @ m[:, 3]])
 

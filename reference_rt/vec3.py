@@ -124,6 +124,11 @@ def max_abs(a: Vec3) -> float:
 
 
 @kernel
+def is_finite(a: Vec3) -> bool:
+    return a.x - a.x == 0.0 and a.y - a.y == 0.0 and a.z - a.z == 0.0
+
+
+@kernel
 def max_component(a: Vec3) -> float:
     return max(a.x, max(a.y, a.z))
 

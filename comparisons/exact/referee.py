@@ -89,7 +89,7 @@ class Referee:
         leaves = self.sizes.by_part(copy)
         for member in copy.members:
             per_leaf = [
-                _crossings(leaves[leaf.part], (o, d), (exact_o, exact_d)) for leaf in member.leaves
+                crossings_of(leaves[leaf.part], (o, d), (exact_o, exact_d)) for leaf in member.leaves
             ]
             for k, ray in enumerate(rays.tolist()):
                 found = [
@@ -123,7 +123,7 @@ Lists = tuple[list[list[tuple[int, int, bool]]], BoolArray]
 """(t, code, enters) of each ray, and which touch."""
 
 
-def _crossings(
+def crossings_of(
     leaf: LeafSizes, rays: tuple[FloatArray, FloatArray], exact: tuple[Dyadic, Dyadic]
 ) -> Lists:
     """All crossings of a leaf, over all t, in order."""
@@ -176,7 +176,7 @@ def _first(member: Member, found: list[list[Crossing]]) -> tuple[int, list[Ident
         return t, [c.identity for c in ahead if _tied(c.t, t)]
     states = [_begins_inside(crossings) for crossings in found]
     events = sorted((c.t, k, c) for k, crossings in enumerate(found) for c in crossings if c.t > 0)
-    inside = _evaluated(member.tree, states)
+    inside = evaluated(member.tree, states)
     position = 0
     while position < len(events):
         t, group = events[position][0], []
@@ -185,7 +185,7 @@ def _first(member: Member, found: list[list[Crossing]]) -> tuple[int, list[Ident
             states[k] += 1 if crossing.enters else -1
             group.append(crossing.identity)
             position += 1
-        if _evaluated(member.tree, states) != inside:
+        if evaluated(member.tree, states) != inside:
             return t, group
     return int(NEVER), []
 
@@ -202,10 +202,10 @@ def _begins_inside(crossings: list[Crossing]) -> int:
     return int(bool(crossings) and max(crossings, key=lambda c: c.t).enters)
 
 
-def _evaluated(tree: Tree | int, states: list[int]) -> bool:
+def evaluated(tree: Tree | int, states: list[int]) -> bool:
     if isinstance(tree, int):
         return states[tree] != 0
-    values = [_evaluated(part, states) for part in tree.of]
+    values = [evaluated(part, states) for part in tree.of]
     if tree.operation == "union":
         return any(values)
     if tree.operation == "intersection":

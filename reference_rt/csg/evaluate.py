@@ -145,6 +145,64 @@ def _width(shapes: Shapes, hit: Hit, ray: Ray) -> float:
     return error / cosine if cosine > 0.0 else math.inf
 
 
+class Front(NamedTuple):
+    """Of the crossings that were passed at once, the last of each operand, which is the one that
+    may show: t, u, v, row (k,)."""
+
+    t: FloatArray
+    u: FloatArray
+    v: FloatArray
+    row: IntArray
+
+
+@kernel
+def _begin_all(
+    solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, walk: Walk
+) -> tuple[int, Hit]:
+    """All operands as the ray's origin finds them, and the first crossing of all."""
+    first, count = solids.first[s], solids.operands[s]
+    at_origin = GRAZING * _head_on(ray, 0.0)
+    for k in range(count):
+        _begin(solids, shapes, bvh, first + k, k, ray, walk)
+        # What is within rounding of the origin is where the ray comes from.
+        hit = _next(solids, first + k, k, walk)
+        if hit.t < at_origin and hit.t <= _width(shapes, hit, ray):
+            _pass(solids, shapes, bvh, first + k, k, ray, walk)
+    return _nearest(solids, first, count, walk)
+
+
+@kernel
+def _pass_together(
+    solids: Solids,
+    shapes: Shapes,
+    bvh: Bvh,
+    s: int,
+    ray: Ray,
+    walk: Walk,
+    front: Front,
+    best: int,
+    hit: Hit,
+) -> tuple[int, Hit]:
+    """Passes a crossing and all that rounding cannot tell apart from it; the next one."""
+    first, count = solids.first[s], solids.operands[s]
+    for k in range(count):
+        walk.before[k], walk.met[k] = walk.state[k], 0
+    reach = hit.t
+    while best >= 0:
+        front.t[best], front.u[best], front.v[best] = hit.t, hit.u, hit.v
+        front.row[best] = hit.row
+        walk.met[best] = 1
+        _pass(solids, shapes, bvh, first + best, best, ray, walk)
+        previous = hit
+        best, hit = _nearest(solids, first, count, walk)
+        if best < 0 or hit.t - previous.t > GRAZING * _head_on(ray, hit.t):
+            break
+        reach = max(reach, previous.t + _width(shapes, previous, ray))
+        if hit.t - _width(shapes, hit, ray) > reach:
+            break
+    return best, hit
+
+
 @kernel
 def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max: float) -> Hit:
     """The first point of the surface of solid s at t in (0, t_max], as a hit of the operand that it
@@ -161,40 +219,74 @@ def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max:
         local_integers(count),
         local_integers(count),
     )
-    values, row = local_integers(solids.depth[s]), local_integers(count)
-    t, u, v = local_floats(count), local_floats(count), local_floats(count)
-    at_origin = GRAZING * _head_on(ray, 0.0)
-    for k in range(count):
-        _begin(solids, shapes, bvh, first + k, k, ray, walk)
-        # What is within rounding of the origin is where the ray comes from.
-        hit = _next(solids, first + k, k, walk)
-        if hit.t < at_origin and hit.t <= _width(shapes, hit, ray):
-            _pass(solids, shapes, bvh, first + k, k, ray, walk)
+    front = Front(
+        local_floats(count), local_floats(count), local_floats(count), local_integers(count)
+    )
+    values = local_integers(solids.depth[s])
+    best, hit = _begin_all(solids, shapes, bvh, s, ray, walk)
     inside = is_inside(solids, s, walk.state, values)
-    best, hit = _nearest(solids, first, count, walk)
     while best >= 0 and hit.t <= t_max:
-        for k in range(count):
-            walk.before[k], walk.met[k] = walk.state[k], 0
-        reach = hit.t
-        while best >= 0:
-            # The last crossing of each operand is the one that may show.
-            t[best], u[best], v[best], row[best] = hit.t, hit.u, hit.v, hit.row
-            walk.met[best] = 1
-            _pass(solids, shapes, bvh, first + best, best, ray, walk)
-            previous = hit
-            best, hit = _nearest(solids, first, count, walk)
-            if best < 0 or hit.t - previous.t > GRAZING * _head_on(ray, hit.t):
-                break
-            reach = max(reach, previous.t + _width(shapes, previous, ray))
-            if hit.t - _width(shapes, hit, ray) > reach:
-                break
+        best, hit = _pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
         was_inside = inside
         inside = is_inside(solids, s, walk.state, values)
         if inside != was_inside:
             shown = _shown(solids, s, count, walk, values, was_inside)
             kind = solids.kind[first + shown]
-            return Hit(t[shown], kind, row[shown], u[shown], v[shown], -1)
+            return Hit(front.t[shown], kind, front.row[shown], front.u[shown], front.v[shown], -1)
     return Hit(math.inf, -1, -1, 0.0, 0.0, -1)
+
+
+@kernel
+def crossings(
+    solids: Solids,
+    shapes: Shapes,
+    bvh: Bvh,
+    s: int,
+    ray: Ray,
+    t: FloatArray,
+    width: FloatArray,
+    part: IntArray,
+) -> int:
+    """How many points of the surface of solid s lie at t > 0; the first of them, as many as there
+    is room for, into t, in order, with `resolution` and the number of the operand that shows."""
+    first, count = solids.first[s], solids.operands[s]
+    walk = Walk(
+        local_floats(CROSSINGS * count),
+        local_floats(CROSSINGS * count),
+        local_floats(count),
+        local_integers(count),
+        local_integers(count),
+        local_integers(count),
+        local_integers(count),
+        local_integers(count),
+        local_integers(count),
+    )
+    front = Front(
+        local_floats(count), local_floats(count), local_floats(count), local_integers(count)
+    )
+    values = local_integers(solids.depth[s])
+    best, hit = _begin_all(solids, shapes, bvh, s, ray, walk)
+    inside = is_inside(solids, s, walk.state, values)
+    found = 0
+    while best >= 0:
+        best, hit = _pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
+        was_inside = inside
+        inside = is_inside(solids, s, walk.state, values)
+        if inside != was_inside:
+            k = _shown(solids, s, count, walk, values, was_inside)
+            if found < len(t):
+                kind = solids.kind[first + k]
+                shown = Hit(front.t[k], kind, front.row[k], front.u[k], front.v[k], -1)
+                t[found], part[found] = shown.t, k
+                width[found] = resolution(shapes, shown, ray)
+            found += 1
+    return found
+
+
+@kernel
+def resolution(shapes: Shapes, hit: Hit, ray: Ray) -> float:
+    """Crossings whose distance, in t, is more than the sum of theirs are told apart."""
+    return min(_width(shapes, hit, ray), 0.5 * GRAZING * _head_on(ray, hit.t))
 
 
 @kernel

@@ -44,15 +44,15 @@ class Path(Description):
     max_depth: Annotated[int, Field(ge=0)] | None = None
     """Most edges of a path from the eye: 1 shows lights alone, 2 adds direct light; none: no end.
     """
-    rr_depth: Annotated[int, Field(ge=1)] = 5
-    """Edges after which Russian roulette begins."""
+    rr_depth: Annotated[int, Field(ge=1, le=4096)] = 5
+    """Edges after which Russian roulette begins: what no limit ends, it does."""
     sampling: Literal["both", "lights", "bsdf"] = "both"
     """What finds lights: samples of lights, of the materials, or both, each weighted by how well
     it does (the same mean, most noise for one alone).  What only one can find, it finds."""
 
     def setup(self) -> "PathSetup":
         limit = UNLIMITED if self.max_depth is None else min(self.max_depth, UNLIMITED)
-        return PathSetup(limit, min(self.rr_depth, UNLIMITED), _SAMPLING.index(self.sampling))
+        return PathSetup(limit, self.rr_depth, _SAMPLING.index(self.sampling))
 
 
 class PathSetup(NamedTuple):
@@ -240,7 +240,7 @@ def advance(
         # eta² undoes the change of radiance in glass: what counts is the power that is left.
         survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)
         u_roulette, _ = draw_pair(sampler, dimension + sampling.ROULETTE)
-        if u_roulette >= survival:
+        if not u_roulette < survival:  # also ends what is NaN
             return Step(emitted, light, lit.shadow, False, ray, state)
         throughput = throughput * (1.0 / survival)
     bsdf_pdf = 0.0 if scattered.is_delta else scattered.pdf

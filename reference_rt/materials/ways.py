@@ -46,7 +46,7 @@ def ways(name: str, materials: Mapping[str, Material]) -> list[Way]:
 
 def _ways(name: str, materials: Mapping[str, Material], above: tuple[str, ...]) -> list[Way]:
     if name in above:
-        raise ValueError(f"contains itself: {' -> '.join([*above, name])}")
+        raise ValueError(f"contains itself: {' -> '.join([*above, name])}; expected no circle")
     above = (*above, name)
     if len(above) > MOST_LAYERS:
         raise ValueError(f"is nested too deeply; expected at most {MOST_LAYERS} materials")

@@ -72,7 +72,7 @@ def _combine(operation: int, a: FloatArray, b: FloatArray, out: FloatArray) -> N
                 n += 1
 
 
-def _interval_list(tree: Tree, o: FloatArray, d: FloatArray) -> FloatArray:
+def interval_list(tree: Tree, o: FloatArray, d: FloatArray) -> FloatArray:
     """The boundaries of a whole tree: see `boundaries`."""
     if isinstance(tree, Operand):
         return boundaries(tree, o, d)
@@ -82,7 +82,7 @@ def _interval_list(tree: Tree, o: FloatArray, d: FloatArray) -> FloatArray:
         _combine(tree.operation, a, b, out)
         return trimmed(out)
 
-    return functools.reduce(combined, (_interval_list(part, o, d) for part in tree.of))
+    return functools.reduce(combined, (interval_list(part, o, d) for part in tree.of))
 
 
 def intervals(tree: Tree, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
@@ -94,7 +94,7 @@ def intervals(tree: Tree, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
     measured, up to half of the rays through what is gone meet a film.  A ray that leaves a surface
     may meet it at once.
     """
-    ends = _interval_list(tree, o, d)
+    ends = interval_list(tree, o, d)
     np.min(np.where(ends > 0.0, ends, math.inf), axis=1, initial=math.inf, out=t)
 
 

@@ -15,7 +15,7 @@ from reference_rt.kernel import kernel
 from reference_rt.ray import Crossing, Ray, SurfacePoint, miss, surface_error
 from reference_rt.shapes.placement import owners
 from reference_rt.shapes.shape import FloatArray, Place
-from reference_rt.transform import Affine
+from reference_rt.transform import FLAT, Affine
 from reference_rt.vec3 import Vec3, dot, max_abs, row
 
 Integers = npt.NDArray[np.object_]
@@ -44,7 +44,7 @@ def columns(
     n = np.cross(x, y)
     n2 = int(n @ n)
     if n2 == 0:
-        raise ValueError("the transform is singular: it flattens space")
+        raise ValueError(FLAT)
     unit = (n / np.abs(n).max()).astype(float)
     try:
         # The basis dual to x, y in the plane; all here is in units of 1 / one.

@@ -36,7 +36,7 @@ class Mesh(Shape):
         n = triangle.geometric_normals(vertices)
         has_area = np.einsum("ij,ij->i", n, n) > 0.0
         if not has_area.any():
-            raise ValueError(f"mesh {path}: no triangle has any area")
+            raise ValueError(f"mesh {path}: no triangle has any area; expected one that has")
         faces = data.faces
         if not has_area.all():
             vertices, faces = vertices[has_area], faces[has_area]

@@ -101,7 +101,9 @@ class Polygon(Shape):
         outline = np.concatenate([np.hstack([r, np.roll(r, -1, axis=0)]) for r in rings])
         clockwise = _is_clockwise(outline, ends)
         if not _has_edges(outline, self.fill):
-            raise ValueError("the polygon has no area: its edges take each other back")
+            raise ValueError(
+                "the polygon has no area: its edges take each other back; expected others"
+            )
         linear = m[:, :3]
         edges = [
             (linear[:, k] - s * linear[:, axis]) * scale for k, s in zip(kept, slopes, strict=True)

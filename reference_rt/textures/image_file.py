@@ -1,5 +1,6 @@
 """Images from files, as linear sRGB."""
 
+import logging
 import warnings
 from pathlib import Path
 from typing import Literal
@@ -7,6 +8,9 @@ from typing import Literal
 import numpy as np
 
 from reference_rt.shapes.shape import FloatArray
+
+
+_SILENT = logging.NullHandler()
 
 
 def read_image(path: Path, encoding: Literal["auto", "srgb", "raw"]) -> FloatArray:
@@ -63,6 +67,8 @@ def _read_with_pillow(path: Path) -> tuple[FloatArray, bool]:
     scaled to 0..1; without opacity."""
     from PIL import Image, UnidentifiedImageError
 
+    # What Pillow logs of rubbish would stand beside the one line of the error.
+    logging.getLogger("PIL").addHandler(_SILENT)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a large size, and of odd metadata
@@ -74,7 +80,7 @@ def _read_with_pillow(path: Path) -> tuple[FloatArray, bool]:
                 deep = any(";16" in str(tile.args) for tile in image.tile)
                 colours = np.asarray(image.convert("RGBA"))[..., :3] / 255.0
     except UnidentifiedImageError:
-        raise ValueError(f"{path}: is not an image that can be read") from None
+        raise ValueError(f"{path}: is not an image that can be read; expected one") from None
     except Exception as error:  # decoders raise what they like at rubbish
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())
         raise ValueError(

@@ -249,7 +249,10 @@ def test_the_pdf_is_that_of_the_samples():
 @pytest.mark.parametrize(
     ("factors", "message"),
     [
-        ((1, 0, 1), "the transform is singular: it flattens space"),
+        (
+            (1, 0, 1),
+            "the transform is singular: it flattens space; expected one that can be undone",
+        ),
         ((1e200, 1e200, 1), "the disk's area is not a float64; expected an ordinary size"),
         ((1e-200, 1e-200, 1), "the disk's area is not a float64; expected an ordinary size"),
     ],

@@ -233,7 +233,7 @@ def test_glass_in_a_furnace_vanishes(n):
         camera=rt.Perspective(eye=(0, 0, 3), fov=50),
         film=rt.Film(width=24, height=24),
         sampler=rt.Sobol(spp=16),
-        integrator=rt.Path(rr_depth=10**6),
+        integrator=rt.Path(rr_depth=4096),
         materials={"glass": rt.Dielectric(interior_ior=n)},
         shapes=(rt.Sphere(material="glass"),),
         lights=(rt.Constant(radiance=(1.0, 2.0, 3.0)),),
