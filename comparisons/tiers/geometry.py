@@ -8,7 +8,6 @@ import numpy as np
 
 from comparisons.answers import Answers, BoolArray, rows_of
 from comparisons.exact.referee import Referee
-from comparisons.float32 import delta
 from comparisons.results import Status, Tier
 from comparisons.tiers import arbiter
 from comparisons.tiers.aimed import aimed_rays
@@ -52,7 +51,7 @@ def geometry(
     the ray.  What remains is told, and whose fault it is.
     """
     camera = compare_camera(scene, twin, pixels)
-    sizes = ShapeSizes(scene)
+    sizes = ShapeSizes(scene, twin.frame)
     unaimed = mixed_rays(scene, tables, sizes, pixels, seed)
     aimed = aimed_rays(tables, sizes, len(unaimed.o), seed)
     rays = Rays(*(np.concatenate(pair) for pair in zip(unaimed, aimed, strict=True)))
@@ -172,7 +171,7 @@ def _answered(
     sag = np.zeros(len(sizes.reach) + 1)
     for shape, found in twin.stand_ins().items():
         sag[shape] = max(s.sag for s in found)
-    radius = delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
+    radius = sizes.frame.delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
     radius += np.maximum(sag[ours.shape], sag[theirs.shape])
     return Answered(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
 
