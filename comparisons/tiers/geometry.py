@@ -17,8 +17,10 @@ from comparisons.tiers.coincidence import coincident, in_one_place
 from comparisons.tiers.comparer import DISCRETE, KINDS, Comparer
 from comparisons.tiers.judgement import FEW, MOST_JUDGED, Judgement, judged
 from comparisons.tiers.rays import Rays, mixed_rays
+from comparisons.tiers.resolution import resolution
 from comparisons.twin import Twin, trace
 from reference_rt import query
+from reference_rt.integrators import RayCast
 from reference_rt.query import Intersections
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -98,6 +100,8 @@ def geometry(
         },
         **camera.numbers,
     }
+    if not isinstance(scene.integrator, RayCast):
+        numbers["resolution"] = resolution(scene, tables, twin, seed)._asdict()
     if camera.problem:
         return Tier("geometry", "differ", camera.problem, numbers)
     status, reason = _outcome(answered, verdict, is_aimed, numbers)

@@ -76,7 +76,8 @@ def is_dark(
         return query.occluded(setting.tables, o, w)
     if kind in POINT_LIKE:
         return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)
-    # Seen from the moved origin a light may turn its back, or its rim be missed.
-    met = query.intersect(setting.tables, o, target - o)
+    # Seen from the moved origin a light may turn its back, or its rim be missed; float32 holds the
+    # point on it no better than the origin, so that a light smaller than that is passed by.
+    met = query.intersect(setting.tables, o, target - offsets - o)
     facing = np.sum(met.n * (target - o), axis=1) < 0.0
     return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | ~facing)
