@@ -17,13 +17,14 @@ from reference_rt.csg.description import operands_of
 from reference_rt.groups import Instance
 from reference_rt.ray import UNIT_ROUNDOFF, surface_error
 from reference_rt.scene import Scene
-from reference_rt.shapes import TABLES
+from reference_rt.shapes import TABLES, Mesh
 from reference_rt.shapes.shape import FloatArray, Place, Shape
 from reference_rt.transform import Affine
 from reference_rt.vec3 import Vec3
 
 MOST = 2000
-"""Shapes that are looked at, copies of groups and operands of solids included."""
+"""Shapes that are looked at, copies of groups and operands of solids included; of a mesh in a group
+the first copy alone, as each copy's table is made for it."""
 
 LISTED = 10
 """Of what is beyond a law, the worst are named."""
@@ -62,7 +63,7 @@ class Leaf(NamedTuple):
 def limits_of(scene: Scene) -> list[Limit]:
     """The nearest that the scene comes to float64's limits, by law, and all (at most LISTED) that
     is beyond; the least margin first."""
-    leaves = []
+    leaves: list[Leaf] = []
     for name, shape, outer in _placed(scene):
         if len(leaves) == MOST:
             break
@@ -78,10 +79,16 @@ def limits_of(scene: Scene) -> list[Limit]:
 def _placed(scene: Scene) -> Iterator[tuple[str, Shape, Affine]]:
     """(name, primitive, the map that its own transform is followed by) of all there is."""
 
+    seen: set[int] = set()
+
     def of(name: str, shape: Shape, outer: Affine) -> Iterator[tuple[str, Shape, Affine]]:
         if isinstance(shape, Instance):
             inner = transform.compose(transform.affine(shape.transform), outer)
             for k, member in enumerate(scene.groups[shape.group]):
+                if isinstance(member, Mesh):
+                    if id(member) in seen:
+                        continue
+                    seen.add(id(member))
                 yield from of(f"{name}, {shape.group}[{k}]", member, inner)
         elif isinstance(shape, Solid):
             for k, (leaf, inner, _, _) in enumerate(operands_of(shape, outer, None)):
@@ -133,7 +140,8 @@ def _thickness(leaf: Leaf) -> FloatArray:
         longest = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1)
         area = np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
         # One without area is met by no ray: nothing is lost with it.
-        return np.divide(area, longest, out=np.full_like(area, np.inf), where=area > 0.0)
+        height = np.divide(area, longest, out=np.full_like(area, np.inf), where=area > 0.0)
+        return np.asarray(height)
     if leaf.field in ("rectangles", "disks"):
         steepest = np.maximum(*(np.linalg.norm(x, axis=1) for x in (table.x_of, table.y_of)))
         return np.asarray(2.0 / steepest)
@@ -170,12 +178,12 @@ def _contacts(leaves: list[Leaf]) -> Iterator[Limit]:
             # Less than what these few operations round by is exactly in one place.
             rounding = 8.0 * UNIT_ROUNDOFF * (apart + radius[i] + rest)
             yield from _gaps(spheres, i, gap, bound, rounding)
-    faces = [face for leaf in leaves for face in _faces(leaf)]
+    faces = [face for leaf in leaves for face in _faces(leaf)][:MOST_FACES]
     for i, (leaf, c, n) in enumerate(faces):
         near = [
             (other, abs(float((at - c) @ n)))
             for other, at, along in faces[i + 1 :]
-            if other is not leaf and abs(float(along @ n)) > 1.0 - PARALLEL and _side(leaf, other)
+            if other is not leaf and abs(float(along @ n)) > 1.0 - PARALLEL and _near(leaf, other)
         ]
         for other, gap in near:
             bound = float(leaf.error[0] + other.error[0])
@@ -212,26 +220,25 @@ def _faces(leaf: Leaf) -> Iterator[tuple[Leaf, FloatArray, FloatArray]]:
             yield leaf, leaf.table.center[0] + edge, n
 
 
-def _side(a: Leaf, b: Leaf) -> bool:
+def _near(a: Leaf, b: Leaf) -> bool:
     """Whether the boxes of two shapes come as near as their errors."""
     slack = a.error[0] + b.error[0]
-    return bool(
-        (a.lower[0] <= b.upper[0] + slack).all() and (b.lower[0] <= a.upper[0] + slack).all()
-    )
+    low, high = np.maximum(a.lower[0], b.lower[0]), np.minimum(a.upper[0], b.upper[0])
+    return bool((low <= high + slack).all())
 
 
 # ---- indices ------------------------------------------------------------------------------------
 
 
 def _indices(scene: Scene) -> Iterator[Limit]:
-    """What bends rays bends them by eta - 1: both indices and their quotient are rounded, eta by
-    2 u at most, the first order of three roundings of u / 2 each side of 1, and one of u."""
+    """What bends rays bends them by eta - 1, where each index is rounded when it is read, and their
+    quotient when it is made: three times u."""
     for name, material in scene.materials.items():
         inside = getattr(material, "interior_ior", None)
         outside = getattr(material, "exterior_ior", None)
         if inside is not None and outside is not None and inside != outside:
             away = abs(inside - outside) / outside
-            yield Limit("index", f"materials.{name}: eta - 1", away, 2.0 * UNIT_ROUNDOFF)
+            yield Limit("index", f"materials.{name}: eta - 1", away, 3.0 * UNIT_ROUNDOFF)
 
 
 def told(limit: Limit) -> str:
