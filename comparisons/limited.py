@@ -3,32 +3,47 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from comparisons.results import Tier
+from comparisons.results import RUNGS, Tier
+from comparisons.tiers import arbiter
 from comparisons.tiers.resolution import Resolution
 
 OF_LIGHT = ("direct", "whitted", "statistics", "images")
 
 
 def limited(rungs: Sequence[Tier]) -> list[Tier]:
-    """The rungs, of which those of light that differ are `reference-limited` where the rung of
-    geometry holds, and a share of hits that is too large is foretold, and found, to be left by
-    Mitsuba for something else than what is there: see `tiers.resolution`.
+    """The rungs, of which those of light that differ are `reference-limited` where the scene is
+    beyond what Mitsuba resolves: what is seen from surfaces is its precision, and says nothing
+    about ours.
 
-    Such a picture says nothing about ours: what is seen from surfaces is Mitsuba's precision.
+    It is where the rung of geometry holds, and a share of hits that is too large is foretold, and
+    found, to be left for something else than what is there (see `tiers.resolution`); and above a
+    rung in which the arbiter finds a share of rays that is too large to be unresolved.
     """
-    geometry = next((tier for tier in rungs if tier.name == "geometry"), None)
-    if geometry is None or geometry.status not in ("agree", "reference-limited"):
-        return list(rungs)
-    numbers = geometry.numbers.get("resolution")
-    if numbers is None or not Resolution(**numbers).is_limited:
-        return list(rungs)
-    told = Resolution(**numbers).told
-    return [
-        replace(tier, status="reference-limited", reason=f"{told}; {tier.reason}")
-        if tier.name in OF_LIGHT and tier.status == "differ"
-        else tier
-        for tier in rungs
-    ]
+    found: list[Tier] = []
+    told = ""
+    for tier in sorted(rungs, key=lambda tier: RUNGS.index(tier.name)):
+        if told and tier.name in OF_LIGHT and tier.status == "differ":
+            tier = replace(tier, status="reference-limited", reason=f"{told}; {tier.reason}")
+        told = told or _limit(tier)
+        found.append(tier)
+    return found
+
+
+def _limit(tier: Tier) -> str:
+    """What of the reference's precision a rung has shown; nothing where it is good enough."""
+    if tier.status not in ("agree", "reference-limited"):
+        return ""
+    if tier.name == "geometry" and "resolution" in tier.numbers:
+        resolution = Resolution(**tier.numbers["resolution"])
+        if resolution.is_limited:
+            return resolution.told
+    count = {"geometry": "rays", "direct": "rays", "whitted": "pixels"}.get(tier.name)
+    if tier.status == "agree" or count is None:
+        return ""
+    total = tier.numbers[count] - tier.numbers.get("aimed_rays", 0)
+    if arbiter.too_many(tier.numbers["explained"], total):
+        return f"{tier.name}: {tier.reason}"
+    return ""
 
 
 __all__ = ["limited"]

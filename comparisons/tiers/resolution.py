@@ -41,7 +41,8 @@ MOST_LIGHTS = 4
 
 class Resolution(NamedTuple):
     """Of `hits` that were left: how many Mitsuba is foretold not to resolve, how many it did not,
-    and how many of the latter were not foretold;  epsilon, rounding: the medians of h and e."""
+    and how many of the latter were not foretold;  epsilon, rounding: the medians of h and e, of
+    those foretold where there are any."""
 
     hits: int
     foretold: int
@@ -89,7 +90,8 @@ def resolution(scene: Scene, tables: SceneTables, twin: Twin, seed: int = 0) -> 
     columns = [np.concatenate(column) for column in zip(*leavings, strict=True)]
     foretold, found, missed, height, rounding = columns
     counts = (int(np.count_nonzero(some)) for some in (foretold, found, missed))
-    medians = (float(np.median(some)) if len(some) else 0.0 for some in (height, rounding))
+    few = foretold if foretold.any() else np.ones(len(foretold), bool)
+    medians = (float(np.median(x[few])) if len(x) else 0.0 for x in (height, rounding))
     return Resolution(len(foretold), *counts, *medians)
 
 
