@@ -8,6 +8,7 @@ import numpy as np
 from comparisons import causes, statistics
 from comparisons.checks import input_tier
 from comparisons.image_rung import images_tier
+from comparisons.limited import limited
 from comparisons.metrics import image_metrics
 from comparisons.results import RUNGS, Case, Cause, FloatArray, Images, Place, Tier
 from comparisons.verdict import decide
@@ -68,6 +69,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
         if not any(tier.status == "invalid" for tier in rungs):
             metrics = image_metrics(images)
             rungs.append(images_tier(images, metrics, rendered.replicates))
+    rungs = limited(rungs)
     verdict, reason = decide(rungs, metrics)
     cause: Cause | None = None
     worst: tuple[Place, ...] = ()

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.frame import OURS, Frame
 from comparisons.layout import Copy, copies_of, place_of
 from reference_rt import transform
 from reference_rt.query import Intersections
@@ -38,11 +39,13 @@ class LeafSizes:
 class ShapeSizes:
     """Lengths of a scene's shapes, for bounds.
 
-    reach (shapes,): the largest coordinate on each shape, 0 on infinite ones;  lower, upper (3,):
-    the bounds of all that is finite;  copies: of the scene;  leaves: the different primitives.
+    reach (shapes,): the largest coordinate on each shape, counted from the middle of `frame`, 0 on
+    infinite ones;  lower, upper (3,): the bounds of all that is finite;  copies: of the scene;
+    leaves: the different primitives;  frame: the coordinates of the scene's twin.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, frame: Frame = OURS) -> None:
+        self.frame = frame
         self.copies = copies_of(scene)
         self.reach = np.zeros(len(scene.shapes))
         self.lower, self.upper = np.full(3, np.inf), np.full(3, -np.inf)
@@ -83,7 +86,7 @@ class ShapeSizes:
                 corners = corners_of(sizes.bounds, copy.outer)
                 self.lower = np.minimum(self.lower, corners.min(axis=0))
                 self.upper = np.maximum(self.upper, corners.max(axis=0))
-                reach = float(np.abs(corners).max())
+                reach = float(self.frame.largest(corners).max())
                 self.reach[copy.shape] = max(self.reach[copy.shape], reach)
 
     def leaves_of(self, copy: Copy) -> list[LeafSizes]:

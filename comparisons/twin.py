@@ -1,12 +1,13 @@
 """A scene's twin in Mitsuba, and what rays hit in it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from comparisons.answers import Answers, nothing, put_nearer, read
+from comparisons.frame import OURS, Frame
 from comparisons.mitsuba_backend import scalar
 from comparisons.mitsuba_scene import first_hits
 from comparisons.pieces import Extent, Piece, StandIn
@@ -28,12 +29,14 @@ class Crowd(NamedTuple):
 @dataclass(frozen=True)
 class Twin:
     """mi_scene: Mitsuba's scene, without what follows;  pieces: what its shapes stand for, by their
-    ids;  solids: what set operations make;  crowd: instances, where they are many."""
+    ids;  solids: what set operations make;  crowd: instances, where they are many;  frame: the
+    coordinates of all these, lengths of pieces and solids included."""
 
     mi_scene: Any
     pieces: Mapping[str, Piece]
     solids: tuple[SolidTwin, ...] = ()
     crowd: Crowd | None = None
+    frame: Frame = OURS
 
     def sensors(self) -> Any:
         """Mitsuba's sensors."""
@@ -56,11 +59,20 @@ class Twin:
 
     def notes(self) -> list[str]:
         """What a reader should know of what stands for what."""
-        return [
+        return self._moved() + [
             f"a mesh of {s.triangles:,} triangles stands in for shape {shape} ({s.name}), within "
             f"{s.sag:.2g} of it; {s.ratio:.2g} times more at half the fineness"
             for shape, found in self.stand_ins().items()
             for s in dict.fromkeys(found)
+        ]
+
+    def _moved(self) -> list[str]:
+        if self.frame.is_ours:
+            return []
+        middle = ", ".join(f"{x:.6g}" for x in self.frame.center)
+        return [
+            f"Mitsuba sees the scene moved by minus ({middle}) and {self.frame.scale:.6g} times as "
+            "large: where it is, rays would begin further off surfaces than a hundredth of its size"
         ]
 
     def all_pieces(self) -> list[Piece]:
@@ -75,22 +87,42 @@ class Twin:
 
     def extents(self) -> dict[int, Extent]:
         """What there is of infinite planes, by the index of the shape."""
-        return {p.shape: p.plugin.extent for p in self.pieces.values() if p.plugin.extent}
+        return {
+            p.shape: Extent(
+                self.frame.out(p.plugin.extent.middle), p.plugin.extent.radius / self.frame.scale
+            )
+            for p in self.pieces.values()
+            if p.plugin.extent
+        }
 
     def stand_ins(self) -> dict[int, list[StandIn]]:
         """The meshes that stand for something else, by the index of the shape."""
         found: dict[int, list[StandIn]] = {}
         for piece in self.all_pieces():
             if piece.plugin.stand_in is not None:
-                found.setdefault(piece.shape, []).append(piece.plugin.stand_in)
+                one = piece.plugin.stand_in
+                one = one._replace(sag=one.sag / self.frame.scale)
+                found.setdefault(piece.shape, []).append(one)
         return found
 
 
 def trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -> Answers:
     """What Mitsuba hits first, in the same record as `reference_rt.query.intersect` returns.
 
-    Mitsuba sees the rays rounded to float32.  `tolerance`: see `SolidTwin.trace`.
+    Mitsuba sees the rays in the twin's frame and rounded to float32.  `tolerance`: see
+    `SolidTwin.trace`.
     """
+    if twin.frame.is_ours:
+        return _trace(twin, o, d, tolerance)
+    found = _trace(twin, twin.frame.into(o), d, tolerance)
+    scale = twin.frame.scale
+    met = found.shape >= 0
+    found.p[met] = twin.frame.out(found.p[met])
+    return replace(found, t=found.t / scale, sag=found.sag / scale)
+
+
+def _trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float) -> Answers:
+    """The same in the twin's coordinates."""
     found = _hits(twin.mi_scene, twin.pieces, o, d)
     everything = np.arange(len(o))
     if twin.crowd is not None and len(o) > 0:

@@ -105,17 +105,26 @@ def render(
 @app.command()
 @guarded
 def explain(scene: SceneArgument) -> None:
-    """Print what a scene needs, what is left out, and why."""
+    """Print what a scene needs, what is left out, and why; how far it is from float64's limits."""
     from rich.console import Console
     from rich.table import Table
 
     from reference_rt.explain import explain as explain_scene
+    from reference_rt.explain import margins
     from reference_rt.tables import build_tables
 
     description = Scene.load(scene)
     used, left_out = explain_scene(description, build_tables(description))
+    near, beyond = margins(description)
     console = Console()
-    for title, lines in (("used", used), ("left out", left_out)):
+    for title, lines in (
+        ("used", used),
+        ("left out", left_out),
+        ("nearest to float64's limits", near),
+        ("warning: beyond float64", beyond),
+    ):
+        if not lines:
+            continue
         table = Table(title=title, title_justify="left", show_header=False, box=None)
         for what, why in lines:
             table.add_row(what, why)

@@ -8,6 +8,7 @@ from reference_rt import bvh
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.lights import Lights
 from reference_rt.lights.environment_map import EnvironmentMaps
+from reference_rt.limits import limits_of, told
 from reference_rt.materials import SMOOTH
 from reference_rt.materials.layers import Layers
 from reference_rt.materials.leaves import TABLES as MATERIAL_TABLES
@@ -40,6 +41,13 @@ def explain(scene: Scene, tables: SceneTables) -> tuple[Lines, Lines]:
     _integration(scene, tables, used, left_out)
     left_out.append(("Mitsuba", "rendering never imports it; only comparing does"))
     return used, left_out
+
+
+def margins(scene: Scene) -> tuple[Lines, Lines]:
+    """(how near the scene comes to float64's limits, where it is beyond), each (law, what)."""
+    found = limits_of(scene)
+    near = [(limit.law, told(limit)) for limit in found if not limit.is_beyond]
+    return near, [(limit.law, told(limit)) for limit in found if limit.is_beyond]
 
 
 def _shapes(tables: SceneTables, used: Lines, left_out: Lines) -> None:

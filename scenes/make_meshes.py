@@ -117,11 +117,50 @@ def lanterns(n: int) -> tuple[Array, Array, Array, Array]:
     return vertices, np.zeros((6 * n, 2)), np.repeat(colours, 6, axis=0), faces
 
 
+def slivers(around: int, along: int, hair: float) -> tuple[Array, Array]:
+    """A closed vase: a profile turned about y, whose columns are broad and `hair` radians wide in
+    turn, its rows high and `hair` of that, so that three of four triangles are slivers.
+
+    Returns vertices and triangles, counter-clockwise seen from outside; the poles are fans.
+    """
+    steps = np.arange(around) * (2.0 * math.pi / around)
+    phi = np.stack([steps, steps + hair], axis=1).ravel()
+    inner = np.arange(1, along) / along
+    s = np.stack([inner, inner + hair], axis=1).ravel()
+    angle = math.pi * s
+    r = np.sin(angle) * (0.62 + 0.3 * np.cos(2.6 * angle - 0.4))
+    y = 1.0 - np.cos(angle)
+    ring = np.stack(np.broadcast_arrays(
+        r[:, None] * np.cos(phi), y[:, None], r[:, None] * np.sin(phi)), axis=-1)  # fmt: skip
+    vertices = np.concatenate([ring.reshape(-1, 3), [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]]])
+    rows, columns = len(s), len(phi)
+    i, j = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    j2 = (j + 1) % columns
+    c00, c10, c01, c11 = (a * columns + b for b in (j, j2) for a in (i, i + 1))
+    sides = np.stack([c00, c10, c11, c00, c11, c01], axis=-1).reshape(-1, 3)
+    k, k2 = np.arange(columns), (np.arange(columns) + 1) % columns
+    bottom, top, last = np.full(columns, rows * columns), np.full(columns, rows * columns + 1), (
+        rows - 1) * columns  # fmt: skip
+    fans = np.concatenate([np.stack([bottom, k, k2], 1), np.stack([top, last + k2, last + k], 1)])
+    return vertices, np.concatenate([sides, fans])
+
+
+def binary_ply(vertices: Array, faces: Array) -> bytes:
+    """A .ply file of float64 positions: text would round slivers away."""
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
+    head += [f"property double {name}" for name in "xyz"]
+    head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    rows = np.zeros(len(faces), [("n", "u1"), ("corners", "<i4", 3)])
+    rows["n"], rows["corners"] = 3, faces
+    return ("\n".join(head) + "\n").encode() + vertices.astype("<f8").tobytes() + rows.tobytes()
+
+
 def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     (FOLDER / "knot.obj").write_text(obj(*torus_knot(2, 3, around=24, along=440, tube=0.22)))
     (FOLDER / "petal.ply").write_text(ply(*petal(24)))
     (FOLDER / "lanterns.ply").write_text(ply(*lanterns(313)))
+    (FOLDER / "slivers.ply").write_bytes(binary_ply(*slivers(around=40, along=20, hair=1e-8)))
 
 
 if __name__ == "__main__":

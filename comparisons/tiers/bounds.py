@@ -6,7 +6,7 @@ where it is, as seen along a ray from `o` to `p`.
 
 import numpy as np
 
-from comparisons.float32 import ROUNDINGS, UNIT_ROUNDOFF, delta, largest, round32
+from comparisons.float32 import ROUNDINGS, UNIT_ROUNDOFF, largest, round32
 from comparisons.sizes import LeafSizes, ShapeSizes
 from reference_rt.query import Intersections
 from reference_rt.shapes.shape import FloatArray
@@ -23,7 +23,7 @@ def slide(
     the one it stands for, over the ray's cosine to n."""
     cosine = np.abs(np.sum(d * hits.n, axis=1)) / np.linalg.norm(d, axis=1)
     with np.errstate(divide="ignore"):
-        size = delta(o, hits.p, sizes.reach_of(hits.shape)) + sag
+        size = sizes.frame.delta(o, hits.p, sizes.reach_of(hits.shape)) + sag
         return np.asarray(size / cosine)
 
 
@@ -32,7 +32,6 @@ __all__ = [
     "UNIT_ROUNDOFF",
     "LeafSizes",
     "ShapeSizes",
-    "delta",
     "largest",
     "round32",
     "slide",

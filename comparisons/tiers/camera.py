@@ -8,7 +8,8 @@ import numpy as np
 
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_scene import for_rays
-from comparisons.tiers.bounds import ROUNDINGS, UNIT_ROUNDOFF, largest
+from comparisons.tiers.bounds import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.twin import Twin
 from reference_rt.cameras import LENS_CENTRE, ThinLens, camera_ray
 from reference_rt.film import Film
 from reference_rt.kernel import entry_kernel
@@ -81,7 +82,7 @@ def sensor_rays(
     return o, d
 
 
-def compare_camera(scene: Scene, mi_scene: Any, most: int) -> CameraComparison:
+def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
     """Directions, and how far Mitsuba's origins lie off our rays, at pixel centres, for a lens
     through several of its points.
 
@@ -92,7 +93,8 @@ def compare_camera(scene: Scene, mi_scene: Any, most: int) -> CameraComparison:
     x, y = pixel_centres(film, most)
     samples = LENS_SAMPLES if isinstance(camera, ThinLens) else (LENS_CENTRE,)
     o, d = _stacked(camera_rays(scene, x, y, lens) for lens in samples)
-    their_o, their_d = _stacked(sensor_rays(mi_scene, x, y, lens) for lens in samples)
+    their_o, their_d = _stacked(sensor_rays(twin, x, y, lens) for lens in samples)
+    their_o = twin.frame.out(their_o)
     forward = -camera.basis[2]
     # Before it is made unit a direction is 1 long along the axis and tan across: rounded numbers as
     # large as in the picture's farthest corner, 1 / cos there, and then shortened by its own
@@ -106,10 +108,10 @@ def compare_camera(scene: Scene, mi_scene: Any, most: int) -> CameraComparison:
     direction_bound = ROUNDINGS * UNIT_ROUNDOFF * (1.0 + (d @ forward) * steepest)
     apart = their_o - o
     off_line = np.linalg.norm(apart - np.sum(apart * d, axis=1)[:, None] * d, axis=1)
-    reach = largest(o).max() + np.abs(camera.eye).max()
+    eye = np.array([camera.eye], dtype=np.float64)
     # Mitsuba's origin lies on the near plane, along its own direction.
     near = np.linalg.norm(apart, axis=1) * direction_bound
-    origin_bound = ROUNDINGS * UNIT_ROUNDOFF * reach + near
+    origin_bound = twin.frame.delta(o, eye, np.zeros(1)).max() + near
     numbers = {
         "max_camera_direction_error": float(direction.max()),
         "max_camera_direction_error_over_bound": float((direction / direction_bound).max()),

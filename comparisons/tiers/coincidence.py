@@ -84,7 +84,8 @@ def _as_one_part(twin: Twin, rays: Rays, ours: Intersections, theirs: Answers) -
         if len(some) == 0:
             continue
         part, primitive = ours.part[some], ours.primitive[some]
-        met = solid.meets(rays.o[some], rays.d[some], part, ours.t[some], primitive)
+        o, t = twin.frame.into(rays.o[some]), ours.t[some] * twin.frame.scale
+        met = solid.meets(o, rays.d[some], part, t, primitive)
         theirs.part[some[met]], theirs.primitive[some[met]] = part[met], primitive[met]
         theirs.has_uv[some[met]] = False
 

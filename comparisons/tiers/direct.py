@@ -9,7 +9,7 @@ import numpy as np
 from comparisons.answers import rows_of
 from comparisons.results import Tier
 from comparisons.tiers import arbiter
-from comparisons.tiers.bounds import ShapeSizes, delta
+from comparisons.tiers.bounds import ShapeSizes
 from comparisons.tiers.light_error import bounds, slopes_of, stand_ins
 from comparisons.tiers.mitsuba_light import is_dark, mitsuba_direct
 from comparisons.tiers.rays import Rays, mixed_rays
@@ -64,7 +64,7 @@ def direct(
         return Tier("direct", "not-comparable", twin.lacking)
     if not (tables.materials.traits & SMOOTH).any():
         return Tier("direct", "not-applicable", "no material scatters light that a light sends")
-    sizes = ShapeSizes(scene)
+    sizes = ShapeSizes(scene, twin.frame)
     rays = mixed_rays(scene, tables, sizes, pixels, seed)
     hits = query.intersect(tables, rays.o, rays.d)
     setting = Setting(scene, tables, twin, rays, hits, sizes)
@@ -156,7 +156,7 @@ def _compare(
         now_dark = is_dark(setting, light, rows_of(hits, numbers), target[numbers], offsets)
         return np.asarray((apart <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
-    radius = delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
+    radius = setting.sizes.frame.delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
     radius += stand_ins(setting, hits)[0]
     settled = arbiter.explained(wrong, radius[wrong], like_theirs)
     right = error <= bound

@@ -8,7 +8,6 @@ import numpy as np
 
 from comparisons.answers import Answers, BoolArray, rows_of
 from comparisons.exact.referee import Referee
-from comparisons.float32 import delta
 from comparisons.results import Status, Tier
 from comparisons.tiers import arbiter
 from comparisons.tiers.aimed import aimed_rays
@@ -18,8 +17,10 @@ from comparisons.tiers.coincidence import coincident, in_one_place
 from comparisons.tiers.comparer import DISCRETE, KINDS, Comparer
 from comparisons.tiers.judgement import FEW, MOST_JUDGED, Judgement, judged
 from comparisons.tiers.rays import Rays, mixed_rays
+from comparisons.tiers.resolution import resolution
 from comparisons.twin import Twin, trace
 from reference_rt import query
+from reference_rt.integrators import RayCast
 from reference_rt.query import Intersections
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -52,7 +53,7 @@ def geometry(
     the ray.  What remains is told, and whose fault it is.
     """
     camera = compare_camera(scene, twin, pixels)
-    sizes = ShapeSizes(scene)
+    sizes = ShapeSizes(scene, twin.frame)
     unaimed = mixed_rays(scene, tables, sizes, pixels, seed)
     aimed = aimed_rays(tables, sizes, len(unaimed.o), seed)
     rays = Rays(*(np.concatenate(pair) for pair in zip(unaimed, aimed, strict=True)))
@@ -99,6 +100,8 @@ def geometry(
         },
         **camera.numbers,
     }
+    if not isinstance(scene.integrator, RayCast):
+        numbers["resolution"] = resolution(scene, tables, twin, seed)._asdict()
     if camera.problem:
         return Tier("geometry", "differ", camera.problem, numbers)
     status, reason = _outcome(answered, verdict, is_aimed, numbers)
@@ -172,7 +175,7 @@ def _answered(
     sag = np.zeros(len(sizes.reach) + 1)
     for shape, found in twin.stand_ins().items():
         sag[shape] = max(s.sag for s in found)
-    radius = delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
+    radius = sizes.frame.delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
     radius += np.maximum(sag[ours.shape], sag[theirs.shape])
     return Answered(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
 

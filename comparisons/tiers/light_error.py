@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from comparisons.accuracy import accuracy
-from comparisons.tiers.bounds import UNIT_ROUNDOFF, delta, slide
+from comparisons.tiers.bounds import UNIT_ROUNDOFF, slide
 from comparisons.tiers.rays import Rays
 from comparisons.tiers.setting import Setting, described, kind_of
 from comparisons.tiers.slopes import is_steep, moved, slopes
@@ -101,7 +101,7 @@ def slopes_of(
     moved rays, and for moved points of lights with textures."""
     asked: list[tuple[Rays, tuple[float, float]]] = []
     if is_steep(setting.scene):
-        radius = delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
+        radius = setting.sizes.frame.delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
         asked += [(other, u) for other in moved(rays, radius)]
     if _has_image(setting, light):
         for step in (-U_STEP, U_STEP):

@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.frame import SHADOW_EPSILON
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_plugins.whitted import emitted, without
 from comparisons.mitsuba_scene import for_rays, light_id
 from comparisons.tiers import arbiter
-from comparisons.tiers.bounds import largest
-from comparisons.tiers.rays import RAY_EPSILON, SHADOW_EPSILON, Rays
+from comparisons.tiers.rays import Rays
 from comparisons.tiers.setting import POINT_LIKE, Setting, kind_of, number_of
 from reference_rt import query
 from reference_rt.lights import DIRECTIONAL, ENVIRONMENT
@@ -47,7 +47,9 @@ def mitsuba_direct(
         f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
         return dr.select(visible, f_cos * radiance, 0.0), local.z
 
-    contribution, cosine = for_rays(value, rays.o, rays.d, target)
+    frame = setting.twin.frame
+    there = target if is_far else frame.into(target)
+    contribution, cosine = for_rays(value, frame.into(rays.o), rays.d, there)
     return contribution, cosine
 
 
@@ -68,13 +70,14 @@ def is_dark(
     is_far = kind in (ENVIRONMENT, DIRECTIONAL)
     w = target if is_far else target - hits.p
     side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
-    height = side * (1.0 + largest(hits.p)) * RAY_EPSILON
+    height = side * setting.twin.frame.epsilon(hits.p)
     o = hits.p + hits.n * height[:, None] + offsets
     if is_far:
         return query.occluded(setting.tables, o, w)
     if kind in POINT_LIKE:
         return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)
-    # Seen from the moved origin a light may turn its back, or its rim be missed.
-    met = query.intersect(setting.tables, o, target - o)
+    # Seen from the moved origin a light may turn its back, or its rim be missed; float32 holds the
+    # point on it no better than the origin, so that a light smaller than that is passed by.
+    met = query.intersect(setting.tables, o, target - offsets - o)
     facing = np.sum(met.n * (target - o), axis=1) < 0.0
     return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | ~facing)

@@ -4,19 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.float32 import largest, round32
+from comparisons.float32 import round32
+from comparisons.frame import Frame
 from comparisons.tiers.bounds import ShapeSizes
 from comparisons.tiers.camera import camera_rays, pixel_centres
 from reference_rt import query
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.tables import SceneTables
-
-RAY_EPSILON = 1500.0 * 2.0**-24
-"""Mitsuba's `math::RayEpsilon`: rays that leave a surface begin (1 + max |p|) times this off it."""
-
-SHADOW_EPSILON = 10.0 * RAY_EPSILON
-"""Mitsuba's `math::ShadowEpsilon`: shadow rays end this fraction of their length early."""
 
 
 class Rays(NamedTuple):
@@ -26,16 +21,16 @@ class Rays(NamedTuple):
     d: FloatArray
 
 
-def pixel_rays(scene: Scene, most: int) -> Rays:
-    """Camera rays through at most `most` pixel centres, as float32 holds them."""
+def pixel_rays(scene: Scene, frame: Frame, most: int) -> Rays:
+    """Camera rays through at most `most` pixel centres, as float32 holds them there."""
     o, d = camera_rays(scene, *pixel_centres(scene.film, most))
-    return Rays(round32(o), round32(d))
+    return Rays(frame.rounded(o), round32(d))
 
 
 def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, seed: int) -> Rays:
     """3 `most` rays: at most `most` of the camera, `most` in random directions from what these and
     others hit, and for the rest random ones through the scene's bounds."""
-    camera = pixel_rays(scene, most)
+    camera = pixel_rays(scene, sizes.frame, most)
     if len(scene.shapes) == 0:
         return camera
     rng = np.random.default_rng(seed)
@@ -48,8 +43,9 @@ def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, 
     # Off the surface as far as Mitsuba's own rays: an origin within float32's error of a surface
     # would be on no defined side of it.
     side = np.sign(np.sum(out * hits.n[hit], axis=1))
-    height = side * (1.0 + largest(hits.p[hit])) * RAY_EPSILON
-    from_hits = Rays(round32(hits.p[hit] + hits.n[hit] * height[:, None]), round32(out))
+    height = side * sizes.frame.epsilon(hits.p[hit])
+    start = hits.p[hit] + hits.n[hit] * height[:, None]
+    from_hits = Rays(sizes.frame.rounded(start), round32(out))
     rest = 3 * most - len(camera.o) - len(hit)
     parts = (camera, Rays(through.o[:rest], through.d[:rest]), from_hits)
     o, d = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -63,4 +59,4 @@ def random_rays(sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
     d = end - start
     length = np.linalg.norm(d, axis=1)[:, None]
     d = np.divide(d, length, out=np.tile([0.0, 0.0, 1.0], (n, 1)), where=length > 0.0)
-    return Rays(round32(start), round32(d))
+    return Rays(sizes.frame.rounded(start), round32(d))

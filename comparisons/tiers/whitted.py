@@ -15,11 +15,9 @@ from comparisons.tiers.bounds import (
     ROUNDINGS,
     UNIT_ROUNDOFF,
     ShapeSizes,
-    delta,
-    largest,
     round32,
 )
-from comparisons.tiers.rays import RAY_EPSILON, Rays, pixel_rays
+from comparisons.tiers.rays import Rays, pixel_rays
 from comparisons.tiers.slopes import is_steep, moved, slopes
 from comparisons.translate.integrators import translate_integrator
 from comparisons.translate.lights import ambient_of
@@ -67,7 +65,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
     if twin.lacking:
         return Tier("whitted", "not-comparable", twin.lacking)
     integrator = scene.integrator if isinstance(scene.integrator, Whitted) else Whitted()
-    rays = pixel_rays(scene, pixels)
+    rays = pixel_rays(scene, twin.frame, pixels)
     setup = integrator.setup()
     ours = query.whitted_radiance(tables, setup, rays.o, rays.d)
     theirs_at = plugin_radiance(scene, tables, twin, integrator)
@@ -78,7 +76,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
     tables_off = max((accuracy(scene, name) for name in scene.materials), default=0.0)
     bound += tables_off * size
     error = np.abs(theirs - ours).max(axis=1)
-    sizes = ShapeSizes(scene)
+    sizes = ShapeSizes(scene, twin.frame)
     if is_steep(scene):
         over = np.flatnonzero(~(error <= bound))
         few = Rays(rays.o[over], rays.d[over])
@@ -93,7 +91,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
         return query.whitted_radiance(tables, setup, o, d)
 
     def theirs_along(o: FloatArray, d: FloatArray) -> FloatArray:
-        return theirs_at(Rays(round32(o), round32(d)))
+        return theirs_at(Rays(twin.frame.rounded(o), round32(d)))
 
     some = Rays(rays.o[outliers], rays.d[outliers])
     settled = _explained(
@@ -132,7 +130,7 @@ def _radii(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> tuple[FloatArr
     """How far rays are moved: float32's bound, then Mitsuba's epsilon."""
     p = query.intersect(tables, rays.o, rays.d).p
     reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
-    return delta(rays.o, p, reach), (1.0 + largest(p)) * RAY_EPSILON
+    return sizes.frame.delta(rays.o, p, reach), sizes.frame.epsilon(p)
 
 
 SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
@@ -166,7 +164,7 @@ def plugin_radiance(
         plugin = mi.load_dict(described)
         return (plugin.sample(twin.mi_scene, None, mi.Ray3f(mi.Point3f(o), d))[0],)
 
-    return lambda rays: for_rays(radiance, rays.o, rays.d)[0]
+    return lambda rays: for_rays(radiance, twin.frame.into(rays.o), rays.d)[0]
 
 
 Radiance = Callable[[FloatArray, FloatArray], FloatArray]

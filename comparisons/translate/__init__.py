@@ -19,6 +19,7 @@ from comparisons.translate.errors import UntranslatableError
 from comparisons.translate.film import translate_film, translate_sampler
 from comparisons.translate.integrators import translate_integrator
 from comparisons.translate.lights import translate_light
+from comparisons.translate.moved import frame_of, moved
 from comparisons.translate.shapes import Site, translate_shape
 from comparisons.translate.textures import Surroundings
 from comparisons.translate.wrappers import coloured_parts_of, is_textured, parts_of
@@ -49,12 +50,14 @@ def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
 
 
 def load(scene: Scene) -> Twin:
-    """The scene in Mitsuba, its shapes not merged.  Raises as `to_mitsuba` does."""
-    found = _translated(scene)
+    """The scene in Mitsuba, its shapes not merged, in the coordinates of `Twin.frame`.  Raises as
+    `to_mitsuba` does."""
+    frame = frame_of(scene)
+    found = _translated(moved(scene, frame))
     crowd = _crowd(found)
     plain = {**_groups(found.pieces), **found.plain}
     mi_scene = mitsuba().load_dict(plain, optimize=False)
-    return Twin(mi_scene, found.pieces, tuple(found.solids), crowd)
+    return Twin(mi_scene, found.pieces, tuple(found.solids), crowd, frame)
 
 
 FEW = 32
