@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 
 from reference_rt.kernel import kernel
 from reference_rt.sampling import sobol
-from reference_rt.sampling.orders import COLUMNS, GROUP
+from reference_rt.sampling.orders import GROUP, OF_DIGITS
 from reference_rt.sampling.sobol import SobolSetup, pair, reverse_bits, seeds_of
 from reference_rt.shapes.shape import FloatArray, IntArray
 
@@ -120,20 +120,29 @@ def _pascal(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
 
 
 def _reordered(builder: ir.IRBuilder, x: ir.Value, place: ir.Value, lanes: Any) -> ir.Value:
-    """`sobol.reordered`: the columns where bits are set, summed."""
-    table_type = ir.ArrayType(ir.IntType(32), COLUMNS.size)
-    columns = ir.Constant(table_type, [int(column) for column in COLUMNS.ravel()])
-    table = cgutils.global_constant(builder, "sampling_orders", columns)
-    number = place.type
+    """`sobol.reordered`.  Lanes differ in the lowest digit alone, because each bit of `x` depends
+    on those of the sample's number from there up: the other digits are summed once for all."""
+    number, word = place.type, ir.IntType(32)
+    values = ir.Constant(ir.ArrayType(word, OF_DIGITS.size), [int(x) for x in OF_DIGITS.ravel()])
+    table = cgutils.global_constant(builder, "sampling_orders", values)
     total = cgutils.alloca_once_value(builder, x)
     with builder.if_then(builder.icmp_signed(">", place, number(0))):
-        row = builder.mul(place, number(COLUMNS.shape[1]))
-        builder.store(_all(0), total)
-        with cgutils.for_range(builder, number(COLUMNS.shape[1])) as loop:
-            column = builder.load(builder.gep(table, [number(0), builder.add(row, loop.index)]))
-            bit = builder.and_(builder.lshr(x, lanes(loop.index)), _all(1))
-            kept = builder.and_(builder.sub(_all(0), bit), lanes(column))
-            builder.store(builder.xor(builder.load(total), kept), total)
+
+        def of_digit(k: int, digit: ir.Value) -> ir.Value:
+            row = builder.add(builder.mul(place, number(8)), number(k))
+            start = builder.add(builder.mul(row, number(16)), digit)
+            return builder.load(builder.gep(table, [number(0), start], inbounds=True))
+
+        one, shared = builder.extract_element(x, word(0)), word(0)
+        for k in range(1, 8):
+            digit = builder.and_(builder.lshr(one, word(4 * k)), word(15))
+            shared = builder.xor(shared, of_digit(k, builder.zext(digit, number)))
+        sums = lanes(shared)
+        for bit in range(4):
+            set_to_all = builder.ashr(builder.shl(x, _all(31 - bit)), _all(31))
+            kept = builder.and_(set_to_all, lanes(of_digit(0, number(1 << bit))))
+            sums = builder.xor(sums, kept)
+        builder.store(sums, total)
     return builder.load(total)
 
 

@@ -69,3 +69,15 @@ def _columns() -> npt.NDArray[np.uint64]:
 
 COLUMNS = _columns()
 """(GROUP, 32): the columns of each place's matrix, as `pascal_columns`."""
+
+
+def _of_digits() -> npt.NDArray[np.uint64]:
+    digits = np.arange(16, dtype=np.uint64)
+    bits = digits[:, None] >> np.arange(4, dtype=np.uint64) & np.uint64(1)
+    columns = COLUMNS.reshape(GROUP, 8, 1, 4)
+    return np.asarray(np.bitwise_xor.reduce(columns * bits, axis=-1))
+
+
+OF_DIGITS = _of_digits()
+"""(GROUP, 8, 16): of each hexadecimal digit of a number, by its place, lowest first, and its value,
+the sum of the columns: a product with the matrix is the sum of eight of these."""

@@ -15,9 +15,9 @@ from pydantic import Field
 from reference_rt.description import Description
 from reference_rt.kernel import kernel
 from reference_rt.sampling.hashing import LOW32, combine, mix
-from reference_rt.sampling.orders import COLUMNS, GROUP
+from reference_rt.sampling.orders import GROUP, OF_DIGITS
 
-_1, _2, _4, _8, _16, _32 = (np.uint64(n) for n in (1, 2, 4, 8, 16, 32))
+_1, _2, _4, _8, _15, _16, _32 = (np.uint64(n) for n in (1, 2, 4, 8, 15, 16, 32))
 _ODD = np.uint64(1)
 _EVEN_1, _ODD_1 = np.uint64(0x55555555), np.uint64(0xAAAAAAAA)
 _EVEN_2, _ODD_2 = np.uint64(0x33333333), np.uint64(0xCCCCCCCC)
@@ -110,9 +110,8 @@ def reordered(index: np.uint64, place: int) -> np.uint64:
     if place == 0:
         return index
     total = np.uint64(0)
-    for j in range(32):
-        if (index >> np.uint64(j)) & _1:
-            total ^= COLUMNS[place, j]
+    for k in range(8):
+        total ^= OF_DIGITS[place, k, (index >> np.uint64(4 * k)) & _15]
     return total
 
 

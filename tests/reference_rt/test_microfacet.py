@@ -17,6 +17,8 @@ from reference_rt.materials.microfacet import (
     MIN_ALPHA,
     AlphaParameter,
     Microfacets,
+    _seen,
+    _slope_across,
     _slope_seen,
     density,
     g1,
@@ -173,6 +175,21 @@ def test_beckmanns_slopes_are_inverted_to_the_last_digits():
             found = seen(c, s, _slope_seen(c, s, u)) / seen(c, s, most)
             # erfc and exp are right to 2 u, and the sums and Newton's last step add some.
             assert abs(float(found - arb(u))) < 16 * U
+    for u in (*rng.uniform(0, 0.5, 200).tolist(), *(10.0 ** rng.uniform(-18, -1, 50)).tolist()):
+        found = seen(1, 0, _slope_across(u)) / (2 * arb.pi().sqrt())
+        assert abs(float(found / arb(u)) - 1) < (16 + 4 * abs(math.log(u))) * U  # x itself rounds
+
+
+@pytest.mark.parametrize("edge", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
+def test_beckmanns_slopes_end_where_their_density_does(edge):
+    """Near the largest slope that is seen, where the density falls to 0, in few steps too."""
+    for angle in np.linspace(0.01, 0.5 * math.pi - 0.01, 20).tolist():
+        c, s = math.cos(angle), math.sin(angle)
+        slopes = [_slope_seen(c, s, u) for u in (1.0 - 2 * edge, 1.0 - edge, 1.0 - 2.0**-53)]
+        assert slopes[0] <= slopes[1] <= slopes[2] <= min(c / s, 6.5)
+        most = min(c / s, 6.5)
+        for u, x in zip((1.0 - 2 * edge, 1.0 - edge), slopes, strict=False):
+            assert abs(_seen(c, s, x) / _seen(c, s, most) - u) < 16 * U
 
 
 def edges():

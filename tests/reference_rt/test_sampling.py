@@ -1,6 +1,8 @@
 """Samplers: uniform, stratified where promised, and functions of their arguments alone."""
 
+import functools
 import itertools
+import operator
 
 import numpy as np
 import pytest
@@ -156,6 +158,17 @@ def test_orders_rearrange_blocks():
     for row in COLUMNS:
         for j, column in enumerate(row.tolist()):
             assert column >> j == 1
+
+
+def test_reordered_is_the_product_with_the_matrix():
+    """Against the sum of the columns where bits are set, for single bits and random numbers."""
+    rng = np.random.default_rng(64)
+    numbers = [*(1 << np.arange(32)).tolist(), *rng.integers(0, 2**32, 100).tolist()]
+    for place in range(GROUP):
+        for number in numbers:
+            columns = [int(COLUMNS[place, j]) for j in range(32) if number >> j & 1]
+            total = functools.reduce(operator.xor, columns, 0)
+            assert sobol.reordered(np.uint64(number), place) == total
 
 
 @pytest.mark.parametrize("bits", [2, 4])

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from builders import U
 from chi_square import SPHERE, Chart, chi_square, sidak
+from scipy.special import ndtri
 
 from reference_rt.kernel import entry_kernel
 from reference_rt.sampling.warp import (
+    about_normal,
     concentric_disk,
     cosine_hemisphere,
     on_circle,
@@ -183,3 +185,12 @@ def test_the_ends_of_the_unit_square():
     assert np.isfinite(sphere).all()
     assert (np.linalg.norm(disk, axis=1) < 1).all()
     assert (hemisphere[:, 2] > 0).all()
+
+
+def test_about_normal():
+    """Against SciPy's quantiles, in the middle and in both tails."""
+    rng = np.random.default_rng(35)
+    tails = 10.0 ** rng.uniform(-18, -1, 500)
+    for u in (*rng.uniform(0, 1, 500), *tails, *(1.0 - tails[tails > 1e-8])):
+        assert about_normal(float(u)) == pytest.approx(ndtri(u) / math.sqrt(2), rel=2e-7, abs=1e-9)
+    assert about_normal(0.5) == 0.0
