@@ -179,7 +179,6 @@ FAMILY = Family(
                 _of(name),
                 unit=OF_BOUND,
                 explained=SINGLE if name in curved.IN_MITSUBA else "",
-                explained=SINGLE,
             )
             for name in curved.KINDS
         ),
