@@ -142,6 +142,8 @@ def product_error(x: Any, y: Any, product: Any) -> Any:
     rounds the difference alone ("fused multiply-add"), here in rational numbers."""
     if isinstance(x, Lanes):
         return x.call("fma", y, -product)
+    if isinstance(x, np.ndarray):
+        return np.vectorize(product_error, otypes=[np.float64])(x, y, product)
     if not (math.isfinite(x) and math.isfinite(y)):
         return math.nan
     if math.isinf(product):

@@ -16,9 +16,9 @@ Passes.  No root missed, none too many, none off by more.  FLINT certifies all f
 of quartics in exact integers; the discriminant of quadratics is exact.
 
 Contestants.  Ours is what the renderer has: for tori Newton's steps and halving on the distance
-between the quartic's turning points, for quadrics q = -(b ± sqrt(D)) / c.  "numpy.roots" is the
-companion matrix, "ferrari" the closed form, "quadratic.formula" (-b ± sqrt(D)) / 2 a.  They get the
-coefficients in floats, of a line that begins next to the torus and has unit direction, but in
+between the quartic's turning points, for quadrics q / a and c / q of q = -(b ± sqrt(D)).
+"numpy.roots" is the companion matrix, "ferrari" the closed form, "quadratic.formula" (-b ± sqrt(D))
+/ 2 a.  They get the coefficients in floats, of a line that begins next to the torus, but in
 `far`, where it begins at the ray's origin.  Mitsuba has no torus and no quartic.
 """
 
@@ -178,7 +178,6 @@ def _of_quadratics(coefficients: FloatArray) -> Mapping[str, Outcome]:
         "numpy.roots": numpy_roots,
         "quadratic.formula": formula,
     }
-    # No number of its own is smaller than float64's, but roots round once.
     return {
         name: judge(solve(coefficients), truth, 0.0, asked) for name, solve in contestants.items()
     }

@@ -51,7 +51,7 @@ def test_product_error_is_the_same_bits_compiled_in_lanes_and_plainly():
             out = np.empty(LANES)
             _lanes(x[k : k + LANES].copy(), y[k : k + LANES].copy(), out)
             assert np.array_equal(out, expected[k : k + LANES], equal_nan=True)
-    with np.errstate(over="ignore"):
+    with np.errstate(all="ignore"):
         both = np.isfinite(expected) & (np.abs(x * y) > 1e-290)
     for a, b, e in zip(x[both].tolist(), y[both].tolist(), expected[both].tolist(), strict=True):
         assert Fraction(a) * Fraction(b) == Fraction(a * b) + Fraction(e)
