@@ -37,7 +37,8 @@ def asymmetry(bsdf: Bsdf, n: float, wo: FloatArray, wi: FloatArray, least: float
     there = there * np.where(wi[:, 2:] < 0.0, n * n, 1.0)
     back = back * np.where(wo[:, 2:] < 0.0, n * n, 1.0)
     size = np.maximum(np.abs(there), np.abs(back))
-    off = np.abs(there - back)
+    with np.errstate(invalid="ignore"):  # inf - inf: a failure, below
+        off = np.abs(there - back)
     found = np.where(size >= least, off / np.maximum(size, least), 0.0)
     found[~np.isfinite(there) | ~np.isfinite(back)] = np.inf
     return np.asarray(found.max(axis=1))
