@@ -122,7 +122,7 @@ def _series(one: SeriesSummary, effort: Effort, seed: int) -> dict[str, Any]:
                 "broken": f.broken,
                 "again": again(f, effort, seed),
                 "outcomes": {
-                    name: _flat(f.outcomes[name]) | {"examples": list(f.outcomes[name].examples)}
+                    name: _flat(f.outcomes[name]) | {"examples": _finite(f.outcomes[name].examples)}
                     for name in contestants([f])
                 },
             }
@@ -140,5 +140,14 @@ def _flat(some: Outcome) -> dict[str, Any]:
     }
 
 
-def _finite(worst: float | None) -> float | str | None:
-    return "inf" if worst is not None and math.isinf(worst) else worst
+def _finite(value: Any) -> Any:
+    """Numbers that JSON does not have as text, however deep: "inf", "-inf", "nan"."""
+    match value:
+        case float() if not math.isfinite(value):
+            return str(value)
+        case Mapping():
+            return {key: _finite(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_finite(item) for item in value]
+        case _:
+            return value
