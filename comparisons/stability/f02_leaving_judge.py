@@ -110,7 +110,7 @@ class Judge:
     def __call__(
         self, tally: Tally, rays: Rays, outer: BoolArray, found: Departures, bounded: bool
     ) -> None:
-        """bounded: whether rays have to begin within the stated bound, else within `CLOSE` sizes."""
+        """bounded: whether rays have to begin within the stated bound, else in `CLOSE` sizes."""
         left = np.isfinite(found.t)
         note = self._noted(rays, found)
         self._primary(tally, rays, np.flatnonzero(~left), note)
