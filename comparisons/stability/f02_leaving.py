@@ -109,7 +109,10 @@ def measure(
 
 ALL = tuple(KINDS)
 
-BOUND = "B = 17 sqrt(3) u (2 |c| + 6 s) reaches a hundredth of the size s at |c| = 1.5e12 s"
+BOUND = (
+    "B = 17 sqrt(3) u (2 |c| + 6 s) is s / 100 at |c| = 1.5e12 s: what is left next to an edge, "
+    "within a few B, may be left through the neighbouring face"
+)
 
 
 def _single(draw: Draw, x: float) -> bool:
@@ -202,7 +205,7 @@ FAMILY = Family(
                 _distance,
                 DISTANCES,
                 (1e0, 1e4, 1e10),
-                holds_to=1e12,
+                holds_to=1e10,
                 law=BOUND,
             )
             for kind in ALL
