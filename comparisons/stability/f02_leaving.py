@@ -125,10 +125,14 @@ def _distance(draw: Draw, x: float) -> Extent:
     return Extent((0.0, 0.0), (1.0, 2.0), (x, x), _single(draw, x))
 
 
-def _size(draw: Draw, x: float) -> Extent:
-    """x or 1 / x, where the draw says so."""
-    size = math.log10(x) * float(draw.rng.choice([-1.0, 1.0]))
-    return Extent((size, size), (1.0, 2.0), (1.0, 1.0), _single(draw, 1.0) and x <= 1e8)
+def _large(draw: Draw, x: float) -> Extent:
+    size = math.log10(x)
+    return Extent((size, size), (1.0, 2.0), (1.0, 1.0), draw.mitsuba and x <= 1e8)
+
+
+def _small(draw: Draw, x: float) -> Extent:
+    size = -math.log10(x)
+    return Extent((size, size), (1.0, 2.0), (1.0, 1.0), draw.mitsuba and x <= 1e8)
 
 
 def _ratio(draw: Draw, x: float) -> Extent:
@@ -210,15 +214,18 @@ FAMILY = Family(
             )
             for kind in ALL
         ),
-        _series(
-            "size",
-            ALL,
-            "size or 1 / size",
-            "All kinds, as far from the origin as they are large.",
-            _size,
-            (1e0, 1e2, 1e4, 1e6, 1e8, 1e16, 1e32, 1e64),
-            (1e4, 1e8),
-            cases=150_000,
+        *(
+            _series(
+                name,
+                ALL,
+                axis,
+                "All kinds, as far from the origin as they are large.",
+                extent,
+                (1e0, 1e2, 1e4, 1e6, 1e8, 1e16, 1e32, 1e64),
+                (1e8,),
+                cases=150_000,
+            )
+            for name, axis, extent in (("small", "1 / size", _small), ("large", "size", _large))
         ),
         _series(
             "anisotropy",
