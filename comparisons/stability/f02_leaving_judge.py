@@ -42,23 +42,23 @@ def exact_of(placed: Placed, subject: Subject) -> Exact:
             return nearest(truths), np.asarray((truths != NEVER) & (back != NEVER))
 
         return of_scene
-    row = {name: column[[subject.row]] for name, column in _rowwise(subject.table).items()}
+    row = row_of(subject)
 
     def of_row(o: FloatArray, d: FloatArray) -> tuple[FloatArray, BoolArray]:
         crossings = all_hits(subject.field, row, o, d)
         ahead = (crossings.t > 0) & (crossings.t < NEVER)
         return first_of(crossings).t, np.asarray(ahead.sum(axis=1) % 2 == 1)
 
-    if subject.field == "polygons":
-        row["outline"] = subject.table.outline
     return of_row
 
 
-def _rowwise(table: Any) -> dict[str, Any]:
+def row_of(subject: Subject) -> dict[str, Any]:
+    """The columns of a subject's row; a polygon's outline is one of all polygons."""
+    columns = subject.table._asdict().items()
     return {
-        name: column
-        for name, column in table._asdict().items()
-        if name != "outline" and column is not None
+        name: column if name == "outline" else column[[subject.row]]
+        for name, column in columns
+        if column is not None
     }
 
 
@@ -105,18 +105,22 @@ class Judge:
         self.placed, self.sample = placed, sample
         self.kind = KINDS[placed.kind]
         self.exact = exact_of(placed, subject)
+        self.row = row_of(subject) if subject.kind >= 0 else {}
 
     def __call__(
         self, tally: Tally, rays: Rays, outer: BoolArray, found: Departures, bounded: bool
     ) -> None:
-        """bounded: whether rays have to begin within the stated bound, else within `CLOSE` sizes."""
+        """bounded: whether rays have to begin within the stated bound, else in `CLOSE` sizes."""
         left = np.isfinite(found.t)
         note = self._noted(rays, found)
         self._primary(tally, rays, np.flatnonzero(~left), note)
         tally.cases += int(left.sum())
         moved = np.where(left, np.linalg.norm(found.start - found.p, axis=1), 0.0)
-        tally.worst = max(tally.worst, float(moved.max(initial=0.0)) / self.placed.bound)
         allowed = self.placed.bound if bounded else max(self.placed.bound, CLOSE * self.placed.size)
+        if self.placed.kind == "plane":  # it goes on beyond its size
+            away = np.linalg.norm(found.p - self.placed.center, axis=1) / self.placed.size
+            moved = np.where(left, moved / np.maximum(1.0, away), 0.0)
+        tally.worst = max(tally.worst, float(moved.max(initial=0.0)) / self.placed.bound)
         failed = moved > allowed
         tally.fail("begins too far off", np.flatnonzero(failed), note)
         asked = left & ~failed & (self._doubtful(outer, found) | self._sampled(left))
@@ -188,10 +192,11 @@ class Judge:
             for axis in (found.n[which], np.cross(found.n[which], w)):
                 there, _ = self.exact(start + step * axis, w)
                 open_ |= differs & _alike(again, there)
-        # A hole that is thinner than a few bounds cannot be entered.
-        begin = found.p[which] + found.n[which] * (bound / 16.0)
-        open_ |= wrong & (self.exact(begin, found.n[which])[0] < CONTACT * bound)
-        wrong &= ~open_
+        # A hole that is thinner than a few bounds cannot be entered: two walls are within them.
+        if wrong.any():
+            walls = self._walls(found.p[which], found.n[which])
+            open_ |= wrong & (walls >= 2)
+            wrong &= ~open_
         self._put_open(tally, open_)
         tally.fail("begins inside", which[wrong], note)
         tally.fail("lost", which[lost & ~open_], note)
@@ -217,7 +222,10 @@ class Judge:
         t, inside = self.exact(start, w)
         if self.placed.kind == "solid":
             inside = np.isfinite(t)
-        right = inside & _alike(again, t) & (found.cosine[which] > 0.0)
+        # The same wall: what it is off by across it is at most a few bounds.
+        with np.errstate(invalid="ignore"):
+            same = np.abs(again - t) * found.cosine[which] <= CONTACT * self.placed.bound
+        right = inside & (_alike(again, t) | same) & (found.cosine[which] > 0.0)
         # What is thinner than a few bounds cannot be left: the walls are one.
         rest = np.flatnonzero(~right)
         if len(rest) == 0:
@@ -232,6 +240,11 @@ class Judge:
         count = int(open_.sum())
         tally.cases -= count
         tally.open += count
+
+    def _walls(self, p: FloatArray, n: FloatArray) -> IntArray:
+        """How many crossings of a torus there are within a few bounds of points, along normals."""
+        t = nearest(all_hits("tori", self.row, p, n).t)
+        return np.asarray((np.abs(t) < CONTACT * self.placed.bound).sum(axis=1))
 
     def _thickness(self, which: IntArray, found: Departures) -> FloatArray:
         """How much of the shape lies below the surface where rays left it, along the normal and

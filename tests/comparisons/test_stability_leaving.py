@@ -32,7 +32,7 @@ def test_ours_leaves_every_shape_at_its_most_extreme(name, tmp_path):
 
 
 def test_the_text_books_epsilon_fails_far_away_and_on_small_shapes(tmp_path):
-    for name, x in (("sphere", 1e10), ("size", 1e8)):
+    for name, x in (("sphere", 1e10), ("small", 1e8)):
         found = f02_leaving.FAMILY.by_name[name].measure(draw_of(tmp_path, 3000), x)
         assert found[f02_leaving.FIXED].failures > 0
         assert found[f02_leaving.FIXED].examples
