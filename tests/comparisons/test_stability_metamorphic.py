@@ -15,6 +15,13 @@ EPSILON = 1e-4
 """What an absolute ray epsilon is."""
 
 
+@pytest.fixture(autouse=True)
+def _nothing_remembered():
+    f09_light.remembered.cache_clear()
+    yield
+    f09_light.remembered.cache_clear()
+
+
 def draw(folder, cases=150, mitsuba=False, effort="quick"):
     return Draw(np.random.default_rng(5), cases, mitsuba, folder, effort)
 
