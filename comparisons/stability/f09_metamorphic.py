@@ -179,7 +179,7 @@ def _turns(draw: Draw, x: float) -> list[FloatArray]:
 
 # ---- the family ---------------------------------------------------------------------------------
 
-_CASES: Any = {"quick": 600, "full": 20_000}
+_CASES: Any = {"quick": 600, "full": 12_000}
 
 _EXPLAINED_SCALE = (
     "Mitsuba's float32 numbers scale as exactly as float64's; what does not scale is its ray "
