@@ -1,7 +1,7 @@
 """Pictures of a scene and of the same scene transformed, and by how much they may differ."""
 
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from itertools import product
 from typing import NamedTuple
 
@@ -76,6 +76,12 @@ def before(render: Renderer, scene: rt.Scene, shift: float, u: float) -> Before:
     return Before(first, (SMOOTH * u + shift / SIZE) * np.abs(first) + _change(first, others))
 
 
+@lru_cache(maxsize=4)
+def remembered(contestant: str, scene: rt.Scene, shift: float) -> Before:
+    """`before`, which is the same for all factors."""
+    return before(partial(colours, contestant), scene, shift, ROUNDOFF[contestant])
+
+
 def _change(first: FloatArray, others: list[FloatArray]) -> FloatArray:
     change = np.max([np.abs(other - first) for other in others], axis=0)
     return np.asarray(STEPS * change.max(axis=-1, keepdims=True))
@@ -120,7 +126,7 @@ def judged(contestant: str, scene: rt.Scene, motion: Motion, mirrored: bool = Fa
     """
     render, u = partial(colours, contestant), ROUNDOFF[contestant]
     shift = REACH * u * (SIZE + max(map(abs, motion.offset)) / motion.factor)
-    base = before(render, scene, shift, u)
+    base = remembered(contestant, scene, shift)
     found = render(moved(scene, motion))
     if mirrored:
         found = found[:, ::-1]
