@@ -182,8 +182,7 @@ def _text_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, bytes]:
 def bomb(rng: np.random.Generator, levels: int) -> str:
     """Aliases of aliases: 9^(3 levels) things, in place of something of the scene."""
     lines = ["a0: &a0 [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]"]
-    for k in range(1, 3 * levels):
-        lines.append(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]")
+    lines += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]" for k in range(1, 3 * levels)]
     key = pick(rng, ("shapes", "lights", "materials", "camera", "description", "groups"))
     return "\n".join([*lines, f"{key}: *a{3 * levels - 1}", ""])
 
@@ -257,7 +256,7 @@ FAMILY = Family(
             (1.0, 4.0),
             {"quick": 60, "full": 900},
             values,
-            explained="Nothing of this hangs on precision: what is refused is refused by rules, and "
+            explained="None of this hangs on precision: what is refused is refused by rules, and "
             "Mitsuba's range of float32 is left by a single hostile number already.",
         ),
         Series(

@@ -148,7 +148,7 @@ def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists
 
 
 def _width(stated: Lists, t: float) -> float:
-    """Of the operand's crossing at t; none stated: its own crossings are closer than can be told."""
+    """Of the operand's crossing at t; none stated: they are too close to be told."""
     there = np.isfinite(stated.t)
     if not there.any():
         return np.inf
@@ -158,8 +158,11 @@ def _width(stated: Lists, t: float) -> float:
 
 
 def problem(truth: Truth, t: FloatArray) -> tuple[str, float] | None:
-    """What is wrong with a list of crossings (k,), and how long the stretch is; None for nothing."""
+    """What is wrong with crossings (k,), and how long the stretch is; None for nothing."""
     t = t[np.isfinite(t)]
+    for x in t.tolist():
+        if not np.any(np.abs(truth.crossings - x) <= 2.0 * truth.widths):
+            return f"a crossing that is none, at {x.hex()}", float(x)
     for stretch in truth.stretches:
         # The last is without end: its middle is beyond all crossings.
         middle = 0.5 * (stretch.t0 + stretch.t1)

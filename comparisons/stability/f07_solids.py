@@ -219,8 +219,8 @@ SHIFTS = (*(float(f"1e{k}") for k in range(3, 16)), 2.0**51, 2.0**52, 2.0**53)
 FAMILY = Family(
     "F7",
     "set operations",
-    "Trees of set operations that are the same set have the same crossings, bit for bit; faces that "
-    "coincide, or nearly, leave nothing that is narrower than rounding, and lose nothing wider.",
+    "Trees of set operations that are the same set have the same crossings, bit for bit; faces "
+    "that coincide, or nearly, leave nothing that is narrower than rounding, and lose nothing wider.",
     (
         Series(
             "shift",
