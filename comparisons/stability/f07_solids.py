@@ -220,7 +220,7 @@ FAMILY = Family(
     "F7",
     "set operations",
     "Trees of set operations that are the same set have the same crossings, bit for bit; faces "
-    "that coincide, or nearly, leave nothing that is narrower than rounding, and lose nothing wider.",
+    "that coincide, or nearly, leave nothing narrower than rounding, and lose nothing wider.",
     (
         Series(
             "shift",

@@ -217,7 +217,9 @@ def surface(tori: Tori, ray: Ray, hit: Hit) -> SurfacePoint:
     major, minor = tori.major[i], tori.minor[i]
     q = local_point(tori, i, at(ray, hit.t))
     rho = math.sqrt(q.x * q.x + q.y * q.y)
-    c = Vec3(major * q.x / rho, major * q.y / rho, 0.0)
+    c = Vec3(major, 0.0, 0.0)
+    if rho > 0.0:  # else rounding alone puts it on the axis, of an eye 1/u sizes away
+        c = Vec3(major * q.x / rho, major * q.y / rho, 0.0)
     across = q - c
     n = across * (1.0 / length(across))
     # Some thirty roundings of numbers up to R + r: c, c + r n, and `excess` of the next ray.

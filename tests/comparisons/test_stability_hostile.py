@@ -128,7 +128,7 @@ def test_limits_of_time_differ(monkeypatch):
 
 
 def hits_of(**changed):
-    one = dict(  # noqa: C408 - as the call below takes it
+    one = dict(  # noqa: C408
         t=np.array([1.0]), shape=np.array([0]), primitive=np.array([0]), part=np.array([0]),
         instance=np.array([-1]), p=np.zeros((1, 3)), n=np.array([[0.0, 0.0, 1.0]]),
         ns=np.array([[0.0, 0.0, 1.0]]), uv=np.zeros((1, 2)),
