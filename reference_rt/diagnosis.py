@@ -41,7 +41,7 @@ def first_problem(model: type[Description], error: ValidationError, data: Any) -
         message = f"expected at most {first['ctx']['max_length']} items"
     elif first["type"] == "too_short":
         message = f"expected at least {first['ctx']['min_length']} items"
-    elif first["type"] == "recursion_loop":
+    elif first["type"].startswith("recursion"):
         message = "nested too deeply; expected fewer levels"
     elif first["type"] in _PLAIN:
         message = f"expected {_PLAIN[first['type']]}"

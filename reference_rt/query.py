@@ -11,24 +11,24 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.csg.evaluate import crossings as solid_crossings
-from reference_rt.geometry import Geometry, closest_hit, owner, surface
+from reference_rt.geometry import closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
-from reference_rt.kernel import entry_kernel, kernel, local_floats
+from reference_rt.kernel import entry_kernel, local_floats
 from reference_rt.materials import kept_floats
 from reference_rt.ray import Ray, at
 from reference_rt.sampling.grid import GridSample
+from reference_rt.scaled_ray import is_told, scaled
 from reference_rt.shading import shade
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3, is_finite, max_abs, row
+from reference_rt.vec3 import Vec3, row
 
 
 @dataclass(frozen=True)
@@ -51,21 +51,6 @@ class Intersections:
     n: FloatArray
     ns: FloatArray
     uv: FloatArray
-
-
-@dataclass(frozen=True)
-class SolidCrossings:
-    """Where n rays go in and out of a solid, in order, over all t > 0.
-
-    t (n, k): inf where there are fewer than k;  width (n, k): how far rounding may have moved t:
-    crossings closer together than the sum of theirs are passed at once, and what is between them,
-    material or gap, is not told;  part (n, k): number of the operand that shows;  count (n,).
-    """
-
-    t: FloatArray
-    width: FloatArray
-    part: IntArray
-    count: IntArray
 
 
 @dataclass(frozen=True)
@@ -97,52 +82,20 @@ class DirectLight:
     contribution: FloatArray
 
 
-class _Scaled(NamedTuple):
-    """A ray whose direction is 1 / unit times as long as what was asked with, so that t counts in
-    units `unit` times as large;  valid: whether it is a ray, of finite numbers and d != 0."""
-
-    ray: Ray
-    unit: float
-    valid: bool
-
-
-@kernel
-def _scaled(o: Vec3, d: Vec3, t_max: float) -> _Scaled:
-    """By a power of two, which changes no bit of what is computed: squares of directions that are
-    very long or short would leave the range of float64."""
-    unit, valid = 1.0, is_finite(o) and is_finite(d) and max_abs(d) > 0.0
-    if valid and not _SHORT <= max_abs(d) <= 1.0 / _SHORT:
-        _, exponent = math.frexp(max_abs(d))
-        unit = math.ldexp(1.0, -min(max(exponent, -1000), 1000))
-        d = d * unit
-    return _Scaled(Ray(o, d, t_max / unit), unit, valid)
-
-
-_SHORT = 2.0**-64
-"""Of a direction: its square, and that of the same of an instance 2^400 times as large, are not 0.
-What is neither shorter nor longer than the inverse is left alone."""
-
-
-@kernel
-def _is_told(t: float, p: Vec3) -> bool:
-    """Whether float64 has numbers for a hit."""
-    return 0.0 < t < math.inf and is_finite(p)
-
-
 @entry_kernel
 def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
     for i in range(len(o)):
         out[i, 0] = math.inf
         for k in range(1, 5):
             out[i, k] = -1.0
-        ray, unit, valid = _scaled(row(o, i), row(d, i), math.inf)
+        ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
         if not valid:
             continue
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
             continue
         point = surface(scene.geometry, ray, hit)
-        if not _is_told(hit.t * unit, point.p):
+        if not is_told(hit.t * unit, point.p):
             continue
         whose = owner(scene.geometry, ray, hit)
         out[i, 0], out[i, 1], out[i, 2] = hit.t * unit, whose.shape, whose.face
@@ -165,32 +118,14 @@ def _closest(
 ) -> None:
     for i in range(len(o)):
         t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
-        ray, unit, valid = _scaled(row(o, i), row(d, i), math.inf)
+        ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
         if not valid:
             continue
         hit = closest_hit(scene.geometry, ray)
-        if hit.kind < 0 or not _is_told(hit.t * unit, at(ray, hit.t)):
+        if hit.kind < 0 or not is_told(hit.t * unit, at(ray, hit.t)):
             continue
         t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
         uv[i, 0], uv[i, 1] = hit.u, hit.v
-
-
-@entry_kernel
-def _crossings(
-    geometry: Geometry,
-    solid: int,
-    o: FloatArray,
-    d: FloatArray,
-    t: FloatArray,
-    width: FloatArray,
-    part: IntArray,
-    count: IntArray,
-) -> None:
-    for i in range(len(o)):
-        ray = Ray(row(o, i), row(d, i), math.inf)
-        count[i] = solid_crossings(
-            geometry.solids, geometry.shapes, geometry.bvh, solid, ray, t[i], width[i], part[i]
-        )
 
 
 @entry_kernel
@@ -198,7 +133,7 @@ def _occluded(
     scene: SceneTables, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
 ) -> None:
     for i in range(len(o)):
-        ray, _, valid = _scaled(row(o, i), row(d, i), t_max[i])
+        ray, _, valid = scaled(row(o, i), row(d, i), t_max[i])
         out[i] = valid and is_occluded(scene.geometry, ray)
 
 
@@ -228,7 +163,10 @@ def _radiance(
         out[i, 0], out[i, 1], out[i, 2] = arriving
 
 
-def _rays(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def checked_rays(
+    origins: npt.ArrayLike, directions: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Both as float64 arrays (n, 3)."""
     # Kernels are compiled for writable arrays: those that are so already are not copied.
     o, d = (np.require(a, np.float64, ("C", "A", "W")) for a in (origins, directions))
     if o.shape != d.shape or o.ndim != 2 or o.shape[1] != 3:
@@ -240,7 +178,7 @@ def intersect(
     scene: SceneTables, origins: npt.ArrayLike, directions: npt.ArrayLike
 ) -> Intersections:
     """The closest hit of each ray."""
-    o, d = _rays(origins, directions)
+    o, d = checked_rays(origins, directions)
     out = np.zeros((len(o), 16))
     with np.errstate(all="ignore"):
         _intersect(scene, o, d, out)
@@ -265,7 +203,7 @@ def closest(
     threads: int | None = None,
 ) -> Closest:
     """The closest hit of each ray and no more, on `threads` threads (default: all cores)."""
-    o, d = _rays(origins, directions)
+    o, d = checked_rays(origins, directions)
     n = len(o)
     found = Closest(np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64), np.empty((n, 2)))
     t, kind, rows, uv = found.t, found.kind, found.row, found.uv
@@ -277,28 +215,6 @@ def closest(
     return found
 
 
-def crossings(
-    scene: SceneTables,
-    solid: int,
-    origins: npt.ArrayLike,
-    directions: npt.ArrayLike,
-    most: int = 64,
-) -> SolidCrossings:
-    """All crossings of each ray with the solid of that number, in the scene's order; `most` of
-    them, though `count` counts all."""
-    solids = scene.geometry.solids
-    if solids is None or not 0 <= solid < len(solids.first):
-        known = 0 if solids is None else len(solids.first)
-        raise ValueError(f"there is no solid {solid}; expected one of the scene's {known}")
-    o, d = _rays(origins, directions)
-    t, width = np.full((2, len(o), most), math.inf)
-    part = np.full((len(o), most), -1)
-    count = np.zeros(len(o), np.int64)
-    with np.errstate(all="ignore"):
-        _crossings(scene.geometry, solid, o, d, t, width, part, count)
-    return SolidCrossings(t, width, part, count)
-
-
 def occluded(
     scene: SceneTables,
     origins: npt.ArrayLike,
@@ -308,7 +224,7 @@ def occluded(
 ) -> npt.NDArray[np.bool_]:
     """Whether anything lies on each ray at 0 < t < t_max (a number, or one for each ray); on
     `threads` threads (default: all cores)."""
-    o, d = _rays(origins, directions)
+    o, d = checked_rays(origins, directions)
     out = np.zeros(len(o), np.bool_)
     ends = np.full(len(o), t_max, dtype=np.float64)
 
@@ -348,7 +264,7 @@ def direct_light(
     u: tuple[float, float] = (0.5, 0.5),
 ) -> DirectLight:
     """Light from entry `light` of `scene.lights.choice`, at its point that `u` picks."""
-    o, d = _rays(origins, directions)
+    o, d = checked_rays(origins, directions)
     choice = scene.lights.choice
     if choice is None or choice.probability[light] == 0.0:
         raise ValueError(f"light {light} cannot be sampled; expected one that can be picked")
@@ -362,7 +278,7 @@ def whitted_radiance(
     scene: SceneTables, integrator: Any, origins: npt.ArrayLike, directions: npt.ArrayLike
 ) -> FloatArray:
     """Radiance (n, 3) along unit rays by a deterministic integrator's `setup()`."""
-    o, d = _rays(origins, directions)
+    o, d = checked_rays(origins, directions)
     out = np.zeros((len(o), 3))
     with np.errstate(all="ignore"):
         _radiance(scene, integrator, o, d, out)

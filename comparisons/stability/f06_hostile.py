@@ -3,20 +3,20 @@
 Law: each hostile scene gives either one line of error (our classes; exit code 3; the file, the
 place in it and what was expected or is malformed), or a picture of which every pixel that is not
 finite is reported (exit code 3 too, with the places).  Never a crash, a traceback ("internal
-error"), a hang (5 s of computing; 120 s in plain Python) or a pixel that is not finite and not told.
-Each hostile ray gives a miss or a hit that is finite throughout.
+error"), a hang (5 s of computing; 120 s in plain Python) or a pixel that is not finite and not
+told.  Each hostile ray gives a miss or a hit that is finite throughout.
 
 Ranges: see `NUMBERS` and others in `f06_damage.py`: NaN, infinities, zeros of both signs, the
-smallest and largest floats, what overflows when it is squared, integers beyond 64 bits, texts, names
-of files that are none, values of other types, sets of each other, cycles, anchors, tags.
+smallest and largest floats, what overflows when it is squared, integers beyond 64 bits, texts,
+names of files that are none, values of other types, sets of each other, cycles, anchors, tags.
 
-Counts: 11,000 scenes and files in the full run (values 4500, structure 1600, grammar 1600, text 480,
-meshes 2400, images 600), rays 10^5 per magnitude.
+Counts: 11,000 scenes and files in the full run (values 4500, structure 1600, grammar 1600, text
+480, meshes 2400, images 600), rays 10^5 per magnitude.
 
-How: scenes go to child processes, which do as `reference-rt render` does (8 x 8 pixels, one sample),
-so that one that dies takes no other with it.  Values change in a few fixed scenes, whose compiled
-kernels stay the same; where they do not, and where the structure changes, plain Python runs the same
-text (NUMBA_DISABLE_JIT=1), bit-identical and without seconds of compiling.
+How: scenes go to child processes, which do as `reference-rt render` does (8 x 8 pixels, one
+sample), so that one that dies takes no other with it.  Values change in a few fixed scenes, whose
+compiled kernels stay the same; where they do not, and where the structure changes, plain Python
+runs the same text (NUMBA_DISABLE_JIT=1), bit-identical and without seconds of compiling.
 
 To reproduce a failure: its scene is in the examples as text, or else the file's bytes in base 64;
 `reference-rt render scene.json -o out.exr --size 8x8 --spp 1`.
@@ -182,8 +182,7 @@ def _text_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, bytes]:
 def bomb(rng: np.random.Generator, levels: int) -> str:
     """Aliases of aliases: 9^(3 levels) things, in place of something of the scene."""
     lines = ["a0: &a0 [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]"]
-    for k in range(1, 3 * levels):
-        lines.append(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]")
+    lines += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]" for k in range(1, 3 * levels)]
     key = pick(rng, ("shapes", "lights", "materials", "camera", "description", "groups"))
     return "\n".join([*lines, f"{key}: *a{3 * levels - 1}", ""])
 
@@ -257,7 +256,7 @@ FAMILY = Family(
             (1.0, 4.0),
             {"quick": 60, "full": 900},
             values,
-            explained="Nothing of this hangs on precision: what is refused is refused by rules, and "
+            explained="None of this hangs on precision: what is refused is refused by rules, and "
             "Mitsuba's range of float32 is left by a single hostile number already.",
         ),
         Series(

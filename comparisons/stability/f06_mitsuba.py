@@ -2,8 +2,6 @@
 
 import contextlib
 import io
-import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,6 @@
 """Hostile cases in processes of their own: one that dies is replaced, and the others go on."""
 
+import contextlib
 import json
 import os
 import signal
@@ -102,8 +103,6 @@ class _Worker:
         """Ends the process."""
         for stream in (self.process.stdin, self.process.stdout):
             if stream is not None:
-                try:
+                with contextlib.suppress(BrokenPipeError):
                     stream.close()
-                except BrokenPipeError:
-                    pass
         self.process.wait()

@@ -144,8 +144,8 @@ SERIES = (
         "rays",
         "magnitude of numbers",
         "Rays in a scene of all shapes, of which one to six numbers are x, 1/x or from the list of "
-        "hostile ones, NaN and infinity among them.  A hit that is not finite throughout breaks the "
-        "law, and one of a ray that is none.",
+        "hostile ones, NaN and infinity among them.  A hit that is not finite throughout breaks "
+        "the law, and one of a ray that is none.",
         (1e0, 1e9, 1e50, 1e100, 1e150, 1e200, 1e250, 1e300),
         (1e9, 1e150, 1e300),
         {"quick": 20_000, "full": 100_000},

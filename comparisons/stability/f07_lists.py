@@ -1,5 +1,6 @@
 """Where rays go in and out of a solid: by ours, by the text-book's methods, and exactly."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +12,8 @@ from comparisons.exact.referee import crossings_of, evaluated
 from comparisons.sizes import ShapeSizes
 from comparisons.stability.f07_trees import MESH
 from comparisons.stability.family import FloatArray
-from reference_rt import methods, query
+from reference_rt import methods
+from reference_rt.csg.all_crossings import crossings
 from reference_rt.methods.csg import interval_list
 from reference_rt.methods.operands import CsgParameters
 from reference_rt.scene import Scene
@@ -39,7 +41,7 @@ class Lists(NamedTuple):
 
 
 def ours(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> Lists:
-    found = query.crossings(scene_of(solid, folder).tables, 0, o, d, MOST)
+    found = crossings(scene_of(solid, folder).tables, 0, o, d, MOST)
     assert found.count.max(initial=0) <= MOST
     k = int(found.count.max(initial=0))
     return Lists(found.t[:, :k], found.width[:, :k])
@@ -146,7 +148,7 @@ def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists
 
 
 def _width(stated: Lists, t: float) -> float:
-    """Of the operand's crossing at t; none stated: its own crossings are closer than can be told."""
+    """Of the operand's crossing at t; none stated: they are too close to be told."""
     there = np.isfinite(stated.t)
     if not there.any():
         return np.inf
@@ -156,18 +158,19 @@ def _width(stated: Lists, t: float) -> float:
 
 
 def problem(truth: Truth, t: FloatArray) -> tuple[str, float] | None:
-    """What is wrong with a list of crossings (k,), and how long the stretch is; None for nothing."""
+    """What is wrong with crossings (k,), and how long the stretch is; None for nothing."""
     t = t[np.isfinite(t)]
+    for x in t.tolist():
+        if not np.any(np.abs(truth.crossings - x) <= 2.0 * truth.widths):
+            return f"a crossing that is none, at {x.hex()}", float(x)
     for stretch in truth.stretches:
-        if stretch.t1 == np.inf:
-            middle = np.inf
-        else:
-            middle = 0.5 * (stretch.t0 + stretch.t1)
+        # The last is without end: its middle is beyond all crossings.
+        middle = 0.5 * (stretch.t0 + stretch.t1)
         if bool(np.sum(t < middle) % 2) != stretch.inside:
             lost = "lost" if stretch.inside else "false"
             length = 0.0 if stretch.t1 == np.inf else stretch.t1 - stretch.t0
             return f"a stretch is {lost}: from {stretch.t0.hex()} to {stretch.t1.hex()}", length
-    for a, b in zip(t[:-1], t[1:], strict=True):
+    for a, b in pairwise(t.tolist()):
         bound = sum(truth.widths[np.argmin(np.abs(truth.crossings - x))] for x in (a, b))
         if b - a < 0.5 * bound:
             return f"a film: from {float(a).hex()} to {float(b).hex()}", float(b - a)

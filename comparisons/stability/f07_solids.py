@@ -5,7 +5,7 @@ Laws, along each ray:
   commutativity, associativity, distribution, De Morgan, complements) have the same list of
   crossings, bit for bit: the operands' crossings are the same numbers.  A - A, A - (A | B) and
   (A & B) - A have none;
-- crossings of operands further apart than the sum of the widths that `query.crossings` states
+- crossings of operands further apart than the sum of the widths that `csg.all_crossings` states
   (the error of the surface and of the ray's arithmetic, over the cosine) are told apart: between
   them the list says inside where exact arithmetic on the tables does.  Nothing narrower is told;
 - the mean of chord lengths is the volume over the area of the beam: within 4 standard errors of
@@ -15,7 +15,7 @@ Ranges: depth 1 to 64, of spheres, ellipsoids, boxes, cylinders, cones, quadrics
 meshes; faces shifted by 1e-3 to 2^-53 of the size, and by nothing; offsets to 1e9 sizes; 2 to 64
 operands.  Counts: 2 x 10^4 rays a depth, 3000 a shift and an offset, with the exact arbiter.
 
-Ours: `query.crossings`; the text-book's: interval lists (Roth 1982), inside tests (Tilove 1980),
+Ours: `csg.all_crossings`; the text-book's: interval lists (Roth 1982), inside tests (Tilove 1980),
 which give the first crossing alone.  Mitsuba has no solids, so that it stays out: what stands in
 for it elsewhere (`comparisons/solids.py`) is a program of this project on Mitsuba's hits.
 """
@@ -219,8 +219,8 @@ SHIFTS = (*(float(f"1e{k}") for k in range(3, 16)), 2.0**51, 2.0**52, 2.0**53)
 FAMILY = Family(
     "F7",
     "set operations",
-    "Trees of set operations that are the same set have the same crossings, bit for bit; faces that "
-    "coincide, or nearly, leave nothing that is narrower than rounding, and lose nothing wider.",
+    "Trees of set operations that are the same set have the same crossings, bit for bit; faces "
+    "that coincide, or nearly, leave nothing narrower than rounding, and lose nothing wider.",
     (
         Series(
             "shift",

@@ -1,6 +1,7 @@
 """Volumes by chords against those of another kernel."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -21,14 +22,11 @@ SIGMAS = 4.0
 
 def volumes(draw: Draw, x: float) -> Mapping[str, Outcome]:
     write_mesh(draw.folder)
-    found: Mapping[str, Outcome] = {}
-    off = {OURS: [], lists.INTERVALS: []}  # type: dict[str, list[float]]
+    off: dict[str, list[float]] = {OURS: [], lists.INTERVALS: []}
     for _ in range(draw.cases):
         shapes, tree, volume = _solid(draw, int(x))
-        grid = np.sqrt(RAYS)
         o = np.column_stack([draw.rng.uniform(-HALF, HALF, (RAYS, 2)), np.full(RAYS, -10.0)])
         d = np.tile([0.0, 0.0, 1.0], (RAYS, 1))
-        del grid
         solid = shapes.solid(tree)
         for name, t in (
             (OURS, lists.ours(solid, draw.folder, o, d).t),
@@ -39,11 +37,10 @@ def volumes(draw: Draw, x: float) -> Mapping[str, Outcome]:
             length = (chords[:, 1::2] - chords[:, 0::2]).sum(axis=1) * (2.0 * HALF) ** 2
             error = max(float(length.std()) / np.sqrt(RAYS), 1e-300)
             off[name].append(abs(float(length.mean()) - volume) / error)
-    found = {
+    return {
         name: Outcome(len(some), sum(s > SIGMAS for s in some), max(some))
         for name, some in off.items()
     }
-    return found
 
 
 def _solid(draw: Draw, operands: int) -> tuple[Shapes, Tree, float]:
@@ -66,7 +63,7 @@ def _solid(draw: Draw, operands: int) -> tuple[Shapes, Tree, float]:
     return Shapes(leaves), tree, float(whole.volume())
 
 
-def _manifold(manifold3d, draw: Draw, shape):  # type: ignore[no-untyped-def]
+def _manifold(manifold3d: Any, draw: Draw, shape: Any) -> Any:
     m = transform.affine(shape.transform)
     if isinstance(shape, rt.Box):
         cube = manifold3d.Manifold.cube((2.0, 2.0, 2.0), True)

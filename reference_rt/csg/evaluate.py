@@ -130,13 +130,13 @@ def _nearest(solids: Solids, first: int, count: int, walk: Walk) -> tuple[int, H
 
 
 @kernel
-def _head_on(ray: Ray, t: float) -> float:
+def head_on(ray: Ray, t: float) -> float:
     """The rounding, in t, of a crossing at t that is met head-on."""
     return surface_error(ray.o, at(ray, t), 0.0) / length(ray.d)
 
 
 @kernel
-def _width(shapes: Shapes, hit: Hit, ray: Ray) -> float:
+def width(shapes: Shapes, hit: Hit, ray: Ray) -> float:
     """How far rounding may have moved a crossing along the ray, in t: the error of the surface and
     of the ray's own arithmetic, over the cosine."""
     point = any_shape.surface(shapes, ray, hit)
@@ -156,23 +156,23 @@ class Front(NamedTuple):
 
 
 @kernel
-def _begin_all(
+def begin_all(
     solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, walk: Walk
 ) -> tuple[int, Hit]:
     """All operands as the ray's origin finds them, and the first crossing of all."""
     first, count = solids.first[s], solids.operands[s]
-    at_origin = GRAZING * _head_on(ray, 0.0)
+    at_origin = GRAZING * head_on(ray, 0.0)
     for k in range(count):
         _begin(solids, shapes, bvh, first + k, k, ray, walk)
         # What is within rounding of the origin is where the ray comes from.
         hit = _next(solids, first + k, k, walk)
-        if hit.t < at_origin and hit.t <= _width(shapes, hit, ray):
+        if hit.t < at_origin and hit.t <= width(shapes, hit, ray):
             _pass(solids, shapes, bvh, first + k, k, ray, walk)
     return _nearest(solids, first, count, walk)
 
 
 @kernel
-def _pass_together(
+def pass_together(
     solids: Solids,
     shapes: Shapes,
     bvh: Bvh,
@@ -195,10 +195,10 @@ def _pass_together(
         _pass(solids, shapes, bvh, first + best, best, ray, walk)
         previous = hit
         best, hit = _nearest(solids, first, count, walk)
-        if best < 0 or hit.t - previous.t > GRAZING * _head_on(ray, hit.t):
+        if best < 0 or hit.t - previous.t > GRAZING * head_on(ray, hit.t):
             break
-        reach = max(reach, previous.t + _width(shapes, previous, ray))
-        if hit.t - _width(shapes, hit, ray) > reach:
+        reach = max(reach, previous.t + width(shapes, previous, ray))
+        if hit.t - width(shapes, hit, ray) > reach:
             break
     return best, hit
 
@@ -223,74 +223,23 @@ def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max:
         local_floats(count), local_floats(count), local_floats(count), local_integers(count)
     )
     values = local_integers(solids.depth[s])
-    best, hit = _begin_all(solids, shapes, bvh, s, ray, walk)
+    best, hit = begin_all(solids, shapes, bvh, s, ray, walk)
     inside = is_inside(solids, s, walk.state, values)
     while best >= 0 and hit.t <= t_max:
-        best, hit = _pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
+        best, hit = pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
         was_inside = inside
         inside = is_inside(solids, s, walk.state, values)
         if inside != was_inside:
-            shown = _shown(solids, s, count, walk, values, was_inside)
+            shown = which_shows(solids, s, count, walk, values, was_inside)
             kind = solids.kind[first + shown]
             return Hit(front.t[shown], kind, front.row[shown], front.u[shown], front.v[shown], -1)
     return Hit(math.inf, -1, -1, 0.0, 0.0, -1)
 
 
 @kernel
-def crossings(
-    solids: Solids,
-    shapes: Shapes,
-    bvh: Bvh,
-    s: int,
-    ray: Ray,
-    t: FloatArray,
-    width: FloatArray,
-    part: IntArray,
+def which_shows(
+    solids: Solids, s: int, count: int, walk: Walk, values: IntArray, inside: bool
 ) -> int:
-    """How many points of the surface of solid s lie at t > 0; the first of them, as many as there
-    is room for, into t, in order, with `resolution` and the number of the operand that shows."""
-    first, count = solids.first[s], solids.operands[s]
-    walk = Walk(
-        local_floats(CROSSINGS * count),
-        local_floats(CROSSINGS * count),
-        local_floats(count),
-        local_integers(count),
-        local_integers(count),
-        local_integers(count),
-        local_integers(count),
-        local_integers(count),
-        local_integers(count),
-    )
-    front = Front(
-        local_floats(count), local_floats(count), local_floats(count), local_integers(count)
-    )
-    values = local_integers(solids.depth[s])
-    best, hit = _begin_all(solids, shapes, bvh, s, ray, walk)
-    inside = is_inside(solids, s, walk.state, values)
-    found = 0
-    while best >= 0:
-        best, hit = _pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
-        was_inside = inside
-        inside = is_inside(solids, s, walk.state, values)
-        if inside != was_inside:
-            k = _shown(solids, s, count, walk, values, was_inside)
-            if found < len(t):
-                kind = solids.kind[first + k]
-                shown = Hit(front.t[k], kind, front.row[k], front.u[k], front.v[k], -1)
-                t[found], part[found] = shown.t, k
-                width[found] = resolution(shapes, shown, ray)
-            found += 1
-    return found
-
-
-@kernel
-def resolution(shapes: Shapes, hit: Hit, ray: Ray) -> float:
-    """Crossings whose distance, in t, is more than the sum of theirs are told apart."""
-    return min(_width(shapes, hit, ray), 0.5 * GRAZING * _head_on(ray, hit.t))
-
-
-@kernel
-def _shown(solids: Solids, s: int, count: int, walk: Walk, values: IntArray, inside: bool) -> int:
     """The operand whose crossing shows, of those that were passed at once and changed `inside`: the
     first in the scene's order that changes it alone, or without which nothing would change."""
     last = -1

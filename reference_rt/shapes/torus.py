@@ -219,9 +219,13 @@ def surface(tori: Tori, ray: Ray, hit: Hit) -> SurfacePoint:
     major, minor = tori.major[i], tori.minor[i]
     q = local_point(tori, i, at(ray, hit.t))
     rho = math.sqrt(q.x * q.x + q.y * q.y)
-    c = Vec3(major * q.x / rho, major * q.y / rho, 0.0)
+    c, n = Vec3(major, 0.0, 0.0), Vec3(0.0, 0.0, 1.0)
+    if rho > 0.0:  # what rounds to the axis, or out of sight, of an eye 1/u sizes away: any point
+        c = Vec3(major * q.x / rho, major * q.y / rho, 0.0)
     across = q - c
-    n = across * (1.0 / length(across))
+    distance = length(across)
+    if 0.0 < distance < math.inf:
+        n = across * (1.0 / distance)
     # Some thirty roundings of numbers up to R + r: c, c + r n, and `excess` of the next ray.
     error = 32.0 * UNIT_ROUNDOFF * (major + minor)
     return world_surface(tori, i, c + n * minor, n, error, tori.material[i], tori.light[i])

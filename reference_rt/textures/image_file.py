@@ -9,7 +9,6 @@ import numpy as np
 
 from reference_rt.shapes.shape import FloatArray
 
-
 _SILENT = logging.NullHandler()
 
 
