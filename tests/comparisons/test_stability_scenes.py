@@ -101,7 +101,7 @@ def test_mirrorings_multiply() -> None:
     mirrors = scene("deep_mirrors")
     k = 400
     # So steep that it crosses k planes before it leaves them sideways; then the sky.
-    o = np.array([[0.0, 0.1, 0.9]])
+    o = np.array([[0.0, 0.9, 0.9]])  # above the frame
     d = np.array([[1.25 / (2.0 * k), 0.0, -1.0]])
     d /= np.linalg.norm(d)
     slope = d[0, 0] / -d[0, 2]
@@ -171,8 +171,8 @@ materials: {lamp: {type: emissive, radiance: 5}, mirror: {type: mirror}}
 shapes:
   - {type: sphere, radius: 0.7}
   - {type: sphere, radius: 0.4, center: [0.9, 0, 0.6], material: mirror}
-  - {type: rectangle, material: lamp, transform: [{scale: 0.5}, {translate: [0, 0.5, 4.5]},
-     {rotate: {axis: [0, 1, 0], degrees: 180}}, {translate: [0, 0, 8]}]}
+  - {type: rectangle, material: lamp, transform: [{scale: 0.5},
+     {rotate: {axis: [1, 0, 0], degrees: 90}}, {translate: [0, 3, 0.5]}]}
   - {type: rectangle, transform: [{scale: 3}, {rotate: {axis: [1, 0, 0], degrees: -90}},
      {translate: [0, -0.8, 0]}]}
 lights:
