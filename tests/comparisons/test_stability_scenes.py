@@ -190,7 +190,7 @@ lights:
         query.whitted_radiance(build_tables(s), Whitted().setup(), *rays)
         for s, rays in ((here, (o, d)), (there, (o2, d2)))
     )
-    assert ours.max() > 1.0
+    assert ours.max() > 0.2
     # But for a ray or two that pass an edge on different sides.
     assert np.count_nonzero(np.abs(ours - theirs).max(axis=1) > 1e-9) <= 2
     assert np.allclose(d, d2, atol=1e-14)
