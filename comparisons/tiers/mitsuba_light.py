@@ -80,4 +80,5 @@ def is_dark(
     # point on it no better than the origin, so that a light smaller than that is passed by.
     met = query.intersect(setting.tables, o, target - offsets - o)
     facing = np.sum(met.n * (target - o), axis=1) < 0.0
-    return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | ~facing)
+    passed_by = met.t > 1.0 + SHADOW_EPSILON
+    return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | passed_by | ~facing)
