@@ -6,7 +6,7 @@ import numpy as np
 
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
-from reference_rt.materials.fresnel import fresnel
+from reference_rt.materials.fresnel import fresnel, relative_index
 from reference_rt.materials.material import Branches, Material
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
@@ -37,7 +37,7 @@ class Dielectric(Material):
 
     def tabulate(self, palette: Palette) -> "Dielectrics":
         return Dielectrics(
-            np.array([self.interior_ior / self.exterior_ior]),
+            np.array([relative_index(self.interior_ior, self.exterior_ior)]),
             palette.colours(self.reflectance),
             palette.colours(self.transmittance),
         )
@@ -53,10 +53,10 @@ class Dielectrics(NamedTuple):
 
 @kernel
 def branches(dielectrics: Dielectrics, i: int, at: At, wo: Vec3) -> Branches:
-    """Reflection F and refraction (1 - F) / eta²: radiance gathers where light slows down."""
+    """Reflection F and refraction T / eta²: radiance gathers where light slows down."""
     refraction = fresnel(wo.z, dielectrics.eta[i])
-    f = refraction.reflectance
-    t = (1.0 - f) / (refraction.eta * refraction.eta)
+    f, passing = refraction.reflectance, refraction.transmittance
+    t = passing / (refraction.eta * refraction.eta)
     cos_t = -refraction.cos_t if wo.z > 0.0 else refraction.cos_t
     return Branches(
         Vec3(-wo.x, -wo.y, wo.z),
@@ -64,5 +64,6 @@ def branches(dielectrics: Dielectrics, i: int, at: At, wo: Vec3) -> Branches:
         Vec3(-wo.x / refraction.eta, -wo.y / refraction.eta, cos_t),
         colour_at(dielectrics.transmittance, i, at) * t,
         f,
+        passing,
         refraction.eta,
     )

@@ -265,6 +265,7 @@ def _branches(layers: Layers | None, materials: Materials, shading: Shading, k: 
         refracted,
         _let(layer, refracted, found.transmittance),
         found.share,
+        found.passing,
         found.eta,
     )
 

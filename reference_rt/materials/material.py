@@ -71,8 +71,8 @@ class Branches(NamedTuple):
     """The mirrored and the refracted direction of a perfectly smooth surface.
 
     Each has the factor on the radiance that arrives from it; a black factor stands for "no such
-    branch".  share: the fraction of power that is mirrored;  eta: index of refraction on the
-    refracted side over that on wo's.
+    branch".  share, passing: the fractions of power that are mirrored and refracted, which add to
+    1;  eta: index of refraction on the refracted side over that on wo's.
     """
 
     reflected: Vec3
@@ -80,27 +80,28 @@ class Branches(NamedTuple):
     refracted: Vec3
     transmittance: Vec3
     share: float
+    passing: float
     eta: float
 
 
 @kernel
 def no_branches() -> Branches:
     zero = Vec3(0.0, 0.0, 0.0)
-    return Branches(zero, zero, zero, zero, 1.0, 1.0)
+    return Branches(zero, zero, zero, zero, 1.0, 0.0, 1.0)
 
 
 @kernel
 def reflection(wo: Vec3, reflectance: Vec3) -> Branches:
     """The mirrored direction alone."""
     zero = Vec3(0.0, 0.0, 0.0)
-    return Branches(Vec3(-wo.x, -wo.y, wo.z), reflectance, zero, zero, 1.0, 1.0)
+    return Branches(Vec3(-wo.x, -wo.y, wo.z), reflectance, zero, zero, 1.0, 0.0, 1.0)
 
 
 @kernel
 def straight_on(wo: Vec3) -> Branches:
     """What is not there: everything passes."""
     zero, one = Vec3(0.0, 0.0, 0.0), Vec3(1.0, 1.0, 1.0)
-    return Branches(zero, zero, -wo, one, 0.0, 1.0)
+    return Branches(zero, zero, -wo, one, 0.0, 1.0, 1.0)
 
 
 @kernel
@@ -111,9 +112,10 @@ def sample_branch(branches: Branches, u: float) -> BsdfSample:
             return no_sample()
         weight = branches.reflectance * (1.0 / branches.share)
         return BsdfSample(branches.reflected, weight, branches.share, 1.0, True)
-    probability = 1.0 - branches.share
-    weight = branches.transmittance * (1.0 / probability)
-    return BsdfSample(branches.refracted, weight, probability, branches.eta, True)
+    if branches.passing == 0.0:
+        return no_sample()
+    weight = branches.transmittance * (1.0 / branches.passing)
+    return BsdfSample(branches.refracted, weight, branches.passing, branches.eta, True)
 
 
 INV_PI = 1.0 / math.pi

@@ -18,7 +18,7 @@ import numpy as np
 
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
-from reference_rt.materials.fresnel import fresnel
+from reference_rt.materials.fresnel import fresnel, relative_index
 from reference_rt.materials.material import (
     INV_PI,
     Branches,
@@ -57,7 +57,7 @@ class Plastic(Material):
         return self.reflectance
 
     def tabulate(self, palette: Palette) -> "Plastics":
-        eta = self.interior_ior / self.exterior_ior
+        eta = relative_index(self.interior_ior, self.exterior_ior)
         return Plastics(
             palette.colours(self.reflectance),
             palette.colours(self.specular),
@@ -105,10 +105,11 @@ def hemispherical_fresnel(eta: float) -> float:
 
 
 class Shares(NamedTuple):
-    """f_o: Fresnel's reflectance towards wo;  base: rho / (1 - c F_int);  specular: the colour of
-    the mirrored light;  p: the probability of sampling it."""
+    """f_o, t_o: Fresnel's reflectance and transmittance towards wo;  base: rho / (1 - c F_int);
+    specular: the colour of the mirrored light;  p: the probability of sampling it."""
 
     f_o: float
+    t_o: float
     base: Vec3
     specular: Vec3
     p: float
@@ -117,7 +118,8 @@ class Shares(NamedTuple):
 @kernel
 def _shares(plastics: Plastics, i: int, at: At, wo: Vec3) -> Shares:
     """Lobes are drawn in proportion to the power of their brightest channel."""
-    f_o = fresnel(wo.z, plastics.eta[i]).reflectance
+    coat = fresnel(wo.z, plastics.eta[i])
+    f_o, t_o = coat.reflectance, coat.transmittance
     f_int = plastics.f_int[i]
     rho = colour_at(plastics.reflectance, i, at)
     base = rho * (1.0 / (1.0 - f_int))
@@ -129,16 +131,16 @@ def _shares(plastics: Plastics, i: int, at: At, wo: Vec3) -> Shares:
         )
     specular = colour_at(plastics.specular, i, at)
     s = f_o * max_component(specular)
-    d = (1.0 - f_o) * (1.0 - f_int) * max_component(base)
-    return Shares(f_o, base, specular, s / (s + d) if s > 0.0 else 0.0)
+    d = t_o * (1.0 - f_int) * max_component(base)
+    return Shares(f_o, t_o, base, specular, s / (s + d) if s > 0.0 else 0.0)
 
 
 @kernel
 def _diffuse(plastics: Plastics, i: int, shares: Shares, wi: Vec3) -> Vec3:
     """f cos wi of what enters the coat."""
     eta = float(plastics.eta[i])
-    f_i = fresnel(wi.z, eta).reflectance
-    return shares.base * ((1.0 - f_i) * (1.0 - shares.f_o) / (eta * eta) * (wi.z * INV_PI))
+    t_i = fresnel(wi.z, eta).transmittance
+    return shares.base * (t_i * shares.t_o / (eta * eta) * (wi.z * INV_PI))
 
 
 @kernel

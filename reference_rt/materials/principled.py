@@ -21,6 +21,7 @@ from pydantic import Field, model_validator
 
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
+from reference_rt.materials.fresnel import Refraction, relative_index
 from reference_rt.materials.material import INV_PI, BsdfSample, Material, no_sample
 from reference_rt.materials.microfacet import (
     GGX,
@@ -28,6 +29,7 @@ from reference_rt.materials.microfacet import (
     bend,
     g1,
     half_vector,
+    refract,
     sample_visible,
 )
 from reference_rt.materials.principled_lobes import (
@@ -38,6 +40,7 @@ from reference_rt.materials.principled_lobes import (
     coat_normals,
     diffuse,
     facet,
+    meet,
     sample_coat,
     sheen,
     sheen_colour,
@@ -121,7 +124,8 @@ class Principled(Material):
     def relative_ior(self) -> float:
         """Inside over outside: of specular s, ((eta - 1) / (eta + 1))² = 0.08 s."""
         if self.eta is not None:
-            return 1.001 if self.eta == 1.0 and self.spec_trans != 0.0 else self.eta
+            eta = 1.001 if self.eta == 1.0 and self.spec_trans != 0.0 else self.eta
+            return relative_index(eta, 1.0)
         specular = 0.5 if self.specular is None else self.specular
         if specular == 0.0 and self.spec_trans != 0.0:
             specular = 1e-3
@@ -175,6 +179,7 @@ def _surface(table: Principleds, i: int, at: At, side: float) -> Surface:
         (1.0 - metallic) * (1.0 - spec_trans),
         (1.0 - metallic) * spec_trans,
         eta if side > 0.0 else 1.0 / eta,
+        eta,
         side > 0.0,
         m,
     )
@@ -196,30 +201,32 @@ class _Shares(NamedTuple):
 
 @kernel
 def _shares(s: Surface, wo: Vec3) -> _Shares:
-    flat = facet(s, wo.z)
+    refraction = meet(s, wo.z)
+    flat = facet(s, refraction)
     main = 0.0
     if s.eta != 1.0 and (s.front or s.transmitting > 0.0):
         main = max(_LEAST_MAIN, max_component(flat.mirrored) + max_component(flat.refracted))
     if not s.front:
         return _Shares(0.0, 0.0, main)
     cosine = s.diffuse * max_component(s.base) + _SHEEN * max_component(sheen_colour(s))
-    return _Shares(cosine, s.clearcoat * coat_fresnel(s, wo.z), main)
+    return _Shares(cosine, s.clearcoat * coat_fresnel(refraction.thin), main)
 
 
 @kernel
 def _value(s: Surface, wo: Vec3, wi: Vec3) -> Vec3:
     """f |cos wi| with wo above."""
     if wi.z < 0.0:
-        bent = bend(wo, wi, s.eta)
-        refracted = facet(s, dot(wo, bent.h)).refracted
+        bent = bend(wo, wi, s.relative_ior, s.front)
+        refracted = facet(s, bent.refraction).refracted
         return refracted * (visible_normals(s.m, wo, bent.h) * bent.spread * g1(s.m, wi))
-    h = half_vector(wo, wi)
-    mirrored = facet(s, dot(wo, h)).mirrored
+    h, cos_d = half_vector(wo, wi)
+    refraction = meet(s, cos_d)
+    mirrored = facet(s, refraction).mirrored
     value = mirrored * (0.25 * visible_normals(s.m, wo, h) * g1(s.m, wi))
     if not s.front:
         return value
-    value = value + diffuse(s, wo, wi, h) + sheen(s, wi, h)
-    c = coat(s, wo, wi, h)
+    value = value + diffuse(s, wo, wi, cos_d) + sheen(s, wi, cos_d)
+    c = coat(s, wo, wi, h, refraction.thin)
     return value + Vec3(c, c, c)
 
 
@@ -230,13 +237,12 @@ def _density(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> float:
     if not total > 0.0:
         return 0.0
     if wi.z < 0.0:
-        bent = bend(wo, wi, s.eta)
-        passing = 1.0 - facet(s, dot(wo, bent.h)).share
+        bent = bend(wo, wi, s.relative_ior, s.front)
+        passing = facet(s, bent.refraction).passing
         normals = visible_normals(s.m, wo, bent.h) * bent.spread * (s.eta * s.eta)
         return shares.main / total * passing * normals
-    h = half_vector(wo, wi)
-    cos_o = dot(wo, h)
-    density = shares.main * facet(s, cos_o).share * 0.25 * visible_normals(s.m, wo, h)
+    h, cos_o = half_vector(wo, wi)
+    density = shares.main * facet(s, meet(s, cos_o)).share * 0.25 * visible_normals(s.m, wo, h)
     density += shares.cosine * (wi.z * INV_PI)
     if shares.coat > 0.0 and cos_o > 0.0:
         density += shares.coat * coat_normals(s, h) * h.z / (4.0 * cos_o)
@@ -264,11 +270,11 @@ def pdf(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
 
 
 @kernel
-def _main(s: Surface, f: Facet, wo: Vec3, h: Vec3, u: float) -> Vec3:
+def _main(f: Facet, refraction: Refraction, wo: Vec3, h: Vec3, u: float) -> Vec3:
     """wo mirrored, or refracted, by a microfacet."""
     if u < f.share:
         return reflect(wo, h)
-    return h * (dot(wo, h) / s.eta - f.cos_t) - wo * (1.0 / s.eta)
+    return refract(wo, h, refraction)
 
 
 @kernel
@@ -292,9 +298,10 @@ def sample(
         if not shares.main > 0.0:
             return no_sample()
         h = sample_visible(s.m, wo, u0, u1)
-        f = facet(s, dot(wo, h))
+        refraction = meet(s, max(0.0, dot(wo, h)))
+        f = facet(s, refraction)
         u = (u - shares.cosine - shares.coat) / shares.main
-        wi = _main(s, f, wo, h, u)
+        wi = _main(f, refraction, wo, h, u)
         is_through = u >= f.share
     if wi.z == 0.0 or (wi.z < 0.0) != is_through:
         return no_sample()

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from reference_rt.kernel import kernel
-from reference_rt.materials.fresnel import fresnel
+from reference_rt.materials.fresnel import Refraction, fresnel
 from reference_rt.materials.material import INV_PI
 from reference_rt.materials.microfacet import (
     GGX,
@@ -20,7 +20,7 @@ from reference_rt.materials.microfacet import (
     g1_over_cos,
 )
 from reference_rt.sampling.warp import on_circle
-from reference_rt.vec3 import Vec3, dot, luminance, max_component
+from reference_rt.vec3 import Vec3, luminance, max_component
 
 
 class Surface(NamedTuple):
@@ -28,7 +28,8 @@ class Surface(NamedTuple):
 
     diffuse, transmitting: the shares (1 - metallic) (1 - spec_trans) and (1 - metallic)
     spec_trans;  coat_alpha: roughness of the clear coat;  eta: index of refraction on the other
-    side over that on wo's;  front: whether wo is outside;  m: the main lobe's microfacets."""
+    side over that on wo's;  relative_ior: inside over outside;  front: whether wo is outside;
+    m: the main lobe's microfacets."""
 
     base: Vec3
     roughness: float
@@ -42,19 +43,20 @@ class Surface(NamedTuple):
     diffuse: float
     transmitting: float
     eta: float
+    relative_ior: float
     front: bool
     m: Microfacets
 
 
 class Facet(NamedTuple):
     """What a microfacet of the main lobe does to light: mirrored and refracted, the factors on
-    radiance without the 1 / eta²;  share: the probability with which `sample` mirrors;  cos_t: of
-    the refracted direction with its normal."""
+    radiance without the 1 / eta²;  share, passing: the probabilities with which `sample` mirrors
+    and refracts."""
 
     mirrored: Vec3
     refracted: Vec3
     share: float
-    cos_t: float
+    passing: float
 
 
 @kernel
@@ -66,9 +68,9 @@ def schlick_weight(cosine: float) -> float:
 
 
 @kernel
-def _schlick_cosine(s: Surface, cos_o: float) -> float:
-    """The cosine on the thinner side: that of what is refracted where eta is below 1."""
-    return cos_o if s.eta > 1.0 else fresnel(min(1.0, cos_o), s.eta).cos_t
+def meet(s: Surface, cosine: float) -> Refraction:
+    """What Fresnel says of light at this angle, from wo's side."""
+    return fresnel(cosine if s.front else -cosine, s.relative_ior)
 
 
 @kernel
@@ -84,19 +86,18 @@ def _tint(base: Vec3) -> Vec3:
 
 
 @kernel
-def facet(s: Surface, cos_o: float) -> Facet:
+def facet(s: Surface, refraction: Refraction) -> Facet:
     """Outside: a dielectric, one of tinted reflection and a metal, mixed; inside, a dielectric.
     What passes is tinted by the base colour's root on each way (Burley 2015, section 5)."""
-    refraction = fresnel(min(1.0, cos_o), s.eta)
-    f, one = refraction.reflectance, Vec3(1.0, 1.0, 1.0)
+    f, passing, one = refraction.reflectance, refraction.transmittance, Vec3(1.0, 1.0, 1.0)
     if s.eta == 1.0:
-        f = 0.0
+        f, passing = 0.0, 1.0
     root = Vec3(math.sqrt(s.base.x), math.sqrt(s.base.y), math.sqrt(s.base.z))
-    refracted = root * (s.transmitting * (1.0 - f))
+    refracted = root * (s.transmitting * passing)
     mirrored = one * (s.transmitting * f)
     if s.front:
         r0 = (s.eta - 1.0) / (s.eta + 1.0)
-        rise = schlick_weight(_schlick_cosine(s, cos_o))
+        rise = schlick_weight(refraction.thin)
         plain = one * ((1.0 - s.metallic) * (1.0 - s.spec_tint) * f)
         tinted = _lerp(_tint(s.base) * (r0 * r0), one, rise)
         metal = _lerp(s.base, one, rise)
@@ -104,7 +105,9 @@ def facet(s: Surface, cos_o: float) -> Facet:
     if f == 0.0:
         mirrored = Vec3(0.0, 0.0, 0.0)
     r, t = max_component(mirrored), max_component(refracted)
-    return Facet(mirrored, refracted, r / (r + t) if r + t > 0.0 else 1.0, refraction.cos_t)
+    if r + t == 0.0:
+        return Facet(mirrored, refracted, 1.0, 0.0)
+    return Facet(mirrored, refracted, r / (r + t), t / (r + t))
 
 
 @kernel
@@ -114,12 +117,11 @@ def visible_normals(m: Microfacets, wo: Vec3, h: Vec3) -> float:
 
 
 @kernel
-def diffuse(s: Surface, wo: Vec3, wi: Vec3, h: Vec3) -> Vec3:
+def diffuse(s: Surface, wo: Vec3, wi: Vec3, cos_d: float) -> Vec3:
     """Burley 2012, section 5.3, with the retro-reflection apart (Burley 2015, eq. 4), and
     `flatness` of the way to the approximation of scattering under the skin (2012, section 5.3:
     after Hanrahan & Krueger 1993)."""
     f_i, f_o = schlick_weight(wi.z), schlick_weight(wo.z)
-    cos_d = dot(h, wi)
     retro = 2.0 * s.roughness * cos_d * cos_d
     lambert = (1.0 - 0.5 * f_i) * (1.0 - 0.5 * f_o)
     surface = lambert + retro * (f_o + f_i + f_o * f_i * (retro - 1.0))
@@ -138,15 +140,15 @@ def sheen_colour(s: Surface) -> Vec3:
 
 
 @kernel
-def sheen(s: Surface, wi: Vec3, h: Vec3) -> Vec3:
+def sheen(s: Surface, wi: Vec3, cos_d: float) -> Vec3:
     """Burley 2012, section 5.5: cloth's edges."""
-    return sheen_colour(s) * (schlick_weight(dot(h, wi)) * wi.z)
+    return sheen_colour(s) * (schlick_weight(cos_d) * wi.z)
 
 
 @kernel
-def coat_fresnel(s: Surface, cos_o: float) -> float:
-    """Schlick's, of a lacquer of index 1.5."""
-    return 0.04 + 0.96 * schlick_weight(_schlick_cosine(s, cos_o))
+def coat_fresnel(thin: float) -> float:
+    """Schlick's, of a lacquer of index 1.5, with the cosine on the thinner side of the base."""
+    return 0.04 + 0.96 * schlick_weight(thin)
 
 
 @kernel
@@ -168,10 +170,10 @@ def sample_coat(s: Surface, u0: float, u1: float) -> Vec3:
 
 
 @kernel
-def coat(s: Surface, wo: Vec3, wi: Vec3, h: Vec3) -> float:
+def coat(s: Surface, wo: Vec3, wi: Vec3, h: Vec3, thin: float) -> float:
     """A quarter of the strength and masking of roughness 1/4, by eye (Burley 2012, section 5.4);
     its 1 / (4 cos wo cos wi) is left out, as in Mitsuba."""
     m = Microfacets(GGX, 0.25, 0.25)
     shown = g1(m, wo) * g1(m, wi)
-    strength = 0.25 * s.clearcoat * coat_fresnel(s, dot(wo, h))
+    strength = 0.25 * s.clearcoat * coat_fresnel(thin)
     return strength * coat_normals(s, h) * shown * wi.z

@@ -87,9 +87,9 @@ def evaluate(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) ->
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Vec3(0.0, 0.0, 0.0)
     m = microfacets_at(conductors.roughness, i, at)
-    h = half_vector(wo, wi)
-    value = 0.25 * g1_over_cos(m, wo) * density(m, h) * g1(m, wi)
-    return _mirrored(conductors, i, at, dot(wo, h)) * value
+    half = half_vector(wo, wi)
+    value = 0.25 * g1_over_cos(m, wo) * density(m, half.h) * g1(m, wi)
+    return _mirrored(conductors, i, at, half.cosine) * value
 
 
 @kernel
@@ -98,7 +98,7 @@ def pdf(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> floa
     if wo.z <= 0.0 or wi.z <= 0.0:
         return 0.0
     m = microfacets_at(conductors.roughness, i, at)
-    return 0.25 * g1_over_cos(m, wo) * density(m, half_vector(wo, wi))
+    return 0.25 * g1_over_cos(m, wo) * density(m, half_vector(wo, wi).h)
 
 
 @kernel

@@ -11,6 +11,7 @@ normal incidence 0.1 % of the light at alpha = 0.1, 1 % at 0.3 and 11 % at 1 fro
 inside 1 %, 10 % and 58 %.
 """
 
+import math
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from pydantic import model_validator
 
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
-from reference_rt.materials.fresnel import fresnel
+from reference_rt.materials.fresnel import Refraction, fresnel, relative_index
 from reference_rt.materials.material import BsdfSample, Material, no_sample
 from reference_rt.materials.microfacet import (
     AlphaParameter,
@@ -32,6 +33,7 @@ from reference_rt.materials.microfacet import (
     half_vector,
     is_anisotropic,
     microfacets_at,
+    refract,
     roughnesses,
     sample_visible,
     visible_density,
@@ -59,11 +61,11 @@ class RoughDielectric(Material):
 
     @model_validator(mode="after")
     def _bends(self) -> "RoughDielectric":
-        # Half vectors are off by u / |eta - 1|, which must stay far below MIN_ALPHA.
-        if abs(self.interior_ior / self.exterior_ior - 1.0) < 1e-6:
+        # Directions, which are off by u, tell normals to u / |eta - 1|: a thousandth of MIN_ALPHA.
+        if abs(self.interior_ior / self.exterior_ior - 1.0) < 1e-9:
             raise ValueError(
                 "interior_ior and exterior_ior are equal: such a boundary bends nothing; "
-                "expected indices that differ by more than a millionth"
+                "expected indices that differ by a billionth or more"
             )
         return self
 
@@ -81,7 +83,7 @@ class RoughDielectric(Material):
 
     def tabulate(self, palette: Palette) -> "RoughDielectrics":
         return RoughDielectrics(
-            np.array([self.interior_ior / self.exterior_ior]),
+            np.array([relative_index(self.interior_ior, self.exterior_ior)]),
             palette.colours(self.reflectance),
             palette.colours(self.transmittance),
             roughnesses(self.distribution, self.alpha, palette),
@@ -100,37 +102,34 @@ class RoughDielectrics(NamedTuple):
 
 class _Facet(NamedTuple):
     """What a microfacet does to light: mirrored and refracted, the factors on radiance without the
-    1 / eta²;  share: the probability with which `sample` mirrors;  cos_t: of the refracted
-    direction with its normal."""
+    1 / eta²;  share, passing: the probabilities with which `sample` mirrors and refracts."""
 
     mirrored: Vec3
     refracted: Vec3
     share: float
-    cos_t: float
+    passing: float
 
 
 @kernel
-def _facet(dielectrics: RoughDielectrics, i: int, at: At, cosine: float, eta: float) -> _Facet:
-    refraction = fresnel(min(1.0, cosine), eta)
-    f = refraction.reflectance
-    mirrored = colour_at(dielectrics.reflectance, i, at) * f
-    refracted = colour_at(dielectrics.transmittance, i, at) * (1.0 - f)
+def _facet(dielectrics: RoughDielectrics, i: int, at: At, refraction: Refraction) -> _Facet:
+    mirrored = colour_at(dielectrics.reflectance, i, at) * refraction.reflectance
+    refracted = colour_at(dielectrics.transmittance, i, at) * refraction.transmittance
     r, t = max_component(mirrored), max_component(refracted)
-    share = r / (r + t) if r + t > 0.0 else 1.0
-    return _Facet(mirrored, refracted, share, refraction.cos_t)
+    if r + t == 0.0:
+        return _Facet(mirrored, refracted, 1.0, 0.0)
+    return _Facet(mirrored, refracted, r / (r + t), t / (r + t))
+
+
+@kernel
+def _meet(dielectrics: RoughDielectrics, i: int, side: float, cosine: float) -> Refraction:
+    """What Fresnel says of light at this angle, from the side of wo.z = `side`."""
+    return fresnel(math.copysign(cosine, side), dielectrics.eta[i])
 
 
 @kernel
 def _upwards(v: Vec3, side: float) -> Vec3:
     """`v` as seen with wo above: the microfacets are the same from either side."""
     return Vec3(v.x, v.y, -v.z) if side < 0.0 else v
-
-
-@kernel
-def _eta(dielectrics: RoughDielectrics, i: int, side: float) -> float:
-    """The index of refraction on the other side over that on wo's."""
-    eta = float(dielectrics.eta[i])
-    return eta if side > 0.0 else 1.0 / eta
 
 
 @kernel
@@ -145,15 +144,15 @@ def evaluate(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) 
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
         return Vec3(0.0, 0.0, 0.0)
-    wo, wi, eta = _upwards(wo, side), _upwards(wi, side), _eta(dielectrics, i, side)
+    wo, wi = _upwards(wo, side), _upwards(wi, side)
     m = microfacets_at(dielectrics.roughness, i, at)
     shown = g1_over_cos(m, wo) * g1(m, wi)
     if wi.z > 0.0:
-        h = half_vector(wo, wi)
-        facet = _facet(dielectrics, i, at, dot(wo, h), eta)
-        return facet.mirrored * (0.25 * density(m, h) * shown)
-    found = bend(wo, wi, eta)
-    facet = _facet(dielectrics, i, at, dot(wo, found.h), eta)
+        half = half_vector(wo, wi)
+        facet = _facet(dielectrics, i, at, _meet(dielectrics, i, side, half.cosine))
+        return facet.mirrored * (0.25 * density(m, half.h) * shown)
+    found = bend(wo, wi, dielectrics.eta[i], side > 0.0)
+    facet = _facet(dielectrics, i, at, found.refraction)
     return facet.refracted * (density(m, found.h) * found.spread * shown)
 
 
@@ -163,16 +162,17 @@ def pdf(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> fl
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
         return 0.0
-    wo, wi, eta = _upwards(wo, side), _upwards(wi, side), _eta(dielectrics, i, side)
+    wo, wi = _upwards(wo, side), _upwards(wi, side)
     m = microfacets_at(dielectrics.roughness, i, at)
     if wi.z > 0.0:
-        h = half_vector(wo, wi)
-        facet = _facet(dielectrics, i, at, dot(wo, h), eta)
-        return facet.share * _mirrored_density(m, wo, h)
-    found = bend(wo, wi, eta)
-    facet = _facet(dielectrics, i, at, dot(wo, found.h), eta)
-    normals = g1_over_cos(m, wo) * density(m, found.h)
-    return (1.0 - facet.share) * normals * found.spread * (eta * eta)
+        half = half_vector(wo, wi)
+        facet = _facet(dielectrics, i, at, _meet(dielectrics, i, side, half.cosine))
+        return facet.share * _mirrored_density(m, wo, half.h)
+    n = float(dielectrics.eta[i])
+    found = bend(wo, wi, n, side > 0.0)
+    facet = _facet(dielectrics, i, at, found.refraction)
+    eta = n if side > 0.0 else 1.0 / n
+    return facet.passing * g1_over_cos(m, wo) * density(m, found.h) * found.spread * (eta * eta)
 
 
 @kernel
@@ -183,11 +183,11 @@ def sample(
     side = wo.z
     if side == 0.0:
         return no_sample()
-    wo, eta = _upwards(wo, side), _eta(dielectrics, i, side)
+    wo = _upwards(wo, side)
     m = microfacets_at(dielectrics.roughness, i, at)
     h = sample_visible(m, wo, u0, u1)
-    cos_o = dot(wo, h)
-    facet = _facet(dielectrics, i, at, cos_o, eta)
+    refraction = _meet(dielectrics, i, side, max(0.0, dot(wo, h)))
+    facet = _facet(dielectrics, i, at, refraction)
     if u_lobe < facet.share:
         wi = reflect(wo, h)
         density_of_wi = facet.share * _mirrored_density(m, wo, h)
@@ -195,12 +195,11 @@ def sample(
             return no_sample()
         weight = facet.mirrored * (g1(m, wi) / facet.share)
         return BsdfSample(_upwards(wi, side), weight, density_of_wi, 1.0, False)
-    wi = h * (cos_o / eta - facet.cos_t) - wo * (1.0 / eta)
-    probability = 1.0 - facet.share
-    length = cos_o - eta * facet.cos_t  # of wo + eta wi
-    spread = eta * eta * facet.cos_t / (length * length)
-    density_of_wi = probability * visible_density(m, wo, h) * spread
-    if wi.z >= 0.0 or density_of_wi == 0.0:
+    eta, gap = refraction.eta, refraction.gap
+    wi = refract(wo, h, refraction)
+    spread = refraction.cos_t / (gap * gap)  # wo + eta wi is eta gap h
+    density_of_wi = facet.passing * visible_density(m, wo, h) * spread
+    if wi.z >= 0.0 or not density_of_wi > 0.0:
         return no_sample()
-    weight = facet.refracted * (g1(m, wi) / (probability * eta * eta))
+    weight = facet.refracted * (g1(m, wi) / (facet.passing * eta * eta))
     return BsdfSample(_upwards(wi, side), weight, density_of_wi, eta, False)

@@ -25,7 +25,7 @@ from pydantic import Field
 
 from reference_rt.description import Positive
 from reference_rt.kernel import entry_kernel, kernel
-from reference_rt.materials.fresnel import fresnel
+from reference_rt.materials.fresnel import fresnel, relative_index
 from reference_rt.materials.material import INV_PI, BsdfSample, Material, no_sample
 from reference_rt.materials.microfacet import (
     MAX_ALPHA,
@@ -37,6 +37,7 @@ from reference_rt.materials.microfacet import (
     g1_over_cos,
     half_vector,
     microfacets_at,
+    refract,
     roughnesses,
     sample_visible,
 )
@@ -77,7 +78,7 @@ class RoughPlastic(Material):
         return self.reflectance
 
     def tabulate(self, palette: Palette) -> "RoughPlastics":
-        eta = self.interior_ior / self.exterior_ior
+        eta = relative_index(self.interior_ior, self.exterior_ior)
         roughness = roughnesses(self.distribution, (self.alpha, self.alpha), palette)
         m = microfacets_at(roughness, 0, _NOWHERE)
         return RoughPlastics(
@@ -122,12 +123,11 @@ def _scatter(
         for a in range(len(nodes)):
             for b in range(len(nodes)):
                 h = sample_visible(m, wo, nodes[a], nodes[b])
-                cos_o = dot(wo, h)
-                refraction = fresnel(min(1.0, cos_o), eta)
+                refraction = fresnel(max(0.0, dot(wo, h)), eta)
                 share, wi = refraction.reflectance, reflect(wo, h)
                 if through:
-                    share = 1.0 - share
-                    wi = wo * (1.0 / eta) - h * (cos_o / eta - refraction.cos_t)
+                    share = refraction.transmittance
+                    wi = refract(wo, h, refraction) * -1.0
                 if wi.z > 0.0:
                     total += weights[a] * weights[b] * share * g1(m, wi)
         out[k] = total
@@ -194,9 +194,9 @@ def _lobes(plastics: RoughPlastics, i: int, at: At, wo: Vec3) -> _Lobes:
 @kernel
 def _value(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) -> Vec3:
     """f cos wi above the surface."""
-    eta, h = float(plastics.eta[i]), half_vector(wo, wi)
-    f = fresnel(min(1.0, dot(wo, h)), eta).reflectance
-    mirrored = f * (0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, h) * g1(lobes.m, wi))
+    eta, half = float(plastics.eta[i]), half_vector(wo, wi)
+    f = fresnel(half.cosine, eta).reflectance
+    mirrored = f * (0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, half.h) * g1(lobes.m, wi))
     t_i = _passing(plastics, i, min(1.0, wi.z))
     diffuse = t_i * lobes.t_o / (eta * eta) * (wi.z * INV_PI)
     return lobes.specular * mirrored + lobes.base * diffuse
@@ -204,7 +204,7 @@ def _value(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) -
 
 @kernel
 def _density(lobes: _Lobes, wo: Vec3, wi: Vec3) -> float:
-    normals = 0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, half_vector(wo, wi))
+    normals = 0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, half_vector(wo, wi).h)
     return lobes.p * normals + (1.0 - lobes.p) * (wi.z * INV_PI)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
-from reference_rt.materials.fresnel import fresnel
+from reference_rt.materials.fresnel import fresnel, relative_index
 from reference_rt.materials.material import Branches, Material
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
@@ -37,7 +37,7 @@ class ThinDielectric(Material):
 
     def tabulate(self, palette: Palette) -> "ThinDielectrics":
         return ThinDielectrics(
-            np.array([self.interior_ior / self.exterior_ior]),
+            np.array([relative_index(self.interior_ior, self.exterior_ior)]),
             palette.colours(self.reflectance),
             palette.colours(self.transmittance),
         )
@@ -54,14 +54,17 @@ class ThinDielectrics(NamedTuple):
 @kernel
 def branches(panes: ThinDielectrics, i: int, at: At, wo: Vec3) -> Branches:
     """With R the reflectance of one face, both together mirror R + T R T + T R R R T + ... =
-    2 R / (1 + R), and the rest goes straight on, as dense as before (PBR 4ed, 9.5.3)."""
-    r = fresnel(abs(wo.z), panes.eta[i]).reflectance
-    r = 2.0 * r / (1.0 + r)
+    2 R / (1 + R), and the rest, T / (1 + R), goes straight on, as dense as before (PBR 4ed,
+    9.5.3)."""
+    face = fresnel(abs(wo.z), panes.eta[i])
+    r = 2.0 * face.reflectance / (1.0 + face.reflectance)
+    t = face.transmittance / (1.0 + face.reflectance)
     return Branches(
         Vec3(-wo.x, -wo.y, wo.z),
         colour_at(panes.reflectance, i, at) * r,
         -wo,
-        colour_at(panes.transmittance, i, at) * (1.0 - r),
+        colour_at(panes.transmittance, i, at) * t,
         r,
+        t,
         1.0,
     )

@@ -66,10 +66,9 @@ def cosine_hemisphere(u0: float, u1: float) -> Vec3:
 @kernel
 def uniform_sphere(u0: float, u1: float) -> Vec3:
     """A direction with density 1 / (4 pi) (Archimedes: height is uniform)."""
-    z = 1.0 - 2.0 * u0
-    r = math.sqrt(max(0.0, 1.0 - z * z))
+    r = 2.0 * math.sqrt(u0 * (1.0 - u0))
     cos_phi, sin_phi = on_circle(u1)
-    return Vec3(r * cos_phi, r * sin_phi, z)
+    return Vec3(r * cos_phi, r * sin_phi, 1.0 - 2.0 * u0)
 
 
 @kernel

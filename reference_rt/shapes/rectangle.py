@@ -37,7 +37,8 @@ area, the irradiance has a relative variance per sample of 0.002 seen from the f
 70 ns more."""
 
 _LEAST_SOLID_ANGLE = 2.0**-26
-"""It rounds by a few u = 2^-53: here half of its digits are left.  Below, by area."""
+"""Places in it are found by differences of angles, which round by a few u = 2^-53: here half of
+their digits are left.  Below, by area."""
 
 _LEAST_HEIGHT = 2.0**-500
 """In half diagonals: its square is a float64."""

@@ -35,10 +35,26 @@ def _corner(x: float, y: float, h: float) -> float:
 
 
 @kernel
+def solid_angle_of(h: float, x0: float, x1: float, y0: float, y1: float) -> float:
+    """Of two triangles, that of each by tan(omega / 2) = |a b c| / (abc + (a·b) c + (b·c) a +
+    (c·a) b) (van Oosterom & Strackee 1983, "The Solid Angle of a Plane Triangle"): the triple
+    product is h times twice the area, so that small ones keep their digits, which differences of
+    angles at corners lose."""
+    volume, h2 = h * (x1 - x0) * (y1 - y0), h * h
+    a, b = math.sqrt(x0 * x0 + y0 * y0 + h2), math.sqrt(x1 * x1 + y0 * y0 + h2)
+    c, d = math.sqrt(x1 * x1 + y1 * y1 + h2), math.sqrt(x0 * x0 + y1 * y1 + h2)
+    ac = x0 * x1 + y0 * y1 + h2
+    ab, bc = x0 * x1 + y0 * y0 + h2, x1 * x1 + y0 * y1 + h2
+    ad, dc = x0 * x0 + y0 * y1 + h2, x0 * x1 + y1 * y1 + h2
+    lower = math.atan2(volume, a * b * c + ab * c + bc * a + ac * b)
+    upper = math.atan2(volume, a * d * c + ad * c + dc * a + ac * d)
+    return 2.0 * (lower + upper)
+
+
+@kernel
 def see(h: float, x0: float, x1: float, y0: float, y1: float) -> Seen:
     phi = _corner(x0, y1, h) - _corner(x0, y0, h)
-    solid_angle = (_corner(x1, y1, h) - _corner(x1, y0, h)) - phi
-    return Seen(h, x0, x1, y0, y1, phi, solid_angle)
+    return Seen(h, x0, x1, y0, y1, phi, solid_angle_of(h, x0, x1, y0, y1))
 
 
 @kernel

@@ -73,6 +73,18 @@ def test_reflectance_at_the_ends(eta, k):
     assert conductor_reflectance(0.0, eta, k) == 1.0
 
 
+def test_faint_reflections_keep_their_digits():
+    """Of the very floats, where hardly anything differs from what is outside."""
+    ctx.dps = 60
+    rng = np.random.default_rng(41)
+    for _ in range(300):
+        c, off, k = (10.0 ** rng.uniform(low, 0 if low > -9 else -1) for low in (-6, -10, -10))
+        eta = float(1 + off * rng.choice([-1, 1]))
+        exact = by_normal_components(float(c), eta, float(k))
+        found = conductor_reflectance(float(c), eta, float(k))
+        assert abs(float((arb(found) - exact) / exact)) <= 64 * U, (c, eta, k)
+
+
 def test_nothing_is_there_where_nothing_refracts():
     assert conductor_reflectance(0.3, 1.0, 0.0) == pytest.approx(0.0, abs=4 * U)
 

@@ -1,0 +1,135 @@
+"""Scenes whose every pixel has one known radiance, rendered by ours and by Mitsuba.
+
+All have the same kinds of shapes, materials and lights, some of them black and too small to be met,
+so that ours compiles its kernels once.  Mitsuba's have only what counts.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.mitsuba_backend import scalar
+from comparisons.mitsuba_scene import picture
+from comparisons.stability.family import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.translate import load
+from reference_rt import transform
+
+_TINY = transform.Scale(scale=(1e-30, 1e-30, 1e-30))
+
+
+def at(x: float, y: float, z: float) -> transform.Translate:
+    return transform.Translate(translate=(x, y, z))
+
+
+def facing(axis: tuple[float, float, float], degrees: float) -> transform.Rotate:
+    return transform.Rotate(rotate=transform.Turn(axis=axis, degrees=degrees))
+
+
+def grey(x: float) -> tuple[float, float, float]:
+    return x, x, x
+
+
+_HIDDEN = (
+    rt.Rectangle(material="nothing", transform=(_TINY, at(0.01, -900.0, 0.01))),
+    rt.Sphere(material="glass", center=(0.02, -900.0, 0.01), radius=1e-30),
+    rt.Disk(material="black", transform=(_TINY, at(0.03, -900.0, 0.01))),
+    rt.Triangle(
+        material="black",
+        v0=(0.04, -900.0, 0.01),
+        v1=(0.04, -900.0, 0.01 + 1e-9),
+        v2=(0.04 + 1e-9, -900.0, 0.01),
+    ),
+)
+_MATERIALS: Mapping[str, Any] = {
+    "black": rt.Diffuse(reflectance=grey(0.0)),
+    "glass": rt.Dielectric(),
+    "nothing": rt.Emissive(radiance=grey(0.0)),
+}
+
+
+class World(NamedTuple):
+    """shapes, materials: what counts;  sky: radiance from all sides;  expected: what every pixel
+    sees;  path: fields of the integrator;  rounding: of what is expected, relatively, per u."""
+
+    shapes: tuple[Any, ...]
+    materials: Mapping[str, Any]
+    camera: Any
+    expected: float
+    path: Mapping[str, Any]
+    sky: float = 0.0
+    rounding: float = 64.0
+
+
+def scene_of(world: World, pixels: int, spp: int, seed: int, hidden: bool) -> rt.Scene:
+    """pixels: along either side of the picture."""
+    lights = (rt.Constant(radiance=grey(world.sky)),) if hidden or world.sky > 0.0 else ()
+    return rt.Scene(
+        camera=world.camera,
+        film=rt.Film(width=pixels, height=pixels, filter=rt.BoxFilter()),
+        sampler=rt.Sobol(spp=spp, seed=seed) if hidden else rt.Independent(spp=spp, seed=seed),
+        integrator=rt.Path(**world.path),
+        hierarchy="sah",
+        materials={**(_MATERIALS if hidden else {}), **world.materials},
+        shapes=(*(_HIDDEN if hidden else ()), *world.shapes),
+        lights=lights,
+    )
+
+
+def ours(world: World, pixels: int, spp: int, seed: int) -> FloatArray:
+    """(pixels², 3)."""
+    scene = scene_of(world, pixels, spp, seed, hidden=True)
+    return rt.render(scene).colour.reshape(-1, 3)
+
+
+def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> FloatArray:
+    def render() -> FloatArray:
+        twin = load(scene_of(world, pixels, spp, seed, hidden=False))
+        return picture(twin.mi_scene, spp, seed).reshape(-1, 3)
+
+    if not in_scalar:
+        return render()
+    with scalar():
+        return render()
+
+
+def judge(
+    pictures: Mapping[str, FloatArray],
+    expected: float,
+    rounding: Callable[[str], float],
+    told: Mapping[str, Any],
+    errors: float = 4.0,
+) -> dict[str, Outcome]:
+    """One case: the mean within `errors` standard errors and rounding, and finite.  The worst is
+    relative."""
+    found = {}
+    for who, pixels in pictures.items():
+        one = pixels.mean(axis=1)
+        mean = float(one.mean())
+        noise = float(one.std(ddof=1)) / math.sqrt(len(one))
+        off = abs(mean - expected)
+        ok = math.isfinite(mean) and off <= errors * noise + rounding(who) * expected
+        relative = off / expected if math.isfinite(off) else math.inf
+        example = {**told, "expected": expected, "found": mean, "standard error": noise}
+        found[who] = Outcome(1, int(not ok), relative, examples=() if ok else (example,))
+    return found
+
+
+def measure(
+    world: World,
+    draw: Draw,
+    spp: int,
+    rounding: Callable[[str], float],
+    told: Mapping[str, Any],
+    pixels: int = 32,
+    in_scalar: bool = True,
+    their_pixels: int = 16,
+) -> dict[str, Outcome]:
+    seed = int(draw.rng.integers(1, 2**31))
+    pictures = {OURS: ours(world, pixels, spp, seed)}
+    if draw.mitsuba:
+        with np.errstate(all="ignore"):
+            pictures[MITSUBA] = theirs(world, their_pixels, spp, seed, in_scalar)
+    return judge(pictures, world.expected, rounding, {**told, "seed": seed})
