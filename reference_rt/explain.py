@@ -9,7 +9,7 @@ from reference_rt.integrators import RayCast, Whitted
 from reference_rt.lights import Lights
 from reference_rt.lights.environment_map import EnvironmentMaps
 from reference_rt.limits import limits_of, told
-from reference_rt.materials import SMOOTH
+from reference_rt.materials import any_smooth
 from reference_rt.materials.layers import Layers
 from reference_rt.materials.leaves import TABLES as MATERIAL_TABLES
 from reference_rt.sampling import Grid
@@ -207,7 +207,7 @@ def _picking(tables: SceneTables, used: Lines, left_out: Lines) -> None:
     if choice is None:
         left_out.append(("light sampling", "there is no light to sample"))
         return
-    if not (tables.materials.traits & SMOOTH).any():
+    if not any_smooth(tables.materials):
         left_out.append(
             ("light sampling", "every material mirrors or refracts: it would find none")
         )

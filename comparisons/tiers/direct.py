@@ -16,7 +16,7 @@ from comparisons.tiers.rays import Rays, mixed_rays
 from comparisons.tiers.setting import POINT_LIKE, Setting
 from comparisons.twin import Twin
 from reference_rt import query
-from reference_rt.materials import SMOOTH
+from reference_rt.materials import any_smooth
 from reference_rt.query import DirectLight
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -62,7 +62,7 @@ def direct(
         return Tier("direct", "not-applicable", "the scene has no light")
     if twin.lacking:
         return Tier("direct", "not-comparable", twin.lacking)
-    if not (tables.materials.traits & SMOOTH).any():
+    if not any_smooth(tables.materials):
         return Tier("direct", "not-applicable", "no material scatters light that a light sends")
     sizes = ShapeSizes(scene, twin.frame)
     rays = mixed_rays(scene, tables, sizes, pixels, seed)

@@ -15,11 +15,9 @@ from reference_rt.materials.conductor import Conductor
 from reference_rt.materials.dielectric import Dielectric
 from reference_rt.materials.diffuse import Diffuse
 from reference_rt.materials.dispatch import (
-    BEHIND,
-    CHOOSES,
-    SMOOTH,
     Materials,
     ambient,
+    any_smooth,
     branch_count,
     branches,
     chooses,
@@ -73,10 +71,7 @@ AnyMaterial = Annotated[
 ]
 
 __all__ = [
-    "BEHIND",
     "BLACK",
-    "CHOOSES",
-    "SMOOTH",
     "AnyMaterial",
     "Blend",
     "Branches",
@@ -102,6 +97,7 @@ __all__ = [
     "TwoSided",
     "Wrapper",
     "ambient",
+    "any_smooth",
     "branch_count",
     "branches",
     "chooses",

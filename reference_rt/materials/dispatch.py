@@ -14,21 +14,23 @@ from reference_rt.shapes.shape import IntArray
 from reference_rt.textures import At, Colours
 from reference_rt.vec3 import Vec3, to_local, to_world
 
-# Bits of `Materials.traits`.
-SMOOTH, CHOOSES, BEHIND = 1, 2, 4
-
 
 class Materials(NamedTuple):
-    """Of each material: kind (n,) and row (n,), which table it is a row of, where it is no layers;
-    traits (n,), SMOOTH where lights can be sampled, CHOOSES where `sample` uses `u_lobe`, BEHIND
-    where light from both sides of the surface counts; shown
-    (n), its colour to ray casting.  oriented (1,) where any scatters differently along u and v, or
-    is tilted by a texture, else None;  textured, None where none has a texture;  layers, None where
-    no material is made of others;  leaves, the tables."""
+    """Of each material: kind (n,) and row (n,), which table it is a row of, where it is no layers,
+    kind None where there is but one table;
+    smooth (n,), whether lights can be sampled, None where all are smooth;  chooses (n,), whether
+    `sample` uses `u_lobe`, None where none does;  behind (n,), whether light from both sides of the
+    surface counts, None where it never does;  shown (n), its colour to ray casting.
 
-    kind: IntArray
+    oriented (1,) where any scatters differently along u and v, or is tilted by a texture, else
+    None;  textured, None where none has a texture;  layers, None where no material is made of
+    others;  leaves, the tables."""
+
+    kind: IntArray | None
     row: IntArray
-    traits: IntArray
+    smooth: IntArray | None
+    chooses: IntArray | None
+    behind: IntArray | None
     shown: Colours
     oriented: IntArray | None
     textured: Textured | None
@@ -36,22 +38,41 @@ class Materials(NamedTuple):
     leaves: Leaves
 
 
+def any_smooth(materials: Materials) -> bool:
+    """Whether there is any to sample lights for."""
+    return materials.smooth is None or bool(materials.smooth.any())
+
+
+@kernel
+def _flag(flags: IntArray | None, m: int, of_all: bool) -> bool:
+    if flags is None:
+        return of_all
+    return bool(flags[m] != 0)
+
+
+@kernel
+def _kind(kinds: IntArray | None, materials: Materials, m: int) -> int:
+    if kinds is None:
+        return any_leaf.only(materials.leaves)
+    return int(kinds[m])
+
+
 @kernel
 def is_smooth(materials: Materials, m: int) -> bool:
     """Whether the material scatters to a continuum of directions, so that lights can be sampled."""
-    return bool(materials.traits[m] & SMOOTH)
+    return _flag(materials.smooth, m, True)
 
 
 @kernel
 def chooses(materials: Materials, m: int) -> bool:
     """Whether `sample` uses its number for the choice of a lobe."""
-    return bool(materials.traits[m] & CHOOSES)
+    return _flag(materials.chooses, m, False)
 
 
 @kernel
 def takes_light_from_behind(materials: Materials, m: int) -> bool:
     """Whether light that comes from both sides of the surface may reach the viewer."""
-    return bool(materials.traits[m] & BEHIND)
+    return _flag(materials.behind, m, False)
 
 
 @kernel
@@ -64,7 +85,7 @@ def evaluate(materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
 def _evaluate(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
     m = shading.point.material
     if layers is None:
-        kind, i = materials.kind[m], materials.row[m]
+        kind, i = _kind(materials.kind, materials, m), materials.row[m]
         return any_leaf.evaluate(materials.leaves, kind, i, shading.at, shading.wo, wi)
     total = Vec3(0.0, 0.0, 0.0)
     first = layers.first[m]
@@ -88,7 +109,7 @@ def pdf(materials: Materials, shading: Shading, wi: Vec3) -> float:
 def _pdf(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> float:
     m = shading.point.material
     if layers is None:
-        kind, i = materials.kind[m], materials.row[m]
+        kind, i = _kind(materials.kind, materials, m), materials.row[m]
         return any_leaf.pdf(materials.leaves, kind, i, shading.at, shading.wo, wi)
     density, total = 0.0, 0.0
     first = layers.first[m]
@@ -122,7 +143,7 @@ def _sample(
 ) -> BsdfSample:
     m = shading.point.material
     if layers is None:
-        kind, i = materials.kind[m], materials.row[m]
+        kind, i = _kind(materials.kind, materials, m), materials.row[m]
         return any_leaf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
     first, count = layers.first[m], layers.number[m]
     total = 0.0
@@ -207,7 +228,8 @@ def ambient(materials: Materials, shading: Shading) -> Vec3:
 def _ambient(layers: Layers | None, materials: Materials, shading: Shading) -> Vec3:
     m = shading.point.material
     if layers is None:
-        return any_leaf.ambient(materials.leaves, materials.kind[m], materials.row[m], shading.at)
+        kind, i = _kind(materials.kind, materials, m), materials.row[m]
+        return any_leaf.ambient(materials.leaves, kind, i, shading.at)
     total = Vec3(0.0, 0.0, 0.0)
     first = layers.first[m]
     for k in range(layers.number[m]):
@@ -228,7 +250,7 @@ def branches(materials: Materials, shading: Shading, k: int) -> Branches:
 def _branches(layers: Layers | None, materials: Materials, shading: Shading, k: int) -> Branches:
     m = shading.point.material
     if layers is None:
-        kind, i = materials.kind[m], materials.row[m]
+        kind, i = _kind(materials.kind, materials, m), materials.row[m]
         return any_leaf.branches(materials.leaves, kind, i, shading.at, shading.wo)
     layer = layer_at(shading, k)
     k += layers.first[m]

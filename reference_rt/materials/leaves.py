@@ -138,6 +138,33 @@ _ambient = _of_table("ambient", _no_ambient)
 
 
 @kernel
+def only(leaves: Leaves) -> int:
+    """The code of the table where there is but one: a constant, so that choices vanish."""
+    kind = PHONG
+    if leaves.diffuses is not None:
+        kind = DIFFUSE
+    elif leaves.mirrors is not None:
+        kind = MIRROR
+    elif leaves.dielectrics is not None:
+        kind = DIELECTRIC
+    elif leaves.conductors is not None:
+        kind = CONDUCTOR
+    elif leaves.thin_dielectrics is not None:
+        kind = THIN_DIELECTRIC
+    elif leaves.rough_conductors is not None:
+        kind = ROUGH_CONDUCTOR
+    elif leaves.rough_dielectrics is not None:
+        kind = ROUGH_DIELECTRIC
+    elif leaves.plastics is not None:
+        kind = PLASTIC
+    elif leaves.rough_plastics is not None:
+        kind = ROUGH_PLASTIC
+    elif leaves.principleds is not None:
+        kind = PRINCIPLED
+    return kind
+
+
+@kernel
 def evaluate(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
     """f(wo, wi) |cos wi| of one leaf, without what it mirrors or refracts perfectly."""
     value = Vec3(0.0, 0.0, 0.0)

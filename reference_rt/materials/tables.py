@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_rt.materials import BEHIND, CHOOSES, SMOOTH, Materials
+from reference_rt.materials import Materials
 from reference_rt.materials.diffuse import Diffuse
 from reference_rt.materials.emissive import Emissive
 from reference_rt.materials.layers import LayerTables
@@ -26,11 +26,14 @@ DEFAULT = "\0"
 
 
 def material_tables(scene: "Scene", palette: Palette, default: bool) -> Materials:
-    """The materials of a scene in its order, then the default one, if that is used (`default`).
+    """The materials of a scene in its order, then the default one, if that is used (`default`) or
+    there is no other.
 
     An emissive material scatters as its base does.  Raises SceneError.
     """
-    materials: dict[str, Material] = {**scene.materials, DEFAULT: Diffuse()}
+    materials: dict[str, Material] = {**scene.materials}
+    if default or not materials:
+        materials[DEFAULT] = Diffuse()
     leaves, layers = _Leaves(materials, palette), LayerTables(palette)
     kinds, rows, traits, shown = [], [], [], []
     oriented = False
@@ -53,10 +56,14 @@ def material_tables(scene: "Scene", palette: Palette, default: bool) -> Material
         rows.append(row)
         traits.append(_traits(found, materials))
         oriented = oriented or any(needs_tangents(way, materials) for way in found)
+    smooth, chooses, behind = np.ascontiguousarray(np.array(traits, np.int64).T)
+    is_one_table = len(leaves.parts) == 1 and set(kinds) == leaves.parts.keys()
     return Materials(
-        kind=np.array(kinds),
+        kind=None if is_one_table else np.array(kinds),
         row=np.array(rows),
-        traits=np.array(traits),
+        smooth=None if smooth.all() else smooth,
+        chooses=chooses if chooses.any() else None,
+        behind=behind if behind.any() else None,
         shown=join(shown),
         oriented=np.zeros(1, np.int64) if oriented else None,
         textured=textured_table(materials, palette),
@@ -91,17 +98,14 @@ def _shown(name: str, materials: Mapping[str, Material]) -> tuple[float, float, 
     return material.colour
 
 
-def _traits(found: list[Way], materials: Mapping[str, Material]) -> int:
-    """The bits of `Materials.traits`."""
+def _traits(found: list[Way], materials: Mapping[str, Material]) -> tuple[bool, bool, bool]:
+    """`Materials.smooth`, `chooses` and `behind`."""
     leaves = [materials[way.leaf] for way in found if way.leaf is not None]
-    bits = 0
-    if any(leaf.smooth for leaf in leaves):
-        bits |= SMOOTH
-    if len(found) > 1 or any(leaf.chooses for leaf in leaves):
-        bits |= CHOOSES
-    if any(transmits(way, materials) or way.turns for way in found):
-        bits |= BEHIND
-    return bits
+    return (
+        any(leaf.smooth for leaf in leaves),
+        len(found) > 1 or any(leaf.chooses for leaf in leaves),
+        any(transmits(way, materials) or way.turns for way in found),
+    )
 
 
 class _Leaves:

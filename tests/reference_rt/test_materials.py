@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import reference_rt as rt
-from reference_rt.materials import dielectric, diffuse, mirror
+from reference_rt.materials import any_smooth, dielectric, diffuse, mirror
 from reference_rt.materials.fresnel import fresnel
+from reference_rt.materials.leaves import BLACK, DIFFUSE, TABLES, Leaves, only
 from reference_rt.materials.material import sample_branch
 from reference_rt.textures import NO_TEXTURES, At
 from reference_rt.vec3 import Vec3, dot, length
@@ -151,3 +152,36 @@ def test_diffuse_reflects_its_reflectance():
     values = [diffuse.evaluate(table, 0, AT, Vec3(0, 0, 1), towards(c, 0.0)) for c in ticks]
     # Linear in the cosine: the midpoint rule is exact.
     assert 2 * math.pi * np.mean(values, axis=0) == pytest.approx((0.1, 0.5, 0.9), rel=1e-14)
+
+
+def tables_of(**materials):
+    shapes = tuple(rt.Sphere(material=name) for name in materials)
+    return rt.build_tables(rt.Scene(materials=materials, shapes=shapes)).materials
+
+
+def test_what_all_materials_share_is_said_by_absence():
+    """So that nothing is asked where there is nothing to choose."""
+    diffuse, mirror, lamp = rt.Diffuse(), rt.Mirror(), rt.Emissive(radiance=1.0)
+    alike = tables_of(a=diffuse, b=diffuse)
+    assert alike.kind is alike.smooth is alike.chooses is alike.behind is None
+    assert any_smooth(alike)
+    # A lamp scatters nothing: it is of no table.
+    lit = tables_of(a=diffuse, lamp=lamp)
+    assert lit.kind.tolist() == [DIFFUSE, BLACK]
+    assert lit.smooth.tolist() == [1, 0]
+    assert lit.chooses is lit.behind is None
+    mirrors = tables_of(a=mirror)
+    assert mirrors.kind is None
+    assert mirrors.smooth.tolist() == [0]
+    assert not any_smooth(mirrors)
+    mixed = tables_of(a=diffuse, b=rt.RoughDielectric(), c=rt.TwoSided(base="a"))
+    assert mixed.kind is not None
+    assert mixed.smooth is None
+    assert mixed.chooses.tolist() == [0, 1, 0]
+    assert mixed.behind.tolist() == [0, 1, 1]
+
+
+def test_the_only_table_is_known():
+    for code, field, _, _, _ in TABLES:
+        one = Leaves(**dict.fromkeys(Leaves._fields) | {field: ()})
+        assert only(one) == code
