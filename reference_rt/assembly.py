@@ -1,5 +1,6 @@
 """All shapes of a scene, its groups and solids -> Geometry: the tables and what leads to them."""
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from reference_rt.geometry import SOLID, Geometry
 from reference_rt.groups import Instance
 from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes
 from reference_rt.shapes.mesh_topology import describe_boundary
-from reference_rt.shapes.shape import Bounds, FloatArray, IntArray, Place
+from reference_rt.shapes.shape import Bounds, FloatArray, IntArray, Place, outward
 from reference_rt.transform import Affine, affine, identity, invert
 from reference_rt.trees import Copies, Reference, Trees
 
@@ -67,11 +68,17 @@ def assemble(scene: "Scene", materials: dict[str | None, int]) -> Geometry:
 
 
 class _Program:
-    """A solid: its first operand and their number, its program, its box (1, 3), (1, 3)."""
+    """A solid: its first operand and their number, its program, where they are seen from and how
+    far from there they reach; its box (1, 3), (1, 3), in the world."""
 
-    def __init__(self, first: int, count: int, steps: list[int], boxes: Sequence[Bounds]) -> None:
-        self.first, self.count, self.steps = first, count, steps
-        self.bounds, self.depth = _solid_bounds(steps, boxes)
+    def __init__(
+        self, first: int, steps: list[int], boxes: Sequence[Bounds], anchor: FloatArray
+    ) -> None:
+        self.first, self.count, self.steps, self.anchor = first, len(boxes), steps, anchor
+        (lower, upper), self.depth = _solid_bounds(steps, boxes)
+        self.bounds = outward(lower + anchor, upper + anchor)
+        # Of a corner; twice, so that no rounding of it counts.
+        self.reach = 2.0 * math.sqrt(3.0) * float(np.abs(boxes).max())
 
 
 class _Assembly:
@@ -85,8 +92,8 @@ class _Assembly:
         self.trees: list[tuple[list[Reference], bool]] = []
         # Where in the scene file owners are that are not shapes of the scene.
         self.paths: dict[int, tuple[str | int, ...]] = {}
-        # (shape, part, turned) by owner number: the scene's shapes first.
-        self.parts = [(i, 0, 0) for i in range(len(scene.shapes))]
+        # (shape, part, solid, turned) by owner number: the scene's shapes first.
+        self.parts = [(i, 0, -1, 0) for i in range(len(scene.shapes))]
         self.solids: list[_Program] = []
         # (kind, row, number of the tree) of each operand.
         self.operands: list[tuple[int, int, int]] = []
@@ -119,9 +126,11 @@ class _Assembly:
             return Reference(SOLID, np.array([self.solid(shape, owner, name)]))
         return self.add(shape, Place(owner, self.materials[name], self.scene.folder))
 
-    def part(self, shape: int, number: int, turned: bool, material: str | None) -> Place:
+    def part(
+        self, shape: int, number: int, material: str | None, solid: int = -1, turned: bool = False
+    ) -> Place:
         """The place of a part of a shape, with an owner number of its own."""
-        self.parts.append((shape, number, int(turned)))
+        self.parts.append((shape, number, solid, int(turned)))
         return Place(len(self.parts) - 1, self.materials[material], self.scene.folder)
 
     # ---- solids ---------------------------------------------------------------------------------
@@ -130,15 +139,17 @@ class _Assembly:
         """The number of a solid, whose operands become primitives that no hierarchy of shapes
         leads to."""
         first, boxes = len(self.operands), []
-        operands = csg.operands_of(shape, identity(), material)
-        for k, (operand, outer, name, turned) in enumerate(operands):
+        operands, names, turned = zip(*csg.operands_of(shape, (), material), strict=True)
+        anchor, operands = csg.anchored(operands)
+        for k, operand in enumerate(operands):
             try:
-                place = self.part(self.parts[owner][0], k, turned, name)
+                solid = len(self.solids)
+                place = self.part(self.parts[owner][0], k, names[k], solid, turned[k])
                 self.paths[place.owner] = self.paths.get(owner, ("shapes", owner))
-                boxes.append(self.operand(operand, place._replace(outer=outer)))
+                boxes.append(self.operand(operand, place))
             except ValueError as error:
                 raise ValueError(f"operand {k}, a {_type_of(operand)}: {error}") from None
-        self.solids.append(_Program(first, len(boxes), csg.postfix(shape), boxes))
+        self.solids.append(_Program(first, csg.postfix(shape), boxes, anchor))
         return len(self.solids) - 1
 
     def operand(self, shape: Shape, place: Place) -> Bounds:
@@ -182,6 +193,8 @@ class _Assembly:
             kind=np.array([kind for kind, _, _ in self.operands]),
             row=np.array(rows),
             root=np.array([trees.start(roots[k]) if k >= 0 else -1 for _, _, k in self.operands]),
+            anchor=np.array([s.anchor for s in self.solids]),
+            reach=np.array([s.reach for s in self.solids]),
         )
 
     def part_table(self) -> Parts | None:
@@ -214,7 +227,7 @@ class _Assembly:
                         raise ValueError(f"over {MOST_INSTANCES:,} copies; expected fewer")
                     maps.append(_composed(inner, _map_of(shape)))
                 else:
-                    owner = self.part(-1, k, False, shape.material).owner
+                    owner = self.part(-1, k, shape.material).owner
                     self.paths[owner] = ("groups", name, k)
                     reference = self.member(shape, owner, None)
                     if not np.isfinite(self.box_of(reference)).all():

@@ -5,6 +5,7 @@ from typing import NamedTuple
 from reference_rt import shapes as any_shape
 from reference_rt.bvh import NOTHING, WIDE_STACK, Bvh, first_of, is_packet, kind_of, row_of, size_of
 from reference_rt.csg import evaluate
+from reference_rt.csg.anchor import out_of_solid, ray_near
 from reference_rt.csg.tables import Parts, Solids
 from reference_rt.groups import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.kernel import kernel, local_floats, local_integers
@@ -185,10 +186,27 @@ def _precedes(shapes: Shapes, hit: Hit, closest: Hit) -> bool:
 @kernel
 def surface(geometry: Geometry, ray: Ray, hit: Hit) -> SurfacePoint:
     """The surface at a hit (which must be one: `hit.kind >= 0`)."""
-    local = ray_in(geometry.instances, hit.instance, ray)
-    point = any_shape.surface(geometry.shapes, local, hit)
+    local, seen, solid = _as_primitive(geometry, ray, hit)
+    point = any_shape.surface(geometry.shapes, local, seen)
     point = _turned(geometry.parts, geometry.shapes, hit, point)
+    point = out_of_solid(geometry.solids, solid, point)
     return out_of(geometry.instances, hit.instance, point)
+
+
+@kernel
+def _as_primitive(geometry: Geometry, ray: Ray, hit: Hit) -> tuple[Ray, Hit, int]:
+    """The ray and the hit as the primitive's table has it, and its solid, -1 for none."""
+    local = ray_in(geometry.instances, hit.instance, ray)
+    solid = _solid_of(geometry.parts, geometry.shapes, hit)
+    local, begin = ray_near(geometry.solids, solid, local)
+    return local, Hit(hit.t - begin, hit.kind, hit.row, hit.u, hit.v, hit.instance), solid
+
+
+@kernel
+def _solid_of(parts: Parts | None, shapes: Shapes, hit: Hit) -> int:
+    if parts is None:
+        return -1
+    return int(parts.solid[any_shape.owner(shapes, hit.kind, hit.row)])
 
 
 @kernel
@@ -220,12 +238,12 @@ class Owner(NamedTuple):
 @kernel
 def owner(geometry: Geometry, ray: Ray, hit: Hit) -> Owner:
     """Whose a hit is: for pictures and queries, which path tracing does not need."""
-    local = ray_in(geometry.instances, hit.instance, ray)
+    local, seen, _ = _as_primitive(geometry, ray, hit)
     number = any_shape.owner(geometry.shapes, hit.kind, hit.row)
     shape, part = _whole(geometry.parts, number)
     shape, copy = _in_scene(geometry.instances, hit.instance, shape)
     face = any_shape.face(geometry.shapes, hit)
-    u, v = any_shape.uv(geometry.shapes, local, hit)
+    u, v = any_shape.uv(geometry.shapes, local, seen)
     return Owner(shape, copy, part, face, u, v)
 
 
@@ -241,8 +259,8 @@ class Coordinates(NamedTuple):
 @kernel
 def coordinates(geometry: Geometry, ray: Ray, hit: Hit) -> Coordinates:
     """Where on its surface a hit lies."""
-    local = ray_in(geometry.instances, hit.instance, ray)
-    u, v = any_shape.uv(geometry.shapes, local, hit)
+    local, seen, _ = _as_primitive(geometry, ray, hit)
+    u, v = any_shape.uv(geometry.shapes, local, seen)
     return Coordinates(u, v, colour(geometry.shapes, hit, Vec3(-1.0, -1.0, -1.0)))
 
 
@@ -250,8 +268,8 @@ def coordinates(geometry: Geometry, ray: Ray, hit: Hit) -> Coordinates:
 def tangents(geometry: Geometry, ray: Ray, hit: Hit) -> Tangents:
     """dp/du and dp/dv at a hit, u and v being those of `coordinates`.  Where an operand's outside
     is the inside of its solid they are the same: only normals turn over."""
-    local = ray_in(geometry.instances, hit.instance, ray)
-    found = any_shape.tangents(geometry.shapes, local, hit)
+    local, seen, _ = _as_primitive(geometry, ray, hit)
+    found = any_shape.tangents(geometry.shapes, local, seen)
     return tangents_out_of(geometry.instances, hit.instance, found)
 
 

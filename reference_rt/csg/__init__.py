@@ -4,6 +4,7 @@
 `difference`, whose `of` lists the operands.
 """
 
+from reference_rt.csg.anchor import Anchored, anchored
 from reference_rt.csg.description import (
     AnyShape,
     Difference,
@@ -19,12 +20,14 @@ __all__ = [
     "AND",
     "NOT",
     "OR",
+    "Anchored",
     "AnyShape",
     "Difference",
     "Intersection",
     "Solid",
     "Solids",
     "Union",
+    "anchored",
     "operands_of",
     "postfix",
 ]

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.bvh import Bvh
+from reference_rt.csg.anchor import ray_near
 from reference_rt.csg.evaluate import (
     CROSSINGS,
     GRAZING,
@@ -58,6 +59,7 @@ def _all_along(
 ) -> int:
     """How many points of the surface of solid s lie at t > 0; the first of them, as many as there
     is room for, into t, in order, with `resolution` and the number of the operand that shows."""
+    ray, begin = ray_near(solids, s, ray)
     first, count = solids.first[s], solids.operands[s]
     walk = Walk(
         local_floats(CROSSINGS * count),
@@ -86,7 +88,7 @@ def _all_along(
             if found < len(t):
                 kind = solids.kind[first + k]
                 hit_k = Hit(front.t[k], kind, front.row[k], front.u[k], front.v[k], -1)
-                t[found], part[found] = hit_k.t, k
+                t[found], part[found] = begin + hit_k.t, k
                 widths[found] = resolution(shapes, hit_k, ray)
             found += 1
     return found

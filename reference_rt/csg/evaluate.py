@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from reference_rt import shapes as any_shape
 from reference_rt.bvh import Bvh
+from reference_rt.csg.anchor import ray_near
 from reference_rt.csg.mesh_walk import Step, next_crossing, winding
 from reference_rt.csg.tables import AND, NOT, OR, Solids
 from reference_rt.kernel import kernel, local_floats, local_integers
@@ -207,6 +208,7 @@ def pass_together(
 def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max: float) -> Hit:
     """The first point of the surface of solid s at t in (0, t_max], as a hit of the operand that it
     belongs to; at inf for none."""
+    ray, begin = ray_near(solids, s, ray)
     first, count = solids.first[s], solids.operands[s]
     walk = Walk(
         local_floats(CROSSINGS * count),
@@ -225,14 +227,15 @@ def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max:
     values = local_integers(solids.depth[s])
     best, hit = begin_all(solids, shapes, bvh, s, ray, walk)
     inside = is_inside(solids, s, walk.state, values)
-    while best >= 0 and hit.t <= t_max:
+    while best >= 0 and begin + hit.t <= t_max:
         best, hit = pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
         was_inside = inside
         inside = is_inside(solids, s, walk.state, values)
         if inside != was_inside:
             shown = which_shows(solids, s, count, walk, values, was_inside)
             kind = solids.kind[first + shown]
-            return Hit(front.t[shown], kind, front.row[shown], front.u[shown], front.v[shown], -1)
+            t, u, v = begin + front.t[shown], front.u[shown], front.v[shown]
+            return Hit(t, kind, front.row[shown], u, v, -1)
     return Hit(math.inf, -1, -1, 0.0, 0.0, -1)
 
 

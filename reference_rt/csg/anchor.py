@@ -1,0 +1,104 @@
+"""Where a solid has its operands' coordinates begin: next to them, so that distance costs nothing.
+
+Tabulated in the world, each operand of a solid far from the origin (D) would be rounded by itself,
+by u D: faces that coincide would be parted by that, and what is as thin could not be told from it.
+Here all maps are put together exactly and seen from one anchor: operands round as if the solid
+stood at the origin, and the ray's origin is counted from the anchor once for all of them.
+"""
+
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference_rt.csg.tables import Solids
+from reference_rt.kernel import kernel
+from reference_rt.ray import UNIT_ROUNDOFF, Ray, SurfacePoint
+from reference_rt.shapes.rounding import along_from
+from reference_rt.shapes.shape import FloatArray, Shape
+from reference_rt.transform import Matrix, Transform
+from reference_rt.vec3 import dot, length, max_abs, row
+
+_exact = np.vectorize(Fraction, otypes=[object])
+
+
+class Anchored(NamedTuple):
+    """operands: shapes that stand as the solid's do, each under one map, but for being seen from
+    `anchor` (3,)."""
+
+    anchor: FloatArray
+    operands: list[Shape]
+
+
+def anchored(operands: list[Shape]) -> Anchored:
+    """Operands, each under all of its transforms.  The anchor is the first one's own origin or, of
+    a sphere, centre, rounded once.  Raises ValueError where coordinates overflow."""
+    try:
+        maps = [_map_of(operand) for operand in operands]
+        anchor = maps[0][:, 3].astype(np.float64)
+        for m in maps:
+            m[:, 3] -= _exact(anchor)
+        rows = [tuple(map(tuple, m.astype(np.float64).tolist())) for m in maps]
+    except (OverflowError, ValueError):
+        raise ValueError("its coordinates overflow; expected finite numbers") from None
+    seen = []
+    for operand, matrix in zip(operands, rows, strict=True):
+        update: dict[str, Any] = {"transform": (Matrix(matrix=matrix),)}
+        if hasattr(operand, "center"):
+            update["center"] = (0.0, 0.0, 0.0)  # in the map
+        seen.append(operand.model_copy(update=update))
+    return Anchored(anchor, seen)
+
+
+def _map_of(operand: Shape) -> Any:
+    """The shape's map (3, 4), exactly; its centre, where it has one, is taken for its origin."""
+    linear, offset = _exact(np.eye(3)), _exact(getattr(operand, "center", (0.0, 0.0, 0.0)))
+    steps: Transform = operand.transform
+    for step in steps:
+        m = _exact(step.matrix_of())
+        linear, offset = m[:, :3] @ linear, m[:, :3] @ offset + m[:, 3]
+    return np.column_stack([linear, offset])
+
+
+@kernel
+def ray_near(solids: Solids | None, s: int, ray: Ray) -> tuple[Ray, float]:
+    """(the ray from the anchor of solid s, begin): its t is begin + t of that ray; as it is for
+    s = -1.
+
+    A ray from far outside of all operands begins next to them, found without rounding
+    (`along_from`): its crossings then round as the solid is large, not as it is far.  Where even
+    the t of that place rounds by more than the solid is large it begins where it did.
+    """
+    if solids is None:
+        return ray, 0.0
+    if s < 0:
+        return ray, 0.0
+    anchor, reach = row(solids.anchor, s), solids.reach[s]
+    seen = Ray(ray.o - anchor, ray.d, ray.t_max)
+    if not max_abs(seen.o) > 8.0 * reach:
+        return seen, 0.0
+    speed = length(ray.d)
+    begin = (-dot(seen.o, ray.d) / speed - 4.0 * reach) / speed
+    if not begin > 0.0:
+        return seen, 0.0
+    o = along_from(ray.o, ray.d, anchor, begin)
+    if not dot(o, ray.d) < -2.0 * reach * speed:
+        return seen, 0.0
+    return Ray(o, ray.d, ray.t_max), begin
+
+
+@kernel
+def out_of_solid(solids: Solids | None, s: int, point: SurfacePoint) -> SurfacePoint:
+    """A point that counts from the anchor of solid s, in the world; as it is for s = -1.
+
+    Three roundings more, of numbers no larger than the anchor and the point: of the point, of the
+    next ray's origin off it, and of that seen from the anchor.
+    """
+    if solids is None:
+        return point
+    if s < 0:
+        return point
+    anchor = row(solids.anchor, s)
+    p = anchor + point.p
+    rounding = (4.0 * 1.7320508075688774 * UNIT_ROUNDOFF) * (max_abs(anchor) + max_abs(p))
+    return SurfacePoint(p, point.n, point.ns, point.error + rounding, point.material, point.light)
