@@ -140,8 +140,8 @@ class _Assembly:
         leads to."""
         first, boxes = len(self.operands), []
         operands, names, turned = zip(*csg.operands_of(shape, (), material), strict=True)
-        anchor, operands = csg.anchored(operands)
-        for k, operand in enumerate(operands):
+        anchor, seen = csg.anchored(operands)
+        for k, operand in enumerate(seen):
             try:
                 solid = len(self.solids)
                 place = self.part(self.parts[owner][0], k, names[k], solid, turned[k])

@@ -9,14 +9,16 @@ import numpy as np
 import reference_rt as rt
 from comparisons.exact.dyadic import Dyadic, nearest
 from comparisons.exact.referee import crossings_of, evaluated
-from comparisons.sizes import ShapeSizes
+from comparisons.layout import Tree, member_of
+from comparisons.sizes import LeafSizes
 from comparisons.stability.f07_trees import MESH
 from comparisons.stability.family import FloatArray
-from reference_rt import methods
+from reference_rt import csg, methods
 from reference_rt.csg.all_crossings import crossings
 from reference_rt.methods.csg import interval_list
 from reference_rt.methods.operands import CsgParameters
 from reference_rt.scene import Scene
+from reference_rt.shapes.shape import Place
 
 INTERVALS, INSIDE_TESTS = "csg.intervals", "csg.inside_tests"
 
@@ -88,41 +90,27 @@ class Truth(NamedTuple):
 
 
 def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth]:
-    """By exact arithmetic on the tables; widths by what ours states of each operand's crossings."""
-    scene = rt.Scene(shapes=(solid,))
-    scene._folder = folder
-    sizes = ShapeSizes(scene)
-    (copy,) = sizes.copies
-    (member,) = copy.members
-    leaves = sizes.by_part(copy)
-    exact = (Dyadic.of(o), Dyadic.of(d))
-    found = [crossings_of(leaves[leaf.part], (o, d), exact) for leaf in member.leaves]
-    shapes = _operands(solid)
-    stated = [ours(rt.Union(of=(shape,)), folder, o, d) for shape in shapes]
-    assert member.tree is not None
+    """By exact arithmetic on the operands as they are tabulated, seen from the solid's anchor;
+    widths by what ours states of each operand's crossings."""
+    tree = member_of(solid, 0).tree
+    assert isinstance(tree, Tree)
+    shapes: Any
+    anchor, shapes = csg.anchored([shape for shape, _, _ in csg.operands_of(solid, (), None)])
+    exact = (Dyadic.of(o) - Dyadic.of(anchor[None]), Dyadic.of(d))
+    seen = exact[0].floats()
+    place = Place(folder=folder)
+    leaves = [LeafSizes(shape, None, shape.tabulate(place)) for shape in shapes]
+    found = [crossings_of(leaf, (seen, d), exact) for leaf in leaves]
+    stated = [ours(rt.Union(of=(shape,)), folder, seen, d) for shape in shapes]
     return [
         _truth(
-            member.tree,
+            tree,
             [lists[k] for lists, _ in found],
             any(bool(flags[k]) for _, flags in found),
             [Lists(s.t[k], s.width[k]) for s in stated],
         )
         for k in range(len(o))
     ]
-
-
-def _operands(solid: Any) -> list[Any]:
-    """The leaves of a solid, each under the maps of those that it is in."""
-    from reference_rt.csg import Solid
-
-    if not isinstance(solid, Solid):
-        return [solid]
-    found = []
-    for part in solid.of:
-        for shape in _operands(part):
-            steps = (*shape.transform, *solid.transform)
-            found.append(shape.model_copy(update={"transform": steps}))
-    return found
 
 
 def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists]) -> Truth:

@@ -71,7 +71,7 @@ def rays_under(motions: list[Motion], exact: bool, makes: tuple[Make, ...], draw
         bench = rays.Bench(
             scene, draw.cases // len(motions), draw.rng, draw.mitsuba and make is scenes.things
         )
-        band = rays.SOLID_BAND if make is scenes.solids else rays.BAND
+        band = rays.BAND
         for motion in motions:
             total = added(total, _rays_of(bench, motion, exact, band))
     return total
@@ -111,7 +111,7 @@ def _translated(draw: Draw, x: float) -> Outcomes:
 
 
 def _translated_solids(draw: Draw, x: float) -> Outcomes:
-    return rays_under([offset(x)], False, (scenes.solids,), draw)
+    return rays_under([offset(x)], x <= EXACT_TO, (scenes.solids,), draw)
 
 
 def _scaled(motion: Callable[[float], Motion], draw: Draw, x: float) -> Outcomes:

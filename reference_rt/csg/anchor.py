@@ -6,6 +6,7 @@ Here all maps are put together exactly and seen from one anchor: operands round 
 stood at the origin, and the ray's origin is counted from the anchor once for all of them.
 """
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -30,7 +31,7 @@ class Anchored(NamedTuple):
     operands: list[Shape]
 
 
-def anchored(operands: list[Shape]) -> Anchored:
+def anchored(operands: Sequence[Shape]) -> Anchored:
     """Operands, each under all of its transforms.  The anchor is the first one's own origin or, of
     a sphere, centre, rounded once.  Raises ValueError where coordinates overflow."""
     try:
@@ -38,12 +39,12 @@ def anchored(operands: list[Shape]) -> Anchored:
         anchor = maps[0][:, 3].astype(np.float64)
         for m in maps:
             m[:, 3] -= _exact(anchor)
-        rows = [tuple(map(tuple, m.astype(np.float64).tolist())) for m in maps]
+        matrices = [Matrix.model_validate({"matrix": m.astype(np.float64).tolist()}) for m in maps]
     except (OverflowError, ValueError):
         raise ValueError("its coordinates overflow; expected finite numbers") from None
     seen = []
-    for operand, matrix in zip(operands, rows, strict=True):
-        update: dict[str, Any] = {"transform": (Matrix(matrix=matrix),)}
+    for operand, matrix in zip(operands, matrices, strict=True):
+        update: dict[str, Any] = {"transform": (matrix,)}
         if hasattr(operand, "center"):
             update["center"] = (0.0, 0.0, 0.0)  # in the map
         seen.append(operand.model_copy(update=update))
