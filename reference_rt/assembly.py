@@ -139,14 +139,14 @@ class _Assembly:
         """The number of a solid, whose operands become primitives that no hierarchy of shapes
         leads to."""
         first, boxes = len(self.operands), []
-        operands, names, turned = zip(*csg.operands_of(shape, (), material), strict=True)
-        anchor, seen = csg.anchored(operands)
-        for k, operand in enumerate(seen):
+        operands = csg.operands_of(shape, identity(), material)
+        anchor, seen = csg.anchored(shape)
+        for k, (_, _, name, turned) in enumerate(operands):
+            operand, outer = seen[k]
             try:
-                solid = len(self.solids)
-                place = self.part(self.parts[owner][0], k, names[k], solid, turned[k])
+                place = self.part(self.parts[owner][0], k, name, len(self.solids), turned)
                 self.paths[place.owner] = self.paths.get(owner, ("shapes", owner))
-                boxes.append(self.operand(operand, place))
+                boxes.append(self.operand(operand, place._replace(outer=outer)))
             except ValueError as error:
                 raise ValueError(f"operand {k}, a {_type_of(operand)}: {error}") from None
         self.solids.append(_Program(first, csg.postfix(shape), boxes, anchor))

@@ -91,8 +91,8 @@ def _placed(scene: Scene) -> Iterator[tuple[str, Shape, Affine]]:
                     seen.add(id(member))
                 yield from of(f"{name}, {shape.group}[{k}]", member, inner)
         elif isinstance(shape, Solid):
-            for k, (leaf, _, _) in enumerate(operands_of(shape, (), None)):
-                yield f"{name}, operand {k}", leaf, outer
+            for k, (leaf, inner, _, _) in enumerate(operands_of(shape, outer, None)):
+                yield f"{name}, operand {k}", leaf, inner
         else:
             yield name, shape, outer
 

@@ -11,8 +11,9 @@ side of a flat one, it meets nothing; what it meets else, exact arithmetic on th
 c being the middle of the shape (largest coordinate) and s its longest half axis, however thin.
 (3) The first ray, aimed at what is well inside, meets the shape wherever exact arithmetic says so.
 
-Where the shape is thinner than 4 B at p, along the normal or along w, its walls are one: such cases
-are open, and so are first rays whose answer hangs on moving them by B.
+Where the shape is thinner than 4 B within B of p, along the normal or along w, its walls are one:
+next to an edge, p may lie beyond the neighbouring face, by its rounding.  Such cases are open,
+and so are first rays whose answer hangs on moving them by B.
 
 Range: 15 kinds of shapes, sizes 1e-8 to 1e8, axes up to 1e12 times as long as others, middles up to
 1e10 sizes from the origin and beyond, directions up to cos = 1e-15 to the surface.  Counts, full:
@@ -110,8 +111,8 @@ def measure(
 ALL = tuple(KINDS)
 
 BOUND = (
-    "B = 17 sqrt(3) u (2 |c| + 6 s) is s / 100 at |c| = 1.5e12 s: what is left next to an edge, "
-    "within a few B, may be left through the neighbouring face"
+    "B = 17 sqrt(3) u (2 |c| + 6 s) is s / 100 at |c| = 1.5e12 s, and s at 1.5e14 s: nothing is "
+    "left of the shape that is not within a few B of its edges"
 )
 
 
@@ -209,7 +210,7 @@ FAMILY = Family(
                 _distance,
                 DISTANCES,
                 (1e0, 1e4, 1e10),
-                holds_to=1e10,
+                holds_to=1e12,
                 law=BOUND,
             )
             for kind in ALL

@@ -248,18 +248,29 @@ class Judge:
 
     def _thickness(self, which: IntArray, found: Departures) -> FloatArray:
         """How much of the shape lies below the surface where rays left it, along the normal and
-        along the way that they went, whichever is less."""
-        n, bound = found.n[which], self.placed.bound
-        above = found.p[which] + n * (CONTACT * bound)
+        along the way that they went, whichever is less.  The points are off by B sideways too: it
+        is the least that lies below a point that near."""
+        n = found.n[which]
+        across = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        ahead, inside = self.exact(found.start[which], found.w[which])
+        least = np.where(inside, ahead, np.inf)
+        for step in (0.0 * n, across, -across, np.cross(n, across), -np.cross(n, across)):
+            point = found.p[which] + step * self.placed.bound
+            least = np.minimum(least, self._below(point, n))
+        return np.asarray(least)
+
+    def _below(self, p: FloatArray, n: FloatArray) -> FloatArray:
+        """The same of points p near the surface, along their normals; 0 beside the shape."""
+        bound = self.placed.bound
+        above = p + n * (CONTACT * bound)
         near, _ = self.exact(above, -n)
         # A hair further than where the normal comes in: what is thinner than that counts as none.
         begin = above - n * (np.where(np.isfinite(near), near, 0.0) + bound / 16.0)[:, None]
         far, inside = self.exact(begin, -n)
         if self.placed.kind == "solid":
             inside = np.isfinite(far)
-        through = np.where(np.isfinite(near) & inside, far, 0.0)
-        ahead, inside = self.exact(found.start[which], found.w[which])
-        return np.asarray(np.where(inside, np.minimum(through, ahead), through))
+        return np.asarray(np.where(np.isfinite(near) & inside, far, 0.0))
 
 
 def _alike(a: FloatArray, b: FloatArray) -> BoolArray:

@@ -19,6 +19,7 @@ from reference_rt.methods.csg import interval_list
 from reference_rt.methods.operands import CsgParameters
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import Place
+from reference_rt.transform import Affine, Matrix
 
 INTERVALS, INSIDE_TESTS = "csg.intervals", "csg.inside_tests"
 
@@ -94,14 +95,15 @@ def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth
     widths by what ours states of each operand's crossings."""
     tree = member_of(solid, 0).tree
     assert isinstance(tree, Tree)
-    shapes: Any
-    anchor, shapes = csg.anchored([shape for shape, _, _ in csg.operands_of(solid, (), None)])
+    anchor, operands = csg.anchored(solid)
     exact = (Dyadic.of(o) - Dyadic.of(anchor[None]), Dyadic.of(d))
     seen = exact[0].floats()
-    place = Place(folder=folder)
-    leaves = [LeafSizes(shape, None, shape.tabulate(place)) for shape in shapes]
+    leaves = [
+        LeafSizes(shape, None, shape.tabulate(Place(folder=folder, outer=outer)))
+        for shape, outer in operands
+    ]
     found = [crossings_of(leaf, (seen, d), exact) for leaf in leaves]
-    stated = [ours(rt.Union(of=(shape,)), folder, seen, d) for shape in shapes]
+    stated = [ours(_alone(shape, outer), folder, seen, d) for shape, outer in operands]
     return [
         _truth(
             tree,
@@ -111,6 +113,12 @@ def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth
         )
         for k in range(len(o))
     ]
+
+
+def _alone(shape: Any, outer: Affine) -> Any:
+    """A solid of this operand alone."""
+    rows: Any = outer.tolist()
+    return rt.Union(of=(shape,), transform=(Matrix(matrix=tuple(map(tuple, rows))),))
 
 
 def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists]) -> Truth:

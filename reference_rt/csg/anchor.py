@@ -6,55 +6,76 @@ Here all maps are put together exactly and seen from one anchor: operands round 
 stood at the origin, and the ray's origin is counted from the anchor once for all of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from reference_rt.csg.description import Solid, operands_of
 from reference_rt.csg.tables import Solids
 from reference_rt.kernel import kernel
 from reference_rt.ray import UNIT_ROUNDOFF, Ray, SurfacePoint
 from reference_rt.shapes.rounding import along_from
 from reference_rt.shapes.shape import FloatArray, Shape
-from reference_rt.transform import Matrix, Transform
+from reference_rt.transform import Affine, Transform, identity
 from reference_rt.vec3 import dot, length, max_abs, row
 
 _exact = np.vectorize(Fraction, otypes=[object])
 
+FAR = 16.0
+"""Sizes from the world's origin up to which operands stay in its coordinates, where they round by
+16 times what they must at most, as shapes do that are no operands."""
+
 
 class Anchored(NamedTuple):
-    """operands: shapes that stand as the solid's do, each under one map, but for being seen from
-    `anchor` (3,)."""
+    """anchor (3,), 0 for the world's origin;  operands: (shape, the map that its own transform is
+    followed by), seen from there."""
 
     anchor: FloatArray
-    operands: list[Shape]
+    operands: list[tuple[Shape, Affine]]
 
 
-def anchored(operands: Sequence[Shape]) -> Anchored:
-    """Operands, each under all of its transforms.  The anchor is the first one's own origin or, of
-    a sphere, centre, rounded once.  Raises ValueError where coordinates overflow."""
+def anchored(solid: Shape) -> Anchored:
+    """The operands of a solid, from left to right.
+
+    The anchor is an operand's own origin or, of a sphere, centre: the first by its coordinates, so
+    that the order of operands does not matter.  Raises ValueError where coordinates overflow.
+    """
+    standing = list(_standing(solid, ()))
     try:
-        maps = [_map_of(operand) for operand in operands]
-        anchor = maps[0][:, 3].astype(np.float64)
+        maps = [_map_of(shape, steps) for shape, steps in standing]
+        anchor = min(maps, key=lambda m: tuple(m[:, 3]))[:, 3].astype(np.float64)
         for m in maps:
             m[:, 3] -= _exact(anchor)
-        matrices = [Matrix.model_validate({"matrix": m.astype(np.float64).tolist()}) for m in maps]
+        floats = [m.astype(np.float64) for m in maps]
     except (OverflowError, ValueError):
         raise ValueError("its coordinates overflow; expected finite numbers") from None
-    seen = []
-    for operand, matrix in zip(operands, matrices, strict=True):
-        update: dict[str, Any] = {"transform": (matrix,)}
-        if hasattr(operand, "center"):
+    if np.abs(anchor).max() <= FAR * np.abs(floats).max():
+        operands = operands_of(solid, identity(), None)
+        return Anchored(np.zeros(3), [(shape, outer) for shape, outer, _, _ in operands])
+    seen: list[tuple[Shape, Affine]] = []
+    for (shape, _), m in zip(standing, floats, strict=True):
+        update: dict[str, Any] = {"transform": ()}
+        if hasattr(shape, "center"):
             update["center"] = (0.0, 0.0, 0.0)  # in the map
-        seen.append(operand.model_copy(update=update))
+        seen.append((shape.model_copy(update=update), m))
     return Anchored(anchor, seen)
 
 
-def _map_of(operand: Shape) -> Any:
-    """The shape's map (3, 4), exactly; its centre, where it has one, is taken for its origin."""
-    linear, offset = _exact(np.eye(3)), _exact(getattr(operand, "center", (0.0, 0.0, 0.0)))
-    steps: Transform = operand.transform
+def _standing(shape: Shape, outer: Transform) -> Iterator[tuple[Shape, Transform]]:
+    """(operand, the steps from its own coordinates to the world's)."""
+    steps = (*shape.transform, *outer)
+    if not isinstance(shape, Solid):
+        yield shape, steps
+        return
+    for operand in shape.of:
+        yield from _standing(operand, steps)
+
+
+def _map_of(shape: Shape, steps: Transform) -> Any:
+    """The map (3, 4), exactly; a shape's centre, where it has one, is taken for its origin."""
+    linear, offset = _exact(np.eye(3)), _exact(getattr(shape, "center", (0.0, 0.0, 0.0)))
     for step in steps:
         m = _exact(step.matrix_of())
         linear, offset = m[:, :3] @ linear, m[:, :3] @ offset + m[:, 3]
@@ -100,6 +121,8 @@ def out_of_solid(solids: Solids | None, s: int, point: SurfacePoint) -> SurfaceP
     if s < 0:
         return point
     anchor = row(solids.anchor, s)
+    if max_abs(anchor) == 0.0:
+        return point
     p = anchor + point.p
     rounding = (4.0 * 1.7320508075688774 * UNIT_ROUNDOFF) * (max_abs(anchor) + max_abs(p))
     return SurfacePoint(p, point.n, point.ns, point.error + rounding, point.material, point.light)

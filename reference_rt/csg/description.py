@@ -9,7 +9,7 @@ from reference_rt.csg.tables import AND, NOT, OR
 from reference_rt.groups import Instance
 from reference_rt.shapes import Primitive
 from reference_rt.shapes.shape import Shape
-from reference_rt.transform import Transform
+from reference_rt.transform import Affine, affine, compose
 
 
 class Solid(Shape):
@@ -50,18 +50,18 @@ for _model in (Union, Intersection, Difference):
 
 
 def operands_of(
-    shape: Shape, outer: Transform, material: str | None, turned: bool = False
-) -> Iterator[tuple[Shape, str | None, bool]]:
-    """The primitive operands of a tree that `outer` is applied to, from left to right: (the shape
-    under all of its transforms, material, whether the solid's outside is its inside)."""
+    shape: Shape, outer: Affine, material: str | None, turned: bool = False
+) -> Iterator[tuple[Shape, Affine, str | None, bool]]:
+    """The primitive operands of a tree, from left to right: (shape, the map that its own transform
+    is followed by, material, whether the solid's outside is its inside)."""
     material = shape.material if shape.material is not None else material
-    steps = (*shape.transform, *outer)
     if not isinstance(shape, Solid):
-        yield shape.model_copy(update={"transform": steps}), material, turned
+        yield shape, outer, material, turned
         return
+    outer = compose(affine(shape.transform), outer)
     for k, operand in enumerate(shape.of):
         takes_away = isinstance(shape, Difference) and k > 0
-        yield from operands_of(operand, steps, material, turned != takes_away)
+        yield from operands_of(operand, outer, material, turned != takes_away)
 
 
 def postfix(shape: Shape) -> list[int]:
