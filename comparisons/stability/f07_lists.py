@@ -117,8 +117,7 @@ def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth
 
 def _alone(shape: Any, outer: Affine) -> Any:
     """A solid of this operand alone."""
-    rows: Any = outer.tolist()
-    return rt.Union(of=(shape,), transform=(Matrix(matrix=tuple(map(tuple, rows))),))
+    return rt.Union(of=(shape,), transform=(Matrix.model_validate({"matrix": outer.tolist()}),))
 
 
 def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists]) -> Truth:
