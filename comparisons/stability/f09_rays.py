@@ -136,7 +136,7 @@ AROUND = np.concatenate([np.zeros((1, 3)), directions(16), 0.3 * directions(8)])
 
 
 SOLID_BAND = BAND + 118.0 / (0.156 * 0.866)
-"""The same for solids: 880.  Crossings of operands count as one where they are closer than E1 / c1 +
+"""The same for solids: 881.  Operands' crossings count as one where they are closer than E1 / c1 +
 E2 / c2 (`csg.evaluate.width`), c being the cosines at which a ray meets the faces, and E at most
 (8 * 3 + 12 + 16 * 2) sqrt(3) = 118 u, of `world_error` and of the ray, in largest coordinates.
 
