@@ -19,6 +19,7 @@ from comparisons.stability.family import (
     Outcome,
 )
 from reference_rt import query, transform
+from reference_rt.shapes.shape import IntArray
 
 APART = 10.0
 """Between the middles of neighbours, none of which is larger than 2."""
@@ -113,7 +114,7 @@ class Asked:
     shapes: tuple[Any, ...]
     o: FloatArray
     d: FloatArray
-    whose: FloatArray
+    whose: IntArray
 
 
 def drawn(rng: np.random.Generator, names: tuple[str, ...], offset: float, n: int) -> Asked:
