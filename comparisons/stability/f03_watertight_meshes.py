@@ -80,7 +80,7 @@ def cube(n: int) -> Closed:
     """[-1, 1]^3, each face n x n squares of two triangles each."""
     ticks = np.arange(n + 1)
     i, j = (x.ravel() for x in np.meshgrid(ticks[:-1], ticks[:-1], indexing="ij"))
-    corners: list[FloatArray] = []
+    corners: list[Any] = []
     quads: list[Any] = []
     for axis in range(3):
         for side in (0, n):
