@@ -26,7 +26,7 @@ from pydantic import Field
 from reference_rt.description import Positive
 from reference_rt.kernel import entry_kernel, kernel
 from reference_rt.materials.fresnel import fresnel, relative_index
-from reference_rt.materials.material import INV_PI, BsdfSample, Material, no_sample
+from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
 from reference_rt.materials.microfacet import (
     MAX_ALPHA,
     Distribution,
@@ -191,15 +191,8 @@ def _lobes(plastics: RoughPlastics, i: int, at: At, wo: Vec3) -> _Lobes:
     return _Lobes(t_o, base, specular, s / (s + d) if s > 0.0 else 0.0, m)
 
 
-class _Scattered(NamedTuple):
-    """value: f cos wi;  density: that of `sample`."""
-
-    value: Vec3
-    density: float
-
-
 @kernel
-def _both(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) -> _Scattered:
+def _scattered(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) -> Scattered:
     """Above the surface; both at once, which share the most of their work."""
     eta, half = float(plastics.eta[i]), half_vector(wo, wi)
     f = fresnel(half.cosine, eta).reflectance
@@ -208,23 +201,27 @@ def _both(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) ->
     t_i = _passing(plastics, i, min(1.0, wi.z))
     diffuse = t_i * lobes.t_o / (eta * eta) * (wi.z * INV_PI)
     value = lobes.specular * mirrored + lobes.base * diffuse
-    return _Scattered(value, lobes.p * normals + (1.0 - lobes.p) * (wi.z * INV_PI))
+    return Scattered(value, lobes.p * normals + (1.0 - lobes.p) * (wi.z * INV_PI))
+
+
+@kernel
+def both(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`."""
+    if wo.z <= 0.0 or wi.z <= 0.0:
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    return _scattered(plastics, i, _lobes(plastics, i, at, wo), wo, wi)
 
 
 @kernel
 def evaluate(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
     """f(wo, wi) cos wi."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    return _both(plastics, i, _lobes(plastics, i, at, wo), wo, wi).value
+    return both(plastics, i, at, wo, wi).value
 
 
 @kernel
 def pdf(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
     """The density of `sample` per solid angle."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return 0.0
-    return _both(plastics, i, _lobes(plastics, i, at, wo), wo, wi).density
+    return both(plastics, i, at, wo, wi).density
 
 
 @kernel
@@ -241,7 +238,7 @@ def sample(
         wi = cosine_hemisphere(u0, u1)
     if wi.z <= 0.0:
         return no_sample()
-    value, density_of_wi = _both(plastics, i, lobes, wo, wi)
+    value, density_of_wi = _scattered(plastics, i, lobes, wo, wi)
     if not density_of_wi > 0.0:
         return no_sample()
     weight = value * (1.0 / density_of_wi)
