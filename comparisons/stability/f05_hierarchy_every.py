@@ -51,7 +51,8 @@ def _every(
         shear = shear_of(ray)
         closest = Hit(np.inf, -1, -1, 0.0, 0.0, -1)
         for k in range(len(references)):
-            kind, number = int(references[k, 0]), int(references[k, 1])
+            kind: Any = np.int64(references[k, 0])
+            number: Any = np.int64(references[k, 1])
             found = any_shape.intersect(shapes, kind, number, ray, shear)
             if found.t < np.inf and found.t <= closest.t:
                 hit = Hit(found.t, kind, number, found.u, found.v, -1)
