@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
-from comparisons.stability import f09_light, f09_metamorphic, f09_rays, f09_scenes, f14_determinism
+from comparisons.stability import (
+    f09_light,
+    f09_metamorphic,
+    f09_rays,
+    f09_scenes,
+    f14_bits,
+    f14_parts,
+)
 from comparisons.stability.families import family
 from comparisons.stability.family import MITSUBA, OURS, Draw, Outcome, generator
 
@@ -171,14 +178,14 @@ def test_the_same_bits_in_plain_python(x, tmp_path):
 
 def test_sums_in_another_order_are_seen(tmp_path, monkeypatch):
     """A band that leaves the last bits to chance."""
-    honest = f14_determinism._band
+    honest = f14_parts._band
 
     def careless(*arguments):
         honest(*arguments)
         out, begin = arguments[7], arguments[9]
         out[begin] = np.nextafter(out[begin], np.inf)
 
-    monkeypatch.setattr(f14_determinism, "_band", careless)
+    monkeypatch.setattr(f14_parts, "_band", careless)
     assert measured("F14", "bands", 64.0, tmp_path)[OURS].failures > 20
 
 
@@ -186,8 +193,8 @@ def test_same_bits():
     one = np.ones((2, 3, 3))
     other = one.copy()
     other[1, 2, 0] = np.nextafter(1.0, 2.0)
-    assert f14_determinism.same_bits(one, one) == Outcome(6, 0, 0.0)
-    found = f14_determinism.same_bits(one, other)
+    assert f14_bits.same_bits(one, one) == Outcome(6, 0, 0.0)
+    found = f14_bits.same_bits(one, other)
     assert (found.failures, found.examples[0]["pixel"]) == (1, [2, 1])
 
 
