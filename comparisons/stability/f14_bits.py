@@ -10,10 +10,11 @@ from comparisons.stability.family import EXAMPLES, Draw, FloatArray, Outcome
 
 
 def same_bits(expected: FloatArray, found: FloatArray) -> Outcome:
-    """A case a pixel; worst: the largest relative difference."""
+    """A case a pixel; worst: the largest relative difference, inf for NaN, which always fails."""
     other = (expected != found).any(axis=-1)
     size = np.maximum(np.abs(expected), np.abs(found))
     off = np.abs(expected - found) / np.where(size > 0.0, size, 1.0)
+    off = np.where(np.isnan(off), np.inf, off)
     examples = tuple(
         {
             "pixel": [int(x), int(y)],

@@ -2,6 +2,10 @@
 bits, and a renderer that lacks them is seen."""
 
 import itertools
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +14,9 @@ import reference_rt as rt
 from comparisons.stability import (
     f09_light,
     f09_metamorphic,
+    f09_motion,
     f09_rays,
+    f09_rearranged,
     f09_scenes,
     f14_bits,
     f14_parts,
@@ -137,6 +143,115 @@ def test_edges_are_found(tmp_path):
     assert changed[fine].mean() > 0.9
 
 
+RAY_SERIES = [("translated", 1e8), ("translated solids", 1e4), ("shrunk", 1e9), ("grown", 1e9)]
+RAY_SERIES += [("powers of two", 3.0), ("turned", 2.0), ("rearranged", 2.0), ("nested", 2.0)]
+
+
+@pytest.mark.parametrize(("series", "x"), RAY_SERIES)
+def test_missing_triangles_are_seen_by_rays(series, x, tmp_path, monkeypatch):
+    """Half of each mesh, in what is transformed alone."""
+
+    def holed(tables, o, d):
+        found = f09_rays.ours(tables, o, d)
+        gone = found.identities[:, 3] >= 160
+        identities = np.where(gone[:, None], -1, found.identities)
+        return f09_rays.Found(np.where(gone, np.inf, found.t), identities)
+
+    rays = SimpleNamespace(**(vars(f09_rays) | {"ours": holed}))
+    for module in (f09_metamorphic, f09_rearranged):
+        monkeypatch.setattr(module, "rays", rays)
+    assert measured("F9", series, x, tmp_path, cases=600)[OURS].failures > 0
+
+
+LIGHT_SERIES = [("translated light", 1e3), ("shrunk light", 1e3), ("grown light", 1e9)]
+
+
+def _transformed_alone(monkeypatch, change):
+    """`change` the scene that is transformed, not those that it is compared with."""
+
+    def moved(scene, motion):
+        found = f09_motion.moved(scene, motion)
+        return change(found) if len(scene.shapes) > 1 else found
+
+    monkeypatch.setattr(f09_light, "moved", moved)
+
+
+@pytest.mark.parametrize(("series", "x"), LIGHT_SERIES)
+def test_a_colour_is_seen(series, x, tmp_path, monkeypatch):
+    def tinted(scene):
+        clay = rt.Diffuse(reflectance=(0.7, 0.4 * (1.0 + 1e-6), 0.3))
+        return scene.changed(materials={**scene.materials, "clay": clay})
+
+    _transformed_alone(monkeypatch, tinted)
+    assert measured("F9", series, x, tmp_path)[OURS].failures > 100
+
+
+@pytest.mark.parametrize(("series", "x"), LIGHT_SERIES)
+def test_a_missing_triangle_is_seen_in_pictures(series, x, tmp_path, monkeypatch):
+    """So few pixels that they are looked at again."""
+    ball = f09_scenes.ball()
+    middle = np.asarray(ball.triangles_center) @ (0.5, 1.25, 8.5)
+    f09_scenes.write_mesh(
+        tmp_path / "holed.obj", ball.vertices, np.delete(ball.faces, middle.argmax(), axis=0)
+    )
+
+    def holed(scene):
+        shapes = tuple(
+            s.model_copy(update={"file": "holed.obj"}) if isinstance(s, rt.Mesh) else s
+            for s in scene.shapes
+        )
+        return scene.changed(shapes=shapes)
+
+    _transformed_alone(monkeypatch, holed)
+    found = measured("F9", series, x, tmp_path)[OURS]
+    assert 0 < found.failures <= 2 * f09_light.FEW * 48 * 36
+
+
+@pytest.mark.parametrize(("series", "x"), LIGHT_SERIES)
+def test_a_few_pixels_are_seen(series, x, tmp_path, monkeypatch):
+    """Twelve pixels of each picture 1e-6 brighter: no scene that is moved by itself shows that."""
+    honest = f09_light.colours
+
+    def tinted(contestant, scene):
+        found = honest(contestant, scene)
+        if np.linalg.norm(np.subtract(scene.camera.eye, f09_scenes.CAMERA.eye)) > 1e-3:
+            found[14:17, 20:24] *= 1.0 + 1e-6
+        return found
+
+    monkeypatch.setattr(f09_light, "colours", tinted)
+    assert measured("F9", series, x, tmp_path)[OURS].failures >= 20
+
+
+LEAVING = """
+import sys
+from pathlib import Path
+import reference_rt as rt
+from reference_rt import ray
+from reference_rt.vec3 import dot
+from comparisons.stability import f09_light, f09_motion, f09_scenes
+def leave(point, w):
+    return point.p + point.n * (1e-6 if dot(w, point.n) >= 0.0 else -1e-6)
+motion = f09_motion.Motion(float(sys.argv[2]))
+scene = f09_scenes.whitted(Path(sys.argv[1])).changed(film=rt.Film(width=8, height=6))
+honest = f09_light.judged("ours", scene, motion).failures
+ray.leave = leave
+f09_light.remembered.cache_clear()
+print(honest, f09_light.judged("ours", scene, motion).failures)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", ["1e-3", "1e9"])
+def test_an_epsilon_of_rays_that_leave_is_seen(factor, tmp_path):
+    """Without compiled kernels, where a kernel can be exchanged for another."""
+    command = [sys.executable, "-c", LEAVING, str(tmp_path), factor]
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(command, check=True, capture_output=True, env=environment, text=True)
+    honest, wrong = map(int, done.stdout.split())
+    assert honest == 0
+    assert wrong > 20
+
+
 # ---- Mitsuba ------------------------------------------------------------------------------------
 
 
@@ -214,7 +329,7 @@ def test_everything(name, tmp_path):
 
 def test_offsets_are_exact():
     """As far as the family says that they are."""
-    moved = f09_metamorphic.offset(f09_metamorphic.EXACT_TO)
+    moved = f09_motion.offset(f09_metamorphic.EXACT_TO)
     p = (7.984375, -7.984375, 0.015625)
     far = moved.point(p)
     assert tuple(a - b for a, b in zip(far, moved.offset, strict=True)) == p
