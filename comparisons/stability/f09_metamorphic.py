@@ -167,7 +167,7 @@ FAMILY = Family(
             about="Scenes of every primitive, and their rays, moved by whole numbers.  A ray that "
             "hits something else, or not at exactly the same t, breaks the law.",
             values=decades(0, 13),
-            quick=(1.0, 1e8),
+            quick=(1.0, 1e8, 1e12),
             cases=_CASES,
             measure=_translated,
             unit=_CHANGE,
@@ -194,7 +194,7 @@ FAMILY = Family(
             about="Pictures, path-traced and by Whitted, of scenes moved by whole numbers.  A pixel"
             " that changes by more than its condition times u (offset + size) breaks the law.",
             values=decades(0, 13),
-            quick=(1e3,),
+            quick=(1e3, 1e9),
             cases={"quick": 1, "full": 1},
             measure=partial(light.under, offset),
             unit=_DIFFERENCE,
@@ -231,7 +231,7 @@ FAMILY = Family(
             axis="1 / factor",
             about="Pictures of scenes made smaller, lights such that they look the same.",
             values=(*decades(0, 12), 1e20, 1e30, 1e50),
-            quick=(1e1,),
+            quick=(1e1, 1e9),
             cases={"quick": 1, "full": 1},
             measure=partial(light.under, shrunk),
             unit=_DIFFERENCE,

@@ -154,6 +154,9 @@ CLOSED = Series(
     {"quick": 1, "full": 1},
     _closed,
     unit="of the value",
+    explained="the range ends at an albedo of 0.999.  Mitsuba lets 95 % of all paths go on at most "
+    "(ours as many as the albedo): of N paths the longest has about 20 ln N edges, and what comes "
+    "later is missing, 0.88 of the value at 1000 (0.35 at 300, within what its noise seems to be)",
 )
 OPEN = Series(
     "open furnace",
@@ -176,6 +179,8 @@ SHELLS = Series(
     {"quick": 1, "full": 1},
     _lossless,
     unit="of the value",
+    explained="a path's weight is a product of ones, and the law allows for 4 u for each surface: "
+    "Mitsuba is off by 3.6e-7 with 100 surfaces",
 )
 
 FAMILY = Family(

@@ -99,7 +99,7 @@ AREA = Series(
     "Disks, spheres, rectangles and triangles of areas x and 1 / x light a floor two of their "
     "sizes below; all is scaled with them.  A case is a picture whose pixels see one point.",
     decades(0, 12, 2),
-    (1.0, 1e6, 1e12),
+    (1.0, 1e8, 1e12),
     {"quick": 8, "full": 8},
     _area,
     unit="of the value",
@@ -113,6 +113,8 @@ RADIANCE = Series(
     {"quick": 4, "full": 4},
     _radiance,
     unit="of the value",
+    explained="1e-30 to 1e30 lie within float32's range, and radiance is a factor of all light: "
+    "Mitsuba's pictures are as near as their noise, 4.5e-3, throughout",
 )
 ROULETTE = Series(
     "roulette",
@@ -124,4 +126,7 @@ ROULETTE = Series(
     {"quick": 3, "full": 3},
     _roulette,
     unit="of the value",
+    explained="no number depends on depth, and albedos are 0.99 at most: Mitsuba's pictures are as "
+    "near as their noise, 7.8e-3 at 1000 edges; with an albedo of 0.999 they are not (F10, closed "
+    "furnace)",
 )
