@@ -1,5 +1,6 @@
 """What rays hit in a scene and in the same scene transformed."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,8 @@ from reference_rt.tables import SceneTables
 
 BoolArray = npt.NDArray[np.bool_]
 Identities = npt.NDArray[np.int64]
+
+Outcomes = dict[str, Outcome]
 
 HALVINGS = 50
 """Steps that close in on an edge: until two rays differ by float64's rounding."""
@@ -238,6 +241,14 @@ def _example(before: Asked, after: Asked, k: int) -> dict[str, Any]:
         }
 
     return {"before": told(before), "after": told(after)}
+
+
+def added(one: Mapping[str, Outcome], other: Mapping[str, Outcome]) -> Outcomes:
+    """Contestant by contestant."""
+    found = dict(one)
+    for name, outcome in other.items():
+        found[name] = found[name] + outcome if name in found else outcome
+    return found
 
 
 class Bench:

@@ -6,9 +6,9 @@ kept; any number of rays traced side by side; plain Python instead of compiled k
 
 Ranges: 1 to 16 threads, bands of 1 pixel to the whole picture in shuffled order, 1 to 8 interrupts,
 blocks of 8 to 256 rays.  Counts: each pixel is a case, of 48 x 36, in the path-traced scene and the
-one by Whitted of F9; in plain Python of 8 x 6.  Passes: every bit is the same.  Mitsuba: its scalar
-and llvm variants with the same seed on 1 to 16 threads, with the box filter, whose pixels share no
-samples, and with the Gaussian, which sums samples of several pixels as threads end.
+one by Whitted of F9; in plain Python of 8 x 6.  Passes: every bit is the same.  Mitsuba: the
+path-traced scene of 96 x 72 pixels three times with the same seed, its scalar variant with the box
+filter, and scalar and llvm with the Gaussian, on 1 to 16 threads against 1.
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,8 @@ FAMILY = Family(
             cases=_ONE,
             measure=threads,
             unit=_UNIT,
-            explained="with the box filter no pixel of Mitsuba's depends on another",
+            explained="the range ends at 16 threads.  Mitsuba's scalar variant has the same bits with "
+            "1 to 8 and not with 16: 11,031 of 20,736 pixels differ, by up to all of their value",
         ),
         Series(
             name="wide filter, scalar",
@@ -50,7 +51,8 @@ FAMILY = Family(
             cases=_ONE,
             measure=partial(wide_filter, SCALAR),
             unit=_UNIT,
-            explained="threads are few",
+            explained="the range ends at 16 threads.  Mitsuba differs from 2 on: in 100 to 171 of "
+            "20,736 pixels by up to 2.3e-7, with 16 in 20,195 by up to 0.94",
         ),
         Series(
             name="wide filter, llvm",
@@ -61,7 +63,8 @@ FAMILY = Family(
             cases=_ONE,
             measure=partial(wide_filter, LLVM),
             unit=_UNIT,
-            explained="threads are few",
+            explained="the range ends at 16 threads.  Mitsuba differs from 2 on: in 1,050 to 6,519 "
+            "of 20,736 pixels, by up to 8.8e-7",
         ),
         Series(
             name="bands",
