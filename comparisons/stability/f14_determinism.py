@@ -39,8 +39,8 @@ FAMILY = Family(
             cases=_ONE,
             measure=threads,
             unit=_UNIT,
-            explained="the range ends at 16 threads.  Mitsuba's scalar variant has the same bits with "
-            "1 to 8 and not with 16: 11,031 of 20,736 pixels differ, by up to all of their value",
+            explained="the range ends at 16 threads.  Mitsuba's scalar variant has the same bits "
+            "with 1 to 8 and not with 16: 11,031 of 20,736 pixels differ, by up to all they are",
         ),
         Series(
             name="wide filter, scalar",
