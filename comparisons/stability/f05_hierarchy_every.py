@@ -38,7 +38,7 @@ def _comes_first(shapes: Shapes, a: Hit, b: Hit) -> bool:
 @entry_kernel
 def _every(
     shapes: Shapes,
-    references: npt.NDArray[np.int32],
+    references: IntArray,
     o: FloatArray,
     d: FloatArray,
     t: FloatArray,
@@ -71,7 +71,7 @@ def every(tables: SceneTables, o: FloatArray, d: FloatArray) -> Closest:
     with np.errstate(all="ignore"):
         _every(
             geometry.shapes,
-            geometry.bvh.references,
+            geometry.bvh.references.astype(np.int64),
             np.ascontiguousarray(o),
             np.ascontiguousarray(d),
             found.t,
