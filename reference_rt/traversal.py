@@ -37,9 +37,10 @@ def view_of(bvh: Bvh, root: int, ray: Ray) -> View:
     frame = bvh.frames
     center = Vec3(frame[root, CENTER], frame[root, CENTER + 1], frame[root, CENTER + 2])
     # Primitives find hits outside of their bounds by as much as their points are uncertain; o - c
-    # rounds once, which is less than what `surface_error` allows for.  Most uncertain are triangles:
-    # vertices are projected to within 15 u (|o| + size), and barycentrics known to CANCELLED u of
-    # a projected triangle, at most 4 size across; `surface_error` allows 27 u (2 |o| + 3 size).
+    # rounds once, which is less than what `surface_error` allows for.  Most uncertain are
+    # triangles: vertices are projected to within 15 u (|o| + size), and barycentrics known to
+    # CANCELLED u of a projected triangle, at most 4 size across; `surface_error` allows
+    # 27 u (2 |o| + 3 size).
     error = surface_error(ray.o, ray.o, 3.0 * frame[root, CENTER + 3])
     o = ray.o - center
     x, y, z = (

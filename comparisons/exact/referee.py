@@ -89,7 +89,8 @@ class Referee:
         leaves = self.sizes.by_part(copy)
         for member in copy.members:
             per_leaf = [
-                crossings_of(leaves[leaf.part], (o, d), (exact_o, exact_d)) for leaf in member.leaves
+                crossings_of(leaves[leaf.part], (o, d), (exact_o, exact_d))
+                for leaf in member.leaves
             ]
             for k, ray in enumerate(rays.tolist()):
                 found = [

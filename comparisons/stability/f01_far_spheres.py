@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from comparisons import translate, twin
+from comparisons import frame, translate, twin
 from comparisons.exact.dyadic import Dyadic, dot
 from comparisons.methods.setting import across, unit_vectors
 from comparisons.mitsuba_backend import scalar
@@ -117,7 +117,7 @@ def single(values: FloatArray) -> FloatArray:
 
 def in_mitsuba(shape: Shape, o: FloatArray, d: FloatArray) -> FloatArray:
     """t (n,); in its scalar variant no mesh stands in for what is small."""
-    return twin.trace(translate.load(Scene(shapes=(shape,))), o, d).t
+    return twin.trace(translate.load(Scene(shapes=(shape,)), frame.OURS), o, d).t
 
 
 def for_mitsuba(rays: Rays) -> Rays:

@@ -116,6 +116,17 @@ BOUND = (
 )
 
 
+OFFSET_GROWS = (
+    "Mitsuba begins rays (1 + max |p|) 8.9e-5 off a surface, which grows with the size: from 1 to "
+    "1e8, as far as it is asked, none of its 192 departures fails"
+)
+
+OFFSET_ALONG_NORMAL = (
+    "Mitsuba begins rays (1 + max |p|) 8.9e-5 off a surface along its normal, at whatever angle "
+    "they leave: at cosines from 0.1 to 1e-15 none of its 192 departures fails"
+)
+
+
 def _single(draw: Draw, x: float) -> bool:
     """Whether Mitsuba takes part: beyond, float32 cannot say where the shape is."""
     return draw.mitsuba and x <= 1e6
@@ -164,6 +175,7 @@ def _series(
     law: str = "",
     grazing: bool = False,
     cases: int = 0,
+    explained: str = "",
 ) -> Series:
     def run(draw: Draw, x: float) -> Mapping[str, Outcome]:
         return measure(draw, kinds, extent(draw, x), 1.0 / x if grazing else None)
@@ -186,6 +198,7 @@ def _series(
         unit="B",
         holds_to=holds_to,
         law=law,
+        explained=explained,
         shoot=picture,
     )
 
@@ -223,10 +236,14 @@ FAMILY = Family(
                 "All kinds, as far from the origin as they are large.",
                 extent,
                 (1e0, 1e2, 1e4, 1e6, 1e8, 1e16, 1e32, 1e64),
-                (1e8,),
+                (1e8, 1e64),
                 cases=150_000,
+                explained=explained,
             )
-            for name, axis, extent in (("small", "1 / size", _small), ("large", "size", _large))
+            for name, axis, extent, explained in (
+                ("small", "1 / size", _small, ""),
+                ("large", "size", _large, OFFSET_GROWS),
+            )
         ),
         _series(
             "anisotropy",
@@ -248,6 +265,7 @@ FAMILY = Family(
             (1e5, 1e15),
             grazing=True,
             cases=150_000,
+            explained=OFFSET_ALONG_NORMAL,
         ),
         _series(
             "everything",

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons import translate
+from comparisons import frame, translate
 from comparisons.exact.dyadic import BoolArray
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.stability.f02_leaving_shapes import Placed, Rays
@@ -19,7 +19,7 @@ def depart(placed: Placed, rays: Rays, ways: Ways) -> Departures:
     out = np.zeros((len(rays.o), COLUMNS))
     out[:, 0] = out[:, 13] = np.inf
     mi = mitsuba()
-    mi_scene = translate.load(scene_of(placed)).mi_scene
+    mi_scene = translate.load(scene_of(placed), frame.OURS).mi_scene
     for k, (o, d, way) in enumerate(zip(*(a.tolist() for a in (*rays, *ways)), strict=True)):
         _depart(mi, mi_scene, o, d, way, out[k])
     return Departures.of(out)

@@ -71,8 +71,8 @@ class Kind(NamedTuple):
 
 def matrix(linear: FloatArray, center: FloatArray) -> tuple[transform.Matrix]:
     """The one step of a transform."""
-    rows = np.column_stack([linear, center]).tolist()
-    return (transform.Matrix(matrix=tuple(tuple(row) for row in rows)),)
+    x, y, z = (tuple(row) for row in np.column_stack([linear, center]).tolist())
+    return (transform.Matrix(matrix=(x, y, z)),)
 
 
 def _placed(shape: Any, **fields: Any) -> Callable[..., Any]:
@@ -249,7 +249,7 @@ def place(kind: str, extent: Extent, draw: Draw) -> Placed:
 
 
 def _single(point: Any) -> Any:
-    return tuple(np.float32(point).astype(np.float64).tolist())
+    return tuple(np.asarray(point, np.float32).astype(np.float64).tolist())
 
 
 class Rays(NamedTuple):

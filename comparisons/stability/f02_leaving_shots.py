@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons import translate
+from comparisons import frame, translate
 from comparisons.methods.setting import FloatArray
 from comparisons.mitsuba_backend import scalar
 from comparisons.stability.f02_leaving_shapes import Extent, Placed, place
@@ -46,7 +46,7 @@ def lit(
     out = np.zeros((len(o), 2))
     if contestant == MITSUBA:
         with scalar() as mi:
-            mi_scene = translate.load(scene).mi_scene
+            mi_scene = translate.load(scene, frame.OURS).mi_scene
             for k, (begin, way, to) in enumerate(
                 zip(o.tolist(), d.tolist(), w.tolist(), strict=True)
             ):

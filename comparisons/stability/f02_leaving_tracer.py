@@ -120,7 +120,7 @@ COMPANY = (
     rt.Rectangle(),
     rt.Disk(),
     rt.Triangle(v0=(0, 0, 0), v1=(1, 0, 0), v2=(0, 1, 0)),
-    rt.Polygon(rings=(((0, 0), (1, 0), (0, 1)),)),
+    rt.Polygon(rings=(((0, 0, 0), (1, 0, 0), (0, 1, 0)),)),
     rt.Plane(),
     rt.Box(),
     rt.Cylinder(),
@@ -159,7 +159,8 @@ def subjects(kind: str, placed: list[Placed]) -> list[Subject]:
 
 def scene_of(placed: Placed) -> rt.Scene:
     """The shape alone."""
-    return rt.Scene(shapes=(placed.shape,), groups=GROUPS if placed.kind == "instance" else {})
+    groups: Any = GROUPS if placed.kind == "instance" else {}
+    return rt.Scene(shapes=(placed.shape,), groups=groups)
 
 
 def _scene(placed: Placed) -> Any:

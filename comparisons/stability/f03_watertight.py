@@ -166,6 +166,8 @@ FAMILY = Family(
             quick=(1.0, 148376.0, 1e9),
             cases=CASES,
             measure=measure_offset,
+            explained="Mitsuba is asked as long as float32 tells the meshes' vertices apart, up to"
+            " 1.5e5; there Embree's robust test still lets none of 11,800 rays through",
             shoot=shot,
         ),
         Series(

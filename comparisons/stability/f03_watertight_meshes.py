@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -79,7 +80,8 @@ def cube(n: int) -> Closed:
     """[-1, 1]^3, each face n x n squares of two triangles each."""
     ticks = np.arange(n + 1)
     i, j = (x.ravel() for x in np.meshgrid(ticks[:-1], ticks[:-1], indexing="ij"))
-    corners, quads = [], []
+    corners: list[Any] = []
+    quads: list[Any] = []
     for axis in range(3):
         for side in (0, n):
             grid = np.empty((n + 1, n + 1, 3), np.int64)

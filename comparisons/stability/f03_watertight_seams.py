@@ -19,6 +19,7 @@ from comparisons.stability.family import (
     Outcome,
 )
 from reference_rt import query, transform
+from reference_rt.shapes.shape import IntArray
 
 APART = 10.0
 """Between the middles of neighbours, none of which is larger than 2."""
@@ -113,7 +114,7 @@ class Asked:
     shapes: tuple[Any, ...]
     o: FloatArray
     d: FloatArray
-    whose: FloatArray
+    whose: IntArray
 
 
 def drawn(rng: np.random.Generator, names: tuple[str, ...], offset: float, n: int) -> Asked:
@@ -164,10 +165,12 @@ def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
     tables = rt.build_tables(rt.Scene(shapes=asked.shapes, hierarchy="sah"))
     found = {OURS: judged(asked, query.intersect(tables, asked.o, asked.d))}
     if draw.mitsuba and fits(np.abs(asked.o)):
-        from comparisons import translate, twin
+        from comparisons import frame, translate, twin
 
         names = tuple(name for name in names if KINDS[name].translated)
         asked = drawn(draw.rng, names, x, draw.cases // len(names))
         scene = rt.Scene(shapes=asked.shapes)
-        found[MITSUBA] = judged(asked, twin.trace(translate.load(scene), asked.o, asked.d))
+        found[MITSUBA] = judged(
+            asked, twin.trace(translate.load(scene, frame.OURS), asked.o, asked.d)
+        )
     return found

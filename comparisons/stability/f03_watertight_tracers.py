@@ -87,7 +87,7 @@ def _tracer(mi: Any, scene: Any) -> Tracer:
 
     def trace(o: FloatArray, d: FloatArray) -> BoolArray:
         (t,) = for_rays(hits, o, d)
-        return np.isfinite(t)
+        return np.asarray(np.isfinite(t))
 
     return trace
 

@@ -54,9 +54,9 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
     row = getattr(tables.geometry.shapes, trial.kind)._asdict()
     found = {OURS: query.closest(tables, trial.o, trial.d).t}
     if mitsuba:
-        from comparisons import translate, twin
+        from comparisons import frame, translate, twin
 
-        found[MITSUBA] = twin.trace(translate.load(scene), trial.o, trial.d).t
+        found[MITSUBA] = twin.trace(translate.load(scene, frame.OURS), trial.o, trial.d).t
     if trial.corners is not None:
         family = "triangle" if trial.kind == "triangles" else "box"
         of = methods.TriangleParameters if family == "triangle" else methods.BoxParameters

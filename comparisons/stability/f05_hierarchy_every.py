@@ -38,7 +38,7 @@ def _comes_first(shapes: Shapes, a: Hit, b: Hit) -> bool:
 @entry_kernel
 def _every(
     shapes: Shapes,
-    references: npt.NDArray[np.int32],
+    references: IntArray,
     o: FloatArray,
     d: FloatArray,
     t: FloatArray,
@@ -51,7 +51,8 @@ def _every(
         shear = shear_of(ray)
         closest = Hit(np.inf, -1, -1, 0.0, 0.0, -1)
         for k in range(len(references)):
-            kind, number = np.int64(references[k, 0]), np.int64(references[k, 1])
+            kind: Any = np.int64(references[k, 0])
+            number: Any = np.int64(references[k, 1])
             found = any_shape.intersect(shapes, kind, number, ray, shear)
             if found.t < np.inf and found.t <= closest.t:
                 hit = Hit(found.t, kind, number, found.u, found.v, -1)
@@ -70,7 +71,7 @@ def every(tables: SceneTables, o: FloatArray, d: FloatArray) -> Closest:
     with np.errstate(all="ignore"):
         _every(
             geometry.shapes,
-            geometry.bvh.references,
+            geometry.bvh.references.astype(np.int64),
             np.ascontiguousarray(o),
             np.ascontiguousarray(d),
             found.t,

@@ -23,7 +23,9 @@ def strewn(rng: np.random.Generator, n: int) -> FloatArray:
     """Triangles (n, 3, 3) in the cube [-1, 1]^3, as large as leaves some space between them; a
     third of the vertices on a lattice, so that boxes are flat and planes coincide."""
     size = 2.0 / np.cbrt(n)
-    corners = rng.uniform(-1.0, 1.0, (n, 1, 3)) + size * rng.uniform(-0.5, 0.5, (n, 3, 3))
+    corners: FloatArray = rng.uniform(-1.0, 1.0, (n, 1, 3)) + size * rng.uniform(
+        -0.5, 0.5, (n, 3, 3)
+    )
     regular = rng.uniform(size=n) < 0.3
     corners[regular] = np.round(corners[regular] * 4.0 / size) * size / 4.0
     # Rounding makes points and lines of some, which meshes leave out: one at least must stay.
@@ -160,7 +162,7 @@ def everything(rng: np.random.Generator, folder: Path) -> rt.Scene:
                 transform.Translate(translate=(round(x), round(y), round(z))),
             )
         shapes += [make(steps)] * (2 if k % 20 == 0 else 1)
-    groups = {"pair": (rt.Box(), rt.Sphere(center=(0.0, 0.0, 1.5), radius=0.5))}
+    groups: dict[str, Any] = {"pair": (rt.Box(), rt.Sphere(center=(0.0, 0.0, 1.5), radius=0.5))}
     return rt.Scene(shapes=tuple(shapes), groups=groups)
 
 

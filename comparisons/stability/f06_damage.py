@@ -75,7 +75,7 @@ def number(rng: np.random.Generator, old: float) -> float | int:
 
 
 def _whole(rng: np.random.Generator) -> int | float:
-    return pick(rng, INTEGERS) if rng.random() < 0.8 else float(pick(rng, NUMBERS))  # type: ignore[no-any-return]
+    return pick(rng, INTEGERS) if rng.random() < 0.8 else float(pick(rng, NUMBERS))
 
 
 def with_numbers(rng: np.random.Generator, base: Any, count: int) -> Any:

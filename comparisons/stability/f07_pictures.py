@@ -4,6 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons.stability import f07_lists as lists
@@ -50,7 +51,7 @@ def shoot(contestant: str, x: float) -> Shot:
     return Shot(pixels, caption)
 
 
-def _shaded(o: FloatArray, d: FloatArray, t: FloatArray) -> FloatArray:
+def _shaded(o: FloatArray, d: FloatArray, t: FloatArray) -> npt.NDArray[np.uint8]:
     """8-bit sRGB (n, 3)."""
     m = transform.affine((TURN,))
     hit = np.isfinite(t)
@@ -63,4 +64,5 @@ def _shaded(o: FloatArray, d: FloatArray, t: FloatArray) -> FloatArray:
     cosine = np.abs(normal @ LIGHT)
     colour = COLOURS[axis] * (0.25 + 0.75 * cosine[:, None])
     colour[~hit] = 0.12
-    return np.round(255.0 * np.clip(colour, 0.0, 1.0)).astype(np.uint8)
+    pixels: npt.NDArray[np.uint8] = np.round(255.0 * np.clip(colour, 0.0, 1.0)).astype(np.uint8)
+    return pixels

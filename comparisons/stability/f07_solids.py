@@ -135,7 +135,8 @@ def judge(draw: Draw, solid: Any, o: FloatArray, d: FloatArray, size: float) -> 
         (INSIDE_TESTS, lists.inside_tests, _first),
     ):
         t = ask(solid, draw.folder, o, d)
-        failures, worst, examples, opened = 0, 0.0, [], 0
+        failures, worst, opened = 0, 0.0, 0
+        examples: list[Mapping[str, Any]] = []
         for k, truth in enumerate(truths):
             if truth.touching:
                 opened += 1

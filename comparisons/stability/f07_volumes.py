@@ -38,7 +38,7 @@ def volumes(draw: Draw, x: float) -> Mapping[str, Outcome]:
             error = max(float(length.std()) / np.sqrt(RAYS), 1e-300)
             off[name].append(abs(float(length.mean()) - volume) / error)
     return {
-        name: Outcome(len(some), sum(s > SIGMAS for s in some), max(some))
+        name: Outcome(len(some), int(np.count_nonzero(np.array(some) > SIGMAS)), max(some))
         for name, some in off.items()
     }
 

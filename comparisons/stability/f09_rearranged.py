@@ -33,8 +33,7 @@ def rearranged(draw: Draw, x: float) -> dict[str, Outcome]:
             found = rays.mitsubas(other, o, d)
             after = rays.Asked(other, o, d, found, old_names(found.identities))
             outcomes[MITSUBA] = rays.judged_mitsuba(bench.mitsuba, after, 1.0)
-        for name, outcome in outcomes.items():
-            total[name] = total[name] + outcome if name in total else outcome
+        total = rays.added(total, outcomes)
     for make in (scenes.path, scenes.whitted):
         scene = make(draw.folder)
         other, _ = change(scene, draw, x)
@@ -120,8 +119,7 @@ def nested(draw: Draw, x: float) -> dict[str, Outcome]:
             found = rays.mitsubas(grouped, o, d)
             after = rays.Asked(grouped, o, d, found, _baked_names(found.identities))
             outcomes[MITSUBA] = rays.judged_mitsuba(bench.mitsuba, after, 1.0)
-        for name, outcome in outcomes.items():
-            total[name] = total[name] + outcome if name in total else outcome
+        total = rays.added(total, outcomes)
     return total
 
 

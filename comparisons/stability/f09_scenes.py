@@ -1,13 +1,12 @@
-"""The scenes that F9 transforms, and how a whole scene is transformed.
+"""The scenes that F9 transforms.
 
 All coordinates are multiples of 1/64 below 8 (where shapes are turned: of their centres), so that
 whole-number offsets up to 2^46 and factors 2^k move a scene exactly, in float64; in float32 up to
 2^15.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -15,7 +14,6 @@ import trimesh
 import reference_rt as rt
 from comparisons.stability.family import FloatArray
 from reference_rt import transform
-from reference_rt.shapes.shape import Shape
 from reference_rt.textures.texture import UvMap
 
 SIZE = 4.0
@@ -28,71 +26,6 @@ FILM = rt.Film(width=48, height=36)
 CAMERA = rt.Perspective(eye=(1, 2, 7), target=(0, 0, 0), fov=48)
 
 UP = (1.0, 0.0, 0.0)
-
-
-class Motion(NamedTuple):
-    """p -> factor turn p + offset.  turn: (3, 3), orthogonal to within rounding."""
-
-    factor: float = 1.0
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    turn: FloatArray = np.eye(3)
-
-    @property
-    def affine(self) -> transform.Affine:
-        return np.column_stack([self.factor * self.turn, self.offset])
-
-    def point(self, p: Sequence[float]) -> tuple[float, float, float]:
-        x, y, z = transform.apply_points(self.affine, np.array([p], np.float64))[0].tolist()
-        return x, y, z
-
-    def vector(self, v: Sequence[float]) -> tuple[float, float, float]:
-        """Turned alone."""
-        x, y, z = transform.apply_points(_linear(self.turn), np.array([v], np.float64))[0].tolist()
-        return x, y, z
-
-    @property
-    def step(self) -> transform.Matrix:
-        rows = tuple(tuple(row) for row in self.affine.tolist())
-        return transform.Matrix(matrix=rows)  # type: ignore[arg-type]
-
-
-def _linear(turn: FloatArray) -> transform.Affine:
-    return np.column_stack([turn, np.zeros(3)])
-
-
-def moved(scene: rt.Scene, motion: Motion) -> rt.Scene:
-    """The scene, all of it: shapes, camera and lights; intensities such that it looks the same."""
-    camera = scene.camera
-    assert isinstance(camera, rt.Perspective)
-    camera = camera.model_copy(
-        update={
-            "eye": motion.point(camera.eye),
-            "target": motion.point(camera.target),
-            "up": motion.vector(camera.up),
-        }
-    )
-    return scene.changed(
-        camera=camera,
-        shapes=tuple(_moved_shape(shape, motion) for shape in scene.shapes),
-        lights=tuple(_moved_light(light, motion) for light in scene.lights),
-    )
-
-
-def _moved_shape(shape: Any, motion: Motion) -> Shape:
-    found: Shape = shape.model_copy(update={"transform": (*shape.transform, motion.step)})
-    return found
-
-
-def _moved_light(light: Any, motion: Motion) -> Any:
-    brighter = motion.factor * motion.factor
-    if isinstance(light, rt.Point | rt.Spot):
-        update: dict[str, Any] = {"intensity": tuple(brighter * x for x in light.intensity)}
-        places = ("position",) if isinstance(light, rt.Point) else ("origin", "target")
-        update |= {name: motion.point(getattr(light, name)) for name in places}
-        return light.model_copy(update=update)
-    if isinstance(light, rt.Directional):
-        return light.model_copy(update={"direction": motion.vector(light.direction)})
-    return light  # the same from everywhere
 
 
 # ---- the scenes ---------------------------------------------------------------------------------

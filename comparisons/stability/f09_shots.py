@@ -11,7 +11,7 @@ import reference_rt as rt
 from comparisons.stability import f09_light as light
 from comparisons.stability import f09_rays as rays
 from comparisons.stability import f09_scenes as scenes
-from comparisons.stability.f09_scenes import Motion
+from comparisons.stability.f09_motion import Motion, moved
 from comparisons.stability.family import OURS, FloatArray, Shot
 
 WIDTH, HEIGHT = 192, 144
@@ -27,9 +27,7 @@ def shoot_light(motion: Callable[[float], Motion], contestant: str, x: float) ->
         scene = scenes.path(Path(folder)).changed(
             film=rt.Film(width=WIDTH, height=HEIGHT), sampler=rt.Sobol(spp=SPP, seed=3)
         )
-        first, found = (
-            light.colours(contestant, s) for s in (scene, scenes.moved(scene, motion(x)))
-        )
+        first, found = (light.colours(contestant, s) for s in (scene, moved(scene, motion(x))))
     visible = np.abs(found - first).max(axis=-1) > 0.1 * first.max(axis=-1) + 0.02
     visible |= ~np.isfinite(found).all(axis=-1)
     said = f"{contestant} at {x:g}: {_percent(visible)} of the pixels visibly other than at 1"
@@ -46,7 +44,7 @@ def shoot_rays(motion: Callable[[float], Motion], contestant: str, x: float) -> 
         pixels = rays.Rays(o, d, np.ones(len(o), bool))
         answers = []
         for one in (Motion(), motion(x)):
-            other = scenes.moved(scene, one)
+            other = moved(scene, one)
             o, d = rays.through(one, pixels)
             if contestant == OURS:
                 answers.append(rays.ours(rt.build_tables(other), o, d))

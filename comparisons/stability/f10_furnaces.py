@@ -154,6 +154,9 @@ CLOSED = Series(
     {"quick": 1, "full": 1},
     _closed,
     unit="of the value",
+    explained="the range ends at an albedo of 0.999, where Mitsuba fails, 0.88 of the value off.  "
+    "Its roulette lets 95 % of all paths go on at most: the variance is infinite from an albedo of "
+    "0.975 on, and few paths are as long as most light needs.  Ours lets 99.9 % go on",
 )
 OPEN = Series(
     "open furnace",
@@ -166,6 +169,8 @@ OPEN = Series(
     {"quick": 10_000, "full": 200_000},
     _open,
     unit="of the light, above all",
+    explained="the range ends at alpha 1e-4.  Few samples say little about a few materials: of 24 "
+    "cases of Mitsuba's with 10,000 samples one fails at 1/3, two at 1e-4, and none between",
 )
 SHELLS = Series(
     "lossless",
@@ -176,6 +181,8 @@ SHELLS = Series(
     {"quick": 1, "full": 1},
     _lossless,
     unit="of the value",
+    explained="a path's weight is a product of ones, and the law allows for 4 u for each surface: "
+    "Mitsuba is off by 3.6e-7 with 100 surfaces",
 )
 
 FAMILY = Family(

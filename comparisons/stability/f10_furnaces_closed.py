@@ -16,6 +16,9 @@ WALLS = tuple(
 
 UNLIMITED = 10**6
 
+LATEST = 4096
+"""Edges after which roulette begins at the latest: no path in glass is that long (measured)."""
+
 
 def closed(albedo: float, edges: int | None = None, rr_depth: int = 5) -> World:
     """Walls that emit 1 and reflect `albedo`, seen from within: 1 / (1 - a), or as much as comes in
@@ -45,5 +48,5 @@ def shells(n: int) -> World:
     )
     camera = rt.Orthographic(eye=(0, 0, 3), target=(0, 0, 0), width=2.1)
     # Without roulette; light is lost only where a path is cut.
-    path = {"max_depth": UNLIMITED, "rr_depth": UNLIMITED}
+    path = {"max_depth": UNLIMITED, "rr_depth": LATEST}
     return World(spheres, materials, camera, 1.0, path, sky=1.0)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
+from comparisons import frame
 from comparisons.mitsuba_backend import scalar
 from comparisons.mitsuba_scene import picture
 from comparisons.stability.family import MITSUBA, OURS, Draw, FloatArray, Outcome
@@ -86,7 +87,7 @@ def ours(world: World, pixels: int, spp: int, seed: int) -> FloatArray:
 
 def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> FloatArray:
     def render() -> FloatArray:
-        twin = load(scene_of(world, pixels, spp, seed, hidden=False))
+        twin = load(scene_of(world, pixels, spp, seed, hidden=False), frame.OURS)
         return picture(twin.mi_scene, spp, seed).reshape(-1, 3)
 
     if not in_scalar:

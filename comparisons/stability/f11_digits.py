@@ -248,6 +248,8 @@ NORMALS = Series(
     {"quick": 1_000, "full": 20_000},
     _densities,
     unit="of the value",
+    explained="64 u of the value are allowed, in each one's own u: 3.8e-6 for Mitsuba, which is "
+    "off by 5.1e-7 to 8.3e-7, no more at small alpha than at large",
 )
 MASKING = Series(
     "masking",

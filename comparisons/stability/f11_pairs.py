@@ -152,9 +152,19 @@ def _series(
     values: tuple[float, ...],
     quick: tuple[float, ...],
     measure: Callable[[Draw, float], Mapping[str, Outcome]],
+    explained: str = "",
 ) -> Series:
-    cases = {"quick": 2_000, "full": 100_000}
-    return Series(name, axis, about, values, quick, cases, measure, unit="of the value")  # type: ignore[arg-type]
+    return Series(
+        name,
+        axis,
+        about,
+        values,
+        quick,
+        {"quick": 2_000, "full": 100_000},
+        measure,
+        unit="of the value",
+        explained=explained,
+    )
 
 
 GRAZING = _series(
@@ -173,6 +183,8 @@ ROUGHNESS = _series(
     (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
     (1.0, 1e2, 1e4),
     _roughness,
+    explained="the range ends at alpha 1e-4, and Mitsuba fails within it: in 8 of 19,784 pairs at "
+    "alpha 1/30, 1,079 of 19,862 at 1e-4, where one is all of the value off",
 )
 MATCHED = _series(
     "matched indices",

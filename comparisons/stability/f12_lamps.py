@@ -99,7 +99,7 @@ AREA = Series(
     "Disks, spheres, rectangles and triangles of areas x and 1 / x light a floor two of their "
     "sizes below; all is scaled with them.  A case is a picture whose pixels see one point.",
     decades(0, 12, 2),
-    (1.0, 1e6, 1e12),
+    (1.0, 1e8, 1e12),
     {"quick": 8, "full": 8},
     _area,
     unit="of the value",
@@ -113,6 +113,8 @@ RADIANCE = Series(
     {"quick": 4, "full": 4},
     _radiance,
     unit="of the value",
+    explained="1e-30 to 1e30 lie within float32's range, and radiance is a factor of all light: "
+    "Mitsuba's pictures are as near as their noise, 4.5e-3, throughout",
 )
 ROULETTE = Series(
     "roulette",
@@ -124,4 +126,7 @@ ROULETTE = Series(
     {"quick": 3, "full": 3},
     _roulette,
     unit="of the value",
+    explained="no number grows with depth.  What Mitsuba's cap of 0.95 on survival costs at an "
+    "albedo of 0.99 is noise, of which 4 standard errors are allowed: its means are up to 0.88 of "
+    "the value off, at 300 edges, without failing; ours up to 6.9e-3",
 )

@@ -150,6 +150,8 @@ DISTANCE = Series(
     {"quick": 2_000, "full": 20_000},
     _distance,
     unit="of the value",
+    explained="1 / d² of 1e-9 to 1e9 is a float of 32 bits as well, and a root, squares and a "
+    "quotient round by a few u wherever they are: Mitsuba is off by 3.1e-7 at most, at all of them",
 )
 SPOT = Series(
     "spot",

@@ -258,6 +258,9 @@ CLOSE_SPHERE = Series(
     {"quick": 1_000, "full": 20_000},
     _close,
     unit="of the value",
+    explained="the law allows for the condition, 1 / cos, so that both may lose digits alike: "
+    "Mitsuba is off by 6.9e-5 at 1e6, ours by 6.3e-14; it is asked as far as float32 has points "
+    "that close, 2^20",
 )
 FLAT = Series(
     "flat lights",
@@ -269,6 +272,8 @@ FLAT = Series(
     {"quick": 200, "full": 2_000},
     _flat,
     unit="of what is allowed",
+    explained="both draw points of the area, whose densities hold no difference of numbers that "
+    "are alike: Mitsuba is off by 0.74 of what is allowed at most, of 6 standard errors",
 )
 SKY = Series(
     "lights that fill the sky",

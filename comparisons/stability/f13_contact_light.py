@@ -75,7 +75,7 @@ def panes(gap: float) -> SceneTables:
     lamp = rt.Rectangle(
         material="lamp", transform=matrix(np.diag([9.0, 9.0, 1.0]), np.array([0.0, 0.0, -3.0]))
     )
-    materials = {
+    materials: dict[str, Any] = {
         "glass": rt.Dielectric(interior_ior=GLASS),
         "lamp": rt.Emissive(radiance=(1.0, 1.0, 1.0)),
     }

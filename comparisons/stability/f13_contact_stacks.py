@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons import translate
+from comparisons import frame, translate
 from comparisons.methods.errors import U
 from comparisons.methods.setting import FloatArray
 from comparisons.mitsuba_backend import scalar
@@ -68,7 +68,7 @@ def follow_in_mitsuba(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int)
     """The same in Mitsuba, by `si.spawn_ray`."""
     out = np.full((len(o), steps), -1)
     with scalar() as mi:
-        twin = translate.load(scene)
+        twin = translate.load(scene, frame.OURS)
         for i in range(len(o)):
             ray = mi.Ray3f(mi.Point3f(o[i].tolist()), mi.Vector3f(d[i].tolist()))
             for k in range(steps):

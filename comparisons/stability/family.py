@@ -93,7 +93,8 @@ class Series:
     as a formula in u = 2^-53, distance, size; needed where holds_to is not the last value;
     explained: why ours does not reach 1e4 times further than Mitsuba, where it does not;
     shoot(contestant, x): a picture of what goes wrong at x, where there is something to see; the
-    page shows it at the first x at which a contestant other than ours fails, beside ours.
+    page shows it at the first x at which a contestant other than ours fails and its picture is
+    another than ours, beside ours.
     """
 
     name: str

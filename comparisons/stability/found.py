@@ -30,8 +30,10 @@ class Found:
         """At once or not at all."""
         document = dataclasses.asdict(self) | {"key": key}
         with replacing(path) as temporary:
-            # Infinity, which is no JSON, is for our own eyes; `results.json` has none.
-            temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
+            # Infinity, which is no JSON, is for our own eyes; `results.json` has none.  NumPy's
+            # numbers become Python's.
+            text = json.dumps(document, indent=1, default=lambda value: value.item())
+            temporary.write_text(text, encoding="utf-8")
 
     @classmethod
     def read(cls, path: Path, key: str) -> "Found | None":

@@ -17,7 +17,7 @@ from comparisons.sources import sources_digest
 from comparisons.stability.families import family
 from comparisons.stability.family import OURS, Effort, Family, Series
 from comparisons.stability.found import Found
-from comparisons.stability.summary import contestants, first_failure, summarise
+from comparisons.stability.summary import contestants, summarise
 from comparisons.stability.worker import Request
 from reference_rt.errors import ReferenceUnavailableError
 
@@ -119,30 +119,54 @@ def run(choice: Choice, out: Path, jobs: int, tell: Tell, fresh: bool = False) -
 
 
 def shoot(choice: Choice, found: Sequence[Found], out: Path, jobs: int) -> list[Picture]:
-    """Pictures of each series at the x where the first other than ours fails: its and ours."""
+    """Pictures of each series at the first x where the first other than ours fails and it can be
+    seen: its picture there and ours, which is another."""
     key = f"{key_of(choice.effort, choice.seed)} {choice.mitsuba}"
-    wanted: dict[tuple[str, str, str, float], Request] = {}
+    left = _failing(choice, found)
+    seen: list[Picture] = []
+    while left:
+        pairs = {}
+        for (one, series), (who, places) in left.items():
+            at = (one, series, places.pop(0), out / "pictures", key)
+            pairs[one, series] = [_request(choice, *at, name) for name in (who, OURS)]
+        wanted = [r for pair in pairs.values() for r in pair if _caption(r.out, key) is None]
+        with closing(pool.run(wanted, jobs, SECONDS["full"], lambda *_: None, WORKER)) as running:
+            for _ in running:
+                pass
+        for place, pair in pairs.items():
+            captions = [_caption(request.out, key) for request in pair]
+            if None not in captions and _differ(*(request.out for request in pair)):
+                seen += [
+                    Picture(*place, request.shoot, request.x, request.out, str(caption))
+                    for request, caption in zip(pair, captions, strict=True)
+                ]
+                del left[place]
+        left = {place: some for place, some in left.items() if some[1]}
+    return seen
+
+
+def _failing(
+    choice: Choice, found: Sequence[Found]
+) -> dict[tuple[str, str], tuple[str, list[float]]]:
+    """By family and series: the first contestant other than ours that fails, and all x where it
+    does."""
+    failing = {}
     for one in map(family, choice.families):
         for summary in summarise(one, found):
-            others = [name for name in contestants(summary.found) if name != OURS]
-            failing = [name for name in others if first_failure(summary.found, name) is not None]
-            if summary.series.shoot is None or not failing:
+            if summary.series.shoot is None:
                 continue
-            x = first_failure(summary.found, failing[0])
-            assert x is not None
-            for who in (failing[0], OURS):
-                place = (one.id, summary.series.name, x, out / "pictures")
-                request = _request(choice, *place, key, who)
-                wanted[one.id, summary.series.name, who, x] = request
-    left = [request for request in wanted.values() if _caption(request.out, key) is None]
-    with closing(pool.run(left, jobs, SECONDS["full"], lambda *_: None, WORKER)) as running:
-        for _ in running:
-            pass
-    return [
-        Picture(*place, request.out, caption)
-        for place, request in wanted.items()
-        if (caption := _caption(request.out, key)) is not None
-    ]
+            for name in contestants(summary.found):
+                outcomes = [(f.x, f.outcomes[name]) for f in summary.found if name in f.outcomes]
+                places = [x for x, some in outcomes if some.failures]
+                if name != OURS and places:
+                    failing[one.id, summary.series.name] = (name, places)
+                    break
+    return failing
+
+
+def _differ(a: Path, b: Path) -> bool:
+    with Image.open(a) as one, Image.open(b) as other:
+        return one.tobytes() != other.tobytes()
 
 
 def _caption(path: Path, key: str) -> str | None:

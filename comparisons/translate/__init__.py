@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.frame import Frame
 from comparisons.layout import Copy, Leaf, copies_of, place_of
 from comparisons.mitsuba_backend import mitsuba, scalar
 from comparisons.mitsuba_scene import light_id, shape_id
@@ -49,10 +50,10 @@ def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
     return {**_groups(found.pieces), **found.plain}
 
 
-def load(scene: Scene) -> Twin:
-    """The scene in Mitsuba, its shapes not merged, in the coordinates of `Twin.frame`.  Raises as
-    `to_mitsuba` does."""
-    frame = frame_of(scene)
+def load(scene: Scene, frame: Frame | None = None) -> Twin:
+    """The scene in Mitsuba, its shapes not merged, in the coordinates of `Twin.frame`: those that
+    suit float32 best, or `frame`.  Raises as `to_mitsuba` does."""
+    frame = frame_of(scene) if frame is None else frame
     found = _translated(moved(scene, frame))
     crowd = _crowd(found)
     plain = {**_groups(found.pieces), **found.plain}

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -111,11 +112,11 @@ def _crossings(
     part: IntArray,
     count: IntArray,
 ) -> None:
+    solids: Any = geometry.solids
+    bvh: Any = geometry.bvh
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
-        count[i] = _all_along(
-            geometry.solids, geometry.shapes, geometry.bvh, solid, ray, t[i], widths[i], part[i]
-        )
+        count[i] = _all_along(solids, geometry.shapes, bvh, solid, ray, t[i], widths[i], part[i])
 
 
 def crossings(

@@ -94,8 +94,7 @@ def _from_light(
     n = float(setup.light_samples)
     if sample.light.is_delta:
         return sample.contribution * (1.0 / (n * pdf))
-    bsdf_pdf = any_material.pdf(scene.materials, shading, sample.wi)
-    weight = power_heuristic(n * pdf, setup.bsdf_samples * bsdf_pdf)
+    weight = power_heuristic(n * pdf, setup.bsdf_samples * sample.bsdf_pdf)
     return sample.contribution * (weight / (n * pdf))
 
 

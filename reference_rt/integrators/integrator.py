@@ -13,11 +13,13 @@ from reference_rt.vec3 import Vec3, is_black, to_local
 
 
 class Direct(NamedTuple):
-    """What one light sample sends to the viewer: f cos L, 0 in shadow, not yet divided by a pdf."""
+    """What one light sample sends to the viewer: f cos L, 0 in shadow, not yet divided by a pdf;
+    bsdf_pdf: the density with which the material's own sampling picks `wi`."""
 
     light: LightSample
     wi: Vec3
     contribution: Vec3
+    bsdf_pdf: float
 
 
 @kernel
@@ -37,7 +39,7 @@ def direct_from(scene: SceneTables, shading: Shading, light: LightSample) -> Dir
     if is_black(found.contribution):
         return found
     if occluded(scene.geometry, shadow_ray(shading.point, light)):
-        return Direct(light, found.wi, black)
+        return Direct(light, found.wi, black, found.bsdf_pdf)
     return found
 
 
@@ -46,10 +48,10 @@ def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Dire
     """The same, whatever may be in the way."""
     if light.pdf == 0.0:
         black = Vec3(0.0, 0.0, 0.0)
-        return Direct(light, black, black)
+        return Direct(light, black, black, 0.0)
     wi = to_local(shading.frame, light.wi)
-    f_cos = any_material.evaluate(scene.materials, shading, wi)
-    return Direct(light, wi, f_cos * light.radiance)
+    scattered = any_material.both(scene.materials, shading, wi)
+    return Direct(light, wi, scattered.value * light.radiance, scattered.density)
 
 
 @kernel

@@ -289,6 +289,5 @@ def _next_event(
     pdf = light.pdf * picked.probability
     if light.is_delta:
         return Lit(sample.contribution * (1.0 / pdf), shadow)
-    bsdf_pdf = any_material.pdf(scene.materials, shading, sample.wi)
-    weight = _weight(path.sampling == _BSDF, path.sampling, pdf, bsdf_pdf)
+    weight = _weight(path.sampling == _BSDF, path.sampling, pdf, sample.bsdf_pdf)
     return Lit(sample.contribution * (weight / pdf), shadow)

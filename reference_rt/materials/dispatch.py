@@ -7,7 +7,7 @@ from reference_rt.materials import layers as any_layer
 from reference_rt.materials import leaves as any_leaf
 from reference_rt.materials.layers import Layer, Layers, layer_at, lets
 from reference_rt.materials.leaves import Leaves
-from reference_rt.materials.material import Branches, BsdfSample, no_sample
+from reference_rt.materials.material import Branches, BsdfSample, Scattered, no_sample
 from reference_rt.materials.shading import Shading
 from reference_rt.materials.textured import Textured, looked_floats
 from reference_rt.shapes.shape import IntArray
@@ -122,6 +122,23 @@ def _pdf(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3
             one = any_leaf.pdf(materials.leaves, kind, i, shading.at, wo_in, wi_in)
             density += one * layer.weight
     return density / total if total > 0.0 else 0.0
+
+
+@kernel
+def both(materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`, which share much of their work."""
+    return _both(materials.layers, materials, shading, wi)
+
+
+@kernel
+def _both(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
+    m = shading.point.material
+    if layers is None:
+        kind, i = _kind(materials.kind, materials, m), materials.row[m]
+        return any_leaf.both(materials.leaves, kind, i, shading.at, shading.wo, wi)
+    return Scattered(
+        _evaluate(layers, materials, shading, wi), _pdf(layers, materials, shading, wi)
+    )
 
 
 @kernel

@@ -29,6 +29,7 @@ from reference_rt.materials.material import (
     Branches,
     BsdfSample,
     Material,
+    Scattered,
     no_branches,
     no_sample,
     sample_branch,
@@ -114,6 +115,11 @@ def _never(table: Any, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
 
 
 @kernel
+def _apart(table: Any, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    return Scattered(_evaluate(table, i, at, wo, wi), _pdf(table, i, at, wo, wi))
+
+
+@kernel
 def _nowhere(
     table: Any, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
@@ -132,6 +138,7 @@ def _no_ambient(table: Any, i: int, at: At) -> Vec3:
 
 _evaluate = _of_table("evaluate", _nothing)
 _pdf = _of_table("pdf", _never)
+_both = _of_table("both", _apart)
 _sample = _of_table("sample", _nowhere)
 _branches = _of_table("branches", _no_branches)
 _ambient = _of_table("ambient", _no_ambient)
@@ -204,6 +211,27 @@ def pdf(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
     elif kind == PHONG:
         density = _pdf(leaves.phongs, i, at, wo, wi)
     return density
+
+
+@kernel
+def both(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`, which share much of their work."""
+    found = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    if kind == DIFFUSE:
+        found = _both(leaves.diffuses, i, at, wo, wi)
+    elif kind == ROUGH_CONDUCTOR:
+        found = _both(leaves.rough_conductors, i, at, wo, wi)
+    elif kind == ROUGH_DIELECTRIC:
+        found = _both(leaves.rough_dielectrics, i, at, wo, wi)
+    elif kind == PLASTIC:
+        found = _both(leaves.plastics, i, at, wo, wi)
+    elif kind == ROUGH_PLASTIC:
+        found = _both(leaves.rough_plastics, i, at, wo, wi)
+    elif kind == PRINCIPLED:
+        found = _both(leaves.principleds, i, at, wo, wi)
+    elif kind == PHONG:
+        found = _both(leaves.phongs, i, at, wo, wi)
+    return found
 
 
 @kernel

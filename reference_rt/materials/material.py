@@ -67,6 +67,13 @@ def no_sample() -> BsdfSample:
     return BsdfSample(zero, zero, 0.0, 1.0, False)
 
 
+class Scattered(NamedTuple):
+    """value: f(wo, wi) |cos wi|;  density: that with which `sample` picks wi."""
+
+    value: Vec3
+    density: float
+
+
 class Branches(NamedTuple):
     """The mirrored and the refracted direction of a perfectly smooth surface.
 

@@ -22,7 +22,7 @@ from pydantic import Field, model_validator
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
 from reference_rt.materials.fresnel import Refraction, relative_index
-from reference_rt.materials.material import INV_PI, BsdfSample, Material, no_sample
+from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
 from reference_rt.materials.microfacet import (
     GGX,
     Microfacets,
@@ -213,60 +213,56 @@ def _shares(s: Surface, wo: Vec3) -> _Shares:
 
 
 @kernel
-def _value(s: Surface, wo: Vec3, wi: Vec3) -> Vec3:
-    """f |cos wi| with wo above."""
+def _scattered(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
+    """With wo above: both at once, which share the most of their work."""
+    total = shares.cosine + shares.coat + shares.main
     if wi.z < 0.0:
         bent = bend(wo, wi, s.relative_ior, s.front)
-        refracted = facet(s, bent.refraction).refracted
-        return refracted * (visible_normals(s.m, wo, bent.h) * bent.spread * g1(s.m, wi))
+        f = facet(s, bent.refraction)
+        normals = visible_normals(s.m, wo, bent.h) * bent.spread
+        value = f.refracted * (normals * g1(s.m, wi))
+        if not total > 0.0:
+            return Scattered(value, 0.0)
+        return Scattered(value, shares.main / total * f.passing * (normals * (s.eta * s.eta)))
     h, cos_d = half_vector(wo, wi)
     refraction = meet(s, cos_d)
-    mirrored = facet(s, refraction).mirrored
-    value = mirrored * (0.25 * visible_normals(s.m, wo, h) * g1(s.m, wi))
-    if not s.front:
-        return value
-    value = value + diffuse(s, wo, wi, cos_d) + sheen(s, wi, cos_d)
-    c = coat(s, wo, wi, h, refraction.thin)
-    return value + Vec3(c, c, c)
+    f, normals = facet(s, refraction), visible_normals(s.m, wo, h)
+    value = f.mirrored * (0.25 * normals * g1(s.m, wi))
+    if s.front:
+        c = coat(s, wo, wi, h, refraction.thin)
+        value = value + diffuse(s, wo, wi, cos_d) + sheen(s, wi, cos_d) + Vec3(c, c, c)
+    if not total > 0.0:
+        return Scattered(value, 0.0)
+    density = shares.main * f.share * 0.25 * normals
+    density += shares.cosine * (wi.z * INV_PI)
+    if shares.coat > 0.0 and cos_d > 0.0:
+        density += shares.coat * coat_normals(s, h) * h.z / (4.0 * cos_d)
+    return Scattered(value, density / total)
 
 
 @kernel
-def _density(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> float:
-    """Of `sample`, with wo above."""
-    total = shares.cosine + shares.coat + shares.main
-    if not total > 0.0:
-        return 0.0
-    if wi.z < 0.0:
-        bent = bend(wo, wi, s.relative_ior, s.front)
-        passing = facet(s, bent.refraction).passing
-        normals = visible_normals(s.m, wo, bent.h) * bent.spread * (s.eta * s.eta)
-        return shares.main / total * passing * normals
-    h, cos_o = half_vector(wo, wi)
-    density = shares.main * facet(s, meet(s, cos_o)).share * 0.25 * visible_normals(s.m, wo, h)
-    density += shares.cosine * (wi.z * INV_PI)
-    if shares.coat > 0.0 and cos_o > 0.0:
-        density += shares.coat * coat_normals(s, h) * h.z / (4.0 * cos_o)
-    return density / total
+def both(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`."""
+    side = wo.z
+    if side == 0.0 or wi.z == 0.0:
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    s, wo = _surface(table, i, at, side), _upwards(wo, side)
+    value, density = _scattered(s, _shares(s, wo), wo, _upwards(wi, side))
+    if side < 0.0 and s.transmitting == 0.0:
+        return Scattered(Vec3(0.0, 0.0, 0.0), density)
+    return Scattered(value, density)
 
 
 @kernel
 def evaluate(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
     """f(wo, wi) |cos wi|."""
-    side = wo.z
-    s = _surface(table, i, at, side)
-    if side == 0.0 or wi.z == 0.0 or (side < 0.0 and s.transmitting == 0.0):
-        return Vec3(0.0, 0.0, 0.0)
-    return _value(s, _upwards(wo, side), _upwards(wi, side))
+    return both(table, i, at, wo, wi).value
 
 
 @kernel
 def pdf(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
     """The density of `sample` per solid angle."""
-    side = wo.z
-    if side == 0.0 or wi.z == 0.0:
-        return 0.0
-    s, wo = _surface(table, i, at, side), _upwards(wo, side)
-    return _density(s, _shares(s, wo), wo, _upwards(wi, side))
+    return both(table, i, at, wo, wi).density
 
 
 @kernel
@@ -305,8 +301,8 @@ def sample(
         is_through = u >= f.share
     if wi.z == 0.0 or (wi.z < 0.0) != is_through:
         return no_sample()
-    density = _density(s, shares, wo, wi)
+    value, density = _scattered(s, shares, wo, wi)
     if not density > 0.0:
         return no_sample()
-    weight = _value(s, wo, wi) * (1.0 / density)
+    weight = value * (1.0 / density)
     return BsdfSample(_upwards(wi, side), weight, density, s.eta if is_through else 1.0, False)

@@ -13,7 +13,7 @@ from reference_rt.description import Colour
 from reference_rt.kernel import kernel
 from reference_rt.materials.conductor import Index, metal_colour
 from reference_rt.materials.fresnel import conductor_colour
-from reference_rt.materials.material import BsdfSample, Material, no_sample
+from reference_rt.materials.material import BsdfSample, Material, Scattered, no_sample
 from reference_rt.materials.microfacet import (
     AlphaParameter,
     Distribution,
@@ -82,23 +82,26 @@ def _mirrored(conductors: RoughConductors, i: int, at: At, cosine: float) -> Vec
 
 
 @kernel
-def evaluate(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi."""
+def both(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`."""
     if wo.z <= 0.0 or wi.z <= 0.0:
-        return Vec3(0.0, 0.0, 0.0)
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
     m = microfacets_at(conductors.roughness, i, at)
     half = half_vector(wo, wi)
-    value = 0.25 * g1_over_cos(m, wo) * density(m, half.h) * g1(m, wi)
-    return _mirrored(conductors, i, at, half.cosine) * value
+    normals = 0.25 * g1_over_cos(m, wo) * density(m, half.h)
+    return Scattered(_mirrored(conductors, i, at, half.cosine) * (normals * g1(m, wi)), normals)
+
+
+@kernel
+def evaluate(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
+    """f(wo, wi) cos wi."""
+    return both(conductors, i, at, wo, wi).value
 
 
 @kernel
 def pdf(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
     """The density of `sample` per solid angle: that of visible normals over 4 wo·h."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return 0.0
-    m = microfacets_at(conductors.roughness, i, at)
-    return 0.25 * g1_over_cos(m, wo) * density(m, half_vector(wo, wi).h)
+    return both(conductors, i, at, wo, wi).density
 
 
 @kernel

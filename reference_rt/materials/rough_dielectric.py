@@ -20,7 +20,7 @@ from pydantic import model_validator
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
 from reference_rt.materials.fresnel import Refraction, fresnel, relative_index
-from reference_rt.materials.material import BsdfSample, Material, no_sample
+from reference_rt.materials.material import BsdfSample, Material, Scattered, no_sample
 from reference_rt.materials.microfacet import (
     AlphaParameter,
     Distribution,
@@ -139,40 +139,40 @@ def _mirrored_density(m: Microfacets, wo: Vec3, h: Vec3) -> float:
 
 
 @kernel
-def evaluate(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi|."""
+def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`."""
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
-        return Vec3(0.0, 0.0, 0.0)
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
     wo, wi = _upwards(wo, side), _upwards(wi, side)
     m = microfacets_at(dielectrics.roughness, i, at)
-    shown = g1_over_cos(m, wo) * g1(m, wi)
+    seen = g1_over_cos(m, wo)
+    shown = seen * g1(m, wi)
     if wi.z > 0.0:
         half = half_vector(wo, wi)
         facet = _facet(dielectrics, i, at, _meet(dielectrics, i, side, half.cosine))
-        return facet.mirrored * (0.25 * density(m, half.h) * shown)
-    found = bend(wo, wi, dielectrics.eta[i], side > 0.0)
+        normals = density(m, half.h)
+        value = facet.mirrored * (0.25 * normals * shown)
+        return Scattered(value, facet.share * (0.25 * seen * normals))
+    n = float(dielectrics.eta[i])
+    found = bend(wo, wi, n, side > 0.0)
     facet = _facet(dielectrics, i, at, found.refraction)
-    return facet.refracted * (density(m, found.h) * found.spread * shown)
+    normals = density(m, found.h)
+    value = facet.refracted * (normals * found.spread * shown)
+    eta = n if side > 0.0 else 1.0 / n
+    return Scattered(value, facet.passing * seen * normals * found.spread * (eta * eta))
+
+
+@kernel
+def evaluate(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
+    """f(wo, wi) |cos wi|."""
+    return both(dielectrics, i, at, wo, wi).value
 
 
 @kernel
 def pdf(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
     """The density of `sample` per solid angle."""
-    side = wo.z
-    if side == 0.0 or wi.z == 0.0:
-        return 0.0
-    wo, wi = _upwards(wo, side), _upwards(wi, side)
-    m = microfacets_at(dielectrics.roughness, i, at)
-    if wi.z > 0.0:
-        half = half_vector(wo, wi)
-        facet = _facet(dielectrics, i, at, _meet(dielectrics, i, side, half.cosine))
-        return facet.share * _mirrored_density(m, wo, half.h)
-    n = float(dielectrics.eta[i])
-    found = bend(wo, wi, n, side > 0.0)
-    facet = _facet(dielectrics, i, at, found.refraction)
-    eta = n if side > 0.0 else 1.0 / n
-    return facet.passing * g1_over_cos(m, wo) * density(m, found.h) * found.spread * (eta * eta)
+    return both(dielectrics, i, at, wo, wi).density
 
 
 @kernel

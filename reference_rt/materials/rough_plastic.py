@@ -26,7 +26,7 @@ from pydantic import Field
 from reference_rt.description import Positive
 from reference_rt.kernel import entry_kernel, kernel
 from reference_rt.materials.fresnel import fresnel, relative_index
-from reference_rt.materials.material import INV_PI, BsdfSample, Material, no_sample
+from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
 from reference_rt.materials.microfacet import (
     MAX_ALPHA,
     Distribution,
@@ -192,36 +192,36 @@ def _lobes(plastics: RoughPlastics, i: int, at: At, wo: Vec3) -> _Lobes:
 
 
 @kernel
-def _value(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) -> Vec3:
-    """f cos wi above the surface."""
+def _scattered(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) -> Scattered:
+    """Above the surface; both at once, which share the most of their work."""
     eta, half = float(plastics.eta[i]), half_vector(wo, wi)
     f = fresnel(half.cosine, eta).reflectance
-    mirrored = f * (0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, half.h) * g1(lobes.m, wi))
+    normals = 0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, half.h)
+    mirrored = f * (normals * g1(lobes.m, wi))
     t_i = _passing(plastics, i, min(1.0, wi.z))
     diffuse = t_i * lobes.t_o / (eta * eta) * (wi.z * INV_PI)
-    return lobes.specular * mirrored + lobes.base * diffuse
+    value = lobes.specular * mirrored + lobes.base * diffuse
+    return Scattered(value, lobes.p * normals + (1.0 - lobes.p) * (wi.z * INV_PI))
 
 
 @kernel
-def _density(lobes: _Lobes, wo: Vec3, wi: Vec3) -> float:
-    normals = 0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, half_vector(wo, wi).h)
-    return lobes.p * normals + (1.0 - lobes.p) * (wi.z * INV_PI)
+def both(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`."""
+    if wo.z <= 0.0 or wi.z <= 0.0:
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    return _scattered(plastics, i, _lobes(plastics, i, at, wo), wo, wi)
 
 
 @kernel
 def evaluate(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
     """f(wo, wi) cos wi."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    return _value(plastics, i, _lobes(plastics, i, at, wo), wo, wi)
+    return both(plastics, i, at, wo, wi).value
 
 
 @kernel
 def pdf(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
     """The density of `sample` per solid angle."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return 0.0
-    return _density(_lobes(plastics, i, at, wo), wo, wi)
+    return both(plastics, i, at, wo, wi).density
 
 
 @kernel
@@ -238,8 +238,8 @@ def sample(
         wi = cosine_hemisphere(u0, u1)
     if wi.z <= 0.0:
         return no_sample()
-    density_of_wi = _density(lobes, wo, wi)
+    value, density_of_wi = _scattered(plastics, i, lobes, wo, wi)
     if not density_of_wi > 0.0:
         return no_sample()
-    weight = _value(plastics, i, lobes, wo, wi) * (1.0 / density_of_wi)
+    weight = value * (1.0 / density_of_wi)
     return BsdfSample(wi, weight, density_of_wi, 1.0, False)

@@ -13,7 +13,7 @@ from reference_rt.methods.method import FloatArray, ray_of
 from reference_rt.shapes import TABLES, TRIANGLE, Shapes
 from reference_rt.shapes.mesh_topology import describe_boundary
 from reference_rt.shapes.shape import IntArray, Place, Shape
-from reference_rt.shapes.triangle import Triangles
+from reference_rt.shapes.triangle import Triangles, on_line
 from reference_rt.shapes.watertight import Shear, project, shear_of
 from reference_rt.transform import Affine, affine, compose, identity, invert
 
@@ -98,13 +98,9 @@ def _spans(shapes: Shapes, kind: int, o: FloatArray, d: FloatArray, t: FloatArra
 @kernel
 def _mesh_crossing(triangles: Triangles, i: int, shear: Shear) -> tuple[float, int]:
     """Where the line crosses triangle i, at t of any sign, and +1 where it goes in, -1 where it
-    comes out, 0 where it passes by.  The arithmetic is that of `triangle.intersect`."""
+    comes out, 0 where it passes by."""
     seen = project(triangles.vertices, i, shear)
-    if seen.side == 0:
-        return math.inf, 0
-    inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
-    t = (seen.e0 * seen.a_z + seen.e1 * seen.b_z + seen.e2 * seen.c_z) * shear.s_z * inverse
-    return t, -seen.side
+    return on_line(seen, shear).t, seen.side
 
 
 @entry_kernel

@@ -166,15 +166,20 @@ def intersect_lane(corners: FloatArray, first: int, size: int, lane: int, shear:
 
 @kernel
 def _crossing(seen: Projection, shear: Shear) -> Crossing:
+    found = on_line(seen, shear)
+    return found if found.t > 0.0 else miss()
+
+
+@kernel
+def on_line(seen: Projection, shear: Shear) -> Crossing:
+    """Where the ray's line crosses a triangle, at t of any sign."""
     if seen.side == 0:
         return miss()
     inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
     u, v = seen.e1 * inverse, seen.e2 * inverse
     # Edge functions times depths would overflow from sizes of 1e102 on, barycentrics do not.
     t = (seen.e0 * inverse * seen.a_z + u * seen.b_z + v * seen.c_z) * shear.s_z
-    if t > 0.0:
-        return Crossing(t, u, v)
-    return miss()
+    return Crossing(t, u, v)
 
 
 @kernel

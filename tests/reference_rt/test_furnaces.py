@@ -70,7 +70,7 @@ def test_closed_furnace_without_roulette(albedo):
     """The finite sum over max_depth emissions, of which nothing is left out: 7000 for the whitest
     leave a thousandth of the infinite sum."""
     depth = {0.0: 10, 0.5: 60, 0.9: 300, 0.99: 700, 0.999: 7000}[albedo]
-    scene = closed(albedo, integrator=rt.Path(max_depth=depth, rr_depth=10**6), pixels=64, spp=16)
+    scene = closed(albedo, integrator=rt.Path(max_depth=depth, rr_depth=4096), pixels=64, spp=16)
     assert_mean(scene, (1 - albedo**depth) / (1 - albedo), power=5e-3)
 
 
@@ -79,7 +79,7 @@ def test_max_depth_counts_edges(depth):
     """By scattered rays alone every path brings the same, and `max_depth` is the number of
     terms: no noise."""
     albedo = np.array([0.2, 0.5, 0.9])
-    for rr_depth in (10**6, depth + 1):
+    for rr_depth in (4096, depth + 1):
         path = rt.Path(max_depth=depth, rr_depth=rr_depth, sampling="bsdf")
         scene = closed(tuple(albedo), integrator=path, pixels=4, spp=4)
         expected = (1 - albedo**depth) / (1 - albedo)
@@ -143,7 +143,7 @@ def body(material, environment, seed=4, spp=64, **path):
 def test_lossless_bodies_vanish(name, sky):
     """Without roulette path by path; a conductor with eta = 1e-9 absorbs 4 eta / (eta² + k² + 1) of
     what it mirrors at most (the Fresnel equations at normal incidence, k >= 1)."""
-    scene = body(LOSSLESS[name], sky, rr_depth=10**6, max_depth=10**5)
+    scene = body(LOSSLESS[name], sky, rr_depth=4096, max_depth=10**5)
     # A few roundings at each of some ten surfaces.
     loss = 4e-9 if name == "conductor" else 1e-12
     assert np.allclose(rt.render(scene).colour, SKY, rtol=loss, atol=0)
