@@ -173,7 +173,7 @@ FAMILY = Family(
             name="translated solids",
             axis="offset / size",
             about="The same of set operations, which are seen from next to them where they are "
-            "far out.  Rays that differ must be right for a ray moved by 880 u (offset + size).",
+            "far out.  Rays that differ must be right for a ray moved by 881 u (offset + size).",
             values=decades(0, 12),
             quick=(1e4,),
             cases={"quick": 240, "full": 1000},

@@ -103,7 +103,7 @@ def markdown(
         str(provenance["machine"]),
         f"{provenance['cores']} cores",
         f"Mitsuba {provenance.get('mitsuba', 'absent')}".partition(":")[0],
-        f"{sum(f.seconds for f in found) / 60.0:.0f} minutes of one core and more",
+        f"{sum(f.seconds for f in found) / 60.0:.0f} minutes of one process",
     ]
     lines = ["Measured: " + ", ".join(told) + ".", ""]
     lines += ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
