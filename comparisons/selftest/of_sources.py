@@ -33,7 +33,7 @@ FAULTS = (
     ),
     SourceFault(
         "1/eta² forgotten", GLASS, "materials/dielectric.py",
-        "    t = (1.0 - f) / (refraction.eta * refraction.eta)\n", "    t = 1.0 - f\n",
+        "    t = passing / (refraction.eta * refraction.eta)\n", "    t = passing\n",
     ),
     SourceFault(
         "biased warp", BOX, "sampling/warp.py",
@@ -68,8 +68,8 @@ FAULTS = (
     ),
     SourceFault(
         "Fresnel of one polarisation", GLASS, "materials/fresnel.py",
-        "0.5 * (parallel * parallel + perpendicular * perpendicular)",
-        "perpendicular * perpendicular",
+        "0.5 * (s * s + p * p)",
+        "s * s",
     ),
     SourceFault(
         "half a pixel off in the camera", BOX, "bands.py",
@@ -78,8 +78,8 @@ FAULTS = (
     ),
     SourceFault(
         "masking forgotten in rough metal", METAL, "materials/rough_conductor.py",
-        "    value = 0.25 * g1_over_cos(m, wo) * density(m, h) * g1(m, wi)\n",
-        "    value = 0.25 * g1_over_cos(m, wo) * density(m, h)\n",
+        "half.cosine) * (normals * g1(m, wi)), normals)",
+        "half.cosine) * normals, normals)",
     ),
     SourceFault(
         "Beckmann in place of GGX", METAL, "materials/microfacet.py",
