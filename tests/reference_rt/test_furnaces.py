@@ -179,7 +179,7 @@ ROUGH = {
 
 
 @pytest.mark.parametrize("name", ROUGH)
-@pytest.mark.parametrize("roulette", [1, 10**6])
+@pytest.mark.parametrize("roulette", [1, 4096])
 def test_rough_bodies_never_shine(name, roulette, sky):
     """Single scattering loses what the facets shadow, and gains nothing: no 4 x 4 pixels brighter
     than the sky beyond their noise over eight seeds (6 standard errors for 64 squares), and most
