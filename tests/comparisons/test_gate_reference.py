@@ -69,8 +69,9 @@ def test_it_is_exact_enough_and_kept(cache: Path, monkeypatch: pytest.MonkeyPatc
     # A smaller limit goes on from where the last one stopped.
     closer = of_scene(scene, LIMIT / 2)
     assert relative_error(closer.pictures) <= LIMIT / 2 * reference.SHARE
-    # Four times as many, by errors that 16 replicates estimate: chi-square of 15 degrees of freedom,
-    # whose mean is 1 and of which 99.9 % lie between 0.23 and 2.5.  Seeds follow the sources.
+    # Four times as many, by errors that 16 replicates estimate: chi-square of 15 degrees of
+    # freedom, whose mean is 1 and of which 99.9 % lie between 0.23 and 2.5.  Seeds follow the
+    # sources.
     assert 0 < calls.count - rendered < 4 * (2.5 / 0.23) * rendered
     # As good as one that was rendered at once.
     for file in cache.iterdir():
