@@ -40,7 +40,7 @@ from reference_rt import Scene, render
 SCENE = "scenes/ball.yaml"
 
 
-def my_renderer(scene, gain=1.0, count=4, spp=64):
+def my_renderer(scene, gain=1.0, count=8, spp=64):
     described = Scene.load(scene)
     seeds = [described.changed(sampler={"type": "sobol", "spp": spp, "seed": 100 + k})
              for k in range(count)]
@@ -101,7 +101,7 @@ def test_one_noisy_picture(image_gate):
     }
     names = {test: sorted(p.name for p in path.iterdir()) for test, path in by_test.items()}
     assert names["test_right"] == ["results.json"]
-    kept = [f"candidate-0{k}.exr" for k in range(4)]
+    kept = [f"candidate-0{k}.exr" for k in range(8)]
     written = ["case.json", "pictures.exr", "report.html", "results.json"]
     assert names["test_gain"] == sorted([*kept, *written])
     results = json.loads((by_test["test_gain"] / "results.json").read_text())

@@ -54,10 +54,10 @@ def test_an_edit_of_a_callee_is_seen(copy, tmp_path):
     text = callee.read_text()
     found = "return Crossing(t, 0.0, 0.0)"
     assert text.count(found) == 1
-    callee.write_text(text.replace(found, found.replace("t,", "t + 1.0,")))
+    callee.write_text(text.replace(found, found.replace("t,", "t + 0.5,")))
     edited = first_hit(copy, tmp_path)
     callee.write_text(text)
-    assert edited[1:] == (3.0, 0)
+    assert edited[1:] == (2.5, 0)
     assert edited[0] != warm[0]
     assert first_hit(copy, tmp_path) == warm
 
