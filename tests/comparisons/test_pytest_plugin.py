@@ -174,7 +174,7 @@ def test_ball(image_gate):
     app = Typer()
     app.command()(accept)
     kept = sorted(str(path) for path in (project.path / "seen").glob("*/candidate-*.exr"))
-    assert len(kept) == 4
+    assert len(kept) == 8
     arguments = [*kept, "--name", "ball", "--baselines", "accepted", "--reason", "looked at it"]
     result = CliRunner().invoke(app, [*arguments, "--scene", "scenes/ball.yaml"])
     assert result.exit_code == 0, result.output
