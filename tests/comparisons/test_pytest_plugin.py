@@ -40,9 +40,9 @@ from reference_rt import Scene, render
 SCENE = "scenes/ball.yaml"
 
 
-def my_renderer(scene, gain=1.0, count=8, spp=64):
+def my_renderer(scene, gain=1.0, count=8, spp=64, first=100):
     described = Scene.load(scene)
-    seeds = [described.changed(sampler={"type": "sobol", "spp": spp, "seed": 100 + k})
+    seeds = [described.changed(sampler={"type": "sobol", "spp": spp, "seed": first + k})
              for k in range(count)]
     return gain * np.stack([render(seeded).colour for seeded in seeds])
 """
@@ -160,10 +160,10 @@ def test_no_scene(image_gate):
 def test_baselines(project: pytest.Pytester) -> None:
     body = """
 def test_ball(image_gate):
-    image_gate(my_renderer(SCENE, gain=GAIN), baseline="ball", limit=0.01)
+    image_gate(my_renderer(SCENE, gain=GAIN, first=FIRST), baseline="ball", limit=0.01)
 """
     options = ("--image-gate-baselines", "accepted", "--image-gate-out", "seen")
-    first = run(project, "GAIN = 1.0\n" + body, *options)
+    first = run(project, "GAIN, FIRST = 1.0, 100\n" + body, *options)
     first.assert_outcomes(failed=1)
     text = first.stdout.str()
     assert "image_gate: there is no baseline 'ball' in" in text
@@ -181,7 +181,10 @@ def test_ball(image_gate):
 
     second = run(
         project,
-        "GAIN = 1.0\n" + body + body.replace("ball(", "wrong(").replace("GAIN)", "1.05)"),
+        # Other seeds: with the baseline's own the two sides would share their noise.
+        "GAIN, FIRST = 1.0, 200\n"
+        + body
+        + body.replace("ball(", "wrong(").replace("GAIN,", "1.05,"),
         *options,
     )
     second.assert_outcomes(passed=1, failed=1)
@@ -189,7 +192,7 @@ def test_ball(image_gate):
     results = json.loads(next((project.path / "seen").glob("*test_ball*/results.json")).read_text())
     assert results["provenance"]["baseline"] == "ball"
     (project.path / "scenes" / "ball.yaml").write_text(SCENE.replace("radius: 1", "radius: 1.1"))
-    stale = run(project, "GAIN = 1.0\n" + body, *options)
+    stale = run(project, "GAIN, FIRST = 1.0, 200\n" + body, *options)
     stale.assert_outcomes(failed=1)
     assert "the baseline 'ball' is stale: the scene 'ball' has changed" in stale.stdout.str()
 
