@@ -2,7 +2,7 @@
 
 The law is that of `reference_rt.ray.surface_error`: a point p on a surface is known to
 16 sqrt(3) u (|anchor| + |p| + size).  A shape that is smaller, a gap that is narrower, or an index
-that is as near to 1 as it is rounded, is not resolved.
+that is as near to 1 as it is rounded, is not resolved.  Products of coordinates must be finite.
 """
 
 import math
@@ -68,7 +68,7 @@ def limits_of(scene: Scene) -> list[Limit]:
         if len(leaves) == MOST:
             break
         leaves.append(_leaf(name, shape, outer, scene))
-    found = [*_thin(leaves), *_contacts(leaves), *_indices(scene)]
+    found = [*_thin(leaves), *_contacts(leaves), *_indices(scene), *_large(leaves)]
     found.sort(key=lambda limit: limit.margin)
     beyond = [limit for limit in found if limit.is_beyond][:LISTED]
     nearest = {limit.law: limit for limit in reversed(found)}
@@ -154,6 +154,22 @@ def _thickness(leaf: Leaf) -> FloatArray:
     side = leaf.upper - leaf.lower
     side = np.where(side > 4.0 * UNIT_ROUNDOFF * np.abs(leaf.upper), side, np.inf)
     return np.asarray(side.min(axis=1))
+
+
+LARGEST = 2.0**510 / 6.0
+"""Of coordinates, 5.6e152: the edge functions of rays at a triangle that is six times as far away
+are sums of 16 products of two, which are to be finite."""
+
+
+def _large(leaves: list[Leaf]) -> Iterator[Limit]:
+    """The largest coordinate of each shape that has an end."""
+    for leaf in leaves:
+        reach = float(np.maximum(np.abs(leaf.lower), np.abs(leaf.upper)).max())
+        if math.isfinite(reach):
+            yield Limit(RANGE, leaf.name, LARGEST, reach)
+
+
+RANGE = "range"
 
 
 # ---- gaps ---------------------------------------------------------------------------------------
@@ -243,6 +259,8 @@ def _indices(scene: Scene) -> Iterator[Limit]:
 
 def told(limit: Limit) -> str:
     """A limit in words."""
+    if limit.law == RANGE:
+        return f"{limit.what}: reaches {limit.bound:.3g}, float64's products {limit.size:.3g}"
     if limit.is_beyond:
         return f"{limit.what}: {limit.size:.3g}, float64's error is {limit.bound:.3g}"
     return f"{limit.what}: {limit.size:.3g} is {limit.margin:.2g} times float64's error"

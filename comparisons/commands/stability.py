@@ -89,7 +89,10 @@ def stability(
         display.line("pictures and page")
         pictures = shoot(choice, found, out, processes)
         write_page(out / "stability.html", found, pictures, effort, seed, facts)
-    Console(highlight=False).print(table.terminal(found))
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 180  # a log has no edge, and words stay whole
+    console.print(table.terminal(found))
     if markdown is not None:
         marked.rewrite(markdown, "stability", table.markdown(found, effort, seed, facts))
     holds = True

@@ -49,7 +49,7 @@ def cells(name: str, one: SeriesSummary) -> list[str]:
 
 
 def where(one: SeriesSummary, contestant: str) -> str:
-    """At which x a contestant starts to fail."""
+    """At which x a contestant starts to fail; of ours whether that is where float64 ends."""
     some = total(one.found, contestant)
     if some is None:
         return "–"
@@ -58,6 +58,8 @@ def where(one: SeriesSummary, contestant: str) -> str:
     share = f"{some.failures:,} of {some.cases:,}"
     x = first_failure(one.found, contestant)
     assert x is not None
+    if contestant == OURS and one.holds:
+        return f"holds to float64's end, {number(one.series.holds_to)}"
     return f"fails from {number(x)} on" if one.series.axis else share
 
 

@@ -15,7 +15,7 @@ import typer
 from typer.testing import CliRunner
 
 from comparisons import cli
-from comparisons.stability import families, run
+from comparisons.stability import families, run, table
 from comparisons.stability.family import OURS, Outcome, Series, generator
 from comparisons.stability.found import Found
 from comparisons.stability.summary import summarise
@@ -183,6 +183,8 @@ def test_a_lead_that_is_too_small_must_be_explained():
         assert one.further == 2.0
         assert one.holds
         assert one.unexplained == (not explained)
+        assert table.where(one, OURS) == "holds to float64's end, 4"
+        assert table.where(one, "mitsuba") == "fails from 4 on"
 
 
 def families_of(name, *series):

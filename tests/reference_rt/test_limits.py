@@ -5,9 +5,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from reference_rt import query
 from reference_rt.cli import app
 from reference_rt.limits import LAW, Limit, limits_of, told
 from reference_rt.scene import Scene
+from reference_rt.tables import build_tables
 
 U = 2.0**-53
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.yaml"))
@@ -34,6 +36,17 @@ def test_a_shape_as_small_as_its_error_is_told(offset: float) -> None:
     for factor, law in ((0.98, ["size"]), (1.02, [])):
         ball = f"center: [{offset}, 0, 0], radius: {factor * bound / 2.0}"
         assert beyond(f"{eye}shapes:\n  - {{type: sphere, {ball}}}\n") == law
+
+
+def test_a_shape_whose_products_overflow_is_told() -> None:
+    for exponent, law in ((510, ["range"]), (506, [])):
+        ball = f"shapes:\n  - {{type: sphere, radius: {2.0**exponent!r}}}\n"
+        (found,) = [limit for limit in limits(ball) if limit.law == "range"]
+        assert beyond(ball) == law
+        assert "reaches" in told(found)
+        # What is told is so: at the lower size rays from inside hit.
+    scene = build_tables(Scene.parse(ball))
+    assert query.intersect(scene, [[0.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]]).t[0] == 2.0**506
 
 
 def test_a_far_eye_counts_as_a_far_shape() -> None:
