@@ -18,9 +18,9 @@ def compare(
     scenes: Annotated[
         list[Path], typer.Argument(metavar="SCENE...", help="Scenes: .yaml or .json.")
     ],
-    out: Annotated[Path, typer.Option(help="Folder for results.json and report.html.")] = Path(
-        "out"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for results.json and report.html.")
+    ] = Path("out"),
     spp: Annotated[int | None, typer.Option(help="Samples per pixel of each replicate.")] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first replicate.")] = None,

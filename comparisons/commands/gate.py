@@ -73,9 +73,9 @@ def gate(
     noise_free: Annotated[
         bool, typer.Option("--noise-free", help="The pictures are made without random numbers.")
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder for results.json and report.html.")] = Path(
-        "out"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for results.json and report.html.")
+    ] = Path("out"),
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML too.")] = None,
     github: Annotated[
         bool,

@@ -15,7 +15,7 @@ from reference_rt.errors import UsageError
 @guarded
 def methods(
     out: Annotated[
-        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for what is measured.")
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for what is measured.")
     ] = Path("out/methods"),
     family: Annotated[
         list[str] | None,

@@ -13,9 +13,9 @@ from reference_rt.errors import UsageError
 
 @guarded
 def selftest(
-    out: Annotated[Path, typer.Option(help="Folder for selftest.json and selftest.md.")] = Path(
-        "out"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for selftest.json and selftest.md.")
+    ] = Path("out"),
     only: Annotated[
         list[str] | None, typer.Option(help="Patterns of the names of faults to plant.")
     ] = None,

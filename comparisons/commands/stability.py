@@ -15,7 +15,7 @@ from reference_rt.errors import UsageError
 @guarded
 def stability(
     out: Annotated[
-        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for what is found.")
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for what is found.")
     ] = Path("out/stability"),
     family: Annotated[
         list[str] | None, typer.Option(help="Only these, F1 to F14; several times for several.")

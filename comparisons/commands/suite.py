@@ -22,7 +22,8 @@ def suite(
         str, typer.Argument(metavar="NAME", help="smoke, standard, full or a .yaml file.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for what is found.  [default: out/NAME]")
+        Path | None,
+        typer.Option("--out", "-o", help="Folder for what is found.  [default: out/NAME]"),
     ] = None,
     only: Annotated[
         list[str] | None,
