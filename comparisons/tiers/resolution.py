@@ -73,7 +73,9 @@ def resolution(scene: Scene, tables: SceneTables, twin: Twin, seed: int = 0) -> 
     rays = mixed_rays(scene, tables, sizes, RAYS, seed)
     d = rays.d
     ours, theirs = query.intersect(tables, rays.o, d), trace(twin, rays.o, d)
-    same = np.flatnonzero((ours.shape >= 0) & ~_differs(ours, theirs, np.inf))
+    # Hits in other places, as of rays that begin behind what they should meet, are left from there.
+    slack = STEEPEST * twin.frame.delta(rays.o, ours.p, sizes.reach_of(ours.shape))
+    same = np.flatnonzero((ours.shape >= 0) & ~_differs(ours, theirs, slack))
     leavings = [_left_behind(tables, twin, sizes, Rays(rays.o[same], d[same]),
                              rows_of(ours, same), rows_of(theirs, same), seed, scene)]  # fmt: skip
     hits, d = rows_of(ours, same), d[same]
@@ -120,6 +122,10 @@ def _left_behind(
         e = frame.delta(hits.p, right.p, sizes.reach_of(right.shape))
         slack = STEEPEST * ((height + rounding)[leaves] + e)
         expected = _doubled(tables, sizes, right, w, e)
+        # What is met next may be put behind the ray's origin.
+        there_is = right.shape >= 0
+        height_there = np.where(there_is, right.t, 0.0) * np.abs(np.sum(right.n * w, axis=1))
+        expected |= there_is & (height_there <= e)
         for start in (height - rounding, height, height + rounding):
             o = hits.p + _side(hits, w) * start[leaves, None]
             expected |= _differs(right, query.intersect(tables, o, w), slack)
