@@ -168,8 +168,9 @@ def _own_error(sizes: ShapeSizes, hits: Intersections) -> FloatArray:
 
 
 def _differs(a: Intersections, b: Intersections, slack: FloatArray | float) -> BoolArray:
-    """(n,): another shape is met, or none, or the same further than `slack` away."""
-    other = (a.shape != b.shape) | (a.instance != b.instance) | (a.part != b.part)
+    """(n,): another shape is met, or none, or the same further than `slack` away.  Which operand of
+    a solid is met in one place says nothing: operands may share their faces."""
+    other = (a.shape != b.shape) | (a.instance != b.instance)
     with np.errstate(invalid="ignore"):
         return np.asarray(other | (np.linalg.norm(a.p - b.p, axis=1) > slack))
 
