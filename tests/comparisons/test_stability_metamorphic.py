@@ -27,9 +27,14 @@ EPSILON = 1e-4
 
 @pytest.fixture(autouse=True)
 def _nothing_remembered():
-    f09_light.remembered.cache_clear()
+    _forget()
     yield
+    _forget()
+
+
+def _forget():
     f09_light.remembered.cache_clear()
+    f09_light.moved_apart.cache_clear()
 
 
 def draw(folder, cases=150, mitsuba=False, effort="quick"):
@@ -238,6 +243,7 @@ scene = f09_scenes.whitted(Path(sys.argv[1])).changed(film=rt.Film(width=8, heig
 honest = f09_light.judged("ours", scene, motion).failures
 ray.leave = leave
 f09_light.remembered.cache_clear()
+f09_light.moved_apart.cache_clear()
 print(honest, f09_light.judged("ours", scene, motion).failures)
 """
 
