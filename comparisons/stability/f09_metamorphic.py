@@ -46,14 +46,7 @@ from comparisons.stability.f09_rays import Outcomes
 from comparisons.stability.f09_rearranged import nested, rearranged
 from comparisons.stability.f09_shots import shoot_light, shoot_rays
 from comparisons.stability.f14_bits import same_bits
-from comparisons.stability.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    Family,
-    Series,
-    decades,
-)
+from comparisons.stability.family import MITSUBA, OURS, Draw, Family, Series, decades
 from reference_rt.csg.anchor import FAR
 
 EXACT_TO = 1e12
