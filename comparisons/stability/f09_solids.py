@@ -76,8 +76,8 @@ class Judge:
             return []
         solids = {k: truths(s, self.scene.folder, o, d) for k, s in self.solids.items()}
         found = []
-        for i, first in enumerate(self.referee.decide(o, d)):
-            first.identities = [(self.number[s], *rest) for s, *rest in first.identities]
+        for ray, first in enumerate(self.referee.decide(o, d)):
+            first.identities = [(self.number[s], i, p, k) for s, i, p, k in first.identities]
             t = float(nearest(np.array([first.t], dtype=object))[0])
-            found.append(Met({k: some[i] for k, some in solids.items()}, first, t))
+            found.append(Met({k: some[ray] for k, some in solids.items()}, first, t))
         return found
