@@ -7,9 +7,10 @@ what the band makes of the root.  Of the other kinds the answer is the exact one
 passes at most 64 u sizes beside (`f01_far_law.MOVED`), t to within 16 u (|t| |d| + D).  A hit is
 within this of the surface, and so within the bounding box.
 
-Ranges.  Distance / radius 1e0 to 1e12 (each times 2 to 10), the centre's offset 1e0 to 1e12 radii,
-radius 1e-9 to 1e9, |d| 1e-3 to 1e3 times the distance; half of the rays within 2^-1 to 2^-40 radii
-of tangency, in `rim` to 2^-53.  Spheres, ellipsoids, open cylinders, cones, paraboloids, capped
+Ranges.  Distance / radius 1e0 to 1e12 (each times 2 to 10; of other kinds 1 to 10, so that rays
+begin within their boxes too), the centre's offset 1e0 to 1e12 radii, radius 1e-9 to 1e9, |d| 1e-3
+to 1e3 times the distance; half of the rays within 2^-1 to 2^-40 radii of tangency, in `rim` to
+2^-53.  Spheres, ellipsoids, open cylinders, cones, paraboloids, capped
 hyperboloids of one sheet, tori.
 
 Counts.  1e5 rays a decade for spheres, 2e4 for quadrics, 2e3 for tori, whose arbiter takes 100 µs.
@@ -37,9 +38,10 @@ Measure = Callable[[Draw, float], Mapping[str, Outcome]]
 OF_BOUND = "of the law's bound"
 
 
-def _from(draw: Draw, x: float, most: float = 1.0) -> FloatArray:
-    """Distances of 2 to 10 times x to x `most`, evenly over the decades."""
-    return np.asarray(x * 10.0 ** draw.rng.uniform(np.log10(2.0), 1.0 + np.log10(most), draw.cases))
+def _from(draw: Draw, x: float, most: float = 1.0, least: float = 2.0) -> FloatArray:
+    """Distances of `least` to 10 times x to x `most`, evenly over the decades."""
+    low, high = np.log10(least), 1.0 + np.log10(most)
+    return np.asarray(x * 10.0 ** draw.rng.uniform(low, high, draw.cases))
 
 
 def _distance(draw: Draw, x: float) -> Mapping[str, Outcome]:
@@ -71,7 +73,7 @@ def _size(draw: Draw, x: float) -> Mapping[str, Outcome]:
 
 def _of(name: str) -> Measure:
     def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
-        return curved.compete(draw, name, _from(draw, x))
+        return curved.compete(draw, name, _from(draw, x, least=1.0))
 
     return measure
 
@@ -80,7 +82,7 @@ def _kinds_at(draw: Draw, x: float) -> Mapping[str, Outcome]:
     found: dict[str, Outcome] = {}
     share = draw._replace(cases=draw.cases // len(curved.KINDS))
     for name in curved.KINDS:
-        outcomes = curved.compete(share, name, _from(share, 1.0, 1e2), offset=x)
+        outcomes = curved.compete(share, name, _from(share, 1.0, 1e2, least=1.0), offset=x)
         for who, outcome in outcomes.items():
             found[who] = found[who] + outcome if who in found else outcome
     return found
@@ -167,7 +169,7 @@ FAMILY = Family(
             Series(
                 name,
                 "distance / size",
-                f"The {name} from 2 to 10 times this far away; half of the rays aim along the"
+                f"The {name} from 1 to 10 times this far away; half of the rays aim along the"
                 " surface, 2^-1 to 2^-40 sizes above or below it. Wrong is what is right for no ray"
                 " that passes within 64 u sizes of this one.",
                 FAR,
@@ -185,7 +187,7 @@ FAMILY = Family(
         Series(
             "kinds_offset",
             "distance of the centre from the origin / size",
-            "All of these kinds that far out, seen from 2 to 1e3 sizes.",
+            "All of these kinds that far out, seen from 1 to 1e3 sizes.",
             FAR,
             (1e6, 1e12),
             {"quick": 900, "full": 12_000},

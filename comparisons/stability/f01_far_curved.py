@@ -115,7 +115,7 @@ KINDS: Mapping[str, Kind] = {
 
 REACH = 2.0
 """No point of a shape of size 1, stretched by up to this, is further from its middle than sqrt(2)
-times it: what distances are counted in."""
+times it: the size that bounds are counted in."""
 
 STRETCH = (0.5, REACH)
 """Of an ellipsoid's axes, and of all others' but a cylinder's, which Mitsuba has only round."""
@@ -156,7 +156,7 @@ def draw_rays(
     passed = np.einsum("nij,nj->ni", linear, reach) + normal * (gap * size)[:, None]
     d = np.where(tangent[:, None], across(rng, normal), unit_vectors(rng, n))
     center = offset * size * unit_vectors(rng, n) + size * rng.uniform(-1.0, 1.0, (n, 3))
-    far = REACH * size * distance
+    far = size * distance
     o = center + passed - d * far[:, None]
     d = d * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1))
     at = far / np.linalg.norm(d, axis=1)

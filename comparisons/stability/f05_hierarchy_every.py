@@ -12,7 +12,8 @@ from reference_rt import bvh, query
 from reference_rt import shapes as any_shape
 from reference_rt.kernel import entry_kernel, kernel
 from reference_rt.query import Closest
-from reference_rt.ray import Hit, Ray
+from reference_rt.ray import Hit, at
+from reference_rt.scaled_ray import is_told, scaled
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import IntArray
 from reference_rt.shapes.watertight import shear_of
@@ -47,7 +48,11 @@ def _every(
     uv: FloatArray,
 ) -> None:
     for i in range(len(o)):
-        ray = Ray(row(o, i), row(d, i), np.inf)
+        # As all queries do: squares of extreme directions would leave float64's range.
+        ray, unit, valid = scaled(row(o, i), row(d, i), np.inf)
+        t[i], kinds[i], rows[i], uv[i, 0], uv[i, 1] = np.inf, -1, -1, 0.0, 0.0
+        if not valid:
+            continue
         shear = shear_of(ray)
         closest = Hit(np.inf, -1, -1, 0.0, 0.0, -1)
         for k in range(len(references)):
@@ -58,8 +63,9 @@ def _every(
                 hit = Hit(found.t, kind, number, found.u, found.v, -1)
                 if found.t < closest.t or _comes_first(shapes, hit, closest):
                     closest = hit
-        t[i], kinds[i], rows[i] = closest.t, closest.kind, closest.row
-        uv[i, 0], uv[i, 1] = closest.u, closest.v
+        if closest.kind >= 0 and is_told(closest.t * unit, at(ray, closest.t)):
+            t[i], kinds[i], rows[i] = closest.t * unit, closest.kind, closest.row
+            uv[i, 0], uv[i, 1] = closest.u, closest.v
 
 
 def every(tables: SceneTables, o: FloatArray, d: FloatArray) -> Closest:

@@ -18,7 +18,7 @@ from reference_rt.csg.all_crossings import crossings
 from reference_rt.methods.csg import interval_list
 from reference_rt.methods.operands import CsgParameters
 from reference_rt.scene import Scene
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import IntArray, Place
 from reference_rt.transform import Affine, Matrix
 
 INTERVALS, INSIDE_TESTS = "csg.intervals", "csg.inside_tests"
@@ -82,12 +82,14 @@ class Stretch(NamedTuple):
 
 class Truth(NamedTuple):
     """Of one ray.  stretches: in order, those between crossings that rounding can tell apart;
-    touching: it runs exactly through an edge;  crossings, widths: of all operands."""
+    touching: it runs exactly through an edge;  crossings, widths, operands: t of each crossing of
+    an operand, how far rounding may have moved it, and the operand's number."""
 
     stretches: list[Stretch]
     touching: bool
     crossings: FloatArray
     widths: FloatArray
+    operands: IntArray
 
 
 def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth]:
@@ -139,7 +141,8 @@ def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists
     stretches.append(Stretch(reach, np.inf, evaluated(tree, states)))
     # What a later crossing reaches back over is not resolved either.
     clear = [s for s in stretches if not np.any((times - 2 * widths < s.t0) & (times > s.t1))]
-    return Truth(clear, touching, times, widths)
+    operands = np.array([k for _, k, _ in events], np.int64)
+    return Truth(clear, touching, times, widths, operands)
 
 
 def _width(stated: Lists, t: float) -> float:

@@ -85,6 +85,15 @@ def remembered(contestant: str, scene: rt.Scene, shift: float) -> Before:
     return before(partial(colours, contestant), scene, shift, ROUNDOFF[contestant])
 
 
+@lru_cache(maxsize=4)
+def moved_apart(contestant: str, scene: rt.Scene, shift: float) -> Before:
+    """The same, with scenes in which everything is moved by itself besides."""
+    base = remembered(contestant, scene, shift)
+    move = partial(_anywhere, np.random.default_rng(0), shift)
+    others = [colours(contestant, _moved_apart(scene, move)) for _ in range(AGAIN)]
+    return Before(base.picture, base.bound + _change(base.picture, others))
+
+
 def _change(first: FloatArray, others: list[FloatArray]) -> FloatArray:
     change = np.max([np.abs(other - first) for other in others], axis=0)
     return np.asarray(STEPS * change.max(axis=-1, keepdims=True))
@@ -142,10 +151,7 @@ def judged(contestant: str, scene: rt.Scene, motion: Motion, mirrored: bool = Fa
         found = found[:, ::-1]
     wrong = wrong_pixels(found, base)
     if 0 < wrong.sum() <= FEW * wrong.size:
-        rng = np.random.default_rng(0)
-        move = partial(_anywhere, rng, shift)
-        others = [render(_moved_apart(scene, move)) for _ in range(AGAIN)]
-        base = Before(base.picture, base.bound + _change(base.picture, others))
+        base = moved_apart(contestant, scene, shift)
         wrong = wrong_pixels(found, base)
     off = np.abs(found - base.picture).max(axis=-1)
     off = np.where(np.isfinite(off), off, np.inf)

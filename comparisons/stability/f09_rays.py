@@ -8,11 +8,10 @@ import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons import frame
-from comparisons.exact.referee import Referee, Truth
 from comparisons.mitsuba_backend import scalar
-from comparisons.sizes import ShapeSizes
 from comparisons.stability.f09_motion import Motion
 from comparisons.stability.f09_scenes import GRID
+from comparisons.stability.f09_solids import Judge
 from comparisons.stability.family import EXAMPLES, FloatArray, Outcome
 from comparisons.tiers.arbiter import directions
 from comparisons.translate import load
@@ -143,23 +142,13 @@ AROUND = np.concatenate([directions(16), 0.3 * directions(8)])
 """Moves, of that size, that a differing ray is asked with."""
 
 
-SOLID_BAND = BAND + 118.0 / (0.156 * 0.866)
-"""The same for solids: 881.  Operands' crossings count as one where they are closer than E1 / c1 +
-E2 / c2 (`csg.evaluate.width`), c being the cosines at which a ray meets the faces, and E at most
-(8 * 3 + 12 + 16 * 2) sqrt(3) = 118 u, of `world_error` and of the ray, in largest coordinates.
-
-A ray that moves by x closes a wedge of angle a by x |n1 / c1 + n2 / c2| at best, along that vector,
-which is across the ray, and >= (1 / c1 + 1 / c2) sin(a / 2): x = E / sin(a / 2) is enough, whatever
-the cosines.  The sharpest edge of `f09_scenes.solids` is that between the two balls that are taken
-away from the box: radii 0.625 and 0.25, 0.866 apart, meet at a = 18 degrees, sin(a / 2) = 0.156.
-The moves that are asked about lie within 30 degrees of any direction: over 0.866.
-"""
-
-
-def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float = BAND) -> Outcome:
+def judged(
+    before: Asked, after: Asked, factor: float, exact: bool, unmoved: bool = False
+) -> Outcome:
     """Ours.  exact: the transformed numbers are the numbers meant, and the answers must be the
     same to the last bit of t;  else where answers differ each must be right in its own scene, by
-    exact arithmetic: where rounding the scene has really changed what is there, both are.
+    exact arithmetic: where rounding the scene has really changed what is there, both are;
+    unmoved: each must be right in the scene before.
     """
     changed = _changed(before, after)
     t0, t1 = before.found.t, after.found.t / factor
@@ -172,7 +161,8 @@ def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float 
     else:
         wrong = changed.copy()
         rows = np.flatnonzero(changed)
-        right, open_[rows] = _both_right(before, after, rows, band)
+        judged_as = before._replace(found=after.found) if unmoved else after
+        right, open_[rows] = _both_right(before, judged_as, rows)
         wrong[rows[right]] = False
     wrong &= ~open_
     rows = np.flatnonzero(wrong)[:EXAMPLES]
@@ -186,44 +176,37 @@ def judged(before: Asked, after: Asked, factor: float, exact: bool, band: float 
 
 
 def _both_right(
-    before: Asked, after: Asked, rows: npt.NDArray[np.int64], band: float
+    before: Asked, after: Asked, rows: npt.NDArray[np.int64]
 ) -> tuple[BoolArray, BoolArray]:
-    """Of some rays: whether both answers are those of exact arithmetic for a ray within `band`, and
+    """Of some rays: whether both answers are those of exact arithmetic for a ray within BAND, and
     whether the arbiter leaves one open."""
     right, touching = np.ones(len(rows), bool), np.zeros(len(rows), bool)
     for asked in (before, after):
         # What is wrong before is wrong.
         left = np.flatnonzero(right)
-        right[left], touching[left] = _right(asked, rows[left], band)
+        right[left], touching[left] = _right(asked, rows[left])
     return right, touching
 
 
-def _right(asked: Asked, rows: npt.NDArray[np.int64], band: float) -> tuple[BoolArray, BoolArray]:
+def _right(asked: Asked, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolArray]:
     """Most are right for the very ray: only others, some 3 ms each, are asked around it."""
     if len(rows) == 0:
         return np.ones(0, bool), np.zeros(0, bool)
-    sizes = ShapeSizes(asked.scene)
-    referee = Referee(sizes)
-    o, d, names = asked.o[rows], asked.d[rows], asked.found.identities[rows]
-    truths = referee.decide(o, d)
-    right = np.array([_is_right(*both) for both in zip(names, truths, strict=True)])
-    touching = np.array([truth.touching for truth in truths])
+    judge, o, d = Judge(asked.scene), asked.o[rows], asked.d[rows]
+    names, t = asked.found.identities[rows], asked.found.t[rows]
+    met = judge.decide(o, d)
+    right = np.array([m.allows(*answer) for m, *answer in zip(met, names, t, strict=True)])
+    touching = np.array([m.touching for m in met])
     rest = np.flatnonzero(~right)
     # An infinite plane counts as far as the ray goes.
-    extent = np.maximum(np.abs(o).max(axis=1), np.abs([sizes.lower, sizes.upper]).max())
-    moves = band * UNIT_ROUNDOFF * extent[rest, None, None] * AROUND
+    extent = np.maximum(np.abs(o).max(axis=1), np.abs(judge.bounds).max())
+    moves = BAND * UNIT_ROUNDOFF * extent[rest, None, None] * AROUND
     origins = (o[rest, None] + moves).reshape(-1, 3)
-    truths = referee.decide(origins, np.repeat(d[rest], len(AROUND), axis=0))
+    met = judge.decide(origins, np.repeat(d[rest], len(AROUND), axis=0))
     for k, ray in enumerate(rest.tolist()):
-        some = truths[k * len(AROUND) : (k + 1) * len(AROUND)]
-        right[ray] = any(_is_right(names[ray], truth) for truth in some)
+        some = met[k * len(AROUND) : (k + 1) * len(AROUND)]
+        right[ray] = any(m.allows(names[ray], t[ray]) for m in some)
     return right, touching
-
-
-def _is_right(identity: Identities, truth: Truth) -> bool:
-    if identity[0] < 0:
-        return not truth.identities
-    return tuple(identity.tolist()) in truth.identities
 
 
 def judged_mitsuba(before: Asked, after: Asked, factor: float) -> Outcome:

@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 
 import reference_rt as rt
+from comparisons.stability.f07_trees import MESH
 from comparisons.stability.family import FloatArray
 from reference_rt import transform
 from reference_rt.textures.texture import UvMap
@@ -61,7 +62,8 @@ def write_mesh(path: Path, vertices: FloatArray, faces: Any) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-BALL = "ball.obj"
+BALL = MESH
+"""F7, which judges solids, has a mesh of this name in each of its scenes."""
 
 
 def write_ball(folder: Path) -> None:

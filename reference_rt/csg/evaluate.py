@@ -205,9 +205,23 @@ def pass_together(
 
 
 @kernel
-def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max: float) -> Hit:
-    """The first point of the surface of solid s at t in (0, t_max], as a hit of the operand that it
-    belongs to; at inf for none."""
+def surface_along(
+    solids: Solids,
+    shapes: Shapes,
+    bvh: Bvh,
+    s: int,
+    ray: Ray,
+    t_max: float,
+    t: FloatArray,
+    widths: FloatArray,
+    part: IntArray,
+) -> tuple[int, Hit]:
+    """(how many points of the surface of solid s lie at t in (0, t_max], the first as a hit of the
+    operand that it belongs to, at inf for none).
+
+    As many of them as there is room for go into t, in order, with their `resolution` and the number
+    of their operand; where there is no room for any, the first ends the walk.
+    """
     ray, begin = ray_near(solids, s, ray)
     first, count = solids.first[s], solids.operands[s]
     walk = Walk(
@@ -227,16 +241,39 @@ def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max:
     values = local_integers(solids.depth[s])
     best, hit = begin_all(solids, shapes, bvh, s, ray, walk)
     inside = is_inside(solids, s, walk.state, values)
+    found, closest = 0, Hit(math.inf, -1, -1, 0.0, 0.0, -1)
     while best >= 0 and begin + hit.t <= t_max:
         best, hit = pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
         was_inside = inside
         inside = is_inside(solids, s, walk.state, values)
         if inside != was_inside:
-            shown = which_shows(solids, s, count, walk, values, was_inside)
-            kind = solids.kind[first + shown]
-            t, u, v = begin + front.t[shown], front.u[shown], front.v[shown]
-            return Hit(t, kind, front.row[shown], u, v, -1)
-    return Hit(math.inf, -1, -1, 0.0, 0.0, -1)
+            k = which_shows(solids, s, count, walk, values, was_inside)
+            kind, at_k = solids.kind[first + k], begin + front.t[k]
+            if found == 0:
+                closest = Hit(at_k, kind, front.row[k], front.u[k], front.v[k], -1)
+            if found < len(t):
+                shown = Hit(front.t[k], kind, front.row[k], front.u[k], front.v[k], -1)
+                t[found], widths[found] = at_k, resolution(shapes, shown, ray)
+                part[found] = k
+            found += 1
+            if len(t) == 0:
+                break
+    return found, closest
+
+
+@kernel
+def resolution(shapes: Shapes, hit: Hit, ray: Ray) -> float:
+    """Crossings whose distance, in t, is more than the sum of theirs are told apart."""
+    return min(width(shapes, hit, ray), 0.5 * GRAZING * head_on(ray, hit.t))
+
+
+@kernel
+def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max: float) -> Hit:
+    """The first point of the surface of solid s at t in (0, t_max], as a hit of the operand that it
+    belongs to; at inf for none."""
+    none, no_parts = local_floats(0), local_integers(0)
+    _, hit = surface_along(solids, shapes, bvh, s, ray, t_max, none, none, no_parts)
+    return hit
 
 
 @kernel

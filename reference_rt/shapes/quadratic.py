@@ -83,6 +83,29 @@ def _discriminant(k: FloatArray, ray: Ray, a: float, b: float, c: float) -> floa
     return b * b - a * value(k, between)
 
 
+STEEP = 0.5
+"""Of the largest gradients, which are 1 to 2 where a row's own coordinates are 1 (`fit`)."""
+
+
+@kernel
+def _nearer(k: FloatArray, ray: Ray, a: float, slope: float, t: float) -> float:
+    """The root that is close to t, where f grows by 2 `slope`, seen from there if f is flat there.
+
+    a, b and c round by u times the square of how far the line has come, which moves a root as far
+    as would a ray that passes this over the gradient beside it: next to the apex of a cone, by any
+    number of u.  Seen from next to it f rounds by u times the gradient, as if the ray had moved by
+    u.  The sign of t, which that of c decided, stays.
+    """
+    p = ray.o + ray.d * t
+    g = gradient(k, p)
+    if not max_abs(g) < STEEP:
+        return t
+    b = 0.5 * dot(g, ray.d)
+    # The same root of a s² + 2 b s + c = 0 either way: without cancellation.
+    s = -value(k, p) / (b + slope) if b * slope > 0.0 else (slope - b) / a
+    return t + s if abs(s) < 0.5 * abs(t) else t
+
+
 class Roots(NamedTuple):
     """Where f <= 0 on a line: between t0 and t1 (nowhere where t0 > t1), or else up to t0 and from
     t1 on."""
@@ -108,10 +131,12 @@ def roots(k: FloatArray, ray: Ray) -> Roots:
     rest = _discriminant(k, ray, a, b, c)
     if not rest >= 0.0:
         return everywhere if rest < 0.0 and a < 0.0 else nowhere
-    q = -(b + math.copysign(math.sqrt(rest), b))
+    half = math.copysign(math.sqrt(rest), b)
+    q = -(b + half)
     # A line along which f has no quadratic term meets it there at ±inf, as IEEE says.
     t0 = q / a if a != 0.0 else q * math.inf
     t1 = c / q if q != 0.0 else t0
+    t0, t1 = _nearer(k, ray, a, -half, t0), _nearer(k, ray, a, half, t1)
     return Roots(min(t0, t1), max(t0, t1), a >= 0.0)
 
 

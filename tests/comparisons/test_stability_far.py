@@ -76,6 +76,24 @@ def test_ours_holds_for_other_kinds(name, x, tmp_path):
     assert found.cases > 30
 
 
+def test_hits_beside_an_apex():
+    """Of lines that run beside a cone's side from next to it to 1e-5 to 1e-2 from its apex: the
+    coefficients of the quadratic, seen from where the ray begins, say little about the roots."""
+    rng = np.random.default_rng(9)
+    n = 1000
+    rays, maps = curved.draw_rays(rng, "cone", np.ones(n), 0.0, 1.0)
+    phi, depth = rng.uniform(0.0, 2.0 * np.pi, n), rng.uniform(0.2, 0.9, (n, 1))
+    side = np.column_stack([np.cos(phi), np.sin(phi), -np.ones(n)])
+    o = depth * side + 0.002 * rng.normal(size=(n, 3))  # from the apex, as the table's rows are
+    q = 10.0 ** rng.uniform(-5.0, -2.0, (n, 1)) * rng.normal(size=(n, 3))
+    linear = np.array(maps)[np.arange(n) % len(maps)]
+    o, d = (np.einsum("nij,nj->ni", linear, v) for v in (o, q - o))
+    beside = Rays(rays.kind, rays.row, rays.size, rays.row["center"] + o, d)
+    found = judge_by_moving(beside, curved.answer(beside))
+    assert found.failures == 0, found.examples
+    assert found.cases > 900
+
+
 def test_faults_at_spheres_are_seen():
     """A t off by twice the bound, a hit for a miss, a miss for a hit, NaN, behind."""
     rays = sphere_rays()

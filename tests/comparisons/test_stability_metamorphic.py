@@ -17,6 +17,7 @@ from comparisons.stability import (
     f09_rays,
     f09_rearranged,
     f09_scenes,
+    f09_solids,
 )
 from comparisons.stability.families import family
 from comparisons.stability.family import MITSUBA, OURS, Draw, generator
@@ -27,9 +28,14 @@ EPSILON = 1e-4
 
 @pytest.fixture(autouse=True)
 def _nothing_remembered():
-    f09_light.remembered.cache_clear()
+    _forget()
     yield
+    _forget()
+
+
+def _forget():
     f09_light.remembered.cache_clear()
+    f09_light.moved_apart.cache_clear()
 
 
 def draw(folder, cases=150, mitsuba=False, effort="quick"):
@@ -124,6 +130,40 @@ def test_exact_arithmetic_judges_both_answers(tmp_path):
     # Of two triangles beside an edge both may be right.
     assert outcome.failures + outcome.open >= hits - 3
     assert hits > 40
+
+
+def test_solids_are_judged_by_what_is_resolved(tmp_path):
+    """What ours finds passes; another operand, nothing, what is behind, and a t that is off do
+    not; of two walls that rounding cannot tell apart either may be first, of others one."""
+    scene = f09_scenes.solids(tmp_path)
+    bench = f09_rays.Bench(scene, 90, np.random.default_rng(3))
+    o, d, found = bench.ours.o, bench.ours.d, bench.ours.found
+    met = f09_solids.Judge(scene).decide(o, d)
+    solid = np.flatnonzero(found.identities[:, 0] > 0)
+    assert len(solid) > 20
+    nothing = np.array([-1, -1, -1, -1])
+    right, part, missed, off = np.zeros(4), 1, 2, 3
+    for k in solid.tolist():
+        name, t = found.identities[k], found.t[k]
+        right[0] += met[k].allows(name, t)
+        right[part] += met[k].allows(np.array([name[0], -1, (name[2] + 1) % 3, name[3]]), t)
+        right[missed] += met[k].allows(nothing, np.inf)
+        right[off] += met[k].allows(name, t * (1.0 + 1e-9))
+    assert right[0] >= len(solid) - 1  # one may pass an edge within rounding
+    assert (right[1:] <= 2).all()
+
+
+@pytest.mark.parametrize(("gap", "either"), [(2.0**-52, True), (1e-12, False)])
+def test_a_film_may_show_or_not(gap, either, tmp_path):
+    """Of a wall as thick as `gap`, cut from a box by another."""
+    f09_scenes.write_ball(tmp_path)
+    cut = rt.Box(transform=[{"translate": [0.0, 0.0, -gap]}])
+    film = rt.Difference(of=(rt.Box(), cut), transform=())
+    scene = rt.Scene.parse("{}", folder=tmp_path).changed(shapes=(rt.Disk(), film))
+    (met,) = f09_solids.Judge(scene).decide(np.array([[0.1, 0.2, 4.0]]), np.array([[0.0, 0, -1]]))
+    assert met.allows(np.array([1, -1, 0, 5]), 3.0)
+    assert met.allows(np.array([0, -1, 0, 0]), 4.0) == either
+    assert not met.allows(np.array([1, -1, 0, 2]), 5.0)
 
 
 def test_edges_are_found(tmp_path):
@@ -238,6 +278,7 @@ scene = f09_scenes.whitted(Path(sys.argv[1])).changed(film=rt.Film(width=8, heig
 honest = f09_light.judged("ours", scene, motion).failures
 ray.leave = leave
 f09_light.remembered.cache_clear()
+f09_light.moved_apart.cache_clear()
 print(honest, f09_light.judged("ours", scene, motion).failures)
 """
 
