@@ -9,7 +9,7 @@ from comparisons.stability.f06_bases import IMAGES, MESHES
 from comparisons.stability.f06_damage import anything, number, pick
 from reference_rt.scene import json_schema
 
-NAMES = ("a", "b", "c")
+NAMES: tuple[str, ...] = ("a", "b", "c")
 """Of materials, textures and groups: few, so that they are found, and contain each other."""
 
 _CIRCLES = 0.05

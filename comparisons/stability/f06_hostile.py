@@ -37,6 +37,7 @@ from comparisons.stability.f06_damage import (
     as_text,
     as_yaml,
     damaged,
+    deep,
     pick,
     with_numbers,
     with_structure,
@@ -159,8 +160,9 @@ def values(draw: Draw, x: float) -> dict[str, Outcome]:
 
 
 def _structure_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, str]:
-    data = with_structure(draw.rng, BASES[name], int(x))
-    return (".json", as_text(data)) if k % 4 else (".yaml", as_yaml(data))
+    with deep():
+        data = with_structure(draw.rng, BASES[name], int(x))
+        return (".json", as_text(data)) if k % 4 else (".yaml", as_yaml(data))
 
 
 def structure(draw: Draw, x: float) -> dict[str, Outcome]:

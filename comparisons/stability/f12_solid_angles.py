@@ -19,6 +19,7 @@ from reference_rt.vec3 import row
 
 TEXTBOOK = "sphere.cosine"
 
+
 @entry_kernel
 def _of_sphere(table: Any, p: Any, u: Any, out: Any) -> None:
     for i in range(len(p)):
