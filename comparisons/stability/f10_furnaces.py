@@ -95,8 +95,8 @@ def _open(draw: Draw, x: float) -> dict[str, Outcome]:
     cosines = COSINES[1::2] if draw.effort == "quick" else COSINES
     for name, material in materials.items():
         own = max(alpha, 1e-3) if isinstance(material, rt.Principled) else alpha
-        for cosine in cosines:
-            for who, bsdf in contestants(material, draw):
+        for who, bsdf in contestants(material, draw):
+            for cosine in cosines:
                 mean, error, most, total, doubt = _power(
                     bsdf, material, own, cosine, draw.rng, draw.cases
                 )
