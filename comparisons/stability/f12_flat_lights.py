@@ -35,7 +35,8 @@ RULES = (20, 14)
 are off by 9e-7, 12 by 2e-10, 16 by 9e-14 (measured): 20 by less than u."""
 
 DOUBT = 0.01
-"""What the rule may be off by at most, as the coarser one tells, where it does not converge."""
+"""What the rule may be off by, relatively, is what the two differ by; at most this, where neither
+converges."""
 
 
 @entry_kernel
@@ -136,9 +137,7 @@ def _compare(
     outcomes = {}
     for who, densities in asked.items():
         mean, coarse = (_mean(densities, p, nodes) for nodes in RULES)
-        # Errors fall as a power of the number of nodes: the finer rule's is what they differ by,
-        # the coarser one's, to the power of the numbers' ratio.
-        doubt = relative(coarse, mean) ** (RULES[0] / RULES[1])
+        doubt = relative(coarse, mean)
         allowed = 64.0 * unit_of(who) * condition + np.minimum(doubt, DOUBT)
 
         def ask(i: int, mean: FloatArray = mean) -> Any:
