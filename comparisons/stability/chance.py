@@ -17,6 +17,9 @@ contestants has one with a chance of at most 2.3e-5, a quick run with less than 
   the same side.  Means over 256 pixels and more are near normal; one suspect case in a thousand, as
   heavy tails would have it, is still but 5e-7 of failures.  A fault is seen with 97 % where it is
   6 standard errors of the first samples: 1 % of the value where they know it to 0.17 %.
+- Where a weight's variance is infinite its samples do not know how wrong they are: 49 % off was
+  less than 3.9 of their standard errors.  A tenth of the value is too much whatever they say; ours
+  are known to 1 % and better, a tenth of that.
 - Weights between 0 and a known bound are judged by their own variance and that bound, whatever
   their distribution: the empirical Bernstein inequality.
 - Histograms are judged by chi-square.
@@ -58,19 +61,28 @@ def off(found: Mean, expected: float, rounding: float) -> float:
     return math.copysign(errors, found.mean - expected)
 
 
-def fails(sample: Callable[[int], Mean], expected: float, rounding: float) -> tuple[bool, Mean]:
+def fails(
+    sample: Callable[[int], Mean], expected: float, rounding: float, most: float = math.inf
+) -> tuple[bool, Mean]:
     """Whether both stages do, and the last one's mean.
 
     sample: of the stages 0 and 1, independent, the second with `AGAIN` times as many samples;
-    rounding: of the mean, absolute.
+    rounding: of the mean, absolute;  most: what it may be off by whatever the noise.
     """
     first = sample(0)
-    one = off(first, expected, rounding)
-    if abs(one) <= ERRORS or math.isnan(one):
+    one = _beyond(first, expected, rounding, most)
+    if one == 0.0 or math.isnan(one):
         return math.isnan(one), first
     second = sample(1)
-    other = off(second, expected, rounding)
-    return math.isnan(other) or (abs(other) > ERRORS and other * one > 0.0), second
+    other = _beyond(second, expected, rounding, most)
+    return math.isnan(other) or other * one > 0.0, second
+
+
+def _beyond(found: Mean, expected: float, rounding: float, most: float) -> float:
+    """`off` where it is suspect, 0 where not."""
+    errors = off(found, expected, rounding)
+    near = abs(errors) <= ERRORS and abs(found.mean - expected) <= most
+    return 0.0 if near else errors
 
 
 def bernstein(error: float, most: float, n: int) -> float:

@@ -2,9 +2,9 @@
 
 Laws:
 - closed: in a room whose walls emit 1 and reflect a, 1 / (1 - a) arrives from everywhere: the mean
-  of 1024 pixels, to its noise (see `chance`).  Both trace with Russian roulette from the fifth edge
-  on.  Ours goes on with a chance of up to 0.999, Mitsuba of up to 0.95: beyond an albedo of 0.975
-  the variance of its weights is infinite.
+  of 1024 pixels, to its noise (see `chance`) and to a tenth.  Both trace with Russian roulette from
+  the fifth edge on.  Ours goes on with a chance of up to 0.999, Mitsuba of up to 0.95: beyond an
+  albedo of 0.975 the variance of its weights is infinite.
 - open: a surface under a white sky sends back, in power, no more than arrives: the mean of weights
   of samples is at most 1, to its noise, and is the integral of evaluate() over a chart of half
   vectors, which no sample has a part in.
@@ -146,7 +146,7 @@ CLOSED = Series(
     {"quick": 1, "full": 1},
     _closed,
     unit="of the value",
-    explained="the range ends at an albedo of 0.999, where Mitsuba fails, 0.88 of the value off.  "
+    explained="the range ends at an albedo of 0.999, where Mitsuba fails, 0.86 of the value off.  "
     "Its roulette lets 95 % of all paths go on at most: the variance is infinite from an albedo of "
     "0.975 on, and few paths are as long as most light needs.  Ours lets 99.9 % go on",
 )

@@ -97,6 +97,9 @@ def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> F
         return render()
 
 
+MOST = 0.1
+"""What a picture's mean may be off by, relatively, whatever its noise."""
+
 Render = Callable[[int, int], FloatArray]
 """Pixels (n, 3) of a picture by its seed and its samples per pixel."""
 
@@ -109,8 +112,8 @@ def judge(
     rounding: Callable[[str], float],
     told: Mapping[str, Any],
 ) -> dict[str, Outcome]:
-    """One case: the mean is finite and, in two stages of `chance`, the expected one, to noise and
-    rounding.  The worst is relative."""
+    """One case: the mean is finite and, in two stages of `chance`, the expected one, to noise, of
+    `MOST` at most, and rounding.  The worst is relative."""
     found = {}
     for who, render in rendered.items():
 
@@ -118,7 +121,8 @@ def judge(
             one = render(seeds[stage], spp * (1, chance.AGAIN)[stage]).mean(axis=1)
             return chance.Mean(float(one.mean()), float(one.std(ddof=1)) / math.sqrt(len(one)))
 
-        failed, (mean, error) = chance.fails(sample, expected, rounding(who) * expected)
+        limits = rounding(who) * expected, MOST * expected
+        failed, (mean, error) = chance.fails(sample, expected, *limits)
         off = abs(mean - expected) / expected
         seen = {"expected": expected, "found": mean, "standard error": error, "seeds": seeds}
         examples = ({**told, **seen},) if failed else ()

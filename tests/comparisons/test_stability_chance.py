@@ -59,6 +59,13 @@ def test_what_rounding_allows_does_not_fail() -> None:
     assert not chance.fails(stages(Mean(1.001, 0.0)), 1.0, 0.01)[0]
 
 
+def test_noise_is_no_excuse_for_everything() -> None:
+    vague = stages(Mean(0.5, 0.4), Mean(0.6, 0.4))
+    assert not chance.fails(vague, 1.0, 0.0)[0]
+    assert chance.fails(vague, 1.0, 0.0, 0.1)[0]
+    assert not chance.fails(stages(Mean(0.5, 0.4), Mean(0.95, 0.4)), 1.0, 0.0, 0.1)[0]
+
+
 def test_right_pictures_are_as_seldom_suspect_as_is_said() -> None:
     """Of pixels whose noise is exponential, as that of paths' lengths is, within three times 1e-4;
     both stages multiply."""
