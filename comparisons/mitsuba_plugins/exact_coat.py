@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy import special
 
 from comparisons.mitsuba_plugins import exact_beckmann, parameters
 from reference_rt.shapes.shape import FloatArray
@@ -20,7 +21,8 @@ CELLS = 512
 """Of T's table, evenly in the root of the cosine: linear between, to 1e-5."""
 
 
-_legendre = functools.cache(np.polynomial.legendre.leggauss)
+_legendre = functools.cache(special.roots_legendre)
+"""Without numpy's dense eigenvalues, which take several threads of a busy machine a second."""
 
 
 def _rule(n: int, low: float = 0.0, high: float = 1.0) -> tuple[FloatArray, FloatArray]:

@@ -8,8 +8,9 @@ from comparisons.stability.summary import SeriesSummary, contestants, named
 SIZE = (4.8, 3.7)
 """Inches."""
 
-LEAST = 1e-2
-"""Of worst errors, on an axis that knows no zero: of the series' unit."""
+LEAST, MOST = 1e-2, 1e30
+"""Of worst errors, of the series' unit: an axis knows no zero, and where a text-book's 1 - R says
+1e-16 in place of 0, the error is some 1e297."""
 
 
 def of_series(one: SeriesSummary) -> list[str]:
@@ -47,7 +48,6 @@ def _least(one: SeriesSummary) -> float:
 
 def _errors(one: SeriesSummary, name: str, colour: int) -> Curve:
     some = [(f.x, f.outcomes[name].worst) for f in one.found if name in f.outcomes]
-    known = [(x, worst) for x, worst in some if worst is not None]
-    return Curve(
-        named(name), [x for x, _ in known], [max(w, LEAST) for _, w in known], colour=colour
-    )
+    known = [(x, worst) for x, worst in some if worst is not None and math.isfinite(worst)]
+    shown = [min(max(worst, LEAST), MOST) for _, worst in known]
+    return Curve(named(name), [x for x, _ in known], shown, colour=colour)

@@ -2,7 +2,9 @@
 
 import copy
 import json
+import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,17 @@ TEXTS = (
 """Names of files and of nothing, long ones, control characters, writing from right to left."""
 
 KEYS = ("type", "", "radius", "of", "base", "file", "transform", "\0", "x" * 300, "__class__")
+
+
+@contextmanager
+def deep() -> Iterator[None]:
+    """Within it, trees may be copied and written that are deeper than what reads them allows."""
+    usual = sys.getrecursionlimit()
+    sys.setrecursionlimit(20 * usual)
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(usual)
 
 
 def numbers_in(data: Any, path: Way = ()) -> Iterator[Way]:

@@ -9,8 +9,11 @@ from comparisons.stability.f06_bases import IMAGES, MESHES
 from comparisons.stability.f06_damage import anything, number, pick
 from reference_rt.scene import json_schema
 
-NAMES = ("a", "b", "c")
+NAMES: tuple[str, ...] = ("a", "b", "c")
 """Of materials, textures and groups: few, so that they are found, and contain each other."""
+
+_CIRCLES = 0.05
+"""The chance that one may contain itself."""
 
 DEEPEST = 7
 """Levels below which everything optional is left out."""
@@ -28,24 +31,30 @@ def sentence(rng: np.random.Generator, share: float) -> Any:
     """A scene in which each value is hostile with the chance `share`."""
     root = _schema()["properties"]
     writer = _Writer(rng, share)
-    scene: dict[str, Any] = {
-        name: {key: writer.value(root[name]["additionalProperties"], 1) for key in NAMES[:2]}
-        for name in ("textures", "materials", "groups")
-    }
+    scene: dict[str, Any] = {}
+    for name in ("textures", "materials", "groups"):
+        scene[name] = {}
+        for k, key in enumerate(NAMES):
+            # Each is made of later ones, but for a few.
+            later = NAMES[k + 1 :] if rng.random() > _CIRCLES else NAMES
+            writer.names = later or NAMES
+            depth = 1 if later else DEEPEST - 2
+            scene[name][key] = writer.value(root[name]["additionalProperties"], depth)
+    writer.names = NAMES
     scene["shapes"] = [writer.value(root["shapes"]["items"], 1) for _ in range(rng.integers(1, 6))]
     scene["lights"] = [writer.value(root["lights"]["items"], 1) for _ in range(rng.integers(0, 3))]
     for name in ("camera", "integrator", "film", "sampler"):
         if rng.random() < _OPTIONAL:
             scene[name] = writer.value(root[name], 1)
     for name in ("textures", "materials", "groups"):
-        if rng.random() < _OPTIONAL:
-            del scene[name]
+        if rng.random() < share:
+            del scene[name]  # which others name
     return scene
 
 
 class _Writer:
     def __init__(self, rng: np.random.Generator, share: float) -> None:
-        self.rng, self.share = rng, share
+        self.rng, self.share, self.names = rng, share, NAMES
 
     def value(self, schema: dict[str, Any], depth: int, key: str = "") -> Any:
         if self.rng.random() < self.share * 0.3:
@@ -59,14 +68,16 @@ class _Writer:
             return schema["const"]
         if "enum" in schema:
             return pick(self.rng, schema["enum"])
-        if key in _SHAPES_OF and self.rng.random() > self.share:
-            return self.rng.uniform(*_SHAPES_OF[key]).tolist()
-        write = getattr(self, "_" + schema.get("type", "null"))
-        return write(schema, depth, key)
+        kind = schema.get("type", "null")
+        known = key in _RANGES.get(kind, {}) and schema.get("maxItems") != 2
+        if known and self.rng.random() > self.share:
+            return np.asarray(self.rng.uniform(*_RANGES[kind][key])).tolist()
+        return getattr(self, "_" + kind)(schema, depth, key)
 
     def _chosen(self, choices: list[dict[str, Any]], depth: int) -> dict[str, Any]:
-        """One of them; far down, none that goes further down."""
-        flat = [c for c in choices if "of" not in str(c.get("$ref", ""))]
+        """One of them; far down, none that goes further down.  Never rough plastic: plain Python
+        takes 10 s to make its tables; `f06_bases.LAYERS` has it."""
+        flat = [c for c in choices if not str(c.get("$ref", "")).endswith("/RoughPlastic")]
         if depth > DEEPEST - 3:
             shallow = [c for c in flat if not str(c.get("$ref", "")).endswith(_DEEP)]
             flat = shallow or flat
@@ -77,13 +88,12 @@ class _Writer:
         found: dict[str, Any] = {}
         for key, part in schema.get("properties", {}).items():
             optional = key not in needed and key != "type"
-            if (
-                optional
-                and key not in _SHAPES_OF
-                and (depth > DEEPEST or self.rng.random() > _OPTIONAL)
-            ):
+            if optional and (depth > DEEPEST or self.rng.random() > _OPTIONAL):
                 continue
-            found[key] = self.value(part, depth + 1, key)
+            if key in _WITH and _WITH[key] not in found:
+                continue
+            name = schema["title"] + key if key == "file" else key
+            found[key] = self.value(part, depth + 1, name)
         return found
 
     def _array(self, schema: dict[str, Any], depth: int, _: str) -> Any:
@@ -110,9 +120,9 @@ class _Writer:
     def _string(self, _: dict[str, Any], __: int, key: str) -> Any:
         if self.rng.random() < self.share:
             return anything(self.rng)
-        if key == "file":
-            return pick(self.rng, MESHES + IMAGES)
-        return pick(self.rng, NAMES)
+        if key.endswith("file"):
+            return pick(self.rng, MESHES if key == "Meshfile" else IMAGES)
+        return pick(self.rng, self.names)
 
     def _boolean(self, _: dict[str, Any], __: int, ___: str) -> Any:
         return bool(self.rng.random() < 0.5)
@@ -121,14 +131,27 @@ class _Writer:
         return None
 
 
-_SHAPES_OF: dict[str, Any] = {
-    "lower": (-2.0, 0.0, 3),
-    "upper": (0.0, 2.0, 3),
-    "matrix": (-1.0, 1.0, (3, 4)),
-    "rings": (-1.0, 1.0, (2, 4, 2)),
-    "scale": (0.5, 2.0, 3),
+_CORNERS = [-1.0, 0.1, -1.0, 0.1], [-0.1, 1.0, -0.1, 1.0]
+
+_RANGES: dict[str, dict[str, Any]] = {
+    "array": {
+        "lower": (-2.0, 0.0, 3),
+        "upper": (0.0, 2.0, 3),
+        "matrix": (-1.0, 1.0, (3, 4)),
+        "rings": (-1.0, 1.0, (2, 4, 2)),
+        "scale": (0.5, 2.0, 3),
+        "view": _CORNERS,
+    },
+    "number": {"z_min": (-1.0, 0.0), "z_max": (1.0, 2.0)},
 }
-"""Arrays of which the schema does not say all, as arguments of `uniform`."""
+"""What the schema does not say all of, by its kind, as arguments of `uniform`."""
+
+_WITH = {"distance": "view"}
+"""Keys that another one must be there for."""
 
 _NUMBER = {"type": "number"}
-_DEEP = ("/Union", "/Intersection", "/Difference", "/Instance")
+_DEEP = (
+    "/Union", "/Intersection", "/Difference", "/Instance",
+    "/Mask", "/Blend", "/Bump", "/NormalMap", "/TwoSided",
+)  # fmt: skip
+"""What is made of others."""

@@ -37,6 +37,7 @@ from comparisons.stability.f06_damage import (
     as_text,
     as_yaml,
     damaged,
+    deep,
     pick,
     with_numbers,
     with_structure,
@@ -128,14 +129,19 @@ def _written(draw: Draw, x: float, names: Sequence[str], make: Any) -> list[tupl
     return found
 
 
+_known: dict[str, str | None] = {}
+"""Signatures of sound scenes, by their text."""
+
+
 def _signatures(draw: Draw, sound: Mapping[str, Any]) -> dict[str, str | None]:
     """Of the sound scenes, which are rendered first, so that what has to compile does."""
-    paths = []
-    for name, data in sound.items():
-        path = draw.folder / f"sound_{name}.json"
-        path.write_text(as_text(data))
-        paths.append(path)
-    return dict(zip(sound, [answer.signature for answer in answers(paths)], strict=True))
+    texts = {name: as_text(data) for name, data in sound.items()}
+    new = [text for text in texts.values() if text not in _known]
+    paths = [draw.folder / f"sound{k}.json" for k in range(len(new))]
+    for path, text in zip(paths, new, strict=True):
+        path.write_text(text)
+    _known.update(zip(new, [answer.signature for answer in answers(paths)], strict=True))
+    return {name: _known[text] for name, text in texts.items()}
 
 
 def _values_of(draw: Draw, x: float, name: str, _: int) -> tuple[str, str]:
@@ -154,8 +160,9 @@ def values(draw: Draw, x: float) -> dict[str, Outcome]:
 
 
 def _structure_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, str]:
-    data = with_structure(draw.rng, BASES[name], int(x))
-    return (".json", as_text(data)) if k % 4 else (".yaml", as_yaml(data))
+    with deep():
+        data = with_structure(draw.rng, BASES[name], int(x))
+        return (".json", as_text(data)) if k % 4 else (".yaml", as_yaml(data))
 
 
 def structure(draw: Draw, x: float) -> dict[str, Outcome]:

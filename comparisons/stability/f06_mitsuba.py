@@ -30,7 +30,6 @@ def judged(scenes: Sequence[Path]) -> Outcome:
 
 def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
     from comparisons import translate
-    from comparisons.mitsuba_backend import scalar
     from comparisons.mitsuba_scene import picture
     from comparisons.translate.errors import UntranslatableError
     from reference_rt.cli import adjusted
@@ -43,7 +42,7 @@ def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
         assert scene.tables is not None  # made now, so that what is wrong with it is told
     except ReferenceRtError:
         return found
-    with scalar(), contextlib.redirect_stderr(io.StringIO()):
+    with contextlib.redirect_stderr(io.StringIO()):
         try:
             twin = translate.load(scene)  # which takes seconds for curved shapes, for our own part
             if twin.lacking:
@@ -60,4 +59,7 @@ def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    serve(_outcome)
+    from comparisons.mitsuba_backend import scalar
+
+    with scalar():  # once: to change the variant takes as long as a case
+        serve(_outcome)

@@ -1,5 +1,9 @@
-"""Hostile cases in processes of their own: one that dies is replaced, and the others go on."""
+"""Hostile cases in processes of their own: one that dies is replaced, and the others go on.
 
+A process goes on from setting to setting: to start one takes as long as fifty cases.
+"""
+
+import atexit
 import contextlib
 import json
 import os
@@ -45,19 +49,25 @@ def answers(
     not rendered.
     """
     wanted = signatures or [None] * len(scenes)
-    worker: _Worker | None = None
-    try:
-        for scene, signature in zip(scenes, wanted, strict=True):
-            if worker is None:
-                worker = _Worker(module, plain)
-            answer = worker.ask({"scene": str(scene), "signature": signature})
-            if answer.exit is None:
-                worker.close()
-                worker = None
-            yield answer
-    finally:
-        if worker is not None:
-            worker.close()
+    for scene, signature in zip(scenes, wanted, strict=True):
+        worker = _workers.get((module, plain))
+        if worker is None:
+            worker = _workers[module, plain] = _Worker(module, plain)
+        answer = worker.ask({"scene": str(scene), "signature": signature})
+        if answer.exit is None:
+            _workers.pop((module, plain)).close()
+        yield answer
+
+
+_workers: dict[tuple[str, bool], "_Worker"] = {}
+"""Those that run, by module and whether they compile nothing."""
+
+
+@atexit.register
+def close() -> None:
+    """Ends them all."""
+    while _workers:
+        _workers.popitem()[1].close()
 
 
 class _Worker:

@@ -6,16 +6,18 @@ whole-number offsets up to 2^46 and factors 2^k move a scene exactly, in float64
 """
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
 
 import reference_rt as rt
 from comparisons.stability.f07_trees import MESH
 from comparisons.stability.family import FloatArray
 from reference_rt import transform
 from reference_rt.textures.texture import UvMap
+
+if TYPE_CHECKING:
+    import trimesh
 
 SIZE = 4.0
 """About the radius of each scene about the origin, its eye included."""
@@ -48,8 +50,10 @@ def _scaled(*factors: float) -> transform.Scale:
 FLOOR = (_scaled(4.0, 4.0, 1.0), _turned(-90.0), _at(0.0, -1.0, 0.0))
 
 
-def ball(subdivisions: int = 2) -> trimesh.Trimesh:
+def ball(subdivisions: int = 2) -> "trimesh.Trimesh":
     """A closed ball of 20 * 4^subdivisions triangles, vertices rounded to multiples of 1/64."""
+    import trimesh
+
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions)
     vertices = np.rint(np.asarray(mesh.vertices) * GRID) / GRID
     return trimesh.Trimesh(vertices, mesh.faces, process=False)

@@ -14,6 +14,7 @@ import reference_rt as rt
 from comparisons import frame
 from comparisons.mitsuba_backend import scalar
 from comparisons.mitsuba_scene import picture
+from comparisons.stability import chance
 from comparisons.stability.family import MITSUBA, OURS, Draw, FloatArray, Outcome
 from comparisons.translate import load
 from reference_rt import transform
@@ -96,25 +97,37 @@ def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> F
         return render()
 
 
+MOST = 0.1
+"""What a picture's mean may be off by, relatively, whatever its noise."""
+
+Render = Callable[[int, int], FloatArray]
+"""Pixels (n, 3) of a picture by its seed and its samples per pixel."""
+
+
 def judge(
-    pictures: Mapping[str, FloatArray],
+    rendered: Mapping[str, Render],
+    seeds: tuple[int, int],
+    spp: int,
     expected: float,
     rounding: Callable[[str], float],
     told: Mapping[str, Any],
-    errors: float = 4.0,
 ) -> dict[str, Outcome]:
-    """One case: the mean within `errors` standard errors and rounding, and finite.  The worst is
-    relative."""
+    """One case: the mean is finite and, in two stages of `chance`, the expected one, to noise, of
+    `MOST` at most, and rounding.  The worst is relative."""
     found = {}
-    for who, pixels in pictures.items():
-        one = pixels.mean(axis=1)
-        mean = float(one.mean())
-        noise = float(one.std(ddof=1)) / math.sqrt(len(one))
-        off = abs(mean - expected)
-        ok = math.isfinite(mean) and off <= errors * noise + rounding(who) * expected
-        relative = off / expected if math.isfinite(off) else math.inf
-        example = {**told, "expected": expected, "found": mean, "standard error": noise}
-        found[who] = Outcome(1, int(not ok), relative, examples=() if ok else (example,))
+    for who, render in rendered.items():
+
+        def sample(stage: int, render: Render = render) -> chance.Mean:
+            one = render(seeds[stage], spp * (1, chance.AGAIN)[stage]).mean(axis=1)
+            return chance.Mean(float(one.mean()), float(one.std(ddof=1)) / math.sqrt(len(one)))
+
+        limits = rounding(who) * expected, MOST * expected
+        failed, (mean, error) = chance.fails(sample, expected, *limits)
+        off = abs(mean - expected) / expected
+        seen = {"expected": expected, "found": mean, "standard error": error, "seeds": seeds}
+        examples = ({**told, **seen},) if failed else ()
+        worst = off if math.isfinite(off) else math.inf
+        found[who] = Outcome(1, int(failed), worst, examples=examples)
     return found
 
 
@@ -128,9 +141,13 @@ def measure(
     in_scalar: bool = True,
     their_pixels: int = 16,
 ) -> dict[str, Outcome]:
-    seed = int(draw.rng.integers(1, 2**31))
-    pictures = {OURS: ours(world, pixels, spp, seed)}
-    if draw.mitsuba:
+    first, again = draw.rng.integers(1, 2**31, 2).tolist()
+
+    def mitsubas(seed: int, spp: int) -> FloatArray:
         with np.errstate(all="ignore"):
-            pictures[MITSUBA] = theirs(world, their_pixels, spp, seed, in_scalar)
-    return judge(pictures, world.expected, rounding, {**told, "seed": seed})
+            return theirs(world, their_pixels, spp, seed, in_scalar)
+
+    rendered: dict[str, Render] = {OURS: lambda seed, spp: ours(world, pixels, spp, seed)}
+    if draw.mitsuba:
+        rendered[MITSUBA] = mitsubas
+    return judge(rendered, (first, again), spp, world.expected, rounding, told)

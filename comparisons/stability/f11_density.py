@@ -11,9 +11,11 @@ dwi = (wo·h + eta wi·h)² / (eta² |wi·h|) dh, eta the index on wi's side ove
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy import stats
 
 from comparisons.exact.crossings import IntArray
@@ -87,19 +89,36 @@ def _cell_of(wo: FloatArray, wi: FloatArray, alpha: float, eta: float) -> IntArr
     return np.asarray(row * CELLS + column)
 
 
+class _Chart(NamedTuple):
+    """there (m,): which nodes of the cells have a direction on that side;  wo, wi (k, 3): that, and
+    where the light comes from;  measure (k,): dwi / (dt dphi);  weights (rule²,): of a cell's."""
+
+    there: npt.NDArray[np.bool_]
+    wo: FloatArray
+    wi: FloatArray
+    measure: FloatArray
+    weights: FloatArray
+
+
+@lru_cache(maxsize=32)  # for materials and contestants in turn
+def _chart(wo: tuple[float, ...], alpha: float, eta: float, through: bool, rule: int) -> _Chart:
+    t, phi, weights = _nodes(rule)
+    h, measure = _normals(t, phi, alpha)
+    wi, spread = _directions(np.array(wo), h, eta, through)
+    there = (spread > 0.0) & ((wi[:, 2] < 0.0) == through)
+    wi = np.ascontiguousarray(wi[there])
+    return _Chart(there, np.tile(wo, (len(wi), 1)), wi, (spread * measure)[there], weights)
+
+
 def _cells(
     function: Density, wo: FloatArray, alpha: float, eta: float, through: bool, rule: int
 ) -> FloatArray:
     """What a function of directions, of one side, integrates to in each cell, (CELLS²,)."""
-    t, phi, weights = _nodes(rule)
-    h, measure = _normals(t, phi, alpha)
-    wi, spread = _directions(wo, h, eta, through)
-    there = (spread > 0.0) & ((wi[:, 2] < 0.0) == through)
-    values = np.zeros(len(h))
-    if there.any():
-        wi = np.ascontiguousarray(wi[there])
-        values[there] = function(np.tile(wo, (len(wi), 1)), wi)
-    return np.asarray((values * spread * measure).reshape(CELLS**2, -1) @ weights)
+    chart = _chart(tuple(wo.tolist()), alpha, eta, through, rule)
+    values = np.zeros(len(chart.there))
+    if len(chart.wi):
+        values[chart.there] = function(chart.wo, chart.wi) * chart.measure
+    return np.asarray(values.reshape(CELLS**2, -1) @ chart.weights)
 
 
 def integral(bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float) -> tuple[float, float]:

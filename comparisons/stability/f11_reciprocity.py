@@ -9,9 +9,8 @@ Laws:
   and the density is `pdf`, to 32 u times the condition 14 / (|h| min(alpha, cos, g)) of a half
   vector h: what rounding a direction to floats changes D, the cosines and Fresnel's root by.
 - bounds: everything is finite; no sample of a metal or a glass weighs more than 1 in power.
-- densities: samples have the density that is said (chi-square, Šidák's level over all cases of a
-  setting for a false alarm in 1e6), and it integrates to at most 1, up to what two rules of
-  quadrature differ by.
+- densities: samples have the density that is said (chi-square, at the level of `chance`), and it
+  integrates to at most 1, up to what two rules of quadrature differ by;
 - digits: Fresnel's R and T, the distribution D and the masking G1 are the exact formulae of the
   very floats, evaluated in 300 bits, to 64 u of their value, plus what moving the cosine by 4 u
   moves them (as at the critical angle); of Beckmann's D times 1 + slope², as its exponent is

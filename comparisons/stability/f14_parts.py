@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -61,33 +62,36 @@ CARRY_ON = """
 import sys
 from pathlib import Path
 from comparisons.stability.f14_parts import carry_on
-carry_on(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))
+carry_on(Path(sys.argv[1]), float.fromhex(sys.argv[2]), float.fromhex(sys.argv[3]))
 """
 
 
-def carry_on(folder: Path, name: str, first: int, last: int) -> None:
-    """Pixels first..last of a scene, added to those that are kept in a file."""
-    scene = getattr(scenes, name)(folder)
-    file = folder / f"{name}.npy"
-    arguments, out = _job(scene)
-    if file.exists():
-        out[:] = np.load(file)
-    _band(*arguments, first, last, 0, scene.resolved_sampler.spp)
-    np.save(file, out)
+def carry_on(folder: Path, first: float, last: float) -> None:
+    """These shares of the pixels of each scene, added to those that are kept in a file."""
+    for make in MAKES:
+        file = folder / f"{make.__name__}.npy"
+        scene = make(folder)
+        arguments, out = _job(scene)
+        if file.exists():
+            out[:] = np.load(file)
+        begin, end = (round(share * len(out)) for share in (first, last))
+        if begin < end:
+            _band(*arguments, begin, end, 0, scene.resolved_sampler.spp)
+        np.save(file, out)
 
 
 def interrupted(draw: Draw, x: float) -> Outcomes:
-    """Each part by a process of its own, from what the one before has left."""
+    """The first part by this process, the others by one of their own each, from what the one before
+    has left."""
+    cuts = [0.0, *np.sort(draw.rng.uniform(0.0, 1.0, int(x))).tolist(), 1.0]
+    carry_on(draw.folder, *cuts[:2])
+    for first, last in pairwise(cuts[1:]):
+        command = [sys.executable, "-c", CARRY_ON, str(draw.folder)]
+        subprocess.run([*command, first.hex(), last.hex()], check=True, capture_output=True)
     total = Outcome(0, 0)
-    for make in MAKES[: 1 if draw.effort == "quick" else 2]:
+    for make in MAKES:
         scene = make(draw.folder)
-        pixels = scene.film.width * scene.film.height
-        cuts = np.sort(draw.rng.choice(np.arange(1, pixels), int(x), replace=False)).tolist()
-        name = make.__name__
-        for first, last in zip([0, *cuts], [*cuts, pixels], strict=True):
-            command = [sys.executable, "-c", CARRY_ON, str(draw.folder), name]
-            subprocess.run([*command, str(first), str(last)], check=True, capture_output=True)
-        found = np.load(draw.folder / f"{name}.npy").reshape(scene.film.height, -1, 3)
+        found = np.load(draw.folder / f"{make.__name__}.npy").reshape(scene.film.height, -1, 3)
         total += same_bits(rt.render(scene).colour, found)
     return {OURS: total}
 

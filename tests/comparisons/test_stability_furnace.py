@@ -15,11 +15,11 @@ from comparisons.stability import (
     f11_digits,
     f11_pairs,
     f11_samples,
+    f12_flat_lights,
     f12_lights,
     f12_solid_angles,
 )
 from comparisons.stability.f10_furnaces import FAMILY as F10
-from comparisons.stability.f10_worlds import judge
 from comparisons.stability.f11_bsdfs import Bsdf, Ours, Samples, towards
 from comparisons.stability.f11_law import density_between, fresnel, masking
 from comparisons.stability.f11_outcomes import outcome, relative
@@ -69,14 +69,19 @@ class Faulty:
 
     def pdf(self, wo: FloatArray, wi: FloatArray) -> FloatArray:
         density = self.ours.pdf(wo, wi)
-        return density * (1.0 + 0.3 * wi[:, 0]) if self.fault == "density" else density
+        faults: dict[str, Any] = {
+            "density": 1.0 + 0.3 * wi[:, 0],
+            "too much": 1.01,
+            "too little": 0.99,
+        }
+        return np.asarray(density * faults.get(self.fault, 1.0))
 
     def sample(self, wo: FloatArray, u: FloatArray) -> Samples:
         drawn = self.ours.sample(wo, u)
         if self.fault == "weight":
             return drawn._replace(weight=drawn.weight * (1.0 + 1e-6))
         if self.fault == "shines":
-            return drawn._replace(weight=drawn.weight * 1.05)
+            return drawn._replace(weight=drawn.weight * 1.01)
         if self.fault == "nan":
             weight = drawn.weight.copy()
             weight[7] = math.nan
@@ -101,6 +106,8 @@ def planted(fault: str) -> Callable[..., Iterator[tuple[str, Bsdf]]]:
         (f11_samples, F11, "weights", "density", 1.0, 150),
         (f11_samples, F11, "weights", "nan", 1e4, 150),
         (f11_samples, F11, "densities", "density", 1.0, 20_000),
+        (f11_samples, F11, "densities", "too much", 1.0, 20_000),
+        (f11_samples, F11, "densities", "too little", 1e4, 100_000),
         (f10_furnaces, F10, "open furnace", "shines", 1e4, 20_000),
     ],
 )
@@ -141,34 +148,38 @@ def test_wide_spots_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("series", "kernel", "x"),
-    [("small spheres", "_of_sphere", 1e6), ("flat lights", "_of_rectangle", 1e3)],
+    ("module", "series", "kernel", "factor", "x"),
+    [
+        (f12_solid_angles, "small spheres", "_of_sphere", 1.0 + 1e-8, 1e6),
+        (f12_flat_lights, "flat lights", "_of_rectangle", 1.0 - 1e-12, 1e20),
+        (f12_flat_lights, "flat lights", "_of_triangle", 1.0 + 1e-12, 1e20),
+        (f12_flat_lights, "lights that fill the sky", "_of_rectangle", 1.0 + 1e-9, 1e12),
+    ],
 )
 def test_wrong_solid_angles_are_seen(
-    series: str, kernel: str, x: float, monkeypatch: pytest.MonkeyPatch
+    module: Any, series: str, kernel: str, factor: float, x: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right = getattr(f12_solid_angles, kernel)
+    right = getattr(module, kernel)
 
     def wrong(*arguments: Any) -> None:
         right(*arguments)
-        arguments[-1][...] *= 1.0 + 1e-8 if kernel == "_of_sphere" else 1.1
+        arguments[-1][...] *= factor
 
-    monkeypatch.setattr(f12_solid_angles, kernel, wrong)
+    monkeypatch.setattr(module, kernel, wrong)
     assert run(F12, series, x)[OURS].failures > 0
 
 
-def test_pictures_are_judged() -> None:
-    rng = np.random.default_rng(5)
-    right = rng.normal(2.0, 0.1, (1024, 3))
-    bad = right.copy()
-    bad[3, 1] = math.nan
-    pictures = {"right": right, "dark": right * 0.98, "nan": bad}
-    found = judge(pictures, 2.0, lambda who: 0.0, {})
-    assert found["right"].failures == 0
-    assert found["dark"].failures == 1
-    assert found["nan"].failures == 1
-    assert found["nan"].worst == math.inf
-    assert found["nan"].examples[0]["expected"] == 2.0
+def test_lights_sampled_by_their_area_miss_the_sky(monkeypatch: pytest.MonkeyPatch) -> None:
+    def by_area(p: FloatArray, u: FloatArray) -> FloatArray:
+        q = np.zeros((len(u), 3))
+        q[:, :2] = 2.0 * u - 1.0
+        d2 = ((p[:, None] - q) ** 2).sum(axis=2)
+        return np.asarray(d2 * np.sqrt(d2) / (4.0 * p[:, 2:]))
+
+    monkeypatch.setattr(f12_flat_lights, "_rectangle_densities", by_area)
+    assert run(F12, "lights that fill the sky", 1.0)[OURS].failures == 0
+    assert run(F12, "lights that fill the sky", 1e3)[OURS].failures > 100
+    assert run(F12, "flat lights", 1e20)[OURS].failures == 0
 
 
 def test_the_exact_laws_closed_forms() -> None:

@@ -1,5 +1,6 @@
 """The families of hostile values and of solids: planted faults are seen, and attributed."""
 
+import contextlib
 import sys
 from pathlib import Path
 
@@ -9,13 +10,14 @@ import pytest
 import reference_rt as rt
 from comparisons.stability import f06_pool, f06_rays
 from comparisons.stability.f06_bases import BASES, files, write_files
-from comparisons.stability.f06_damage import as_text, damaged, with_numbers, with_structure
+from comparisons.stability.f06_damage import as_text, damaged, deep, with_numbers, with_structure
 from comparisons.stability.f06_grammar import sentence
 from comparisons.stability.f06_hostile import bomb, example, problem
 from comparisons.stability.f06_pool import Answer, answers
 from comparisons.stability.f07_lists import Stretch, Truth
 from comparisons.stability.f07_lists import problem as list_problem
 from comparisons.stability.f07_trees import Tree, chain, rewritten
+from reference_rt.errors import ImageError, SceneError
 from reference_rt.query import Intersections
 
 # ---- hostile scenes ------------------------------------------------------------------------------
@@ -34,6 +36,26 @@ def test_the_same_seed_gives_the_same_cases():
     ):
         assert make(rng()) == make(rng())
         assert make(rng()) != make(rng(2))
+
+
+def test_trees_deeper_than_python_recurses_are_made():
+    """Seed 1287 copies 300 levels of solids."""
+    with pytest.raises(RecursionError):
+        as_text(with_structure(rng(1287), BASES["recursive"], 8))
+    with deep():
+        assert as_text(with_structure(rng(1287), BASES["recursive"], 8)).startswith("{")
+
+
+def test_sentences_come_to_scenes(tmp_path):
+    """Where one rule refused nearly all, what lies behind it would not be tested."""
+    write_files(tmp_path)
+    r, sound = rng(), 0
+    for _ in range(60):
+        (tmp_path / "case.json").write_text(as_text(sentence(r, 0.001)))
+        with contextlib.suppress(SceneError, ImageError):
+            rt.Scene.load(tmp_path / "case.json")
+            sound += 1
+    assert sound > 12
 
 
 def test_sound_scenes_are_sound(tmp_path):
