@@ -33,7 +33,7 @@ def closed(albedo, **parts):
 
 # With roulette the paths are some 1 / (1 - a) long, without as long as they are let: where a^k has
 # fallen below the standard error, or the rest is in the formula.
-ALBEDOS = (0.0, 0.5, 0.9, 0.99, 0.999)
+ALBEDOS = (0.0, 0.5, 0.9, 0.99, pytest.param(0.999, marks=pytest.mark.slow))
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ ALBEDOS = (0.0, 0.5, 0.9, 0.99, 0.999)
         (0.5, 64),
         (0.9, 64),
         (0.99, 64),
-        (0.999, 16),
+        pytest.param(0.999, 16, marks=pytest.mark.slow),
         pytest.param(0.999, 64, marks=pytest.mark.slow),
     ],
 )

@@ -39,6 +39,8 @@ MATERIALS = {
     "lamp": rt.Emissive(radiance=tuple(RADIANCE)),
     "checks": rt.Diffuse(reflectance="white and black"),
     "gauze": rt.Mask(base="checks", opacity="white and black"),
+    "silver on both sides": rt.TwoSided(base="silver"),
+    "half gold": rt.Blend(first="gold", second="floor", weight=0.5),
     NOTHING: rt.Emissive(radiance="black"),
 }
 
