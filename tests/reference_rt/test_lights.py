@@ -13,13 +13,14 @@ ELSEWHERE = (
     rt.Sphere(center=(0, -50, 0), radius=1e-3),
     rt.Box(transform=(SMALL, transform.Translate(translate=(0, -60, 0)))),
     rt.Triangle(v0=(0, -70, 0), v1=(1e-3, -70, 0), v2=(0, -70, 1e-3)),
-    rt.Rectangle(transform=(SMALL, transform.Translate(translate=(0, -80, 0)))),
+    rt.Rectangle(material="off", transform=(SMALL, transform.Translate(translate=(0, -80, 0)))),
 )
-"""One of each shape out of sight: every scene here has the same tables, and those that are rendered
-in the same way share kernels."""
+"""One of each shape, and a lamp, out of sight: every scene here has the same tables, and those that
+are rendered in the same way share kernels."""
 
 MATERIALS = {
     "lamp": rt.Emissive(radiance=(3.0, 2.0, 1.0)),
+    "off": rt.Emissive(radiance=(0, 0, 0)),
     "floor": rt.Diffuse(reflectance=(0.8, 0.5, 0.2)),
     "glass": rt.Dielectric(),
 }
