@@ -10,6 +10,7 @@ import pytest
 from builders import SCENES, every_law, every_light, every_shape
 
 import reference_rt as rt
+from reference_rt import query
 
 SMALL = rt.Film(width=6, height=4)
 
@@ -24,19 +25,19 @@ np.savez(sys.argv[3], **here.pictures(Path(sys.argv[2]), sys.argv[4] == "True"))
 
 def scenes(folder, more):
     """Every shape, material, texture, light, integrator and sampler, and two of the usual scenes,
-    which lack most of them; `more`: every material and light by Whitted too."""
+    which lack most of them; `more`: also shapes by paths, and materials and lights by Whitted."""
     shapes = rt.Scene.load(every_shape(folder))
     laws = rt.Scene.load(every_law(folder))
     lights = rt.Scene.load(every_light(folder))
     whitted = {"integrator": rt.Whitted(), "sampler": rt.Grid(spp=4)}
     box = rt.Scene.load(SCENES / "cornell_box.yaml")
     spheres = rt.Scene.load(SCENES / "spheres_whitted.yaml")
-    by_whitted = {
+    others = {
+        "shapes": shapes,
         "laws, whitted": laws.changed(**whitted),
         "lights, whitted": lights.changed(**whitted),
     }
-    return (by_whitted if more else {}) | {
-        "shapes": shapes,
+    return (others if more else {}) | {
         "shapes, ray cast": shapes.changed(integrator=rt.RayCast(), sampler=None),
         "laws": laws,
         "lights": lights,
@@ -47,8 +48,12 @@ def scenes(folder, more):
 
 
 def pictures(folder, more):
-    """Every layer of every scene."""
-    return {
+    """Every layer of every scene, and which rays are in the shadow of any shape."""
+    rng = np.random.default_rng(1)
+    o, d = rng.uniform(-4.0, 4.0, (300, 3)), rng.normal(size=(300, 3))
+    tables = rt.build_tables(rt.Scene.load(every_shape(folder)))
+    shadow = np.flatnonzero(query.occluded(tables, o, d, rng.uniform(1.0, 9.0, 300)))
+    return {"shapes: shadow": shadow} | {
         f"{name}: {layer}": pixels
         for name, scene in scenes(folder, more).items()
         for layer, pixels in rt.render(scene, threads=1).layers.items()
