@@ -24,8 +24,8 @@ ELSEWHERE = (
 """Out of the way: scenes have the same kinds of shapes, and share kernels."""
 
 
-def solid_of(shape):
-    return rt.Scene(shapes=(shape, *ELSEWHERE))
+def solid_of(shape, **more):
+    return rt.Scene(shapes=(shape, *ELSEWHERE), **more)
 
 
 def rays(seed, n=N, reach=2.5):
@@ -206,7 +206,7 @@ def test_first_operand_shows_where_faces_coincide():
             for name, w in zip(order, (1.0, 2.0), strict=True)
         ]
         materials = {"red": rt.Diffuse(reflectance=(1, 0, 0)), "blue": rt.Diffuse()}
-        scene = solid_of(boxes[0] | boxes[1]).changed(materials=materials)
+        scene = solid_of(boxes[0] | boxes[1], materials=materials)
         rng = np.random.default_rng(8)
         o = np.column_stack([rng.uniform(-0.9, 0.9, (1000, 2)), np.full(1000, 5.0)])
         hits = scene.intersect(o, np.tile([0.0, 0.0, -1.0], (1000, 1)))
