@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.geometry import closest_hit, owner, surface
+from reference_rt.geometry import Geometry, closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
@@ -82,8 +82,9 @@ class DirectLight:
     contribution: FloatArray
 
 
+# Three kernels take the geometry alone: scenes of other materials and lights share them.
 @entry_kernel
-def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
+def _intersect(geometry: Geometry, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
     for i in range(len(o)):
         out[i, 0] = math.inf
         for k in range(1, 5):
@@ -91,13 +92,13 @@ def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray
         ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
         if not valid:
             continue
-        hit = closest_hit(scene.geometry, ray)
+        hit = closest_hit(geometry, ray)
         if hit.kind < 0:
             continue
-        point = surface(scene.geometry, ray, hit)
+        point = surface(geometry, ray, hit)
         if not is_told(hit.t * unit, point.p):
             continue
-        whose = owner(scene.geometry, ray, hit)
+        whose = owner(geometry, ray, hit)
         out[i, 0], out[i, 1], out[i, 2] = hit.t * unit, whose.shape, whose.face
         out[i, 3], out[i, 4] = whose.part, whose.instance
         out[i, 5], out[i, 6], out[i, 7] = point.p
@@ -108,7 +109,7 @@ def _intersect(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray
 
 @entry_kernel
 def _closest(
-    scene: SceneTables,
+    geometry: Geometry,
     o: FloatArray,
     d: FloatArray,
     t: FloatArray,
@@ -121,7 +122,7 @@ def _closest(
         ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
         if not valid:
             continue
-        hit = closest_hit(scene.geometry, ray)
+        hit = closest_hit(geometry, ray)
         if hit.kind < 0 or not is_told(hit.t * unit, at(ray, hit.t)):
             continue
         t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
@@ -130,11 +131,11 @@ def _closest(
 
 @entry_kernel
 def _occluded(
-    scene: SceneTables, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
+    geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
 ) -> None:
     for i in range(len(o)):
         ray, _, valid = scaled(row(o, i), row(d, i), t_max[i])
-        out[i] = valid and is_occluded(scene.geometry, ray)
+        out[i] = valid and is_occluded(geometry, ray)
 
 
 @entry_kernel
@@ -181,7 +182,7 @@ def intersect(
     o, d = checked_rays(origins, directions)
     out = np.zeros((len(o), 16))
     with np.errstate(all="ignore"):
-        _intersect(scene, o, d, out)
+        _intersect(scene.geometry, o, d, out)
     shape, primitive, part, instance = out[:, 1:5].astype(np.int64).T
     return Intersections(
         t=out[:, 0],
@@ -209,7 +210,7 @@ def closest(
     t, kind, rows, uv = found.t, found.kind, found.row, found.uv
 
     def trace(k: slice) -> None:
-        _closest(scene, o[k], d[k], t[k], kind[k], rows[k], uv[k])
+        _closest(scene.geometry, o[k], d[k], t[k], kind[k], rows[k], uv[k])
 
     _in_blocks(trace, n, threads)
     return found
@@ -229,7 +230,7 @@ def occluded(
     ends = np.full(len(o), t_max, dtype=np.float64)
 
     def trace(k: slice) -> None:
-        _occluded(scene, o[k], d[k], ends[k], out[k])
+        _occluded(scene.geometry, o[k], d[k], ends[k], out[k])
 
     _in_blocks(trace, len(o), threads)
     return out

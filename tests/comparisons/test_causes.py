@@ -163,15 +163,16 @@ def test_lights(amount: float, name: str) -> None:
     assert without is None or "light" not in without.name.replace("highlights", "")
 
 
-def test_noise_alone_has_no_cause() -> None:
+@pytest.mark.parametrize("pairs", [20, pytest.param(100, marks=pytest.mark.slow)])
+def test_noise_alone_has_no_cause(pairs: int) -> None:
     """Also not skewed noise whose strength is known from few replicates only."""
-    for seed in range(100):
+    for seed in range(pairs):
         for name in ("cornell_box", "textured_room"):
             assert likeliest(pair(name, lambda p: p, seed)) is None
     rng = np.random.default_rng(6)
     clean = picture("cornell_box")
     for count in (2, 4, 16):
-        for _ in range(20):
+        for _ in range(pairs // 5):
             sides = [
                 clean * rng.gamma(1.0, 1.0, size=(count, *clean.shape[:2], 1)) for _ in range(2)
             ]

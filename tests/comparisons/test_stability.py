@@ -41,7 +41,7 @@ def stability(out, *options):
     """The command's exit code and what it printed."""
     app = typer.Typer()
     cli.register(app)
-    found = CliRunner().invoke(app, ["stability", "-o", str(out), "--jobs", "2", *options])
+    found = CliRunner().invoke(app, ["stability", "-o", str(out), "--jobs", "1", *options])
     return found.exit_code, found.output
 
 

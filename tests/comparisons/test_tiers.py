@@ -85,20 +85,15 @@ FAULTS: tuple[tuple[Rung, str, str], ...] = (
     # a shape moved by a thousandth
     (geometry, "center: [0.9, 0.7, 1.2]", "center: [0.901, 0.7, 1.2]"),
     (geometry, "translate: [-0.2, 0.5, 1.5]", "translate: [-0.2, 0.501, 1.5]"),
-    (geometry, "v1: [-2, 2.5, 0]", "v1: [-2, 2.501, 0]"),
     (geometry, "radius: 0.6}", "radius: 0.60005}"),
     # a normal turned over
     (geometry, "[{scale: 6}, ", "[{scale: [6, 6, -6]}, "),
-    (geometry, "v1: [-2, 2.5, 0], v2: [-1.5, 2.5, -1]", "v2: [-2, 2.5, 0], v1: [-1.5, 2.5, -1]"),
     (geometry, "fov: 40", "fov: 40.01"),
     # lights and colours wrong by one per cent
     (direct, "intensity: [10, 11, 12]", "intensity: [10, 11.11, 12]"),
-    (direct, "intensity: 4", "intensity: 4.04"),
     (direct, "radiance: [9, 8, 7]", "radiance: [9.09, 8, 7]"),
-    (direct, "radiance: [2, 3, 4]", "radiance: [2, 3, 4.04]"),
     (direct, "radiance: [0.1, 0.2, 0.3]", "radiance: [0.1, 0.202, 0.3]"),
-    (direct, "reflectance: [0.8, 0.7, 0.6]", "reflectance: [0.8, 0.7, 0.606]"),
-    (direct, "position: [2, 3, 3]", "position: [2.001, 3, 3]"),
+    (direct, "reflectance: [0.7, 0.2, 0.1]", "reflectance: [0.7, 0.2, 0.101]"),
     (direct, "{scale: [0.4, 0.3, 1]}", "{scale: [0.4, 0.3, -1]}"),
     # something stands in the light
     (direct, "shapes:\n", "shapes:\n  - {type: sphere, center: [1.4, 2.2, 2.5], radius: 0.1}\n"),
@@ -106,13 +101,23 @@ FAULTS: tuple[tuple[Rung, str, str], ...] = (
     (whitted, "interior_ior: 1.5,", "interior_ior: 1.505,"),
     (whitted, "interior_ior: 1.5, exterior_ior: 1.1", "interior_ior: 1.1, exterior_ior: 1.5"),
     (whitted, "reflectance: [0.9, 0.8, 0.7]", "reflectance: [0.909, 0.8, 0.7]"),
+    (whitted, "material: mirror, center", "material: glass, center"),
+)  # fmt: skip
+MORE_FAULTS: tuple[tuple[Rung, str, str], ...] = (
+    (geometry, "v1: [-2, 2.5, 0]", "v1: [-2, 2.501, 0]"),
+    (geometry, "v1: [-2, 2.5, 0], v2: [-1.5, 2.5, -1]", "v2: [-2, 2.5, 0], v1: [-1.5, 2.5, -1]"),
+    (direct, "intensity: 4", "intensity: 4.04"),
+    (direct, "radiance: [2, 3, 4]", "radiance: [2, 3, 4.04]"),
+    (direct, "position: [2, 3, 3]", "position: [2.001, 3, 3]"),
     (whitted, "radiance: [0.1, 0.2, 0.3]", "radiance: [0.1, 0.202, 0.3]"),
     (whitted, "radiance: [9, 8, 7]", "radiance: [9.09, 8, 7]"),
-    (whitted, "material: mirror, center", "material: glass, center"),
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(("rung", "right", "wrong"), FAULTS)
+@pytest.mark.parametrize(
+    ("rung", "right", "wrong"),
+    [*FAULTS, *(pytest.param(*fault, marks=pytest.mark.slow) for fault in MORE_FAULTS)],
+)
 def test_a_planted_fault_is_seen(
     rung: Rung, right: str, wrong: str, scene: Scene, tables: SceneTables
 ) -> None:
@@ -158,6 +163,9 @@ shapes:
   - {type: rectangle, transform: [{scale: 2}]}
   - type: box
     transform: [{rotate: {axis: [0, 0, 1], degrees: 17}}, {translate: [0.1, 0.2, 1]}]
+  # Aside: with them there are the same kinds of shapes as above, which share kernels.
+  - {type: sphere, center: [9, 9, 9], radius: 0.5}
+  - {type: triangle, v0: [9, -9, 9], v1: [8, -9, 9], v2: [9, -8, 9]}
 """
     scene = Scene.parse(text)
     tier = geometry(scene, build_tables(scene), load(scene))

@@ -14,6 +14,7 @@ from comparisons.tiers import direct, film, geometry, whitted
 from comparisons.translate import UntranslatableError, load, to_mitsuba
 from comparisons.translate.lights import translate_light
 from comparisons.translate.notes import notes_of
+from comparisons.translate.shapes import tori
 from comparisons.translate.textures import Surroundings, translate_texture
 from reference_rt.filters import (
     AnyFilter,
@@ -230,8 +231,20 @@ def tables(scene: Scene) -> Any:
     return build_tables(scene)
 
 
-def test_the_same_light(scene: Scene, tables: Any) -> None:
-    twin = load(scene)
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mesh for the torus that takes less time to make."""
+    monkeypatch.setattr(tori, "CELLS", (256, 128))
+
+
+@pytest.fixture(scope="module")
+def twin(scene: Scene) -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tori, "CELLS", (256, 128))
+        return load(scene)
+
+
+def test_the_same_light(scene: Scene, tables: Any, twin: Any) -> None:
     for tier in (
         geometry(scene, tables, twin, pixels=1000),
         direct(scene, tables, twin, 500),
@@ -242,8 +255,9 @@ def test_the_same_light(scene: Scene, tables: Any) -> None:
         assert tier.numbers["unexplained" if tier.name != "geometry" else "decided_ours"] == 0
 
 
-def test_the_same_picture(scene: Scene, tables: Any) -> None:
-    images = whitted_pictures(scene, tables, load(scene)).images
+@pytest.mark.slow
+def test_the_same_picture(scene: Scene, tables: Any, twin: Any) -> None:
+    images = whitted_pictures(scene, tables, twin).images
     off = np.abs(images.candidate - images.reference).max(axis=-1)
     assert (off > 1e-3).mean() < 0.01  # edges within float32
 

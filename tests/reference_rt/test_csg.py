@@ -11,8 +11,21 @@ from reference_rt import query, transform
 N = 8_000
 
 
+TINY = (
+    transform.Scale(scale=(1e-3, 1e-3, 1e-3)),
+    transform.Translate(translate=(0.0, 0.0, -1e6)),
+)
+ELSEWHERE = (
+    rt.Sphere(transform=TINY),
+    rt.Box(transform=TINY),
+    rt.Triangle(v0=(0, 0, 0), v1=(1, 0, 0), v2=(0, 1, 0), transform=TINY),
+    rt.Box(transform=TINY) - rt.Sphere(transform=TINY),
+)
+"""Out of the way: scenes have the same kinds of shapes, and share kernels."""
+
+
 def solid_of(shape, **more):
-    return rt.Scene(shapes=(shape,), **more)
+    return rt.Scene(shapes=(shape, *ELSEWHERE), **more)
 
 
 def rays(seed, n=N, reach=2.5):
@@ -193,7 +206,7 @@ def test_first_operand_shows_where_faces_coincide():
             for name, w in zip(order, (1.0, 2.0), strict=True)
         ]
         materials = {"red": rt.Diffuse(reflectance=(1, 0, 0)), "blue": rt.Diffuse()}
-        scene = rt.Scene(shapes=(boxes[0] | boxes[1],), materials=materials)
+        scene = solid_of(boxes[0] | boxes[1], materials=materials)
         rng = np.random.default_rng(8)
         o = np.column_stack([rng.uniform(-0.9, 0.9, (1000, 2)), np.full(1000, 5.0)])
         hits = scene.intersect(o, np.tile([0.0, 0.0, -1.0], (1000, 1)))

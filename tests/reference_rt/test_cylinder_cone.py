@@ -21,6 +21,7 @@ from quadric_checks import (
 from quadric_exact import exactly, meetings
 
 import reference_rt as rt
+from reference_rt import transform
 from reference_rt.shapes import quadrics
 
 KINDS = {
@@ -271,8 +272,15 @@ def test_solids():
         (rt.Cylinder(z_min=-3, z_max=5) & low, rt.Cylinder(z_min=-0.5, z_max=0.5)),
         (rt.Cone(height=1.0) - high, rt.Cone(height=0.5, top_radius=0.5)),
     )
+    # Elsewhere one of each: all scenes have the same kinds, and share kernels.
+    away = (transform.Translate(translate=(0.0, 0.0, 1e6)),)
+    others = (
+        rt.Cylinder(transform=away),
+        rt.Cone(transform=away),
+        rt.Box(transform=away) - rt.Box(),
+    )
     for made, expected in pairs:
-        one, two = (rt.Scene(shapes=(s,)).intersect(o, d) for s in (made, expected))
+        one, two = (rt.Scene(shapes=(s, *others)).intersect(o, d) for s in (made, expected))
         hit = np.isfinite(two.t)
         assert hit.sum() > 300
         assert np.array_equal(hit, np.isfinite(one.t))

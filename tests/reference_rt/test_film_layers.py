@@ -1,4 +1,7 @@
-"""Layers beside the colour: closed forms, and the samples' own spread."""
+"""Layers beside the colour: closed forms, and the samples' own spread.
+
+Scenes have all layers, and the same kinds of shapes and materials, so that they share kernels.
+"""
 
 import importlib
 
@@ -24,28 +27,40 @@ def cornell():
     )
 
 
-def wall(**changes):
+BEHIND = rt.Rectangle(material="lamp", transform=(transform.Translate(translate=(0, 0, 9)),))
+"""A lamp behind the eye that shines away: every scene has one."""
+
+
+def wall(material="paint", lamp=None, **changes):
     """A wall of 4 x 4 checks of colours (0.75, 0.5, 0.25) and 0.125, 5 before the eye, that covers
-    the left three quarters of the picture, 8 pixels wide."""
+    the left three quarters of the picture, 8 pixels wide; or of another material."""
+    materials = {
+        "paint": rt.Diffuse(reflectance="checks"),
+        "air": rt.Diffuse(),
+        "lamp": rt.Emissive(radiance=(1, 1, 1), base="chalk"),
+        "chalk": rt.Diffuse(reflectance=(1, 1, 1)),
+    }
+    if lamp is not None:
+        materials["lamp"] = rt.Emissive(radiance=lamp, base="chalk")
     parts = {
         "camera": rt.Orthographic(eye=(0, 0, 5), width=4),
-        "film": Film(width=8, height=8, layers=("albedo", "normal", "depth", "id")),
+        "film": Film(width=8, height=8, layers=ALL),
         "sampler": rt.Independent(spp=16, seed=2),
         "integrator": rt.Whitted(),
         "textures": {"checks": Checker(first=(0.75, 0.5, 0.25), second=(0.125,) * 3)},
-        "materials": {"paint": rt.Diffuse(reflectance="checks"), "air": rt.Diffuse()},
         "shapes": (
             rt.Sphere(center=(0, 0, 9), material="air"),  # behind the eye: takes the number 0
             rt.Rectangle(
-                material="paint",
+                material=material,
                 transform=(
                     transform.Scale(scale=(2, 2, 1)),
                     transform.Translate(translate=(-1, 0, 0)),
                 ),
             ),
+            BEHIND,
         ),
     }
-    return rt.Scene(**(parts | changes))
+    return rt.Scene(materials=materials, **(parts | changes))
 
 
 def test_colour_is_the_same_bits_with_and_without(cornell):
@@ -83,12 +98,8 @@ def test_a_checked_wall():
 
 def test_albedo_is_seen_through_the_filter():
     """As the colour is: a white emitter's albedo layer, if white, is its picture."""
-    lamp = {"paint": rt.Emissive(radiance=(1, 1, 1), base="chalk"), "air": rt.Diffuse(),
-            "chalk": rt.Diffuse(reflectance=(1, 1, 1))}  # fmt: skip
-    film = Film(width=8, height=8, filter=LanczosFilter(), layers=("albedo", "normal"))
-    picture = rt.render(
-        wall(materials=lamp, textures={}, film=film, integrator=rt.Path(max_depth=1))
-    )
+    film = Film(width=8, height=8, filter=LanczosFilter(), layers=ALL)
+    picture = rt.render(wall("lamp", film=film))
     assert np.array_equal(picture.colour, picture.layers["albedo"])
     assert np.array_equal(picture.colour[..., 0], picture.layers["normal"][..., 2])
     assert (picture.colour < 0.0).any()  # beside the edge, where Lanczos' filter rings
@@ -98,7 +109,7 @@ def test_albedo_is_seen_through_the_filter():
 def test_smooth_normals():
     """A sphere's in the middle of its pixels, and shorter where they bend inside a pixel."""
     ball = rt.Sphere(radius=1.0)
-    scene = wall(shapes=(ball,), film=Film(width=33, height=33, layers=("normal",)))
+    scene = wall(shapes=(ball, BEHIND), film=Film(width=33, height=33, layers=ALL))
     n = rt.render(scene).layers["normal"]
     x, y = np.meshgrid(np.arange(33) - 16, 16 - np.arange(33))
     inside = np.hypot(x, y) < 7
@@ -137,9 +148,7 @@ def test_variance_is_that_of_the_samples(cornell):
 
 
 def test_variance_of_what_does_not_vary():
-    lamp = {"paint": rt.Emissive(radiance=(0.1, 1e5, 3)), "air": rt.Diffuse()}
-    film = Film(width=8, height=8, layers=("variance",))
-    variance = rt.render(wall(materials=lamp, textures={}, film=film)).layers["variance"]
+    variance = rt.render(wall("lamp", lamp=(0.1, 1e5, 3))).layers["variance"]
     # Sums of 16 equal numbers round, each time by half a unit of at most 16 times the number.
     assert (variance <= (16 * 2.0**-53 * np.array([0.1, 1e5, 3])) ** 2).all()
 
@@ -148,11 +157,9 @@ def test_variance_predicts_the_spread_of_means():
     """Over 4096 pixels that are each half covered: p (1 - p) / n, and what the means do."""
     edge = (transform.Scale(scale=(5, 5000, 1)), transform.Translate(translate=(-5, 0, 0)))
     scene = wall(
-        shapes=(rt.Rectangle(material="lamp", transform=edge),),
-        textures={},
-        materials={"lamp": rt.Emissive(radiance=(1, 1, 1))},
+        shapes=(rt.Rectangle(material="lamp", transform=edge), rt.Sphere(center=(0, 0, 9))),
         camera=rt.Orthographic(eye=(0, 0, 1), width=1),
-        film=Film(width=1, height=4096, layers=("variance",)),
+        film=Film(width=1, height=4096, layers=ALL),
     )
     picture = rt.render(scene)
     means, variance = picture.colour[..., 0].ravel(), picture.layers["variance"][..., 0].ravel()
@@ -170,9 +177,11 @@ def test_variance_needs_two_samples(cornell):
 
 def test_files(tmp_path):
     """The .exr has all layers; the .png is the same file with and without them."""
-    text = (SCENES / "spheres_whitted.yaml").read_text()
+    text = (SCENES / "cornell_box.yaml").read_text()
+    text = text.replace("{type: sobol, spp: 64}", "{type: independent, spp: 4}")
+    assert "independent" in text
     film = next(line for line in text.splitlines() if line.startswith("film:"))
-    for name, layers in (("plain", ""), ("layers", ", layers: [albedo, normal, depth, id]")):
+    for name, layers in (("plain", ""), ("layers", f", layers: [{', '.join(ALL)}]")):
         (tmp_path / name).mkdir()
         scene = tmp_path / name / "scene.yaml"
         scene.write_text(text.replace(film, film.rstrip("} ") + layers + "}"))
@@ -185,7 +194,7 @@ def test_files(tmp_path):
     assert set(plain) == set("RGB")
     assert set(channels) == {
         *"RGB", "albedo.R", "albedo.G", "albedo.B", "normal.X", "normal.Y", "normal.Z",
-        "depth.Z", "id.V",
+        "depth.Z", "id.V", "variance.R", "variance.G", "variance.B",
     }  # fmt: skip
     assert all(np.array_equal(plain[c], channels[c]) for c in "RGB")
     assert np.isfinite(channels["albedo.R"]).all()

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from worlds import ORIGIN, RADIANCE, RHO
+from worlds import RADIANCE, RHO
 
 import reference_rt as rt
 from reference_rt import transform
@@ -27,6 +27,8 @@ FLOOR = rt.Rectangle(
 LAMP = rt.Sphere(center=(0.5, 2.0, -1.0), radius=0.8, material="lamp")
 LAMP_IRRADIANCE = math.pi * 0.64 / 5.25 * 2 / math.sqrt(5.25)
 """pi (r/d)² cos."""
+ORIGIN = rt.Perspective(eye=(0, 1e-3, 0), target=(0, 0, 0), up=(0, 0, -1), fov=1e-6)
+"""Every pixel sees the same point."""
 OFF = rt.Sphere(center=(0, -9, 0), radius=0.1, material="off")
 
 # (shapes, radiance of the environment, radiance of the floor)

@@ -39,6 +39,8 @@ MATERIALS = {
     "lamp": rt.Emissive(radiance=tuple(RADIANCE)),
     "checks": rt.Diffuse(reflectance="white and black"),
     "gauze": rt.Mask(base="checks", opacity="white and black"),
+    "silver on both sides": rt.TwoSided(base="silver"),
+    "half gold": rt.Blend(first="gold", second="floor", weight=0.5),
     NOTHING: rt.Emissive(radiance="black"),
 }
 
@@ -59,6 +61,11 @@ _HIDDEN_SHAPES = (
     rt.Sphere(center=(0.02, -0.5, 0.01), radius=1e-9, material="glass"),
     rt.Disk(transform=(_TINY, *at(0.03, -0.5, 0.01)), material="gauze"),
     rt.Triangle(v0=(0.04, -0.5, 0.01), v1=(0.04, -0.5, 0.01 + 1e-9), v2=(0.04 + 1e-9, -0.5, 0.01)),
+    # Apart from the rest, so that the hierarchy has a leaf of triangles alone, which is a kind too.
+    *(
+        rt.Triangle(v0=(x, -9.0, 0.0), v1=(x, -9.0, 1e-9), v2=(x + 1e-9, -9.0, 0.0))
+        for x in (0.0, 1e-9, 2e-9, 3e-9)
+    ),
 )
 _HIDDEN_LIGHTS = (
     rt.Point(position=(0, -0.5, 0), intensity=0),

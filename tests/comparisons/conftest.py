@@ -1,0 +1,111 @@
+"""Fixtures that several modules of tests share."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from gate_checks import SCENE, pictures
+
+from comparisons.gate import reference
+from comparisons.mitsuba_backend import Backend
+from comparisons.report import write_report
+from comparisons.suites import run
+from reference_rt.shapes.shape import FloatArray
+
+# ---- the page in a browser ----------------------------------------------------------------------
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+WIDE = {"width": 1200, "height": 900}
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip(
+        "playwright.sync_api",
+        reason="playwright is not installed: pip install 'reference-rt[test]'",
+    )
+    named = os.environ.get("CHROMIUM")
+    found = named or next(filter(None, map(shutil.which, BROWSERS)), None)
+    if not found:
+        pytest.skip(f"no browser: set CHROMIUM, or install one of {', '.join(BROWSERS)}")
+    with playwright.sync_playwright() as driver:
+        # A sandbox needs rights that a container does not give; the page is our own.
+        yield driver.chromium.launch(executable_path=found, args=["--no-sandbox"])
+
+
+@pytest.fixture(scope="module")
+def window(browser):
+    """One page for all tests, which is quicker than one for each."""
+    return browser.new_context(viewport=WIDE, offline=True).new_page()
+
+
+@pytest.fixture
+def show(browser, window, tmp_path):
+    """Write a page about cases and open it; it must neither complain nor ask for anything."""
+    complaints, requests, contexts = [], [], []
+    listeners = {
+        "console": lambda message: complaints.append(message.text),
+        "pageerror": lambda error: complaints.append(str(error)),
+        "dialog": lambda dialog: complaints.append(dialog.message),
+        "request": lambda request: requests.append(request.url),
+    }
+
+    def opened(*cases, report=None, **options):
+        path = tmp_path / "report.html"
+        write_report(path, cases, {"date": "2025-11-20"}, **(report or {}))
+        page = window
+        if options:
+            contexts.append(browser.new_context(**{"viewport": WIDE} | options))
+            page = contexts[0].new_page()
+        for event, listener in listeners.items():
+            page.on(event, listener)
+        page.goto(path.as_uri())
+        return page
+
+    yield opened
+    for context in contexts:
+        context.close()
+    if not contexts:
+        for event, listener in listeners.items():
+            window.remove_listener(event, listener)
+    assert complaints == []
+    asked = [url for url in requests if not url.startswith("data:")]
+    assert [url.startswith("file:") for url in asked] == [True]
+
+
+# ---- suites -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def fake_runners(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers find `suite_runners`, and no backend is looked for."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.setattr(run, "backend", lambda: Backend("llvm_ad_rgb", "0", "", None))
+    monkeypatch.setattr(run, "provenance", lambda **more: {"mitsuba": "none", **more})
+
+
+# ---- the gate -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def gate_references(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder of references for all tests."""
+    return tmp_path_factory.mktemp("references")
+
+
+@pytest.fixture
+def gate_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gate_references: Path) -> Path:
+    """The working folder is the test's own, and it is not CI's."""
+    for name in ("CI", "GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(reference, "cache_folder", lambda: gate_references)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ball.yaml").write_text(SCENE)
+    return tmp_path
+
+
+@pytest.fixture(scope="session")
+def right() -> FloatArray:
+    """Replicates that are right."""
+    return pictures()

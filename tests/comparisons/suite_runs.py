@@ -1,0 +1,33 @@
+"""Suites whose workers run what `suite_runners` does in the place of `compare`."""
+
+from pathlib import Path
+
+from comparisons.suites.run import Options, run_suite
+from comparisons.suites.suite import Source, parse_suite, plan
+
+SCENES = Path(__file__).parents[2] / "scenes"
+RUNNER = "suite_runners:by_name"
+RAY_CAST = "integrator: {type: ray_cast}\n"
+NOISY = "integrator: {type: path}\n"
+
+
+def scenes(folder: Path, *names: str, text: str = RAY_CAST) -> Path:
+    folder.mkdir(exist_ok=True)
+    for name in names:
+        (folder / f"{name}.yaml").write_text(text)
+    return folder
+
+
+def suite(text: str = "about: a test\n") -> Source:
+    return Source(parse_suite(text, "test.yaml"), "test", "test.yaml", "test.yaml", text)
+
+
+def run_in(out: Path, folder: Path, text: str = "about: a test\n", only=(), **options):
+    source = suite(text)
+    rungs = options.get("rungs", ())
+    planned = plan(source, folder, only, rungs)
+    return run_suite(source, planned, Options(out, runner=RUNNER, **options))
+
+
+def processes(found) -> dict[str, int]:
+    return {case.scene: case.tiers[0].numbers["process"] for case in found.cases}

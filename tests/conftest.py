@@ -1,0 +1,44 @@
+"""In which order processes take the files of tests."""
+
+from pathlib import Path
+
+import pytest
+
+LONGEST_FIRST = (
+    "test_extremes",  # compiles for all that stand on `worlds`
+    "test_plain_python",
+    "test_twins_of_light",
+    "test_tiers",
+    "test_stability_metamorphic",
+    "test_estimators",
+    "test_film_layers",
+    "test_properties_of_rays",
+    "test_gate",
+    "test_stability_leaving",
+    "test_invariances",
+    "test_furnaces",
+    "test_stability_furnace",
+    "test_convergence_run",
+    "test_csg_methods",
+    "test_plastic",
+    "test_solids",
+    "test_principled",
+    "test_rough",
+    "test_suites_processes",
+    "test_stability_watertight",
+    "test_stability",
+)
+"""Files that take more than some ten seconds without compiled kernels: at the end no process is
+left alone with one.  Those that share kernels are apart: the second finds them compiled."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """xdist would take the files of the most tests first, which are quick ones."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The rest stays in its order."""
+    places = {name: k for k, name in enumerate(LONGEST_FIRST)}
+    items.sort(key=lambda item: places.get(Path(item.path).stem, len(places)))
