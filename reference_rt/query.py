@@ -20,13 +20,24 @@ from reference_rt.geometry import closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
-from reference_rt.kernel import entry_kernel, local_floats
+from reference_rt.integrators.scratch import closest_hits
+from reference_rt.kernel import entry_kernel, local_floats, local_integers
 from reference_rt.materials import kept_floats
-from reference_rt.ray import Ray, at
+from reference_rt.ray import BLOCK, Ray, at
 from reference_rt.sampling.grid import GridSample
 from reference_rt.scaled_ray import is_told, scaled
 from reference_rt.shading import shade
 from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.streams import (
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    Hits,
+    Rays,
+    hit_of,
+    put_ray,
+    ray_of,
+)
 from reference_rt.tables import SceneTables
 from reference_rt.vec3 import Vec3, row
 
@@ -116,16 +127,27 @@ def _closest(
     rows: IntArray,
     uv: FloatArray,
 ) -> None:
-    for i in range(len(o)):
-        t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
-        ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
-        if not valid:
-            continue
-        hit = closest_hit(scene.geometry, ray)
-        if hit.kind < 0 or not is_told(hit.t * unit, at(ray, hit.t)):
-            continue
-        t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
-        uv[i, 0], uv[i, 1] = hit.u, hit.v
+    rays = Rays(local_floats(RAY_FLOATS))
+    hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
+    units = local_floats(BLOCK)
+    for k in range(RAY_FLOATS):
+        rays.numbers[k] = 1.0
+    nothing = Ray(Vec3(0.0, 0.0, 0.0), Vec3(1.0, 0.0, 0.0), 0.0)
+    for begin in range(0, len(o), BLOCK):
+        n = min(BLOCK, len(o) - begin)
+        for j in range(n):
+            ray, unit, valid = scaled(row(o, begin + j), row(d, begin + j), math.inf)
+            put_ray(rays, j, ray if valid else nothing)
+            units[j] = unit
+        closest_hits(scene.geometry, rays, hits, n)
+        for j in range(n):
+            i = begin + j
+            t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
+            hit = hit_of(hits, j)
+            if hit.kind < 0 or not is_told(hit.t * units[j], at(ray_of(rays, j), hit.t)):
+                continue
+            t[i], kind[i], rows[i] = hit.t * units[j], hit.kind, hit.row
+            uv[i, 0], uv[i, 1] = hit.u, hit.v
 
 
 @entry_kernel

@@ -1,0 +1,157 @@
+"""The closest hits of many rays, of which neighbours may go together."""
+
+from reference_rt.bundles import (
+    BUNDLE,
+    OWN_FLOATS,
+    SPAN_FLOATS,
+    Bundle,
+    bundle_of,
+    enter_child,
+    enter_together,
+    prepare_each,
+    shear_in,
+)
+from reference_rt.bvh import NOTHING, Bvh, child_of, first_of, is_packet, kind_of, row_of, size_of
+from reference_rt.geometry import (
+    STACK,
+    Geometry,
+    closest_hit,
+    nearer_primitive,
+    nearest_of_packet,
+)
+from reference_rt.groups import Instances
+from reference_rt.kernel import kernel, local_floats, local_integers
+from reference_rt.lanes import LANES, lowest
+from reference_rt.ray import Hit, no_hit
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.streams import Hits, Rays, hit_of, put_hit, ray_of
+from reference_rt.traversal import can_be_nearer
+
+
+@kernel
+def closest_in_bundles(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
+    """`closest_hit` of the first n rays."""
+    for at in range(0, n, BUNDLE):
+        if at + BUNDLE <= n:
+            if _go_together(geometry.instances, bvh, geometry, rays, hits, at):
+                continue
+        for j in range(at, min(at + BUNDLE, n)):
+            put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
+
+
+@kernel
+def _go_together(
+    instances: Instances | None, bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, at: int
+) -> bool:
+    """`closest_hit` of the BUNDLE rays from number `at` on, if they are coherent; else False."""
+    if instances is not None:
+        return False
+    span, own = local_floats(SPAN_FLOATS), local_floats(OWN_FLOATS)
+    bundle = bundle_of(bvh, rays, at, span)
+    if not bundle.together:
+        return False
+    for j in range(at, at + BUNDLE):
+        put_hit(hits, j, no_hit(ray_of(rays, j)))
+    stack, waiting = local_integers(STACK), local_floats(STACK)
+    distances = local_floats(LANES)
+    is_prepared = False
+    t_max = bundle.t_max
+    # Children are called by their places, node * LANES + lane, by which their boxes are found.
+    node, place, top = 0, -1, 0
+    unbounded = bvh.unbounded
+    while True:
+        while node >= 0:
+            met = enter_together(bvh, node, bundle, t_max, distances)
+            if met == 0:
+                node = NOTHING
+            else:
+                place, top = _nearest_place(node, met, distances, stack, waiting, top)
+                node = child_of(bvh, place // LANES, place % LANES)
+        if node != NOTHING:
+            if not is_prepared:
+                prepare_each(bvh, bundle, rays, at, own)
+                is_prepared = True
+            if _nearest_of_leaf(bvh, geometry, node, place, bundle, rays, at, own, hits):
+                t_max = 0.0
+                for j in range(at, at + BUNDLE):
+                    t_max = max(t_max, hits.numbers[j])
+        node = NOTHING
+        while top > 0 and node == NOTHING:
+            top -= 1
+            if can_be_nearer(waiting[top], t_max):
+                place = stack[top]
+                node = child_of(bvh, place // LANES, place % LANES)
+        if node == NOTHING:
+            if unbounded < 0:
+                return True
+            node, unbounded = unbounded, -1
+
+
+@kernel
+def _nearest_of_leaf(
+    bvh: Bvh,
+    geometry: Geometry,
+    leaf: int,
+    place: int,
+    bundle: Bundle,
+    rays: Rays,
+    at: int,
+    own: FloatArray,
+    hits: Hits,
+) -> bool:
+    """Let each ray of a bundle that enters a leaf, the child at a place, find what is nearer there
+    than its hit so far; whether any did enter."""
+    any_entered = False
+    for begin in range(0, BUNDLE, LANES):
+        entered = enter_child(bvh, place, bundle, begin, own, hits.numbers, at + begin)
+        while entered != 0:
+            j = begin + lowest(entered)
+            entered &= entered - 1
+            any_entered = True
+            shear = shear_in(bundle, rays, at, j, own)
+            closest = hit_of(hits, at + j)
+            if is_packet(leaf):
+                closest = nearest_of_packet(
+                    bvh.corners, bvh, geometry.shapes, leaf, shear, -1, closest
+                )
+            else:
+                ray, first = ray_of(rays, at + j), first_of(leaf)
+                for k in range(first, first + size_of(leaf)):
+                    closest = nearer_primitive(
+                        bvh,
+                        geometry.shapes,
+                        geometry.solids,
+                        kind_of(bvh, k),
+                        row_of(bvh, k),
+                        ray,
+                        shear,
+                        -1,
+                        closest,
+                    )
+            put_hit(hits, at + j, closest)
+    return any_entered
+
+
+@kernel
+def _nearest_place(
+    node: int, met: int, distances: FloatArray, stack: IntArray, waiting: FloatArray, top: int
+) -> tuple[int, int]:
+    """As `traversal.nearest_child`, with children's places."""
+    lane = lowest(met)
+    nearest, t_nearest = node * LANES + lane, distances[lane]
+    met &= met - 1
+    bottom = top
+    while met != 0:
+        lane = lowest(met)
+        met &= met - 1
+        place, t = node * LANES + lane, distances[lane]
+        if t < t_nearest:
+            place, nearest = nearest, place
+            t, t_nearest = t_nearest, t
+        k = top
+        while k > bottom and waiting[k - 1] < t:
+            stack[k], waiting[k] = stack[k - 1], waiting[k - 1]
+            k -= 1
+        stack[k], waiting[k] = place, t
+        top += 1
+    return nearest, top
