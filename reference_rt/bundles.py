@@ -23,7 +23,7 @@ BUNDLE = 16
 each, 16 take 30, 32 take 31, 64 take 40; alone 69."""
 
 NARROW = 1.0 / 8.0
-"""How far apart directions may be, as tangents, and origins, in halves of the tree's longest side."""
+"""How far apart directions may be, as tangents, and origins, in halves of the longest side."""
 
 SPAN_FLOATS = 14 * LANES
 OWN_FLOATS = 12 * BUNDLE
@@ -51,23 +51,32 @@ class Bundle(NamedTuple):
     t_max: float
 
 
+@kernel
+def are_alike(first: Vec3, last: Vec3) -> bool:
+    """Whether directions may be those of a bundle's ends: told at once, for rays that go all
+    ways."""
+    length = NARROW * max(abs(first.x), max(abs(first.y), abs(first.z)))
+    off = last - first
+    return abs(off.x) <= length and abs(off.y) <= length and abs(off.z) <= length
+
+
 @lane_kernel
-def _span(rays: Any, at: Any, boxes: Any, span: Any) -> Any:
-    """The smallest and the largest of each component of o and d among the rays from number `at` on,
+def _span(rays: Any, boxes: Any, span: Any) -> Any:
+    """The smallest and the largest of each component of o and d among BUNDLE rays,
     the largest t_max, and how far the tree reaches from its centre, each into LANES numbers; the
     lanes whose rays are of finite numbers."""
-    is_finite = rays.load(at) <= float("inf")
+    is_finite = rays.load(0) <= float("inf")
     for k in range(6):
-        low = high = rays.load(at + k * BLOCK)
+        low = high = rays.load(k * BLOCK)
         for more in range(0, BUNDLE, LANES):
-            x = rays.load(at + (k * BLOCK + more))
+            x = rays.load(k * BLOCK + more)
             is_finite = is_finite & (abs(x) < float("inf"))
             low, high = smaller(low, x), larger(high, x)
         span.store(2 * k * LANES, smallest(low))
         span.store((2 * k + 1) * LANES, largest(high))
-    t_max = rays.load(at + 6 * BLOCK)
+    t_max = rays.load(6 * BLOCK)
     for more in range(LANES, BUNDLE, LANES):
-        t_max = larger(t_max, rays.load(at + (6 * BLOCK + more)))
+        t_max = larger(t_max, rays.load(6 * BLOCK + more))
     span.store(12 * LANES, largest(t_max))
     upper = larger(boxes.load(3 * LANES), boxes.load(4 * LANES))
     span.store(13 * LANES, largest(larger(upper, boxes.load(5 * LANES))))
@@ -75,9 +84,9 @@ def _span(rays: Any, at: Any, boxes: Any, span: Any) -> Any:
 
 
 @kernel
-def bundle_of(bvh: Bvh, rays: Rays, at: int, span: FloatArray) -> Bundle:
-    """The BUNDLE rays from number `at` on; span (SPAN_FLOATS,) is scratch."""
-    is_finite = _span(rays.numbers, at, bvh.boxes, span) == (1 << LANES) - 1
+def bundle_of(bvh: Bvh, rays: Rays, span: FloatArray) -> Bundle:
+    """The first BUNDLE rays; span (SPAN_FLOATS,) is scratch."""
+    is_finite = _span(rays.numbers, bvh.boxes, span) == (1 << LANES) - 1
     o_low, o_high = _corner(span, 0), _corner(span, 1)
     d_low, d_high = _corner(span, 6), _corner(span, 7)
     frame = bvh.frames
@@ -95,7 +104,9 @@ def bundle_of(bvh: Bvh, rays: Rays, at: int, span: FloatArray) -> Bundle:
         low, high = component(d_low, k), component(d_high, k)
         together = together and (low > 0.0 or high < 0.0 or low == high)
         together = together and high - low <= NARROW * length
-        together = together and component(o_high, k) - component(o_low, k) <= NARROW * span[13 * LANES]
+        together = (
+            together and component(o_high, k) - component(o_low, k) <= NARROW * span[13 * LANES]
+        )
         if k != axis:
             together = together and max(abs(low), abs(high)) < length
     # The largest that any of the rays has in `view_of`.
@@ -202,9 +213,7 @@ def _entered(
 
 
 @kernel
-def enter_together(
-    bvh: Bvh, node: int, bundle: Bundle, t_max: float, distances: FloatArray
-) -> int:
+def enter_together(bvh: Bvh, node: int, bundle: Bundle, t_max: float, distances: FloatArray) -> int:
     """The children of a node that rays of a bundle meet, as bits; into distances (LANES,) how far
     away."""
     return _entered(
@@ -233,7 +242,6 @@ def enter_together(
 @lane_kernel
 def _each(
     rays: Any,
-    at: Any,
     x: Any,
     y: Any,
     z: Any,
@@ -250,15 +258,15 @@ def _each(
     place = ((center_x, error_x), (center_y, error_y), (center_z, error_z))
     for j in range(0, BUNDLE, LANES):
         for k, (center, error) in enumerate(place):
-            o, d = rays.load(at + (k * BLOCK + j)), rays.load(at + ((3 + k) * BLOCK + j))
+            o, d = rays.load(k * BLOCK + j), rays.load((3 + k) * BLOCK + j)
             own.store(k * BUNDLE + j, o - center + error)
             own.store((3 + k) * BUNDLE + j, o - center - error)
             own.store((6 + k) * BUNDLE + j, 1.0 / (d + 0.0))  # of -0 inf too, as in `_slab`
-        d_x, d_y, d_z = (rays.load(at + axis * BLOCK + (3 * BLOCK + j)) for axis in (x, y, z))
+        d_x, d_y, d_z = (rays.load(axis * BLOCK + (3 * BLOCK + j)) for axis in (x, y, z))
         own.store(9 * BUNDLE + j, d_x / d_z)
         own.store(10 * BUNDLE + j, d_y / d_z)
         own.store(11 * BUNDLE + j, 1.0 / d_z)
-    return rays.load(at) <= float("inf")
+    return rays.load(0) <= float("inf")
 
 
 @kernel
@@ -271,13 +279,12 @@ def shear_axes(bundle: Bundle) -> tuple[int, int, int]:
 
 
 @kernel
-def prepare_each(bvh: Bvh, bundle: Bundle, rays: Rays, at: int, own: FloatArray) -> None:
+def prepare_each(bvh: Bvh, bundle: Bundle, rays: Rays, own: FloatArray) -> None:
     """Before the first leaf: most bundles of a picture meet none."""
     x, y, z = shear_axes(bundle)
     frame = bvh.frames
     _each(
         rays.numbers,
-        at,
         x,
         y,
         z,
@@ -292,7 +299,7 @@ def prepare_each(bvh: Bvh, bundle: Bundle, rays: Rays, at: int, own: FloatArray)
 
 
 @kernel
-def shear_in(bundle: Bundle, rays: Rays, at: int, j: int, own: FloatArray) -> Shear:
+def shear_in(bundle: Bundle, rays: Rays, j: int, own: FloatArray) -> Shear:
     """That of ray number j of a bundle."""
     x, y, z = shear_axes(bundle)
     o = rays.numbers
@@ -300,9 +307,9 @@ def shear_in(bundle: Bundle, rays: Rays, at: int, j: int, own: FloatArray) -> Sh
         x,
         y,
         z,
-        o[x * BLOCK + at + j],
-        o[y * BLOCK + at + j],
-        o[z * BLOCK + at + j],
+        o[x * BLOCK + j],
+        o[y * BLOCK + j],
+        o[z * BLOCK + j],
         own[9 * BUNDLE + j],
         own[10 * BUNDLE + j],
         own[11 * BUNDLE + j],
@@ -314,7 +321,6 @@ def _enter_box(
     own: Any,
     j: Any,
     ends: Any,
-    end: Any,
     near_x: Any,
     near_y: Any,
     near_z: Any,
@@ -327,7 +333,7 @@ def _enter_box(
     t_in = larger(0.0, (near_x - own.load(j)) * inverse[0])
     t_in = larger(t_in, (near_y - own.load(j + BUNDLE)) * inverse[1])
     t_in = larger(t_in, (near_z - own.load(j + 2 * BUNDLE)) * inverse[2])
-    t_out = smaller(ends.load(end), (far_x - own.load(j + 3 * BUNDLE)) * inverse[0])
+    t_out = smaller(ends.load(j), (far_x - own.load(j + 3 * BUNDLE)) * inverse[0])
     t_out = smaller(t_out, (far_y - own.load(j + 4 * BUNDLE)) * inverse[1])
     t_out = smaller(t_out, (far_z - own.load(j + 5 * BUNDLE)) * inverse[2])
     return t_in <= t_out * FAR_SLACK
@@ -335,16 +341,15 @@ def _enter_box(
 
 @kernel
 def enter_child(
-    bvh: Bvh, place: int, bundle: Bundle, j: int, own: FloatArray, ends: FloatArray, end: int
+    bvh: Bvh, place: int, bundle: Bundle, j: int, own: FloatArray, ends: FloatArray
 ) -> int:
-    """Which of LANES rays from number j of a bundle on enter a child before ends[end + lane]."""
+    """Which of LANES rays from number j of a bundle on enter a child before ends[j + lane]."""
     node, lane = place // LANES, place % LANES
     box = bvh.boxes[node]
     return _enter_box(
         own,
         j,
         ends,
-        end,
         float(box[bundle.x * LANES + lane]),
         float(box[bundle.y * LANES + lane]),
         float(box[bundle.z * LANES + lane]),

@@ -1,4 +1,4 @@
-"""The closest hits of many rays, of which neighbours may go together."""
+"""The closest hits of a bundle of rays."""
 
 from reference_rt.bundles import (
     BUNDLE,
@@ -15,42 +15,42 @@ from reference_rt.bvh import NOTHING, Bvh, child_of, first_of, is_packet, kind_o
 from reference_rt.geometry import (
     STACK,
     Geometry,
-    closest_hit,
     nearer_primitive,
     nearest_of_packet,
 )
 from reference_rt.groups import Instances
 from reference_rt.kernel import kernel, local_floats, local_integers
 from reference_rt.lanes import LANES, lowest
-from reference_rt.ray import Hit, no_hit
+from reference_rt.ray import no_hit
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.streams import Hits, Rays, hit_of, put_hit, ray_of
 from reference_rt.traversal import can_be_nearer
 
 
 @kernel
-def closest_in_bundles(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
-    """`closest_hit` of the first n rays."""
-    for at in range(0, n, BUNDLE):
-        if at + BUNDLE <= n:
-            if _go_together(geometry.instances, bvh, geometry, rays, hits, at):
-                continue
-        for j in range(at, min(at + BUNDLE, n)):
-            put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
+def closest_together(geometry: Geometry, rays: Rays, hits: Hits) -> bool:
+    """`closest_hit` of the first BUNDLE rays, if they are coherent; else False, and nothing."""
+    return _closest_together(geometry.bvh, geometry.instances, geometry, rays, hits)
 
 
 @kernel
-def _go_together(
-    instances: Instances | None, bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, at: int
+def _closest_together(
+    bvh: Bvh | None, instances: Instances | None, geometry: Geometry, rays: Rays, hits: Hits
 ) -> bool:
-    """`closest_hit` of the BUNDLE rays from number `at` on, if they are coherent; else False."""
-    if instances is not None:
+    if bvh is None:
         return False
+    if instances is not None:  # where rays have directions and origins of their own in each
+        return False
+    return _traverse(bvh, geometry, rays, hits)
+
+
+@kernel
+def _traverse(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits) -> bool:
     span, own = local_floats(SPAN_FLOATS), local_floats(OWN_FLOATS)
-    bundle = bundle_of(bvh, rays, at, span)
+    bundle = bundle_of(bvh, rays, span)
     if not bundle.together:
         return False
-    for j in range(at, at + BUNDLE):
+    for j in range(BUNDLE):
         put_hit(hits, j, no_hit(ray_of(rays, j)))
     stack, waiting = local_integers(STACK), local_floats(STACK)
     distances = local_floats(LANES)
@@ -69,11 +69,11 @@ def _go_together(
                 node = child_of(bvh, place // LANES, place % LANES)
         if node != NOTHING:
             if not is_prepared:
-                prepare_each(bvh, bundle, rays, at, own)
+                prepare_each(bvh, bundle, rays, own)
                 is_prepared = True
-            if _nearest_of_leaf(bvh, geometry, node, place, bundle, rays, at, own, hits):
+            if _nearest_of_leaf(bvh, geometry, node, place, bundle, rays, own, hits):
                 t_max = 0.0
-                for j in range(at, at + BUNDLE):
+                for j in range(BUNDLE):
                     t_max = max(t_max, hits.numbers[j])
         node = NOTHING
         while top > 0 and node == NOTHING:
@@ -95,7 +95,6 @@ def _nearest_of_leaf(
     place: int,
     bundle: Bundle,
     rays: Rays,
-    at: int,
     own: FloatArray,
     hits: Hits,
 ) -> bool:
@@ -103,19 +102,19 @@ def _nearest_of_leaf(
     than its hit so far; whether any did enter."""
     any_entered = False
     for begin in range(0, BUNDLE, LANES):
-        entered = enter_child(bvh, place, bundle, begin, own, hits.numbers, at + begin)
+        entered = enter_child(bvh, place, bundle, begin, own, hits.numbers)
         while entered != 0:
             j = begin + lowest(entered)
             entered &= entered - 1
             any_entered = True
-            shear = shear_in(bundle, rays, at, j, own)
-            closest = hit_of(hits, at + j)
+            shear = shear_in(bundle, rays, j, own)
+            closest = hit_of(hits, j)
             if is_packet(leaf):
                 closest = nearest_of_packet(
                     bvh.corners, bvh, geometry.shapes, leaf, shear, -1, closest
                 )
             else:
-                ray, first = ray_of(rays, at + j), first_of(leaf)
+                ray, first = ray_of(rays, j), first_of(leaf)
                 for k in range(first, first + size_of(leaf)):
                     closest = nearer_primitive(
                         bvh,
@@ -128,7 +127,7 @@ def _nearest_of_leaf(
                         -1,
                         closest,
                     )
-            put_hit(hits, at + j, closest)
+            put_hit(hits, j, closest)
     return any_entered
 
 

@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from reference_rt.bundles import BUNDLE, are_alike
+from reference_rt.coherent import closest_together
 from reference_rt.geometry import closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
-from reference_rt.integrators.scratch import closest_hits
-from reference_rt.kernel import entry_kernel, local_floats, local_integers
+from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
 from reference_rt.materials import kept_floats
-from reference_rt.ray import BLOCK, Ray, at
+from reference_rt.ray import Hit, Ray, at, no_hit
 from reference_rt.sampling.grid import GridSample
 from reference_rt.scaled_ray import is_told, scaled
 from reference_rt.shading import shade
@@ -129,25 +130,40 @@ def _closest(
 ) -> None:
     rays = Rays(local_floats(RAY_FLOATS))
     hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
-    units = local_floats(BLOCK)
-    for k in range(RAY_FLOATS):
-        rays.numbers[k] = 1.0
-    nothing = Ray(Vec3(0.0, 0.0, 0.0), Vec3(1.0, 0.0, 0.0), 0.0)
-    for begin in range(0, len(o), BLOCK):
-        n = min(BLOCK, len(o) - begin)
-        for j in range(n):
-            ray, unit, valid = scaled(row(o, begin + j), row(d, begin + j), math.inf)
-            put_ray(rays, j, ray if valid else nothing)
-            units[j] = unit
-        closest_hits(scene.geometry, rays, hits, n)
-        for j in range(n):
-            i = begin + j
-            t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
-            hit = hit_of(hits, j)
-            if hit.kind < 0 or not is_told(hit.t * units[j], at(ray_of(rays, j), hit.t)):
+    for begin in range(0, len(o), BUNDLE):
+        end = min(begin + BUNDLE, len(o))
+        if end == begin + BUNDLE and are_alike(row(d, begin), row(d, end - 1)):
+            for i in range(begin, end):
+                put_ray(rays, i - begin, Ray(row(o, i), row(d, i), math.inf))
+            if closest_together(scene.geometry, rays, hits):
+                for i in range(begin, end):
+                    ray, hit = ray_of(rays, i - begin), hit_of(hits, i - begin)
+                    _tell(ray, 1.0, hit, i, t, kind, rows, uv)
                 continue
-            t[i], kind[i], rows[i] = hit.t * units[j], hit.kind, hit.row
-            uv[i, 0], uv[i, 1] = hit.u, hit.v
+        for i in range(begin, end):
+            ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
+            hit = no_hit(ray)
+            if valid:
+                hit = closest_hit(scene.geometry, ray)
+            _tell(ray, unit, hit, i, t, kind, rows, uv)
+
+
+@kernel
+def _tell(
+    ray: Ray,
+    unit: float,
+    hit: Hit,
+    i: int,
+    t: FloatArray,
+    kind: IntArray,
+    rows: IntArray,
+    uv: FloatArray,
+) -> None:
+    """Write what ray number i has hit, see `Closest`; unit: of its t, see `scaled`."""
+    t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
+    if hit.kind >= 0 and is_told(hit.t * unit, at(ray, hit.t)):
+        t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
+        uv[i, 0], uv[i, 1] = hit.u, hit.v
 
 
 @entry_kernel

@@ -4,12 +4,11 @@ from typing import NamedTuple
 
 from reference_rt import shapes as any_shape
 from reference_rt.bvh import Bvh
-from reference_rt.coherent import closest_in_bundles
-from reference_rt.geometry import Geometry, occluded
+from reference_rt.geometry import Geometry, closest_hit, occluded
 from reference_rt.kernel import kernel
 from reference_rt.ray import BLOCK
 from reference_rt.shapes.shape import FloatArray, IntArray
-from reference_rt.streams import RAY_FLOATS, Hits, Rays, ray_of
+from reference_rt.streams import RAY_FLOATS, Hits, Rays, put_hit, ray_of
 
 STATE_FLOATS = 11 * BLOCK
 VECTOR_FLOATS = 3 * BLOCK
@@ -61,8 +60,8 @@ def _trace(
     if bvh is None:
         any_shape.nearest_of_rays(geometry.shapes, rays, hits, n, any_hit)
         return
-    if not any_hit:
-        closest_in_bundles(bvh, geometry, rays, hits, n)
-        return
     for j in range(n):
-        hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
+        if any_hit:
+            hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
+        else:
+            put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
