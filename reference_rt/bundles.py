@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from reference_rt.bvh import CENTER, FAR_SLACK, Bvh
 from reference_rt.kernel import kernel, reciprocal
-from reference_rt.lanes import LANES, lane_kernel, larger, largest, smaller, smallest
+from reference_rt.lanes import LANES, lane_kernel, larger, smaller
 from reference_rt.ray import BLOCK, surface_error
 from reference_rt.scaled_ray import SHORT
 from reference_rt.shapes.shape import FloatArray
@@ -25,7 +25,8 @@ each, 16 take 30, 32 take 31, 64 take 40; alone 69."""
 NARROW = 1.0 / 8.0
 """How far apart directions may be, as tangents, and origins, in halves of the longest side."""
 
-SPAN_FLOATS = 14 * LANES
+_TURNS = 3 * LANES
+SPAN_FLOATS = 4 * _TURNS + LANES
 OWN_FLOATS = 12 * BUNDLE
 
 
@@ -35,7 +36,7 @@ class Bundle(NamedTuple):
 
     together: whether they can go together, else the rest means nothing;  near, far: origins
     relative to the tree's centre;  least, most: 1 / d, by magnitude;  error: how far origins were
-    moved, with the sign of d;  x, y, z: the rows of near planes;  axis: the largest of d;  t_max.
+    moved, with the sign of d;  x, y, z: the rows of near planes;  axis: the largest of d.
     """
 
     together: bool
@@ -48,7 +49,6 @@ class Bundle(NamedTuple):
     y: int
     z: int
     axis: int
-    t_max: float
 
 
 @kernel
@@ -61,64 +61,80 @@ def are_alike(first: Vec3, last: Vec3) -> bool:
 
 
 @lane_kernel
-def _span(rays: Any, boxes: Any, span: Any) -> Any:
-    """The smallest and the largest of each component of o and d among BUNDLE rays,
-    the largest t_max, and how far the tree reaches from its centre, each into LANES numbers; the
-    lanes whose rays are of finite numbers."""
-    is_finite = rays.load(0) <= float("inf")
-    for k in range(6):
-        low = high = rays.load(k * BLOCK)
-        for more in range(0, BUNDLE, LANES):
-            x = rays.load(k * BLOCK + more)
-            is_finite = is_finite & (abs(x) < float("inf"))
-            low, high = smaller(low, x), larger(high, x)
-        span.store(2 * k * LANES, smallest(low))
-        span.store((2 * k + 1) * LANES, largest(high))
-    t_max = rays.load(6 * BLOCK)
-    for more in range(LANES, BUNDLE, LANES):
-        t_max = larger(t_max, rays.load(6 * BLOCK + more))
-    span.store(12 * LANES, largest(t_max))
+def _span(o: Any, d: Any, first: Any, boxes: Any, span: Any) -> Any:
+    """Of BUNDLE origins and directions from number `first` of their arrays on the smallest numbers
+    and the largest of eight bundles of x, y and z in turn, and how far a tree's boxes reach from
+    its centre, into span (SPAN_FLOATS,); the lanes whose numbers are finite."""
+    is_finite = boxes.load(0) <= float("inf")
+    for place, vectors in ((0, o), (_TURNS, d)):
+        for begin in range(0, 3 * LANES, LANES):
+            low = high = vectors.load(first + begin)
+            for more in range(0, 3 * BUNDLE, 3 * LANES):
+                x = vectors.load(first + (begin + more))
+                is_finite = is_finite & (abs(x) < float("inf"))
+                low, high = smaller(low, x), larger(high, x)
+            span.store(place + begin, low)
+            span.store(2 * _TURNS + place + begin, high)
     upper = larger(boxes.load(3 * LANES), boxes.load(4 * LANES))
-    span.store(13 * LANES, largest(larger(upper, boxes.load(5 * LANES))))
+    span.store(4 * _TURNS, larger(upper, boxes.load(5 * LANES)))
     return is_finite
 
 
 @kernel
-def bundle_of(bvh: Bvh, rays: Rays, span: FloatArray) -> Bundle:
-    """The first BUNDLE rays; span (SPAN_FLOATS,) is scratch."""
-    is_finite = _span(rays.numbers, bvh.boxes, span) == (1 << LANES) - 1
-    o_low, o_high = _corner(span, 0), _corner(span, 1)
-    d_low, d_high = _corner(span, 6), _corner(span, 7)
-    frame = bvh.frames
-    center = Vec3(frame[0, CENTER], frame[0, CENTER + 1], frame[0, CENTER + 2])
-    size = frame[0, CENTER + 3]
-    axis = 2
+def _lowest(span: FloatArray, place: int) -> Vec3:
+    """The smallest x, y and z of those that `_span` has left."""
+    low = Vec3(span[place], span[place + 1], span[place + 2])
+    for j in range(place + 3, place + _TURNS, 3):
+        low = Vec3(min(low.x, span[j]), min(low.y, span[j + 1]), min(low.z, span[j + 2]))
+    return low
+
+
+@kernel
+def _highest(span: FloatArray, place: int) -> Vec3:
+    """The largest."""
+    high = Vec3(span[place], span[place + 1], span[place + 2])
+    for j in range(place + 3, place + _TURNS, 3):
+        high = Vec3(max(high.x, span[j]), max(high.y, span[j + 1]), max(high.z, span[j + 2]))
+    return high
+
+
+@kernel
+def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArray) -> Bundle:
+    """The BUNDLE rays from number `begin` on; span (SPAN_FLOATS,) is scratch."""
+    together = _span(o, d, 3 * begin, bvh.boxes, span) == (1 << LANES) - 1
+    o_low, d_low = _lowest(span, 0), _lowest(span, _TURNS)
+    o_high, d_high = _highest(span, 2 * _TURNS), _highest(span, 3 * _TURNS)
+    reach = 0.0
+    for lane in range(LANES):
+        reach = max(reach, span[4 * _TURNS + lane])
     steep = Vec3(_least(d_low.x, d_high.x), _least(d_low.y, d_high.y), _least(d_low.z, d_high.z))
+    axis = 2
     if steep.x > steep.y and steep.x > steep.z:
         axis = 0
     elif steep.y > steep.z:
         axis = 1
     length = component(steep, axis)
-    together = is_finite and SHORT <= length <= 1.0 / SHORT
+    together = together and SHORT <= length <= 1.0 / SHORT
     for k in range(3):
         low, high = component(d_low, k), component(d_high, k)
         together = together and (low > 0.0 or high < 0.0 or low == high)
         together = together and high - low <= NARROW * length
-        together = (
-            together and component(o_high, k) - component(o_low, k) <= NARROW * span[13 * LANES]
-        )
-        if k != axis:
-            together = together and max(abs(low), abs(high)) < length
-    # The largest that any of the rays has in `view_of`.
+        together = together and component(o_high, k) - component(o_low, k) <= NARROW * reach
+        together = together and (k == axis or max(abs(low), abs(high)) < length)
+    frame = bvh.frames
+    size = frame[0, CENTER + 3]
+    # As in `view_of`, of a point as far out as any of the origins.
     far_out = Vec3(
         max(abs(o_low.x), abs(o_high.x)),
         max(abs(o_low.y), abs(o_high.y)),
         max(abs(o_low.z), abs(o_high.z)),
     )
     error = surface_error(far_out, far_out, 3.0 * size)
-    x = _slab(o_low.x - center.x, o_high.x - center.x, d_low.x, d_high.x, error)
-    y = _slab(o_low.y - center.y, o_high.y - center.y, d_low.y, d_high.y, error)
-    z = _slab(o_low.z - center.z, o_high.z - center.z, d_low.z, d_high.z, error)
+    center = Vec3(frame[0, CENTER], frame[0, CENTER + 1], frame[0, CENTER + 2])
+    o_low, o_high = o_low - center, o_high - center
+    x = _slab(o_low.x, o_high.x, d_low.x, d_high.x, error)
+    y = _slab(o_low.y, o_high.y, d_low.y, d_high.y, error)
+    z = _slab(o_low.z, o_high.z, d_low.z, d_high.z, error)
     return Bundle(
         together,
         Vec3(x.near, y.near, z.near),
@@ -130,14 +146,7 @@ def bundle_of(bvh: Bvh, rays: Rays, span: FloatArray) -> Bundle:
         1 if y.least > 0.0 else 4,
         2 if z.least > 0.0 else 5,
         axis,
-        span[12 * LANES],
     )
-
-
-@kernel
-def _corner(span: FloatArray, first: int) -> Vec3:
-    """Every second of three numbers of a span."""
-    return Vec3(span[first * LANES], span[(first + 2) * LANES], span[(first + 4) * LANES])
 
 
 @kernel

@@ -1,10 +1,13 @@
 """The closest hits of a bundle of rays."""
 
+import math
+
 from reference_rt.bundles import (
     BUNDLE,
     OWN_FLOATS,
     SPAN_FLOATS,
     Bundle,
+    are_alike,
     bundle_of,
     enter_child,
     enter_together,
@@ -21,41 +24,59 @@ from reference_rt.geometry import (
 from reference_rt.groups import Instances
 from reference_rt.kernel import kernel, local_floats, local_integers
 from reference_rt.lanes import LANES, lowest
-from reference_rt.ray import no_hit
+from reference_rt.ray import Ray, no_hit
 from reference_rt.shapes.shape import FloatArray, IntArray
-from reference_rt.streams import Hits, Rays, hit_of, put_hit, ray_of
+from reference_rt.streams import Hits, Rays, hit_of, put_hit, put_ray, ray_of
 from reference_rt.traversal import can_be_nearer
+from reference_rt.vec3 import row
+
+ALONE, MISSED, FOUND = -1, 0, 1
 
 
 @kernel
-def closest_together(geometry: Geometry, rays: Rays, hits: Hits) -> bool:
-    """`closest_hit` of the first BUNDLE rays, if they are coherent; else False, and nothing."""
-    return _closest_together(geometry.bvh, geometry.instances, geometry, rays, hits)
+def closest_together(
+    geometry: Geometry, o: FloatArray, d: FloatArray, begin: int, rays: Rays, hits: Hits
+) -> int:
+    """`closest_hit` of the BUNDLE rays from origins o (n, 3) into directions d (n, 3) from number
+    `begin` on.
+
+    ALONE: they are not coherent, or have no hierarchy to go through;  MISSED: none met anything;
+    FOUND: `hits` are those of `rays`, of which they are the first.
+    """
+    if not are_alike(row(d, begin), row(d, begin + BUNDLE - 1)):
+        return ALONE
+    return _closest_together(geometry.bvh, geometry.instances, geometry, o, d, begin, rays, hits)
 
 
 @kernel
 def _closest_together(
-    bvh: Bvh | None, instances: Instances | None, geometry: Geometry, rays: Rays, hits: Hits
-) -> bool:
+    bvh: Bvh | None,
+    instances: Instances | None,
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    begin: int,
+    rays: Rays,
+    hits: Hits,
+) -> int:
     if bvh is None:
-        return False
+        return ALONE
     if instances is not None:  # where rays have directions and origins of their own in each
-        return False
-    return _traverse(bvh, geometry, rays, hits)
+        return ALONE
+    return _traverse(bvh, geometry, o, d, begin, rays, hits)
 
 
 @kernel
-def _traverse(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits) -> bool:
+def _traverse(
+    bvh: Bvh, geometry: Geometry, o: FloatArray, d: FloatArray, begin: int, rays: Rays, hits: Hits
+) -> int:
     span, own = local_floats(SPAN_FLOATS), local_floats(OWN_FLOATS)
-    bundle = bundle_of(bvh, rays, span)
+    bundle = bundle_of(bvh, o, d, begin, span)
     if not bundle.together:
-        return False
-    for j in range(BUNDLE):
-        put_hit(hits, j, no_hit(ray_of(rays, j)))
+        return ALONE
     stack, waiting = local_integers(STACK), local_floats(STACK)
     distances = local_floats(LANES)
-    is_prepared = False
-    t_max = bundle.t_max
+    outcome, t_max = MISSED, math.inf
     # Children are called by their places, node * LANES + lane, by which their boxes are found.
     node, place, top = 0, -1, 0
     unbounded = bvh.unbounded
@@ -68,9 +89,13 @@ def _traverse(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits) -> bool:
                 place, top = _nearest_place(node, met, distances, stack, waiting, top)
                 node = child_of(bvh, place // LANES, place % LANES)
         if node != NOTHING:
-            if not is_prepared:
+            if outcome == MISSED:
+                outcome = FOUND
+                for j in range(BUNDLE):
+                    ray = Ray(row(o, begin + j), row(d, begin + j), math.inf)
+                    put_ray(rays, j, ray)
+                    put_hit(hits, j, no_hit(ray))
                 prepare_each(bvh, bundle, rays, own)
-                is_prepared = True
             if _nearest_of_leaf(bvh, geometry, node, place, bundle, rays, own, hits):
                 t_max = 0.0
                 for j in range(BUNDLE):
@@ -83,7 +108,7 @@ def _traverse(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits) -> bool:
                 node = child_of(bvh, place // LANES, place % LANES)
         if node == NOTHING:
             if unbounded < 0:
-                return True
+                return outcome
             node, unbounded = unbounded, -1
 
 

@@ -129,29 +129,6 @@ def larger(a: Any, b: Any) -> Any:
     return select(b > a, b, a)
 
 
-def _exchanged(x: Any, step: int) -> Any:
-    """The numbers of lanes `step` apart, a power of two, in each other's place."""
-    places = [lane ^ step for lane in range(LANES)]
-    if isinstance(x, Lanes):
-        which = ir.Constant(ir.VectorType(I32, LANES), places)
-        return Lanes(x.builder, x.builder.shuffle_vector(x.value, x.value, which))
-    return x[places]
-
-
-def smallest(x: Any) -> Any:
-    """The smallest number of all lanes, in each."""
-    for step in (4, 2, 1):
-        x = smaller(x, _exchanged(x, step))
-    return x
-
-
-def largest(x: Any) -> Any:
-    """The largest number of all lanes, in each."""
-    for step in (4, 2, 1):
-        x = larger(x, _exchanged(x, step))
-    return x
-
-
 def square_root(x: Any) -> Any:
     return x.call("sqrt") if isinstance(x, Lanes) else math.sqrt(x)
 
