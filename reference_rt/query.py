@@ -16,28 +16,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.bundles import BUNDLE
-from reference_rt.coherent import ALONE, FOUND, MISSED, closest_together
+from reference_rt.coherent import closest_of_rays
 from reference_rt.geometry import closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
-from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
+from reference_rt.kernel import entry_kernel, local_floats
 from reference_rt.materials import kept_floats
-from reference_rt.ray import Hit, Ray, at
+from reference_rt.ray import Ray
 from reference_rt.sampling.grid import GridSample
 from reference_rt.scaled_ray import is_told, scaled
 from reference_rt.shading import shade
 from reference_rt.shapes.shape import FloatArray, IntArray
-from reference_rt.streams import (
-    HIT_FLOATS,
-    HIT_INTEGERS,
-    RAY_FLOATS,
-    Hits,
-    Rays,
-    hit_of,
-    ray_of,
-)
 from reference_rt.tables import SceneTables
 from reference_rt.vec3 import Vec3, row
 
@@ -127,42 +117,7 @@ def _closest(
     rows: IntArray,
     uv: FloatArray,
 ) -> None:
-    rays = Rays(local_floats(RAY_FLOATS))
-    hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
-    for begin in range(0, len(o), BUNDLE):
-        end = min(begin + BUNDLE, len(o))
-        for i in range(begin, end):
-            t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
-        outcome = ALONE
-        if end == begin + BUNDLE:
-            outcome = closest_together(scene.geometry, o, d, begin, rays, hits)
-        if outcome == MISSED:
-            continue
-        for i in range(begin, end):
-            if outcome == FOUND:
-                j = i - begin
-                _tell(ray_of(rays, j), 1.0, hit_of(hits, j), i, t, kind, rows, uv)
-                continue
-            ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
-            if valid:
-                _tell(ray, unit, closest_hit(scene.geometry, ray), i, t, kind, rows, uv)
-
-
-@kernel
-def _tell(
-    ray: Ray,
-    unit: float,
-    hit: Hit,
-    i: int,
-    t: FloatArray,
-    kind: IntArray,
-    rows: IntArray,
-    uv: FloatArray,
-) -> None:
-    """Write what ray number i has hit, if it has; unit: of its t, see `scaled`."""
-    if hit.kind >= 0 and is_told(hit.t * unit, at(ray, hit.t)):
-        t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
-        uv[i, 0], uv[i, 1] = hit.u, hit.v
+    closest_of_rays(scene.geometry, o, d, t, kind, rows, uv)
 
 
 @entry_kernel

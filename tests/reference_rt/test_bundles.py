@@ -12,7 +12,8 @@ from builders import cube, icosphere, unit_vectors, write_obj
 
 import reference_rt as rt
 from reference_rt import query, trees
-from reference_rt.bundles import BUNDLE, SPAN_FLOATS, bundle_of, enter_together
+from reference_rt.bundle_traversal import enter_together
+from reference_rt.bundles import BUNDLE, SPAN_FLOATS, bundle_of
 from reference_rt.geometry import closest_hit
 from reference_rt.kernel import entry_kernel, local_floats
 from reference_rt.lanes import LANES
