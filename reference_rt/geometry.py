@@ -90,7 +90,7 @@ def _traverse(
                 for k in range(bottom, top):
                     space[k] = instance
         if is_packet(node):
-            closest = _nearest_of_packet(bvh.corners, bvh, shapes, node, shear, instance, closest)
+            closest = nearest_of_packet(bvh.corners, bvh, shapes, node, shear, instance, closest)
         else:
             first = first_of(node)
             for k in range(first, first + size_of(node)):
@@ -100,16 +100,9 @@ def _traverse(
                         stack[top], waiting[top], space[top] = instances.root[row], 0.0, row
                         top += 1
                         continue
-                if solids is not None:
-                    if kind == SOLID:
-                        hit = evaluate.intersect(solids, shapes, bvh, row, local, closest.t)
-                        found = Crossing(hit.t, hit.u, hit.v)
-                        kind, row = hit.kind, hit.row
-                    else:
-                        found = any_shape.intersect(shapes, kind, row, local, shear)
-                else:
-                    found = any_shape.intersect(shapes, kind, row, local, shear)
-                closest = _nearer(shapes, found, kind, row, instance, closest)
+                closest = nearer_primitive(
+                    bvh, shapes, solids, kind, row, local, shear, instance, closest
+                )
         # Asked once a leaf: asked for each primitive it costs a quarter of the speed.
         if any_hit and closest.kind >= 0:
             return closest
@@ -129,7 +122,29 @@ def _traverse(
 
 
 @kernel
-def _nearest_of_packet(
+def nearer_primitive(
+    bvh: Bvh,
+    shapes: Shapes,
+    solids: Solids | None,
+    kind: int,
+    row: int,
+    ray: Ray,
+    shear: Shear,
+    instance: int,
+    closest: Hit,
+) -> Hit:
+    """The nearer of `closest` and what a reference of a leaf stands for."""
+    if solids is not None:
+        if kind == SOLID:
+            hit = evaluate.intersect(solids, shapes, bvh, row, ray, closest.t)
+            found = Crossing(hit.t, hit.u, hit.v)
+            return _nearer(shapes, found, hit.kind, hit.row, instance, closest)
+    found = any_shape.intersect(shapes, kind, row, ray, shear)
+    return _nearer(shapes, found, kind, row, instance, closest)
+
+
+@kernel
+def nearest_of_packet(
     corners: FloatArray | None,
     bvh: Bvh,
     shapes: Shapes,

@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from reference_rt.coherent import closest_of_rays
 from reference_rt.geometry import Geometry, closest_hit, owner, surface
 from reference_rt.geometry import occluded as is_occluded
 from reference_rt.integrators import radiance as radiance_along
 from reference_rt.integrators.integrator import direct
 from reference_rt.kernel import entry_kernel, local_floats
 from reference_rt.materials import kept_floats
-from reference_rt.ray import Ray, at
+from reference_rt.ray import Ray
 from reference_rt.sampling.grid import GridSample
 from reference_rt.scaled_ray import is_told, scaled
 from reference_rt.shading import shade
@@ -117,16 +118,7 @@ def _closest(
     rows: IntArray,
     uv: FloatArray,
 ) -> None:
-    for i in range(len(o)):
-        t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
-        ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
-        if not valid:
-            continue
-        hit = closest_hit(geometry, ray)
-        if hit.kind < 0 or not is_told(hit.t * unit, at(ray, hit.t)):
-            continue
-        t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
-        uv[i, 0], uv[i, 1] = hit.u, hit.v
+    closest_of_rays(geometry, o, d, t, kind, rows, uv)
 
 
 @entry_kernel

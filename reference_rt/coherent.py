@@ -1,0 +1,238 @@
+"""The closest hits of arrays of rays, of which neighbours may go together."""
+
+import math
+
+from reference_rt.bundle_traversal import (
+    OWN_FLOATS,
+    enter_child,
+    enter_together,
+    prepare_each,
+    shear_in,
+)
+from reference_rt.bundles import BUNDLE, SPAN_FLOATS, Bundle, are_alike, bundle_of
+from reference_rt.bvh import NOTHING, Bvh, child_of, first_of, is_packet, kind_of, row_of, size_of
+from reference_rt.geometry import (
+    STACK,
+    Geometry,
+    closest_hit,
+    nearer_primitive,
+    nearest_of_packet,
+)
+from reference_rt.groups import Instances
+from reference_rt.kernel import kernel, local_floats, local_integers
+from reference_rt.lanes import LANES, lowest
+from reference_rt.ray import Hit, Ray, at, no_hit
+from reference_rt.scaled_ray import is_told, scaled
+from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.streams import (
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    Hits,
+    Rays,
+    hit_of,
+    put_hit,
+    put_ray,
+    ray_of,
+)
+from reference_rt.traversal import can_be_nearer
+from reference_rt.vec3 import row
+
+ALONE, MISSED, FOUND = -1, 0, 1
+
+
+@kernel
+def closest_of_rays(
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    t: FloatArray,
+    kind: IntArray,
+    rows: IntArray,
+    uv: FloatArray,
+) -> None:
+    """What rays from origins o (n, 3) into directions d (n, 3) hit first, see `query.Closest`."""
+    rays = Rays(local_floats(RAY_FLOATS))
+    hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
+    for begin in range(0, len(o), BUNDLE):
+        end = min(begin + BUNDLE, len(o))
+        for i in range(begin, end):
+            t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
+        outcome = ALONE
+        if end == begin + BUNDLE:
+            outcome = closest_together(geometry, o, d, begin, rays, hits)
+        if outcome == MISSED:
+            continue
+        for i in range(begin, end):
+            if outcome == FOUND:
+                j = i - begin
+                _tell(ray_of(rays, j), 1.0, hit_of(hits, j), i, t, kind, rows, uv)
+                continue
+            ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
+            if valid:
+                _tell(ray, unit, closest_hit(geometry, ray), i, t, kind, rows, uv)
+
+
+@kernel
+def _tell(
+    ray: Ray,
+    unit: float,
+    hit: Hit,
+    i: int,
+    t: FloatArray,
+    kind: IntArray,
+    rows: IntArray,
+    uv: FloatArray,
+) -> None:
+    """Write what ray number i has hit, if it has; unit: of its t, see `scaled`."""
+    if hit.kind >= 0 and is_told(hit.t * unit, at(ray, hit.t)):
+        t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
+        uv[i, 0], uv[i, 1] = hit.u, hit.v
+
+
+@kernel
+def closest_together(
+    geometry: Geometry, o: FloatArray, d: FloatArray, begin: int, rays: Rays, hits: Hits
+) -> int:
+    """`closest_hit` of the BUNDLE rays from origins o (n, 3) into directions d (n, 3) from number
+    `begin` on.
+
+    ALONE: they are not coherent, or have no hierarchy to go through;  MISSED: none met anything;
+    FOUND: `hits` are those of `rays`, of which they are the first.
+    """
+    if not are_alike(row(d, begin), row(d, begin + BUNDLE - 1)):
+        return ALONE
+    return _closest_together(geometry.bvh, geometry.instances, geometry, o, d, begin, rays, hits)
+
+
+@kernel
+def _closest_together(
+    bvh: Bvh | None,
+    instances: Instances | None,
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    begin: int,
+    rays: Rays,
+    hits: Hits,
+) -> int:
+    if bvh is None:
+        return ALONE
+    if instances is not None:  # where rays have directions and origins of their own in each
+        return ALONE
+    return _traverse(bvh, geometry, o, d, begin, rays, hits)
+
+
+@kernel
+def _traverse(
+    bvh: Bvh, geometry: Geometry, o: FloatArray, d: FloatArray, begin: int, rays: Rays, hits: Hits
+) -> int:
+    span, own = local_floats(SPAN_FLOATS), local_floats(OWN_FLOATS)
+    bundle = bundle_of(bvh, o, d, begin, span)
+    if not bundle.together:
+        return ALONE
+    stack, waiting = local_integers(STACK), local_floats(STACK)
+    distances = local_floats(LANES)
+    outcome, t_max = MISSED, math.inf
+    # Children are called by their places, node * LANES + lane, by which their boxes are found.
+    node, place, top = 0, -1, 0
+    unbounded = bvh.unbounded
+    while True:
+        while node >= 0:
+            met = enter_together(bvh, node, bundle, t_max, distances)
+            if met == 0:
+                node = NOTHING
+            else:
+                place, top = _nearest_place(node, met, distances, stack, waiting, top)
+                node = child_of(bvh, place // LANES, place % LANES)
+        if node != NOTHING:
+            if outcome == MISSED:
+                outcome = FOUND
+                for j in range(BUNDLE):
+                    ray = Ray(row(o, begin + j), row(d, begin + j), math.inf)
+                    put_ray(rays, j, ray)
+                    put_hit(hits, j, no_hit(ray))
+                prepare_each(bvh, bundle, rays, own)
+            if _nearest_of_leaf(bvh, geometry, node, place, bundle, rays, own, hits):
+                t_max = 0.0
+                for j in range(BUNDLE):
+                    t_max = max(t_max, hits.numbers[j])
+        node = NOTHING
+        while top > 0 and node == NOTHING:
+            top -= 1
+            if can_be_nearer(waiting[top], t_max):
+                place = stack[top]
+                node = child_of(bvh, place // LANES, place % LANES)
+        if node == NOTHING:
+            if unbounded < 0:
+                return outcome
+            node, unbounded = unbounded, -1
+
+
+@kernel
+def _nearest_of_leaf(
+    bvh: Bvh,
+    geometry: Geometry,
+    leaf: int,
+    place: int,
+    bundle: Bundle,
+    rays: Rays,
+    own: FloatArray,
+    hits: Hits,
+) -> bool:
+    """Let each ray of a bundle that enters a leaf, the child at a place, find what is nearer there
+    than its hit so far; whether any did enter."""
+    any_entered = False
+    for begin in range(0, BUNDLE, LANES):
+        entered = enter_child(bvh, place, bundle, begin, own, hits.numbers)
+        while entered != 0:
+            j = begin + lowest(entered)
+            entered &= entered - 1
+            any_entered = True
+            shear = shear_in(bundle, rays, j, own)
+            closest = hit_of(hits, j)
+            if is_packet(leaf):
+                closest = nearest_of_packet(
+                    bvh.corners, bvh, geometry.shapes, leaf, shear, -1, closest
+                )
+            else:
+                ray, first = ray_of(rays, j), first_of(leaf)
+                for k in range(first, first + size_of(leaf)):
+                    closest = nearer_primitive(
+                        bvh,
+                        geometry.shapes,
+                        geometry.solids,
+                        kind_of(bvh, k),
+                        row_of(bvh, k),
+                        ray,
+                        shear,
+                        -1,
+                        closest,
+                    )
+            put_hit(hits, j, closest)
+    return any_entered
+
+
+@kernel
+def _nearest_place(
+    node: int, met: int, distances: FloatArray, stack: IntArray, waiting: FloatArray, top: int
+) -> tuple[int, int]:
+    """As `traversal.nearest_child`, with children's places."""
+    lane = lowest(met)
+    nearest, t_nearest = node * LANES + lane, distances[lane]
+    met &= met - 1
+    bottom = top
+    while met != 0:
+        lane = lowest(met)
+        met &= met - 1
+        place, t = node * LANES + lane, distances[lane]
+        if t < t_nearest:
+            place, nearest = nearest, place
+            t, t_nearest = t_nearest, t
+        k = top
+        while k > bottom and waiting[k - 1] < t:
+            stack[k], waiting[k] = stack[k - 1], waiting[k - 1]
+            k -= 1
+        stack[k], waiting[k] = place, t
+        top += 1
+    return nearest, top
