@@ -17,14 +17,14 @@ from reference_rt.vec3 import Vec3, to_local, to_world
 
 class Materials(NamedTuple):
     """Of each material: kind (n,) and row (n,), which table it is a row of, where it is no layers,
-    kind None where there is but one table;
-    smooth (n,), whether lights can be sampled, None where all are smooth;  chooses (n,), whether
-    `sample` uses `u_lobe`, None where none does;  behind (n,), whether light from both sides of the
-    surface counts, None where it never does;  shown (n), its colour to ray casting.
+    kind None where there is but one table;  smooth (n,), whether lights can be sampled, None where
+    all are smooth;  chooses (n,), whether `sample` uses `u_lobe`, None where none does;
+    behind (n,), whether light from both sides of the surface counts, None where it never does;
+    shown (n), its colour to ray casting.
 
     oriented (1,) where any scatters differently along u and v, or is tilted by a texture, else
-    None;  textured, None where none has a texture;  layers, None where no material is made of
-    others;  leaves, the tables."""
+    None;  asks (n,), whether it asks a texture, None where all or none do;  textured, None where
+    none has one for a colour;  layers, None where none is made of others;  leaves, the tables."""
 
     kind: IntArray | None
     row: IntArray
@@ -33,6 +33,7 @@ class Materials(NamedTuple):
     behind: IntArray | None
     shown: Colours
     oriented: IntArray | None
+    asks: IntArray | None
     textured: Textured | None
     layers: Layers | None
     leaves: Leaves
@@ -67,6 +68,12 @@ def is_smooth(materials: Materials, m: int) -> bool:
 def chooses(materials: Materials, m: int) -> bool:
     """Whether `sample` uses its number for the choice of a lobe."""
     return _flag(materials.chooses, m, False)
+
+
+@kernel
+def asks_textures(materials: Materials, m: int) -> bool:
+    """Whether it matters where textures are asked."""
+    return _flag(materials.asks, m, True)
 
 
 @kernel
