@@ -274,26 +274,6 @@ def _look_up(textures, colour, u, v, out):
         out[i, 3], out[i, 4] = lookup_gradient(k, at)
 
 
-def test_where_textures_are_asked(tmp_path):
-    """Surface coordinates are found for materials that ask a texture, heights included."""
-    Image.fromarray(IMAGE).save(tmp_path / "image.png")
-    materials = {
-        "grey": rt.Diffuse(),
-        "chequered": rt.Diffuse(reflectance="squares"),
-        "dented": rt.Bump(base="grey", height="image"),
-        "both": rt.TwoSided(base="grey", back="chequered"),
-        "lamp": rt.Emissive(radiance=1, base="chequered"),
-        "plain lamp": rt.Emissive(radiance=1),
-    }
-    (tmp_path / "empty.yaml").write_text("{}")
-    scene = rt.Scene.load(tmp_path / "empty.yaml").changed(
-        textures={"squares": Checker(), "image": Bitmap(file="image.png")}, materials=materials
-    )
-    assert scene.tables.materials.asks.tolist() == [0, 1, 1, 1, 1, 0]
-    some = {name: materials[name] for name in ("chequered", "lamp")}
-    assert scene.changed(materials=some).tables.materials.asks is None
-
-
 def test_compiled_and_plain_give_the_same_bits(tmp_path):
     uv = UvMap(scale=(5.0, 3.0), rotate=77.0, offset=(0.3, 0.1))
     textures = tables_of(
