@@ -2,7 +2,7 @@
 
 from reference_rt.geometry import Geometry, coordinates, surface, tangents
 from reference_rt.kernel import kernel
-from reference_rt.materials import Shading, prepare
+from reference_rt.materials import Shading, asks_textures, prepare
 from reference_rt.materials.textured import look, looked_floats
 from reference_rt.ray import Hit, Ray
 from reference_rt.shading_frame import oriented_frame
@@ -24,12 +24,20 @@ def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
     world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
     frame = _frame(scene.materials.oriented, point.ns, world)
     local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))
-    at = texture_place(scene.textures, scene.geometry, ray, hit)
+    at = _place(scene, point.material, ray, hit)
     looked = look(scene.materials.textured, point.material, at, kept)
     layers = kept[looked_floats(scene.materials.textured) :]
     shading = Shading(point, frame, to_local(frame, -ray.d), looked, local, layers)
     prepare(scene.materials, shading, at)
     return shading
+
+
+@kernel
+def _place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
+    """Where the textures of material m are asked at a hit; anywhere, if it has none."""
+    if not asks_textures(scene.materials, m):
+        return At(scene.textures, 0.0, 0.0, _NO_COLOUR)
+    return texture_place(scene.textures, scene.geometry, ray, hit)
 
 
 @kernel

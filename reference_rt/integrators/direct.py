@@ -39,6 +39,11 @@ class Direct(Description):
             raise ValueError("no samples at all; expected light_samples or bsdf_samples above 0")
         return self
 
+    @property
+    def follows_scattered(self) -> bool:
+        """Whether scattered rays bring the light of what is sampled too."""
+        return self.bsdf_samples > 0
+
     def setup(self) -> "DirectSetup":
         return DirectSetup(self.light_samples, self.bsdf_samples)
 

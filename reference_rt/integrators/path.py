@@ -50,6 +50,11 @@ class Path(Description):
     """What finds lights: samples of lights, of the materials, or both, each weighted by how well
     it does (the same mean, most noise for one alone).  What only one can find, it finds."""
 
+    @property
+    def follows_scattered(self) -> bool:
+        """Whether scattered rays bring the light of what is sampled too."""
+        return self.sampling != "lights"
+
     def setup(self) -> "PathSetup":
         limit = UNLIMITED if self.max_depth is None else min(self.max_depth, UNLIMITED)
         return PathSetup(limit, self.rr_depth, _SAMPLING.index(self.sampling))

@@ -18,6 +18,7 @@ class RayCast(Description):
     """The display modes: one ray per pixel; all layers are computed, one is the picture."""
 
     deterministic: ClassVar[bool] = True
+    follows_scattered: ClassVar[bool] = False
     type: Literal["ray_cast"] = "ray_cast"
     show: Literal["colour", "distance", "normal", "id", "uv"] = "colour"
     """Which layer is the picture: the surface's own colour, the distance from the eye, the

@@ -30,6 +30,7 @@ class Whitted(Description):
     """
 
     deterministic: ClassVar[bool] = True
+    follows_scattered: ClassVar[bool] = False
     type: Literal["whitted"] = "whitted"
     max_depth: Annotated[int, Field(ge=0, le=4096)] = 8
     """Most mirrorings and refractions of a ray."""

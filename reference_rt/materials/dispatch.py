@@ -17,14 +17,14 @@ from reference_rt.vec3 import Vec3, to_local, to_world
 
 class Materials(NamedTuple):
     """Of each material: kind (n,) and row (n,), which table it is a row of, where it is no layers,
-    kind None where there is but one table;
-    smooth (n,), whether lights can be sampled, None where all are smooth;  chooses (n,), whether
-    `sample` uses `u_lobe`, None where none does;  behind (n,), whether light from both sides of the
-    surface counts, None where it never does;  shown (n), its colour to ray casting.
+    kind None where there is but one table;  smooth (n,), whether lights can be sampled, None where
+    all are smooth;  chooses (n,), whether `sample` uses `u_lobe`, None where none does;
+    behind (n,), whether light from both sides of the surface counts, None where it never does;
+    shown (n), its colour to ray casting.
 
     oriented (1,) where any scatters differently along u and v, or is tilted by a texture, else
-    None;  textured, None where none has a texture;  layers, None where no material is made of
-    others;  leaves, the tables."""
+    None;  asks (n,), whether it asks a texture, None where all or none do;  textured, None where
+    none has one for a colour;  layers, None where none is made of others;  leaves, the tables."""
 
     kind: IntArray | None
     row: IntArray
@@ -33,6 +33,7 @@ class Materials(NamedTuple):
     behind: IntArray | None
     shown: Colours
     oriented: IntArray | None
+    asks: IntArray | None
     textured: Textured | None
     layers: Layers | None
     leaves: Leaves
@@ -70,6 +71,12 @@ def chooses(materials: Materials, m: int) -> bool:
 
 
 @kernel
+def asks_textures(materials: Materials, m: int) -> bool:
+    """Whether it matters where textures are asked."""
+    return _flag(materials.asks, m, True)
+
+
+@kernel
 def takes_light_from_behind(materials: Materials, m: int) -> bool:
     """Whether light that comes from both sides of the surface may reach the viewer."""
     return _flag(materials.behind, m, False)
@@ -78,50 +85,13 @@ def takes_light_from_behind(materials: Materials, m: int) -> bool:
 @kernel
 def evaluate(materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
     """f(wo, wi) |cos wi|, without what is mirrored or refracted perfectly."""
-    return _evaluate(materials.layers, materials, shading, wi)
-
-
-@kernel
-def _evaluate(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
-    m = shading.point.material
-    if layers is None:
-        kind, i = _kind(materials.kind, materials, m), materials.row[m]
-        return any_leaf.evaluate(materials.leaves, kind, i, shading.at, shading.wo, wi)
-    total = Vec3(0.0, 0.0, 0.0)
-    first = layers.first[m]
-    for k in range(layers.number[m]):
-        layer = layer_at(shading, k)
-        if layer.weight > 0.0 and lets(layer, wi):
-            wo_in, wi_in = to_local(layer.basis, shading.wo), to_local(layer.basis, wi)
-            kind, i = layers.kind[first + k], layers.row[first + k]
-            value = any_leaf.evaluate(materials.leaves, kind, i, shading.at, wo_in, wi_in)
-            total = total + value * layer.weight
-    return total
+    return both(materials, shading, wi).value
 
 
 @kernel
 def pdf(materials: Materials, shading: Shading, wi: Vec3) -> float:
     """The density per solid angle with which `sample` picks `wi`; discrete directions apart."""
-    return _pdf(materials.layers, materials, shading, wi)
-
-
-@kernel
-def _pdf(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> float:
-    m = shading.point.material
-    if layers is None:
-        kind, i = _kind(materials.kind, materials, m), materials.row[m]
-        return any_leaf.pdf(materials.leaves, kind, i, shading.at, shading.wo, wi)
-    density, total = 0.0, 0.0
-    first = layers.first[m]
-    for k in range(layers.number[m]):
-        layer = layer_at(shading, k)
-        if layer.weight > 0.0:
-            total += layer.weight
-            wo_in, wi_in = to_local(layer.basis, shading.wo), to_local(layer.basis, wi)
-            kind, i = layers.kind[first + k], layers.row[first + k]
-            one = any_leaf.pdf(materials.leaves, kind, i, shading.at, wo_in, wi_in)
-            density += one * layer.weight
-    return density / total if total > 0.0 else 0.0
+    return both(materials, shading, wi).density
 
 
 @kernel
@@ -136,9 +106,19 @@ def _both(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec
     if layers is None:
         kind, i = _kind(materials.kind, materials, m), materials.row[m]
         return any_leaf.both(materials.leaves, kind, i, shading.at, shading.wo, wi)
-    return Scattered(
-        _evaluate(layers, materials, shading, wi), _pdf(layers, materials, shading, wi)
-    )
+    value, density, total = Vec3(0.0, 0.0, 0.0), 0.0, 0.0
+    first = layers.first[m]
+    for k in range(layers.number[m]):
+        layer = layer_at(shading, k)
+        if layer.weight > 0.0:
+            total += layer.weight
+            wo_in, wi_in = to_local(layer.basis, shading.wo), to_local(layer.basis, wi)
+            kind, i = layers.kind[first + k], layers.row[first + k]
+            one = any_leaf.both(materials.leaves, kind, i, shading.at, wo_in, wi_in)
+            if lets(layer, wi):
+                value = value + one.value * layer.weight
+            density += one.density * layer.weight
+    return Scattered(value, density / total if total > 0.0 else 0.0)
 
 
 @kernel
@@ -195,11 +175,10 @@ def _sample(
     if count == 1:
         return BsdfSample(wi, drawn.weight * total, drawn.pdf, drawn.eta, False)
     # All layers could have drawn it.
-    density = _pdf(layers, materials, shading, wi)
-    if not density > 0.0:
+    found = _both(layers, materials, shading, wi)
+    if not found.density > 0.0:
         return no_sample()
-    value = _evaluate(layers, materials, shading, wi)
-    return BsdfSample(wi, value * (1.0 / density), density, drawn.eta, False)
+    return BsdfSample(wi, found.value * (1.0 / found.density), found.density, drawn.eta, False)
 
 
 @kernel

@@ -12,7 +12,7 @@ from reference_rt.materials.layers import LayerTables
 from reference_rt.materials.leaves import BLACK, CLEAR, TABLES, Leaves
 from reference_rt.materials.material import Material
 from reference_rt.materials.phong import Phong
-from reference_rt.materials.textured import textured_table
+from reference_rt.materials.textured import asks_textures, textured_table
 from reference_rt.materials.ways import Way, needs_tangents, transmits, ways
 from reference_rt.materials.wrappers import Wrapper
 from reference_rt.textures import Palette
@@ -57,6 +57,7 @@ def material_tables(scene: "Scene", palette: Palette, default: bool) -> Material
         traits.append(_traits(found, materials))
         oriented = oriented or any(needs_tangents(way, materials) for way in found)
     smooth, chooses, behind = np.ascontiguousarray(np.array(traits, np.int64).T)
+    asks = np.array([asks_textures(name, materials) for name in materials], np.int64)
     is_one_table = len(leaves.parts) == 1 and set(kinds) == leaves.parts.keys()
     return Materials(
         kind=None if is_one_table else np.array(kinds),
@@ -66,6 +67,7 @@ def material_tables(scene: "Scene", palette: Palette, default: bool) -> Material
         behind=behind if behind.any() else None,
         shown=join(shown),
         oriented=np.zeros(1, np.int64) if oriented else None,
+        asks=asks if asks.any() and not asks.all() else None,
         textured=textured_table(materials, palette),
         layers=layers.tables(),
         leaves=leaves.tables(),

@@ -44,17 +44,29 @@ def textured_table(materials: Mapping[str, Material], palette: Palette) -> Textu
 def _textures(name: str, materials: Mapping[str, Material], palette: Palette) -> set[int]:
     """The numbers of the textures that a material asks for colours."""
     material = materials[name]
-    if isinstance(material, Wrapper):
-        below = [getattr(material, base) for base in material.bases]
-    else:
-        below = [material.base] if isinstance(material, Emissive) else []
     found = {
         palette.numbers_of[texture]
         for field, texture in texture_names(material).items()
         # Of heights, the slopes are asked, and there is one place for that anyway.
         if not (isinstance(material, Bump) and field == "height")
     }
-    return found.union(*(_textures(base, materials, palette) for base in below if base is not None))
+    return found.union(*(_textures(base, materials, palette) for base in _bases(material)))
+
+
+def asks_textures(name: str, materials: Mapping[str, Material]) -> bool:
+    """Whether a material asks any texture, also for heights."""
+    material = materials[name]
+    asked = [asks_textures(base, materials) for base in _bases(material)]
+    return bool(texture_names(material)) or any(asked)
+
+
+def _bases(material: Material) -> list[str]:
+    """The names of those that a material is made of."""
+    if isinstance(material, Wrapper):
+        named = [getattr(material, base) for base in material.bases]
+    else:
+        named = [material.base] if isinstance(material, Emissive) else []
+    return [base for base in named if base is not None]
 
 
 @kernel

@@ -192,6 +192,45 @@ def test_whitteds_environment_is_seen_and_lights_nothing():
 # ---- furnaces -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("integrator", "share"),
+    [
+        (rt.Path(max_depth=2), 0.125),
+        (rt.Path(max_depth=2, sampling="bsdf"), 0.125),
+        (rt.Path(max_depth=2, sampling="lights"), 0.99),
+        (rt.Direct(), 0.125),
+        (rt.Direct(bsdf_samples=0), 0.99),
+    ],
+    ids=["both", "bsdf", "lights", "direct", "direct lights"],
+)
+def test_a_lamp_under_a_sky(integrator, share):
+    """The sky is picked seldom where scattered rays find it too, and gives as much as ever."""
+    m = transform.affine(STEPS)
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+    seen = polygon_irradiance(transform.apply_points(m, square), UP)
+    sky = np.array([2.0, 0.5, 1.0])
+    lamp = rt.Rectangle(transform=STEPS, material="lamp")
+    scene = lit(lamp, lights=(rt.Constant(radiance=tuple(sky)),)).changed(integrator=integrator)
+    chances = scene.tables.lights.choice.probability
+    assert chances[1] == share if share < 0.5 else chances[1] > share
+    assert chances.sum() == pytest.approx(1.0, abs=1e-15)
+    assert_estimates(scene, RHO / math.pi * (RADIANCE * seen + sky * (math.pi - seen)))
+
+
+def test_a_sky_without_other_lights_keeps_its_share():
+    """Also beside lamps without power; what other lights have goes by their power."""
+    sky, point = rt.Constant(radiance=1), rt.Point(position=(0, 5, 0), intensity=1)
+    dark = point.model_copy(update={"intensity": (0.0, 0.0, 0.0)})
+    twice = point.model_copy(update={"intensity": (2.0, 2.0, 2.0)})
+    for lights, expected in (
+        ((sky,), [1]),
+        ((dark, sky), [0, 1]),
+        ((point, dark, twice, sky), [7 / 24, 0, 14 / 24, 1 / 8]),
+    ):
+        chances = lit(BLACK, lights=lights).tables.lights.choice.probability
+        np.testing.assert_allclose(chances, expected, rtol=1e-15)
+
+
 def test_open_furnace():
     """A convex body in a constant environment: reflectance times radiance, wherever it is seen."""
     camera = rt.Orthographic(eye=(0, 0, 5), width=0.5)

@@ -185,3 +185,21 @@ def test_the_only_table_is_known():
     for code, field, _, _, _ in TABLES:
         one = Leaves(**dict.fromkeys(Leaves._fields) | {field: ()})
         assert only(one) == code
+
+
+def test_who_asks_textures():
+    """Surface coordinates are found for materials that ask a texture, for heights too."""
+    materials = {
+        "grey": rt.Diffuse(),
+        "chequered": rt.Diffuse(reflectance="squares"),
+        "dented": rt.Bump(base="grey", height="squares"),
+        "both": rt.TwoSided(base="grey", back="chequered"),
+        "lamp": rt.Emissive(radiance=1, base="chequered"),
+        "plain lamp": rt.Emissive(radiance=1),
+    }
+    body = rt.Sphere(material="grey")
+    scene = rt.Scene(textures={"squares": rt.Checker()}, materials=materials, shapes=(body,))
+    assert scene.tables.materials.asks.tolist() == [0, 1, 1, 1, 1, 0]
+    asking = {"chequered": materials["chequered"], "lamp": materials["lamp"]}
+    body = rt.Sphere(material="chequered")
+    assert scene.changed(materials=asking, shapes=(body,)).tables.materials.asks is None
