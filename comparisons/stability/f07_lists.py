@@ -14,12 +14,12 @@ from comparisons.sizes import LeafSizes
 from comparisons.stability.f07_trees import MESH
 from comparisons.stability.family import FloatArray
 from reference_rt import csg, methods
-from reference_rt.csg.all_crossings import crossings
+from reference_rt.csg.all_crossings import SolidCrossings, crossings
 from reference_rt.methods.csg import interval_list
 from reference_rt.methods.operands import CsgParameters
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import IntArray, Place
-from reference_rt.transform import Affine, Matrix
+from reference_rt.tables import SceneTables
 
 INTERVALS, INSIDE_TESTS = "csg.intervals", "csg.inside_tests"
 
@@ -44,7 +44,10 @@ class Lists(NamedTuple):
 
 
 def ours(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> Lists:
-    found = crossings(scene_of(solid, folder).tables, 0, o, d, MOST)
+    return _lists(crossings(scene_of(solid, folder).tables, 0, o, d, MOST))
+
+
+def _lists(found: SolidCrossings) -> Lists:
     assert found.count.max(initial=0) <= MOST
     k = int(found.count.max(initial=0))
     return Lists(found.t[:, :k], found.width[:, :k])
@@ -105,7 +108,8 @@ def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth
         for shape, outer in operands
     ]
     found = [crossings_of(leaf, (seen, d), exact) for leaf in leaves]
-    stated = [ours(_alone(shape, outer), folder, seen, d) for shape, outer in operands]
+    tables = scene_of(solid, folder).tables
+    stated = [_alone(tables, k, o, d) for k in range(len(operands))]
     return [
         _truth(
             tree,
@@ -117,9 +121,22 @@ def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth
     ]
 
 
-def _alone(shape: Any, outer: Affine) -> Any:
-    """A solid of this operand alone."""
-    return rt.Union(of=(shape,), transform=(Matrix.model_validate({"matrix": outer.tolist()}),))
+def _alone(tables: SceneTables, k: int, o: FloatArray, d: FloatArray) -> Lists:
+    """What ours states of operand k alone, where it stands in the solid 0: by itself it would count
+    its coordinates from an anchor of its own, and round otherwise."""
+    solids = tables.geometry.solids
+    assert solids is not None
+    one, zero = np.ones(1, np.int64), np.zeros(1, np.int64)
+    alone = solids._replace(
+        first=solids.first + k,
+        operands=one,
+        step_first=zero,
+        step_count=one,
+        depth=one,
+        steps=zero,
+    )
+    geometry = tables.geometry._replace(solids=alone)
+    return _lists(crossings(tables._replace(geometry=geometry), 0, o, d, MOST))
 
 
 def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists]) -> Truth:
