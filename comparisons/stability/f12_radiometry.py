@@ -13,6 +13,9 @@ Laws, u = 2^-53 (Mitsuba: its own u = 2^-24, and numbers that float32 holds):
   do lamps of radiance 1e-30 to 1e30: within their noise (see `chance`) and to a tenth, finite;
 - paths with roulette at every bounce gather (1 - a^n) / (1 - a) in n edges of a closed furnace, n
   to 1e3, within their noise and to a tenth.
+
+Counts of a setting in full: 20,000 points for point lights, spots and spheres, 2,000 for rectangles
+and for triangles, 400 numbers at each; pictures of 1024 pixels of 16 samples, 64 for roulette.
 """
 
 from comparisons.stability.f12_flat_lights import FLAT, SKY
