@@ -204,6 +204,7 @@ TRUE = Truth(
     False,
     np.array([1.05, 2.05]),
     np.array([0.01, 0.01]),
+    np.array([0, 0]),
 )
 
 
