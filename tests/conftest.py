@@ -1,8 +1,13 @@
 """In which order processes take the files of tests."""
 
+import sys
 from pathlib import Path
 
 import pytest
+
+# pytest puts this folder on the path, where its own folder `reference_rt` would stand for the
+# package if that is installed as editable.
+sys.path[:] = [path for path in sys.path if Path(path) != Path(__file__).parent]
 
 LONGEST_FIRST = (
     "test_extremes",  # compiles for all that stand on `worlds`
