@@ -21,7 +21,7 @@ def stability(
         list[str] | None, typer.Option(help="Only these, F1 to F14; several times for several.")
     ] = None,
     full: Annotated[
-        bool, typer.Option("--full/--quick", help="All of it: half an hour, not two minutes.")
+        bool, typer.Option("--full/--quick", help="All of it: some twenty minutes, not two.")
     ] = False,
     series: Annotated[
         str | None, typer.Option(metavar="NAME", help="Only this series of the one family.")
