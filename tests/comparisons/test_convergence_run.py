@@ -60,9 +60,9 @@ def test_reference_is_kept_and_added_to(own_cache):
     assert few.seconds > 0.0 == kept.seconds
     np.testing.assert_array_equal(few.mean, kept.mean)
     assert (few.spp, kept.spp, more.spp, more.count) == (16, 16, 64, COUNT)
-    # Four times the samples, more evenly placed: a quarter or less.  Each is known to some 15 %: 16
-    # pictures tell a pixel's variance to a third, and few of 144 pixels have most of it.
-    assert more.relmse < few.relmse / 4.0 * (1.0 + 3.0 * 2.0**0.5 * 0.15)
+    # Over 80 seeds, which follow the sources, four times the samples have 0.27 of the variance, as
+    # 16 pictures tell it, with a standard deviation of 0.044: four of these.
+    assert more.relmse < 0.45 * few.relmse
     assert not np.array_equal(few.mean, more.mean)
     off = (few.mean - more.mean) / np.sqrt(few.variance + 1e-12)
     assert 0.5 < np.sqrt((off**2).mean()) < 2.0  # of one picture, by its own standard error
