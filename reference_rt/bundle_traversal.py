@@ -3,14 +3,14 @@
 from typing import Any
 
 from reference_rt.bundles import BUNDLE, Bundle
-from reference_rt.bvh import CENTER, FAR_SLACK, Bvh
+from reference_rt.bvh import CENTER, FAR_SLACK, NODE_SINGLES, Bvh
 from reference_rt.kernel import kernel
-from reference_rt.lanes import LANES, lane_kernel, larger, smaller
+from reference_rt.lane_kernels import lane_kernel
+from reference_rt.lanes import LANES, larger, smaller
 from reference_rt.ray import BLOCK
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.shapes.watertight import Shear
 from reference_rt.streams import Rays
-from reference_rt.traversal import NODE_SINGLES
 from reference_rt.vec3 import component
 
 OWN_FLOATS = 12 * BUNDLE

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 from reference_rt.bvh import CENTER, Bvh
 from reference_rt.kernel import kernel, reciprocal
-from reference_rt.lanes import LANES, lane_kernel, larger, smaller
+from reference_rt.lane_kernels import lane_kernel
+from reference_rt.lanes import LANES, larger, smaller
 from reference_rt.ray import surface_error
 from reference_rt.scaled_ray import SHORT
 from reference_rt.shapes.shape import FloatArray

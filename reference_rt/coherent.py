@@ -1,4 +1,4 @@
-"""The closest hits of arrays of rays, of which neighbours may go together."""
+"""The closest hits of neighbouring rays that go through a hierarchy together."""
 
 import math
 
@@ -14,20 +14,16 @@ from reference_rt.bvh import NOTHING, Bvh, child_of, first_of, is_packet, kind_o
 from reference_rt.geometry import (
     STACK,
     Geometry,
-    closest_hit,
     nearer_primitive,
     nearest_of_packet,
 )
 from reference_rt.groups import Instances
 from reference_rt.kernel import kernel, local_floats, local_integers
-from reference_rt.lanes import LANES, lowest
-from reference_rt.ray import Hit, Ray, at, no_hit
-from reference_rt.scaled_ray import is_told, scaled
+from reference_rt.lane_kernels import lowest
+from reference_rt.lanes import LANES
+from reference_rt.ray import Ray, no_hit
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.streams import (
-    HIT_FLOATS,
-    HIT_INTEGERS,
-    RAY_FLOATS,
     Hits,
     Rays,
     hit_of,
@@ -39,55 +35,6 @@ from reference_rt.traversal import can_be_nearer
 from reference_rt.vec3 import row
 
 ALONE, MISSED, FOUND = -1, 0, 1
-
-
-@kernel
-def closest_of_rays(
-    geometry: Geometry,
-    o: FloatArray,
-    d: FloatArray,
-    t: FloatArray,
-    kind: IntArray,
-    rows: IntArray,
-    uv: FloatArray,
-) -> None:
-    """What rays from origins o (n, 3) into directions d (n, 3) hit first, see `query.Closest`."""
-    rays = Rays(local_floats(RAY_FLOATS))
-    hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
-    for begin in range(0, len(o), BUNDLE):
-        end = min(begin + BUNDLE, len(o))
-        for i in range(begin, end):
-            t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
-        outcome = ALONE
-        if end == begin + BUNDLE:
-            outcome = closest_together(geometry, o, d, begin, rays, hits)
-        if outcome == MISSED:
-            continue
-        for i in range(begin, end):
-            if outcome == FOUND:
-                j = i - begin
-                _tell(ray_of(rays, j), 1.0, hit_of(hits, j), i, t, kind, rows, uv)
-                continue
-            ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
-            if valid:
-                _tell(ray, unit, closest_hit(geometry, ray), i, t, kind, rows, uv)
-
-
-@kernel
-def _tell(
-    ray: Ray,
-    unit: float,
-    hit: Hit,
-    i: int,
-    t: FloatArray,
-    kind: IntArray,
-    rows: IntArray,
-    uv: FloatArray,
-) -> None:
-    """Write what ray number i has hit, if it has; unit: of its t, see `scaled`."""
-    if hit.kind >= 0 and is_told(hit.t * unit, at(ray, hit.t)):
-        t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
-        uv[i, 0], uv[i, 1] = hit.u, hit.v
 
 
 @kernel

@@ -9,7 +9,8 @@ from reference_rt.csg.anchor import out_of_solid, ray_near
 from reference_rt.csg.tables import Parts, Solids
 from reference_rt.groups import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.kernel import kernel, local_floats, local_integers
-from reference_rt.lanes import LANES, lowest
+from reference_rt.lane_kernels import lowest
+from reference_rt.lanes import LANES
 from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, no_hit
 from reference_rt.shapes import TRIANGLE, Packets, Shapes, triangle
 from reference_rt.shapes.shape import FloatArray, Tangents

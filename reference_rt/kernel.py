@@ -174,7 +174,7 @@ def _local_array(dtype: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             item = context.get_data_type(dtype)
             data = builder.alloca(item, size=arguments[0])
-            data.align = 8
+            data.align = 64  # a line of the cache: vectors that cross its end take longer
             item_size = context.get_constant(types.intp, context.get_abi_sizeof(item))
             array = context.make_array(array_type)(context, builder)
             arrayobj.populate_array(
@@ -202,9 +202,14 @@ if numba.config.DISABLE_JIT:
         """Scratch for `n` integers, likewise."""
         return np.empty(n, np.int64)
 
+    def local_naturals(n: int) -> npt.NDArray[np.uint32]:
+        """Scratch for `n` integers that are not negative, likewise."""
+        return np.empty(n, np.uint32)
+
 else:
     local_floats = _local_array(types.float64)
     local_integers = _local_array(types.int64)
+    local_naturals = _local_array(types.uint32)
 
 
 @kernel

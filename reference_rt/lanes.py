@@ -8,17 +8,15 @@ IEEE's rules, in the order written: the results are the same bits.  Where the pr
 vectors that wide LLVM uses narrower ones.
 
 Such a text has no branches.  Where it chooses, it calls `select`, `smaller` and `larger`; the
-square root and the sign are those below; conditions are joined by &, | and ~.
+square root and the sign are those below; conditions are joined by &, | and ~.  How kernels call it
+is in `lane_kernels`.
 """
 
-import functools
-import inspect
 import math
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -67,6 +65,12 @@ class Lanes:
         name = f"llvm.{name}.v{LANES}f64"
         function = cgutils.get_or_insert_function(self.builder.module, of_type, name)
         return Lanes(self.builder, self.builder.call(function, values))
+
+    def moved(self, by: int) -> "Lanes":
+        """In each lane the number of that whose index differs in the bits of `by`."""
+        which = ir.Constant(ir.VectorType(I32, LANES), [lane ^ by for lane in range(LANES)])
+        undefined = ir.Constant(REALS, ir.Undefined)
+        return Lanes(self.builder, self.builder.shuffle_vector(self.value, undefined, which))
 
     def compared(self, how: str, other: Any) -> Mask:
         return Mask(self.builder, self.builder.fcmp_ordered(how, self.value, self.of(other)))
@@ -129,12 +133,23 @@ def larger(a: Any, b: Any) -> Any:
     return select(b > a, b, a)
 
 
+def least(x: Any) -> Any:
+    """The smallest of the lanes, of which none may be NaN, in all of them."""
+    if not isinstance(x, Lanes):
+        return np.full(LANES, np.min(x))
+    for half in (4, 2, 1):
+        x = smaller(x, x.moved(half))
+    return x
+
+
 def square_root(x: Any) -> Any:
     return x.call("sqrt") if isinstance(x, Lanes) else math.sqrt(x)
 
 
 def with_sign(x: Any, sign: Any) -> Any:
-    return x.call("copysign", sign) if isinstance(x, Lanes) else math.copysign(x, sign)
+    if isinstance(x, Lanes):
+        return x.call("copysign", sign)
+    return np.copysign(x, sign) if isinstance(x, np.ndarray) else math.copysign(x, sign)
 
 
 def product_error(x: Any, y: Any, product: Any) -> Any:
@@ -181,145 +196,3 @@ def in_all_lanes(builder: ir.IRBuilder, x: ir.Value, of: ir.Type = REALS) -> ir.
     one = builder.insert_element(undefined, x, I32(0))
     which = ir.Constant(ir.VectorType(I32, LANES), [0] * LANES)
     return builder.shuffle_vector(one, undefined, which)
-
-
-class _Index:
-    """An integer of the code that is being written."""
-
-    def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
-        self.builder, self.value = builder, value
-
-    def of(self, x: Any) -> ir.Value:
-        return x.value if isinstance(x, _Index) else I64(x)
-
-    def __add__(self, other: Any) -> "_Index":
-        return _Index(self.builder, self.builder.add(self.value, self.of(other)))
-
-    def __mul__(self, other: Any) -> "_Index":
-        return _Index(self.builder, self.builder.mul(self.value, self.of(other)))
-
-    def __rsub__(self, other: Any) -> "_Index":
-        return _Index(self.builder, self.builder.sub(self.of(other), self.value))
-
-    __radd__, __rmul__ = __add__, __mul__
-
-
-class _Memory:
-    """An array of which LANES numbers are loaded and stored at once."""
-
-    def __init__(self, builder: ir.IRBuilder, data: ir.Value, is_single: bool) -> None:
-        self.builder, self.data, self.is_single = builder, data, is_single
-
-    def load(self, start: Any) -> Lanes:
-        of = ir.VectorType(ir.FloatType(), LANES) if self.is_single else REALS
-        value = self.builder.load(self._place(start, of), align=4 if self.is_single else 8)
-        return Lanes(self.builder, self.builder.fpext(value, REALS) if self.is_single else value)
-
-    def store(self, start: Any, lanes: Lanes) -> None:
-        self.builder.store(lanes.value, self._place(start, REALS), align=8)
-
-    def _place(self, start: Any, of: ir.Type) -> ir.Value:
-        at = start.value if isinstance(start, _Index) else I64(start)
-        return self.builder.bitcast(self.builder.gep(self.data, [at]), of.as_pointer())
-
-
-class _PlainMemory:
-    def __init__(self, array: Any) -> None:
-        self.flat = array.reshape(-1)
-
-    def load(self, start: int) -> Any:
-        return self.flat[start : start + LANES].astype(np.float64)
-
-    def store(self, start: int, lanes: Any) -> None:
-        self.flat[start : start + LANES] = lanes
-
-
-def plain(function: Callable[..., Any]) -> Callable[..., int]:
-    """A lane kernel as plain Python on NumPy's arrays."""
-
-    @functools.wraps(function)
-    def run(*arguments: Any) -> int:
-        wrapped: list[Any] = [
-            _PlainMemory(a)
-            if isinstance(a, np.ndarray)
-            else (np.full(LANES, a) if isinstance(a, float) else int(a))
-            for a in arguments
-        ]
-        return int(np.packbits(function(*wrapped), bitorder="little")[0])
-
-    return run
-
-
-def lane_kernel(function: Callable[..., Any]) -> Callable[..., int]:
-    """Let kernels call `function`, which returns the lanes that fulfil a condition, as bits.
-
-    Its arguments are C-contiguous arrays of float64 or float32, with load(i) of LANES numbers from
-    number i on and store(i, lanes) (float64 only); float64 numbers, which stand in every lane; and
-    integers, which may be added and multiplied.
-    """
-    if numba.config.DISABLE_JIT:
-        return plain(function)
-
-    def typed(typing_context: Any, *arguments: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            written: list[Any] = []
-            for of, value in zip(signature.args, values, strict=True):
-                if isinstance(of, types.Array):
-                    data = context.make_array(of)(context, builder, value).data
-                    written.append(_Memory(builder, data, of.dtype == types.float32))
-                elif of == types.float64:
-                    written.append(Lanes(builder, in_all_lanes(builder, value)))
-                else:
-                    written.append(_Index(builder, value))
-            bits = builder.bitcast(function(*written).value, ir.IntType(LANES))
-            return builder.zext(bits, I64)
-
-        return types.int64(*map(_taken_as, arguments)), generate
-
-    # Numba asks how many arguments there are.
-    names = ("typing_context", *inspect.signature(function).parameters)
-    kind = inspect.Parameter.POSITIONAL_ONLY
-    typed.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [inspect.Parameter(name, kind) for name in names]
-    )
-    made: Callable[..., int] = intrinsic(typed)
-    return made
-
-
-def _taken_as(of: Any) -> Any:
-    if isinstance(of, types.Array):
-        return of
-    return types.float64 if isinstance(of, types.Float) else types.int64
-
-
-if numba.config.DISABLE_JIT:
-
-    def lowest(bits: int) -> int:
-        """The number of the lowest bit that is set (one must be)."""
-        return int(bits & -bits).bit_length() - 1
-
-    def prefetch(array: Any, start: int) -> None:
-        """Ask for a number of an array, which will be read soon."""
-
-else:
-
-    @intrinsic  # type: ignore[untyped-decorator]
-    def lowest(typing_context: Any, bits: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            return builder.cttz(values[0], ir.IntType(1)(1))
-
-        return types.int64(types.int64), generate
-
-    @intrinsic  # type: ignore[untyped-decorator]
-    def prefetch(typing_context: Any, array: Any, start: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            data = context.make_array(array)(context, builder, values[0]).data
-            byte = ir.IntType(8).as_pointer()
-            of_type = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
-            function = builder.module.declare_intrinsic("llvm.prefetch", [byte], of_type)
-            place = builder.bitcast(builder.gep(data, [values[1]]), byte)
-            # To be read, kept in all caches, data.
-            builder.call(function, [place, I32(0), I32(3), I32(1)])
-            return context.get_dummy_value()
-
-        return types.void(array, types.int64), generate

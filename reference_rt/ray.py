@@ -81,6 +81,10 @@ def no_hit(ray: Ray) -> Hit:
     return Hit(ray.t_max, -1, -1, 0.0, 0.0, -1)
 
 
+SURFACE_ROUNDING = 16.0 * 1.7320508075688774 * UNIT_ROUNDOFF
+"""The share of the largest numbers that `surface_error` allows for."""
+
+
 @kernel
 def surface_error(p: Vec3, anchor: Vec3, size: float) -> float:
     """A bound on |distance to the surface|, for `SurfacePoint.error`.
@@ -91,7 +95,7 @@ def surface_error(p: Vec3, anchor: Vec3, size: float) -> float:
     takes as many of numbers no larger than |p - anchor| <= size and |p|.  Each is at most u times
     the number, and a vector's length is at most sqrt(3) times its largest component.
     """
-    return (16.0 * 1.7320508075688774 * UNIT_ROUNDOFF) * (max_abs(anchor) + max_abs(p) + size)
+    return SURFACE_ROUNDING * (max_abs(anchor) + max_abs(p) + size)
 
 
 @kernel

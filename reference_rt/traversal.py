@@ -3,15 +3,13 @@
 import math
 from typing import Any, NamedTuple
 
-from reference_rt.bvh import CENTER, FAR_SLACK, Bvh, child_of
+from reference_rt.bvh import CENTER, FAR_SLACK, NODE_SINGLES, Bvh, child_of
 from reference_rt.kernel import kernel, reciprocal
-from reference_rt.lanes import LANES, lane_kernel, larger, lowest, prefetch, smaller
+from reference_rt.lane_kernels import lane_kernel, lowest, prefetch
+from reference_rt.lanes import LANES, larger, smaller
 from reference_rt.ray import Ray, surface_error
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.vec3 import Vec3
-
-NODE_SINGLES = 64
-"""How many float32 numbers a node takes, in four cache lines."""
 
 
 class View(NamedTuple):
@@ -58,6 +56,24 @@ def view_of(bvh: Bvh, root: int, ray: Ray) -> View:
     )
 
 
+def between(boxes: Any, node: Any, view: Any, t_max: Any) -> Any:
+    """A text for lanes: where a ray enters the boxes of a node's children, which of them it enters
+    before t_max;  view: of x, y and z each the row of the near planes, and near, far and inverse of
+    `View`.
+
+    The rows of the near planes are chosen by the sign of d: the 0 * inf of a ray in a plane can
+    only be NaN, which `larger` and `smaller` pass over: such a plane does not limit the ray.
+    """
+    first = node * NODE_SINGLES
+    t_in, t_out = 0.0, t_max
+    for axis, (row, near, far, inverse) in enumerate(view):
+        near_plane = boxes.load(first + row * LANES)
+        far_plane = boxes.load(first + (3 + 2 * axis - row) * LANES)
+        t_in = larger(t_in, (near_plane - near) * inverse)
+        t_out = smaller(t_out, (far_plane - far) * inverse)
+    return t_in, t_in <= t_out * FAR_SLACK
+
+
 @lane_kernel
 def _entered(
     boxes: Any,
@@ -77,20 +93,15 @@ def _entered(
     t_max: Any,
     distances: Any,
 ) -> Any:
-    """The children whose boxes a ray enters before t_max, and where it enters them.
-
-    The rows of the near planes are chosen by the sign of d: the 0 * inf of a ray in a plane can
-    only be NaN, which `larger` and `smaller` pass over: such a plane does not limit the ray.
-    """
-    first = node * NODE_SINGLES
-    t_in = larger(0.0, (boxes.load(first + x * LANES) - near_x) * inverse_x)
-    t_in = larger(t_in, (boxes.load(first + y * LANES) - near_y) * inverse_y)
-    t_in = larger(t_in, (boxes.load(first + z * LANES) - near_z) * inverse_z)
-    t_out = smaller(t_max, (boxes.load(first + (3 - x) * LANES) - far_x) * inverse_x)
-    t_out = smaller(t_out, (boxes.load(first + (5 - y) * LANES) - far_y) * inverse_y)
-    t_out = smaller(t_out, (boxes.load(first + (7 - z) * LANES) - far_z) * inverse_z)
+    """The children whose boxes a ray enters before t_max, and where it enters them."""
+    view = (
+        (x, near_x, far_x, inverse_x),
+        (y, near_y, far_y, inverse_y),
+        (z, near_z, far_z, inverse_z),
+    )
+    t_in, met = between(boxes, node, view, t_max)
     distances.store(0, t_in)
-    return t_in <= t_out * FAR_SLACK
+    return met
 
 
 @kernel

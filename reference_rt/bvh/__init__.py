@@ -20,6 +20,7 @@ from reference_rt.bvh.statistics import Statistics, of_wide, statistics
 from reference_rt.bvh.wide import (
     CENTER,
     CHILDREN,
+    NODE_SINGLES,
     NOTHING,
     WIDE_STACK,
     Bvh,
@@ -40,6 +41,7 @@ __all__ = [
     "CHILDREN",
     "FAR_SLACK",
     "LEAF_SIZE",
+    "NODE_SINGLES",
     "NOTHING",
     "STACK_SIZE",
     "WIDE_STACK",

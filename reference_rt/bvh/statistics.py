@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_rt.bvh.nodes import Nodes
-from reference_rt.bvh.wide import CHILDREN, NOTHING, Bvh
+from reference_rt.bvh.wide import CHILDREN, NOTHING, Bvh, codes_of
 from reference_rt.lanes import LANES
 from reference_rt.shapes.shape import FloatArray
 
@@ -55,7 +55,7 @@ def of_wide(bvh: Bvh) -> Statistics:
     depth = -1
     while len(level) > 0:
         depth += 1
-        children = bvh.children[level, CHILDREN : CHILDREN + LANES].astype(np.int64)
+        children = codes_of(bvh)[level].astype(np.int64)
         planes = bvh.boxes[level, :CHILDREN].reshape(-1, 6, LANES).transpose(0, 2, 1)
         there = children != NOTHING
         codes.append(children[there])

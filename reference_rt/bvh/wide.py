@@ -19,8 +19,10 @@ from reference_rt.shapes.shape import FloatArray, IntArray
 Singles = npt.NDArray[np.float32]
 Codes = npt.NDArray[np.int32]
 
+NODE_SINGLES = 64
+"""How many float32 or int32 numbers a node takes, in four cache lines."""
 CHILDREN = 48
-"""The column of `Bvh.children` with the first child's code; the planes of boxes stand before it."""
+"""The number of a node with the first child's code; the planes of boxes stand before it."""
 CENTER = 28
 """The column of `Bvh.frames` with a tree's centre; its size follows."""
 MOST_REFERENCES = 2**26
@@ -38,7 +40,7 @@ class Bvh(NamedTuple):
     A node is a row of 256 bytes, seen as
     boxes (n, 64): float32, lower x of LANES children, lower y, lower z, upper x, y and z, relative
     to the tree's centre and rounded outwards: boxes only cull, and so half the memory will do;
-    children (n, 64): int32, from CHILDREN on the children's codes;
+    children (64 n,): int32, of each node from CHILDREN on the children's codes;
     frames (n, 32): float64, of a tree's root from CENTER on the centre and the largest coordinate.
 
     The code of a node is its row, that of a leaf `leaf_code`.  references (m, 2): kind and row of
@@ -94,8 +96,13 @@ def is_packet(code: int) -> bool:
 @kernel
 def child_of(bvh: Bvh, node: int, lane: int) -> int:
     """The code of a node's child."""
-    code: int = np.int64(bvh.children[node, CHILDREN + lane])  # type: ignore[assignment]
+    code: int = np.int64(bvh.children[node * NODE_SINGLES + CHILDREN + lane])  # type: ignore[assignment]
     return code
+
+
+def codes_of(bvh: Bvh) -> Codes:
+    """The codes of all nodes' children (n, LANES)."""
+    return bvh.children.reshape(-1, NODE_SINGLES)[:, CHILDREN : CHILDREN + LANES]
 
 
 @kernel
@@ -142,7 +149,7 @@ def joined(
     codes = children[:, CHILDREN : CHILDREN + LANES].astype(np.int64)
     references = np.column_stack([np.concatenate(kinds), np.concatenate(rows)]).astype(np.int32)
     corners = None if vertices is None else _packets(vertices, codes, references[:, 1])
-    return Bvh(boxes, children, frames, references, corners, -1)
+    return Bvh(boxes, children.reshape(-1), frames, references, corners, -1)
 
 
 def _aligned(n: int) -> FloatArray:

@@ -7,10 +7,11 @@ from pydantic import Field
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
+from reference_rt.block_hits import any_hits, closest_hits
 from reference_rt.description import Description
 from reference_rt.geometry import closest_hit, occluded
 from reference_rt.integrators.integrator import power_heuristic, receiver, unshadowed
-from reference_rt.integrators.scratch import Scratch, any_hits, closest_hits
+from reference_rt.integrators.scratch import Scratch
 from reference_rt.kernel import kernel, local_floats
 from reference_rt.lights import area, shadow_ray
 from reference_rt.materials import Shading

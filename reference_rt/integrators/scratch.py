@@ -1,14 +1,11 @@
-"""A block of samples: the scratch of a band of pixels, and rays that are traced together."""
+"""A block of samples: the scratch of a band of pixels."""
 
 from typing import NamedTuple
 
-from reference_rt import shapes as any_shape
-from reference_rt.bvh import Bvh
-from reference_rt.geometry import Geometry, closest_hit, occluded
 from reference_rt.kernel import kernel
 from reference_rt.ray import BLOCK
 from reference_rt.shapes.shape import FloatArray, IntArray
-from reference_rt.streams import RAY_FLOATS, Hits, Rays, put_hit, ray_of
+from reference_rt.streams import RAY_FLOATS, Hits, Rays
 
 STATE_FLOATS = 11 * BLOCK
 VECTOR_FLOATS = 3 * BLOCK
@@ -39,29 +36,3 @@ def prepare(scratch: Scratch) -> None:
     for k in range(RAY_FLOATS):
         scratch.rays.numbers[k] = 1.0
         scratch.shadows.numbers[k] = 1.0
-
-
-@kernel
-def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
-    """`closest_hit` of the first n rays."""
-    _trace(geometry.bvh, geometry, rays, hits, n, False)
-
-
-@kernel
-def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
-    """`occluded` of the first n rays: of the hits, only whether there is any is meant."""
-    _trace(geometry.bvh, geometry, rays, hits, n, True)
-
-
-@kernel
-def _trace(
-    bvh: Bvh | None, geometry: Geometry, rays: Rays, hits: Hits, n: int, any_hit: bool
-) -> None:
-    if bvh is None:
-        any_shape.nearest_of_rays(geometry.shapes, rays, hits, n, any_hit)
-        return
-    for j in range(n):
-        if any_hit:
-            hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
-        else:
-            put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))

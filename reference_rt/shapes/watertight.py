@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from reference_rt.kernel import kernel
-from reference_rt.lanes import lane_kernel
+from reference_rt.lane_kernels import lane_kernel
 from reference_rt.ray import Ray
 from reference_rt.shapes.rounding import product_error
 from reference_rt.shapes.shape import FloatArray

@@ -9,7 +9,8 @@ from builders import U, unit_vectors
 
 import reference_rt as rt
 from reference_rt.kernel import entry_kernel
-from reference_rt.lanes import LANES, lane_kernel, product_error
+from reference_rt.lane_kernels import lane_kernel
+from reference_rt.lanes import LANES, product_error
 from reference_rt.shapes.rounding import along_from, difference_error
 from reference_rt.vec3 import row
 

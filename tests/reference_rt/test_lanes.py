@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 
 from reference_rt.kernel import entry_kernel
-from reference_rt.lanes import (
-    LANES,
-    lane_kernel,
-    larger,
-    lowest,
-    plain,
-    smaller,
-)
+from reference_rt.lane_kernels import lane_kernel, lowest, plain
+from reference_rt.lanes import LANES, larger, smaller
 from reference_rt.ray import Ray
 from reference_rt.shapes import watertight
 from reference_rt.shapes.watertight import shear_of

@@ -8,9 +8,9 @@ from builders import SCENES
 
 import reference_rt as rt
 from reference_rt import bands
+from reference_rt.block_hits import any_hits, closest_hits
 from reference_rt.geometry import closest_hit, occluded
 from reference_rt.integrators import radiance
-from reference_rt.integrators.scratch import any_hits, closest_hits
 from reference_rt.kernel import entry_kernel
 from reference_rt.lanes import LANES
 from reference_rt.ray import BLOCK, Ray

@@ -6,7 +6,7 @@ from bvh_checks import METHODS, bounds, build, slivers, small_triangles
 
 from reference_rt import bvh
 from reference_rt.bvh import widening
-from reference_rt.bvh.wide import CENTER, CHILDREN, LEAF_SHARE, WIDE_STACK, leaf_code
+from reference_rt.bvh.wide import CENTER, CHILDREN, LEAF_SHARE, WIDE_STACK, codes_of, leaf_code
 from reference_rt.lanes import LANES
 
 
@@ -16,7 +16,7 @@ def _walk(tree):
     while jobs:
         node, boxes, depth = jobs.pop()
         for lane in range(LANES):
-            code = int(tree.children[node, CHILDREN + lane])
+            code = int(codes_of(tree)[node, lane])
             if code == bvh.NOTHING:
                 continue
             own = tree.boxes[node, :CHILDREN].reshape(6, LANES)[:, lane].astype(float)
@@ -67,7 +67,7 @@ def test_holds_what_the_binary_tree_holds(method, n, offset):
     assert found.leaves == len(_walk(tree))
     assert found.depth == max(depth for _, _, depth in _walk(tree))
     assert found.depth * (LANES - 1) <= WIDE_STACK
-    assert found.nodes == len(tree.children)
+    assert found.nodes == len(tree.boxes)
 
 
 def test_boxes_are_tight_far_from_the_origin():
@@ -141,10 +141,10 @@ def test_is_the_cheapest_of_all(seed):
     is_triangle = rng.random(26) < 0.6
     nodes, references, tree = _joined(corners, "sah", is_triangle)
     cost = 0.0
-    for row in range(len(tree.children)):
+    for row in range(len(tree.boxes)):
         planes = tree.boxes[row, :CHILDREN].reshape(6, LANES).astype(float)
         x, y, z = planes[3:] - planes[:3]
-        for lane, code in enumerate(tree.children[row, CHILDREN : CHILDREN + LANES].tolist()):
+        for lane, code in enumerate(codes_of(tree)[row].tolist()):
             if code != bvh.NOTHING:
                 rows = tree.references[bvh.first_of(code) :][: bvh.size_of(code), 1]
                 tests = 1.0
