@@ -9,8 +9,9 @@ import numpy as np
 from reference_rt import csg
 from reference_rt.csg import NOT, OR, Solid
 from reference_rt.csg.tables import Parts, Solids
-from reference_rt.geometry import SOLID, Geometry
+from reference_rt.geometry import Geometry
 from reference_rt.groups import Instance
+from reference_rt.leaves import SOLID
 from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes
 from reference_rt.shapes.mesh_topology import describe_boundary
 from reference_rt.shapes.shape import Bounds, FloatArray, IntArray, Place, outward

@@ -10,26 +10,24 @@ from reference_rt.bundle_traversal import (
     shear_in,
 )
 from reference_rt.bundles import BUNDLE, SPAN_FLOATS, Bundle, are_alike, bundle_of
-from reference_rt.bvh import NOTHING, Bvh, child_of, first_of, is_packet, kind_of, row_of, size_of
+from reference_rt.bvh import NOTHING, Bvh, child_of
 from reference_rt.geometry import (
     STACK,
     Geometry,
-    nearer_primitive,
-    nearest_of_packet,
 )
 from reference_rt.groups import Instances
 from reference_rt.kernel import kernel, local_floats, local_integers
 from reference_rt.lane_kernels import lowest
 from reference_rt.lanes import LANES
+from reference_rt.leaves import nearest_of_leaf
 from reference_rt.ray import Ray, no_hit
 from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.shapes.watertight import SEEN_FLOATS
 from reference_rt.streams import (
     Hits,
     Rays,
-    hit_of,
     put_hit,
     put_ray,
-    ray_of,
 )
 from reference_rt.traversal import can_be_nearer
 from reference_rt.vec3 import row
@@ -79,7 +77,7 @@ def _traverse(
     if not bundle.together:
         return ALONE
     stack, waiting = local_integers(STACK), local_floats(STACK)
-    distances = local_floats(LANES)
+    distances, seen = local_floats(LANES), local_floats(SEEN_FLOATS)
     outcome, t_max = MISSED, math.inf
     # Children are called by their places, node * LANES + lane, by which their boxes are found.
     node, place, top = 0, -1, 0
@@ -100,7 +98,7 @@ def _traverse(
                     put_ray(rays, j, ray)
                     put_hit(hits, j, no_hit(ray))
                 prepare_each(bvh, bundle, rays, own)
-            if _nearest_of_leaf(bvh, geometry, node, place, bundle, rays, own, hits):
+            if _nearest_of_leaf(bvh, geometry, node, place, bundle, rays, own, seen, hits):
                 t_max = 0.0
                 for j in range(BUNDLE):
                     t_max = max(t_max, hits.numbers[j])
@@ -125,6 +123,7 @@ def _nearest_of_leaf(
     bundle: Bundle,
     rays: Rays,
     own: FloatArray,
+    seen: FloatArray,
     hits: Hits,
 ) -> bool:
     """Let each ray of a bundle that enters a leaf, the child at a place, find what is nearer there
@@ -137,26 +136,7 @@ def _nearest_of_leaf(
             entered &= entered - 1
             any_entered = True
             shear = shear_in(bundle, rays, j, own)
-            closest = hit_of(hits, j)
-            if is_packet(leaf):
-                closest = nearest_of_packet(
-                    bvh.corners, bvh, geometry.shapes, leaf, shear, -1, closest
-                )
-            else:
-                ray, first = ray_of(rays, j), first_of(leaf)
-                for k in range(first, first + size_of(leaf)):
-                    closest = nearer_primitive(
-                        bvh,
-                        geometry.shapes,
-                        geometry.solids,
-                        kind_of(bvh, k),
-                        row_of(bvh, k),
-                        ray,
-                        shear,
-                        -1,
-                        closest,
-                    )
-            put_hit(hits, j, closest)
+            nearest_of_leaf(bvh, geometry.shapes, geometry.solids, leaf, rays, j, shear, seen, hits)
     return any_entered
 
 

@@ -4,23 +4,18 @@ from typing import NamedTuple
 
 from reference_rt import shapes as any_shape
 from reference_rt.bvh import NOTHING, WIDE_STACK, Bvh, first_of, is_packet, kind_of, row_of, size_of
-from reference_rt.csg import evaluate
 from reference_rt.csg.anchor import out_of_solid, ray_near
 from reference_rt.csg.tables import Parts, Solids
 from reference_rt.groups import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.kernel import kernel, local_floats, local_integers
-from reference_rt.lane_kernels import lowest
 from reference_rt.lanes import LANES
-from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, no_hit
+from reference_rt.leaves import INSTANCE, nearer_primitive, nearest_of_packet
+from reference_rt.ray import Hit, Ray, SurfacePoint, no_hit
 from reference_rt.shapes import TRIANGLE, Packets, Shapes, triangle
-from reference_rt.shapes.shape import FloatArray, Tangents
-from reference_rt.shapes.watertight import Shear, maybe_met, shear_of
+from reference_rt.shapes.shape import Tangents
+from reference_rt.shapes.watertight import SEEN_FLOATS, shear_of
 from reference_rt.traversal import any_child, can_be_nearer, enter, nearest_child, view_of
 from reference_rt.vec3 import Vec3
-
-SOLID, INSTANCE = 100, 101
-"""Codes of references that are not rows of a shape's table, but of `Solids` or `Instances`.  Rays
-hit the primitives in these: no `Hit` has such a kind."""
 
 STACK = 2 * WIDE_STACK + LANES + 1
 """A hierarchy of instances, one of a group, the instances of a leaf, and what is infinite."""
@@ -69,7 +64,7 @@ def _traverse(
     """The nearest child first; the others wait on a stack with the distances of their boxes, and
     with the instance in whose coordinates they stand."""
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
-    distances = local_floats(LANES)
+    distances, seen = local_floats(LANES), local_floats(SEEN_FLOATS)
     closest = no_hit(ray)
     local, instance = ray, -1
     view, shear = view_of(bvh, 0, local), shear_of(local)
@@ -91,7 +86,9 @@ def _traverse(
                 for k in range(bottom, top):
                     space[k] = instance
         if is_packet(node):
-            closest = nearest_of_packet(bvh.corners, bvh, shapes, node, shear, instance, closest)
+            closest = nearest_of_packet(
+                bvh.corners, bvh, shapes, node, shear, seen, instance, closest
+            )
         else:
             first = first_of(node)
             for k in range(first, first + size_of(node)):
@@ -120,83 +117,6 @@ def _traverse(
                 local = ray_in(instances, instance, ray)
                 shear = shear_of(local)
                 view = view_of(bvh, 0 if instance < 0 else instances.root[instance], local)
-
-
-@kernel
-def nearer_primitive(
-    bvh: Bvh,
-    shapes: Shapes,
-    solids: Solids | None,
-    kind: int,
-    row: int,
-    ray: Ray,
-    shear: Shear,
-    instance: int,
-    closest: Hit,
-) -> Hit:
-    """The nearer of `closest` and what a reference of a leaf stands for."""
-    if solids is not None:
-        if kind == SOLID:
-            hit = evaluate.intersect(solids, shapes, bvh, row, ray, closest.t)
-            found = Crossing(hit.t, hit.u, hit.v)
-            return _nearer(shapes, found, hit.kind, hit.row, instance, closest)
-    found = any_shape.intersect(shapes, kind, row, ray, shear)
-    return _nearer(shapes, found, kind, row, instance, closest)
-
-
-@kernel
-def nearest_of_packet(
-    corners: FloatArray | None,
-    bvh: Bvh,
-    shapes: Shapes,
-    node: int,
-    shear: Shear,
-    instance: int,
-    closest: Hit,
-) -> Hit:
-    """The nearest of `closest` and the triangles of a leaf."""
-    if corners is None:
-        return closest
-    first, size = first_of(node), size_of(node)
-    met = maybe_met(corners, first, size, shear)
-    while met != 0:
-        lane = lowest(met)
-        met &= met - 1
-        found = triangle.intersect_lane(corners, first, size, lane, shear)
-        row = row_of(bvh, first + lane)
-        closest = _nearer(shapes, found, TRIANGLE, row, instance, closest)
-    return closest
-
-
-@kernel
-def _nearer(
-    shapes: Shapes, found: Crossing, kind: int, row: int, instance: int, closest: Hit
-) -> Hit:
-    """The nearer of what was found and the closest so far."""
-    if found.t <= closest.t:
-        hit = Hit(found.t, kind, row, found.u, found.v, instance)
-        if found.t < closest.t or _precedes(shapes, hit, closest):
-            return hit
-    return closest
-
-
-@kernel
-def _precedes(shapes: Shapes, hit: Hit, closest: Hit) -> bool:
-    """Which of two hits at the same t counts: by kind, then in the order of the scene, so that no
-    order of traversal can change a picture."""
-    if closest.kind < 0:
-        return hit.t < closest.t  # t_max itself lies beyond the ray's end
-    if hit.instance != closest.instance:
-        return hit.instance < closest.instance
-    if hit.kind != closest.kind:
-        return hit.kind < closest.kind
-    owners = (
-        any_shape.owner(shapes, hit.kind, hit.row),
-        any_shape.owner(shapes, closest.kind, closest.row),
-    )
-    if owners[0] != owners[1]:
-        return owners[0] < owners[1]
-    return any_shape.face(shapes, hit) < any_shape.face(shapes, closest)
 
 
 @kernel

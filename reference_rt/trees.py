@@ -7,8 +7,8 @@ import numpy as np
 
 from reference_rt import bvh
 from reference_rt.bvh import Bvh
-from reference_rt.geometry import INSTANCE, SOLID
 from reference_rt.groups import Instances
+from reference_rt.leaves import INSTANCE, SOLID
 from reference_rt.shapes import TABLES, TRIANGLE, Packets
 from reference_rt.shapes.placement import bounds as placed_bounds
 from reference_rt.shapes.shape import Bounds, FloatArray, IntArray

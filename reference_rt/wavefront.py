@@ -15,18 +15,16 @@ from reference_rt.bvh import (
     Bvh,
     child_of,
     first_of,
-    is_packet,
-    kind_of,
-    row_of,
-    size_of,
 )
-from reference_rt.geometry import Geometry, nearer_primitive, nearest_of_packet
+from reference_rt.geometry import Geometry
 from reference_rt.kernel import kernel, local_floats, local_naturals
 from reference_rt.lane_kernels import lane_kernel, lowest, prefetch
 from reference_rt.lanes import LANES, least, select
+from reference_rt.leaves import nearest_of_leaf
 from reference_rt.ray import BLOCK
 from reference_rt.shapes.shape import FloatArray
-from reference_rt.streams import Hits, Rays, hit_of, put_hit, ray_of
+from reference_rt.shapes.watertight import SEEN_FLOATS
+from reference_rt.streams import Hits, Rays
 from reference_rt.traversal import between
 from reference_rt.wave import (
     LEVELS,
@@ -58,6 +56,7 @@ def closest_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: in
         local_naturals(LEVELS * BLOCK),
         local_naturals(3 * BLOCK),
     )
+    seen = local_floats(SEEN_FLOATS)
     # Of each child how far away it is, inf where it does not wait.
     waiting = local_floats(LEVELS * BLOCK * LANES)
     prepare(bvh, wave, rays, hits, n)
@@ -66,7 +65,7 @@ def closest_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: in
         lengths = begin_at(wave, hits, root, n, False)
         while lengths.nodes + lengths.leaves + lengths.back > 0:
             lengths = _enter_nodes(bvh, wave, waiting, hits, lengths)
-            lengths = _visit_leaves(bvh, geometry, wave, rays, hits, lengths, False)
+            lengths = _visit_leaves(bvh, geometry, wave, rays, seen, hits, lengths, False)
             lengths = _go_back(bvh, wave, waiting, hits, lengths)
         root = bvh.unbounded if root == 0 else -1
 
@@ -83,14 +82,14 @@ def any_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: int) -
         local_naturals(LEVELS * BLOCK),
         local_naturals(3 * BLOCK),
     )
-    waiting = local_naturals(LEVELS * BLOCK)
+    seen, waiting = local_floats(SEEN_FLOATS), local_naturals(LEVELS * BLOCK)
     prepare(bvh, wave, rays, hits, n)
     root = 0
     while root >= 0:
         lengths = begin_at(wave, hits, root, n, True)
         while lengths.nodes + lengths.leaves + lengths.back > 0:
             lengths = _meet_nodes(bvh, wave, waiting, hits, lengths)
-            lengths = _visit_leaves(bvh, geometry, wave, rays, hits, lengths, True)
+            lengths = _visit_leaves(bvh, geometry, wave, rays, seen, hits, lengths, True)
             lengths = _go_back_any(bvh, wave, waiting, lengths)
         root = bvh.unbounded if root == 0 else -1
 
@@ -217,6 +216,7 @@ def _visit_leaves(
     geometry: Geometry,
     wave: Wave,
     rays: Rays,
+    seen: FloatArray,
     hits: Hits,
     lengths: Lengths,
     any_hit: bool,
@@ -226,25 +226,10 @@ def _visit_leaves(
     back = lengths.back
     for i in range(lengths.leaves):
         j = natural(wave.queues, BLOCK + i)
-        leaf, closest = -1 - natural(wave.leaf, j), hit_of(hits, j)
-        shear = shear_in(wave, rays, j)
-        if is_packet(leaf):
-            closest = nearest_of_packet(bvh.corners, bvh, geometry.shapes, leaf, shear, -1, closest)
-        else:
-            ray, first = ray_of(rays, j), first_of(leaf)
-            for k in range(first, first + size_of(leaf)):
-                closest = nearer_primitive(
-                    bvh,
-                    geometry.shapes,
-                    geometry.solids,
-                    kind_of(bvh, k),
-                    row_of(bvh, k),
-                    ray,
-                    shear,
-                    -1,
-                    closest,
-                )
-        put_hit(hits, j, closest)
+        leaf, shear = -1 - natural(wave.leaf, j), shear_in(wave, rays, j)
+        closest = nearest_of_leaf(
+            bvh, geometry.shapes, geometry.solids, leaf, rays, j, shear, seen, hits
+        )
         wave.queues[2 * BLOCK + (back & (BLOCK - 1))] = j
         back += (wave.level[j] > 0) & (not (any_hit and closest.kind >= 0))
     return Lengths(lengths.nodes, 0, back)

@@ -47,9 +47,9 @@ FAULTS = (
         "combine(setup.seed, np.uint64(pixel))", "combine(np.uint64(0), np.uint64(pixel))",
     ),
     SourceFault(
-        "one leaf missing from the hierarchy", KNOT, "geometry.py",
-        "    met = maybe_met(corners, first, size, shear)\n",
-        "    met = maybe_met(corners, first, size, shear)\n"
+        "one leaf missing from the hierarchy", KNOT, "leaves.py",
+        "    met = see(corners, first, size, shear, seen)\n",
+        "    met = see(corners, first, size, shear, seen)\n"
         "    if first <= 5000 < first + size:\n        met = 0\n",
     ),
     SourceFault(

@@ -1,7 +1,7 @@
 """The hierarchy that rays go through: nodes of up to eight children, made from a binary one.
 
 A node's eight boxes are met or missed at once (`reference_rt.traversal`), and so are the triangles
-of a leaf (`shapes.watertight.maybe_met`): half as many steps as in the binary tree, and measured on
+of a leaf (`shapes.watertight.see`): half as many steps as in the binary tree, and measured on
 the Stanford bunny twice as many rays.  `widening` makes it; this file is what it is.
 """
 
@@ -45,7 +45,7 @@ class Bvh(NamedTuple):
 
     The code of a node is its row, that of a leaf `leaf_code`.  references (m, 2): kind and row of
     what each is, leaf after leaf;  corners (9 m + 8,): of leaves of triangles alone the vertices,
-    see `shapes.watertight.maybe_met`, None where there is no such leaf;  unbounded: the node of
+    see `shapes.watertight.see`, None where there is no such leaf;  unbounded: the node of
     what has no finite box, -1 for none.
     """
 

@@ -159,9 +159,11 @@ def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
 
 
 @kernel
-def intersect_lane(corners: FloatArray, first: int, size: int, lane: int, shear: Shear) -> Crossing:
-    """The same of a triangle of a leaf, see `watertight.maybe_met`."""
-    return _crossing(project_lane(corners, first, size, lane, shear), shear)
+def intersect_lane(
+    corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
+) -> Crossing:
+    """The same of a triangle of a leaf, see `watertight.see`."""
+    return _crossing(project_lane(corners, first, size, lane, shear, seen), shear)
 
 
 @kernel

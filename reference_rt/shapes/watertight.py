@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from reference_rt.kernel import kernel
 from reference_rt.lane_kernels import lane_kernel
+from reference_rt.lanes import LANES, select
 from reference_rt.ray import Ray
 from reference_rt.shapes.rounding import product_error
 from reference_rt.shapes.shape import FloatArray
@@ -78,8 +79,16 @@ def project(vertices: FloatArray, i: int, shear: Shear) -> Projection:
 
 
 @kernel
-def project_lane(corners: FloatArray, first: int, size: int, lane: int, shear: Shear) -> Projection:
-    """A triangle of a leaf, see `maybe_met`, seen along a ray."""
+def project_lane(
+    corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
+) -> Projection:
+    """A triangle of a leaf, of which `see` has left what it can, seen along a ray."""
+    if seen[_DOUBT + lane] == 0.0:
+        e0 = seen[lane]
+        side = 1 if e0 > 0.0 else -1
+        e1, e2 = seen[LANES + lane], seen[2 * LANES + lane]
+        depths = seen[3 * LANES + lane], seen[4 * LANES + lane], seen[5 * LANES + lane]
+        return Projection(side, e0, e1, e2, depths[0], depths[1], depths[2])
     return _project(corners, 9 * first + lane, size, shear)
 
 
@@ -126,8 +135,12 @@ def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection
     return Projection(side, e0, e1, e2, a_z, b_z, c_z)
 
 
+_DOUBT = 6 * LANES
+SEEN_FLOATS = 7 * LANES
+
+
 @lane_kernel
-def _maybe_met(
+def _see(
     corners: Any,
     start: Any,
     size: Any,
@@ -139,9 +152,10 @@ def _maybe_met(
     o_z: Any,
     s_x: Any,
     s_y: Any,
+    seen: Any,
 ) -> Any:
-    """`_project`'s edge functions of the triangles of a leaf, by the same operations: those that
-    do not differ in sign."""
+    """`_project` of the triangles of a leaf, by the same operations, and where it takes more than
+    these; those whose edge functions do not differ in sign."""
     x, y, z = start + x * size, start + y * size, start + z * size
     a_z = corners.load(z) - o_z
     b_z = corners.load(z + 3 * size) - o_z
@@ -152,24 +166,32 @@ def _maybe_met(
     a_y = corners.load(y) - o_y - s_y * a_z
     b_y = corners.load(y + 3 * size) - o_y - s_y * b_z
     c_y = corners.load(y + 6 * size) - o_y - s_y * c_z
-    e0 = c_x * b_y - c_y * b_x
-    e1 = a_x * c_y - a_y * c_x
-    e2 = b_x * a_y - b_y * a_x
+    left0, right0 = c_x * b_y, c_y * b_x
+    left1, right1 = a_x * c_y, a_y * c_x
+    left2, right2 = b_x * a_y, b_y * a_x
+    e0, e1, e2 = left0 - right0, left1 - right1, left2 - right2
+    for k, number in enumerate((e0, e1, e2, a_z, b_z, c_z)):
+        seen.store(k * LANES, number)
+    products = abs(left0) + abs(right0) + abs(left1) + abs(right1) + abs(left2) + abs(right2)
+    in_front = (e0 > 0.0) & (e1 > 0.0) & (e2 > 0.0)
+    behind = (e0 < 0.0) & (e1 < 0.0) & (e2 < 0.0)
+    cancelled = products > abs(e0 + e1 + e2) * CANCELLED
+    seen.store(_DOUBT, select((in_front | behind) & ~cancelled, 0.0, 1.0))
     below = (e0 < 0.0) | (e1 < 0.0) | (e2 < 0.0)
     above = (e0 > 0.0) | (e1 > 0.0) | (e2 > 0.0)
     return ~(below & above)
 
 
 @kernel
-def maybe_met(corners: FloatArray, first: int, size: int, shear: Shear) -> int:
+def see(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArray) -> int:
     """The triangles of a leaf, as bits, that `project_lane` may find met: all that are, and some on
-    whose edges the ray passes.
+    whose edges the ray passes;  seen (SEEN_FLOATS,): what it need not do again.
 
     The vertices of references first .. first + size, LANES at most, lie in `corners` from 9 first
     on: the first coordinate of each, the second of each, and so on.  What follows the last one's
     takes up the lanes that are left.
     """
-    met = _maybe_met(
+    met = _see(
         corners,
         9 * first,
         size,
@@ -181,6 +203,7 @@ def maybe_met(corners: FloatArray, first: int, size: int, shear: Shear) -> int:
         shear.o_z,
         shear.s_x,
         shear.s_y,
+        seen,
     )
     return met & ((1 << size) - 1)
 
