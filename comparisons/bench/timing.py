@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from comparisons.settling import settle
+
 ROUNDS = 7
 """The fewest that a median is taken of here: then one disturbance, or two, do not move it far."""
 
@@ -53,6 +55,7 @@ def alternate(
     for k in range(rounds):
         for name in list(measures)[:: 1 if k % 2 == 0 else -1]:
             say(name, done / total)
+            settle()
             found[name].append(measures[name]())
             done += 1
     return found

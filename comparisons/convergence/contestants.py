@@ -11,6 +11,7 @@ import numpy as np
 
 from comparisons.layout import copies_of
 from comparisons.mitsuba_backend import LLVM, SCALAR, backend, mitsuba, variant
+from comparisons.settling import settle
 from comparisons.translate import FEW, UntranslatableError, to_mitsuba
 from comparisons.translate.notes import notes_of
 from reference_rt.errors import UsageError
@@ -156,6 +157,7 @@ class Stable:
 
         def shot(spp: int, replicate: int) -> Shot:
             seeded = scene.changed(sampler=make(spp=spp, seed=first + replicate))
+            settle()
             start = time.perf_counter()
             picture = render(seeded, tables=tables).colour
             return Shot(picture, spp, time.perf_counter() - start)
@@ -179,6 +181,7 @@ class Stable:
 
         def shot(spp: int, replicate: int) -> Shot:
             mi = self._in(contestant.side)
+            settle()
             start = time.perf_counter()
             # The array is what forces the lazy rendering to happen.
             found = np.array(mi.render(mi_scene, spp=spp, seed=seed_of(replicate)))
