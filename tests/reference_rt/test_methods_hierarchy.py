@@ -64,7 +64,7 @@ def test_each_builds_what_it_says():
         for name in ("none", "median", "sah", "spatial")
     )
     # 63 leaves of eight in 8 nodes under a root, all with the same box.
-    assert len(none.children) == 9
+    assert len(none.boxes) == 9
     assert len(np.unique(none.boxes[1:, :6], axis=0)) == 1
     assert all(len(tree.references) == 500 for tree in (none, median, sah))
     assert 500 < len(spatial.references) <= 1000
