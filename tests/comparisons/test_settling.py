@@ -1,36 +1,50 @@
 """Nothing is measured beside what is still at work."""
 
-import hashlib
-import threading
+import time
+
+import pytest
 
 from comparisons.settling import settle
 
 
-def test_waits_for_a_busy_thread():
-    # Hashing lets go of Python's lock: some tenths of a second, on a core of its own.
-    done = threading.Event()
+class Clock:
+    """Time that only sleeping passes, of a process whose threads are busy until `rests`."""
 
-    def work():
-        hashlib.sha256(bytes(1 << 27)).digest()
-        done.set()
+    def __init__(self, threads, rests):
+        self.threads, self.rests, self.now, self.used = threads, rests, 0.0, 0.0
 
-    worker = threading.Thread(target=work)
-    worker.start()
-    settle(longest=60.0)
-    assert done.is_set()
-    worker.join()
+    def sleep(self, seconds):
+        busy = max(0.0, min(self.rests - self.now, seconds))
+        self.now += seconds
+        self.used += self.threads * busy + 0.001 * seconds
 
 
-def test_does_not_wait_for_ever():
-    stop = threading.Event()
+@pytest.fixture
+def clock(monkeypatch):
+    def start(threads, rests):
+        found = Clock(threads, rests)
+        monkeypatch.setattr(time, "sleep", found.sleep)
+        monkeypatch.setattr(time, "perf_counter", lambda: found.now)
+        monkeypatch.setattr(time, "process_time", lambda: found.used)
+        return found
 
-    def work():
-        while not stop.is_set():
-            pass
+    return start
 
-    worker = threading.Thread(target=work)
-    worker.start()
-    settle(longest=0.05)
-    assert worker.is_alive()
-    stop.set()
-    worker.join()
+
+@pytest.mark.parametrize("threads", [0.5, 1, 2])
+def test_waits_until_all_threads_rest(clock, threads):
+    now = clock(threads, rests=0.02)
+    settle()
+    assert 0.02 <= now.now < 0.04
+
+
+def test_a_process_at_rest_hardly_waits(clock):
+    now = clock(1, rests=0.0)
+    settle()
+    assert now.now < 0.01
+
+
+def test_does_not_wait_for_ever(clock):
+    now = clock(1, rests=1e9)
+    settle(longest=0.5)
+    assert 0.5 <= now.now < 0.52
