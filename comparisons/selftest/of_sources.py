@@ -11,8 +11,8 @@ METAL, SKY = "material_rough_conductor", "environment"
 FAULTS = (
     SourceFault(
         "direct light counted twice", BOX, "integrators/path.py",
-        "            weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, "
-        "light_pdf)\n        emitted = throughput * area",
+        "            weight = _weight(path.alone, _BSDF, bsdf_pdf, light_pdf)\n"
+        "        emitted = throughput * area",
         "        emitted = throughput * area",
     ),
     SourceFault(

@@ -6,9 +6,10 @@ from reference_rt import shapes as any_shape
 from reference_rt.bvh import Bvh
 from reference_rt.geometry import Geometry, closest_hit, occluded
 from reference_rt.kernel import kernel
-from reference_rt.ray import BLOCK
+from reference_rt.ray import BLOCK, Hit, Ray
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.streams import RAY_FLOATS, Hits, Rays, put_hit, ray_of
+from reference_rt.streams import hit_of as kept_hit
 
 STATE_FLOATS = 11 * BLOCK
 VECTOR_FLOATS = 3 * BLOCK
@@ -19,7 +20,7 @@ class Scratch(NamedTuple):
 
     While an integrator works: shadows, rays that may be blocked, and the light (VECTOR_FLOATS,)
     that each brings to sample `lit` (BLOCK,);  hits;  states (STATE_FLOATS,) of paths, and the
-    sample (BLOCK,) that each is of.
+    sample (BLOCK,) that each is of;  kept (`materials.kept_floats`,) for `shade`.
     """
 
     rays: Rays
@@ -30,6 +31,7 @@ class Scratch(NamedTuple):
     hits: Hits
     states: FloatArray
     samples: IntArray
+    kept: FloatArray
 
 
 @kernel
@@ -43,7 +45,7 @@ def prepare(scratch: Scratch) -> None:
 
 @kernel
 def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
-    """`closest_hit` of the first n rays."""
+    """`closest_hit` of the first n rays: what `hit_of` tells."""
     _trace(geometry.bvh, geometry, rays, hits, n, False)
 
 
@@ -51,6 +53,19 @@ def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
 def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
     """`occluded` of the first n rays: of the hits, only whether there is any is meant."""
     _trace(geometry.bvh, geometry, rays, hits, n, True)
+
+
+@kernel
+def hit_of(geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
+    """What ray number j has found."""
+    return _hit_of(geometry.bvh, geometry, ray, hits, j)
+
+
+@kernel
+def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
+    if bvh is None:
+        return any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
+    return kept_hit(hits, j)
 
 
 @kernel

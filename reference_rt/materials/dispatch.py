@@ -83,6 +83,12 @@ def takes_light_from_behind(materials: Materials, m: int) -> bool:
 
 
 @kernel
+def any_transmits(materials: Materials) -> bool:
+    """Whether light passes to the other side of any: a constant."""
+    return materials.behind is not None
+
+
+@kernel
 def evaluate(materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
     """f(wo, wi) |cos wi|, without what is mirrored or refracted perfectly."""
     return both(materials, shading, wi).value
