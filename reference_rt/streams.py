@@ -45,6 +45,11 @@ def put_vector(numbers: FloatArray, column: int, j: int, v: Vec3) -> None:
 
 
 @kernel
+def add_vector(numbers: FloatArray, column: int, j: int, v: Vec3) -> None:
+    put_vector(numbers, column, j, vector_of(numbers, column, j) + v)
+
+
+@kernel
 def ray_of(rays: Rays, j: int) -> Ray:
     """Ray number j."""
     numbers = rays.numbers

@@ -18,8 +18,7 @@ from reference_rt.materials import Shading
 from reference_rt.ray import Ray, ray_from
 from reference_rt.sampling import Samplers, draw_pair, sampler_of
 from reference_rt.shading import shade
-from reference_rt.shapes.shape import FloatArray
-from reference_rt.streams import put_ray, put_vector, ray_of, vector_of
+from reference_rt.streams import add_vector, put_ray, put_vector, ray_of, vector_of
 from reference_rt.tables import SceneTables
 from reference_rt.vec3 import Vec3, is_black, max_component, to_world
 
@@ -132,11 +131,11 @@ def radiances(
             ray = ray_of(rays, j)
             hit = hit_of(scene.geometry, ray, hits, j)
             if hit.kind < 0:
-                _add(scratch.totals, k, _from_sky(path, scene, state, ray))
+                add_vector(scratch.totals, 0, k, _from_sky(path, scene, state, ray))
                 continue
             shading = shade(scene, ray, hit, scratch.kept)
             if any_light.is_area(scene.lights.areas, shading.point):
-                _add(scratch.totals, k, _from_lamp(path, scene, state, ray, shading))
+                add_vector(scratch.totals, 0, k, _from_lamp(path, scene, state, ray, shading))
             if depth + 1 >= path.max_depth:
                 continue
             sampler = sampler_of(samplers, k)
@@ -154,13 +153,8 @@ def radiances(
         any_hits(scene.geometry, shadows, hits, lit)
         for j in range(lit):
             if hits.codes[j] < 0:
-                _add(scratch.totals, scratch.lit[j], vector_of(scratch.lights, 0, j))
+                add_vector(scratch.totals, 0, scratch.lit[j], vector_of(scratch.lights, 0, j))
         n = alive
-
-
-@kernel
-def _add(totals: FloatArray, k: int, light: Vec3) -> None:
-    put_vector(totals, 0, k, vector_of(totals, 0, k) + light)
 
 
 @kernel
