@@ -14,6 +14,7 @@ from reference_rt.integrators import radiances
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
+from reference_rt.materials import kept_floats
 from reference_rt.ray import BLOCK, Ray
 from reference_rt.sampling import (
     PAIR_FLOATS,
@@ -87,6 +88,7 @@ def render_band(
         hits=Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
         states=local_floats(STATE_FLOATS),
         samples=local_integers(BLOCK),
+        kept=local_floats(kept_floats(scene.materials)),
     )
     weights = local_floats(BLOCK)
     samplers = Samplers(

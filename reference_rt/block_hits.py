@@ -5,13 +5,15 @@ from reference_rt.bvh import Bvh
 from reference_rt.geometry import Geometry, closest_hit, occluded
 from reference_rt.groups import Instances
 from reference_rt.kernel import kernel
+from reference_rt.ray import Hit, Ray
 from reference_rt.streams import Hits, Rays, put_hit, ray_of
+from reference_rt.streams import hit_of as kept_hit
 from reference_rt.wavefront import any_of_block, closest_of_block
 
 
 @kernel
 def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
-    """`closest_hit` of the first n rays."""
+    """`closest_hit` of the first n rays: what `hit_of` tells."""
     _closest_hits(geometry.bvh, geometry.instances, geometry, rays, hits, n)
 
 
@@ -33,6 +35,19 @@ def _closest_hits(
             put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
         return
     closest_of_block(bvh, geometry, rays, hits, n)
+
+
+@kernel
+def hit_of(geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
+    """What ray number j has found."""
+    return _hit_of(geometry.bvh, geometry, ray, hits, j)
+
+
+@kernel
+def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
+    if bvh is None:
+        return any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
+    return kept_hit(hits, j)
 
 
 @kernel

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.block_hits import any_hits, closest_hits
+from reference_rt.block_hits import any_hits, closest_hits, hit_of
 from reference_rt.bundles import BUNDLE
 from reference_rt.coherent import ALONE, FOUND, closest_together
 from reference_rt.geometry import Geometry
@@ -19,7 +19,6 @@ from reference_rt.streams import (
     RAY_FLOATS,
     Hits,
     Rays,
-    hit_of,
     put_ray,
     ray_of,
 )
@@ -53,7 +52,7 @@ def closest_of_rays(
             outcome = closest_together(geometry, o, d, begin, bundle, hits)
         if outcome == FOUND:
             for j in range(BUNDLE):
-                _tell(bundle, 1.0, hits, j, begin + j, t, kind, rows, uv)
+                _tell(geometry, bundle, 1.0, hits, j, begin + j, t, kind, rows, uv)
         elif outcome == ALONE:
             for i in range(begin, end):
                 ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
@@ -64,12 +63,13 @@ def closest_of_rays(
         if count > BLOCK - BUNDLE or end == len(o):
             closest_hits(geometry, rays, hits, count)
             for j in range(count):
-                _tell(rays, units[j], hits, j, numbers[j], t, kind, rows, uv)
+                _tell(geometry, rays, units[j], hits, j, numbers[j], t, kind, rows, uv)
             count = 0
 
 
 @kernel
 def _tell(
+    geometry: Geometry,
     rays: Rays,
     unit: float,
     hits: Hits,
@@ -82,8 +82,9 @@ def _tell(
 ) -> None:
     """Write what ray j of a block, number i of all, has hit, if it has; unit: of its t, see
     `scaled`."""
-    hit = hit_of(hits, j)
-    if hit.kind >= 0 and is_told(hit.t * unit, at(ray_of(rays, j), hit.t)):
+    ray = ray_of(rays, j)
+    hit = hit_of(geometry, ray, hits, j)
+    if hit.kind >= 0 and is_told(hit.t * unit, at(ray, hit.t)):
         t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
         uv[i, 0], uv[i, 1] = hit.u, hit.v
 

@@ -33,15 +33,23 @@ class Hits(NamedTuple):
 
 @kernel
 def vector_of(numbers: FloatArray, column: int, j: int) -> Vec3:
-    """Number j of the vectors in three columns of BLOCK numbers each."""
-    at = column * BLOCK + j
-    return Vec3(numbers[at], numbers[at + BLOCK], numbers[at + 2 * BLOCK])
+    """Number j of the vectors in three columns of BLOCK numbers each.
+
+    Unsigned, as in `vec3.row` (measured: 2 % of spheres under a sky).
+    """
+    at, next_column = np.uint64(column * BLOCK + j), np.uint64(BLOCK)
+    return Vec3(numbers[at], numbers[at + next_column], numbers[at + next_column + next_column])
 
 
 @kernel
 def put_vector(numbers: FloatArray, column: int, j: int, v: Vec3) -> None:
-    at = column * BLOCK + j
-    numbers[at], numbers[at + BLOCK], numbers[at + 2 * BLOCK] = v
+    at, next_column = np.uint64(column * BLOCK + j), np.uint64(BLOCK)
+    numbers[at], numbers[at + next_column], numbers[at + next_column + next_column] = v
+
+
+@kernel
+def add_vector(numbers: FloatArray, column: int, j: int, v: Vec3) -> None:
+    put_vector(numbers, column, j, vector_of(numbers, column, j) + v)
 
 
 @kernel

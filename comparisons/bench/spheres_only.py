@@ -18,14 +18,14 @@ from reference_rt.cameras.perspective import PerspectiveView, camera_ray
 from reference_rt.film import BoxFilter
 from reference_rt.integrators import Path
 from reference_rt.integrators.integrator import power_heuristic
-from reference_rt.integrators.path import ROULETTE_CAP
+from reference_rt.integrators.path import ROULETTE_CAP, Lit
 from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
 from reference_rt.lanes import LANES
 from reference_rt.lights import Constant
 from reference_rt.lights.constant import PDF
 from reference_rt.materials import Diffuse
 from reference_rt.materials.material import INV_PI
-from reference_rt.ray import BLOCK, Hit, Ray, ray_from
+from reference_rt.ray import BLOCK, Hit, Ray, SurfacePoint, ray_from
 from reference_rt.sampling import PAIR_FLOATS, PAIR_INTEGERS, Samplers, Sobol, blocks, forget_pairs
 from reference_rt.sampling.blocks import BlockSample
 from reference_rt.sampling.sobol import SobolSetup
@@ -36,8 +36,17 @@ from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.shapes.side_by_side import begin as begin_lanes
 from reference_rt.shapes.side_by_side import end as end_lanes
 from reference_rt.shapes.sphere import Spheres
-from reference_rt.streams import RAY_FLOATS, Rays, put_ray, put_vector, ray_of, vector_of
+from reference_rt.streams import (
+    RAY_FLOATS,
+    Rays,
+    add_vector,
+    put_ray,
+    put_vector,
+    ray_of,
+    vector_of,
+)
 from reference_rt.vec3 import (
+    Frame,
     Vec3,
     frame_from_normal,
     is_black,
@@ -75,21 +84,26 @@ class Scratch(NamedTuple):
 
 
 class State(NamedTuple):
-    """What a path is when it goes on: see `reference_rt.integrators.path.State`."""
+    """What a path is when it goes on: see `reference_rt.integrators.path_state.State`."""
 
     throughput: Vec3
     bsdf_pdf: float
 
 
 class Step(NamedTuple):
-    """What a path finds at a hit: see `reference_rt.integrators.path.Step`."""
+    """How a path leaves a surface: see `reference_rt.integrators.path.Step`."""
 
-    emitted: Vec3
-    light: Vec3
-    shadow: Ray
     goes_on: bool
     ray: Ray
     state: State
+
+
+class Shading(NamedTuple):
+    """point: of a sphere;  frame: around its normal;  wo: towards the viewer, local."""
+
+    point: SurfacePoint
+    frame: Frame
+    wo: Vec3
 
 
 def world_of(scene: Scene) -> World:
@@ -144,55 +158,44 @@ def _put_state(scratch: Scratch, j: int, k: int, state: State) -> None:
 
 
 @kernel
-def _advance(
-    max_depth: int,
-    rr_depth: int,
-    world: World,
-    depth: int,
-    ray: Ray,
-    t: float,
-    i: int,
-    state: State,
-    sampler: BlockSample,
-) -> Step:
-    """From what the ray has hit, sphere i at t, to the next ray."""
-    throughput, black = state.throughput, Vec3(0.0, 0.0, 0.0)
-    if i < 0:
-        weight = 1.0
-        if state.bsdf_pdf > 0.0:
-            weight = power_heuristic(state.bsdf_pdf, PDF)
-        return Step(throughput * world.sky * weight, black, ray, False, ray, state)
-    point = sphere.surface(world.spheres, ray, Hit(t, SPHERE, i, 0.0, 0.0, -1))
-    frame = frame_from_normal(point.ns)
-    wo = to_local(frame, -ray.d)
-    if depth + 1 >= max_depth:
-        return Step(black, black, ray, False, ray, state)
-    reflectance = row(world.reflectance, point.material)
-    dimension = sampling.PER_BOUNCE * depth
-    u0, u1 = blocks.draw(sampler, dimension + sampling.LIGHT_POINT)
+def _next_event(
+    world: World, state: State, shading: Shading, sampler: BlockSample, depth: int
+) -> Lit:
+    point = shading.point
+    nothing = Lit(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
+    u0, u1 = blocks.draw(sampler, sampling.PER_BOUNCE * depth + sampling.LIGHT_POINT)
     towards = uniform_sphere(u0, u1)
-    wi = to_local(frame, towards)
-    light, shadow = black, ray
-    if wo.z > 0.0 and wi.z > 0.0:
-        weight = power_heuristic(PDF, wi.z * INV_PI)
-        light = throughput * (reflectance * (wi.z * INV_PI) * world.sky * (weight / PDF))
-        shadow = ray_from(point, towards)
+    wi = to_local(shading.frame, towards)
+    if shading.wo.z <= 0.0 or wi.z <= 0.0:
+        return nothing
+    density = wi.z * INV_PI
+    weight = power_heuristic(PDF, density)
+    arriving = row(world.reflectance, point.material) * density * world.sky * (weight / PDF)
+    return Lit(state.throughput * arriving, ray_from(point, towards))
+
+
+@kernel
+def _scatter(
+    rr_depth: int, world: World, state: State, shading: Shading, sampler: BlockSample, depth: int
+) -> Step:
+    point, dimension = shading.point, sampling.PER_BOUNCE * depth
+    ended = Step(False, Ray(point.p, point.n, 0.0), state)
     u0, u1 = blocks.draw(sampler, dimension + sampling.BSDF_DIRECTION)
-    if wo.z <= 0.0:
-        return Step(black, light, shadow, False, ray, state)
+    if shading.wo.z <= 0.0:
+        return ended
     wi = cosine_hemisphere(u0, u1)
     bsdf_pdf = wi.z * INV_PI
     if bsdf_pdf == 0.0:
-        return Step(black, light, shadow, False, ray, state)
-    throughput = throughput * reflectance
+        return ended
+    throughput = state.throughput * row(world.reflectance, point.material)
     if depth + 1 >= rr_depth:
         survival = min(max_component(throughput), ROULETTE_CAP)
         u_roulette, _ = blocks.draw(sampler, dimension + sampling.ROULETTE)
         if u_roulette >= survival:
-            return Step(black, light, shadow, False, ray, state)
+            return ended
         throughput = throughput * (1.0 / survival)
-    ray = ray_from(point, to_world(frame, wi))
-    return Step(black, light, shadow, True, ray, State(throughput, bsdf_pdf))
+    ray = ray_from(point, to_world(shading.frame, wi))
+    return Step(True, ray, State(throughput, bsdf_pdf))
 
 
 @kernel
@@ -210,18 +213,27 @@ def _radiances(
         _nearest(world.spheres, rays, scratch.distances, scratch.hits, n)
         alive, lit = 0, 0
         for j in range(n):
-            k = scratch.samples[j]
-            t, i = scratch.distances[j], scratch.hits[j]
-            state, sampler = _state_of(scratch, j), _sampler_of(samplers, k)
-            step = _advance(
-                max_depth, rr_depth, world, depth, ray_of(rays, j), t, i, state, sampler
-            )
-            put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + step.emitted)
-            if not is_black(step.light):
-                put_ray(shadows, lit, step.shadow)
-                put_vector(scratch.lights, 0, lit, step.light)
+            k, t, i = scratch.samples[j], scratch.distances[j], scratch.hits[j]
+            state, ray = _state_of(scratch, j), ray_of(rays, j)
+            if i < 0:
+                weight = 1.0
+                if state.bsdf_pdf > 0.0:
+                    weight = power_heuristic(state.bsdf_pdf, PDF)
+                add_vector(scratch.totals, 0, k, state.throughput * world.sky * weight)
+                continue
+            if depth + 1 >= max_depth:
+                continue
+            point = sphere.surface(world.spheres, ray, Hit(t, SPHERE, i, 0.0, 0.0, -1))
+            frame = frame_from_normal(point.ns)
+            shading = Shading(point, frame, to_local(frame, -ray.d))
+            sampler = _sampler_of(samplers, k)
+            found = _next_event(world, state, shading, sampler, depth)
+            if not is_black(found.light):
+                put_ray(shadows, lit, found.shadow)
+                put_vector(scratch.lights, 0, lit, found.light)
                 scratch.lit[lit] = k
                 lit += 1
+            step = _scatter(rr_depth, world, state, shading, sampler, depth)
             if step.goes_on:
                 put_ray(rays, alive, step.ray)
                 _put_state(scratch, alive, k, step.state)
@@ -229,9 +241,7 @@ def _radiances(
         _nearest(world.spheres, shadows, scratch.distances, scratch.hits, lit)
         for j in range(lit):
             if scratch.hits[j] < 0:
-                k = scratch.lit[j]
-                light = vector_of(scratch.lights, 0, j)
-                put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + light)
+                add_vector(scratch.totals, 0, scratch.lit[j], vector_of(scratch.lights, 0, j))
         n = alive
 
 

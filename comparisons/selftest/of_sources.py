@@ -11,14 +11,14 @@ METAL, SKY = "material_rough_conductor", "environment"
 FAULTS = (
     SourceFault(
         "direct light counted twice", BOX, "integrators/path.py",
-        "            weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, "
-        "light_pdf)\n        emitted = throughput * area",
-        "        emitted = throughput * area",
+        "        weight = _weight(path.alone, _BSDF, state.bsdf_pdf, light_pdf)\n"
+        "    return state.throughput * area",
+        "    return state.throughput * area",
     ),
     SourceFault(
         "cosine missing after the first bounce", BOX, "integrators/path.py",
-        "    throughput = throughput * scattered.weight\n",
-        "    throughput = throughput * scattered.weight\n"
+        "    throughput = state.throughput * scattered.weight\n",
+        "    throughput = state.throughput * scattered.weight\n"
         "    if depth == 0 and scattered.wi.z > 0.0:\n"
         "        throughput = throughput * (0.6666666666666666 / scattered.wi.z)\n",
     ),
@@ -91,8 +91,8 @@ FAULTS = (
     ),
     SourceFault(
         "1/pi written as 0.32", BOX, "materials/diffuse.py",
-        "    return colour_at(diffuses.reflectance, i, at) * (wi.z * INV_PI)\n",
-        "    return colour_at(diffuses.reflectance, i, at) * (wi.z * 0.32)\n",
+        "    return Scattered(colour_at(diffuses.reflectance, i, at) * density, density)\n",
+        "    return Scattered(colour_at(diffuses.reflectance, i, at) * (wi.z * 0.32), density)\n",
     ),
     SourceFault(
         "light of the back of lamps", BOX, "lights/area.py",

@@ -7,19 +7,19 @@ from pydantic import Field
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt.block_hits import any_hits, closest_hits
+from reference_rt.block_hits import any_hits, closest_hits, hit_of
 from reference_rt.description import Description
 from reference_rt.geometry import closest_hit, occluded
 from reference_rt.integrators.integrator import power_heuristic, receiver, unshadowed
+from reference_rt.integrators.path_state import State, put_state, start, state_of
 from reference_rt.integrators.scratch import Scratch
 from reference_rt.kernel import kernel, local_floats
 from reference_rt.lights import area, shadow_ray
 from reference_rt.materials import Shading
-from reference_rt.ray import BLOCK, Hit, Ray, ray_from
+from reference_rt.ray import Ray, ray_from
 from reference_rt.sampling import Samplers, draw_pair, sampler_of
 from reference_rt.shading import shade
-from reference_rt.shapes.shape import FloatArray
-from reference_rt.streams import hit_of, put_ray, put_vector, ray_of, vector_of
+from reference_rt.streams import add_vector, put_ray, put_vector, ray_of, vector_of
 from reference_rt.tables import SceneTables
 from reference_rt.vec3 import Vec3, is_black, max_component, to_world
 
@@ -32,8 +32,8 @@ infinite from albedo² = cap on.  Mitsuba's cap of 0.95 reaches that at an albed
 is the same.
 """
 
-_SAMPLING = ("both", "lights", "bsdf")
-_BOTH, _LIGHTS, _BSDF = range(3)
+_LIGHTS, _BSDF = range(2)
+_ALONE = {"lights": _LIGHTS, "bsdf": _BSDF}
 
 
 class Path(Description):
@@ -58,54 +58,31 @@ class Path(Description):
 
     def setup(self) -> "PathSetup":
         limit = UNLIMITED if self.max_depth is None else min(self.max_depth, UNLIMITED)
-        return PathSetup(limit, self.rr_depth, _SAMPLING.index(self.sampling))
+        return PathSetup(limit, self.rr_depth, _ALONE.get(self.sampling))
 
 
 class PathSetup(NamedTuple):
+    """alone: the one thing that is to find lights; None for both, so that nothing is asked."""
+
     max_depth: int
     rr_depth: int
-    sampling: int
-
-
-class State(NamedTuple):
-    """What a path is when it goes on.
-
-    throughput: the weight of what it finds;  eta: of the product of the media's it has entered;
-    how its ray was chosen: with density bsdf_pdf, 0 for the eye and for delta lobes, whose finds no
-    light sample competes for, from `previous`, for a light-picking normal.
-    """
-
-    throughput: Vec3
-    eta: float
-    bsdf_pdf: float
-    previous: Vec3
-    normal: Vec3
+    alone: int | None
 
 
 class Step(NamedTuple):
-    """What a path finds at a hit: emitted, the light that is sent towards the eye;  light, what
-    comes by way of the surface if nothing is on the ray `shadow`, 0 where nothing can;  both
-    weighted;  goes_on, whether it does, along `ray` with `state`."""
+    """How a path leaves a surface: goes_on, whether it does, along `ray` with `state`."""
 
-    emitted: Vec3
-    light: Vec3
-    shadow: Ray
     goes_on: bool
     ray: Ray
     state: State
 
 
 class Lit(NamedTuple):
-    """Light from one point of a light, if nothing is on the ray `shadow`."""
+    """The light, weighted, that comes by way of a surface if nothing is on the ray `shadow`; 0
+    where nothing can."""
 
     light: Vec3
     shadow: Ray
-
-
-@kernel
-def start(ray: Ray) -> State:
-    """A path at the eye."""
-    return State(Vec3(1.0, 1.0, 1.0), 1.0, 0.0, ray.o, ray.d)
 
 
 @kernel
@@ -116,11 +93,18 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sa
     kept = local_floats(any_material.kept_floats(scene.materials))
     for depth in range(path.max_depth):
         hit = closest_hit(scene.geometry, ray)
-        step = advance(path, scene, depth, ray, hit, state, sampler, kept)
-        total = total + step.emitted
-        if not is_black(step.light):
-            if not occluded(scene.geometry, step.shadow):
-                total = total + step.light
+        if hit.kind < 0:
+            return total + _from_sky(path, scene, state, ray)
+        shading = shade(scene, ray, hit, kept)
+        if any_light.is_area(scene.lights.areas, shading.point):
+            total = total + _from_lamp(path, scene, state, ray, shading)
+        if depth + 1 >= path.max_depth:
+            break
+        lit = _next_event(path, scene, state, shading, sampler, depth)
+        if not is_black(lit.light):
+            if not occluded(scene.geometry, lit.shadow):
+                total = total + lit.light
+        step = _scatter(path, scene, state, shading, sampler, depth)
         if not step.goes_on:
             break
         ray, state = step.ray, step.state
@@ -135,9 +119,8 @@ def radiances(
     by edge, so that rays are traced side by side and no path waits for another."""
     rays, shadows, hits = scratch.rays, scratch.shadows, scratch.hits
     for j in range(n):
-        _put_state(scratch, j, j, start(ray_of(rays, j)))
+        put_state(scene, scratch, j, j, start(ray_of(rays, j)))
         put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
-    kept = local_floats(any_material.kept_floats(scene.materials))
     for depth in range(path.max_depth):
         if n == 0:
             break
@@ -145,144 +128,88 @@ def radiances(
         alive, lit = 0, 0
         for j in range(n):
             k = scratch.samples[j]
-            state = _state_of(scratch, j)
+            state = state_of(scene, scratch, j)
+            ray = ray_of(rays, j)
+            hit = hit_of(scene.geometry, ray, hits, j)
+            if hit.kind < 0:
+                add_vector(scratch.totals, 0, k, _from_sky(path, scene, state, ray))
+                continue
+            shading = shade(scene, ray, hit, scratch.kept)
+            if any_light.is_area(scene.lights.areas, shading.point):
+                add_vector(scratch.totals, 0, k, _from_lamp(path, scene, state, ray, shading))
+            if depth + 1 >= path.max_depth:
+                continue
             sampler = sampler_of(samplers, k)
-            step = advance(
-                path, scene, depth, ray_of(rays, j), hit_of(hits, j), state, sampler, kept
-            )
-            put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + step.emitted)
-            if not is_black(step.light):
-                put_ray(shadows, lit, step.shadow)
-                put_vector(scratch.lights, 0, lit, step.light)
+            found = _next_event(path, scene, state, shading, sampler, depth)
+            if not is_black(found.light):
+                put_ray(shadows, lit, found.shadow)
+                put_vector(scratch.lights, 0, lit, found.light)
                 scratch.lit[lit] = k
                 lit += 1
+            step = _scatter(path, scene, state, shading, sampler, depth)
             if step.goes_on:
                 put_ray(rays, alive, step.ray)
-                _put_state(scratch, alive, k, step.state)
+                put_state(scene, scratch, alive, k, step.state)
                 alive += 1
         any_hits(scene.geometry, shadows, hits, lit)
         for j in range(lit):
             if hits.codes[j] < 0:
-                k = scratch.lit[j]
-                light = vector_of(scratch.lights, 0, j)
-                put_vector(scratch.totals, 0, k, vector_of(scratch.totals, 0, k) + light)
+                add_vector(scratch.totals, 0, scratch.lit[j], vector_of(scratch.lights, 0, j))
         n = alive
 
 
 @kernel
-def _state_of(scratch: Scratch, j: int) -> State:
-    numbers = scratch.states
-    return State(
-        vector_of(numbers, 0, j),
-        numbers[9 * BLOCK + j],
-        numbers[10 * BLOCK + j],
-        vector_of(numbers, 3, j),
-        vector_of(numbers, 6, j),
-    )
+def _from_sky(path: PathSetup, scene: SceneTables, state: State, ray: Ray) -> Vec3:
+    """What a path finds that hits nothing, weighted."""
+    lights, weight = scene.lights, 1.0
+    if state.bsdf_pdf > 0.0:
+        light_pdf = any_light.environment_pdf(lights, state.previous, state.normal, ray.d)
+        weight = _weight(path.alone, _BSDF, state.bsdf_pdf, light_pdf)
+    emitted: Vec3 = any_light.background(lights.environment, ray.d)
+    return state.throughput * emitted * weight
 
 
 @kernel
-def _put_state(scratch: Scratch, j: int, k: int, state: State) -> None:
-    """As number j of the paths that go on, the path of sample k."""
-    scratch.samples[j] = k
-    numbers = scratch.states
-    put_vector(numbers, 0, j, state.throughput)
-    put_vector(numbers, 3, j, state.previous)
-    put_vector(numbers, 6, j, state.normal)
-    numbers[9 * BLOCK + j], numbers[10 * BLOCK + j] = state.eta, state.bsdf_pdf
+def _from_lamp(
+    path: PathSetup, scene: SceneTables, state: State, ray: Ray, shading: Shading
+) -> Vec3:
+    """What a path finds that hits an area light, weighted."""
+    lights, point, weight = scene.lights, shading.point, 1.0
+    if state.bsdf_pdf > 0.0:
+        shapes = scene.geometry.shapes
+        light_pdf = any_light.area_pdf(lights, shapes, state.previous, state.normal, point)
+        weight = _weight(path.alone, _BSDF, state.bsdf_pdf, light_pdf)
+    return state.throughput * area.emitted(lights.areas, point, shading.at, -ray.d) * weight
 
 
 @kernel
-def advance(
-    path: PathSetup,
-    scene: SceneTables,
-    depth: int,
-    ray: Ray,
-    hit: Hit,
-    state: State,
-    sampler: sampling.Sample,
-    kept: FloatArray,
-) -> Step:
-    """From what the ray that is edge number `depth` of a path has hit to the next ray."""
-    lights = scene.lights
-    throughput, bsdf_pdf = state.throughput, state.bsdf_pdf
-    previous, normal = state.previous, state.normal
-    black = Vec3(0.0, 0.0, 0.0)
-    if hit.kind < 0:
-        weight = 1.0
-        if bsdf_pdf > 0.0:
-            light_pdf = any_light.environment_pdf(lights, previous, normal, ray.d)
-            weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, light_pdf)
-        emitted = throughput * any_light.background(lights.environment, ray.d) * weight
-        return Step(emitted, black, ray, False, ray, state)
-    shading = shade(scene, ray, hit, kept)
-    point = shading.point
-    emitted = black
-    if point.light >= 0:
-        weight = 1.0
-        if bsdf_pdf > 0.0:
-            shapes = scene.geometry.shapes
-            light_pdf = any_light.area_pdf(lights, shapes, previous, normal, point)
-            weight = _weight(path.sampling == _LIGHTS, path.sampling, bsdf_pdf, light_pdf)
-        emitted = throughput * area.emitted(lights.areas, point, shading.at, -ray.d) * weight
-    if depth + 1 >= path.max_depth:
-        return Step(emitted, black, ray, False, ray, state)
-    dimension = sampling.PER_BOUNCE * depth
-    normal = receiver(scene, shading)
-    lit = Lit(black, ray)
-    if any_material.is_smooth(scene.materials, point.material):
-        lit = _next_event(path, scene, shading, normal, sampler, dimension)
-    light = throughput * lit.light
-    u_lobe = 0.5
-    if any_material.chooses(scene.materials, point.material):
-        _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
-    u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
-    scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
-    if scattered.pdf == 0.0:
-        return Step(emitted, light, lit.shadow, False, ray, state)
-    throughput = throughput * scattered.weight
-    eta = state.eta * scattered.eta
-    if depth + 1 >= path.rr_depth:
-        # eta² undoes the change of radiance in glass: what counts is the power that is left.
-        survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)
-        u_roulette, _ = draw_pair(sampler, dimension + sampling.ROULETTE)
-        if not u_roulette < survival:  # also ends what is NaN
-            return Step(emitted, light, lit.shadow, False, ray, state)
-        throughput = throughput * (1.0 / survival)
-    bsdf_pdf = 0.0 if scattered.is_delta else scattered.pdf
-    state = State(throughput, eta, bsdf_pdf, point.p, normal)
-    ray = ray_from(point, to_world(shading.frame, scattered.wi))
-    return Step(emitted, light, lit.shadow, True, ray, state)
-
-
-@kernel
-def _weight(is_other: bool, mode: int, pdf: float, other: float) -> float:
+def _weight(alone: int | None, way: int, pdf: float, other: float) -> float:
     """The weight of what one way of sampling found with density `pdf`, and the other could have
-    with `other`; all or nothing where one way alone is asked for (`is_other`: the other)."""
-    if mode == _BOTH or other == 0.0:
+    with `other`; all or nothing where one way alone is asked for."""
+    if alone is None:
         return power_heuristic(pdf, other)
-    return 0.0 if is_other else 1.0
+    return 1.0 if alone == way or other == 0.0 else 0.0
 
 
 @kernel
 def _next_event(
     path: PathSetup,
     scene: SceneTables,
+    state: State,
     shading: Shading,
-    normal: Vec3,
     sampler: sampling.Sample,
-    dimension: int,
+    depth: int,
 ) -> Lit:
     """Direct light from one light picked at random, weighted against the BSDF's own sampling."""
-    point = shading.point
+    point, dimension = shading.point, sampling.PER_BOUNCE * depth
     nothing = Lit(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
     count = any_light.count(scene.lights)
-    if count == 0:
+    if count == 0 or not any_material.is_smooth(scene.materials, point.material):
         return nothing
     u_pick = 0.5
     if count > 1:
         u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
-    picked = any_light.pick(scene.lights, point.p, normal, u_pick)
+    picked = any_light.pick(scene.lights, point.p, receiver(scene, shading), u_pick)
     if picked.probability == 0.0:
         return nothing
     u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
@@ -291,9 +218,42 @@ def _next_event(
     sample = unshadowed(scene, shading, light)
     if is_black(sample.contribution):
         return nothing
-    shadow = shadow_ray(point, light)
     pdf = light.pdf * picked.probability
-    if light.is_delta:
-        return Lit(sample.contribution * (1.0 / pdf), shadow)
-    weight = _weight(path.sampling == _BSDF, path.sampling, pdf, sample.bsdf_pdf)
-    return Lit(sample.contribution * (weight / pdf), shadow)
+    weight = 1.0
+    if not light.is_delta:
+        weight = _weight(path.alone, _LIGHTS, pdf, sample.bsdf_pdf)
+    arriving = sample.contribution * (weight / pdf)
+    return Lit(state.throughput * arriving, shadow_ray(point, light))
+
+
+@kernel
+def _scatter(
+    path: PathSetup,
+    scene: SceneTables,
+    state: State,
+    shading: Shading,
+    sampler: sampling.Sample,
+    depth: int,
+) -> Step:
+    """From the surface that edge number `depth` of a path has hit to the next ray."""
+    point, dimension = shading.point, sampling.PER_BOUNCE * depth
+    ended = Step(False, Ray(point.p, point.n, 0.0), state)
+    u_lobe = 0.5
+    if any_material.chooses(scene.materials, point.material):
+        _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
+    u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
+    scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
+    if scattered.pdf == 0.0:
+        return ended
+    throughput = state.throughput * scattered.weight
+    eta = state.eta * scattered.eta
+    if depth + 1 >= path.rr_depth:
+        # eta² undoes the change of radiance in glass: what counts is the power that is left.
+        survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)
+        u_roulette, _ = draw_pair(sampler, dimension + sampling.ROULETTE)
+        if not u_roulette < survival:  # also ends what is NaN
+            return ended
+        throughput = throughput * (1.0 / survival)
+    bsdf_pdf = 0.0 if scattered.is_delta else scattered.pdf
+    ray = ray_from(point, to_world(shading.frame, scattered.wi))
+    return Step(True, ray, State(throughput, eta, bsdf_pdf, point.p, receiver(scene, shading)))

@@ -16,7 +16,7 @@ class Scratch(NamedTuple):
 
     While an integrator works: shadows, rays that may be blocked, and the light (VECTOR_FLOATS,)
     that each brings to sample `lit` (BLOCK,);  hits;  states (STATE_FLOATS,) of paths, and the
-    sample (BLOCK,) that each is of.
+    sample (BLOCK,) that each is of;  kept (`materials.kept_floats`,) for `shade`.
     """
 
     rays: Rays
@@ -27,6 +27,7 @@ class Scratch(NamedTuple):
     hits: Hits
     states: FloatArray
     samples: IntArray
+    kept: FloatArray
 
 
 @kernel

@@ -10,7 +10,7 @@ from reference_rt.kernel import kernel
 from reference_rt.lights.light import LightSample
 from reference_rt.sampling.warp import uniform_sphere
 from reference_rt.shapes.shape import FloatArray
-from reference_rt.vec3 import Vec3, luminance, row
+from reference_rt.vec3 import Vec3, luminance
 
 PDF = 0.25 / math.pi
 """Directions are drawn uniformly over the sphere."""
@@ -24,19 +24,17 @@ class Constant(Description):
     """W sr^-1 m^-2, linear sRGB."""
 
     def tabulate(self) -> "Environment":
-        return Environment(np.array([self.radiance]))
+        return Environment(Vec3(*self.radiance))
 
 
 class Environment(NamedTuple):
-    """radiance (1, 3)."""
-
-    radiance: FloatArray
+    radiance: Vec3
 
 
 @kernel
 def radiance(environment: Environment, d: Vec3) -> Vec3:
     """What arrives from the direction `d`."""
-    return row(environment.radiance, 0)
+    return environment.radiance
 
 
 @kernel
@@ -49,11 +47,11 @@ def pdf(environment: Environment, d: Vec3) -> float:
 def sample(environment: Environment, u0: float, u1: float) -> LightSample:
     """A direction, uniformly over the sphere."""
     wi = uniform_sphere(u0, u1)
-    return LightSample(wi, row(environment.radiance, 0), PDF, wi, math.inf, False)
+    return LightSample(wi, environment.radiance, PDF, wi, math.inf, False)
 
 
 def power(environment: Environment, scene_radius: float) -> FloatArray:
     """Luminance of the power (1,) into the sphere of the scene's radius R: 4 pi² R² L, its area
     4 pi R² times the irradiance pi L."""
-    arriving = luminance(Vec3(*environment.radiance.T))
-    return np.asarray(4.0 * math.pi * math.pi * scene_radius * scene_radius * arriving)
+    arriving = luminance(environment.radiance)
+    return np.array([4.0 * math.pi * math.pi * scene_radius * scene_radius * arriving])

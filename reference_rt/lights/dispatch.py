@@ -12,7 +12,6 @@ from reference_rt.lights.environment_map import EnvironmentMaps
 from reference_rt.lights.light import (
     AREA,
     DIRECTIONAL,
-    ENVIRONMENT,
     POINT,
     SPOT,
     LightSample,
@@ -106,6 +105,18 @@ def _pick_probability(
 
 
 @kernel
+def asks_place(lights: Lights) -> bool:
+    """Whether any chance or density depends on the place that a light is picked for: a constant."""
+    return lights.areas is not None or lights.tree is not None
+
+
+@kernel
+def asks_normal(lights: Lights) -> bool:
+    """Whether any depends on the normal there: a constant."""
+    return lights.tree is not None
+
+
+@kernel
 def count(lights: Lights) -> int:
     """How many lights can be picked."""
     return _count(lights.choice)
@@ -115,7 +126,7 @@ def count(lights: Lights) -> int:
 def _count(lights: Choice | None) -> int:
     if lights is None:
         return 0
-    return len(lights.kind)
+    return choice.count(lights)
 
 
 @kernel
@@ -166,16 +177,16 @@ def _sample_one(
     if entries is None:
         return no_light()
     kind, i = entries.kind[k], entries.row[k]
-    found: LightSample = no_light()
-    if kind == AREA:
-        found = _from_area(lights.areas, i, shapes, textures, p, u0, u1)
-    elif kind == POINT:
+    # A kind that the scene lacks is not asked for; where there is but the last, none is.
+    if lights.areas is not None and kind == AREA:
+        found: LightSample = _from_area(lights.areas, i, shapes, textures, p, u0, u1)
+    elif lights.points is not None and kind == POINT:
         found = _from_point(lights.points, i, p)
-    elif kind == SPOT:
+    elif lights.spots is not None and kind == SPOT:
         found = _from_spot(lights.spots, i, p)
-    elif kind == DIRECTIONAL:
+    elif lights.directionals is not None and kind == DIRECTIONAL:
         found = _from_directional(lights.directionals, i)
-    elif kind == ENVIRONMENT:
+    else:
         found = _environment_sample(lights.environment, u0, u1)
     return found
 
@@ -217,6 +228,14 @@ def _from_directional(directionals: Directionals | None, i: int) -> LightSample:
 
 
 @kernel
+def is_area(areas: Areas | None, q: SurfacePoint) -> bool:
+    """Whether a surface is an area light."""
+    if areas is None:
+        return False
+    return q.light >= 0
+
+
+@kernel
 def area_pdf(lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint) -> float:
     """The density per solid angle, choice included, with which light sampling for a surface at `p`
     with normal `n` finds `q`."""
@@ -229,7 +248,7 @@ def _area_pdf(
 ) -> float:
     if areas is None:
         return 0.0
-    if q.light < 0:
+    if not is_area(areas, q):
         return 0.0
     chance = pick_probability(lights, p, n, q.light)
     return area.pdf(areas, q.light, shapes, p, q) * chance

@@ -108,7 +108,8 @@ def _choice(kind: Any, row: Any, weight: FloatArray) -> Choice | None:
 
 def _choice_by(kind: Any, row: Any, probability: FloatArray) -> Choice:
     bounded = probability[(kind != DIRECTIONAL) & (kind != ENVIRONMENT)].sum()
-    return Choice(kind, row, probability, np.cumsum(probability), np.array([bounded]))
+    cumulative = np.cumsum(probability) if len(probability) > 1 else None
+    return Choice(kind, row, probability, cumulative, np.array([bounded]))
 
 
 def _mostly_others(choice: Choice) -> Choice:

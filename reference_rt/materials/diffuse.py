@@ -3,7 +3,7 @@
 from typing import ClassVar, Literal, NamedTuple
 
 from reference_rt.kernel import kernel
-from reference_rt.materials.material import INV_PI, BsdfSample, Material, no_sample
+from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
 from reference_rt.sampling.warp import cosine_hemisphere
 from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
 from reference_rt.vec3 import Vec3
@@ -32,19 +32,25 @@ class Diffuses(NamedTuple):
 
 
 @kernel
+def both(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`, with one question after the sides (measured: 1 % of spheres under a
+    sky)."""
+    if wo.z <= 0.0 or wi.z <= 0.0:
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    density = wi.z * INV_PI
+    return Scattered(colour_at(diffuses.reflectance, i, at) * density, density)
+
+
+@kernel
 def evaluate(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
     """f(wo, wi) cos wi."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    return colour_at(diffuses.reflectance, i, at) * (wi.z * INV_PI)
+    return both(diffuses, i, at, wo, wi).value
 
 
 @kernel
 def pdf(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
     """The density of `sample` per solid angle: cos wi / pi."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return 0.0
-    return wi.z * INV_PI
+    return both(diffuses, i, at, wo, wi).density
 
 
 @kernel

@@ -17,17 +17,17 @@ from reference_rt.vec3 import Vec3, to_local, to_world
 
 class Materials(NamedTuple):
     """Of each material: kind (n,) and row (n,), which table it is a row of, where it is no layers,
-    kind None where there is but one table;  smooth (n,), whether lights can be sampled, None where
-    all are smooth;  chooses (n,), whether `sample` uses `u_lobe`, None where none does;
-    behind (n,), whether light from both sides of the surface counts, None where it never does;
-    shown (n), its colour to ray casting.
+    kind None where there is but one table, row None too where each is the row of its own number;
+    smooth (n,), whether lights can be sampled, None where all are smooth;  chooses (n,), whether
+    `sample` uses `u_lobe`, None where none does;  behind (n,), whether light from both sides of
+    the surface counts, None where it never does;  shown (n), its colour to ray casting.
 
     oriented (1,) where any scatters differently along u and v, or is tilted by a texture, else
     None;  asks (n,), whether it asks a texture, None where all or none do;  textured, None where
     none has one for a colour;  layers, None where none is made of others;  leaves, the tables."""
 
     kind: IntArray | None
-    row: IntArray
+    row: IntArray | None
     smooth: IntArray | None
     chooses: IntArray | None
     behind: IntArray | None
@@ -59,6 +59,13 @@ def _kind(kinds: IntArray | None, materials: Materials, m: int) -> int:
 
 
 @kernel
+def _row(rows: IntArray | None, m: int) -> int:
+    if rows is None:
+        return m
+    return int(rows[m])
+
+
+@kernel
 def is_smooth(materials: Materials, m: int) -> bool:
     """Whether the material scatters to a continuum of directions, so that lights can be sampled."""
     return _flag(materials.smooth, m, True)
@@ -83,6 +90,12 @@ def takes_light_from_behind(materials: Materials, m: int) -> bool:
 
 
 @kernel
+def any_transmits(materials: Materials) -> bool:
+    """Whether light passes to the other side of any: a constant."""
+    return materials.behind is not None
+
+
+@kernel
 def evaluate(materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
     """f(wo, wi) |cos wi|, without what is mirrored or refracted perfectly."""
     return both(materials, shading, wi).value
@@ -104,7 +117,7 @@ def both(materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
 def _both(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
     m = shading.point.material
     if layers is None:
-        kind, i = _kind(materials.kind, materials, m), materials.row[m]
+        kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return any_leaf.both(materials.leaves, kind, i, shading.at, shading.wo, wi)
     value, density, total = Vec3(0.0, 0.0, 0.0), 0.0, 0.0
     first = layers.first[m]
@@ -140,7 +153,7 @@ def _sample(
 ) -> BsdfSample:
     m = shading.point.material
     if layers is None:
-        kind, i = _kind(materials.kind, materials, m), materials.row[m]
+        kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return any_leaf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
     first, count = layers.first[m], layers.number[m]
     total = 0.0
@@ -224,7 +237,7 @@ def ambient(materials: Materials, shading: Shading) -> Vec3:
 def _ambient(layers: Layers | None, materials: Materials, shading: Shading) -> Vec3:
     m = shading.point.material
     if layers is None:
-        kind, i = _kind(materials.kind, materials, m), materials.row[m]
+        kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return any_leaf.ambient(materials.leaves, kind, i, shading.at)
     total = Vec3(0.0, 0.0, 0.0)
     first = layers.first[m]
@@ -246,7 +259,7 @@ def branches(materials: Materials, shading: Shading, k: int) -> Branches:
 def _branches(layers: Layers | None, materials: Materials, shading: Shading, k: int) -> Branches:
     m = shading.point.material
     if layers is None:
-        kind, i = _kind(materials.kind, materials, m), materials.row[m]
+        kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return any_leaf.branches(materials.leaves, kind, i, shading.at, shading.wo)
     layer = layer_at(shading, k)
     k += layers.first[m]

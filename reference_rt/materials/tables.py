@@ -61,7 +61,7 @@ def material_tables(scene: "Scene", palette: Palette, default: bool) -> Material
     is_one_table = len(leaves.parts) == 1 and set(kinds) == leaves.parts.keys()
     return Materials(
         kind=None if is_one_table else np.array(kinds),
-        row=np.array(rows),
+        row=None if is_one_table and rows == list(range(len(rows))) else np.array(rows),
         smooth=None if smooth.all() else smooth,
         chooses=chooses if chooses.any() else None,
         behind=behind if behind.any() else None,

@@ -16,7 +16,7 @@ from reference_rt.shapes.dispatch import (
     tangents,
     uv,
 )
-from reference_rt.shapes.few import Packets, nearest, nearest_of_rays
+from reference_rt.shapes.few import Packets, nearest, nearest_of_ray, nearest_of_rays
 from reference_rt.shapes.mesh import Mesh
 from reference_rt.shapes.plane import Plane
 from reference_rt.shapes.polygon import Polygon
@@ -73,6 +73,7 @@ __all__ = [
     "intersect",
     "middle",
     "nearest",
+    "nearest_of_ray",
     "nearest_of_rays",
     "owner",
     "pdf",

@@ -27,7 +27,7 @@ from reference_rt.shapes.tables import (
 )
 from reference_rt.shapes.triangle import Triangles
 from reference_rt.shapes.watertight import shear_of
-from reference_rt.streams import Hits, Rays, put_hit, ray_of
+from reference_rt.streams import Hits, Rays, ray_of
 from reference_rt.vec3 import row, triple
 
 
@@ -106,6 +106,14 @@ def _nearest_of_others(shapes: Shapes, ray: Ray, closest: Hit) -> Hit:
 
 
 @kernel
+def _has_others(shapes: Shapes) -> bool:
+    """Whether there is what has no packets: a constant."""
+    flat = shapes.disks is not None or shapes.planes is not None or shapes.polygons is not None
+    curved = shapes.quadrics is not None or shapes.tori is not None
+    return shapes.triangles is not None or flat or curved
+
+
+@kernel
 def _nearest_triangle(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hit:
     if triangles is None:
         return closest
@@ -118,7 +126,8 @@ _KIND = 2**40
 
 @kernel
 def nearest_of_rays(shapes: Shapes, rays: Rays, hits: Hits, n: int, any_hit: bool) -> None:
-    """`nearest` for the first n of `rays`; where `any_hit`, only whether there is any."""
+    """What `nearest_of_ray` makes the hits of the first n of `rays` of; where `any_hit`, only
+    whether there is any, by the sign of its code."""
     t, codes = local_floats(LANES), local_integers(LANES)
     for at in range(0, n, LANES):
         begin(rays.numbers, at, t, codes)
@@ -126,23 +135,32 @@ def nearest_of_rays(shapes: Shapes, rays: Rays, hits: Hits, n: int, any_hit: boo
         _nearer_rectangles(shapes.rectangles, rays, at, t, codes)
         _nearer_boxes(shapes.boxes, rays, at, t, codes)
         end(t, codes, at, hits.numbers, hits.codes)
-    for j in range(n):
-        ray = ray_of(rays, j)
-        closest = _hit_of_code(shapes, ray, hits.codes[j], hits.numbers[j], any_hit)
-        put_hit(hits, j, _nearest_of_others(shapes, ray, closest))
+    if any_hit and _has_others(shapes):
+        for j in range(n):
+            if hits.codes[j] < 0:
+                ray = ray_of(rays, j)
+                hits.codes[j] = _nearest_of_others(shapes, ray, no_hit(ray)).kind
 
 
 @kernel
-def _hit_of_code(shapes: Shapes, ray: Ray, code: int, t: float, any_hit: bool) -> Hit:
+def nearest_of_ray(shapes: Shapes, ray: Ray, hits: Hits, j: int) -> Hit:
+    """`nearest` for ray number j of those that `nearest_of_rays` was asked for."""
+    closest = _hit_of_code(shapes, ray, hits.codes[j], hits.numbers[j])
+    return _nearest_of_others(shapes, ray, closest)
+
+
+@kernel
+def _hit_of_code(shapes: Shapes, ray: Ray, code: int, t: float) -> Hit:
     if code < 0:
         return no_hit(ray)
     kind, i = code // _KIND, code % _KIND
+    if shapes.rectangles is None and shapes.boxes is None:
+        kind = SPHERE  # a constant, so that choices vanish
     found = Crossing(t, 0.0, 0.0)
-    if not any_hit:
-        if kind == RECTANGLE:
-            found = _found(shapes.rectangles, i, ray, t)
-        elif kind == BOX:
-            found = _found(shapes.boxes, i, ray, t)
+    if kind == RECTANGLE:
+        found = _found(shapes.rectangles, i, ray, t)
+    elif kind == BOX:
+        found = _found(shapes.boxes, i, ray, t)
     return Hit(found.t, kind, i, found.u, found.v, -1)
 
 

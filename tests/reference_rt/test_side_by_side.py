@@ -8,7 +8,7 @@ from builders import SCENES
 
 import reference_rt as rt
 from reference_rt import bands
-from reference_rt.block_hits import any_hits, closest_hits
+from reference_rt.block_hits import any_hits, closest_hits, hit_of
 from reference_rt.geometry import closest_hit, occluded
 from reference_rt.integrators import radiance
 from reference_rt.kernel import entry_kernel
@@ -17,7 +17,7 @@ from reference_rt.ray import BLOCK, Ray
 from reference_rt.sampling import start_sample
 from reference_rt.shapes import box, rectangle, sphere
 from reference_rt.shapes.side_by_side import nearer_plainly
-from reference_rt.streams import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, Hits, Rays, hit_of
+from reference_rt.streams import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, Hits, Rays, ray_of
 from reference_rt.vec3 import Vec3
 
 
@@ -60,12 +60,13 @@ def _alone(geometry, o, d, t_max, found, blocked):
 
 @entry_kernel
 def _together(geometry, numbers, hits, n, found, blocked):
-    closest_hits(geometry, Rays(numbers), hits, n)
+    rays = Rays(numbers)
+    closest_hits(geometry, rays, hits, n)
     for j in range(n):
-        hit = hit_of(hits, j)
+        hit = hit_of(geometry, ray_of(rays, j), hits, j)
         found[j, 0], found[j, 1], found[j, 2] = hit.t, hit.u, hit.v
         found[j, 3], found[j, 4] = hit.kind, hit.row
-    any_hits(geometry, Rays(numbers), hits, n)
+    any_hits(geometry, rays, hits, n)
     for j in range(n):
         blocked[j] = hits.codes[j] >= 0
 
