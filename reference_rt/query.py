@@ -216,7 +216,11 @@ def occluded(
     `threads` threads (default: all cores)."""
     o, d = checked_rays(origins, directions)
     out = np.zeros(len(o), np.bool_)
-    ends = np.full(len(o), t_max, dtype=np.float64)
+    if np.ndim(t_max) == 0:
+        t_max = np.full(len(o), t_max, np.float64)
+    ends = np.require(t_max, np.float64, ("C", "A", "W"))
+    if ends.shape != (len(o),):
+        raise ValueError(f"t_max: expected a number or {len(o)} numbers, got {ends.shape}")
 
     def trace(k: slice) -> None:
         _occluded(scene.geometry, o[k], d[k], ends[k], out[k])
