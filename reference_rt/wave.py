@@ -9,10 +9,10 @@ from reference_rt.bvh import CENTER, NODE_SINGLES, STACK_SIZE, Bvh
 from reference_rt.kernel import kernel
 from reference_rt.lane_kernels import lane_kernel, prefetch
 from reference_rt.lanes import LANES, larger, with_sign
-from reference_rt.ray import BLOCK, SURFACE_ROUNDING, no_hit
+from reference_rt.ray import BLOCK, SURFACE_ROUNDING
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.shapes.watertight import Shear
-from reference_rt.streams import Hits, Rays, put_hit, ray_of
+from reference_rt.streams import Hits, Rays, ray_of
 
 Naturals = npt.NDArray[np.uint32]
 
@@ -58,7 +58,7 @@ class Lengths(NamedTuple):
 
 
 @kernel
-def prepare(bvh: Bvh, wave: Wave, rays: Rays, hits: Hits, n: int) -> None:
+def prepare(bvh: Bvh, wave: Wave, rays: Rays, n: int) -> None:
     """What of the first n rays does not change on their ways."""
     frame = bvh.frames
     for j in range(0, n, LANES):
@@ -72,7 +72,6 @@ def prepare(bvh: Bvh, wave: Wave, rays: Rays, hits: Hits, n: int) -> None:
             wave.views,
         )
     for j in range(n):
-        put_hit(hits, j, no_hit(ray_of(rays, j)))
         for axis in range(3):
             is_forward = wave.views[(6 + axis) * BLOCK + j] > 0.0
             wave.axes[axis * BLOCK + j] = axis + 3 - 3 * is_forward

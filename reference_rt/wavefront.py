@@ -21,10 +21,10 @@ from reference_rt.kernel import kernel, local_floats, local_naturals
 from reference_rt.lane_kernels import lane_kernel, lowest, prefetch
 from reference_rt.lanes import LANES, least, select
 from reference_rt.leaves import nearest_of_leaf
-from reference_rt.ray import BLOCK
+from reference_rt.ray import BLOCK, no_hit
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.shapes.watertight import SEEN_FLOATS
-from reference_rt.streams import Hits, Rays
+from reference_rt.streams import Hits, Rays, put_hit, ray_of
 from reference_rt.traversal import between
 from reference_rt.wave import (
     LEVELS,
@@ -59,7 +59,9 @@ def closest_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: in
     seen = local_floats(SEEN_FLOATS)
     # Of each child how far away it is, inf where it does not wait.
     waiting = local_floats(LEVELS * BLOCK * LANES)
-    prepare(bvh, wave, rays, hits, n)
+    prepare(bvh, wave, rays, n)
+    for j in range(n):
+        put_hit(hits, j, no_hit(ray_of(rays, j)))
     root = 0
     while root >= 0:
         lengths = begin_at(wave, hits, root, n, False)
@@ -83,7 +85,9 @@ def any_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: int) -
         local_naturals(3 * BLOCK),
     )
     seen, waiting = local_floats(SEEN_FLOATS), local_naturals(LEVELS * BLOCK)
-    prepare(bvh, wave, rays, hits, n)
+    prepare(bvh, wave, rays, n)
+    for j in range(n):  # the rest of a hit that is none is not asked for
+        hits.numbers[j], hits.codes[j] = rays.numbers[6 * BLOCK + j], -1
     root = 0
     while root >= 0:
         lengths = begin_at(wave, hits, root, n, True)
