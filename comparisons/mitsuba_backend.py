@@ -15,6 +15,7 @@ import platform
 import re
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -140,12 +141,21 @@ def variant(name: str) -> Iterator[Any]:
     """Mitsuba in another variant, our plugins registered there too, while the context lasts."""
     mi = mitsuba()
     chosen = mi.variant()
-    mi.set_variant(name)
+    _set_variant(mi, name)
     try:
         _register_once(name)
         yield mi
     finally:
-        mi.set_variant(chosen)
+        _set_variant(mi, chosen)
+
+
+def _set_variant(mi: Any, name: str) -> None:
+    """Mitsuba defines all of its own plugins anew, and after a thousand definitions Dr.Jit warns,
+    each time, that this is slow."""
+    if mi.variant() != name:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            mi.set_variant(name)
 
 
 @functools.cache

@@ -1,7 +1,6 @@
 """Who is timed: ours and Mitsuba's variants, each with its default sampler and its best one."""
 
 import time
-import warnings
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -125,12 +124,9 @@ class Stable:
         own plugins again."""
         mi = mitsuba()
         if mi.variant() != side:
-            with warnings.catch_warnings():
-                # Dr.Jit warns that this is slow, after a thousand definitions.
-                warnings.simplefilter("ignore", RuntimeWarning)
-                self._entered.close()
-                if mi.variant() != side:
-                    self._entered.enter_context(variant(side))
+            self._entered.close()
+            if mi.variant() != side:
+                self._entered.enter_context(variant(side))
         return mi
 
     def ready(self, contestant: Contestant, progress: Progress | None = None) -> Renderer:
