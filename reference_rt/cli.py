@@ -227,7 +227,8 @@ def main() -> None:
         _add_commands()
         gc.freeze()  # what the imports made stays: 0.04 s less of looking through it for garbage
         # Compiling makes millions of small objects, few of them in cycles: looked through a
-        # thirtieth as often the first render of mesh_knot takes 12.0 in place of 12.9 s, and 3 MB.
+        # thirtieth as often the first render of mesh_knot takes 11.9 in place of 12.9 s (means of
+        # two), and 3 MB more.
         gc.set_threshold(20_000)
         app()
     except KeyboardInterrupt:  # before or after a command, which has its own answer

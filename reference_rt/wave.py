@@ -36,8 +36,8 @@ class Wave(NamedTuple):
     by -1 less its code;  nodes (LEVELS BLOCK,): of which children wait for it, `level` (BLOCK,) of
     them;  queues (3 BLOCK,): rays at nodes, at leaves, and on their way back.
 
-    Numba asks of each index whether it is negative, but not of natural numbers: a tenth of the
-    time (measured).
+    Numba asks of each index whether it is negative, but not of natural numbers: 6 % of the time
+    (measured, with children's codes in one row).
     """
 
     views: FloatArray

@@ -1,5 +1,7 @@
 """What the benchmark measures: the kernels pruned by hand, meshes, rays and the machine."""
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -124,3 +126,14 @@ def test_peak_memory_is_in_megabytes() -> None:
     block = np.ones(40_000_000)  # 320 MB
     assert peak() >= before
     assert peak() > block.nbytes / 1e6
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="what Linux tells")
+def test_peak_memory_is_not_that_of_who_started_the_process() -> None:
+    block = np.ones(60_000_000)
+    told = subprocess.run(
+        [sys.executable, "-c", "from comparisons.bench.million_worker import peak; print(peak())"],
+        capture_output=True,
+        check=True,
+    )
+    assert 0.0 < float(told.stdout) < block.nbytes / 1e6 < peak()

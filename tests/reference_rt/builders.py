@@ -1,5 +1,8 @@
 """Scenes, tables and meshes that tests are made of."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +18,26 @@ U = 2.0**-53
 """The unit roundoff: one operation is off by at most this, relatively."""
 
 SCENES = Path(__file__).parents[2] / "scenes"
+
+
+_PLAIN = """
+import importlib
+import sys
+from pathlib import Path
+folder, module, function, *arguments = sys.argv[1:]
+sys.path.insert(0, folder)
+getattr(importlib.import_module(module), function)(*map(Path, arguments))
+"""
+
+
+def in_plain_python(test_file: str, function: str, *arguments: Path) -> None:
+    """Call a function of a test's file with paths, where kernels run as plain Python."""
+    file = Path(test_file)
+    subprocess.run(
+        [sys.executable, "-c", _PLAIN, str(file.parent), file.stem, function, *map(str, arguments)],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+        check=True,
+    )
 
 
 def unit_vectors(rng: np.random.Generator, n: int) -> FloatArray:

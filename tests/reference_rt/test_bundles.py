@@ -1,14 +1,10 @@
 """Rays that go together find what each finds alone, to the last bit."""
 
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import cube, icosphere, unit_vectors, write_obj
+from builders import cube, icosphere, in_plain_python, unit_vectors, write_obj
 
 import reference_rt as rt
 from reference_rt import query, trees
@@ -211,15 +207,6 @@ def test_a_bundle_enters_what_its_rays_enter(width, tmp_path):
     assert entered <= (1.2 if width == 0.0 else 5.0) * needed
 
 
-_PLAIN = """
-import sys
-sys.path.insert(0, sys.argv[1])
-import test_bundles as here
-from pathlib import Path
-here.write_hits(Path(sys.argv[2]), sys.argv[3])
-"""
-
-
 def write_hits(folder, file):
     tables = mesh_scene(folder, icosphere(2))
     rng = np.random.default_rng(12)
@@ -230,12 +217,7 @@ def write_hits(folder, file):
 
 def test_plain_python_gives_the_same_bits(tmp_path):
     write_hits(tmp_path, tmp_path / "compiled.npz")
-    arguments = [str(Path(__file__).parent), str(tmp_path), str(tmp_path / "plain.npz")]
-    subprocess.run(
-        [sys.executable, "-c", _PLAIN, *arguments],
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
-        check=True,
-    )
+    in_plain_python(__file__, "write_hits", tmp_path, tmp_path / "plain.npz")
     compiled, plain = (np.load(tmp_path / f"{name}.npz") for name in ("compiled", "plain"))
     assert compiled["share"] > 0.5
     assert np.isfinite(compiled["t"]).any()

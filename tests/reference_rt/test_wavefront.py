@@ -1,14 +1,10 @@
 """Rays on their ways through a hierarchy together find what each finds alone, to the last bit."""
 
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import cube, icosphere, unit_vectors, write_obj
+from builders import cube, icosphere, in_plain_python, unit_vectors, write_obj
 
 import reference_rt as rt
 from reference_rt import query, trees
@@ -170,15 +166,6 @@ def test_what_lies_on_arrays_of_rays(tmp_path):
     assert np.array_equal(query.occluded(tables, o, d, t_max), expected & ~spoiled)
 
 
-_PLAIN = """
-import sys
-sys.path.insert(0, sys.argv[1])
-import test_wavefront as here
-from pathlib import Path
-here.write_hits(Path(sys.argv[2]), sys.argv[3])
-"""
-
-
 def write_hits(folder, file):
     tables = rt.build_tables(rt.Scene(shapes=(mesh(folder, icosphere(2)),)))
     numbers = block(*rays(np.random.default_rng(8), 40))
@@ -191,12 +178,7 @@ def write_hits(folder, file):
 
 def test_plain_python_gives_the_same_bits(tmp_path):
     write_hits(tmp_path, tmp_path / "compiled.npz")
-    arguments = [str(Path(__file__).parent), str(tmp_path), str(tmp_path / "plain.npz")]
-    subprocess.run(
-        [sys.executable, "-c", _PLAIN, *arguments],
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
-        check=True,
-    )
+    in_plain_python(__file__, "write_hits", tmp_path, tmp_path / "plain.npz")
     compiled, plain = (np.load(tmp_path / f"{name}.npz") for name in ("compiled", "plain"))
     assert 5 < compiled["blocked"].sum() < 35
     for name in compiled.files:
