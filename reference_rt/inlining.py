@@ -14,7 +14,7 @@ from typing import Any
 
 from llvmlite import binding
 from numba import _dynfunc
-from numba.core import cgutils, config, types
+from numba.core import cgutils, config, typed_passes, types, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -162,6 +162,24 @@ _INTERNAL: dict[Any, Any] = {}
 """Numba's own functions that kernels call, compiled for these models."""
 
 
+_LEFT_OUT = (
+    NativeLowering,  # another comes in its place
+    # For what no kernel has: closures, `with`, generators, literal lists, raises, array expressions.
+    typed_passes.InlineOverloads,
+    typed_passes.NopythonRewrites,
+    typed_passes.NoPythonSupportedFeatureValidation,
+    typed_passes.DumpParforDiagnostics,
+    untyped_passes.FindLiterallyCalls,
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.InlineInlinables,
+    untyped_passes.LiteralPropagationSubPipelinePass,
+    untyped_passes.LiteralUnroll,
+    untyped_passes.MakeFunctionToJitFunction,
+    untyped_passes.RewriteDynamicRaises,
+    untyped_passes.WithLifting,
+)
+
+
 class _Compiler(CompilerBase):
     """Numba's compiler with another lowering, and tuples as above."""
 
@@ -176,7 +194,7 @@ class _Compiler(CompilerBase):
     def define_pipelines(self) -> list[Any]:
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(self.lowering, NativeLowering)
-        passes.passes = [p for p in passes.passes if p[0] is not NativeLowering]
+        passes.passes = [p for p in passes.passes if p[0] not in _LEFT_OUT]
         passes.finalize()
         return [passes]
 
