@@ -1,6 +1,7 @@
 """What the rays of a block hit: side by side, on their ways together, or one after another."""
 
 from reference_rt import shapes as any_shape
+from reference_rt.apart import Address, call_at
 from reference_rt.bvh import Bvh
 from reference_rt.geometry import Geometry, closest_hit, occluded
 from reference_rt.groups import Instances
@@ -34,7 +35,7 @@ def _closest_hits(
         for j in range(n):
             put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
         return
-    closest_of_block(bvh, geometry, rays, hits, n)
+    _trace(geometry.tracer, bvh, geometry, rays, hits, n, False)
 
 
 @kernel
@@ -72,4 +73,23 @@ def _any_hits(
         for j in range(n):
             hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
         return
-    any_of_block(bvh, geometry, rays, hits, n)
+    _trace(geometry.tracer, bvh, geometry, rays, hits, n, True)
+
+
+@kernel
+def _trace(
+    tracer: Address | None,
+    bvh: Bvh,
+    geometry: Geometry,
+    rays: Rays,
+    hits: Hits,
+    n: int,
+    any_hit: bool,
+) -> None:
+    if tracer is not None:
+        call_at(tracer[0], (bvh, geometry.shapes, geometry.solids, rays, hits, n, any_hit))
+        return
+    if any_hit:
+        any_of_block(bvh, geometry.shapes, geometry.solids, rays, hits, n)
+    else:
+        closest_of_block(bvh, geometry.shapes, geometry.solids, rays, hits, n)

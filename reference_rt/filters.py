@@ -19,6 +19,7 @@ from pydantic import Field
 
 from reference_rt.description import Description, Positive
 from reference_rt.kernel import ByClass, kernel
+from reference_rt.sampling.distribution import cell_of
 from reference_rt.shapes.shape import FloatArray
 
 
@@ -227,8 +228,7 @@ def _tent_offset(tent: TentSetup, u: float) -> tuple[float, float]:
 def _tabulated_offset(table: Tabulated, u: float) -> tuple[float, float]:
     """Linear inside a cell of the table; the weight is the filter over that cell's density."""
     edges, cumulative = table.edges, table.cumulative
-    cell = int(np.searchsorted(cumulative, u, "right")) - 1
-    cell = min(max(cell, 0), len(edges) - 2)
+    cell = cell_of(cumulative, u)
     low, high = cumulative[cell], cumulative[cell + 1]
     span = edges[cell + 1] - edges[cell]
     x = edges[cell] + span * (u - low) / (high - low)

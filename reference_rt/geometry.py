@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from reference_rt import shapes as any_shape
+from reference_rt.apart import Address
 from reference_rt.bvh import NOTHING, WIDE_STACK, Bvh, first_of, is_packet, kind_of, row_of, size_of
 from reference_rt.csg.anchor import out_of_solid, ray_near
 from reference_rt.csg.tables import Parts, Solids
@@ -22,7 +23,10 @@ STACK = 2 * WIDE_STACK + LANES + 1
 
 
 class Geometry(NamedTuple):
-    """All shapes, and the hierarchy over them where they are many enough to need one."""
+    """All shapes, and the hierarchy over them where they are many enough to need one.
+
+    tracer: where `wavefront.trace_block` stands, compiled for these; None where it is inlined.
+    """
 
     shapes: Shapes
     packets: Packets
@@ -30,6 +34,7 @@ class Geometry(NamedTuple):
     solids: Solids | None
     instances: Instances | None
     parts: Parts | None
+    tracer: Address | None = None
 
 
 @kernel

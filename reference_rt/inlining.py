@@ -15,12 +15,14 @@ from typing import Any
 from llvmlite import binding
 from numba import _dynfunc
 from numba.core import cgutils, config, typed_passes, types, untyped_passes
+from numba.core.analysis import dead_branch_prune
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import register_pass
 from numba.core.datamodel import DataModelManager, default_manager
 from numba.core.datamodel.models import TupleModel, UniTupleModel
 from numba.core.typed_passes import NativeLowering
+from numba.core.untyped_passes import DeadBranchPrune
 
 # Numba's classes have no types that mypy knows.
 # mypy: disable-error-code="attr-defined, misc, untyped-decorator"
@@ -67,24 +69,31 @@ class _Entry(_Inlined):
         return JITCodeLibrary._get_module_for_linking(self)
 
 
+def invoke(
+    context: Any, builder: Any, function: Any, returns: Any, types: Any, arguments: Any
+) -> Any:
+    """Write a call of a kernel: as Numba's own, without asking whether it raised anything, which
+    takes five blocks; but for indices out of bounds, where these are checked, none does."""
+    if config.BOUNDSCHECK:
+        status, value = context.call_conv.call_function(
+            builder, function, returns, types, arguments
+        )
+        with cgutils.if_unlikely(builder, status.is_error):
+            context.call_conv.return_status_propagate(builder, status)
+        return value
+    returned = cgutils.alloca_once(builder, function.type.pointee.args[0].pointee)
+    raised = builder.function.args[1]
+    packed = context.get_arg_packer(types).as_arguments(builder, arguments)
+    builder.call(function, [returned, raised, *packed])
+    return context.get_returned_value(builder, returns, builder.load(returned))
+
+
 def _call(called: Any, library: Any) -> Any:
-    """What writes a call of a kernel: as Numba's own, without asking whether it raised anything,
-    which takes five blocks; but for indices out of bounds, where these are checked, none does."""
+    """What writes a call of a kernel that is to be inlined."""
 
     def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         function = context.declare_function(builder.module, called)
-        if config.BOUNDSCHECK:
-            status, value = context.call_conv.call_function(
-                builder, function, called.restype, called.argtypes, arguments
-            )
-            with cgutils.if_unlikely(builder, status.is_error):
-                context.call_conv.return_status_propagate(builder, status)
-            return value
-        returned = cgutils.alloca_once(builder, function.args[0].type.pointee)
-        raised = builder.function.args[1]
-        packed = context.get_arg_packer(called.argtypes).as_arguments(builder, arguments)
-        builder.call(function, [returned, raised, *packed])
-        return context.get_returned_value(builder, called.restype, builder.load(returned))
+        return invoke(context, builder, function, called.restype, called.argtypes, arguments)
 
     write.signature = called.argtypes
     write.libs = (library,)
@@ -162,13 +171,41 @@ _INTERNAL: dict[Any, Any] = {}
 """Numba's own functions that kernels call, compiled for these models."""
 
 
+class _There:
+    """In place of the type of an argument: certainly not that of None."""
+
+    def __init__(self, numba_type: Any) -> None:
+        self.literal_type = numba_type  # what Numba's pass compares with None's
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Prune(DeadBranchPrune):
+    """Remove the branches that `x is None` decides.
+
+    Numba's own leaves `if x is None:` where x is there, and what stands below is compiled for
+    nothing, with all that it calls: a scene without a hierarchy's intersection of a few shapes in
+    one with a hierarchy.
+    """
+
+    _name = "prune"
+
+    def run_pass(self, state: Any) -> bool:
+        maybe = (types.NoneType, types.Omitted, types.Optional)
+        known = [t if isinstance(t, maybe) else _There(t) for t in state.args]
+        dead_branch_prune(state.func_ir, known)
+        return True
+
+
 _LEFT_OUT = (
-    NativeLowering,  # another comes in its place
-    # For what no kernel has: closures, `with`, generators, literal lists, raises, array expressions.
+    NativeLowering,  # others come in their place
+    DeadBranchPrune,
+    # For what no kernel has: closures, `with`, generators, loops over literals, expressions of
+    # whole arrays, references to count.
     typed_passes.InlineOverloads,
     typed_passes.NopythonRewrites,
     typed_passes.NoPythonSupportedFeatureValidation,
     typed_passes.DumpParforDiagnostics,
+    typed_passes.IRLegalization,
     untyped_passes.FindLiterallyCalls,
     untyped_passes.InlineClosureLikes,
     untyped_passes.InlineInlinables,
@@ -180,6 +217,22 @@ _LEFT_OUT = (
 )
 
 
+class _Flags(Flags):
+    """Numba's options.
+
+    It asks some 30,000 times a scene whether two are the same, to find a kernel that is compiled
+    already, and takes all 25 of both apart each time: a tenth of its calls (measured).
+    """
+
+    def __hash__(self) -> int:
+        return 0  # all kernels have the same, but for a few
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, _Flags) and self._values == other._values:
+            return True
+        return bool(super().__eq__(other))
+
+
 class _Compiler(CompilerBase):
     """Numba's compiler with another lowering, and tuples as above."""
 
@@ -187,6 +240,7 @@ class _Compiler(CompilerBase):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
+        self.state.flags = _Flags(self.state.flags)
         self.state.targetctx = self.state.targetctx.subtarget(
             data_model_manager=_MODELS, cached_internal_func=_INTERNAL
         )
@@ -194,6 +248,7 @@ class _Compiler(CompilerBase):
     def define_pipelines(self) -> list[Any]:
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(self.lowering, NativeLowering)
+        passes.add_pass_after(_Prune, untyped_passes.RewriteSemanticConstants)
         passes.passes = [p for p in passes.passes if p[0] not in _LEFT_OUT]
         passes.finalize()
         return [passes]

@@ -16,12 +16,13 @@ from reference_rt.bvh import (
     child_of,
     first_of,
 )
-from reference_rt.geometry import Geometry
-from reference_rt.kernel import kernel, local_floats, local_naturals
+from reference_rt.csg.tables import Solids
+from reference_rt.kernel import entry_kernel, kernel, local_floats, local_naturals
 from reference_rt.lane_kernels import lane_kernel, lowest, prefetch
 from reference_rt.lanes import LANES, least, select
 from reference_rt.leaves import nearest_of_leaf
 from reference_rt.ray import BLOCK, no_hit
+from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.shapes.watertight import SEEN_FLOATS
 from reference_rt.streams import Hits, Rays, put_hit, ray_of
@@ -44,8 +45,27 @@ _ALL = (1 << LANES) - 1
 _LAST = 1 << (LANES - 1)
 
 
+@entry_kernel
+def trace_block(
+    bvh: Bvh,
+    shapes: Shapes,
+    solids: Solids | None,
+    rays: Rays,
+    hits: Hits,
+    n: int,
+    any_hit: bool,
+) -> None:
+    """`any_of_block` or `closest_of_block`, for callers that are compiled without them."""
+    if any_hit:
+        any_of_block(bvh, shapes, solids, rays, hits, n)
+    else:
+        closest_of_block(bvh, shapes, solids, rays, hits, n)
+
+
 @kernel
-def closest_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
+def closest_of_block(
+    bvh: Bvh, shapes: Shapes, solids: Solids | None, rays: Rays, hits: Hits, n: int
+) -> None:
     """The closest hits of the first n rays, in a hierarchy without instances."""
     wave = Wave(
         local_floats(VIEW_FLOATS),
@@ -67,13 +87,15 @@ def closest_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: in
         lengths = begin_at(wave, hits, root, n, False)
         while lengths.nodes + lengths.leaves + lengths.back > 0:
             lengths = _enter_nodes(bvh, wave, waiting, hits, lengths)
-            lengths = _visit_leaves(bvh, geometry, wave, rays, seen, hits, lengths, False)
+            lengths = _visit_leaves(bvh, shapes, solids, wave, rays, seen, hits, lengths, False)
             lengths = _go_back(bvh, wave, waiting, hits, lengths)
         root = bvh.unbounded if root == 0 else -1
 
 
 @kernel
-def any_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
+def any_of_block(
+    bvh: Bvh, shapes: Shapes, solids: Solids | None, rays: Rays, hits: Hits, n: int
+) -> None:
     """Any hits of the first n rays, likewise: children that wait are bits.
 
     The arrays are made here again, since they live no longer than the kernel that makes them.
@@ -96,7 +118,7 @@ def any_of_block(bvh: Bvh, geometry: Geometry, rays: Rays, hits: Hits, n: int) -
         lengths = begin_at(wave, hits, root, n, True)
         while lengths.nodes + lengths.leaves + lengths.back > 0:
             lengths = _meet_nodes(bvh, wave, waiting, hits, lengths)
-            lengths = _visit_leaves(bvh, geometry, wave, rays, seen, hits, lengths, True)
+            lengths = _visit_leaves(bvh, shapes, solids, wave, rays, seen, hits, lengths, True)
             lengths = _go_back_any(bvh, wave, waiting, lengths)
         root = bvh.unbounded if root == 0 else -1
 
@@ -220,7 +242,8 @@ def _send_any(
 @kernel
 def _visit_leaves(
     bvh: Bvh,
-    geometry: Geometry,
+    shapes: Shapes,
+    solids: Solids | None,
     wave: Wave,
     rays: Rays,
     seen: FloatArray,
@@ -234,9 +257,7 @@ def _visit_leaves(
     for i in range(lengths.leaves):
         j = natural(wave.queues, BLOCK + i)
         leaf, shear = -1 - natural(wave.leaf, j), shear_in(wave, rays, j)
-        closest = nearest_of_leaf(
-            bvh, geometry.shapes, geometry.solids, leaf, rays, j, shear, seen, hits
-        )
+        closest = nearest_of_leaf(bvh, shapes, solids, leaf, rays, j, shear, seen, hits)
         wave.queues[2 * BLOCK + (back & (BLOCK - 1))] = j
         back += (wave.level[j] > 0) & (not (any_hit and closest.kind >= 0))
     return Lengths(lengths.nodes, 0, back)

@@ -2,11 +2,10 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from reference_rt.kernel import kernel
 from reference_rt.lights import light_tree
 from reference_rt.lights.light_tree import LightTree, Pick
+from reference_rt.sampling.distribution import count_up_to
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.vec3 import Vec3
 
@@ -56,7 +55,7 @@ def _by_power(cumulative: FloatArray | None, choice: Choice, u: float) -> Pick:
     """The light whose stretch of the running sum holds `u`."""
     if cumulative is None:
         return Pick(0, 1.0)
-    k = min(int(np.searchsorted(cumulative, u, "right")), len(cumulative) - 1)
+    k = min(count_up_to(cumulative, u), len(cumulative) - 1)
     return Pick(k, choice.probability[k])
 
 

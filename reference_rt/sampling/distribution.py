@@ -15,9 +15,23 @@ def running_sums(values: FloatArray) -> FloatArray:
 
 
 @kernel
+def count_up_to(sums: FloatArray, x: float) -> int:
+    """How many of the ascending sums (n,) are at most x: `np.searchsorted(sums, x, "right")`, of
+    which Numba makes seven kernels: 3 % of a first render with many lights (measured)."""
+    low, high = 0, len(sums)
+    while low < high:
+        middle = (low + high) >> 1
+        if sums[middle] <= x:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
 def cell_of(sums: FloatArray, x: float) -> int:
     """The i with sums[i] <= x < sums[i + 1], of running sums (n + 1,): never one of no width."""
-    return min(max(int(np.searchsorted(sums, x, "right")) - 1, 0), len(sums) - 2)
+    return min(max(count_up_to(sums, x) - 1, 0), len(sums) - 2)
 
 
 @kernel

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 import pytest
+from numba.core import event
 
 from reference_rt.kernel import ByClass, entry_kernel, kernel
 from reference_rt.vec3 import Vec3
@@ -72,3 +73,38 @@ def test_nothing_is_left_of_what_is_inlined():
         defined = [line for line in code.splitlines() if line.startswith("define")]
         assert defined
         assert not any(name in line for line in defined for name in ("turned", "_of_", "Vec3."))
+
+
+@kernel
+def _of_none(x: float) -> float:
+    return -x
+
+
+@kernel
+def _of_some(array: Any, x: float) -> float:
+    return array[0] + x
+
+
+@kernel
+def _either(array: Any, x: float) -> float:
+    if array is None:
+        return _of_none(x)
+    return _of_some(array, x)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize(
+    ("array", "expected", "needed", "spared"),
+    [(np.array([3.0]), 5.0, _of_some, _of_none), (None, -2.0, _of_none, _of_some)],
+)
+def test_what_is_for_none_is_compiled_where_there_is_none_only(
+    array, expected, needed, spared, monkeypatch
+):
+    """Numba compiles what stands below `if x is None:` for every x, with all that it calls."""
+    monkeypatch.setattr("reference_rt.kernel.CACHE_FOLDER", None)
+    either = entry_kernel(_either)
+    with event.install_recorder("numba:run_pass") as passes:
+        assert either(array, 2.0) == expected
+    compiled = {one.data["qualname"] for _, one in passes.buffer}
+    assert needed.__qualname__ in compiled
+    assert spared.__qualname__ not in compiled
