@@ -1,7 +1,7 @@
 """Kernels that are compiled by themselves and called through their address.
 
 A caller that takes an address is compiled without what stands there: both can be compiled at the
-same time (`compiling.py`), and what one of them knows nothing of does not make it anew.
+same time (`meanwhile.py`), and what is kept of one serves all callers of its types.
 """
 
 from collections.abc import Callable
@@ -20,9 +20,9 @@ Address = npt.NDArray[np.intp]
 """(1,) where a kernel stands; what it holds is written before any call."""
 
 
-def address_of(compiled: Callable[..., Any], *args: Any) -> int:
+def address_of(compiled: Callable[..., Any], arguments: tuple[Any, ...]) -> int:
     """Where the machine code of an entry kernel stands that is compiled for these arguments."""
-    signature = tuple(numba.typeof(a) for a in args)
+    signature = tuple(numba.typeof(a) for a in arguments)
     found = compiled.overloads[signature]  # type: ignore[attr-defined]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 

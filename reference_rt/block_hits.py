@@ -15,13 +15,14 @@ from reference_rt.wavefront import any_of_block, closest_of_block
 @kernel
 def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
     """`closest_hit` of the first n rays: what `hit_of` tells."""
-    _closest_hits(geometry.bvh, geometry.instances, geometry, rays, hits, n)
+    _closest_hits(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n)
 
 
 @kernel
 def _closest_hits(
     bvh: Bvh | None,
     instances: Instances | None,
+    tracer: Address | None,
     geometry: Geometry,
     rays: Rays,
     hits: Hits,
@@ -35,7 +36,10 @@ def _closest_hits(
         for j in range(n):
             put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
         return
-    _trace(geometry.tracer, bvh, geometry, rays, hits, n, False)
+    if tracer is not None:
+        call_at(tracer[0], (bvh, geometry.shapes, geometry.solids, rays, hits, n, False))
+        return
+    closest_of_block(bvh, geometry.shapes, geometry.solids, rays, hits, n)
 
 
 @kernel
@@ -54,13 +58,14 @@ def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: Hits, j: int) -
 @kernel
 def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
     """`occluded` of the first n rays: of the hits, only whether there is any is meant."""
-    _any_hits(geometry.bvh, geometry.instances, geometry, rays, hits, n)
+    _any_hits(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n)
 
 
 @kernel
 def _any_hits(
     bvh: Bvh | None,
     instances: Instances | None,
+    tracer: Address | None,
     geometry: Geometry,
     rays: Rays,
     hits: Hits,
@@ -73,23 +78,7 @@ def _any_hits(
         for j in range(n):
             hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
         return
-    _trace(geometry.tracer, bvh, geometry, rays, hits, n, True)
-
-
-@kernel
-def _trace(
-    tracer: Address | None,
-    bvh: Bvh,
-    geometry: Geometry,
-    rays: Rays,
-    hits: Hits,
-    n: int,
-    any_hit: bool,
-) -> None:
     if tracer is not None:
-        call_at(tracer[0], (bvh, geometry.shapes, geometry.solids, rays, hits, n, any_hit))
+        call_at(tracer[0], (bvh, geometry.shapes, geometry.solids, rays, hits, n, True))
         return
-    if any_hit:
-        any_of_block(bvh, geometry.shapes, geometry.solids, rays, hits, n)
-    else:
-        closest_of_block(bvh, geometry.shapes, geometry.solids, rays, hits, n)
+    any_of_block(bvh, geometry.shapes, geometry.solids, rays, hits, n)

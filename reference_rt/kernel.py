@@ -125,6 +125,18 @@ def precompile(compiled: Callable[..., Any], *args: Any) -> None:
         compiled.compile(tuple(numba.typeof(a) for a in args))  # type: ignore[attr-defined]
 
 
+def is_compiled(compiled: Callable[..., Any], *args: Any) -> bool:
+    """Whether `compiled` is compiled for these arguments, in this process or in the cache."""
+    if numba.config.DISABLE_JIT:
+        return True
+    signature = tuple(numba.typeof(a) for a in args)
+    if signature in compiled.overloads or CACHE_FOLDER is None:  # type: ignore[attr-defined]
+        return signature in compiled.overloads  # type: ignore[attr-defined]
+    cache = compiled._cache  # type: ignore[attr-defined]
+    key = cache._index_key(signature, compiled.targetctx.codegen())  # type: ignore[attr-defined]
+    return key in cache._cache_file._load_index()
+
+
 def is_named_tuple(numba_type: Any, cls: type) -> bool:
     """Whether a Numba type is that of instances of the NamedTuple `cls`."""
     return isinstance(numba_type, types.BaseNamedTuple) and numba_type.instance_class is cls

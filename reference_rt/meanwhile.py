@@ -1,0 +1,89 @@
+"""Compiling in two processes at once: Numba's compiler is Python code, and a process runs one
+thread of that at a time."""
+
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+from numba.core.compiler_lock import global_compiler_lock
+
+from reference_rt.kernel import CACHE_FOLDER, is_compiled, precompile
+
+PATIENCE = 60.0
+"""Seconds that the other process is waited for when nothing else is left to do: all kernels of a
+scene take less."""
+
+Call = tuple[Callable[..., Any], tuple[Any, ...]]
+"""An entry kernel, and arguments of the types that it is to be compiled for."""
+
+
+def precompile_all(calls: Sequence[Call]) -> None:
+    """Compile entry kernels, or load what was compiled before, without running them.
+
+    Of those that are to be compiled the first is compiled here, the others meanwhile in a copy of
+    this process that leaves them in the cache; where there is no such process (no `fork`, one core,
+    no cache, not the main thread), or it comes to nothing, here too.
+    """
+    missing = [(compiled, args) for compiled, args in calls if not is_compiled(compiled, *args)]
+    child = _fork(missing[1:]) if len(missing) > 1 and _may_fork() else None
+    try:
+        for compiled, args in missing[:1]:
+            precompile(compiled, *args)
+        if child is not None:
+            _wait(child)
+    except BaseException:
+        if child is not None:
+            _end(child)
+        raise
+    for compiled, args in calls:
+        precompile(compiled, *args)
+
+
+def _may_fork() -> bool:
+    return (
+        sys.platform == "linux"
+        and CACHE_FOLDER is not None
+        and len(os.sched_getaffinity(0)) > 1
+        and threading.current_thread() is threading.main_thread()
+    )
+
+
+def _fork(calls: Sequence[Call]) -> int:
+    """The number of a new process that compiles these and does nothing else."""
+    # Nobody else holds the compiler's lock then: the new process has this thread only, and what
+    # other threads hold stays locked in it.
+    with global_compiler_lock, warnings.catch_warnings():
+        # Python 3.12 warns of that.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child != 0:
+        return child
+    try:
+        for compiled, args in calls:
+            precompile(compiled, *args)
+    finally:
+        # Neither buffers are written nor handlers called a second time; nor is an error told: who
+        # compiles it again will.
+        os._exit(0)
+
+
+def _wait(child: int) -> None:
+    end = time.monotonic() + PATIENCE
+    with suppress(ChildProcessError):  # where somebody else waits for all that end
+        while os.waitpid(child, os.WNOHANG)[0] == 0:
+            if time.monotonic() > end:
+                _end(child)
+                return
+            time.sleep(0.002)
+
+
+def _end(child: int) -> None:
+    with suppress(ProcessLookupError, ChildProcessError):
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)

@@ -1,0 +1,182 @@
+"""Kernels compiled in two processes, and kernels called at an address."""
+
+import os
+import subprocess
+import sys
+import time
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import pytest
+
+from reference_rt import Scene, Sphere, meanwhile, render
+from reference_rt.apart import address_of, call_at
+from reference_rt.kernel import entry_kernel, is_compiled, precompile
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+
+_TWO = """
+import numpy as np
+from reference_rt.kernel import entry_kernel, is_compiled
+from reference_rt.meanwhile import precompile_all
+
+@entry_kernel
+def double(x):
+    x[0] *= 2.0
+
+@entry_kernel
+def negate(x):
+    x[0] = -x[0]
+
+def main():
+    x = np.array([3.0])
+    before = is_compiled(double, x), is_compiled(negate, x)
+    precompile_all([(double, (x,)), (negate, (x,))])
+    double(x)
+    negate(x)
+    kernels = double, negate
+    print(before, [sum(k.stats.cache_hits.values()) for k in kernels], x)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is one process")
+@pytest.mark.skipif(os.cpu_count() == 1, reason="one core")
+def test_the_second_kernel_is_found_in_the_cache(tmp_path):
+    """Compiled by another process, that is; the next process finds both."""
+    (tmp_path / "two.py").write_text(_TWO)
+    expected = "(False, False) [0, 1] [-6.]", "(True, True) [1, 1] [-6.]"
+    for line in expected:
+        done = subprocess.run(
+            [sys.executable, "-c", "import two; two.main()"],
+            env=os.environ | {"REFERENCE_RT_CACHE": str(tmp_path / "cache")},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.strip() == line
+
+
+@entry_kernel
+def increase(x: Any, by: float) -> None:
+    x[0] += by
+
+
+@entry_kernel
+def decrease(x: Any, by: float) -> None:
+    x[0] -= by
+
+
+@pytest.fixture
+def cold(monkeypatch, tmp_path):
+    """Two calls of which nothing is compiled, and the number of this process."""
+    calls = [(increase, (np.zeros(1), 1.0)), (decrease, (np.zeros(1), 1.0))]
+    monkeypatch.setattr(meanwhile, "is_compiled", lambda *call: False)
+    monkeypatch.setattr(meanwhile, "_may_fork", lambda: hasattr(os, "fork"))
+    return calls, os.getpid()
+
+
+def no_child_is_left():
+    try:
+        os.waitpid(-1, os.WNOHANG)
+    except ChildProcessError:
+        return True
+    return False
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="one process")
+@pytest.mark.parametrize("fault", ["stands still", "fails", "is killed"])
+def test_what_comes_to_nothing_elsewhere_is_compiled_here(fault, cold, monkeypatch, tmp_path):
+    calls, here = cold
+    compiled = []
+
+    def one_that_ends(kernel, *args):
+        if os.getpid() == here:
+            compiled.append(kernel)
+            return precompile(kernel, *args)
+        (tmp_path / "began").touch()  # in the other process
+        if fault == "stands still":
+            time.sleep(1000.0)
+        if fault == "fails":
+            raise OSError("no space left on device")
+        return os.kill(os.getpid(), 9)
+
+    monkeypatch.setattr(meanwhile, "precompile", one_that_ends)
+    monkeypatch.setattr(meanwhile, "PATIENCE", 0.5)
+    meanwhile.precompile_all(calls)
+    assert (tmp_path / "began").exists()
+    assert compiled == [increase, increase, decrease]
+    assert all(is_compiled(kernel, *args) for kernel, args in calls)
+    assert no_child_is_left()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="one process")
+@pytest.mark.parametrize("when", ["compiling", "waiting"])
+def test_an_interrupt_ends_the_other_process_too(when, cold, monkeypatch):
+    calls, here = cold
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    def compiling(kernel, *args):
+        if os.getpid() != here:
+            time.sleep(1000.0)
+        elif when == "compiling":
+            interrupt()
+
+    monkeypatch.setattr(meanwhile, "precompile", compiling)
+    if when == "waiting":
+        monkeypatch.setattr(meanwhile.time, "monotonic", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        meanwhile.precompile_all(calls)
+    assert no_child_is_left()
+
+
+class Pair(NamedTuple):
+    numbers: Any
+    factor: float
+
+
+@entry_kernel
+def weigh(pair: Pair, nothing: None, offset: int, negative: bool, out: Any) -> None:
+    for i in range(len(out)):
+        value = pair.numbers[i] * pair.factor + offset
+        out[i] = -value if negative else value
+
+
+@entry_kernel
+def weigh_at(address: Any, pair: Pair, out: Any) -> None:
+    call_at(address[0], (pair, None, len(out), True, out))
+
+
+def test_a_kernel_is_called_at_its_address():
+    pair, out = Pair(np.array([1.0, 2.0, 4.0]), 0.5), np.zeros(3)
+    arguments = pair, None, 0, False, out
+    precompile(weigh, *arguments)
+    weigh_at(np.array([address_of(weigh, arguments)], np.intp), pair, out)
+    assert out.tolist() == [-3.5, -4.0, -5.0]
+
+
+def test_paths_are_the_same_with_their_tracer_apart(monkeypatch):
+    """Enough spheres for a hierarchy, one in the other's light."""
+    rng = np.random.default_rng(7)
+    spheres = tuple(Sphere(center=tuple(rng.uniform(-2.0, 2.0, 3)), radius=0.4) for _ in range(60))
+    scene = Scene.model_validate(
+        {
+            "shapes": [s.model_dump() for s in spheres],
+            "lights": [{"type": "constant", "radiance": 1.0}],
+            "film": {"width": 16, "height": 16},
+            "sampler": {"type": "sobol", "spp": 4},
+            "integrator": {"type": "path", "max_depth": 3},
+        }
+    )
+    module = sys.modules["reference_rt.render"]
+    asked = []
+    tracer_of = module._tracer
+    monkeypatch.setattr(module, "_tracer", lambda g: asked.append(tracer_of(g)) or asked[-1])
+    apart = render(scene)
+    assert asked[0] is not None
+    monkeypatch.setattr(module, "_tracer", lambda geometry: None)
+    assert np.array_equal(apart.colour, render(scene).colour)
+    assert len(np.unique(apart.colour)) > 100
