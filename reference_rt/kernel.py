@@ -119,10 +119,17 @@ def entry_kernel(function: F) -> F:
     return compiled
 
 
-def precompile(compiled: Callable[..., Any], *args: Any) -> None:
-    """Compile `compiled` for these arguments, or load it from the cache, without running it."""
-    if not numba.config.DISABLE_JIT:
-        compiled.compile(tuple(numba.typeof(a) for a in args))  # type: ignore[attr-defined]
+def precompile(compiled: Callable[..., Any], *args: Any) -> Callable[..., Any]:
+    """Compile `compiled` for these arguments, or load it from the cache, without running it.
+
+    What is returned runs it for arguments of the same types, which must be right: of a scene's
+    tables Numba asks some 400 types at every call otherwise (34 us against 2, measured).
+    """
+    if numba.config.DISABLE_JIT:
+        return compiled
+    types_of = tuple(numba.typeof(a) for a in args)
+    ready: Callable[..., Any] = compiled.compile(types_of)  # type: ignore[attr-defined]
+    return ready
 
 
 def is_compiled(compiled: Callable[..., Any], *args: Any) -> bool:

@@ -23,8 +23,8 @@ Call = tuple[Callable[..., Any], tuple[Any, ...]]
 """An entry kernel, and arguments of the types that it is to be compiled for."""
 
 
-def precompile_all(calls: Sequence[Call]) -> None:
-    """Compile entry kernels, or load what was compiled before, without running them.
+def precompile_all(calls: Sequence[Call]) -> list[Callable[..., Any]]:
+    """`kernel.precompile` of entry kernels: what runs each for arguments of these types.
 
     Of those that are to be compiled the first is compiled here, the others meanwhile in a copy of
     this process that leaves them in the cache; where there is no such process (no `fork`, one core,
@@ -41,8 +41,7 @@ def precompile_all(calls: Sequence[Call]) -> None:
         if child is not None:
             _end(child)
         raise
-    for compiled, args in calls:
-        precompile(compiled, *args)
+    return [precompile(compiled, *args) for compiled, args in calls]
 
 
 def _may_fork() -> bool:

@@ -13,6 +13,7 @@ from comparisons.bench.timing import alternate, ratios, seconds
 from reference_rt.cameras import Perspective
 from reference_rt.film import BoxFilter, Film
 from reference_rt.integrators import Path
+from reference_rt.kernel import precompile
 from reference_rt.lights import Constant
 from reference_rt.materials import AnyMaterial, Diffuse
 from reference_rt.render import Picture, render, run_bands
@@ -121,7 +122,8 @@ def render_pruned(scene: Scene, threads: int | None = None) -> Picture:
         out.reshape(-1, 3),
     )
     pixels, threads = out[..., 0].size, threads or os.cpu_count() or 1
-    run_bands(spheres_only.render_band, arguments, pixels, sampler.spp, threads, _silent)
+    band = precompile(spheres_only.render_band, *arguments, 0, 0, 0, 0)
+    run_bands(band, arguments, pixels, sampler.spp, threads, _silent)
     return Picture({"colour": out})
 
 
