@@ -29,10 +29,14 @@ import numpy as np
 import numpy.typing as npt
 import platformdirs
 from numba import njit, types
+from numba.core.caching import FunctionCache
 from numba.extending import intrinsic, overload, register_jitable
 from numba.np import arrayobj
 
 from reference_rt.inlining import EntryCompiler, InlinedCompiler
+
+if sys.platform != "win32":
+    import fcntl
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -101,6 +105,19 @@ def overload_kernel(function: Any) -> Callable[[F], F]:
     return decorate
 
 
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """Numba's cache of a function's kernels, into which one process writes at a time.
+
+    Two that add to it at once may take the same number: one's index then leads to the other's code.
+    """
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        with (Path(str(CACHE_FOLDER)) / "lock").open("a") as lock:
+            if sys.platform != "win32":
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            super().save_overload(sig, data)
+
+
 def entry_kernel(function: F) -> F:
     """Compile `function`, which Python calls with arrays, on first call for each set of argument
     types; keep the result on disk.  Releases the GIL."""
@@ -114,6 +131,8 @@ def entry_kernel(function: F) -> F:
             cache=CACHE_FOLDER is not None,
             pipeline_class=EntryCompiler,
         )(function)
+        if CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
+            compiled._cache = _Cache(function)  # type: ignore[attr-defined]
     finally:
         numba.config.CACHE_DIR = previous
     return compiled

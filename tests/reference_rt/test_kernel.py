@@ -6,10 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 import reference_rt
+from reference_rt import kernel as kernel_module
 from reference_rt.kernel import entry_kernel, local_floats, local_integers, reciprocal
 
 _HIT = """
@@ -100,3 +103,31 @@ def test_scratch():
 def test_reciprocal():
     assert reciprocal(4.0) == 0.25
     assert (reciprocal(0.0), reciprocal(-0.0)) == (np.inf, -np.inf)
+
+
+@pytest.mark.skipif(kernel_module.CACHE_FOLDER is None, reason="nothing is kept")
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
+def test_one_process_at_a_time_adds_kernels(monkeypatch, tmp_path):
+    """Two that read Numba's index before either wrote it would write to the same file."""
+    import fcntl
+
+    monkeypatch.setattr(kernel_module, "CACHE_FOLDER", str(tmp_path))
+    refused = []
+
+    def save(self, key, data):
+        with (tmp_path / "lock").open("a") as other, pytest.raises(BlockingIOError):
+            fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        refused.append(key)
+
+    monkeypatch.setattr(IndexDataCacheFile, "save", save)
+
+    def thrice(x):
+        x[0] *= 3.0
+
+    x = np.ones(1)
+    entry_kernel(thrice)(x)
+    assert x[0] == 3.0
+    assert len(refused) == 1
+    with (tmp_path / "lock").open("a") as other:
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
