@@ -23,15 +23,15 @@ Call = tuple[Callable[..., Any], tuple[Any, ...]]
 """An entry kernel, and arguments of the types that it is to be compiled for."""
 
 
-def precompile_all(calls: Sequence[Call]) -> list[Callable[..., Any]]:
+def precompile_all(calls: Sequence[Call], threads: int) -> list[Callable[..., Any]]:
     """`kernel.precompile` of entry kernels: what runs each for arguments of these types.
 
     Of those that are to be compiled the first is compiled here, the others meanwhile in a copy of
-    this process that leaves them in the cache; where there is no such process (no `fork`, one core,
-    no cache, not the main thread), or it comes to nothing, here too.
+    this process that leaves them in the cache; where there is no such process (one of the `threads`
+    that may be used, no `fork`, no cache, not the main thread), or it comes to nothing, here too.
     """
     missing = [(compiled, args) for compiled, args in calls if not is_compiled(compiled, *args)]
-    child = _fork(missing[1:]) if len(missing) > 1 and _may_fork() else None
+    child = _fork(missing[1:]) if len(missing) > 1 and threads > 1 and may_fork() else None
     try:
         for compiled, args in missing[:1]:
             precompile(compiled, *args)
@@ -44,11 +44,11 @@ def precompile_all(calls: Sequence[Call]) -> list[Callable[..., Any]]:
     return [precompile(compiled, *args) for compiled, args in calls]
 
 
-def _may_fork() -> bool:
+def may_fork() -> bool:
+    """Whether another process could be begun, and its kernels found."""
     return (
         sys.platform == "linux"
         and CACHE_FOLDER is not None
-        and len(os.sched_getaffinity(0)) > 1
         and threading.current_thread() is threading.main_thread()
     )
 

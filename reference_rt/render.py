@@ -102,16 +102,16 @@ def render(
     else:
         shown, (jobs, layers) = "colour", _render_jobs(scene, integrator.setup(), tables)
     say("compile", 0.0)
+    threads = threads or os.cpu_count() or 1
     calls = [(job.band, (*job.arguments, 0, 0, 0, 0)) for job in jobs]
     if tracer is None:
-        bands = precompile_all(calls)
+        bands = precompile_all(calls, threads)
     else:
-        *bands, _ = precompile_all([*calls, tracer])
+        *bands, _ = precompile_all([*calls, tracer], threads)
         address[0] = address_of(*tracer)
     say("compile", 1.0)
     clock.append(time.perf_counter())
     pixels = scene.film.width * scene.film.height
-    threads = threads or os.cpu_count() or 1
     for k, (band, job) in enumerate(zip(bands, jobs, strict=True)):
 
         def say_part(what: str, fraction: float, k: int = k) -> None:

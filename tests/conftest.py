@@ -9,6 +9,8 @@ import pytest
 # package if that is installed as editable.
 sys.path[:] = [path for path in sys.path if Path(path) != Path(__file__).parent]
 
+from reference_rt import meanwhile  # noqa: E402
+
 LONGEST_FIRST = (
     "test_extremes",  # compiles for all that stand on `worlds`
     "test_plain_python",
@@ -41,6 +43,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """xdist would take the files of the most tests first, which are quick ones."""
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
+    if hasattr(config, "workerinput"):
+        # Every core has a process of tests: kernels are compiled by it, not by one more.
+        meanwhile.may_fork = lambda: False
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
