@@ -7,7 +7,6 @@ same time (`meanwhile.py`), and what is kept of one serves all callers of its ty
 from collections.abc import Callable
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from numba import types
@@ -15,14 +14,15 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reference_rt.inlining import invoke
+from reference_rt.kernel import Signature
 
 Address = npt.NDArray[np.intp]
 """(1,) where a kernel stands; what it holds is written before any call."""
 
 
-def address_of(compiled: Callable[..., Any], arguments: tuple[Any, ...]) -> int:
-    """Where the machine code of an entry kernel stands that is compiled for these arguments."""
-    signature = tuple(numba.typeof(a) for a in arguments)
+def address_of(compiled: Callable[..., Any], signature: Signature) -> int:
+    """Where the machine code of an entry kernel stands that is compiled for arguments of these
+    types."""
     found = compiled.overloads[signature]  # type: ignore[attr-defined]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 

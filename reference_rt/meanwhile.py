@@ -13,35 +13,37 @@ from typing import Any
 
 from numba.core.compiler_lock import global_compiler_lock
 
-from reference_rt.kernel import CACHE_FOLDER, is_compiled, precompile
+from reference_rt.kernel import CACHE_FOLDER, Signature, is_compiled, precompile
 
 PATIENCE = 60.0
 """Seconds that the other process is waited for when nothing else is left to do: all kernels of a
 scene take less."""
 
-Call = tuple[Callable[..., Any], tuple[Any, ...]]
-"""An entry kernel, and arguments of the types that it is to be compiled for."""
+Call = tuple[Callable[..., Any], Signature]
+"""An entry kernel, and the types of arguments that it is to be compiled for."""
 
 
 def precompile_all(calls: Sequence[Call], threads: int) -> list[Callable[..., Any]]:
-    """`kernel.precompile` of entry kernels: what runs each for arguments of these types.
+    """`kernel.precompile` of entry kernels: what runs each for arguments of its types.
 
     Of those that are to be compiled the first is compiled here, the others meanwhile in a copy of
     this process that leaves them in the cache; where there is no such process (one of the `threads`
     that may be used, no `fork`, no cache, not the main thread), or it comes to nothing, here too.
     """
-    missing = [(compiled, args) for compiled, args in calls if not is_compiled(compiled, *args)]
-    child = _fork(missing[1:]) if len(missing) > 1 and threads > 1 and may_fork() else None
+    missing: list[Call] = []
+    if len(calls) > 1 and threads > 1 and may_fork():
+        missing = [call for call in calls if not is_compiled(*call)]
+    child = _fork(missing[1:]) if len(missing) > 1 else None
     try:
-        for compiled, args in missing[:1]:
-            precompile(compiled, *args)
+        for call in missing[:1]:
+            precompile(*call)
         if child is not None:
             _wait(child)
     except BaseException:
         if child is not None:
             _end(child)
         raise
-    return [precompile(compiled, *args) for compiled, args in calls]
+    return [precompile(*call) for call in calls]
 
 
 def may_fork() -> bool:
@@ -64,8 +66,8 @@ def _fork(calls: Sequence[Call]) -> int:
     if child != 0:
         return child
     try:
-        for compiled, args in calls:
-            precompile(compiled, *args)
+        for call in calls:
+            precompile(*call)
     finally:
         # Neither buffers are written nor handlers called a second time; nor is an error told: who
         # compiles it again will.

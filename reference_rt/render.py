@@ -15,6 +15,7 @@ from reference_rt.apart import address_of
 from reference_rt.bands import cast_band, first_hits_band, render_band
 from reference_rt.geometry import Geometry
 from reference_rt.integrators import Path, RayCast
+from reference_rt.kernel import signature_of
 from reference_rt.meanwhile import Call, precompile_all
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -103,7 +104,7 @@ def render(
         shown, (jobs, layers) = "colour", _render_jobs(scene, integrator.setup(), tables)
     say("compile", 0.0)
     threads = threads or os.cpu_count() or 1
-    calls = [(job.band, (*job.arguments, 0, 0, 0, 0)) for job in jobs]
+    calls = [(job.band, signature_of(*job.arguments, 0, 0, 0, 0)) for job in jobs]
     if tracer is None:
         bands = precompile_all(calls, threads)
     else:
@@ -128,7 +129,8 @@ def _tracer(geometry: Geometry) -> Call | None:
     without."""
     if numba.config.DISABLE_JIT or geometry.bvh is None or geometry.instances is not None:
         return None
-    return trace_block, tracer_arguments(geometry.bvh, geometry.shapes, geometry.solids)
+    arguments = tracer_arguments(geometry.bvh, geometry.shapes, geometry.solids)
+    return trace_block, signature_of(*arguments)
 
 
 def _cast_jobs(scene: Scene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:

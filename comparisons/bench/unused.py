@@ -13,7 +13,7 @@ from comparisons.bench.timing import ROUNDS, alternate, ratios, seconds
 from reference_rt.cameras import Perspective
 from reference_rt.film import BoxFilter, Film
 from reference_rt.integrators import Path
-from reference_rt.kernel import precompile
+from reference_rt.kernel import precompile, signature_of
 from reference_rt.lights import Constant
 from reference_rt.materials import AnyMaterial, Diffuse
 from reference_rt.render import Picture, render, run_bands
@@ -125,7 +125,7 @@ def render_pruned(scene: Scene, threads: int | None = None) -> Picture:
         out.reshape(-1, 3),
     )
     pixels, threads = out[..., 0].size, threads or os.cpu_count() or 1
-    band = precompile(spheres_only.render_band, *arguments, 0, 0, 0, 0)
+    band = precompile(spheres_only.render_band, signature_of(*arguments, 0, 0, 0, 0))
     run_bands(band, arguments, pixels, sampler.spp, threads, _silent)
     return Picture({"colour": out})
 

@@ -1,5 +1,6 @@
 """The cache of compiled kernels: exact, and not needed."""
 
+import errno
 import os
 import shutil
 import subprocess
@@ -112,13 +113,14 @@ def test_one_process_at_a_time_adds_kernels(monkeypatch, tmp_path):
     """Two that read Numba's index before either wrote it would write to the same file."""
     import fcntl
 
-    monkeypatch.setattr(kernel_module, "CACHE_FOLDER", str(tmp_path))
-    refused = []
+    folder = tmp_path / "not there any more"
+    monkeypatch.setattr(kernel_module, "CACHE_FOLDER", str(folder))
+    saved = []
 
     def save(self, key, data):
-        with (tmp_path / "lock").open("a") as other, pytest.raises(BlockingIOError):
+        with (folder / "lock").open("a") as other, pytest.raises(BlockingIOError):
             fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        refused.append(key)
+        saved.append(key)
 
     monkeypatch.setattr(IndexDataCacheFile, "save", save)
 
@@ -128,6 +130,22 @@ def test_one_process_at_a_time_adds_kernels(monkeypatch, tmp_path):
     x = np.ones(1)
     entry_kernel(thrice)(x)
     assert x[0] == 3.0
-    assert len(refused) == 1
-    with (tmp_path / "lock").open("a") as other:
+    assert len(saved) == 1
+    with (folder / "lock").open("a") as other:
         fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@pytest.mark.skipif(kernel_module.CACHE_FOLDER is None, reason="nothing is kept")
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_full_disk_keeps_nobody_from_his_kernel(monkeypatch, tmp_path):
+    monkeypatch.setattr(kernel_module, "CACHE_FOLDER", str(tmp_path))
+    asked = []
+
+    def save(self, key, data):
+        asked.append(key)
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    monkeypatch.setattr(IndexDataCacheFile, "save", save)
+    x = np.ones(1)
+    entry_kernel(lambda x: x.fill(5.0))(x)
+    assert (x[0], len(asked)) == (5.0, 1)

@@ -12,13 +12,13 @@ import pytest
 
 from reference_rt import Scene, Sphere, meanwhile, render
 from reference_rt.apart import address_of, call_at
-from reference_rt.kernel import entry_kernel, is_compiled, precompile
+from reference_rt.kernel import entry_kernel, is_compiled, precompile, signature_of
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 _TWO = """
 import numpy as np
-from reference_rt.kernel import entry_kernel, is_compiled
+from reference_rt.kernel import entry_kernel, is_compiled, signature_of
 from reference_rt.meanwhile import precompile_all
 
 @entry_kernel
@@ -31,8 +31,9 @@ def negate(x):
 
 def main():
     x = np.array([3.0])
-    before = is_compiled(double, x), is_compiled(negate, x)
-    precompile_all([(double, (x,)), (negate, (x,))], threads=2)
+    calls = [(kernel, signature_of(x)) for kernel in (double, negate)]
+    before = tuple(is_compiled(*call) for call in calls)
+    precompile_all(calls, threads=2)
     double(x)
     negate(x)
     kernels = double, negate
@@ -67,33 +68,42 @@ def decrease(x: Any, by: float) -> None:
     x[0] -= by
 
 
+class Cold(NamedTuple):
+    calls: list[meanwhile.Call]
+    here: int
+    children: list[int]
+
+    def one_child_has_ended(self):
+        """Asked by its number: other tests' children may live on in this process."""
+        (child,) = self.children
+        try:
+            os.waitpid(child, os.WNOHANG)
+        except ChildProcessError:
+            return True
+        return False
+
+
 @pytest.fixture
-def cold(monkeypatch, tmp_path):
-    """Two calls of which nothing is compiled, and the number of this process."""
-    calls = [(increase, (np.zeros(1), 1.0)), (decrease, (np.zeros(1), 1.0))]
+def cold(monkeypatch):
+    """Two calls of which nothing is compiled, this process's number, and its children's."""
+    calls = [(kernel, signature_of(np.zeros(1), 1.0)) for kernel in (increase, decrease)]
+    children = []
+    fork = meanwhile._fork
+    monkeypatch.setattr(meanwhile, "_fork", lambda c: children.append(fork(c)) or children[-1])
     monkeypatch.setattr(meanwhile, "is_compiled", lambda *call: False)
     monkeypatch.setattr(meanwhile, "may_fork", lambda: hasattr(os, "fork"))
-    return calls, os.getpid()
-
-
-def no_child_is_left():
-    try:
-        os.waitpid(-1, os.WNOHANG)
-    except ChildProcessError:
-        return True
-    return False
+    return Cold(calls, os.getpid(), children)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="one process")
 @pytest.mark.parametrize("fault", ["stands still", "fails", "is killed"])
 def test_what_comes_to_nothing_elsewhere_is_compiled_here(fault, cold, monkeypatch, tmp_path):
-    calls, here = cold
     compiled = []
 
-    def one_that_ends(kernel, *args):
-        if os.getpid() == here:
+    def one_that_ends(kernel, signature):
+        if os.getpid() == cold.here:
             compiled.append(kernel)
-            return precompile(kernel, *args)
+            return precompile(kernel, signature)
         (tmp_path / "began").touch()  # in the other process
         if fault == "stands still":
             time.sleep(1000.0)
@@ -102,24 +112,22 @@ def test_what_comes_to_nothing_elsewhere_is_compiled_here(fault, cold, monkeypat
         return os.kill(os.getpid(), 9)
 
     monkeypatch.setattr(meanwhile, "precompile", one_that_ends)
-    monkeypatch.setattr(meanwhile, "PATIENCE", 0.5)
-    meanwhile.precompile_all(calls, threads=2)
+    monkeypatch.setattr(meanwhile, "PATIENCE", 2.0)
+    meanwhile.precompile_all(cold.calls, threads=2)
     assert (tmp_path / "began").exists()
     assert compiled == [increase, increase, decrease]
-    assert all(is_compiled(kernel, *args) for kernel, args in calls)
-    assert no_child_is_left()
+    assert all(is_compiled(*call) for call in cold.calls)
+    assert cold.one_child_has_ended()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="one process")
 @pytest.mark.parametrize("when", ["compiling", "waiting"])
 def test_an_interrupt_ends_the_other_process_too(when, cold, monkeypatch):
-    calls, here = cold
-
     def interrupt():
         raise KeyboardInterrupt
 
-    def compiling(kernel, *args):
-        if os.getpid() != here:
+    def compiling(kernel, signature):
+        if os.getpid() != cold.here:
             time.sleep(1000.0)
         elif when == "compiling":
             interrupt()
@@ -128,8 +136,8 @@ def test_an_interrupt_ends_the_other_process_too(when, cold, monkeypatch):
     if when == "waiting":
         monkeypatch.setattr(meanwhile.time, "monotonic", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        meanwhile.precompile_all(calls, threads=2)
-    assert no_child_is_left()
+        meanwhile.precompile_all(cold.calls, threads=2)
+    assert cold.one_child_has_ended()
 
 
 class Pair(NamedTuple):
@@ -151,9 +159,9 @@ def weigh_at(address: Any, pair: Pair, out: Any) -> None:
 
 def test_a_kernel_is_called_at_its_address():
     pair, out = Pair(np.array([1.0, 2.0, 4.0]), 0.5), np.zeros(3)
-    arguments = pair, None, 0, False, out
-    precompile(weigh, *arguments)
-    weigh_at(np.array([address_of(weigh, arguments)], np.intp), pair, out)
+    signature = signature_of(pair, None, 0, False, out)
+    precompile(weigh, signature)
+    weigh_at(np.array([address_of(weigh, signature)], np.intp), pair, out)
     assert out.tolist() == [-3.5, -4.0, -5.0]
 
 
