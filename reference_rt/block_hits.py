@@ -1,25 +1,50 @@
 """What the rays of a block hit: side by side, on their ways together, or one after another."""
 
+import numba
+import numpy as np
+
 from reference_rt import shapes as any_shape
 from reference_rt.apart import Address, call_at
 from reference_rt.bvh import Bvh
 from reference_rt.geometry import Geometry, closest_hit, occluded
 from reference_rt.groups import Instances
-from reference_rt.kernel import kernel
+from reference_rt.kernel import kernel, signature_of
+from reference_rt.meanwhile import Call
 from reference_rt.ray import Hit, Ray
-from reference_rt.streams import Hits, Rays, put_hit, ray_of
+from reference_rt.streams import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, Hits, Rays, put_hit, ray_of
 from reference_rt.streams import hit_of as kept_hit
-from reference_rt.wavefront import any_of_block, closest_of_block
+from reference_rt.wavefront import any_of_block, closest_of_block, trace_block
+
+
+def tracer_of(geometry: Geometry) -> Call | None:
+    """The kernel that is to stand at `geometry.tracer`; None for none, where it is inlined or there
+    is no hierarchy.
+
+    A few shapes were compiled by themselves too: nothing was won that the noise would show, and
+    spheres were 1 to 2 % slower (measured).
+    """
+    bvh, shapes, solids = geometry.bvh, geometry.shapes, geometry.solids
+    if numba.config.DISABLE_JIT or bvh is None or geometry.instances is not None:
+        return None
+    rays = Rays(np.empty(RAY_FLOATS))
+    hits = Hits(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
+    return trace_block, signature_of(bvh, shapes, solids, rays, hits, 0, False)
 
 
 @kernel
 def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
     """`closest_hit` of the first n rays: what `hit_of` tells."""
-    _closest_hits(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n)
+    _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, False)
 
 
 @kernel
-def _closest_hits(
+def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
+    """`occluded` of the first n rays: of the hits, only whether there is any is meant."""
+    _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, True)
+
+
+@kernel
+def _trace(
     bvh: Bvh | None,
     instances: Instances | None,
     tracer: Address | None,
@@ -27,19 +52,27 @@ def _closest_hits(
     rays: Rays,
     hits: Hits,
     n: int,
+    any_hit: bool,
 ) -> None:
+    shapes, solids = geometry.shapes, geometry.solids
     if bvh is None:
-        any_shape.nearest_of_rays(geometry.shapes, rays, hits, n, False)
+        any_shape.nearest_of_rays(shapes, rays, hits, n, any_hit)
         return
     if instances is not None:
         # Rays have directions and origins of their own in each, which change on their ways.
         for j in range(n):
-            put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
+            if any_hit:
+                hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
+            else:
+                put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
         return
     if tracer is not None:
-        call_at(tracer[0], (bvh, geometry.shapes, geometry.solids, rays, hits, n, False))
+        call_at(tracer[0], (bvh, shapes, solids, rays, hits, n, any_hit))
         return
-    closest_of_block(bvh, geometry.shapes, geometry.solids, rays, hits, n)
+    if any_hit:
+        any_of_block(bvh, shapes, solids, rays, hits, n)
+    else:
+        closest_of_block(bvh, shapes, solids, rays, hits, n)
 
 
 @kernel
@@ -53,32 +86,3 @@ def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: Hits, j: int) -
     if bvh is None:
         return any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
     return kept_hit(hits, j)
-
-
-@kernel
-def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
-    """`occluded` of the first n rays: of the hits, only whether there is any is meant."""
-    _any_hits(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n)
-
-
-@kernel
-def _any_hits(
-    bvh: Bvh | None,
-    instances: Instances | None,
-    tracer: Address | None,
-    geometry: Geometry,
-    rays: Rays,
-    hits: Hits,
-    n: int,
-) -> None:
-    if bvh is None:
-        any_shape.nearest_of_rays(geometry.shapes, rays, hits, n, True)
-        return
-    if instances is not None:
-        for j in range(n):
-            hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
-        return
-    if tracer is not None:
-        call_at(tracer[0], (bvh, geometry.shapes, geometry.solids, rays, hits, n, True))
-        return
-    any_of_block(bvh, geometry.shapes, geometry.solids, rays, hits, n)

@@ -8,19 +8,17 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
 from reference_rt.apart import address_of
 from reference_rt.bands import cast_band, first_hits_band, render_band
-from reference_rt.geometry import Geometry
+from reference_rt.block_hits import tracer_of
 from reference_rt.integrators import Path, RayCast
 from reference_rt.kernel import signature_of
-from reference_rt.meanwhile import Call, precompile_all
+from reference_rt.meanwhile import precompile_all
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.tables import SceneTables, build_tables
-from reference_rt.wavefront import trace_block, tracer_arguments
 
 SAMPLES_PER_BAND = 1 << 15
 """A band takes some 20 ms: short enough for progress and Ctrl-C, long against the 0.1 ms that
@@ -94,7 +92,7 @@ def render(
     tables = build_tables(scene) if tables is None else tables
     clock.append(time.perf_counter())
     integrator = scene.integrator
-    tracer = _tracer(tables.geometry) if isinstance(integrator, Path) else None
+    tracer = tracer_of(tables.geometry) if isinstance(integrator, Path) else None
     address = np.zeros(1, np.intp)
     if tracer is not None:
         tables = tables._replace(geometry=tables.geometry._replace(tracer=address))
@@ -122,15 +120,6 @@ def render(
     clock.append(time.perf_counter())
     seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
     return Picture(layers, shown, seconds)
-
-
-def _tracer(geometry: Geometry) -> Call | None:
-    """The kernel that paths call at an address to have their rays traced; None where they do
-    without."""
-    if numba.config.DISABLE_JIT or geometry.bvh is None or geometry.instances is not None:
-        return None
-    arguments = tracer_arguments(geometry.bvh, geometry.shapes, geometry.solids)
-    return trace_block, signature_of(*arguments)
 
 
 def _cast_jobs(scene: Scene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:

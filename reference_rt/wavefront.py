@@ -10,8 +10,6 @@ node, to a leaf or back is a queue that it is put into, not a branch.  Each find
 import math
 from typing import Any
 
-import numpy as np
-
 from reference_rt.bvh import (
     FAR_SLACK,
     Bvh,
@@ -28,9 +26,6 @@ from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.shapes.watertight import SEEN_FLOATS
 from reference_rt.streams import (
-    HIT_FLOATS,
-    HIT_INTEGERS,
-    RAY_FLOATS,
     Hits,
     Rays,
     put_hit,
@@ -53,13 +48,6 @@ from reference_rt.wave import (
 
 _ALL = (1 << LANES) - 1
 _LAST = 1 << (LANES - 1)
-
-
-def tracer_arguments(bvh: Bvh, shapes: Shapes, solids: Solids | None) -> tuple[Any, ...]:
-    """Arguments of `trace_block` of the types that it is compiled for."""
-    rays = Rays(np.empty(RAY_FLOATS))
-    hits = Hits(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
-    return bvh, shapes, solids, rays, hits, 0, False
 
 
 @entry_kernel

@@ -172,6 +172,7 @@ def test_paths_are_the_same_with_their_tracer_apart(monkeypatch):
     scene = Scene.model_validate(
         {
             "shapes": [s.model_dump() for s in spheres],
+            "camera": {"type": "perspective", "eye": [0.5, 1.0, 5.0]},
             "lights": [{"type": "constant", "radiance": 1.0}],
             "film": {"width": 16, "height": 16},
             "sampler": {"type": "sobol", "spp": 4},
@@ -180,10 +181,10 @@ def test_paths_are_the_same_with_their_tracer_apart(monkeypatch):
     )
     module = sys.modules["reference_rt.render"]
     asked = []
-    tracer_of = module._tracer
-    monkeypatch.setattr(module, "_tracer", lambda g: asked.append(tracer_of(g)) or asked[-1])
+    tracer_of = module.tracer_of
+    monkeypatch.setattr(module, "tracer_of", lambda g: asked.append(tracer_of(g)) or asked[-1])
     apart = render(scene)
     assert asked[0] is not None
-    monkeypatch.setattr(module, "_tracer", lambda geometry: None)
+    monkeypatch.setattr(module, "tracer_of", lambda geometry: None)
     assert np.array_equal(apart.colour, render(scene).colour)
     assert len(np.unique(apart.colour)) > 100
