@@ -3,15 +3,43 @@
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from gate_checks import SCENE, pictures
+from PIL import Image
 
 from comparisons.gate import reference
 from comparisons.mitsuba_backend import Backend
 from comparisons.report import write_report
 from comparisons.suites import run
 from reference_rt.shapes.shape import FloatArray
+
+# ---- images that textures and skies are made of ------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def image_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("images")
+    rng = np.random.default_rng(3)
+
+    def write(name: str, values: Any, size: tuple[int, int]) -> None:
+        image = Image.fromarray((255.0 * values).astype(np.uint8)).resize(size, Image.BICUBIC)
+        image.save(path / name)
+
+    write("colours.png", rng.uniform(size=(4, 6, 3)), (24, 16))
+    write("heights.png", rng.uniform(size=(6, 6)), (32, 32))
+    write("wide.png", rng.uniform(size=(6, 6)), (32, 16))
+    write("sky.png", rng.uniform(size=(8, 16, 3)) ** 3, (32, 16))
+    tilt = 0.1 * np.sin(np.linspace(0.0, 9.0, 32))
+    write(
+        "normals.png",
+        np.dstack([*np.meshgrid(0.5 + tilt, 0.5 + tilt), np.full((32, 32), 0.95)]),
+        (32, 32),
+    )
+    return path
+
 
 # ---- the page in a browser ----------------------------------------------------------------------
 
