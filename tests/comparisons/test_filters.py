@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from comparisons.mitsuba_backend import mitsuba
+from comparisons.tiers import film
 from comparisons.translate.film import translate_filter
 from reference_rt.film import (
     AnyFilter,
@@ -15,21 +16,21 @@ from reference_rt.film import (
     TentFilter,
 )
 
-
-@pytest.mark.parametrize(
-    "film_filter",
-    [
-        BoxFilter(),
-        TentFilter(radius=1.5),
-        GaussianFilter(stddev=0.7),
-        MitchellFilter(),
-        MitchellFilter(b=0.9, c=0.2),
-        CatmullRomFilter(),
-        LanczosFilter(),
-        LanczosFilter(lobes=2),
-    ],
-    ids=str,
+FILTERS: tuple[AnyFilter, ...] = (
+    BoxFilter(),
+    TentFilter(radius=1.5),
+    GaussianFilter(),
+    GaussianFilter(stddev=0.7),
+    MitchellFilter(),
+    MitchellFilter(b=0.9, c=0.2),
+    CatmullRomFilter(),
+    LanczosFilter(),
+    LanczosFilter(lobes=2),
+    LanczosFilter(lobes=5),
 )
+
+
+@pytest.mark.parametrize("film_filter", FILTERS, ids=str)
 def test_values(film_filter: AnyFilter) -> None:
     theirs = mitsuba().load_dict(translate_filter(film_filter))
     radius = theirs.radius()
@@ -43,3 +44,16 @@ def test_values(film_filter: AnyFilter) -> None:
     tolerance = 5e-4 if isinstance(film_filter, GaussianFilter) else 64 * 2.0**-24
     assert np.abs(there - scale * ours).max() < tolerance
     assert not ours[np.abs(x) > radius * 1.001].any()
+
+
+@pytest.mark.parametrize("film_filter", FILTERS, ids=str)
+def test_the_rung_of_the_film(film_filter: AnyFilter) -> None:
+    tier = film(film_filter, film_filter)
+    assert (tier.name, tier.status) == ("film", "agree"), tier.reason
+
+
+def test_another_filter_is_told_apart() -> None:
+    third = 1.0 / 3.0
+    reference = MitchellFilter(b=third, c=third)
+    assert film(reference, reference).status == "agree"
+    assert film(MitchellFilter(b=0.3334, c=third), reference).status == "differ"

@@ -1,4 +1,4 @@
-"""Textures, environment maps and filters against their twins."""
+"""Textures and environment maps against their twins."""
 
 from pathlib import Path
 from typing import Any
@@ -8,17 +8,8 @@ import pytest
 
 from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_scene import for_rays
-from comparisons.tiers import film
 from comparisons.translate.lights import translate_light
 from comparisons.translate.textures import Surroundings, translate_texture
-from reference_rt.filters import (
-    AnyFilter,
-    CatmullRomFilter,
-    GaussianFilter,
-    LanczosFilter,
-    MitchellFilter,
-    TentFilter,
-)
 from reference_rt.lights import EnvironmentMap, environment_map
 from reference_rt.scene import Scene
 from reference_rt.tables import build_tables
@@ -113,28 +104,3 @@ def test_environment_maps(turn: str, image_folder: Path) -> None:
     sine = np.hypot(d[:, 0], d[:, 2])
     bound = 32.0 * 8.0 * 2.0**-24 * table.texels.max() / np.maximum(sine, 0.05)
     assert (np.abs(theirs - ours).max(axis=1) < bound).all()
-
-
-FILTERS: tuple[AnyFilter, ...] = (
-    TentFilter(radius=1.5),
-    GaussianFilter(),
-    GaussianFilter(stddev=0.8),
-    MitchellFilter(),
-    MitchellFilter(b=0.1, c=0.9),
-    CatmullRomFilter(),
-    LanczosFilter(),
-    LanczosFilter(lobes=5),
-)
-
-
-@pytest.mark.parametrize("film_filter", FILTERS)
-def test_filters(film_filter: AnyFilter) -> None:
-    tier = film(film_filter, film_filter)
-    assert (tier.name, tier.status) == ("film", "agree"), tier.reason
-
-
-def test_another_filter_is_told_apart() -> None:
-    third = 1.0 / 3.0
-    reference = MitchellFilter(b=third, c=third)
-    assert film(reference, reference).status == "agree"
-    assert film(MitchellFilter(b=0.3334, c=third), reference).status == "differ"
