@@ -7,6 +7,7 @@ from reference_rt.errors import (
     ReferenceRtError,
     ReferenceUnavailableError,
     SceneError,
+    SceneWarning,
     UsageError,
 )
 from reference_rt.film import (
@@ -116,6 +117,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "SceneTables",
+    "SceneWarning",
     "Sobol",
     "Sphere",
     "Spot",

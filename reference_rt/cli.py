@@ -5,6 +5,7 @@ import gc
 import importlib.metadata
 import json
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 from pydantic import ValidationError
 
-from reference_rt.errors import ImageError, ReferenceRtError, UsageError
+from reference_rt.errors import ImageError, ReferenceRtError, SceneWarning, UsageError
 from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.scene import Scene
@@ -38,7 +39,8 @@ def guarded(command: F) -> F:
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> Any:
         try:
-            return command(*args, **kwargs)
+            with _printed_warnings():
+                return command(*args, **kwargs)
         except ReferenceRtError as error:
             _fail(str(error), error.exit_code)
         except typer.Exit:
@@ -52,6 +54,23 @@ def guarded(command: F) -> F:
             _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
 
     return run  # type: ignore[return-value]
+
+
+@contextmanager
+def _printed_warnings() -> Iterator[None]:
+    """Print each `SceneWarning` as one line on standard error; other warnings stay Python's."""
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def show(message: Any, category: type[Warning], *place: Any) -> None:
+            if issubclass(category, SceneWarning):
+                typer.echo(f"warning: {message}", err=True)
+            else:
+                others(message, category, *place)
+
+        warnings.simplefilter("always", SceneWarning)
+        warnings.showwarning = show
+        yield
 
 
 def _fail(message: str, code: int) -> None:

@@ -55,6 +55,17 @@ class SceneError(ReferenceRtError):
         return ": ".join(part for part in (where, keys, self.message) if part)
 
 
+class SceneWarning(UserWarning):
+    """A scene is valid, but probably not what its author meant.
+
+    The text has the form of a `SceneError`: file, line, keys, what was found and what was expected.
+    Python code sees it through the `warnings` module; the command line prints it.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(_one_line(message))
+
+
 class ImageError(ReferenceRtError):
     """An image cannot be read, written or used."""
 

@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import math
+import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
@@ -19,7 +20,7 @@ from reference_rt.cameras.perspective import Perspective
 from reference_rt.csg import AnyShape, Solid
 from reference_rt.description import Description
 from reference_rt.diagnosis import first_problem, line_of
-from reference_rt.errors import SceneError
+from reference_rt.errors import SceneError, SceneWarning
 from reference_rt.film import Film
 from reference_rt.groups import Instance
 from reference_rt.integrators import AnyIntegrator
@@ -171,6 +172,10 @@ class Scene(Description):
             return SceneError(message, path)
         name, text = self._source
         return SceneError(message, path, name, line_of(text, path))
+
+    def warn(self, message: str, *path: str | int) -> None:
+        """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`."""
+        warnings.warn(SceneWarning(str(self.error(message, *path))), stacklevel=3)
 
     @property
     def resolved_sampler(self) -> AnySampler:
