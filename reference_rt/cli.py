@@ -62,11 +62,11 @@ def _printed_warnings() -> Iterator[None]:
     with warnings.catch_warnings():
         others = warnings.showwarning
 
-        def show(message: Any, category: type[Warning], *place: Any) -> None:
+        def show(message: Warning | str, category: type[Warning], *place: Any, **to: Any) -> None:
             if issubclass(category, SceneWarning):
                 typer.echo(f"warning: {message}", err=True)
             else:
-                others(message, category, *place)
+                others(message, category, *place, **to)
 
         warnings.simplefilter("always", SceneWarning)
         warnings.showwarning = show

@@ -7,7 +7,7 @@ import numpy as np
 
 from reference_rt.description import Colour, Description, Vector
 from reference_rt.kernel import kernel
-from reference_rt.lights.light import LightSample
+from reference_rt.lights.light import LightSample, no_light
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.vec3 import Vec3, dot, luminance, row
 
@@ -37,6 +37,8 @@ def sample(points: Points, i: int, p: Vec3) -> LightSample:
     target = row(points.position, i)
     w = target - p
     distance2 = dot(w, w)
+    if distance2 == 0.0:
+        return no_light()  # no direction leads there
     distance = math.sqrt(distance2)
     radiance = row(points.intensity, i) * (1.0 / distance2)
     return LightSample(w * (1.0 / distance), radiance, 1.0, target, distance, True)

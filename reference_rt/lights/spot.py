@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from reference_rt.description import Colour, Description, Vector
 from reference_rt.kernel import kernel
-from reference_rt.lights.light import LightSample
+from reference_rt.lights.light import LightSample, no_light
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.vec3 import Vec3, cross, dot, length, luminance, row
 
@@ -84,6 +84,8 @@ def sample(spots: Spots, i: int, p: Vec3) -> LightSample:
     target = row(spots.position, i)
     w = target - p
     distance2 = dot(w, w)
+    if distance2 == 0.0:
+        return no_light()  # no direction leads there
     distance = math.sqrt(distance2)
     shining = falloff(spots, i, -w)
     radiance = row(spots.intensity, i) * (shining / distance2)

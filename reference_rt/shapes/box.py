@@ -7,7 +7,7 @@ import numpy as np
 
 from reference_rt.kernel import kernel
 from reference_rt.lanes import larger, select, smaller
-from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at
+from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.shapes import placement
 from reference_rt.shapes.placement import columns, local_point, world_surface
 from reference_rt.shapes.shape import (
@@ -26,7 +26,7 @@ from reference_rt.shapes.shape import (
     solid_angle_pdf,
 )
 from reference_rt.shapes.side_by_side import nearer_by
-from reference_rt.vec3 import Vec3, dot, row, triple
+from reference_rt.vec3 import Vec3, dot, max_abs, row, triple
 
 
 class Box(Shape):
@@ -256,9 +256,29 @@ def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
     local = Vec3(a, a, b) if axis == 0 else Vec3(a, b, b)
     q = on_face(local, axis, sign)
     point = world_surface(boxes, i, q, face_normal(axis, sign), 0.0, -1, -1)
-    pdf = solid_angle_pdf(p, point.p, point.n, area)
+    density = pdf(boxes, i, area, p, point)
     face = axis + 3.0 if sign > 0.0 else axis + 0.0
-    return LightPoint(point.p, point.n, point.error, pdf, face, 0.0)
+    return LightPoint(point.p, point.n, point.error, density, face, 0.0)
+
+
+@kernel
+def error_at(boxes: Boxes, i: int, p: Vec3) -> float:
+    """The bound of `SurfacePoint.error` that holds for every point p of box i.
+
+    Of `world_error`, |A| |q| is at most `size` in each component, and what is seen along the local
+    normal, over the length of that normal in the world, at most the length of |A| |q|.
+    """
+    edges = boxes.edges
+    size = (
+        max_abs(triple(edges, i, 0)) + max_abs(triple(edges, i, 1)) + max_abs(triple(edges, i, 2))
+    )
+    return surface_error(p, row(boxes.center, i), 2.0 * size)
+
+
+@kernel
+def pdf(boxes: Boxes, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
+    """The density of `sample` per solid angle, at the point `q` of the box."""
+    return solid_angle_pdf(p, q.p, q.n, area, error_at(boxes, i, p))
 
 
 @kernel

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt.kernel import kernel
-from reference_rt.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss, surface_error
 from reference_rt.sampling.warp import concentric_disk
 from reference_rt.shapes import flat
 from reference_rt.shapes.shape import (
@@ -21,7 +21,7 @@ from reference_rt.shapes.shape import (
     outward,
     solid_angle_pdf,
 )
-from reference_rt.vec3 import Vec3, row
+from reference_rt.vec3 import Vec3, max_abs, row
 
 
 class Disk(Shape):
@@ -102,8 +102,21 @@ def tangents(disks: Disks, ray: Ray, hit: Hit) -> Tangents:
 
 
 @kernel
+def error_at(disks: Disks, i: int, p: Vec3) -> float:
+    """The bound of `SurfacePoint.error` that holds for every point p of disk i."""
+    size = max_abs(row(disks.x_edge, i)) + max_abs(row(disks.y_edge, i))
+    return surface_error(p, row(disks.center, i), size)
+
+
+@kernel
 def sample(disks: Disks, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
     """A point uniform over the area, as a light for `p`."""
     x, y = concentric_disk(u0, u1)
     q = flat.surface_at(disks, i, x, y)
-    return LightPoint(q.p, q.n, q.error, solid_angle_pdf(p, q.p, q.n, area), x, y)
+    return LightPoint(q.p, q.n, q.error, pdf(disks, i, area, p, q), x, y)
+
+
+@kernel
+def pdf(disks: Disks, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
+    """The density of `sample` per solid angle, at the point `q` of the disk."""
+    return solid_angle_pdf(p, q.p, q.n, area, error_at(disks, i, p))

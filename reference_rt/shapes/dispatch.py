@@ -14,7 +14,6 @@ from reference_rt.shapes.shape import (
     Tangents,
     no_light_point,
     no_spans,
-    solid_angle_pdf,
 )
 from reference_rt.shapes.tables import (
     BOX,
@@ -71,8 +70,8 @@ def _no_middle(table: Any, i: int, area: float, p: Vec3) -> LightPoint:
 
 
 @kernel
-def _pdf_by_area(table: Any, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
-    return solid_angle_pdf(p, q.p, q.n, area)
+def _no_pdf(table: Any, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
+    return 0.0
 
 
 @kernel
@@ -87,7 +86,7 @@ _tangents = of_table("tangents", _no_tangents)
 _face = of_table("face_of", _first_face)
 _sample = of_table("sample", _no_sample)
 _middle = of_table("middle", _no_middle)
-_pdf = of_table("pdf", _pdf_by_area)
+_pdf = of_table("pdf", _no_pdf)
 _spans = of_table("spans", _no_spans)
 
 
@@ -285,8 +284,15 @@ def middle(shapes: Shapes, kind: int, i: int, area: float, p: Vec3) -> LightPoin
 @kernel
 def pdf(shapes: Shapes, kind: int, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density per solid angle with which `sample` picks, from `p`, the point `q`."""
+    density = 0.0
     if kind == SPHERE:
-        return float(_pdf(shapes.spheres, i, area, p, q))
-    if kind == RECTANGLE:
-        return float(_pdf(shapes.rectangles, i, area, p, q))
-    return solid_angle_pdf(p, q.p, q.n, area)
+        density = _pdf(shapes.spheres, i, area, p, q)
+    elif kind == RECTANGLE:
+        density = _pdf(shapes.rectangles, i, area, p, q)
+    elif kind == BOX:
+        density = _pdf(shapes.boxes, i, area, p, q)
+    elif kind == DISK:
+        density = _pdf(shapes.disks, i, area, p, q)
+    elif kind == TRIANGLE:
+        density = _pdf(shapes.triangles, i, area, p, q)
+    return density

@@ -40,9 +40,6 @@ _LEAST_SOLID_ANGLE = 2.0**-26
 """Places in it are found by differences of angles, which round by a few u = 2^-53: here half of
 their digits are left.  Below, by area."""
 
-_LEAST_HEIGHT = 2.0**-500
-"""In half diagonals: its square is a float64."""
-
 
 class Rectangle(Shape):
     """The square [-1, 1]² at z = 0 with normal +z, where its transform takes it."""
@@ -188,10 +185,11 @@ def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
     half_diagonal2 = width * width + height * height
     if dot(w, w) >= _NEAR * _NEAR * half_diagonal2:
         return spherical_rectangle.unseen()
+    height_of_p = dot(w, row(rectangles.normal, i))
+    if height_of_p <= error_at(rectangles, i, p):
+        return spherical_rectangle.unseen()  # behind it, or a point of the rectangle itself
     unit = 1.0 / math.sqrt(half_diagonal2)
-    h = dot(w, row(rectangles.normal, i)) * unit
-    if h <= _LEAST_HEIGHT:
-        return spherical_rectangle.unseen()
+    h = height_of_p * unit
     width, height = width * unit, height * unit
     x, y = dot(w, row(rectangles.x_of, i)), dot(w, row(rectangles.y_of, i))
     return spherical_rectangle.see(
@@ -221,7 +219,8 @@ def sample_by_area(
     """A point uniform over the area, as a light for `p`."""
     x, y = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
     q, n = place(rectangles, i, x, y), row(rectangles.normal, i)
-    return LightPoint(q, n, error_at(rectangles, i, q), solid_angle_pdf(p, q, n, area), x, y)
+    density = solid_angle_pdf(p, q, n, area, error_at(rectangles, i, p))
+    return LightPoint(q, n, error_at(rectangles, i, q), density, x, y)
 
 
 @kernel
@@ -235,5 +234,5 @@ def pdf(rectangles: Rectangles, i: int, area: float, p: Vec3, q: SurfacePoint) -
     """The density of `sample` per solid angle, at the point `q` of the rectangle."""
     seen = _see(rectangles, i, p)
     if seen.solid_angle < _LEAST_SOLID_ANGLE:
-        return solid_angle_pdf(p, q.p, q.n, area)
+        return solid_angle_pdf(p, q.p, q.n, area, error_at(rectangles, i, p))
     return 1.0 / seen.solid_angle

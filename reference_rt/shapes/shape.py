@@ -125,17 +125,23 @@ def no_light_point() -> LightPoint:
 
 
 @kernel
-def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float) -> float:
-    """A uniform density over `area`, at its point `q` with unit normal `n`, per solid angle at `p`.
+def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float, error: float) -> float:
+    """A uniform density over `area`, at its point `q` with unit normal `n`, per solid angle at `p`:
+    distance² / (cos area) (e.g. Veach 1997, eq. 8.2).
 
-    distance² / (cos area) (e.g. Veach 1997, eq. 8.2); 0 from behind.
+    0 for a receiver behind the surface, and for one that rounding alone may have lifted above it: a
+    point of the flat surface itself, which sees nothing of it.  `error` is the shape's bound
+    `error_at` p.  Of a point p of the shape, half of that bound is p's distance from the plane; q
+    has at most twice p's bound, since |q| <= |anchor| + size, and half of it again is q's distance;
+    the product with n rounds by less than the other half of p's: 2 `error` in all.
     """
     w = p - q
-    cos_times_length = dot(w, n)
-    distance2 = dot(w, w)
-    if cos_times_length <= 0.0:
+    height = dot(w, n)
+    if height <= 2.0 * error:
         return 0.0
-    return distance2 * math.sqrt(distance2) / (cos_times_length * area)
+    distance2 = dot(w, w)
+    # In this order nothing overflows or underflows where the area is an ordinary float64.
+    return (distance2 / area) * (math.sqrt(distance2) / height)
 
 
 class Tangents(NamedTuple):

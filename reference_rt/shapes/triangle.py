@@ -258,7 +258,14 @@ def sample(triangles: Triangles, i: int, area: float, p: Vec3, u0: float, u1: fl
     u, v = root * (1.0 - u1), root * u1
     q = interpolate(triangles.vertices, i, u, v)
     n = normal(triangles, i)
-    return LightPoint(q, n, error_at(triangles, i, q), solid_angle_pdf(p, q, n, area), u, v)
+    density = solid_angle_pdf(p, q, n, area, error_at(triangles, i, p))
+    return LightPoint(q, n, error_at(triangles, i, q), density, u, v)
+
+
+@kernel
+def pdf(triangles: Triangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
+    """The density of `sample` per solid angle, at the point `q` of the triangle."""
+    return solid_angle_pdf(p, q.p, q.n, area, error_at(triangles, i, p))
 
 
 @kernel
