@@ -112,6 +112,8 @@ def render(
         f"kernels, {seconds['render']:.2f} s to render",
         err=True,
     )
+    if not picture.layers[picture.shown].any():
+        description.warn("the picture is black: the camera sees nothing that shines", "camera")
     bad = picture.nonfinite_pixels
     if len(bad) > 0:
         places = ", ".join(f"({x}, {y})" for x, y in bad[:4])
@@ -130,17 +132,24 @@ def explain(scene: SceneArgument) -> None:
 
     from reference_rt.explain import explain as explain_scene
     from reference_rt.explain import margins
+    from reference_rt.likely_mistakes import likely_mistakes
     from reference_rt.tables import build_tables
 
     description = Scene.load(scene)
-    used, left_out = explain_scene(description, build_tables(description))
+    tables = build_tables(description)
+    used, left_out = explain_scene(description, tables)
     near, beyond = margins(description)
+    mistakes = [
+        (str(description.error("", *mistake.path)), mistake.message)
+        for mistake in likely_mistakes(description, tables)
+    ]
     console = Console()
     for title, lines in (
         ("used", used),
         ("left out", left_out),
         ("nearest to float64's limits", near),
         ("warning: beyond float64", beyond),
+        ("warning: probably a mistake", mistakes),
     ):
         if not lines:
             continue

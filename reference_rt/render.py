@@ -15,6 +15,7 @@ from reference_rt.bands import cast_band, first_hits_band, render_band
 from reference_rt.block_hits import tracer_of
 from reference_rt.integrators import Path, RayCast
 from reference_rt.kernel import signature_of
+from reference_rt.likely_mistakes import likely_mistakes
 from reference_rt.meanwhile import precompile_all
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -84,13 +85,16 @@ def render(
     """Render a scene.
 
     The same scene gives the same bits for any number of `threads` (default: all cores).  `tables`
-    spares building them again.  Ctrl-C stops within a band.  Raises SceneError.
+    spares building them again.  Ctrl-C stops within a band.  Raises SceneError; issues a
+    SceneWarning for what looks like a mistake (`likely_mistakes`).
     """
     say = progress or (lambda what, fraction: None)
     _check(scene)
     clock = [time.perf_counter()]
     tables = build_tables(scene) if tables is None else tables
     clock.append(time.perf_counter())
+    for mistake in likely_mistakes(scene, tables):
+        scene.warn(mistake.message, *mistake.path)
     integrator = scene.integrator
     tracer = tracer_of(tables.geometry) if isinstance(integrator, Path) else None
     address = np.zeros(1, np.intp)

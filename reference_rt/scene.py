@@ -166,6 +166,11 @@ class Scene(Description):
         """The scene file's name without its suffix."""
         return Path(self._source[0]).stem if self._source else "scene"
 
+    @property
+    def is_from_file(self) -> bool:
+        """Whether the scene was read from a file or from text."""
+        return self._source is not None
+
     def error(self, message: str, *path: str | int) -> SceneError:
         """An error about the part at `path`, with file and line where the scene has them."""
         if self._source is None:
@@ -264,7 +269,7 @@ class Scene(Description):
 
     def changed(self, **parts: Any) -> "Scene":
         """The same scene with other parts (film=..., sampler=...), checked again."""
-        fields = {name: getattr(self, name) for name in type(self).model_fields} | parts
+        fields = {name: getattr(self, name) for name in self.model_fields_set} | parts
         scene = type(self)(**fields)
         scene._folder, scene._source = self._folder, self._source
         return scene
