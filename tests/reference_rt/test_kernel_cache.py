@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections import namedtuple
+from contextlib import ExitStack
 from pathlib import Path
 
 import numba
@@ -185,58 +186,70 @@ Path.write_bytes = write
 """
 
 
-def _start(tmp_path, code):
+@pytest.fixture
+def start(tmp_path):
+    """start(code) begins a process that runs the code after `_KERNEL`, with an empty cache at
+    first.  It is waited for, or ended, when the test ends."""
     (tmp_path / "halves.py").write_text(_KERNEL)
-    return subprocess.Popen(
-        [sys.executable, "-c", f"from halves import *\n{code}"],
-        env=os.environ | {"REFERENCE_RT_CACHE": str(tmp_path / "cache")},
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    with ExitStack() as ending:
+
+        def begin(code):
+            process = subprocess.Popen(
+                [sys.executable, "-c", f"from halves import *\n{code}"],
+                env=os.environ | {"REFERENCE_RT_CACHE": str(tmp_path / "cache")},
+                cwd=tmp_path,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            ending.enter_context(process)
+            ending.callback(process.kill)
+            return process
+
+        yield begin
 
 
 def _done(process):
-    out, errors = process.communicate()
+    out, errors = process.communicate(timeout=300.0)
     assert errors == ""
     return process.returncode, out.strip()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="nothing kills so")
-def test_a_writer_that_is_killed_leaves_nothing_that_is_read(tmp_path):
-    assert _done(_start(tmp_path, _KILLED + "run()")) == (-signal.SIGKILL, "")
+def test_a_writer_that_is_killed_leaves_nothing_that_is_read(start, tmp_path):
+    assert _done(start(_KILLED + "run()")) == (-signal.SIGKILL, "")
     (folder,) = (tmp_path / "cache" / "kernels").iterdir()
     (left,) = folder.iterdir()
     assert left.name.startswith(".")
-    assert [_done(_start(tmp_path, "print(run())")) for _ in range(2)] == [(0, "0"), (0, "1")]
+    assert [_done(start("print(run())")) for _ in range(2)] == [(0, "0"), (0, "1")]
     assert left.exists()  # for all that is known its writer is still at it
     long_ago = time.time() - kernel_cache._UNFINISHED_FOR - 60.0
     os.utime(left, (long_ago, long_ago))
-    assert _done(_start(tmp_path, "print(run())")) == (0, "1")
+    assert _done(start("print(run())")) == (0, "1")
     assert not left.exists()
 
 
 _WRITES = """
+halve._cache.load_overload = lambda *arguments: None  # what was loaded cannot be written again
 run()
 compiled, = halve.overloads.values()
-for _ in range(300):
+for _ in range(100):
     halve._cache.save_overload(compiled.signature.args, compiled)
 """
 
 _READS = """
 run()
 compiled, = halve.overloads.values()
-for _ in range(300):
+for _ in range(100):
     assert halve._cache.load_overload(compiled.signature.args, halve.targetctx) is not None
 """
 
 
-def test_processes_write_and_read_at_the_same_time(tmp_path):
+def test_processes_write_and_read_at_the_same_time(start):
     """Each finds a whole file whenever it looks."""
-    together = [_start(tmp_path, code) for code in (_WRITES, _READS, _WRITES)]
+    together = [start(code) for code in (_WRITES, _READS, _WRITES)]
     assert [_done(process) for process in together] == [(0, "")] * 3
-    assert _done(_start(tmp_path, "print(run())")) == (0, "1")
+    assert _done(start("print(run())")) == (0, "1")
 
 
 def test_tuples_of_one_name_are_told_apart(kept):
