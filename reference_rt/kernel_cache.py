@@ -70,8 +70,8 @@ def prepare_folder(compiler: str) -> str | None:
             return None
     except OSError:
         return None
-    _delete_old(folder.parent.iterdir(), _UNUSED_FOR)
-    _delete_old(folder.glob(".*"), _UNFINISHED_FOR)
+    _delete_old(folder.parent, "*", _UNUSED_FOR)
+    _delete_old(folder, ".*", _UNFINISHED_FOR)
     return str(folder)
 
 
@@ -83,10 +83,10 @@ def _make(folder: Path) -> None:
     folder.mkdir(mode=0o700)
 
 
-def _delete_old(paths: Any, seconds: float) -> None:
+def _delete_old(folder: Path, pattern: str, seconds: float) -> None:
     """Another process may delete the same ones at the same time."""
     with suppress(OSError):
-        for path in paths:
+        for path in folder.glob(pattern):
             with suppress(OSError):
                 if time.time() - path.lstat().st_mtime > seconds:
                     _delete(path)
