@@ -5,14 +5,12 @@ tried in a child process before this one depends on it.
 """
 
 import contextlib
-import ctypes.util
 import functools
 import importlib.metadata
 import importlib.util
 import json
 import os
 import platform
-import re
 import subprocess
 import sys
 import warnings
@@ -23,10 +21,11 @@ from typing import Any
 
 import platformdirs
 
+from comparisons import llvm_libraries
+from comparisons.llvm_libraries import LIBRARY
 from reference_rt.errors import ReferenceUnavailableError
 
 FORCE = "REFERENCE_RT_MITSUBA_VARIANT"
-LIBRARY = "DRJIT_LIBLLVM_PATH"
 
 SCALAR, LLVM = "scalar_rgb", "llvm_ad_rgb"
 
@@ -34,21 +33,13 @@ _PROOF_SECONDS = 120.0
 """A proof takes 1 to 3 s alone; the rest is for a machine that others keep busy."""
 
 _MOST_PROOFS = 4
-"""Libraries that are tried: each costs seconds, and the newest that works is the first found."""
-
-_PLACES = (
-    "/usr/lib/*/libLLVM*.so*",
-    "/usr/lib/libLLVM*.so*",
-    "/usr/lib64/libLLVM*.so*",
-    "/usr/lib/llvm-*/lib/libLLVM*.so*",
-    "/usr/lib64/llvm*/lib*/libLLVM*.so*",
-    "/usr/local/lib/libLLVM*.so*",
-    "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
-    "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
-)
+"""Libraries that are tried: each costs seconds."""
 
 _PROOF = """
+import ctypes
 import sys
+for library in sys.argv[2:]:
+    ctypes.CDLL(library)
 import numpy as np
 import mitsuba as mi
 mi.set_variant(sys.argv[1])
@@ -82,9 +73,9 @@ class Backend:
 def choose() -> Backend:
     """Find the best variant that works, without loading Mitsuba into this process.
 
-    The environment variable REFERENCE_RT_MITSUBA_VARIANT forces a variant; DRJIT_LIBLLVM_PATH
-    names the only LLVM to try.  Raises ReferenceUnavailableError: Mitsuba is not installed, or the
-    forced variant does not run.
+    The environment variable REFERENCE_RT_MITSUBA_VARIANT forces a variant.  Libraries are tried in
+    the order of `llvm_libraries.candidates`.  Raises ReferenceUnavailableError: Mitsuba is not
+    installed, or the forced variant does not run.
     """
     version = _version()
     forced = os.environ.get(FORCE)
@@ -95,14 +86,14 @@ def choose() -> Backend:
         return Backend(forced, version, f"forced by {FORCE}", None)
     variant = forced or LLVM
     tried = []
-    for path in _candidates()[:_MOST_PROOFS]:
+    for path in llvm_libraries.candidates()[:_MOST_PROOFS]:
         problem = _remembered_proof(version, variant, path)
         if problem is None:
             why = f"forced by {FORCE}" if forced else "the fastest variant that works here"
             return Backend(variant, version, f"{why}, with {path}", path)
         tried.append(f"{path} {problem}")
     found = "; ".join(tried) or "no libLLVM was found"
-    advice = f"to get llvm: apt-get install libllvm19, or set {LIBRARY}"
+    advice = f"to get llvm: {llvm_libraries.ADVICE}"
     if forced:
         raise ReferenceUnavailableError(f"{FORCE}={forced}: {found}; {advice}")
     return Backend(SCALAR, version, f"{found}; {advice}", None)
@@ -121,13 +112,14 @@ def mitsuba() -> Any:
     Raises ReferenceUnavailableError.
     """
     chosen = backend()
-    if chosen.llvm_path is not None:
-        os.environ[LIBRARY] = chosen.llvm_path
     try:
+        if chosen.llvm_path is not None:
+            os.environ[LIBRARY] = chosen.llvm_path
+            llvm_libraries.load_needed(chosen.llvm_path)
         import mitsuba as mi
 
         mi.set_variant(chosen.variant)
-    except (ImportError, AttributeError, RuntimeError) as error:
+    except (ImportError, AttributeError, RuntimeError, OSError) as error:
         raise ReferenceUnavailableError(f"Mitsuba does not start: {error}") from None
     # Plugins log a warning per load in scalar variants ("terrible performance"): known, and told
     # by `Backend.reason`.
@@ -176,11 +168,13 @@ def scalar() -> contextlib.AbstractContextManager[Any]:
 def prove(variant: str, llvm_path: str | None) -> str | None:
     """Render a small scene in a child process: None if it works, else what happened."""
     environment = dict(os.environ)
+    needed: list[str] = []
     if llvm_path is not None:
         environment[LIBRARY] = llvm_path
+        needed = llvm_libraries.needed_by(llvm_path)
     try:
         run = subprocess.run(
-            [sys.executable, "-c", _PROOF, variant],
+            [sys.executable, "-c", _PROOF, variant, *needed],
             env=environment,
             capture_output=True,
             text=True,
@@ -204,36 +198,6 @@ def _version() -> str:
             "Mitsuba is not installed; expected: pip install 'reference-rt[compare]'"
         )
     return importlib.metadata.version("mitsuba")
-
-
-def _candidates() -> list[str]:
-    """Paths of LLVM libraries, the newest first; only the user's own where one is named."""
-    own = os.environ.get(LIBRARY)
-    if own:
-        return [own]
-    places = list(_PLACES)
-    if "CONDA_PREFIX" in os.environ:
-        places.append(os.environ["CONDA_PREFIX"].lstrip("/") + "/lib/libLLVM*")
-    root = Path("/")
-    # One file has many names; its real one holds the full version.
-    files = {p.resolve() for place in places for p in root.glob(place.lstrip("/")) if p.is_file()}
-    found = {str(file) for file in files if _llvm_version(str(file))}
-    if not found:
-        name = ctypes.util.find_library("LLVM")
-        found = {name} if name else set()
-    return sorted(found, key=_llvm_version, reverse=True)
-
-
-def _llvm_version(path: str) -> tuple[int, ...]:
-    """(19, 1) of .../libLLVM.so.19.1 or .../libLLVM-19.so.1; from the folder's name on macOS, (0,)
-    where that has none; () for a file that is not all of LLVM."""
-    if not re.match(r"libLLVM[-.]\w", Path(path).name):
-        return ()
-    for part in reversed(Path(path).parts):
-        match = re.match(r"(?:libLLVM(?:-|\.so\.)|llvm[-@]?)(\d+(?:\.\d+)*)", part)
-        if match:
-            return tuple(int(n) for n in match.group(1).split("."))
-    return (0,)
 
 
 # ---- what was proven before ---------------------------------------------------------------------
@@ -265,7 +229,9 @@ def _read_memory() -> dict[str, str | None]:
         memory = json.loads(_memory_file().read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return memory if isinstance(memory, dict) else {}
+    if not isinstance(memory, dict):
+        return {}
+    return {key: found for key, found in memory.items() if found is None or isinstance(found, str)}
 
 
 def _write_memory(memory: dict[str, str | None]) -> None:
@@ -280,4 +246,4 @@ def _write_memory(memory: dict[str, str | None]) -> None:
         part.unlink(missing_ok=True)
 
 
-__all__ = ["Backend", "backend", "choose", "mitsuba", "prove", "scalar", "variant"]
+__all__ = ["LIBRARY", "Backend", "backend", "choose", "mitsuba", "prove", "scalar", "variant"]

@@ -13,8 +13,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from reference_rt.inlining import invoke
-from reference_rt.kernel import Signature
+from reference_rt.kernel import COMPILER, Signature
 
 Address = npt.NDArray[np.intp]
 """(1,) where a kernel stands; what it holds is written before any call."""
@@ -44,6 +43,6 @@ def call_at(typing_context: Any, address: Any, arguments: Any) -> Any:
                 cgutils.unpack_tuple(builder, values[1]), arguments, declared, strict=True
             )
         ]
-        return invoke(context, builder, function, types.none, declared.types, given)
+        return COMPILER.invoke(context, builder, function, types.none, declared.types, given)
 
     return types.none(types.intp, arguments), generate

@@ -16,9 +16,10 @@ from llvmlite import binding
 from numba import _dynfunc
 from numba.core import cgutils, config, typed_passes, types, untyped_passes
 from numba.core.analysis import dead_branch_prune
-from numba.core.codegen import JITCodeLibrary
+from numba.core.base import BaseContext
+from numba.core.codegen import CPUCodegen, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
-from numba.core.compiler_machinery import register_pass
+from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.datamodel import DataModelManager, default_manager
 from numba.core.datamodel.models import TupleModel, UniTupleModel
 from numba.core.typed_passes import NativeLowering
@@ -26,6 +27,32 @@ from numba.core.untyped_passes import DeadBranchPrune
 
 # Numba's classes have no types that mypy knows.
 # mypy: disable-error-code="attr-defined, misc, untyped-decorator"
+
+REPLACED: tuple[tuple[type, str], ...] = (
+    (JITCodeLibrary, "_optimize_functions"),
+    (JITCodeLibrary, "finalize"),
+    (JITCodeLibrary, "_finalize_final_module"),
+    (JITCodeLibrary, "_get_module_for_linking"),
+    (JITCodeLibrary, "enable_object_caching"),
+    (CPUCodegen, "_module_pass_manager"),
+    (BaseContext, "subtarget"),
+    (BaseContext, "insert_func_defn"),
+    (BaseContext, "declare_function"),
+    (BaseContext, "get_arg_packer"),
+    (BaseContext, "get_returned_value"),
+    (CompilerBase, "define_pipelines"),
+    (DefaultPassBuilder, "define_nopython_pipeline"),
+    (PassManager, "add_pass_after"),
+    (TupleModel, "as_argument"),
+    (NativeLowering, "run_pass"),
+    (DeadBranchPrune, "run_pass"),
+)
+"""Methods of Numba that are replaced or called below, beside the imports.  A renamed one that is
+replaced would still be found here, and never be called."""
+
+for _owner, _method in REPLACED:
+    if not hasattr(_owner, _method):
+        raise ImportError(f"{_owner.__module__}.{_owner.__name__} has no {_method}")
 
 
 class _Inlined(JITCodeLibrary):

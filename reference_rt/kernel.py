@@ -1,6 +1,6 @@
 """`@kernel`, `@entry_kernel`: the one way to compile; `ByClass` for choice.
 
-Compiled code is kept on disk in an exact cache.
+Compiled code is kept on disk (`kernel_cache.py`).
 
 A kernel is plain scalar code on floats, integers, arrays and NamedTuples of these.  With
 ``NUMBA_DISABLE_JIT=1`` the same text runs as plain Python with bit-identical results; the rules
@@ -13,79 +13,26 @@ that this asks for are few:
   are guarded (`reciprocal`): Python raises where the machine returns NaN or infinity.
 """
 
-import hashlib
 import math
-import os
-import shutil
-import sys
-import time
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, TypeVar
 
-import llvmlite
 import numba
 import numpy as np
 import numpy.typing as npt
-import platformdirs
 from numba import njit, types
-from numba.core.caching import FunctionCache
 from numba.extending import intrinsic, overload, register_jitable
 from numba.np import arrayobj
 
-from reference_rt.inlining import EntryCompiler, InlinedCompiler
-
-if sys.platform != "win32":
-    import fcntl
+from reference_rt import compiler
+from reference_rt.kernel_cache import KernelCache, prepare_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_UNUSED_FOR = 14 * 24 * 3600.0
-"""Seconds after which another version's kernels are deleted: compiling them again takes ten."""
+COMPILER = compiler.choose()
 
-
-def _sources_digest() -> str:
-    """Numba's own key misses an edit in a callee's file and the bounds-check flag (numba#1833)."""
-    digest = hashlib.sha256()
-    for version in (sys.version, numba.__version__, llvmlite.__version__):
-        digest.update(version.encode())
-    digest.update(str(numba.config.BOUNDSCHECK).encode())
-    package = Path(__file__).parent
-    for source in sorted(package.rglob("*.py")):
-        digest.update(source.relative_to(package).as_posix().encode())
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:20]
-
-
-def _prepare_cache() -> str | None:
-    """The folder for this exact version's kernels; None where none can be written."""
-    root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
-    folder = Path(root) / "kernels" / _sources_digest()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)
-        if not os.access(folder, os.W_OK):
-            return None
-        for other in folder.parent.iterdir():
-            if time.time() - other.stat().st_mtime > _UNUSED_FOR:
-                shutil.rmtree(other, ignore_errors=True)
-    except OSError:
-        return None
-    return str(folder)
-
-
-CACHE_FOLDER = _prepare_cache()
-
-# Without _nrt=False, calls count references of every array of the scene, atomically: measured 5
-# times slower on the Cornell box, with threads that contend.
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-
-_INSIDE = _OPTIONS | {
-    "no_cfunc_wrapper": True,
-    "forceinline": True,
-    "pipeline_class": InlinedCompiler,
-}
+CACHE_FOLDER = prepare_folder(COMPILER.name)
 
 
 def kernel(function: F) -> F:
@@ -93,54 +40,27 @@ def kernel(function: F) -> F:
 
     IEEE arithmetic in the order written.  The machine's calling convention would pass the scene's
     tables field by field, some 400 words a call: hence the inlining (measured: 1.5 times faster).
-    How it comes about, without compiling anything twice, is in `inlining.py`.
+    How it comes about, without compiling anything twice, is in `inlining.py`; `compiler.py` chooses
+    between that and Numba's own compiler.
     """
-    inlined: F = register_jitable(**_INSIDE)(function)
+    inlined: F = register_jitable(**COMPILER.kernel)(function)
     return inlined
 
 
 def overload_kernel(function: Any) -> Callable[[F], F]:
     """`numba.extending.overload` for what kernels call: decorates a function of the types of the
     arguments that returns the kernel to be run for them, None for none."""
-    decorate: Callable[[F], F] = overload(function, jit_options=_INSIDE, strict=False)
+    decorate: Callable[[F], F] = overload(function, jit_options=COMPILER.kernel, strict=False)
     return decorate
-
-
-class _Cache(FunctionCache):  # type: ignore[misc]
-    """Numba's cache of a function's kernels, into which one process writes at a time.
-
-    Two that add to it at once may take the same number: one's index then leads to the other's code.
-    What cannot be kept (a full disk) is compiled again by the next process.
-    """
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        folder = Path(str(CACHE_FOLDER))
-        with suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)  # somebody may have emptied the cache
-            with (folder / "lock").open("a") as lock:
-                if sys.platform != "win32":
-                    with suppress(OSError):  # a file system without locks
-                        fcntl.flock(lock, fcntl.LOCK_EX)
-                super().save_overload(sig, data)
 
 
 def entry_kernel(function: F) -> F:
     """Compile `function`, which Python calls with arrays, on first call for each set of argument
     types; keep the result on disk.  Releases the GIL."""
-    previous = numba.config.CACHE_DIR
-    if CACHE_FOLDER is not None:
-        numba.config.CACHE_DIR = CACHE_FOLDER
-    try:
-        compiled: F = njit(
-            **_OPTIONS,
-            nogil=True,
-            cache=CACHE_FOLDER is not None,
-            pipeline_class=EntryCompiler,
-        )(function)
-        if CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
-            compiled._cache = _Cache(function)  # type: ignore[attr-defined]
-    finally:
-        numba.config.CACHE_DIR = previous
+    compiled: F = njit(**COMPILER.entry)(function)
+    if CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
+        with suppress(OSError):  # without a source file
+            compiled._cache = KernelCache(function, CACHE_FOLDER)  # type: ignore[attr-defined]
     return compiled
 
 
@@ -170,11 +90,8 @@ def is_compiled(compiled: Callable[..., Any], signature: Signature) -> bool:
     """Whether it is compiled for arguments of these types, in this process or in the cache."""
     if numba.config.DISABLE_JIT or signature in compiled.overloads:  # type: ignore[attr-defined]
         return True
-    if CACHE_FOLDER is None:
-        return False
-    cache = compiled._cache  # type: ignore[attr-defined]
-    key = cache._index_key(signature, compiled.targetctx.codegen())  # type: ignore[attr-defined]
-    return key in cache._cache_file._load_index()
+    cache, codegen = compiled._cache, compiled.targetctx.codegen()  # type: ignore[attr-defined]
+    return isinstance(cache, KernelCache) and cache.has(signature, codegen)
 
 
 def is_named_tuple(numba_type: Any, cls: type) -> bool:

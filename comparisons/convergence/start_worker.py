@@ -6,6 +6,7 @@ imported before the side's own modules.
 """
 
 import json
+import os
 import sys
 import time
 from itertools import pairwise
@@ -38,6 +39,11 @@ def _ours(side: str, path: Path, folder: Path, spp: int, begun: float) -> dict[s
 
 
 def _mitsubas(side: str, path: Path, folder: Path, spp: int, begun: float) -> dict[str, float]:
+    own = time.time()  # no part of Mitsuba's start
+    from comparisons.llvm_libraries import LIBRARY, load_needed
+
+    load_needed(os.environ.get(LIBRARY, ""))
+    begun += time.time() - own
     import mitsuba as mi
     import numpy as np
 

@@ -243,7 +243,8 @@ def cache_folder() -> Path:
 
 def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
     """What the cache has; zeros and 0 where it has nothing that can be used."""
-    with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
+    # A damaged directory asks for what zipfile cannot do: RuntimeError.
+    with suppress(OSError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile, EOFError):
         # Opened here, since NumPy leaves a file that is no archive open.
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             pictures, rounds = np.array(file["pictures"]), int(file["rounds"])
