@@ -28,6 +28,8 @@ class MeshData:
     """(n, 2), finite; (0, 0) is the lower left corner of a picture, (1, 1) the upper right."""
     colours: FloatArray | None = None
     """(n, 3) linear sRGB, finite, not negative."""
+    ignored: tuple[str, ...] = ()
+    """Names of what the file has besides, as the format calls it."""
 
 
 class RawMesh(NamedTuple):
@@ -38,6 +40,7 @@ class RawMesh(NamedTuple):
     normals: npt.NDArray[Any] | None = None
     uv: npt.NDArray[Any] | None = None
     colours: npt.NDArray[Any] | None = None
+    ignored: tuple[str, ...] = ()
 
 
 def checked(mesh: RawMesh) -> MeshData:
@@ -46,6 +49,12 @@ def checked(mesh: RawMesh) -> MeshData:
         raise ValueError(" is empty; expected vertices and faces")
     vertices = np.ascontiguousarray(mesh.vertices, np.float64)
     faces = np.ascontiguousarray(mesh.faces, np.int64)
+    for name in ("normals", "uv", "colours"):
+        values = getattr(mesh, name)
+        if values is not None and len(values) != len(vertices):
+            raise ValueError(
+                f" has {len(values)} {name} and {len(vertices)} vertices; expected one for each"
+            )
     _expect_finite(vertices, "vertex {} is not finite; expected three finite numbers")
     outside = (faces < 0) | (faces >= len(vertices))
     if outside.any():
@@ -64,7 +73,7 @@ def checked(mesh: RawMesh) -> MeshData:
             np.where(colours < 0.0, np.nan, colours),
             "the colour of vertex {} is negative or not finite; expected numbers of at least 0",
         )
-    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours)
+    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours, mesh.ignored)
 
 
 def _expect_finite(rows: FloatArray, message: str) -> None:
