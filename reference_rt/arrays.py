@@ -26,7 +26,7 @@ def plain(value: Any) -> Any:
     An array of what is neither numbers, booleans nor strings stays as it is: strict validation
     refuses it, with its place.
     """
-    convert = _converter(type(value))
+    convert = _converter(type(value))  # type: ignore[arg-type]
     return value if convert is None else convert(value)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
+
 from reference_rt.errors import (
     ImageError,
     ReferenceRtError,

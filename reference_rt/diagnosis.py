@@ -10,6 +10,15 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 Keys = tuple[str | int, ...]
 
+
+class FieldError(ValueError):
+    """What is wrong with one field of a description, where only the whole can tell."""
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(message)
+        self.field = field
+
+
 _PLAIN = {
     "model_type": "keys with values",
     "model_attributes_type": "keys with values",
@@ -25,6 +34,9 @@ def first_problem(model: type[BaseModel], error: ValidationError, data: Any) -> 
     location: Keys = first["loc"]
     keys = _keys_in(data, location)
     message = first["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, FieldError):
+        return message, (*keys, cause.field)
     if first["type"] == "extra_forbidden":
         known = _models_at(model, location[:-1])[0].model_fields
         message = f"unknown key; expected one of: {', '.join(known)}"
@@ -43,9 +55,7 @@ def first_problem(model: type[BaseModel], error: ValidationError, data: Any) -> 
         message = "nested too deeply; expected fewer levels"
     elif first["type"] in _PLAIN:
         message = f"expected {_PLAIN[first['type']]}"
-    elif first["type"] != "value_error" and not isinstance(
-        first["input"], dict | list | tuple
-    ):
+    elif first["type"] != "value_error" and not isinstance(first["input"], dict | list | tuple):
         message += f", got {_shown(first['input'])}"
     return message, keys
 

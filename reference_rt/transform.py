@@ -205,6 +205,7 @@ Step = Annotated[
     ),
 ]
 
+
 def _steps(value: Any) -> Any:
     """A matrix alone as a list of one step."""
     if isinstance(value, list | tuple) and value and all(map(_is_row, value)):

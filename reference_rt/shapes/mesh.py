@@ -8,11 +8,13 @@ from pydantic import model_validator
 
 from reference_rt import transform
 from reference_rt.arrays import AS_DIGEST, Floats2, Floats3, Integers3
+from reference_rt.diagnosis import FieldError
 from reference_rt.shapes import triangle
 from reference_rt.shapes.mesh_files import MeshData, read_mesh
 from reference_rt.shapes.mesh_files.data import RawMesh, checked
 from reference_rt.shapes.shape import FloatArray, IntArray, Place, Shape
 from reference_rt.shapes.vertex_normals import smooth_normals
+from reference_rt.transform import Affine
 
 _MOST_NAMED = 12
 """Of what a file has besides, a warning names so many."""
@@ -42,7 +44,7 @@ class Mesh(Shape):
     uv: Floats2 | None = None
     """Texture coordinates (n, 2); (0, 0) is the lower left corner of a picture."""
     colours: Floats3 | None = None
-    """Vertex colours (n, 3), linear sRGB from 0 to 1."""
+    """Vertex colours (n, 3), linear sRGB of at least 0."""
     face_normals: bool = False
     """Shade with each triangle's own normal, whatever the file has."""
     smooth: bool = False
@@ -51,17 +53,18 @@ class Mesh(Shape):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        given = sorted(name for name in self.array_fields if getattr(self, name) is not None)
+        given = [name for name in sorted(self.array_fields) if getattr(self, name) is not None]
         if self.file is not None and given:
-            raise ValueError(f"has a file and {', '.join(given)}; expected either")
-        if self.file is None and not {"faces", "vertices"} <= set(given):
+            raise FieldError(given[0], "beside a file; expected one of the two")
+        if self.file is None and (self.vertices is None or self.faces is None):
             raise ValueError("expected a file, or vertices and faces")
         if self.smooth and self.face_normals:
-            raise ValueError("'smooth' and 'face_normals' are both true; expected one at most")
+            raise FieldError("smooth", "beside face_normals; expected one of the two at most")
         if self.file is None:
-            self.data(Path())
-            if self.colours is not None and self.colours.max() > 1.0:
-                raise ValueError("colours: expected numbers from 0 to 1")
+            try:
+                self.data(Path())
+            except FieldError as error:
+                raise FieldError(error.field, str(error).lstrip(": ")) from None
         return self
 
     def __eq__(self, other: object) -> bool:
@@ -80,11 +83,7 @@ class Mesh(Shape):
             return read_mesh(folder / self.file)
         assert self.vertices is not None
         assert self.faces is not None
-        try:
-            raw = RawMesh(self.vertices, self.faces, self.normals, self.uv, self.colours)
-            return checked(raw)
-        except ValueError as error:
-            raise ValueError(f"the mesh{error}") from None
+        return checked(RawMesh(self.vertices, self.faces, self.normals, self.uv, self.colours))
 
     def tabulate(self, place: Place) -> triangle.Triangles:
         m = self.map_in(place)
@@ -122,9 +121,7 @@ class Mesh(Shape):
         """Whether the mesh has vertex normals that its data have not."""
         return self.smooth and data.normals is None
 
-    def _normals(
-        self, data: MeshData, faces: IntArray, m: transform.Affine
-    ) -> FloatArray | None:
+    def _normals(self, data: MeshData, faces: IntArray, m: Affine) -> FloatArray | None:
         """Unit normals (m, 9) at the corners of faces where the map takes them."""
         if self.makes_normals(data):
             made = smooth_normals(data.vertices, faces, data.uv).reshape(-1, 3)

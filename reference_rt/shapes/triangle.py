@@ -46,7 +46,7 @@ class Triangle(Shape):
 class Triangles(NamedTuple):
     """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), texture coordinates (n, 6)
     and linear sRGB colours (n, 9; -1 for none) of the vertices, each None where no triangle has
-    any; owners (n,); face, the number within its shape, of a mesh the one that the file gives it."""
+    any; owners (n,); face, the number within its shape, of a mesh that in its file."""
 
     vertices: FloatArray
     normals: FloatArray | None

@@ -32,7 +32,7 @@ def smooth_normals(vertices: FloatArray, faces: IntArray, uv: FloatArray | None)
     number, firsts = number_rows(vertices if uv is None else np.column_stack([vertices, uv]))
     vertex = number[faces]
     n, angles = _normals_and_angles(vertices[faces])
-    has_area = n.any(axis=1)
+    has_area: npt.NDArray[np.bool_] = np.any(n != 0.0, axis=1)
     weights = np.where(has_area[:, None], angles, 0.0)
     terms = weights[:, :, None] * n[:, None, :]
     sums = np.stack([_summed(vertex, terms[:, :, k], len(firsts)) for k in range(3)], axis=1)
@@ -51,11 +51,13 @@ def unit(vectors: FloatArray) -> FloatArray:
     largest = np.abs(vectors).max(axis=1, keepdims=True)
     scaled = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0.0)
     length = np.linalg.norm(scaled, axis=1, keepdims=True)
-    return np.divide(scaled, length, out=scaled, where=length > 0.0)
+    return np.asarray(np.divide(scaled, length, out=scaled, where=length > 0.0))
 
 
 def _summed(vertex: IntArray, values: FloatArray, count: int) -> FloatArray:
-    return np.bincount(vertex.ravel(), weights=values.ravel(), minlength=count)
+    return np.asarray(
+        np.bincount(vertex.ravel(), weights=values.ravel(), minlength=count), np.float64
+    )
 
 
 def _normals_and_angles(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -75,13 +77,13 @@ def _normals_and_angles(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _near_one(rows: FloatArray) -> FloatArray:
     """(m, 3, 3), each of the m times the power of two that makes its largest number about 1."""
     _, exponent = np.frexp(np.abs(rows).max(axis=(1, 2)))
-    return np.ldexp(rows, -exponent[:, None, None])
+    return np.asarray(np.ldexp(rows, -exponent[:, None, None]))
 
 
 def _determinant(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
     """a d - b c to within two roundings, on slivers too, whose two products nearly cancel."""
     x, y = a * d, b * c
-    return (x - y) + (_lost(a, d, x) - _lost(b, c, y))
+    return np.asarray((x - y) + (_lost(a, d, x) - _lost(b, c, y)))
 
 
 def _lost(a: FloatArray, b: FloatArray, product: FloatArray) -> Any:
