@@ -19,6 +19,9 @@ from reference_rt.transform import Affine
 _MOST_NAMED = 12
 """Of what a file has besides, a warning names so many."""
 
+_LONGEST = 60
+"""Characters of a name, which a damaged file may make any."""
+
 
 class Mesh(Shape):
     """The triangles of a file, or of arrays, with vertex normals, texture coordinates and colours.
@@ -132,7 +135,7 @@ class Mesh(Shape):
 
 
 def _told(ignored: tuple[str, ...]) -> str:
-    names = [name[:40] for name in ignored[:_MOST_NAMED]]
+    names = [name[:_LONGEST] for name in ignored[:_MOST_NAMED]]
     more = [f"{len(ignored) - len(names)} more"] if len(ignored) > len(names) else []
     return (
         f"ignored: {', '.join(names + more)}; expected positions, faces, and of the vertices "
