@@ -71,6 +71,7 @@ class Scene(Description):
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: "tuple[str, str] | None" = PrivateAttr(default=None)
     _tables: "SceneTables | None" = PrivateAttr(default=None)
+    _warned: set[str] = PrivateAttr(default_factory=set)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -179,8 +180,14 @@ class Scene(Description):
         return SceneError(message, path, name, line_of(text, path))
 
     def warn(self, message: str, *path: str | int) -> None:
-        """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`."""
-        warnings.warn(SceneWarning(str(self.error(message, *path))), stacklevel=3)
+        """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`.
+
+        Once: a second table of the scene, or one of a `changed` scene, has nothing new to say.
+        """
+        text = str(self.error(message, *path))
+        if text not in self._warned:
+            self._warned.add(text)
+            warnings.warn(SceneWarning(text), stacklevel=3)
 
     @property
     def resolved_sampler(self) -> AnySampler:
@@ -269,6 +276,7 @@ class Scene(Description):
         fields = {name: getattr(self, name) for name in type(self).model_fields} | parts
         scene = type(self)(**fields)
         scene._folder, scene._source = self._folder, self._source
+        scene._warned = self._warned
         return scene
 
     # ---- out ------------------------------------------------------------------------------------
