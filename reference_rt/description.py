@@ -40,7 +40,7 @@ class Description(BaseModel):
     def __init__(self, /, **fields: Any) -> None:
         kept = type(self).array_fields
         self._checked(
-            {name: v if name in kept else plain(v) for name, v in fields.items()}, instance=self
+            {name: v if name in kept else _plain(v) for name, v in fields.items()}, instance=self
         )
 
     # Without this, pydantic would call `__init__` for every part of a scene file: files hold plain
@@ -59,7 +59,7 @@ class Description(BaseModel):
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
         """A description from a dictionary.  Raises SceneError, as making one does."""
-        data = plain(obj)
+        data = _plain(obj)
         try:
             return super().model_validate(data, **options)
         except ValidationError as error:
@@ -105,6 +105,13 @@ class Description(BaseModel):
                     if field in properties:
                         properties[field]["description"] = text
         return schema
+
+
+def _plain(value: Any) -> Any:
+    try:
+        return plain(value)
+    except RecursionError:
+        raise SceneError("nested too deeply; expected fewer levels") from None
 
 
 def _frozen(description: Description, name: str) -> SceneError:
