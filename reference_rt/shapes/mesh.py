@@ -107,8 +107,8 @@ class Mesh(Shape):
             place.warn(
                 place.owner,
                 f"{name}: {len(has_area) - len(numbers):,} of {len(has_area):,} triangles have no "
-                "area and are left out; expected triangles with an area (the others keep their "
-                "numbers)",
+                "area, or one that float64 cannot hold, and are left out (the others keep their "
+                "numbers); expected triangles with an area",
             )
         triangles = triangle.soup(
             np.ascontiguousarray(vertices),
