@@ -14,7 +14,7 @@ from reference_rt.shapes.mesh_files import MeshData, read_mesh
 from reference_rt.shapes.mesh_files.data import RawMesh, checked
 from reference_rt.shapes.shape import FloatArray, IntArray, Place, Shape
 from reference_rt.shapes.vertex_normals import smooth_normals
-from reference_rt.transform import Affine
+from reference_rt.transform import IDENTITY, Affine
 
 _MOST_NAMED = 12
 """Of what a file has besides, a warning names so many."""
@@ -128,7 +128,7 @@ class Mesh(Shape):
         """Unit normals (m, 9) at the corners of faces where the map takes them."""
         if self.makes_normals(data):
             made = smooth_normals(data.vertices, faces, data.uv).reshape(-1, 3)
-            return transform.apply_normals(m, made).reshape(-1, 9)
+            return (made if m is IDENTITY else transform.apply_normals(m, made)).reshape(-1, 9)
         if data.normals is None or self.face_normals:
             return None
         return _at_corners(transform.apply_normals(m, data.normals), faces)

@@ -190,6 +190,15 @@ def test_explain_and_the_command_line_tell(tmp_path):
     )
 
 
+def test_told_once(tmp_path):
+    """Not again for second tables, nor for those of a changed scene."""
+    flat = PLACES["middle"]
+    scene = placed(tmp_path, mesh_of("mesh.obj", *grid(flat), tmp_path))
+    tables_of(scene, flat)
+    rt.build_tables(scene)
+    scene.changed(film=rt.Film(width=4)).tables  # noqa: B018
+
+
 def test_nothing_is_told_where_nothing_is_left_out(tmp_path):
     scene = placed(tmp_path, mesh_of("mesh.obj", *grid(()), tmp_path))
     used, left_out = explain(scene, scene.tables)

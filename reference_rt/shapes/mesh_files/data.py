@@ -14,7 +14,8 @@ from reference_rt.shapes.shape import FloatArray, IntArray
 class MeshData:
     """A checked mesh.  What the file does not give for every vertex is None.
 
-    Triangles without area are among the faces.  A vertex that differs in normal, uv or colour from
+    Triangles are numbered in the order of the file, those of a polygon one after the other; those
+    without area are among them.  A vertex that differs in normal, uv or colour from
     face to face is several vertices.  Polygons are fans about their first corner: exact for convex
     ones; a concave one's fan may cover area outside of it.
     """
