@@ -72,9 +72,9 @@ def _colours(scene: Scene, tables: SceneTables, hits: Answers, uv: FloatArray) -
         sizes_of = sizes.leaves[number]
         material[rows] = names.index(sizes_of.material)
         if sizes_of.field == "triangles" and sizes_of.table.colours is not None:
-            primitive = hits.primitive[rows]
-            weights = _barycentrics(sizes_of.table.vertices[primitive], local[rows])
-            of_corners = sizes_of.table.colours[primitive].reshape(-1, 3, 3)
+            row = sizes_of.row_of(hits.primitive[rows])
+            weights = _barycentrics(sizes_of.table.vertices[row], local[rows])
+            of_corners = sizes_of.table.colours[row].reshape(-1, 3, 3)
             has_any = of_corners[:, :1, 0] >= 0.0
             mixed[rows] = np.where(has_any, np.einsum("nk,nki->ni", weights, of_corners), -1.0)
     _shown(tables, material, uv, mixed, found)

@@ -33,7 +33,14 @@ class LeafSizes:
         """(n,) for points p of the faces `primitive`."""
         if self._faces is None:
             return _quadric_features(self.table, p, primitive)
-        return np.asarray(self._faces[np.clip(primitive, 0, len(self._faces) - 1)])
+        return np.asarray(self._faces[np.clip(self.row_of(primitive), 0, len(self._faces) - 1)])
+
+    def row_of(self, primitive: IntArray) -> IntArray:
+        """The rows (n,) of the table whose faces have the numbers `primitive`: of a mesh those of
+        its file, of which the table lacks those without area."""
+        if self.field != "triangles":
+            return primitive
+        return np.searchsorted(self.table.face, primitive)
 
 
 class ShapeSizes:

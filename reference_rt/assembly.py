@@ -117,7 +117,7 @@ class _Assembly:
                 owner = table.owner[~finite][0] if len(finite) == len(table.owner) else 0
                 raise self.scene.error(
                     "its coordinates overflow; expected finite numbers",
-                    *self.paths.get(int(owner), ("shapes", int(owner))),
+                    *self.path_of(int(owner)),
                 )
 
     def member(self, shape: Shape, owner: int, material: str | None) -> Reference:
@@ -125,14 +125,24 @@ class _Assembly:
         name = shape.material if shape.material is not None else material
         if isinstance(shape, Solid):
             return Reference(SOLID, np.array([self.solid(shape, owner, name)]))
-        return self.add(shape, Place(owner, self.materials[name], self.scene.folder))
+        return self.add(shape, self.place(owner, name))
 
     def part(
         self, shape: int, number: int, material: str | None, solid: int = -1, turned: bool = False
     ) -> Place:
         """The place of a part of a shape, with an owner number of its own."""
         self.parts.append((shape, number, solid, int(turned)))
-        return Place(len(self.parts) - 1, self.materials[material], self.scene.folder)
+        return self.place(len(self.parts) - 1, material)
+
+    def place(self, owner: int, material: str | None) -> Place:
+        return Place(owner, self.materials[material], self.scene.folder, warn=self.warn)
+
+    def path_of(self, owner: int) -> tuple[str | int, ...]:
+        """Where in the scene file an owner is."""
+        return self.paths.get(owner, ("shapes", owner))
+
+    def warn(self, owner: int, message: str) -> None:
+        self.scene.warn(message, *self.path_of(owner))
 
     # ---- solids ---------------------------------------------------------------------------------
 
@@ -146,7 +156,7 @@ class _Assembly:
             operand, outer = seen[k]
             try:
                 place = self.part(self.parts[owner][0], k, name, len(self.solids), turned)
-                self.paths[place.owner] = self.paths.get(owner, ("shapes", owner))
+                self.paths[place.owner] = self.path_of(owner)
                 boxes.append(self.operand(operand, place._replace(outer=outer)))
             except ValueError as error:
                 raise ValueError(f"operand {k}, a {_type_of(operand)}: {error}") from None

@@ -12,9 +12,14 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
-from pydantic import ValidationError
 
-from reference_rt.errors import ImageError, ReferenceRtError, SceneWarning, UsageError
+from reference_rt.errors import (
+    ImageError,
+    ReferenceRtError,
+    SceneError,
+    SceneWarning,
+    UsageError,
+)
 from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.scene import Scene
@@ -207,9 +212,8 @@ def _changed(part: Any, option: str, **fields: Any) -> Any:
         return type(part)(
             **{name: getattr(part, name) for name in type(part).model_fields} | fields
         )
-    except ValidationError as error:
-        message = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise UsageError(f"{option}: {message.replace('Input should be', 'expected')}") from None
+    except SceneError as error:
+        raise UsageError(f"{option}: {error.message}") from None
 
 
 def provenance(scene: Scene) -> dict[str, str]:

@@ -2,10 +2,11 @@
 
 import ast
 import inspect
+import json
 import math
 import textwrap
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import (
     BaseModel,
@@ -14,16 +15,78 @@ from pydantic import (
     Field,
     GetJsonSchemaHandler,
     Strict,
+    ValidationError,
     WithJsonSchema,
 )
 
+from reference_rt.arrays import plain
+from reference_rt.diagnosis import first_problem
+from reference_rt.errors import SceneError
+
 
 class Description(BaseModel):
-    """A frozen part of a scene.  Unknown keys, wrong types, NaN and infinity are errors."""
+    """A frozen part of a scene.  Unknown keys, wrong types, NaN and infinity are errors.
+
+    In Python, arrays, NumPy scalars and paths stand for lists, numbers and strings.  Whatever is
+    wrong is a `SceneError`, whose `path` is the way to it from the description that is made.
+    """
 
     model_config: ClassVar[ConfigDict] = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False
     )
+    array_fields: ClassVar[frozenset[str]] = frozenset()
+    """The fields that keep arrays as arrays."""
+
+    def __init__(self, /, **fields: Any) -> None:
+        kept = type(self).array_fields
+        self._checked(
+            {name: v if name in kept else _plain(v) for name, v in fields.items()}, instance=self
+        )
+
+    # Without this, pydantic would call `__init__` for every part of a scene file: files hold plain
+    # data, and scenes of 100,000 shapes must not wait for the conversion.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def _checked(cls, data: Any, instance: Self | None = None) -> Self:
+        """A description from plain data.  Raises SceneError with the keys of the culprit."""
+        try:
+            found: Self = cls.__pydantic_validator__.validate_python(data, self_instance=instance)
+        except ValidationError as error:
+            raise SceneError(*first_problem(cls, error, data)) from None
+        return found
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """A description from a dictionary.  Raises SceneError, as making one does."""
+        data = _plain(obj)
+        try:
+            return super().model_validate(data, **options)
+        except ValidationError as error:
+            raise SceneError(*first_problem(cls, error, data)) from None
+
+    @classmethod
+    def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
+        """A description from JSON text.  Raises SceneError, as making one does."""
+        try:
+            data = json.loads(json_data)
+        except ValueError as error:
+            raise SceneError(f"malformed JSON: {error}") from None
+        return cls.model_validate(data, **options)
+
+    if not TYPE_CHECKING:  # type checkers know that fields are frozen
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            try:
+                super().__setattr__(name, value)
+            except ValidationError:
+                raise _frozen(self, name) from None
+
+        def __delattr__(self, name: str) -> None:
+            try:
+                super().__delattr__(name)
+            except ValidationError:
+                raise _frozen(self, name) from None
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -42,6 +105,18 @@ class Description(BaseModel):
                     if field in properties:
                         properties[field]["description"] = text
         return schema
+
+
+def _plain(value: Any) -> Any:
+    try:
+        return plain(value)
+    except RecursionError:
+        raise SceneError("nested too deeply; expected fewer levels") from None
+
+
+def _frozen(description: Description, name: str) -> SceneError:
+    kind = type(description).__name__
+    return SceneError(f"a {kind} is frozen; expected a new {kind} with another '{name}'", (name,))
 
 
 def _strings_below(cls: type) -> dict[str, str]:

@@ -1,16 +1,23 @@
-"""What is wrong with a scene file, and where: pydantic's complaint as one line for people."""
+"""What is wrong with a description, and where: pydantic's complaint as one line for people."""
 
 from collections.abc import Iterator
 from typing import Any, get_args
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
-from reference_rt.description import Description
-
 Keys = tuple[str | int, ...]
+
+
+class FieldError(ValueError):
+    """What is wrong with one field of a description, where only the whole can tell."""
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(message)
+        self.field = field
+
 
 _PLAIN = {
     "model_type": "keys with values",
@@ -21,12 +28,15 @@ _PLAIN = {
 """What pydantic calls by the names of Python's types."""
 
 
-def first_problem(model: type[Description], error: ValidationError, data: Any) -> tuple[str, Keys]:
+def first_problem(model: type[BaseModel], error: ValidationError, data: Any) -> tuple[str, Keys]:
     """One clear line and the keys of the culprit, from the first complaint about `data`."""
     first = error.errors()[0]
     location: Keys = first["loc"]
     keys = _keys_in(data, location)
     message = first["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, FieldError):
+        return message, (*keys, cause.field)
     if first["type"] == "extra_forbidden":
         known = _models_at(model, location[:-1])[0].model_fields
         message = f"unknown key; expected one of: {', '.join(known)}"
@@ -45,9 +55,25 @@ def first_problem(model: type[Description], error: ValidationError, data: Any) -
         message = "nested too deeply; expected fewer levels"
     elif first["type"] in _PLAIN:
         message = f"expected {_PLAIN[first['type']]}"
-    elif first["type"] != "value_error" and not isinstance(first["input"], dict | list):
-        message += f", got {first['input']!r}"
+    elif first["type"] != "value_error" and not isinstance(first["input"], dict | list | tuple):
+        message += f", got {_shown(first['input'])}"
     return message, keys
+
+
+_MOST_SHOWN = 60
+"""Characters of a wrong value that a message repeats."""
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, BaseModel):
+        return f"a {type(value).__name__}"
+    if hasattr(value, "dtype") and hasattr(value, "shape"):
+        return f"{value.dtype} of shape {value.shape}"
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of thousands of digits
+        return f"an {type(value).__name__} too long to show"
+    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
 
 
 def _keys_in(data: Any, location: Keys) -> Keys:
@@ -58,13 +84,13 @@ def _keys_in(data: Any, location: Keys) -> Keys:
         if isinstance(data, dict) and (key in data or (last and key != data.get("type"))):
             keys.append(key)
             data = data.get(key)
-        elif isinstance(data, list) and isinstance(key, int) and key < len(data):
+        elif isinstance(data, list | tuple) and isinstance(key, int) and key < len(data):
             keys.append(key)
             data = data[key]
     return tuple(keys)
 
 
-def _models_at(model: type[Description], location: Keys) -> list[type[Description]]:
+def _models_at(model: type[BaseModel], location: Keys) -> list[type[BaseModel]]:
     """The descriptions that may stand at pydantic's location: several where one is to be chosen."""
     models = [model]
     for key in location:
@@ -77,19 +103,19 @@ def _models_at(model: type[Description], location: Keys) -> list[type[Descriptio
     return models
 
 
-def _descriptions_in(annotation: Any) -> Iterator[type[Description]]:
+def _descriptions_in(annotation: Any) -> Iterator[type[BaseModel]]:
     """The descriptions that a field's annotation names, however deep."""
-    if isinstance(annotation, type) and issubclass(annotation, Description):
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for part in get_args(annotation):
         yield from _descriptions_in(part)
 
 
-def _type_of(model: type[Description]) -> Any:
+def _type_of(model: type[BaseModel]) -> Any:
     return model.model_fields["type"].default if "type" in model.model_fields else None
 
 
-def _types(models: list[type[Description]]) -> str:
+def _types(models: list[type[BaseModel]]) -> str:
     return ", ".join(str(_type_of(m)) for m in models)
 
 

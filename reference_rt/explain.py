@@ -1,10 +1,12 @@
 """What a scene needs, what was left out, and why."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from reference_rt import bvh
+from reference_rt.csg import Solid
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.lights import Lights
 from reference_rt.lights.environment_map import EnvironmentMaps
@@ -15,6 +17,8 @@ from reference_rt.materials.leaves import TABLES as MATERIAL_TABLES
 from reference_rt.sampling import Grid
 from reference_rt.scene import Scene
 from reference_rt.shapes import TABLES as SHAPE_TABLES
+from reference_rt.shapes import Mesh, Shape
+from reference_rt.shapes.shape import Place
 from reference_rt.tables import SceneTables
 from reference_rt.textures import TABLES as TEXTURE_TABLES
 
@@ -34,6 +38,7 @@ def explain(scene: Scene, tables: SceneTables) -> tuple[Lines, Lines]:
     used: Lines = []
     left_out: Lines = []
     _shapes(tables, used, left_out)
+    _meshes(scene, used, left_out)
     _hierarchy(scene, tables, used, left_out)
     _materials(tables, used, left_out)
     _textures(tables, used, left_out)
@@ -76,6 +81,35 @@ def _shapes(tables: SceneTables, used: Lines, left_out: Lines) -> None:
         left_out.append(("instances", "no group is drawn"))
     else:
         used.append(("instances", f"{len(instances.root):,} of {len(np.unique(instances.root)):,}"))
+
+
+def _meshes(scene: Scene, used: Lines, left_out: Lines) -> None:
+    """What of its meshes is left out, and what is made for them."""
+    for name, mesh in _named_meshes(scene):
+
+        def left(_: int, note: str, name: str = name) -> None:
+            left_out.append((f"of {name}", note))
+
+        mesh.tabulate(Place(folder=scene.folder, warn=left))
+        if mesh.smooth and mesh.makes_normals(mesh.data(scene.folder)):
+            used.append((f"smooth {name}", "its vertex normals are made, weighted by angle"))
+        elif mesh.smooth:
+            left_out.append((f"smooth {name}", "it has vertex normals of its own"))
+
+
+def _named_meshes(scene: Scene) -> Iterator[tuple[str, Mesh]]:
+    def of(name: str, shape: Shape) -> Iterator[tuple[str, Mesh]]:
+        if isinstance(shape, Mesh):
+            yield name, shape
+        elif isinstance(shape, Solid):
+            for k, operand in enumerate(shape.of):
+                yield from of(f"{name}.of[{k}]", operand)
+
+    for i, shape in enumerate(scene.shapes):
+        yield from of(f"shapes[{i}]", shape)
+    for group, shapes in scene.groups.items():
+        for k, shape in enumerate(shapes):
+            yield from of(f"groups.{group}[{k}]", shape)
 
 
 def _hierarchy(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> None:

@@ -36,9 +36,10 @@ class Intersections:
     """What n rays hit first.
 
     t (n,): inf for a miss;  shape (n,): index in the scene's shapes, -1 for a miss;  primitive
-    (n,): number of the triangle in its mesh, or of the face of a solid (of a box: axis, + 3 on the
-    positive side);  part (n,): number of the operand in its solid, or of the shape in its group;
-    instance (n,): number of the copy that the shape stands for, -1 outside groups;
+    (n,): number of the triangle in its mesh, among all that the file has, those that are left out
+    too (see `MeshData`), or of the face of a solid (of a box: axis, + 3 on the positive side);
+    part (n,): number of the operand in its solid, or of the shape in its group;  instance (n,):
+    number of the copy that the shape stands for, -1 outside groups;
     p, n, ns (n, 3): point, unit geometric and shading normal, 0 for a miss;  uv (n, 2).
     """
 

@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from reference_rt.arrays import AS_DIGEST
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.perspective import Perspective
 from reference_rt.csg import AnyShape, Solid
 from reference_rt.description import Description
-from reference_rt.diagnosis import first_problem, line_of
+from reference_rt.diagnosis import line_of
 from reference_rt.errors import SceneError, SceneWarning
 from reference_rt.film import Film
 from reference_rt.groups import Instance
@@ -70,6 +71,7 @@ class Scene(Description):
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: "tuple[str, str] | None" = PrivateAttr(default=None)
     _tables: "SceneTables | None" = PrivateAttr(default=None)
+    _warned: set[str] = PrivateAttr(default_factory=set)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -149,10 +151,14 @@ class Scene(Description):
 
     def __eq__(self, other: object) -> bool:
         """Equal descriptions; where they were read from does not count."""
-        return isinstance(other, Scene) and self.to_json() == other.to_json()
+        return isinstance(other, Scene) and self._key() == other._key()
 
     def __hash__(self) -> int:
-        return hash(self.to_json())
+        return hash(self._key())
+
+    def _key(self) -> str:
+        """As `to_json`, with a digest in place of each array."""
+        return self.model_dump_json(exclude_none=True, indent=1, context=AS_DIGEST)
 
     # ---- where it comes from --------------------------------------------------------------------
 
@@ -179,8 +185,14 @@ class Scene(Description):
         return SceneError(message, path, name, line_of(text, path))
 
     def warn(self, message: str, *path: str | int) -> None:
-        """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`."""
-        warnings.warn(SceneWarning(str(self.error(message, *path))), stacklevel=3)
+        """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`.
+
+        Once: a second table of the scene, or one of a `changed` scene, has nothing new to say.
+        """
+        text = str(self.error(message, *path))
+        if text not in self._warned:
+            self._warned.add(text)
+            warnings.warn(SceneWarning(text), stacklevel=3)
 
     @property
     def resolved_sampler(self) -> AnySampler:
@@ -191,7 +203,7 @@ class Scene(Description):
 
     def digest(self) -> str:
         """SHA-256 of the description: what pictures name as their source."""
-        return hashlib.sha256(self.to_json().encode()).hexdigest()
+        return hashlib.sha256(self._key().encode()).hexdigest()
 
     # ---- what rays find -------------------------------------------------------------------------
 
@@ -256,13 +268,10 @@ class Scene(Description):
         if not isinstance(data, dict):
             raise SceneError("expected keys such as camera, shapes, lights", file=name, line=1)
         try:
-            scene = cls.model_validate(data)
+            scene = cls._checked(data)
         except SceneError as error:
             line = line_of(text, error.path)
             raise SceneError(error.message, error.path, name, line) from None
-        except ValidationError as error:
-            message, keys = first_problem(cls, error, data)
-            raise SceneError(message, keys, name, line_of(text, keys)) from None
         scene._folder = Path() if folder is None else folder
         scene._source = (name, text)
         return scene
@@ -272,6 +281,7 @@ class Scene(Description):
         fields = {name: getattr(self, name) for name in self.model_fields_set} | parts
         scene = type(self)(**fields)
         scene._folder, scene._source = self._folder, self._source
+        scene._warned = self._warned
         return scene
 
     # ---- out ------------------------------------------------------------------------------------

@@ -160,21 +160,28 @@ class Rotate(Description):
         return rotate(self.rotate.axis, self.rotate.degrees)
 
 
-def _twelve(value: Any) -> Any:
+def _rows(value: Any) -> Any:
+    """The three rows of a matrix (3, 4), or of an affine one (4, 4)."""
     rows = list(value) if isinstance(value, list | tuple) else []
-    if len(rows) != 3 or any(not isinstance(r, list | tuple) or len(r) != 4 for r in rows):
-        raise ValueError("expected three rows of four numbers")
-    return tuple(tuple(r) for r in rows)
+    if len(rows) not in (3, 4) or not all(map(_is_row, rows)):
+        raise ValueError("expected three rows of four numbers, or four of an affine matrix")
+    if len(rows) == 4 and list(rows.pop()) != [0.0, 0.0, 0.0, 1.0]:
+        raise ValueError("expected an affine matrix, whose last row is [0, 0, 0, 1]")
+    return tuple(map(tuple, rows))
+
+
+def _is_row(value: Any) -> bool:
+    return isinstance(value, list | tuple) and len(value) == 4
 
 
 Row = tuple[float, float, float, float]
 
 
 class Matrix(Description):
-    """Applies a (3, 4) matrix [A | b], given by rows."""
+    """Applies a (3, 4) matrix [A | b], given by rows; or a (4, 4) one with the last row 0 0 0 1."""
 
     matrix: Annotated[
-        tuple[Row, Row, Row], BeforeValidator(_twelve), WithJsonSchema({"type": "array"})
+        tuple[Row, Row, Row], BeforeValidator(_rows), WithJsonSchema({"type": "array"})
     ]
 
     def matrix_of(self) -> Affine:
@@ -198,8 +205,17 @@ Step = Annotated[
     ),
 ]
 
-Transform = Annotated[tuple[Step, ...], Field(strict=False)]
-"""A list of steps, applied in the order written: the first one first."""
+
+def _steps(value: Any) -> Any:
+    """A matrix alone as a list of one step."""
+    if isinstance(value, list | tuple) and value and all(map(_is_row, value)):
+        return ({"matrix": value},)
+    return value
+
+
+Transform = Annotated[tuple[Step, ...], Field(strict=False), BeforeValidator(_steps)]
+"""A list of steps, applied in the order written: the first one first; or one matrix, as in
+`Matrix`."""
 
 
 def affine(steps: Transform) -> Affine:

@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
 from reference_rt.description import Description
-from reference_rt.errors import ImageError, UsageError
+from reference_rt.errors import ImageError, SceneError, UsageError
 from reference_rt.exr import write_exr
 from reference_rt.scene import Scene
 
@@ -254,8 +254,8 @@ def _record(path: Path) -> Record:
         if seal != _seal(data):
             raise ValueError("its seal is broken")
         return Record.model_validate(data)
-    except (OSError, ValueError, KeyError, AttributeError, ValidationError) as error:
-        reason = "its fields" if isinstance(error, ValidationError) else str(error)
+    except (OSError, ValueError, KeyError, AttributeError, SceneError) as error:
+        reason = "its fields" if isinstance(error, SceneError) else str(error)
         raise BaselineEditedError(
             f"{path}: is not what `accept` wrote ({' '.join(reason.split())[:100]}); restore it, "
             "or accept a new baseline"

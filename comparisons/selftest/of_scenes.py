@@ -85,6 +85,7 @@ def _one_face_flipped(scene: Scene) -> Scene:
     """The first mesh, of an .obj, with one face wound the other way."""
     mesh = scene.shapes[0]
     assert isinstance(mesh, Mesh)
+    assert mesh.file is not None
     lines = (scene.folder / mesh.file).read_text(encoding="utf-8").splitlines()
     faces = [k for k, line in enumerate(lines) if line.startswith("f ")]
     # The twentieth part of all: a face that the camera sees, and that is no special one.

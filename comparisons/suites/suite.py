@@ -5,13 +5,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, field_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from comparisons.budget import Budget
 from reference_rt.description import Description, Positive
-from reference_rt.diagnosis import first_problem, line_of
+from reference_rt.diagnosis import line_of
 from reference_rt.errors import SceneError, UsageError
 from reference_rt.scene import Scene
 
@@ -129,9 +129,8 @@ def parse_suite(text: str, file: str) -> Suite:
         raise SceneError("expected keys such as about, defaults, scenes", file=file, line=1)
     try:
         return Suite.model_validate(data)
-    except ValidationError as error:
-        message, keys = first_problem(Suite, error, data)
-        raise SceneError(message, keys, file, line_of(text, keys)) from None
+    except SceneError as error:
+        raise SceneError(error.message, error.path, file, line_of(text, error.path)) from None
 
 
 def plan(

@@ -27,7 +27,7 @@ def boundary_edges(faces: npt.NDArray[np.integer], vertices: FloatArray) -> Boun
     with two equal corners has no inside, and is taken as not being there; one without area but
     three different corners counts, since leaving it out would leave a gap between edges.
     """
-    point, firsts = _points(vertices)
+    point, firsts = number_rows(vertices)
     f = point[faces]
     f = f[(f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])]
     start, end = f.reshape(-1), np.roll(f, -1, axis=1).reshape(-1)
@@ -51,14 +51,15 @@ def boundary_edges(faces: npt.NDArray[np.integer], vertices: FloatArray) -> Boun
     return BoundaryEdges(ends, forward[open_], uses[open_] - forward[open_])
 
 
-def _points(vertices: FloatArray) -> tuple[IntArray, IntArray]:
-    """The number of each vertex's position (n,), and of each position a vertex there."""
-    order = np.lexsort(vertices.T)  # -0 and 0 compare as equal, here and below
-    new = np.ones(len(vertices), bool)
-    new[1:] = np.any(vertices[order[1:]] != vertices[order[:-1]], axis=1)
-    point = np.empty(len(vertices), np.int64)
-    point[order] = np.cumsum(new) - 1
-    return point, order[new]
+def number_rows(rows: FloatArray) -> tuple[IntArray, IntArray]:
+    """The number of each of n rows (n, k), the same for equal ones; and of each number, a row that
+    has it."""
+    order = np.lexsort(rows.T)  # -0 and 0 compare as equal, here and below
+    new = np.ones(len(rows), bool)
+    new[1:] = np.any(rows[order[1:]] != rows[order[:-1]], axis=1)
+    number = np.empty(len(rows), np.int64)
+    number[order] = np.cumsum(new) - 1
+    return number, order[new]
 
 
 def describe_boundary(triangles: FloatArray, most: int = 3) -> str:

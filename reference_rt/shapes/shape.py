@@ -1,6 +1,7 @@
 """What all shapes share: the base description, the codes of their tables, points as lights."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,17 +19,23 @@ IntArray = npt.NDArray[np.int64]
 Bounds = tuple[FloatArray, FloatArray]
 
 
+def _unheard(owner: int, message: str) -> None:
+    """Warnings of tables that are made for a closer look at a shape: the scene's tell them."""
+
+
 class Place(NamedTuple):
     """As what a shape is tabulated.
 
     owner: its index in the scene (in its group);  material: the row of its material;  folder: what
-    file names are relative to;  outer: the map that its own transform is followed by.
+    file names are relative to;  outer: the map that its own transform is followed by;  warn: takes
+    the owner and what a user should know about the shape.
     """
 
     owner: int = 0
     material: int = 0
     folder: Path = Path()
     outer: Affine = IDENTITY
+    warn: Callable[[int, str], None] = _unheard
 
 
 class Shape(Description):

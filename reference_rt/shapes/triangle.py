@@ -46,7 +46,7 @@ class Triangle(Shape):
 class Triangles(NamedTuple):
     """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), texture coordinates (n, 6)
     and linear sRGB colours (n, 9; -1 for none) of the vertices, each None where no triangle has
-    any; owners (n,); face, the number within its shape."""
+    any; owners (n,); face, the number within its shape, of a mesh that in its file."""
 
     vertices: FloatArray
     normals: FloatArray | None
@@ -64,8 +64,9 @@ def soup(
     normals: FloatArray | None = None,
     uvs: FloatArray | None = None,
     colours: FloatArray | None = None,
+    face: IntArray | None = None,
 ) -> Triangles:
-    """Triangles of one shape: see `Triangles`."""
+    """Triangles of one shape: see `Triangles`; without numbers, `face` counts them."""
     n = len(vertices)
     return Triangles(
         vertices=vertices,
@@ -75,7 +76,7 @@ def soup(
         owner=np.full(n, place.owner),
         material=np.full(n, place.material),
         light=np.full(n, -1),
-        face=np.arange(n),
+        face=np.arange(n) if face is None else face,
     )
 
 

@@ -90,8 +90,8 @@ def square(form, faces=((0, 1, 2),), properties=FACES):
 TRIANGLES = np.random.default_rng(3).normal(size=(5, 3, 3)).astype("<f4")
 
 
-def binary_stl(triangles, header=b"solid of nothing"):
-    rows = (struct.pack("<12fH", 0, 0, 0, *t.ravel(), 9) for t in triangles)
+def binary_stl(triangles, header=b"solid of nothing", attribute=9):
+    rows = (struct.pack("<12fH", 0, 0, 0, *t.ravel(), attribute) for t in triangles)
     return header.ljust(80, b"\0") + struct.pack("<I", len(triangles)) + b"".join(rows)
 
 

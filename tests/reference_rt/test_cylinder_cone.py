@@ -258,7 +258,7 @@ def test_leaving_the_apex():
     ],
 )
 def test_refused(shape, fields, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
+    with pytest.raises(rt.SceneError, match=re.escape(message)):
         shape(**fields)
 
 

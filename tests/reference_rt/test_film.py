@@ -244,5 +244,5 @@ def test_a_step(description):
     ids=str,
 )
 def test_bad_input(cls, fields):
-    with pytest.raises(ValueError, match="validation error"):
+    with pytest.raises(rt.SceneError, match="expected"):
         cls(**fields)

@@ -18,8 +18,8 @@ from leaf_checks import (
     sample,
     towards,
 )
-from pydantic import ValidationError
 
+from reference_rt.errors import SceneError
 from reference_rt.materials import phong
 from reference_rt.materials.phong import Phong, power
 from reference_rt.textures import NO_TEXTURES, Palette
@@ -188,10 +188,10 @@ def test_compiled_is_plain():
     ],
 )
 def test_bad_input(fields):
-    with pytest.raises(ValidationError):
+    with pytest.raises(SceneError):
         Phong(**({"diffuse": 0.1} | fields))
 
 
 def test_diffuse_is_asked_for():
-    with pytest.raises(ValidationError, match="diffuse"):
+    with pytest.raises(SceneError, match="diffuse"):
         Phong()

@@ -19,8 +19,8 @@ from leaf_checks import (
     sample,
     towards,
 )
-from pydantic import ValidationError
 
+from reference_rt.errors import SceneError
 from reference_rt.materials import plastic, rough_plastic
 from reference_rt.materials.fresnel import fresnel
 from reference_rt.materials.microfacet import Microfacets
@@ -256,5 +256,5 @@ def test_compiled_is_plain():
     ],
 )
 def test_bad_input(material, fields):
-    with pytest.raises(ValidationError):
+    with pytest.raises(SceneError):
         material(**fields)

@@ -18,8 +18,8 @@ from leaf_checks import (
     sample,
     towards,
 )
-from pydantic import ValidationError
 
+from reference_rt.errors import SceneError
 from reference_rt.materials import principled, principled_lobes, rough_dielectric
 from reference_rt.materials.principled import Principled
 from reference_rt.materials.rough_dielectric import RoughDielectric
@@ -246,5 +246,5 @@ def test_orientation():
     + [{"specular": 0.5, "eta": 1.5}],
 )
 def test_bad_input(fields):
-    with pytest.raises(ValidationError):
+    with pytest.raises(SceneError):
         Principled(**fields)

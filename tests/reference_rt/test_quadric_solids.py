@@ -162,7 +162,7 @@ def test_no_surface(coefficients):
 )
 def test_refused(fields, message):
     good = {"coefficients": [1, 1, 0, 0, 0, 0, 0, 0, -1, 0], "lower": [-1, -1, -1]}
-    with pytest.raises(ValueError, match=re.escape(message)):
+    with pytest.raises(SceneError, match=re.escape(message)):
         rt.Quadric(**{**good, "upper": [1, 1, 1], **fields})
 
 

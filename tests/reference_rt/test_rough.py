@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from builders import U, unit_vectors
 from chi_square import chi_square, integrate, sidak
-from pydantic import ValidationError
 
+from reference_rt.errors import SceneError
 from reference_rt.kernel import ByClass, entry_kernel
 from reference_rt.materials import rough_conductor, rough_dielectric
 from reference_rt.materials.fresnel import conductor_colour, fresnel
@@ -335,5 +335,5 @@ def test_sides():
     ],
 )
 def test_bad_input(make, problem):
-    with pytest.raises(ValidationError, match=problem):
+    with pytest.raises(SceneError, match=problem):
         make()

@@ -260,7 +260,7 @@ def test_grid_is_the_centres_of_cells():
 
 @pytest.mark.parametrize("spp", [2, 3, 8, 0, -4])
 def test_a_grid_needs_a_square(spp):
-    with pytest.raises(ValueError, match=r"square number|greater than or equal"):
+    with pytest.raises(rt.SceneError, match=r"square number|greater than or equal"):
         rt.Grid(spp=spp)
 
 

@@ -6,7 +6,6 @@ import pytest
 from builders import EVERY_LAW, EVERY_LIGHT, EVERY_SHAPE, SCENES, every_shape
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 import reference_rt as rt
 from reference_rt.textures.texture import UvMap
@@ -274,9 +273,9 @@ def test_a_number_is_grey():
 
 def test_frozen():
     scene = rt.Scene(shapes=(rt.Sphere(),))
-    with pytest.raises(ValidationError, match="frozen"):
+    with pytest.raises(rt.SceneError, match="frozen"):
         scene.film = rt.Film()
-    with pytest.raises(ValidationError, match="frozen"):
+    with pytest.raises(rt.SceneError, match="frozen"):
         scene.shapes[0].radius = 2.0
 
 
@@ -291,7 +290,7 @@ def test_changed(tmp_path):
     assert other != scene
     with pytest.raises(rt.SceneError, match="random numbers"):
         scene.changed(sampler=rt.Grid())
-    with pytest.raises((rt.SceneError, ValidationError)):
+    with pytest.raises(rt.SceneError):
         scene.changed(materials={})
 
 

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
+from reference_rt.errors import SceneError
 from reference_rt.lights import constant, directional, point, spot
 from reference_rt.lights.constant import Constant
 from reference_rt.lights.directional import Directional
@@ -115,7 +115,7 @@ BAD = {
 @pytest.mark.parametrize(("fields", "message"), BAD.values(), ids=BAD)
 def test_bad_spots(fields, message):
     good = {"origin": tuple(ORIGIN), "target": (0.0, 0.0, 0.0), "intensity": (1.0, 1.0, 1.0)}
-    with pytest.raises(ValidationError, match=message):
+    with pytest.raises(SceneError, match=message):
         Spot(**(good | fields))
-    with pytest.raises(ValidationError, match="not zero"):
+    with pytest.raises(SceneError, match="not zero"):
         Directional(direction=(0, 0, 0), irradiance=1.0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from builders import U
 from leaf_checks import NOWHERE, random_direction
-from pydantic import ValidationError
 
+from reference_rt.errors import SceneError
 from reference_rt.materials import thin_dielectric
 from reference_rt.materials.fresnel import fresnel
 from reference_rt.materials.material import sample_branch
@@ -82,5 +82,5 @@ def test_limits():
     ],
 )
 def test_bad_input(fields):
-    with pytest.raises(ValidationError):
+    with pytest.raises(SceneError):
         ThinDielectric(**fields)

@@ -1,5 +1,5 @@
-"""Meshes: the very triangles of our tables, in our order, so that Mitsuba's prim_index is our
-number of a triangle."""
+"""Meshes: the very triangles of our tables, in our order, so that Mitsuba's prim_index counts the
+rows of our table.  These are numbered as in the file, of which they lack triangles without area."""
 
 from typing import Any
 
@@ -25,7 +25,8 @@ between triangles (of 100,000 rays at edges 7,226 did; without a group, 15)."""
 
 class Soup:
     """Triangles with corners of their own: positions (3 n, 3), and of the corners, None for none,
-    unit normals (3 n, 3), uv (3 n, 2), colours (3 n, 3)."""
+    unit normals (3 n, 3), uv (3 n, 2), colours (3 n, 3);  numbers (n,): ours of the triangles, None
+    where they are counted."""
 
     def __init__(
         self,
@@ -34,7 +35,9 @@ class Soup:
         uvs: FloatArray | None = None,
         colours: FloatArray | None = None,
         faces: IntArray | None = None,
+        numbers: IntArray | None = None,
     ) -> None:
+        self.numbers = numbers
         self.positions, self.normals, self.uvs, self.colours = positions, normals, uvs, colours
         self.faces = np.arange(len(positions)).reshape(-1, 3) if faces is None else faces
 
@@ -102,7 +105,8 @@ def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
         # (measured with all at one uv: two thirds of the light were lost).
         raise UntranslatableError("Mesh that shines by a texture", "shape")
     key = ("mesh", id(shape))
-    return [placed(soup, key, site.place.outer, site.mirrored, site)._replace(uv=same_uv)]
+    plugin = placed(soup, key, site.place.outer, site.mirrored, site)
+    return [plugin._replace(uv=same_uv, faces=soup.numbers)]
 
 
 def placed(soup: Soup, key: Any, m: transform.Affine, mirrored: bool, site: Site) -> Plugin:
@@ -121,4 +125,5 @@ def _soup(table: Triangles) -> Soup:
         None if table.normals is None else table.normals.reshape(-1, 3),
         None if table.uvs is None else table.uvs.reshape(-1, 2),
         None if table.colours is None else table.colours.reshape(-1, 3),
+        numbers=table.face,
     )

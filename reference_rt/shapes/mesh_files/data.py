@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from reference_rt.diagnosis import FieldError
 from reference_rt.shapes.shape import FloatArray, IntArray
 
 
@@ -13,7 +14,8 @@ from reference_rt.shapes.shape import FloatArray, IntArray
 class MeshData:
     """A checked mesh.  What the file does not give for every vertex is None.
 
-    Triangles without area are among the faces.  A vertex that differs in normal, uv or colour from
+    Triangles are numbered in the order of the file, those of a polygon one after the other; those
+    without area are among them.  A vertex that differs in normal, uv or colour from
     face to face is several vertices.  Polygons are fans about their first corner: exact for convex
     ones; a concave one's fan may cover area outside of it.
     """
@@ -28,6 +30,8 @@ class MeshData:
     """(n, 2), finite; (0, 0) is the lower left corner of a picture, (1, 1) the upper right."""
     colours: FloatArray | None = None
     """(n, 3) linear sRGB, finite, not negative."""
+    ignored: tuple[str, ...] = ()
+    """Names of what the file has besides, as the format calls it."""
 
 
 class RawMesh(NamedTuple):
@@ -38,39 +42,49 @@ class RawMesh(NamedTuple):
     normals: npt.NDArray[Any] | None = None
     uv: npt.NDArray[Any] | None = None
     colours: npt.NDArray[Any] | None = None
+    ignored: tuple[str, ...] = ()
 
 
 def checked(mesh: RawMesh) -> MeshData:
-    """Raises ValueError: the rest of a line that begins with the file's name."""
+    """Raises FieldError, whose text is the rest of a line that begins with the file's name."""
     if len(mesh.vertices) == 0 or len(mesh.faces) == 0:
-        raise ValueError(" is empty; expected vertices and faces")
+        field = "faces" if len(mesh.vertices) else "vertices"
+        raise FieldError(field, " is empty; expected vertices and faces")
     vertices = np.ascontiguousarray(mesh.vertices, np.float64)
     faces = np.ascontiguousarray(mesh.faces, np.int64)
-    _expect_finite(vertices, "vertex {} is not finite; expected three finite numbers")
+    for name in ("normals", "uv", "colours"):
+        values = getattr(mesh, name)
+        if values is not None and len(values) != len(vertices):
+            raise FieldError(
+                name, f": {len(values)} {name} and {len(vertices)} vertices; expected one for each"
+            )
+    _expect_finite("vertices", vertices, "vertex {} is not finite; expected three finite numbers")
     outside = (faces < 0) | (faces >= len(vertices))
     if outside.any():
         bad = int(np.flatnonzero(outside.any(axis=1))[0])
-        raise ValueError(
+        raise FieldError(
+            "faces",
             f": face {bad} has index {faces[bad][outside[bad]][0]}, out of range; "
-            f"expected 0 to {len(vertices) - 1}"
+            f"expected 0 to {len(vertices) - 1}",
         )
     uv = colours = None
     if mesh.uv is not None:
         uv = np.ascontiguousarray(mesh.uv, np.float64)
-        _expect_finite(uv, "the uv of vertex {} is not finite; expected two finite numbers")
+        _expect_finite("uv", uv, "the uv of vertex {} is not finite; expected two finite numbers")
     if mesh.colours is not None:
         colours = np.ascontiguousarray(mesh.colours, np.float64)
         _expect_finite(
+            "colours",
             np.where(colours < 0.0, np.nan, colours),
             "the colour of vertex {} is negative or not finite; expected numbers of at least 0",
         )
-    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours)
+    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours, mesh.ignored)
 
 
-def _expect_finite(rows: FloatArray, message: str) -> None:
+def _expect_finite(field: str, rows: FloatArray, message: str) -> None:
     finite = np.isfinite(rows).all(axis=1)
     if not finite.all():
-        raise ValueError(": " + message.format(int(np.argmin(finite))))
+        raise FieldError(field, ": " + message.format(int(np.argmin(finite))))
 
 
 def _unit(normals: npt.NDArray[Any] | None) -> FloatArray | None:
@@ -80,9 +94,10 @@ def _unit(normals: npt.NDArray[Any] | None) -> FloatArray | None:
     largest = np.abs(n).max(axis=1)
     bad = ~((largest > 0.0) & np.isfinite(largest))
     if bad.any():
-        raise ValueError(
+        raise FieldError(
+            "normals",
             f": a vertex normal is zero or not finite, of vertex {int(np.argmax(bad))}; "
-            "expected a direction"
+            "expected a direction",
         )
     n = n / largest[:, None]  # squares of extreme lengths overflow
     return np.ascontiguousarray(n / np.linalg.norm(n, axis=1, keepdims=True))

@@ -1,8 +1,8 @@
 """glTF 2.0 (ISO/IEC 12113), .gltf and .glb: the triangles of its scene, as one mesh.
 
 Read are POSITION, NORMAL, TEXCOORD_0 and COLOR_0 (linear, as the format has it), at rest: without
-animations, skins and morphing.  Points, lines, materials, images and all else are skipped.  A
-buffer may be a file, in the mesh's folder or below it.
+animations, skins and morphing.  Points, lines, materials, images and all else are ignored, and
+named.  A buffer may be a file, in the mesh's folder or below it.
 """
 
 import base64
@@ -23,6 +23,7 @@ from reference_rt.shapes.mesh_files.join import joined
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # points and lines are 0 to 3
+_READ = ("POSITION", "NORMAL", "TEXCOORD_0", "COLOR_0")
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 
 # What may be required although it is not known here: it does not change the shape.
@@ -38,7 +39,7 @@ Rows = npt.NDArray[Any]
 
 
 def read_gltf(content: bytes, folder: Path) -> RawMesh:
-    return joined(_File(content, None, folder).parts())
+    return _joined(_File(content, None, folder))
 
 
 def read_glb(content: bytes, folder: Path) -> RawMesh:
@@ -61,7 +62,12 @@ def read_glb(content: bytes, folder: Path) -> RawMesh:
         chunks.setdefault(kind, content[position - size : position])
     if _JSON not in chunks:
         raise ValueError("it has no JSON chunk")
-    return joined(_File(chunks[_JSON], chunks.get(_BIN), folder).parts())
+    return _joined(_File(chunks[_JSON], chunks.get(_BIN), folder))
+
+
+def _joined(file: "_File") -> RawMesh:
+    found = joined(file.parts())
+    return found._replace(ignored=(*found.ignored, *file.ignored()))
 
 
 class _File:
@@ -71,6 +77,7 @@ class _File:
         self.root, self.binary, self.folder = json.loads(text), binary, folder
         self.buffers: dict[int, bytes] = {}
         self.files: dict[Path, bytes] = {}
+        self.has_lines = False
         if not isinstance(self.root, dict):
             raise ValueError("its JSON is no object")
         for name in self.root.get("extensionsRequired", []):
@@ -103,6 +110,13 @@ class _File:
                 for primitive in self.item("meshes", node["mesh"])["primitives"]:
                     if primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN):
                         yield self.primitive(primitive), m
+                    else:
+                        self.has_lines = True
+
+    def ignored(self) -> tuple[str, ...]:
+        """What the file has besides its parts, as far as it changes what is seen."""
+        names = [key for key in ("materials", "animations", "skins") if self.root.get(key)]
+        return (*names, *(["points or lines"] if self.has_lines else []))
 
     def primitive(self, primitive: dict[str, Any]) -> RawMesh:
         attributes = primitive["attributes"]
@@ -123,7 +137,13 @@ class _File:
         if "indices" in primitive:
             corners = self.accessor(primitive["indices"], (1,))[:, 0].astype(np.int64)
         faces = _faces(corners, primitive.get("mode", _TRIANGLES))
-        return RawMesh(points, faces, normals, uv, None if colours is None else colours[:, :3])
+        ignored = [name for name in attributes if name not in _READ]
+        if primitive.get("targets"):
+            ignored.append("targets")
+        if colours is not None and colours.shape[1] == 4 and np.any(colours[:, 3] < 1.0):
+            ignored.append("alpha of COLOR_0")
+        rgb = None if colours is None else colours[:, :3]
+        return RawMesh(points, faces, normals, uv, rgb, tuple(map(str, ignored)))
 
     def accessor(self, index: Any, widths: tuple[int, ...], fraction: bool = False) -> Rows:
         """Rows (count, one of `widths`); fraction: integers are those of [0, 1] or [-1, 1]."""

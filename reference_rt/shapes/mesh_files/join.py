@@ -18,11 +18,12 @@ and must not fill the memory."""
 def joined(parts: Iterable[tuple[RawMesh, transform.Affine]]) -> RawMesh:
     """Parts, each with its map (3, 4) to the scene.
 
-    Normals, uv and colours that not all parts have are left out.  A map that mirrors turns the
+    Normals, uv and colours that not all parts have are ignored.  A map that mirrors turns the
     winding, so that the front stays outside.  Raises ValueError for indices beyond their own part.
     """
     vertices, faces, n_vertices, n_faces = [], [], 0, 0
-    others: list[list[npt.NDArray[Any] | None]] = [[], [], []]
+    others: dict[str, list[npt.NDArray[Any] | None]] = {"normals": [], "uv": [], "colours": []}
+    names: dict[str, None] = {}  # a set in the order of the parts
     for part, m in parts:
         f = part.faces.astype(np.int64)
         if f.size and not 0 <= f.min() <= f.max() < len(part.vertices):
@@ -39,11 +40,22 @@ def joined(parts: Iterable[tuple[RawMesh, transform.Affine]]) -> RawMesh:
             normals = transform.apply_normals(m, normals.astype(np.float64))
         faces.append(n_vertices + (f[:, ::-1] if mirrored else f))
         n_vertices += len(part.vertices)
-        for values, found in zip(others, (normals, part.uv, part.colours), strict=True):
-            values.append(found)
+        for name, found in (("normals", normals), ("uv", part.uv), ("colours", part.colours)):
+            others[name].append(found)
+        names |= dict.fromkeys(part.ignored)
     if not vertices:
         return RawMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
-    return RawMesh(np.concatenate(vertices), np.concatenate(faces), *map(_all_or_none, others))
+    for name, values in others.items():
+        if any(v is None for v in values) and any(v is not None for v in values):
+            names[f"{name} of some parts"] = None
+    return RawMesh(
+        np.concatenate(vertices),
+        np.concatenate(faces),
+        normals=_all_or_none(others["normals"]),
+        uv=_all_or_none(others["uv"]),
+        colours=_all_or_none(others["colours"]),
+        ignored=tuple(names),
+    )
 
 
 def _all_or_none(values: list[npt.NDArray[Any] | None]) -> FloatArray | None:

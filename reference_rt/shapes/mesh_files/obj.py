@@ -1,8 +1,8 @@
 """Wavefront .obj (Advanced Visualizer manual, appendix B1): polygons of v, vt and vn.
 
 Vertex colours, `v x y z r g b`, are no part of the format but widely written, from 0 to 1 and as
-displayed (by Blender, MeshLab and three.js): they are taken as sRGB-encoded.  Groups, materials and
-curves are ignored.
+displayed (by Blender, MeshLab and three.js): they are taken as sRGB-encoded.  All groups and
+objects are one mesh.  Materials, lines, points, curves and all else are ignored, and named.
 """
 
 import math
@@ -18,6 +18,9 @@ from reference_rt.shapes.shape import FloatArray
 Triple = tuple[int, int, int]
 
 _WIDTHS = {b"v": 3, b"vt": 2, b"vn": 3}
+
+_NAMES_ONLY = (b"", b"g", b"o")
+"""Without a meaning for the surface: blank lines, names of groups and objects."""
 
 
 class _Corners(dict[bytes, int]):
@@ -60,11 +63,12 @@ class _Corners(dict[bytes, int]):
 def read(content: bytes) -> RawMesh:
     """Vertices are numbered in the order of their first use; unused ones are left out.
 
-    An index counts the lines before it.  Normals, uv and colours that not all have are left out.
+    An index counts the lines before it.  Normals, uv and colours that not all have are ignored.
     """
     vertex_of = _Corners()
     rows = vertex_of.rows
     colours, corners, counts = array("d"), array("q"), array("q")
+    others: dict[str, None] = {}  # a set in the order of the file
     for line, text in _logical_lines(content):
         words = (text.partition(b"#")[0] if b"#" in text else text).split()
         kind = words[0] if words else b""
@@ -78,10 +82,19 @@ def read(content: bytes) -> RawMesh:
                 rows[b"v"].extend(_three(words))
                 if len(words) > 5:
                     colours.extend(_colour(words))
+                elif len(words) == 5 and words[4] != b"1" and float(words[4]) != 1.0:
+                    others["w of v"] = None
             elif kind == b"vn":
                 rows[b"vn"].extend(_three(words))
             elif kind == b"vt":
                 rows[b"vt"].extend(_uv(words))
+                if len(words) == 4 and float(words[3]) != 0.0:
+                    others["w of vt"] = None
+            elif kind == b"s":
+                if words[1:] not in ([b"off"], [b"0"]):
+                    others["s (smoothing groups)"] = None
+            elif kind not in _NAMES_ONLY:
+                others[_keyword(kind)] = None
         except ValueError as error:
             raise ValueError(f"line {line}: {error}") from None
 
@@ -89,13 +102,29 @@ def read(content: bytes) -> RawMesh:
     v, vt, vn = triples.reshape(-1, 3).T
     positions, uv, normals = (_table(rows[kind], width) for kind, width in _WIDTHS.items())
     rgb = _table(colours, 3)
+    if len(normals) and np.all(vn >= 0):
+        others.pop("s (smoothing groups)", None)  # the normals say the same
+    for name, table, complete in (
+        ("vn of some corners", normals, np.all(vn >= 0)),
+        ("vt of some corners", uv, np.all(vt >= 0)),
+        ("colours of some v", rgb, len(rgb) == len(positions)),
+    ):
+        if len(table) and not complete:
+            others[name] = None
     return RawMesh(
         positions[v],
         fans(np.frombuffer(corners, np.int64), np.frombuffer(counts, np.int64)),
         normals[vn] if np.all(vn >= 0) else None,
         uv[vt] if np.all(vt >= 0) else None,
         linear(rgb[v]) if len(rgb) == len(positions) else None,
+        tuple(others),
     )
+
+
+def _keyword(kind: bytes) -> str:
+    what = {b"mtllib": "materials", b"usemtl": "materials", b"l": "lines", b"p": "points"}
+    name = kind.decode("ascii", "replace")
+    return f"{name} ({what[kind]})" if kind in what else name
 
 
 def _logical_lines(content: bytes) -> Iterable[tuple[int, bytes]]:

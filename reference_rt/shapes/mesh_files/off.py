@@ -1,4 +1,5 @@
-"""Object files, .off (Geomview): polygons in ascii; of COFF, NOFF, STOFF the positions alone."""
+"""Object files, .off (Geomview): polygons in ascii.  Of COFF, NOFF, STOFF only the positions are
+read; colours, normals and texture coordinates are ignored, and named."""
 
 import re
 from array import array
@@ -16,6 +17,7 @@ def read(content: bytes) -> RawMesh:
     # Not 4OFF and nOFF: they have other coordinates than x y z.
     if not re.fullmatch(rb"(ST)?C?N?OFF", words[0]):
         raise ValueError("expected 'OFF' as its first word")
+    kind = _kind(words[0])
     if not words[1:]:
         number, words = next(lines, (number, words))
         words = [b"OFF", *words]
@@ -28,12 +30,15 @@ def read(content: bytes) -> RawMesh:
         raise ValueError(f"line {number}: {n_vertices} vertices and {n_faces} faces do not fit in")
 
     points, corners, counts = array("d"), array("q"), array("q")
+    ignored: dict[str, None] = {}  # a set in the order of the file
     for number, words in islice(lines, n_vertices):
         try:
             x, y, z = map(float, words[:3])
         except ValueError:
             raise ValueError(f"line {number}: expected a vertex, x y z") from None
         points.extend((x, y, z))
+        if len(words) > 3:
+            ignored[f"{kind} of vertices"] = None
     for number, words in islice(lines, n_faces):
         try:
             count = int(words[0])
@@ -45,6 +50,8 @@ def read(content: bytes) -> RawMesh:
             raise ValueError(
                 f"line {number}: {len(words) - 1} of {count} corners; expected three or more, all"
             )
+        if len(words) > count + 1:
+            ignored["colours of faces"] = None
     if len(counts) < n_faces:
         raise ValueError(f"it ends within its {n_vertices} vertices and {n_faces} faces")
     if (left := next(lines, None)) is not None:
@@ -52,7 +59,15 @@ def read(content: bytes) -> RawMesh:
     return RawMesh(
         np.frombuffer(points, np.float64).reshape(-1, 3),
         fans(np.frombuffer(corners, np.int64), np.frombuffer(counts, np.int64)),
+        ignored=tuple(ignored),
     )
+
+
+def _kind(word: bytes) -> str:
+    """What the first word of a file says that its vertices have besides positions."""
+    letters = {b"ST": "texture coordinates", b"C": "colours", b"N": "normals"}
+    found = [what for letter, what in letters.items() if letter in word.removesuffix(b"OFF")]
+    return " and ".join(found) or "further numbers"
 
 
 def _lines(content: bytes) -> Iterator[tuple[int, list[bytes]]]:

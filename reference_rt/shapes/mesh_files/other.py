@@ -1,6 +1,7 @@
 """Formats that trimesh reads, where what it needs for them is installed (.3mf: lxml, networkx).
 
-Positions and triangles, in the scene that the file describes; no normals, uv or colours.
+Positions and triangles, in the scene that the file describes; no normals, uv or colours (these two
+are named as ignored).
 """
 
 import io
@@ -54,4 +55,7 @@ def _parts(content: bytes, kind: str) -> Iterator[tuple[RawMesh, transform.Affin
         if hasattr(geometry, "faces"):
             vertices = np.asarray(geometry.vertices, np.float64)
             faces = np.asarray(geometry.faces, np.int64)
-            yield RawMesh(vertices, faces), np.asarray(matrix, np.float64)[:3]
+            visual = getattr(geometry.visual, "kind", None)
+            ignored = () if visual is None else (f"{visual} colours or textures",)
+            raw = RawMesh(vertices, faces, ignored=ignored)
+            yield raw, np.asarray(matrix, np.float64)[:3]

@@ -1,11 +1,15 @@
 """Polygon files, .ply (Turk 1994): ascii, binary of both byte orders, any mixture of polygons.
 
-Read are the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u texture_v) and
-red green blue, and the element `face` with its list vertex_indices or vertex_index; all else is
-skipped.  Colours of integers are sRGB-encoded, 255 or 65535 being 1: as displayed, which is what
-scanners and modellers write.  Colours of floats are linear: as computed.
+Read are the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u texture_v) and a
+colour, and the element `face` with its list vertex_indices or vertex_index; all else is ignored,
+and named.  A colour is red green blue, or r g b; or diffuse_red and so on; or as Mitsuba writes it,
+color_0 color_1 color_2, and in the other forms that it reads, color_r and vertex_color_x among
+them.  Of several it is the first in this order.  Colours of integers are sRGB-encoded, 255 or 65535
+being 1: as displayed, which is what scanners and modellers write.  Colours of floats are linear: as
+computed.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +34,18 @@ _TYPES = {
 }  # fmt: skip
 _ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _UV = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
-_RGB = ("red", "green", "blue")
+_WORDS, _LETTERS = ("red", "green", "blue"), ("r", "g", "b")
+_RGB = (
+    _WORDS,
+    _LETTERS,
+    *(
+        tuple(prefix + last for last in lasts)
+        for prefix in ("diffuse_", "color_", "colour_", "vertex_color_", "vertex_colour_")
+        for lasts in (_WORDS, _LETTERS, ("0", "1", "2"), ("1", "2", "3"), ("x", "y", "z"))
+    ),
+)
+_NORMAL = ("nx", "ny", "nz")
+_INDICES = ("vertex_indices", "vertex_index")
 
 
 class Header(NamedTuple):
@@ -49,45 +64,62 @@ def read(content: bytes) -> RawMesh:
     if ascii_:
         body = memoryview(numbers(bytes(body)).tobytes())
     mesh, position = RawMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64)), 0
+    ignored: list[str] = []
     for element in header.elements:
         if element.name == "vertex":
             table, position = columns(body, position, element)
-            points = _together(table, ("x", "y", "z"))
+            points = _together(table, _first(table, (("x", "y", "z"),)))
             if points is None:
                 raise ValueError("its element 'vertex' lacks x, y or z; expected these")
-            uv = (_together(table, names) for names in _UV)
+            normal, uv, rgb = (_first(table, sets) for sets in ((_NORMAL,), _UV, _RGB))
+            ignored += [
+                f"vertex {name}"
+                for name in table
+                if name not in ("x", "y", "z", *normal, *uv, *rgb)
+            ]
             mesh = RawMesh(
                 points,
                 mesh.faces,
-                _together(table, ("nx", "ny", "nz")),
-                next((pair for pair in uv if pair is not None), None),
-                _colours(table, element),
+                _together(table, normal),
+                _together(table, uv),
+                _colours(table, rgb, element),
             )
         elif element.name == "face" and element.rows > 0:
             corners, counts, position = lists(body, position, element, _indices(element))
             if not np.all(np.isfinite(corners) & (corners == np.trunc(corners))):
                 raise ValueError("it has an index that is no integer")
             mesh = mesh._replace(faces=fans(corners.astype(np.int64), counts))
+            used = _indices(element).name
+            ignored += [f"face {p.name}" for p in element.properties if p.name != used]
         else:
             _, _, position = lists(body, position, element, None)
+            if element.rows > 0:
+                ignored.append(f"element {element.name}")
     if position != len(body):
         left = (len(body) - position) // (8 if ascii_ else 1)
         what = "numbers" if ascii_ else "bytes"
         raise ValueError(f"{left} {what} are left after all that its header promises")
-    return mesh
+    return mesh._replace(ignored=tuple(ignored))
+
+
+def _first(table: dict[str, Array], sets: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """The first of several sets of names that is there as a whole; () for none."""
+    return next((names for names in sets if all(n in table for n in names)), ())
 
 
 def _together(table: dict[str, Array], names: tuple[str, ...]) -> FloatArray | None:
-    if not all(n in table for n in names):
+    if not names:
         return None
     return np.stack([table[n].astype(np.float64) for n in names], axis=1)
 
 
-def _colours(table: dict[str, Array], element: Element) -> FloatArray | None:
-    colours = _together(table, _RGB)
+def _colours(
+    table: dict[str, Array], names: tuple[str, ...], element: Element
+) -> FloatArray | None:
+    colours = _together(table, names)
     if colours is None:
         return None
-    types = {p.declared for p in element.properties if p.name in _RGB}
+    types = {p.declared for p in element.properties if p.name in names}
     if types <= {"f4", "f8"}:
         return colours
     if types not in ({"u1"}, {"u2"}):
@@ -100,7 +132,7 @@ def _colours(table: dict[str, Array], element: Element) -> FloatArray | None:
 
 def _indices(element: Element) -> Property:
     for p in element.properties:
-        if p.name in ("vertex_indices", "vertex_index") and p.length is not None:
+        if p.name in _INDICES and p.length is not None:
             if p.declared[0] == "f":
                 raise ValueError(f"its '{p.name}' are floats; expected integers")
             return p

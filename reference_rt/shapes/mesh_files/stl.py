@@ -1,7 +1,7 @@
 """Stereolithography files, .stl (3D Systems 1989): separate triangles, binary or ascii.
 
 Normals are not read, being those of the winding; nor are the attributes of binary files, which have
-no agreed meaning.  The solids of an ascii file become one mesh.
+no agreed meaning, and are named where there are any.  The solids of an ascii file become one mesh.
 """
 
 import re
@@ -29,9 +29,13 @@ _END = re.compile(rb"\s*endsolid\b[^\r\n]*", re.IGNORECASE)
 def read(content: bytes) -> RawMesh:
     # Binary files may begin with "solid", too: their length tells.
     count = struct.unpack_from("<I", content, 80)[0] if len(content) >= 84 else -1
+    ignored: tuple[str, ...] = ()
     size = 84 + count * _TRIANGLE.itemsize
     if len(content) == size:
-        vertices = np.frombuffer(content, _TRIANGLE, offset=84)["vertices"].reshape(-1, 3)
+        triangles = np.frombuffer(content, _TRIANGLE, offset=84)
+        vertices = triangles["vertices"].reshape(-1, 3)
+        if triangles["attribute"].any():
+            ignored = ("attributes of triangles",)
     elif _SOLID.match(content):
         vertices = _ascii(content)
     elif count < 0:
@@ -41,7 +45,7 @@ def read(content: bytes) -> RawMesh:
             f"it has {len(content)} bytes; expected {size} for the {count} triangles that its "
             "header promises, or 'solid' as its first word"
         )
-    return RawMesh(vertices, np.arange(len(vertices)).reshape(-1, 3))
+    return RawMesh(vertices, np.arange(len(vertices)).reshape(-1, 3), ignored=ignored)
 
 
 def _ascii(content: bytes) -> FloatArray:
