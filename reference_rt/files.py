@@ -34,12 +34,23 @@ def replacing(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def check_writable(path: Path) -> None:
-    """Raise ImageError now, rather than after a long render, where `path` could not be written."""
+def check_writable(*paths: Path) -> None:
+    """Raise ImageError where one of these files could not be written.
+
+    Every command calls this for all files that it will write, before its work begins: nobody should
+    wait for results that cannot be stored.  Makes the parent folders.
+    """
+    for path in paths:
+        _check_writable(path)
+
+
+def _check_writable(path: Path) -> None:
     probe = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
     try:
         if path.is_dir():
             raise ImageError(f"{path}: is a folder; expected the name of a file")
+        if (file := next((p for p in path.parents if p.is_file()), None)) is not None:
+            raise ImageError(f"{path}: cannot be written: {file} is a file; expected a folder")
         path.parent.mkdir(parents=True, exist_ok=True)
         probe.touch()
     except OSError as error:

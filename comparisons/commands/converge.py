@@ -61,7 +61,7 @@ def converge(
         from comparisons.convergence.store import Store, run_key
         from comparisons.convergence.summary import again, lines_of
         from comparisons.provenance import provenance
-        from comparisons.suites.suite import folder_name
+        from comparisons.suites.work import folder_name
     from reference_rt.files import check_writable
 
     settings = Settings(
