@@ -124,6 +124,6 @@ def how_many(run: int, missing: int) -> str:
     """How many cases were run, of how many that were asked for, in words: "64 cases", or
     "17 of 64 cases run" where the rest is missing."""
     asked = run + missing
-    return (
-        f"{asked} case{'s' if asked != 1 else ''}" if not missing else f"{run} of {asked} cases run"
-    )
+    if missing:
+        return f"{run} of {asked} cases run"
+    return f"{asked} case{'s' if asked != 1 else ''}"

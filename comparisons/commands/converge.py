@@ -79,8 +79,7 @@ def converge(
     if double := [name for name in names if names.count(name) > 1]:
         raise UsageError(f"two scenes are called '{double[0]}'; expected each once")
     files = [out / name for name in ("results.json", "results.csv", "report.html")]
-    for file in files:
-        check_writable(file)
+    check_writable(*files, out / "rungs" / "a rung")
     facts = provenance()
     found = []
     for path, scene in zip(scenes, described, strict=True):
