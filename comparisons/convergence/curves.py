@@ -64,7 +64,6 @@ class Curves:
     size: tuple[int, int] = (0, 0)
     contestants: Mapping[str, Contestant] = field(default_factory=dict)
     findings: Mapping[str, Findings] = field(default_factory=dict)
-    absent: Mapping[str, str] = field(default_factory=dict)
     reference: Reference | None = None
     grids: Grids | None = None
     starts: Starts = field(default_factory=dict)
@@ -73,6 +72,7 @@ class Curves:
     notes: tuple[str, ...] = ()
     again: str = ""
     problem: str = ""
+    absent: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def missing(self) -> list[str]:

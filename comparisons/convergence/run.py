@@ -151,12 +151,12 @@ class _Run:
                 name: findings_of(rungs, reference, settings.targets, by_name[name].is_independent)
                 for name, rungs in climbed.items()
             },
-            absent,
             reference,
             starts=starts,
             crops=crops_of(climbed, renderers, reference, self.store) if settings.crops else (),
             left_out=tuple(left_out),
             notes=notes,
+            absent=absent,
         )
 
     def _plan(self, contestants: tuple[Contestant, ...]) -> Plan:

@@ -132,7 +132,7 @@ def curves_of(scene, *, absent=None, **noises):
     climb(some, EXACT, 8, Store(None, ""))
     found = {n: findings_of(c.rungs, EXACT, (MEASURED, BEYOND), False) for n, c in some.items()}
     contestants = {name: BY_NAME[name] for name in (*noises, *(absent or {}))}
-    return Curves(scene, (16, 12), contestants, found, absent or {}, EXACT)
+    return Curves(scene, (16, 12), contestants, found, EXACT, absent=absent or {})
 
 
 @pytest.fixture(scope="module")
