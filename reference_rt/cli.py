@@ -69,7 +69,7 @@ def scene_warnings(tell: Callable[[str], None]) -> Iterator[None]:
                 others(message, category, *place)
 
         warnings.simplefilter("always", SceneWarning)
-        warnings.showwarning = show
+        warnings.showwarning = show  # type: ignore[assignment]
         yield
 
 

@@ -33,16 +33,21 @@ def compare(
     again."""
     with compare_extra():
         from comparisons.budget import Budget
-        from comparisons.suites.run import Options, run_cases
+        from comparisons.suites.display import summarise
+        from comparisons.suites.run import Options, Run, run_cases
         from comparisons.suites.work import Changes, plan_of_files
         from comparisons.verdict import exit_code
 
     changes = Changes(spp=spp, size=size, seed=seed)
     plan = plan_of_files(scenes, changes, Budget(replicates=replicates))
     work = tuple(w._replace(again=_command(w.path, changes, replicates)) for w in plan.work)
-    options = Options(out, threads=threads, fresh=fresh, steps=True)
+
+    def tell(run: Run) -> None:
+        summarise(run.cases, run.walls, run.not_run, run.missing)
+        typer.echo(f"{options.results}, {options.report}", err=True)
+
+    options = Options(out, threads=threads, fresh=fresh, steps=True, tell=tell)
     run = run_cases(plan._replace(work=work), options)
-    typer.echo(f"{options.results}, {options.report}", err=True)
     raise typer.Exit(exit_code(run.cases, run.missing))
 
 

@@ -102,7 +102,8 @@ def _median(ratios: Sequence[Ratio]) -> Cell:
     if not values:
         return Cell("–")
     extrapolated = sum(ratio.extrapolated for ratio in ratios if ratio.times is not None)
-    told = [f"of {len(values)} scenes", *([f"{extrapolated} extrapolated"] if extrapolated else [])]
+    scenes = f"of {len(values)} scene{'s' if len(values) != 1 else ''}"
+    told = [scenes, *([f"{extrapolated} extrapolated"] if extrapolated else [])]
     median = float(np.median(values))
     look = "extrapolated" if extrapolated else ""
     return Cell(f"{median:.2f}" if math.isfinite(median) else "∞", ", ".join(told), look)

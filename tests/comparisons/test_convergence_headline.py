@@ -168,7 +168,7 @@ def test_the_headline_says_what_is_extrapolated(told):
     assert looks == ["extrapolated", "extrapolated"]  # the ratio and the median
     assert "extrapolated" in found[0][1]
     assert found[0][1].startswith("≈ 0.")
-    assert "of 1 scenes, 1 extrapolated" in found[-1][1]
+    assert "of 1 scene, 1 extrapolated" in found[-1][1]
     assert "good" not in {look for look, _ in cells(headline)}
     # Where it was measured, the ratio is green.
     table = page[page.index("Time to a relative error") :]

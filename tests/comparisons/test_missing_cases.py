@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -104,12 +105,14 @@ app()
 
 
 def interrupted(number, out, *arguments):
-    """The program, which gets this signal in its second case; its exit code."""
+    """The program, which gets this signal in its second case: its exit code and what it said."""
     command = [sys.executable, "-c", PROGRAM, *map(str, arguments), "--out", str(out)]
-    process = subprocess.Popen(command)
+    log = out.with_suffix(".txt")
+    with log.open("w") as stream:
+        process = subprocess.Popen(command, stderr=stream)
     workers = []
     try:
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + 120.0
         results = out / "results.json"
         while not (results.exists() and json.loads(results.read_text())["cases"]):
             assert time.monotonic() < deadline
@@ -122,10 +125,11 @@ def interrupted(number, out, *arguments):
         process.wait(timeout=120.0)
     finally:
         process.kill()
-        for worker in workers:  # those of a killed program live on until their case is done
-            if number == signal.SIGKILL:
+        # The workers of a killed program live on until their case is done.
+        for worker in workers if number == signal.SIGKILL else ():
+            with suppress(ProcessLookupError):
                 os.kill(int(worker), signal.SIGKILL)
-    return process.returncode
+    return process.returncode, log.read_text()
 
 
 NUMBERS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}
@@ -143,11 +147,13 @@ def test_an_interrupted_run_says_so_and_is_continued(tmp_path, number, command, 
     files = [folder / f"{name}.yaml" for name in ("a", "wait", "z")]
     more = ("--scenes", folder, "--jobs", 1, "--junit", xml)
     arguments = ("compare", *files) if command == "compare" else ("suite", mine, *more)
-    assert interrupted(number, out, *arguments) == NUMBERS[number]
+    code, said = interrupted(number, out, *arguments)
+    assert code == NUMBERS[number]
     told = json.loads((out / "results.json").read_text())
     assert (told["asked"], told["missing"]) == (3, ["wait", "z"])
     page = out / "report.html"
     assert page.exists() == (number != signal.SIGKILL)
+    assert ("1 of 3 cases run: 1 agree" in said) == (number != signal.SIGKILL)
     if command == "suite" and number != signal.SIGKILL:
         (suite,) = JUnitXml.fromfile(str(xml))
         assert (suite.tests, suite.errors) == (3, 2)
