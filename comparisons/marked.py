@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from reference_rt.errors import UsageError
-from reference_rt.files import replacing
+from reference_rt.files import check_writable, replacing
 
 END = "<!-- end -->"
 
@@ -21,6 +21,12 @@ def rewrite(path: Path, name: str, text: str) -> None:
     before, after = around(path, name)
     with replacing(path) as temporary:
         temporary.write_text(f"{before}{begin(name)}\n{text}{END}{after}", encoding="utf-8")
+
+
+def check(path: Path, name: str) -> None:
+    """Raise what `rewrite` would raise, before the work whose result it writes begins."""
+    around(path, name)
+    check_writable(path)
 
 
 def around(path: Path, name: str) -> tuple[str, str]:

@@ -84,9 +84,9 @@ class ImageGate:
         except ModuleNotFoundError as error:
             pytest.fail(f"image_gate needs {error.name}: pip install 'reference-rt[compare]'")
 
-        folder = self._folder()
         given: list[tuple[Picture, Path | None]] = []
         try:
+            folder = self._folder()
             given = _pictures(candidate, folder)
             judge = Request(
                 scene=None if scene is None else Scene.load(self._root / scene),
@@ -110,14 +110,19 @@ class ImageGate:
         return case
 
     def _folder(self) -> Path:
-        """A folder of this call alone, the same in each run; what a run left there is removed."""
+        """A folder of this call alone, the same in each run; what a run left there is removed.
+        Raises ImageError where it cannot be written."""
+        from reference_rt.files import check_writable
+
         nodeid = self._node.nodeid
         plain = re.sub(r"[^A-Za-z0-9._-]+", "-", nodeid.rpartition("/")[2]).strip("-.")
         # Names that differ in what was replaced must not meet.
         unique = hashlib.sha256(nodeid.encode()).hexdigest()[:8]
         folder = self._out / f"{plain[:80]}-{unique}-{self._calls}"
-        for name in ("results.json", "report.html", "case.json", "pictures.exr"):
-            (folder / name).unlink(missing_ok=True)
+        files = [folder / n for n in ("results.json", "report.html", "case.json", "pictures.exr")]
+        check_writable(*files)
+        for file in files:
+            file.unlink(missing_ok=True)
         for old in folder.glob("candidate-*.exr"):
             old.unlink()
         return folder

@@ -18,9 +18,13 @@ Status = Literal[
     "invalid",  # non-finite pixels, wrong size: no statement about agreement is possible
 ]
 
-RUNGS = ("run", "input", "film", "geometry", "direct", "whitted", "statistics", "images")
-"""The ladder, in order: a failure is reported at the first rung that breaks.  `run` exists only
-where a case could not be carried through; `input` says what is wrong with pictures as such."""
+RUNGS = ("scene", "run", "input", "film", "geometry", "direct", "whitted", "statistics", "images")
+"""The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
+where the scene or a file that it names is invalid, `run` only where the case could not be carried
+through; `input` says what is wrong with pictures as such."""
+
+COMPARED = RUNGS[3:]
+"""The rungs that compare the two renderers: those a suite can be limited to."""
 
 
 @dataclass(frozen=True)
@@ -107,3 +111,19 @@ class Case:
     """What the scene does not need, and so was not run."""
     again: str = ""
     """The command that repeats this case alone."""
+
+
+WARNING = "warning: "
+"""Begins the notes of a case that are warnings about its scene."""
+
+INTERRUPTED = "the run was interrupted before this case"
+"""Why a case that was asked for is missing."""
+
+
+def how_many(run: int, missing: int) -> str:
+    """How many cases were run, of how many that were asked for, in words: "64 cases", or
+    "17 of 64 cases run" where the rest is missing."""
+    asked = run + missing
+    if missing:
+        return f"{run} of {asked} cases run"
+    return f"{asked} case{'s' if asked != 1 else ''}"

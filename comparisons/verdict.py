@@ -43,12 +43,17 @@ def decide(tiers: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]
     return "agree", f"{rungs}: {told.reason}"
 
 
-def exit_code(cases: Sequence[Case]) -> int:
-    """0 if every case agrees or is limited by the reference only, otherwise 1.
+def exit_code(cases: Sequence[Case], missing: Sequence[str] = ()) -> int:
+    """0 if every case agrees or is limited by the reference only, otherwise the highest of these:
 
-    4 if a case could not be carried through (its process died or hung), or if there is no case: a
-    run that compared nothing has not passed. It goes before 1, because such a run is incomplete.
+    - 4: a case could not be carried through (its process died or hung), or there is no case, since
+      a run that compared nothing has not passed;
+    - 3: a scene, or a file that it names, is invalid;
+    - 1: any other case does not pass, or cases are `missing`, because the run was interrupted.
     """
-    if not cases or any(tier.name == "run" for case in cases for tier in case.tiers):
+    failed = {tier.name for case in cases for tier in case.tiers} & {"scene", "run"}
+    if not cases or "run" in failed:
         return 4
-    return 0 if all(case.verdict in PASSING for case in cases) else 1
+    if failed:
+        return 3
+    return 0 if not missing and all(case.verdict in PASSING for case in cases) else 1

@@ -44,7 +44,7 @@ def guarded(command: F) -> F:
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> Any:
         try:
-            with _printed_warnings():
+            with scene_warnings(lambda text: typer.echo(f"warning: {text}", err=True)):
                 return command(*args, **kwargs)
         except ReferenceRtError as error:
             _fail(str(error), error.exit_code)
@@ -62,19 +62,19 @@ def guarded(command: F) -> F:
 
 
 @contextmanager
-def _printed_warnings() -> Iterator[None]:
-    """Print each `SceneWarning` as one line on standard error; other warnings stay Python's."""
+def scene_warnings(tell: Callable[[str], None]) -> Iterator[None]:
+    """Call `tell` with the text of each `SceneWarning`; other warnings stay Python's."""
     with warnings.catch_warnings():
         others = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **to: Any) -> None:
             if issubclass(category, SceneWarning):
-                typer.echo(f"warning: {message}", err=True)
+                tell(str(message))
             else:
                 others(message, category, *place, **to)
 
         warnings.simplefilter("always", SceneWarning)
-        warnings.showwarning = show
+        warnings.showwarning = show  # type: ignore[assignment]
         yield
 
 

@@ -34,12 +34,25 @@ def replacing(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def check_writable(path: Path) -> None:
-    """Raise ImageError now, rather than after a long render, where `path` could not be written."""
+def check_writable(*paths: Path) -> None:
+    """Raise ImageError where one of these files could not be written.
+
+    Every command calls this for all files that it will write, before its work begins: nobody should
+    wait for results that cannot be stored.  Leaves nothing behind, no folder either.
+    """
+    for path in paths:
+        _check_writable(path)
+
+
+def _check_writable(path: Path) -> None:
     probe = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
+    made: list[Path] = []
     try:
         if path.is_dir():
             raise ImageError(f"{path}: is a folder; expected the name of a file")
+        if (file := next((p for p in path.parents if p.is_file()), None)) is not None:
+            raise ImageError(f"{path}: cannot be written: {file} is a file; expected a folder")
+        made = [parent for parent in path.parents if not parent.exists()]
         path.parent.mkdir(parents=True, exist_ok=True)
         probe.touch()
     except OSError as error:
@@ -49,3 +62,6 @@ def check_writable(path: Path) -> None:
     finally:
         with suppress(OSError):
             probe.unlink(missing_ok=True)
+        for parent in made:  # the deepest first; one that somebody else fills stays
+            with suppress(OSError):
+                parent.rmdir()

@@ -1,6 +1,7 @@
 """Seconds until a relative error of 1 %, over the scenes that are path traced on both sides."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,18 +29,24 @@ def measure(setting: Setting) -> list[Row]:
 
     Raises ReferenceUnavailableError.
     """
-    from comparisons.convergence import time_to_error
+    from comparisons.convergence import reached
 
     scenes = path_traced(setting)
     found: dict[str, dict[str, float]] = {}
     left_out: dict[str, str] = {}
+    extrapolated: dict[str, list[str]] = {}
     for k, (name, scene) in enumerate(scenes.items()):
         setting.say(name, k / len(scenes))
         try:
-            found[name] = time_to_error(scene, TARGET, SECONDS)
+            targets = reached(scene, TARGET, SECONDS)
         except (ValueError, ReferenceRtError) as error:
             left_out[name] = str(error)
-    return rows(found, left_out)
+            continue
+        found[name] = {who: target.seconds.value for who, target in targets.items()}
+        extrapolated[name] = [
+            who for who, target in targets.items() if target.how == "extrapolated"
+        ]
+    return rows(found, left_out, extrapolated)
 
 
 def path_traced(setting: Setting) -> dict[str, Scene]:
@@ -60,19 +67,28 @@ def path_traced(setting: Setting) -> dict[str, Scene]:
     return found
 
 
-def rows(found: dict[str, dict[str, float]], left_out: dict[str, str]) -> list[Row]:
-    """The rows of times by scene and contestant; `left_out` says why other scenes have none."""
+def rows(
+    found: dict[str, dict[str, float]],
+    left_out: dict[str, str],
+    extrapolated: Mapping[str, Sequence[str]] | None = None,
+) -> list[Row]:
+    """The rows of times by scene and contestant; `left_out` says why other scenes have none,
+    `extrapolated` which times of a scene lie beyond what was measured."""
+    guessed = extrapolated or {}
     against_default = _ratios(found, DEFAULT)
     against_best = _ratios(found, BEST)
     what = f"time to {TARGET:.0%} relative error"
     details: dict[str, Any] = {"target": TARGET, "seconds": found, "left_out": left_out}
+    details["extrapolated"] = {name: list(who) for name, who in guessed.items() if who}
     worst = max(against_default, key=lambda name: against_default[name], default="")
     return [
-        _row("error_default", f"{what}, median over scenes: / Mitsuba llvm, its default sampler",
+        _row("error_default",
+             f"{what}, median over {_scenes(against_default, DEFAULT, guessed)}: / Mitsuba llvm, "
+             "its default sampler",
              found, DEFAULT, against_default, MEDIAN_GOAL, details),
         Row(
             "error_default_worst",
-            f"the same, the worst scene ({worst})",
+            f"the same, the worst scene ({worst}{_worst(worst, DEFAULT, guessed)})",
             found.get(worst, {}).get("ours", math.nan),
             found.get(worst, {}).get(DEFAULT, math.nan),
             "Mitsuba llvm, default sampler",
@@ -83,9 +99,28 @@ def rows(found: dict[str, dict[str, float]], left_out: dict[str, str]) -> list[R
             {},
             {"worst": worst, "ratios": against_default},
         ),
-        _row("error_best", f"{what}, median over scenes: / Mitsuba llvm, its best sampler",
+        _row("error_best",
+             f"{what}, median over {_scenes(against_best, BEST, guessed)}: / Mitsuba llvm, "
+             "its best sampler",
              found, BEST, against_best, BEST_GOAL, details),
     ]  # fmt: skip
+
+
+def _is_extrapolated(scene: str, peer: str, extrapolated: Mapping[str, Sequence[str]]) -> bool:
+    """Whether a time that the ratio of a scene is made of was not measured."""
+    return bool({"ours", peer} & set(extrapolated.get(scene, ())))
+
+
+def _scenes(
+    ratios: Mapping[str, float], peer: str, extrapolated: Mapping[str, Sequence[str]]
+) -> str:
+    """ "scenes", and of how many of them the ratio is extrapolated."""
+    number = sum(_is_extrapolated(scene, peer, extrapolated) for scene in ratios)
+    return f"{len(ratios)} scenes ({number} extrapolated)" if number else "scenes"
+
+
+def _worst(scene: str, peer: str, extrapolated: Mapping[str, Sequence[str]]) -> str:
+    return ", extrapolated" if _is_extrapolated(scene, peer, extrapolated) else ""
 
 
 def _ratios(found: dict[str, dict[str, float]], peer: str) -> dict[str, float]:

@@ -53,7 +53,7 @@ def run(
     the same sources, versions, machine and setting unless `fresh`; `results.json` and `bench.md`
     are whole after each, with all groups that are kept.  Raises UsageError, SceneError, ImageError.
     """
-    check_writable(out / "results.json")
+    check_writable(out / "results.json", out / "bench.md", out / "rows" / "a row")
     facts = machine()
     key = key_of(setting, facts)
     outcome = Outcome(machine=facts)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from comparisons.ci.ranking import SEVERITY, ranked
-from comparisons.results import Case
+from comparisons.results import INTERRUPTED, Case, how_many
 from comparisons.verdict import PASSING
 from reference_rt.errors import ImageError
 
@@ -40,16 +40,26 @@ def summary_path() -> Path | None:
     return Path(path) if path else None
 
 
-def annotate(cases: Sequence[Case], stream: TextIO, files: Mapping[str, str] | None = None) -> None:
+def annotate(
+    cases: Sequence[Case],
+    stream: TextIO,
+    files: Mapping[str, str] | None = None,
+    missing: Sequence[str] = (),
+) -> None:
     """Write an annotation for each case that fails, the worst first: errors for what is invalid or
     differs, warnings for what could not be told.
 
-    files: the file that a case is about, by the case's name.  Where there are more cases than
-    annotations, the last one says how many.
+    files: the file that a case is about, by the case's name;  missing: names of cases that an
+    interrupted run did not come to: one error.  Where there are more cases than annotations, the
+    last one says how many.
     """
+    if missing:
+        title = {"title": how_many(len(cases), len(missing))}
+        _command(stream, "error", title, _cut(f"Missing: {', '.join(missing)}"))
     for kind in ("error", "warning"):
         failed = [case for case in ranked(cases) if _KINDS.get(case.verdict) == kind]
-        shown = failed if len(failed) <= MOST_ANNOTATIONS else failed[: MOST_ANNOTATIONS - 1]
+        most = MOST_ANNOTATIONS - (1 if missing and kind == "error" else 0)
+        shown = failed if len(failed) <= most else failed[: most - 1]
         for case in shown:
             where = {"title": f"{case.scene}: {case.verdict}"}
             if files and case.scene in files:
@@ -88,15 +98,21 @@ def _property(text: str) -> str:
 
 
 def summarise(
-    cases: Sequence[Case], path: Path, title: str, not_run: Mapping[str, str] | None = None
+    cases: Sequence[Case],
+    path: Path,
+    title: str,
+    not_run: Mapping[str, str] | None = None,
+    missing: Sequence[str] = (),
 ) -> None:
     """Append a summary in Markdown: counts, then a table of the cases, the worst first, as many as
-    there is room for.  Raises ImageError where the file cannot be written."""
+    there is room for.  missing: names of cases that an interrupted run did not come to.  Raises
+    ImageError where the file cannot be written."""
     counts = Counter(case.verdict for case in cases)
     told = ", ".join(f"**{counts[v]}** {v}" for v in SEVERITY if counts[v]) or "no case was run"
-    head = f"## {_markdown(title)}\n\n{len(cases)} cases: {told}\n\n"
+    head = f"## {_markdown(title)}\n\n{how_many(len(cases), len(missing))}: {told}\n\n"
     head += "| case | verdict | why |\n| --- | --- | --- |\n"
-    rows = [_row(case) for case in ranked(cases)]
+    rows = [f"| {_markdown(name)} | ❌ missing | {INTERRUPTED} |\n" for name in missing]
+    rows += [_row(case) for case in ranked(cases)]
     rows += [
         f"| {_markdown(name)} | not run | {_markdown(_cut(why))} |\n"
         for name, why in (not_run or {}).items()

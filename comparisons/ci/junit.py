@@ -7,7 +7,7 @@ from pathlib import Path
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from comparisons.ci.ranking import ranked
-from comparisons.results import Case
+from comparisons.results import INTERRUPTED, Case
 from comparisons.verdict import PASSING
 from reference_rt.files import replacing
 
@@ -24,25 +24,33 @@ def write(
     name: str,
     seconds: Mapping[str, float] | None = None,
     not_run: Mapping[str, str] | None = None,
+    missing: Sequence[str] = (),
 ) -> None:
     """Write one test suite `name` of the cases, the worst first.  Raises ImageError.
 
     seconds: of each case by its name, where more is known than the case says;  not_run: why other
-    cases were not run, by name: they are skipped tests.
+    cases were not run, by name: they are skipped tests;  missing: names of cases that an
+    interrupted run did not come to: they are errors.
     """
     suite = TestSuite(_legal(name))
     for case in ranked(cases):
         of_steps = sum(sum(times.values()) for times in case.seconds.values())
         suite.add_testcase(_test(case, name, (seconds or {}).get(case.scene, of_steps)))
+    for left in missing:
+        suite.add_testcase(_without_case(left, name, Error(INTERRUPTED, "missing")))
     for skipped, why in (not_run or {}).items():
-        test = TestCase(_legal(skipped), _legal(name), 0.0)
-        test.result = [Skipped(_legal(why))]
-        suite.add_testcase(test)
+        suite.add_testcase(_without_case(skipped, name, Skipped(_legal(why))))
     document = JUnitXml(_legal(name))
     document.add_testsuite(suite)
     document.update_statistics()
     with replacing(path) as temporary:
         document.write(str(temporary), pretty=True)
+
+
+def _without_case(case: str, suite: str, result: Error | Skipped) -> TestCase:
+    test = TestCase(_legal(case), _legal(suite), 0.0)
+    test.result = [result]
+    return test
 
 
 def _test(case: Case, suite: str, seconds: float) -> TestCase:

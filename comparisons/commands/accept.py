@@ -52,7 +52,6 @@ def accept(
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import check_sizes, is_noise_free
         from comparisons.provenance import ours
-
     if listed or unused is not None:
         if candidates or name:
             raise UsageError("--list and --unused accept nothing; expected no candidates")
@@ -66,6 +65,7 @@ def accept(
     if not candidates or name is None or reason is None:
         raise UsageError("expected CANDIDATE... with --name and --reason, or --list, or --unused")
     store.refuse_in_ci()
+    store.check_place(baselines, name)
     pictures = [p for path in candidates for p in read_candidates(path, layer)]
     of_scene = None
     if scene is not None:

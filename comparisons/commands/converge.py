@@ -9,7 +9,7 @@ import typer
 from comparisons.commands.extra import compare_extra
 from reference_rt.cli import guarded
 from reference_rt.console import ProgressLine
-from reference_rt.errors import UsageError
+from reference_rt.errors import SceneError, UsageError
 from reference_rt.scene import Scene
 
 
@@ -53,6 +53,7 @@ def converge(
     """Error against run time: ours and Mitsuba's; what is done is not done again."""
     with compare_extra():
         from comparisons.convergence.contestants import chosen
+        from comparisons.convergence.curves import Curves
         from comparisons.convergence.data import Settings
         from comparisons.convergence.outputs import write_results, write_table
         from comparisons.convergence.page import write_page
@@ -61,7 +62,8 @@ def converge(
         from comparisons.convergence.store import Store, run_key
         from comparisons.convergence.summary import again, lines_of
         from comparisons.provenance import provenance
-        from comparisons.suites.suite import folder_name
+        from comparisons.results import INTERRUPTED
+        from comparisons.suites.work import folder_name, read
     from reference_rt.files import check_writable
 
     settings = Settings(
@@ -74,32 +76,44 @@ def converge(
         starts=starts,
     )
     chosen(settings.only)
-    described = [Scene.load(path) for path in scenes]
-    names = [scene.name for scene in described]
+    described = [read(path) for path in scenes]
+    names = [path.stem for path in scenes]
     if double := [name for name in names if names.count(name) > 1]:
         raise UsageError(f"two scenes are called '{double[0]}'; expected each once")
+    invalid = False
     files = [out / name for name in ("results.json", "results.csv", "report.html")]
-    for file in files:
-        check_writable(file)
+    check_writable(*files, out / "rungs" / "a rung")
     facts = provenance()
-    found = []
-    for path, scene in zip(scenes, described, strict=True):
+    found = [Curves(name, problem=INTERRUPTED) for name in names]
+
+    def curves_of(scene: Scene | SceneError, name: str) -> Curves:
+        if isinstance(scene, SceneError):
+            raise scene
         key = run_key(prepared(scene, settings), replicates)
-        store = Store(out / "rungs" / folder_name(scene.name), key, fresh=fresh)
+        store = Store(out / "rungs" / folder_name(name), key, fresh=fresh)
         with ProgressLine() as progress:
 
-            def say(what: str, part: float, name: str = scene.name) -> None:
+            def say(what: str, part: float) -> None:
                 progress(what if what == "compile" else f"{name}: {what}", part)
 
-            curves = converge_scene(scene, settings, store, say)
-        found.append(replace(curves, again=again(path, out, settings)))
+            return converge_scene(scene, settings, store, say)
+
+    for k, (path, scene) in enumerate(zip(scenes, described, strict=True)):
+        try:
+            curves = curves_of(scene, names[k])
+        except SceneError as error:  # the other scenes have curves all the same
+            curves = Curves(names[k], problem=f"invalid: {error}")
+            invalid = True
+        found[k] = replace(curves, again=again(path, out, settings))
         # After each scene, so that an interruption loses none that is finished.
         write_results(files[0], found, settings, facts)
         write_table(files[1], found)
         write_page(files[2], found, settings, facts)
-        for line in lines_of(found[-1]):
+        for line in lines_of(found[k]):
             typer.echo(line)
     typer.echo(", ".join(map(str, files)), err=True)
+    if invalid:
+        raise typer.Exit(SceneError.exit_code)
 
 
 def _size(size: str | None) -> tuple[int, int] | None:

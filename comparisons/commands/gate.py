@@ -118,7 +118,8 @@ def gate(
 
     name = baseline or ("" if described is None else described.name)
     name = name or Path((reference or [Path("nothing")])[0]).stem
-    outputs.remove(out)
+    kept = () if run is None else (out / "candidates" / "a candidate",)
+    outputs.prepare(out, *kept, *outputs.ci_files(junit, github))
     start = time.perf_counter()
     pictures: list[Picture] = []
     failed: ReferenceRtError | None = None

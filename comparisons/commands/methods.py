@@ -42,7 +42,8 @@ def methods(
     names = list(dict.fromkeys(family or FAMILIES))
     if unknown := [name for name in names if name not in FAMILIES]:
         raise UsageError(f"--family: expected one of {', '.join(FAMILIES)}, got '{unknown[0]}'")
-    check_writable(out / "results.json")
+    page = out / "methods.html"
+    check_writable(out / "results.json", out / "results.csv", page)
     effort, about = FULL if full else QUICK, ours()
     rows = []
     with ProgressLine() as progress:
@@ -50,7 +51,7 @@ def methods(
             rows += run(FAMILIES[name], effort, seed, progress)
             write(out, rows, effort, seed, about)
         progress("page", 0.0)
-        write_page(out / "methods.html", rows, effort, seed, about)
+        write_page(page, rows, effort, seed, about)
         progress("page", 1.0)
     console = Console(highlight=False)
     for name in names:

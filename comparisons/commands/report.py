@@ -11,19 +11,29 @@ from reference_rt.cli import guarded
 
 @guarded
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="What a suite wrote to.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="What a suite or `compare` wrote to.")
+    ],
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="The page.  [default: DIR/report.html]")
     ] = None,
 ) -> None:
-    """Write results.json and the page again, from the records of a suite."""
+    """Write results.json and the page again, from the records of a suite or of `compare`.
+
+    Exit code 1 where cases are missing, because the run was interrupted.
+    """
     with compare_extra():
         from comparisons.report import write_report, write_results
-        from comparisons.suites.archive import read_archive
+        from comparisons.results import how_many
+        from comparisons.suites.archive import check_archive, read_archive
+    from reference_rt.files import check_writable
 
-    archive = read_archive(folder)
     page = out or folder / "report.html"
     results = folder / "results.json"
-    write_results(results, archive.cases, archive.provenance, archive.suite, archive.not_run)
-    write_report(page, archive.cases, archive.provenance)
-    typer.echo(f"{len(archive.cases)} cases: {results}, {page}", err=True)
+    check_archive(folder)
+    check_writable(results, page)
+    cases, provenance, suite, not_run, missing = read_archive(folder)
+    write_results(results, cases, provenance, suite, not_run, missing)
+    write_report(page, cases, provenance, missing=missing)
+    typer.echo(f"{how_many(len(cases), len(missing))}: {results}, {page}", err=True)
+    raise typer.Exit(1 if missing else 0)

@@ -28,11 +28,14 @@ def selftest(
     """Plant faults and see whether the suites catch them; count false alarms without any."""
     from comparisons.selftest import FAULTS
     from comparisons.selftest.run import SUITES, run
+    from reference_rt.files import check_writable
 
     patterns = only or ["*"]
     faults = [f for f in FAULTS if any(fnmatchcase(f.name, pattern) for pattern in patterns)]
     if not faults:
         raise UsageError(f"--only: no fault fits {', '.join(patterns)}")
+    files = out / "selftest.json", out / "selftest.md"
+    check_writable(*files)
     console = Console(stderr=True, highlight=False)
 
     def say(line: str) -> None:
@@ -44,5 +47,5 @@ def selftest(
         say(f"{suite}: {caught} of {total} faults caught")
     for alarms in outcome.alarms:
         say(f"{alarms.scene}: {alarms.false_alarms} false alarms in {alarms.runs:,} runs")
-    say(f"{out / 'selftest.json'}, {out / 'selftest.md'}")
+    say(", ".join(map(str, files)))
     raise typer.Exit(0 if outcome.holds else 1)

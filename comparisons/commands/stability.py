@@ -74,9 +74,11 @@ def stability(
             raise UsageError(f"--series: expected one of {', '.join(known)}, got '{series}'")
     if at is not None and series is None:
         raise UsageError("--at: expected a --series with it")
+    page = out / "stability.html"
+    kept = out / "settings" / "a setting", out / "pictures" / "a picture"
+    check_writable(out / "results.json", out / "results.csv", page, *kept)
     if markdown is not None:
-        marked.around(markdown, "stability")  # now, rather than after half an hour
-    check_writable(out / "results.json")
+        marked.check(markdown, "stability")
     missing = mitsuba_is_there() if mitsuba else "not asked"
     effort: Effort = "full" if full else "quick"
     choice = Choice(names, effort, seed, series, at, not missing)
@@ -88,7 +90,7 @@ def stability(
         write(out, found, effort, seed, facts)
         display.line("pictures and page")
         pictures = shoot(choice, found, out, processes)
-        write_page(out / "stability.html", found, pictures, effort, seed, facts)
+        write_page(page, found, pictures, effort, seed, facts)
     console = Console(highlight=False)
     if not console.is_terminal:
         console.width = 180  # a log has no edge, and words stay whole

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.results import RUNGS
+from comparisons.results import COMPARED
 from reference_rt.cli import guarded
 from reference_rt.errors import UsageError
 
@@ -30,7 +30,7 @@ def suite(
         typer.Option(metavar="GLOB", help="Only cases of such names, like 'material_*'."),
     ] = None,
     tier: Annotated[
-        list[str] | None, typer.Option(metavar="RUNG", help=f"Only these: {', '.join(RUNGS[2:])}.")
+        list[str] | None, typer.Option(metavar="RUNG", help=f"Only these: {', '.join(COMPARED)}.")
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes at once.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
@@ -48,26 +48,37 @@ def suite(
         from comparisons.ci import github as github_actions
         from comparisons.ci import junit as junit_xml
         from comparisons.suites.display import summarise
-        from comparisons.suites.run import Options, run_suite
+        from comparisons.suites.run import Options, Run, run_suite
         from comparisons.suites.suite import load_suite, plan
         from comparisons.verdict import exit_code
+    from reference_rt.files import check_writable
 
     rungs = tuple(tier or ())
-    if unknown := [rung for rung in rungs if rung not in RUNGS[2:]]:
-        raise UsageError(f"--tier: expected one of {', '.join(RUNGS[2:])}, got '{unknown[0]}'")
+    if unknown := [rung for rung in rungs if rung not in COMPARED]:
+        raise UsageError(f"--tier: expected one of {', '.join(COMPARED)}, got '{unknown[0]}'")
     source = load_suite(name)
     planned = plan(source, scenes, tuple(only or ()), rungs)
     folder = out or Path("out") / source.name
     jobs = jobs or min(os.cpu_count() or 1, MOST_JOBS)
     threads = max((os.cpu_count() or 1) // jobs, 1)
-    run = run_suite(source, planned, Options(folder, rungs, jobs, threads, fresh))
     files = {work.name: work.path.as_posix() for work in planned.work}
-    if junit is not None:
-        junit_xml.write(junit, run.cases, source.name, run.walls, run.not_run)
-    if github or github_actions.is_there():
-        github_actions.annotate(run.cases, sys.stdout, files)
-        if (summary := github_actions.summary_path()) is not None:
-            github_actions.summarise(run.cases, summary, source.name, run.not_run)
-    summarise(run.cases, run.walls, run.not_run)
-    typer.echo(f"{folder / 'results.json'}, {folder / 'report.html'}", err=True)
-    raise typer.Exit(exit_code(run.cases))
+    on_github = github or github_actions.is_there()
+    summary = github_actions.summary_path() if on_github else None
+    check_writable(*(path for path in (junit, summary) if path is not None))
+
+    def tell(run: Run) -> None:
+        """Also of a run that is interrupted: what a build server shows must not be of a former
+        run."""
+        if junit is not None:
+            junit_xml.write(junit, run.cases, source.name, run.walls, run.not_run, run.missing)
+        if on_github:
+            github_actions.annotate(run.cases, sys.stdout, files, run.missing)
+        if summary is not None:
+            title = source.name
+            github_actions.summarise(run.cases, summary, title, run.not_run, run.missing)
+        summarise(run.cases, run.walls, run.not_run, run.missing)
+        typer.echo(f"{options.results}, {options.report}", err=True)
+
+    options = Options(folder, rungs, jobs, threads, fresh, tell=tell)
+    run = run_suite(source, planned, options)
+    raise typer.Exit(exit_code(run.cases, run.missing))

@@ -1,8 +1,11 @@
 """Error against run time: ours and Mitsuba's, sample for sample and second for second."""
 
-import math
+from typing import TYPE_CHECKING
 
 from reference_rt.scene import Scene
+
+if TYPE_CHECKING:
+    from comparisons.convergence.findings import Target
 
 CONTESTANTS = ("ours", "mitsuba_llvm", "mitsuba_llvm_best", "mitsuba_scalar")
 
@@ -11,7 +14,14 @@ NARROW = 64
 
 
 def time_to_error(scene: Scene, target: float, seconds: float) -> dict[str, float]:
-    """Render seconds until the relative error, the root of relMSE, is `target`, by contestant.
+    """Render seconds until the relative error, the root of relMSE, is `target`, by contestant: the
+    values of `reached`, which also says how they are known."""
+    found = reached(scene, target, seconds)
+    return {name: one.seconds.value for name, one in found.items()}
+
+
+def reached(scene: Scene, target: float, seconds: float) -> "dict[str, Target]":
+    """When the relative error, the root of relMSE, is `target`, by contestant.
 
     scene: of a random integrator; rendered through a box filter and at most 64 pixels wide, where
     a short budget still reaches high rungs (times grow with the pixels, ratios do not);  seconds:
@@ -19,7 +29,7 @@ def time_to_error(scene: Scene, target: float, seconds: float) -> dict[str, floa
     "ours", "mitsuba_llvm", "mitsuba_llvm_best" (its best sampler), "mitsuba_scalar"; one that
     cannot render the scene, or not within the budget, is absent; one with a proven bias above the
     target takes infinitely long.  Times are medians of warm renders on all cores, read off the
-    measured ladder of samples, or off its fit where the target lies beyond.
+    measured ladder of samples, or off its fit where the target lies beyond ("extrapolated").
 
     Raises SceneError, ReferenceUnavailableError; ValueError for a deterministic scene.
     """
@@ -38,8 +48,8 @@ def time_to_error(scene: Scene, target: float, seconds: float) -> dict[str, floa
         crops=False,
     )
     found = converge(scene, settings).findings
-    times = {name: found[name].targets[0].seconds.value for name in CONTESTANTS if name in found}
-    return {name: time for name, time in times.items() if not math.isnan(time)}
+    times = {name: found[name].targets[0] for name in CONTESTANTS if name in found}
+    return {name: one for name, one in times.items() if one.how != "unknown"}
 
 
-__all__ = ["time_to_error"]
+__all__ = ["reached", "time_to_error"]

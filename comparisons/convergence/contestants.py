@@ -1,8 +1,8 @@
 """Who is timed: ours and Mitsuba's variants, each with its default sampler and its best one."""
 
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, Self
 
@@ -35,6 +35,9 @@ class Renderer(Protocol):
     def __call__(self, spp: int, replicate: int) -> Shot:
         """A picture of about `spp` samples a pixel; another `replicate` is independent of it."""
 
+
+MOST_TOLD = 200
+"""Characters of a renderer's message that a reason quotes."""
 
 BEST = "best"
 """Stands for the sampler that a trial is to find."""
@@ -92,6 +95,16 @@ def chosen(only: tuple[str, ...]) -> tuple[Contestant, ...]:
 
 class AbsentError(Exception):
     """A contestant cannot render the scene; the message says why."""
+
+
+@contextmanager
+def failing(what: str) -> Iterator[None]:
+    """Turn the exceptions of Mitsuba and Dr.Jit into AbsentError: one contestant that fails must
+    not cost the curves of the others."""
+    try:
+        yield
+    except (RuntimeError, MemoryError) as error:
+        raise AbsentError(f"{what}: {' '.join(str(error).split())[:MOST_TOLD]}") from None
 
 
 def remarks(scene: Scene) -> list[str]:
@@ -172,15 +185,17 @@ class Stable:
             raise AbsentError(
                 f"{instances} instances, for which Mitsuba's llvm variant takes minutes to compile"
             )
-        mi_scene = mi.load_dict(description)
+        with failing("Mitsuba cannot load the scene"):
+            mi_scene = mi.load_dict(description)
         sampler = mi_scene.sensors()[0].sampler()
 
         def shot(spp: int, replicate: int) -> Shot:
             mi = self._in(contestant.side)
             settle()
             start = time.perf_counter()
-            # The array is what forces the lazy rendering to happen.
-            found = np.array(mi.render(mi_scene, spp=spp, seed=seed_of(replicate)))
+            with failing(f"Mitsuba cannot render {spp} samples a pixel"):
+                # The array is what forces the lazy rendering to happen.
+                found = np.array(mi.render(mi_scene, spp=spp, seed=seed_of(replicate)))
             seconds = time.perf_counter() - start
             return Shot(_three(found), int(sampler.sample_count()), seconds)
 

@@ -7,8 +7,7 @@ from typing import NamedTuple
 from comparisons.convergence.contestants import Contestant
 from comparisons.convergence.crops import Crops
 from comparisons.convergence.data import Reference
-from comparisons.convergence.estimates import Estimate
-from comparisons.convergence.findings import Findings, ratio
+from comparisons.convergence.findings import Findings, Ratio, compared
 from reference_rt.shapes.shape import FloatArray
 
 Starts = Mapping[str, Mapping[str, Mapping[str, float]]]
@@ -53,14 +52,16 @@ class Grids:
 class Curves:
     """Error against time of one scene.
 
-    scene: its name;  size: width and height in pixels;  contestants, findings: by name;  grids: of
-    a deterministic scene, which has no reference and no findings;  starts: of processes;  crops:
-    pictures at equal time and at equal error;  left_out: what was not done, and why;  notes: what a
-    reader should know;  again: the command that repeats it.
+    scene: its name;  size: width and height in pixels;  contestants, findings: by name;  absent:
+    why there are no findings of other contestants, by name;  grids: of a deterministic scene, which
+    has no reference and no findings;  starts: of processes;  crops: pictures at equal time and at
+    equal error;  left_out: what else was not done, and why;  notes: what a reader should know;
+    again: the command that repeats it;  problem: why there is nothing at all, because the scene is
+    invalid, or because the run was interrupted before it.
     """
 
     scene: str
-    size: tuple[int, int]
+    size: tuple[int, int] = (0, 0)
     contestants: Mapping[str, Contestant] = field(default_factory=dict)
     findings: Mapping[str, Findings] = field(default_factory=dict)
     reference: Reference | None = None
@@ -70,14 +71,21 @@ class Curves:
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     again: str = ""
+    problem: str = ""
+    absent: Mapping[str, str] = field(default_factory=dict)
 
-    def ratios(self, name: str = "ours") -> dict[str, list[Estimate | None]]:
+    @property
+    def missing(self) -> list[str]:
+        """A line for each contestant without findings: who, and why."""
+        return [f"{self.contestants[name].title}: {why}" for name, why in self.absent.items()]
+
+    def ratios(self, name: str = "ours") -> dict[str, list[Ratio]]:
         """Times to the targets of contestant `name` over those of each other, with bands."""
         if name not in self.findings:
             return {}
         mine = self.findings[name].targets
         return {
-            other: [ratio(a, b) for a, b in zip(mine, found.targets, strict=True)]
+            other: [compared(a, b) for a, b in zip(mine, found.targets, strict=True)]
             for other, found in self.findings.items()
             if other != name
         }

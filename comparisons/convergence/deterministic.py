@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from comparisons import pictures
+from comparisons.convergence.contestants import AbsentError, failing
 from comparisons.convergence.curves import GridPoint, Grids, GridStep
 from comparisons.convergence.data import Settings, weights
 from comparisons.convergence.store import Store
@@ -87,8 +88,9 @@ def _made(scene: Scene, settings: Settings, say: Say) -> tuple[Grids, list[str]]
         say("grids", n / most)
     points = []
     try:
-        points.append(_mitsubas(scene))
-    except UntranslatableError as error:
+        with failing("Mitsuba cannot render the scene"):
+            points.append(_mitsubas(scene))
+    except (UntranslatableError, AbsentError) as error:
         left_out.append(f"Mitsuba: {error}")
     return Grids(tuple(steps), tuple(points), across * across, finest), left_out
 

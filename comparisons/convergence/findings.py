@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -53,6 +53,31 @@ class Target(NamedTuple):
     seconds: Estimate
     spp: float
     drawn: FloatArray
+
+
+class Ratio(NamedTuple):
+    """A time to a target over another, and how much it is worth.
+
+    times: the ratio with the band of both, None where it is unknown;  extrapolated: whether a time
+    lies beyond the last rung that was measured;  bound: "at most" where only the first is reached
+    by the first rung already, so that its time is an upper bound, "at least" where only the second
+    is, "neither" where both are;  why: it is unknown, else "".
+    """
+
+    times: Estimate | None
+    extrapolated: bool = False
+    bound: Literal["", "at most", "at least", "neither"] = ""
+    why: str = ""
+
+    @property
+    def shown(self) -> Literal["", "less", "more"]:
+        """ "less" or "more" where measurements, with their bands, show the ratio to be less or more
+        than 1; what is extrapolated shows neither."""
+        if self.times is None or self.extrapolated or self.bound == "neither":
+            return ""
+        if self.times.high < 1.0 and self.bound != "at least":
+            return "less"
+        return "more" if self.times.low > 1.0 and self.bound != "at most" else ""
 
 
 @dataclass(frozen=True)
@@ -162,4 +187,20 @@ def ratio(mine: Target, theirs: Target) -> Estimate | None:
     return band(drawn[np.isfinite(drawn)])
 
 
-__all__ = ["Findings", "Step", "Target", "findings_of", "points_of", "ratio"]
+def compared(mine: Target, theirs: Target) -> Ratio:
+    """Times to one target, mine over theirs."""
+    first = mine.how == "below", theirs.how == "below"
+    unknown = [who for who, t in (("ours", mine), ("theirs", theirs)) if t.how == "unknown"]
+    times = ratio(mine, theirs)
+    why = f"{' and '.join(unknown)}: too few rungs, or the error does not fall" if unknown else ""
+    if not why and times is None:
+        why = "neither reaches it"
+    return Ratio(
+        times,
+        "extrapolated" in (mine.how, theirs.how),
+        "neither" if all(first) else "at most" if first[0] else "at least" if first[1] else "",
+        why,
+    )
+
+
+__all__ = ["Findings", "Ratio", "Step", "Target", "compared", "findings_of", "points_of", "ratio"]

@@ -5,7 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from comparisons.convergence.contestants import Renderer
+import numpy as np
+
+from comparisons.convergence.contestants import AbsentError, Renderer
 from comparisons.convergence.data import Reference, Rung
 from comparisons.convergence.estimates import Accumulator, against
 from comparisons.convergence.store import Store
@@ -26,7 +28,8 @@ class Climb:
 
     renderer: makes it ready, when first needed;  planned: its rungs;  share: its seconds;  apart:
     whether its turn comes when the others are through with their rungs, since changing to it takes
-    time;  gathered: by samples asked for, what is done of them;  stopped: why not all are.
+    time;  gathered: by samples asked for, what is done of them;  stopped: why not all are;  failed:
+    why it has no rungs at all.
     """
 
     renderer: Callable[[], Renderer]
@@ -35,11 +38,27 @@ class Climb:
     apart: bool = False
     gathered: dict[int, Accumulator] = field(default_factory=dict)
     stopped: str = ""
+    failed: str = ""
 
     @property
     def rungs(self) -> list[Rung]:
         """Those that are done, the lowest first."""
         return [self.gathered[spp].rung() for spp in self.planned if self.gathered[spp].count]
+
+    def add(self, spp: int, replicate: int) -> None:
+        """Render one more picture.  A contestant that cannot, or whose picture is not finite, gives
+        up all of its rungs."""
+        try:
+            shot = self.renderer()(spp, replicate)
+        except AbsentError as error:
+            self.failed = str(error)
+        else:
+            bad = np.count_nonzero(~np.isfinite(shot.picture).all(axis=-1))
+            if not bad:
+                self.gathered[spp].add(*shot)
+                return
+            self.failed = f"{bad} pixels of a picture of {spp} samples a pixel are not finite"
+        self.planned = ()
 
     def shorten(self, replicates: int) -> None:
         """Give up the highest rungs where the pictures so far say that all replicates would take
@@ -80,7 +99,8 @@ def climb(
 
     def keep() -> None:
         for name, spp in sorted(changed):
-            store.keep(name, climbs[name].gathered[spp].rung())
+            if not climbs[name].failed:
+                store.keep(name, climbs[name].gathered[spp].rung())
         changed.clear()
 
     say("ladder", 0.0)
@@ -89,10 +109,10 @@ def climb(
             sweep = _sweep(climbs)
             samples, all_samples = 0, sum(spp for _, spp in sweep)
             for name, spp in sweep:
-                gathered = climbs[name].gathered[spp]
-                if gathered.count <= k:
+                one = climbs[name]
+                if one.gathered[spp].count <= k and not one.failed:
                     # The numbers of other rungs' replicates are none of this one's.
-                    gathered.add(*climbs[name].renderer()(spp, spp * replicates + k))
+                    one.add(spp, spp * replicates + k)
                     changed.add((name, spp))
                 samples += spp
                 say("ladder", (k + samples / all_samples) / replicates)

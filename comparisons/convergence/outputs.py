@@ -48,12 +48,17 @@ def write_results(
                          "bias" and "relative_bias": {"squared", "low", "high", "seen"},
                          "targets": [{"error", "how", "spp",
                                       "seconds": {"value", "low", "high"}}]}},
-                     "ratios": {name: [{"error", "value", "low", "high"} or null]},
+                     "absent": {name of another contestant: why it has no findings},
+                     "ratios": {name: [{"error", "value", "low", "high", "extrapolated": whether a
+                                        time lies beyond the measured rungs, "bound": "at most" or
+                                        "at least" or "neither" where times of first rungs are
+                                        upper bounds, else ""} or null]},
                      "grids": {"finest_spp", "steps": [...], "mitsuba": [...]} or null,
                      "starts": {side: {"cold" and "warm": {stage: seconds}}},
                      "crops": [{"kind", "level", "corner", "size",
                                 "shown": {name: {"spp", "seconds", "error"}}}],
-                     "left_out": [...], "notes": [...]}]}
+                     "left_out": [...], "notes": [...],
+                     "problem": why there is nothing about the scene, "" for most}]}
 
     Bands hold the value with a confidence of 95 %; a squared bias lies above "low" with 99.99 % and
     below "high" with 99 %.  "ratios" are ours over the contestant's.  Strict JSON (RFC 8259): NaN
@@ -110,6 +115,7 @@ def _scene(one: Curves) -> dict[str, Any]:
             "seconds": reference.seconds,
         },
         "contestants": {name: _contestant(one, name) for name in one.findings},
+        "absent": one.absent,
         "ratios": _ratios(one),
         "grids": None
         if one.grids is None
@@ -134,6 +140,7 @@ def _scene(one: Curves) -> dict[str, Any]:
         ],
         "left_out": one.left_out,
         "notes": one.notes,
+        "problem": one.problem,
     }
 
 
@@ -188,7 +195,9 @@ def _ratios(one: Curves) -> dict[str, Any]:
     errors = [target.error for target in one.findings["ours"].targets]
     return {
         name: [
-            found and {"error": error, **found._asdict()}
+            found.times
+            and {"error": error, **found.times._asdict()}
+            | {"extrapolated": found.extrapolated, "bound": found.bound}
             for error, found in zip(errors, ratios, strict=True)
         ]
         for name, ratios in one.ratios().items()

@@ -14,8 +14,8 @@ from PIL import Image
 from comparisons.convergence.crops import Crops
 from comparisons.convergence.curves import Curves
 from comparisons.convergence.data import Settings
-from comparisons.convergence.estimates import Bias, Estimate
-from comparisons.convergence.findings import Target
+from comparisons.convergence.estimates import Bias
+from comparisons.convergence.findings import Ratio, Target
 from comparisons.convergence.fits import Line
 from comparisons.convergence.starts import STAGES
 from comparisons.metrics import encode, white_level
@@ -58,36 +58,60 @@ def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
     """Ours against each other contestant at one target, scene by scene, and the medians."""
     targets = list(settings.targets)
     if not targets:
-        return {"target": "", "columns": [], "rows": [], "medians": []}
+        return {"target": "", "columns": [], "rows": [], "medians": [], "absent": []}
     place = targets.index(0.01) if 0.01 in targets else len(targets) - 1
-    names = list(dict.fromkeys(name for one in curves for name in one.ratios()))
     titles = {name: c.title for one in curves for name, c in one.contestants.items()}
+    names = [name for name in titles if name != "ours"]
     rows = []
-    known: dict[str, list[float]] = {name: [] for name in names}
+    known: dict[str, list[Ratio]] = {name: [] for name in names}
     for number, one in enumerate(curves, 1):
         found = {name: ratios[place] for name, ratios in one.ratios().items()}
-        rows.append((number, one.scene, _kind(one), [_ratio(found.get(name)) for name in names]))
+        cells = [_ratio(found[n]) if n in found else _without_ratio(one, n) for n in names]
+        rows.append((number, one.scene, _instead(one), cells))
         for name, ratio in found.items():
-            if ratio is not None and math.isfinite(ratio.value):
-                known[name].append(ratio.value)
-    medians = [f"{np.median(values):.2f}" if values else "–" for values in known.values()]
+            known[name].append(ratio)
     return {
         "target": percent(targets[place]),
         "columns": [titles[name] for name in names],
         "rows": rows,
-        "medians": medians,
+        "medians": [_median(ratios) for ratios in known.values()],
+        "absent": [f"{one.scene}: {line}" for one in curves for line in one.missing],
     }
 
 
-def _kind(one: Curves) -> str:
-    return "grid" if one.grids is not None else "ladder"
+def _instead(one: Curves) -> str:
+    """What is said of a scene that has no ladder."""
+    if one.problem:
+        return one.problem
+    if one.grids is None:
+        return ""
+    return "; ".join(["deterministic: a grid of samples, no ladder", *one.left_out])
+
+
+def _without_ratio(one: Curves, name: str) -> Cell:
+    """Of a scene and a contestant one of which was not asked for, or has no data."""
+    who = next((n for n in ("ours", name) if n in one.absent), None)
+    if who is None:
+        return Cell("–", "ours is not there" if name in one.findings else "not asked for")
+    return Cell("no data", "of ours" if who == "ours" else "see below", "bad")
+
+
+def _median(ratios: Sequence[Ratio]) -> Cell:
+    """Over scenes; "never" counts as 0 or as infinity."""
+    values = [ratio.times.value for ratio in ratios if ratio.times is not None]
+    if not values:
+        return Cell("–")
+    extrapolated = sum(ratio.extrapolated for ratio in ratios if ratio.times is not None)
+    scenes = f"of {len(values)} scene{'s' if len(values) != 1 else ''}"
+    told = [scenes, *([f"{extrapolated} extrapolated"] if extrapolated else [])]
+    median = float(np.median(values))
+    look = "extrapolated" if extrapolated else ""
+    return Cell(f"{median:.2f}" if math.isfinite(median) else "∞", ", ".join(told), look)
 
 
 def _view(one: Curves) -> dict[str, Any]:
     """What the template shows of a scene."""
     view: dict[str, Any] = {"one": one, "plots": [], "picture": "", "crops": []}
-    titles = [one.contestants[name].title for name in one.findings]
-    view["titles"] = titles
     if one.reference is not None:
         white = white_level(one.reference.mean)
         view["picture"] = _png(one.reference.mean, white)
@@ -106,7 +130,7 @@ def _view(one: Curves) -> dict[str, Any]:
         (
             one.contestants[name].title,
             [_reached(target) for target in found.targets],
-            [_ratio(r) for r in ratios[name]] if name in ratios else None,
+            [_ratio(ratio) for ratio in ratios[name]] if name in ratios else None,
         )
         for name, found in one.findings.items()
     ]
@@ -189,6 +213,7 @@ def _reached(target: Target) -> Cell:
             return Cell(f"≤ {_seconds(target.seconds.value)}", "first rung")
     small = f"{_seconds(target.seconds.low)} to {_seconds(target.seconds.high)}"
     if target.how == "extrapolated":
+        small = f"extrapolated, {small}"
         return Cell(f"≈ {_seconds(target.seconds.value)}", small, "extrapolated")
     return Cell(_seconds(target.seconds.value), small)
 
@@ -197,13 +222,22 @@ def _seconds(value: float) -> str:
     return f"{shown(float(f'{value:.3g}'))} s" if math.isfinite(value) else "∞"
 
 
-def _ratio(found: Estimate | None) -> Cell:
-    if found is None:
-        return Cell("–")
-    look = "good" if found.high < 1.0 else "bad" if found.low > 1.0 else ""
-    if found.low == found.high:
-        return Cell("0" if found.value == 0.0 else "∞", "bias", look)
-    return Cell(f"{found.value:.2f}", f"{found.low:.2f} to {found.high:.2f}", look)
+def _ratio(found: Ratio) -> Cell:
+    """Green or red only where what was measured says so."""
+    times = found.times
+    if times is None:
+        return Cell("–", found.why)
+    look = {"less": "good", "more": "bad", "": ""}[found.shown]
+    if times.low == times.high:
+        return Cell("0" if times.value == 0.0 else "∞", "bias", look)
+    sign = {"at most": "≤ ", "at least": "≥ ", "neither": "≈ ", "": ""}[found.bound]
+    told = [f"{times.low:.2f} to {times.high:.2f}"]
+    if found.bound:
+        told.insert(0, "first rungs" if found.bound == "neither" else "first rung")
+    if found.extrapolated:
+        sign, look = sign or "≈ ", "extrapolated"
+        told.insert(0, "extrapolated")
+    return Cell(f"{sign}{times.value:.2f}", ", ".join(told), look)
 
 
 def _slope(line: Line | None) -> Cell:

@@ -83,18 +83,22 @@ def converge(
 @dataclass(frozen=True)
 class Plan:
     """rungs: by contestant;  reference_spp: samples a pixel of each picture of the reference;
-    merits: of Mitsuba's samplers, by the variant that was tried;  left_out: what, and why."""
+    merits: of Mitsuba's samplers, by the variant that was tried;  left_out: which rungs of a
+    contestant, and why;  absent: why contestants have no rungs at all, by name."""
 
     rungs: dict[str, list[int]]
     reference_spp: int
     merits: dict[str, dict[str, float]]
     left_out: list[str]
+    absent: dict[str, str]
 
     def resolved(self, contestant: Contestant) -> Contestant:
         """The contestant with the best sampler, where it asks for that."""
         if contestant.sampler != BEST:
             return contestant
-        (found,) = self.merits.values()
+        found = next(iter(self.merits.values()), None)
+        if found is None:
+            return contestant
         return with_sampler(contestant, min(found, key=lambda name: found[name]))
 
 
@@ -120,15 +124,19 @@ class _Run:
         plan = self._plan(contestants)
         reference = reference_of(scene, plan.reference_spp, self.say)
         share = settings.time_limit / (len(plan.rungs) + 1)
-        by_name = {c.name: plan.resolved(c) for c in contestants if plan.rungs.get(c.name)}
+        everyone = {c.name: plan.resolved(c) for c in contestants}
+        by_name = {name: c for name, c in everyone.items() if plan.rungs.get(name)}
         climbs = {
             name: Climb(partial(self.renderer, c), plan.rungs[name], share, c.side == SCALAR)
             for name, c in by_name.items()
         }
         climb(climbs, reference, settings.replicates, self.store, self.say)
+        absent = plan.absent | {name: one.failed for name, one in climbs.items() if one.failed}
+        by_name = {name: c for name, c in by_name.items() if name not in absent}
         left_out = [*plan.left_out]
-        left_out += [f"{by_name[n].title}: {c.stopped}" for n, c in climbs.items() if c.stopped]
-        climbed = {name: one.rungs for name, one in climbs.items()}
+        stopped = {c.title: climbs[name].stopped for name, c in by_name.items()}
+        left_out += [f"{title}: {why}" for title, why in stopped.items() if why]
+        climbed = {name: climbs[name].rungs for name in by_name}
         renderers = {name: climbs[name].renderer for name in climbed}
         starts = starts_of(scene, by_name.values(), self.store, self.say) if settings.starts else {}
         left_out += [f"starts of {side}: a process failed" for side, t in starts.items() if not t]
@@ -138,7 +146,7 @@ class _Run:
         return Curves(
             scene.name,
             (scene.film.width, scene.film.height),
-            by_name,
+            everyone,
             {
                 name: findings_of(rungs, reference, settings.targets, by_name[name].is_independent)
                 for name, rungs in climbed.items()
@@ -148,6 +156,7 @@ class _Run:
             crops=crops_of(climbed, renderers, reference, self.store) if settings.crops else (),
             left_out=tuple(left_out),
             notes=notes,
+            absent=absent,
         )
 
     def _plan(self, contestants: tuple[Contestant, ...]) -> Plan:
@@ -157,7 +166,7 @@ class _Run:
         stored = self.store.fact("plan", question)
         if stored is not None:
             return Plan(**stored)
-        plan = Plan({}, 0, {}, [])
+        plan = Plan({}, 0, {}, [], {})
         costs = self._costs(contestants, plan)
         share = settings.time_limit / (len(costs) + 1)
         pixels = self.scene.film.width * self.scene.film.height
@@ -168,7 +177,8 @@ class _Run:
                 fit = rungs(settings.max_spp)[:2]
             why = why_left_out(cost, fit, share, settings, pixels, factor)
             if len(fit) < 2:
-                fit, why = (), f"all: two rungs at least make a curve; {why}"
+                plan.absent[contestant.name] = f"two rungs at least make a curve; {why}"
+                continue
             if why:
                 plan.left_out.append(f"{contestant.title}: {why}")
             plan.rungs[contestant.name] = list(fit)
@@ -190,7 +200,7 @@ class _Run:
                 chosen_one = plan.resolved(contestant)
                 found[chosen_one] = estimate(self.renderer(chosen_one))
             except AbsentError as error:
-                plan.left_out.append(f"{contestant.title}: {error}")
+                plan.absent[contestant.name] = str(error)
         self.say("trial pictures", 1.0)
         return found
 

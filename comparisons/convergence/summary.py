@@ -5,22 +5,22 @@ from pathlib import Path
 
 from comparisons.convergence.curves import Curves
 from comparisons.convergence.data import Settings
+from comparisons.convergence.findings import Ratio, Target
 from comparisons.report.values import percent
 
 
 def lines_of(curves: Curves) -> list[str]:
     """A line for each contestant, or grid of samples, and for what was left out."""
+    if curves.problem:
+        return [f"{curves.scene}: {curves.problem}"]
     lines = []
     ratios = curves.ratios()
     for name, found in curves.findings.items():
-        times = ", ".join(
-            f"{percent(target.error)} in {'about ' * (target.how == 'extrapolated')}"
-            f"{target.seconds.value:.3g} s"
-            for target in found.targets
-        )
-        known = [r.value for r in ratios.get(name, []) if r is not None]
-        against = f"; ours / this: {', '.join(f'{value:.2f}' for value in known)}" if known else ""
+        times = ", ".join(f"{percent(target.error)} {_told(target)}" for target in found.targets)
+        known = [_against(r) for r in ratios.get(name, []) if r.times is not None]
+        against = f"; ours / this: {', '.join(known)}" if known else ""
         lines.append(f"{name}: {times}{against}")
+    lines += [f"no data of {line}" for line in curves.missing]
     if curves.grids is not None:
         lines += [
             f"ours, {step.spp} samples: {percent(step.relmse**0.5)} in {step.seconds:.3g} s"
@@ -33,6 +33,31 @@ def lines_of(curves: Curves) -> list[str]:
         ]
     lines += [f"left out: {line}" for line in curves.left_out]
     return [f"{curves.scene}: {line}" for line in lines]
+
+
+def _told(target: Target) -> str:
+    seconds = f"{target.seconds.value:.3g} s"
+    match target.how:
+        case "bias":
+            return "never (bias)"
+        case "unknown":
+            return "unknown"
+        case "below":
+            return f"in at most {seconds}"
+        case "extrapolated":
+            return f"in about {seconds} (extrapolated)"
+    return f"in {seconds}"
+
+
+def _against(ratio: Ratio) -> str:
+    assert ratio.times is not None
+    told = f"{ratio.times.value:.2f}"
+    match ratio.bound:
+        case "at most" | "at least":
+            told = f"{ratio.bound} {told}"
+        case "neither":
+            told += " (first rungs)"
+    return f"{told} (extrapolated)" if ratio.extrapolated else told
 
 
 def again(path: Path, out: Path, settings: Settings) -> str:

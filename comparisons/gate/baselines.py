@@ -27,6 +27,7 @@ from comparisons.gate.reference import Reference, stacked, usable
 from reference_rt.description import Description
 from reference_rt.errors import ImageError, SceneError, UsageError
 from reference_rt.exr import write_exr
+from reference_rt.files import check_writable
 from reference_rt.scene import Scene
 
 RECORD = "baseline.json"
@@ -102,6 +103,14 @@ def check_name(name: str) -> None:
         )
 
 
+def check_place(folder: Path, name: str) -> None:
+    """Refuse a baseline that `accept` could not write.  Raises UsageError, ImageError."""
+    check_name(name)
+    if (folder / name).is_file():
+        raise ImageError(f"{folder / name}: is a file; expected the folder of a baseline")
+    check_writable(folder / "a baseline")
+
+
 def load(folder: Path, name: str, candidates: Sequence[str] = ()) -> Baseline:
     """The baseline `name` in `folder`.
 
@@ -153,7 +162,7 @@ def accept(
     (pictures of unlike size, or none that could be a reference).
     """
     refuse_in_ci()
-    check_name(name)
+    check_place(folder, name)
     if not reason.strip():
         raise UsageError("--reason: is empty; expected why this picture is right")
     pictures = usable(candidates)

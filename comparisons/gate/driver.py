@@ -14,7 +14,7 @@ from pathlib import Path
 
 from comparisons.gate.errors import RendererError
 from comparisons.gate.pictures_in import Picture, read_candidate
-from reference_rt.errors import UsageError
+from reference_rt.errors import ImageError, UsageError
 
 PLACEHOLDERS = ("scene", "output", "seed", "spp")
 
@@ -94,7 +94,7 @@ def drive(
                 keep.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(output, kept)
             except OSError as error:
-                raise UsageError(f"{kept}: cannot be written: {error.strerror}") from None
+                raise ImageError(f"{kept}: cannot be written: {error.strerror}") from None
         pictures.append(read_candidate(kept))
     return pictures
 

@@ -1,7 +1,6 @@
 """What a gate leaves behind: results.json and the page, JUnit XML, what GitHub shows."""
 
 import sys
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ from comparisons.provenance import ours
 from comparisons.report import write_report, write_results
 from comparisons.results import Case
 from comparisons.verdict import exit_code
+from reference_rt.files import check_writable
 
 
 def write(
@@ -29,11 +29,19 @@ def write(
     return results, report
 
 
-def remove(out: Path) -> None:
-    """Remove what an earlier gate wrote: what is there afterwards is of this one."""
-    with suppress(OSError):
-        for name in ("results.json", "report.html"):
-            (out / name).unlink(missing_ok=True)
+def prepare(out: Path, *others: Path) -> None:
+    """Check that `write` can write to `out`, and that these other files can be written; remove what
+    an earlier gate wrote: what is there afterwards is of this one.  Raises ImageError."""
+    files = out / "results.json", out / "report.html"
+    check_writable(*files, *others)
+    for file in files:
+        file.unlink(missing_ok=True)
+
+
+def ci_files(junit_file: Path | None, annotate: bool) -> tuple[Path, ...]:
+    """The files that `for_ci` writes."""
+    summary = github.summary_path() if annotate or github.is_there() else None
+    return tuple(path for path in (junit_file, summary) if path is not None)
 
 
 def for_ci(case: Case, junit_file: Path | None, about: str, annotate: bool) -> None:

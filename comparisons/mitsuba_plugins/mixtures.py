@@ -1,8 +1,9 @@
 """Blends and masks whose parts can be asked one by one, and sampled where they are mirrors.
 
 Mitsuba's own, as of 3.9.1: a blend joins the probability of a mirrored direction and the density of
-the other material there as if they were the same thing, which takes light away from mirrors (half
-of one over half of a diffuse material keeps 0.5 / (1 + cos / pi) of its light, instead of 0.5); a
+the other material there as if they were the same thing, which takes light away from mirrors: one
+with a share w has (w + (1 - w) f) / (w + (1 - w) p) of its light, with f the value of the other
+material in the mirrored direction (its cosine included) and p its density there; a
 mask that is asked for one of its components takes the wrong one.  Everything else here is
 Mitsuba's.
 """

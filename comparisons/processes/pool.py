@@ -43,12 +43,14 @@ R = TypeVar("R", bound=Request)
 @dataclass(frozen=True)
 class Outcome(Generic[R]):
     """How a request ended.  failure: why nothing came of it, None if something did;  log: what its
-    process wrote to standard error meanwhile;  wall: seconds."""
+    process wrote to standard error meanwhile;  wall: seconds;  invalid: whether the failure is that
+    a scene, or a file that it names, is invalid."""
 
     request: R
     failure: str | None
     log: str
     wall: float
+    invalid: bool = False
 
 
 def run(
@@ -89,6 +91,7 @@ def run(
             if worker not in busy:
                 continue  # its last words, after it was ended
             failure: str | None
+            invalid = message is not None and "invalid" in message
             if message is None:
                 worker.end()
                 failure = f"took longer than {seconds:g} s"
@@ -98,10 +101,10 @@ def run(
             elif "unavailable" in message:
                 raise ReferenceUnavailableError(str(message["unavailable"]))
             elif message:
-                failure = message.get("failed")
+                failure = message.get("invalid", message.get("failed"))
             else:
                 failure = worker.cause_of_death()
-            yield worker.outcome(failure)
+            yield worker.outcome(failure, invalid)
             if left and worker.is_fit():
                 give(worker)
             else:
@@ -154,10 +157,10 @@ class _Worker(Generic[R]):
             self._process.stdin.write(request.model_dump_json().encode() + b"\n")
             self._process.stdin.flush()
 
-    def outcome(self, failure: str | None) -> Outcome[R]:
+    def outcome(self, failure: str | None, invalid: bool) -> Outcome[R]:
         """How the case ended."""
         wall = time.perf_counter() - self._start
-        return Outcome(self.request, failure, self._log_of_case(), wall)
+        return Outcome(self.request, failure, self._log_of_case(), wall, invalid)
 
     def is_fit(self) -> bool:
         """Whether it can run another case."""

@@ -6,6 +6,7 @@ output one that answers:
     {"say": text}          any number of times, what is being done
     {"done": true}         what was asked for is where it was to be put
     {"failed": text}       it could not be made, and why
+    {"invalid": text}      the same, because a scene, or a file that it names, is invalid
     {"unavailable": text}  nothing can be made here, and why
 """
 
@@ -15,7 +16,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from reference_rt.errors import ReferenceRtError, ReferenceUnavailableError
+from reference_rt.errors import ReferenceRtError, ReferenceUnavailableError, SceneError
 
 
 def private_stdout() -> TextIO:
@@ -39,6 +40,8 @@ def carry_out(task: Callable[[], None], answers: TextIO) -> None:
         raise
     except ReferenceUnavailableError as error:
         tell(answers, unavailable=str(error))
+    except SceneError as error:
+        tell(answers, invalid=str(error))
     except ReferenceRtError as error:
         tell(answers, failed=str(error))
     except (Exception, SystemExit) as error:

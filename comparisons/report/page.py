@@ -19,7 +19,7 @@ from comparisons.report.fitting import Fitted, fitted
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, thumbnails
 from comparisons.report.values import shown
-from comparisons.results import RUNGS, Case, Metrics, Status
+from comparisons.results import RUNGS, Case, Metrics, Status, how_many
 
 MOST_BYTES = 15_000_000
 """Of a page, unless the caller says otherwise: what is still mailed and opened without a wait."""
@@ -68,9 +68,11 @@ def write_report(
     provenance: Mapping[str, Any],
     *,
     most_bytes: int = MOST_BYTES,
+    missing: Sequence[str] = (),
 ) -> None:
     """Write the page about `cases`, at once or not at all.
 
+    missing: names of cases that were asked for and not run, because the run was interrupted.
     `provenance` is shown as it comes: the caller names versions, Mitsuba's variant and why it was
     chosen, the machine and the date. In the numbers of a tier, a name that ends in `_bias` means
     a fraction and is shown in percent; nested mappings and lists are shown in line. A page that
@@ -95,6 +97,8 @@ def write_report(
             modes=MODES,
             provenance=provenance,
             cases=views,
+            how_many=how_many(len(cases), len(missing)),
+            missing=missing,
             coarser=sum(view["factor"] > 1 for view in views),
             most_megabytes=most_bytes / 1e6,
             script=script,

@@ -22,10 +22,13 @@ def write_results(
     provenance: Mapping[str, Any],
     suite: str | None = None,
     not_run: Mapping[str, str] | None = None,
+    missing: Sequence[str] = (),
 ) -> None:
     """Write `results.json`, at once or not at all.
 
         {"schema": 2, "suite": name or null, "provenance": {...},
+         "asked": number of cases that were asked for, those of "not_run" left out,
+         "missing": [names of those that are not here, because the run was interrupted],
          "not_run": {name of a case: why it was not run},
          "cases": [{"scene", "verdict", "reason",
                     "sides": {"candidate": whose pictures, "reference": whose},
@@ -45,6 +48,8 @@ def write_results(
         "schema": SCHEMA,
         "suite": suite,
         "provenance": _plain(provenance),
+        "asked": len(cases) + len(missing),
+        "missing": list(missing),
         "not_run": dict(not_run or {}),
         "cases": [_case(case) for case in cases],
     }

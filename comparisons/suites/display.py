@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from comparisons.ci.ranking import ranked
-from comparisons.results import Case
+from comparisons.results import WARNING, Case, how_many
 from comparisons.suites.worker import Request
 from comparisons.verdict import PASSING
 from reference_rt.console import Bar
@@ -28,24 +28,31 @@ _SLOWEST = 3
 
 
 class Display(Bar):
-    """Told of each case as it begins and ends."""
+    """Told of each case as it begins and ends.  steps: show every step and every reason as a line
+    that stays, for runs of few cases."""
 
-    def __init__(self, cases: int) -> None:
+    def __init__(self, cases: int, steps: bool = False) -> None:
         super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
+        self._steps = steps
         self._task = self._bar.add_task("", total=cases)
         self._running: dict[str, str] = {}
 
     def doing(self, request: Request, step: str) -> None:
         """A case begins, or is at `step`."""
         self._running[request.name] = step
+        if self._steps and step:
+            self.line(f"{request.name}: {step}")
         self._show()
 
     def done(self, case: Case, remark: str) -> None:
         """A case has ended."""
         self._running.pop(case.scene, None)
+        for note in case.notes:
+            if note.startswith(WARNING):
+                self.line(note)
         line = Text.assemble(f"{case.scene}: ", (case.verdict, _STYLES[case.verdict]))
         line.append(f" ({remark})")
-        if case.verdict not in PASSING:
+        if self._steps or case.verdict not in PASSING:
             line.append(f": {case.reason}")
         self._console.print(line, soft_wrap=True)
         self._bar.advance(self._task)
@@ -57,14 +64,18 @@ class Display(Bar):
 
 
 def summarise(
-    cases: Sequence[Case], walls: Mapping[str, float], not_run: Mapping[str, str]
+    cases: Sequence[Case],
+    walls: Mapping[str, float],
+    not_run: Mapping[str, str],
+    missing: Sequence[str] = (),
 ) -> None:
-    """Counts of the verdicts, what failed and at which rung first, the slowest, and what was not
-    run."""
+    """Counts of the verdicts, what failed and at which rung first, the slowest, what was not run,
+    and what is missing because the run was interrupted."""
     console = Console(stderr=True, highlight=False)
     counts = Counter(case.verdict for case in cases)
     told = ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
-    console.print(f"{len(cases)} cases: {told}", markup=False)
+    told = f": {told}" if told else ""
+    console.print(f"{how_many(len(cases), len(missing))}{told}", markup=False)
     failed = [case for case in ranked(cases) if case.verdict not in PASSING]
     if failed:
         # Why has been told on the line of the case.
@@ -81,3 +92,5 @@ def summarise(
         console.print(f"slowest: {told}", markup=False, soft_wrap=True)
     for name, why in not_run.items():
         console.print(f"not run: {name}: {why}", markup=False, soft_wrap=True)
+    if missing:
+        console.print(f"missing: {', '.join(missing)}", markup=False, soft_wrap=True)

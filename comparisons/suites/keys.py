@@ -3,6 +3,7 @@
 import hashlib
 import importlib.metadata
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -42,27 +43,28 @@ def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Back
 def files_digest(scene: Scene) -> str:
     """SHA-256 of the contents of every file that the scene names."""
     digest = hashlib.sha256()
-    for name in sorted(set(_named(scene.model_dump()))):
+    for name, keys in sorted(dict(_named(scene.model_dump())).items()):
         for path in _with_parts(scene.folder / name):
-            digest.update(path.name.encode() + b"\0")
+            digest.update(os.fsencode(path.name) + b"\0")
             try:
                 digest.update(hashlib.sha256(path.read_bytes()).digest())
-            except OSError as error:
-                raise scene.error(f"{path}: cannot be read: {error.strerror}") from None
+            except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+                reason = getattr(error, "strerror", None) or error
+                raise scene.error(f"{path}: cannot be read: {reason}", *keys) from None
     return digest.hexdigest()
 
 
-def _named(value: Any) -> Iterator[str]:
-    """The values of all keys `file`, however deep."""
+def _named(value: Any, *keys: str | int) -> Iterator[tuple[str, tuple[str | int, ...]]]:
+    """The values of all keys `file`, however deep, each with the keys that lead to it."""
     if isinstance(value, dict):
         for key, item in value.items():
             if key == "file" and isinstance(item, str):
-                yield item
+                yield item, (*keys, key)
             else:
-                yield from _named(item)
+                yield from _named(item, *keys, key)
     elif isinstance(value, list | tuple):
-        for item in value:
-            yield from _named(item)
+        for k, item in enumerate(value):
+            yield from _named(item, *keys, k)
 
 
 def _with_parts(path: Path) -> list[Path]:

@@ -1,16 +1,19 @@
-"""A suite from its plan to its results: what is done is read, the rest is run, all of it told."""
+"""Cases from their plan to their results: what is done is read, the rest is run, all of it told.
+
+`reference-rt compare` and `reference-rt suite` both run their cases through `run_cases`.
+"""
 
 import contextlib
 import shlex
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, NamedTuple
 
-from comparisons.mitsuba_backend import backend
+from comparisons.mitsuba_backend import Backend, backend
 from comparisons.processes import pool
 from comparisons.provenance import provenance
 from comparisons.record import read_case, read_record, write_case
@@ -18,56 +21,93 @@ from comparisons.report import write_report, write_results
 from comparisons.results import Case, Tier
 from comparisons.suites.display import Display
 from comparisons.suites.keys import case_key
-from comparisons.suites.suite import Plan, Source, Work, folder_name
+from comparisons.suites.suite import Source
+from comparisons.suites.work import Plan, Work, folder_name
 from comparisons.suites.worker import Request
-from reference_rt.errors import ImageError
+from reference_rt.errors import ImageError, SceneError
 from reference_rt.files import check_writable
 
 LOG = "stderr.txt"
 """In the folder of a case that could not be carried through: what its process wrote meanwhile."""
 
+_NO_LIMIT = 1e9
+"""Seconds, some thirty years: clocks of Python take no infinity."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came of a run: cases, in the order they were asked for, the seconds each took, why
+    others were not run, by name, and the names of those that are missing, because the run was
+    interrupted."""
+
+    cases: tuple[Case, ...]
+    walls: dict[str, float]
+    not_run: dict[str, str]
+    missing: tuple[str, ...] = ()
+
 
 @dataclass(frozen=True)
 class Options:
     """out: folder of the results;  rungs: only these, all if none;  jobs: processes at once;
-    threads: of each;  fresh: do again what is done;  runner: see `comparisons.suites.worker`."""
+    threads: of each;  fresh: do again what is done;  steps: show each step of a case, not only how
+    it ended;  tell: is called with what came of the run, also of one that is interrupted;  runner:
+    see `comparisons.suites.worker`."""
 
     out: Path
     rungs: tuple[str, ...] = ()
     jobs: int = 1
     threads: int | None = None
     fresh: bool = False
+    steps: bool = False
+    tell: Callable[[Run], None] = lambda run: None
     runner: str | None = None
 
+    @property
+    def results(self) -> Path:
+        """The file `results.json`."""
+        return self.out / "results.json"
 
-@dataclass(frozen=True)
-class Run:
-    """What came of a suite: cases, in the order of the plan, the seconds each took, and why others
-    were not run, by name."""
-
-    cases: tuple[Case, ...]
-    walls: dict[str, float]
-    not_run: dict[str, str]
+    @property
+    def report(self) -> Path:
+        """The page."""
+        return self.out / "report.html"
 
 
 def run_suite(source: Source, plan: Plan, options: Options) -> Run:
-    """Run what is not done yet.
-
-    `results.json` in the folder is whole after each case, so that an interrupted run keeps what it
-    found, and `report.html` comes at the end.  Raises ReferenceUnavailableError; SceneError for a
-    file that a scene names; ImageError where nothing can be written.
-    """
-    check_writable(options.out / "results.json")
-    chosen = backend()
-    facts = provenance(
-        suite=f"{source.name}: {source.suite.about}",
-        jobs=options.jobs,
+    """`run_cases` for a suite."""
+    work = tuple(w._replace(again=_again(w, source, options)) for w in plan.work)
+    facts = {
+        "suite": f"{source.name}: {source.suite.about}",
+        "jobs": options.jobs,
         **({"rungs": ", ".join(options.rungs)} if options.rungs else {}),
         **{f"not run: {name}": why for name, why in plan.skipped.items()},
-    )
+    }
+    seconds = source.suite.case_seconds
+    return run_cases(plan._replace(work=work), options, seconds, source.name, facts)
+
+
+def run_cases(
+    plan: Plan,
+    options: Options,
+    seconds: float = _NO_LIMIT,
+    suite: str | None = None,
+    facts: Mapping[str, Any] | None = None,
+) -> Run:
+    """Run the cases that are not done yet.
+
+    seconds: how long a case may take;  suite: the name of the suite, if it is one;  facts: what to
+    tell besides versions, date and machine.
+
+    `results.json` in the folder is whole after each case and says how many were asked for, so that
+    an interrupted run keeps what it found.  `report.html` is written at the end, also by Ctrl-C or
+    SIGTERM; `reference-rt report` makes it of what a killed run left.  A scene that is invalid is a
+    case that says so.  Raises ReferenceUnavailableError; ImageError where nothing can be written.
+    """
+    check_writable(options.results, options.report, options.out / "cases" / "a case")
+    chosen = backend()
+    told = provenance(**(facts or {}))
     found: dict[str, Case] = {}
     run = Run((), {}, dict(plan.skipped))
-    requests: list[Request] = []
 
     def add(case: Case, wall: float) -> None:
         if options.rungs and not _has_one_of(case, options.rungs):
@@ -75,60 +115,100 @@ def run_suite(source: Source, plan: Plan, options: Options) -> Run:
         else:
             found[case.scene], run.walls[case.scene] = case, wall
 
-    def write() -> list[Case]:
-        cases = [found[work.name] for work in plan.work if work.name in found]
-        write_results(options.out / "results.json", cases, facts, source.name, run.not_run)
-        return cases
+    def now() -> Run:
+        names = [work.name for work in plan.work if work.name not in run.not_run]
+        cases = tuple(found[name] for name in names if name in found)
+        return replace(run, cases=cases, missing=tuple(n for n in names if n not in found))
 
-    with Display(len(plan.work)) as display, _terminable():
-        display.line(f"Mitsuba {facts['mitsuba']}")
-        for work in plan.work:
-            key = case_key(work.scene, work.budget, options.rungs, chosen)
-            request = _request(work, source, options, key)
-            done = None if options.fresh else _done(request)
-            if done is None:
-                requests.append(request)
-            else:
-                add(*done)
-                display.done(done[0], "done before")
-        write()
-        for outcome in _outcomes(requests, source.suite.case_seconds, options, display):
-            case = _case(outcome)
-            add(case, outcome.wall)
-            display.done(case, f"{outcome.wall:.1f} s")
+    def write() -> None:
+        at = now()
+        write_results(options.results, at.cases, told, suite, at.not_run, at.missing)
+
+    def finish() -> None:
+        at = now()
+        write_report(options.report, at.cases, told, missing=at.missing)
+        options.tell(at)
+
+    with Display(len(plan.work), options.steps) as display, _terminable():
+        display.line(f"Mitsuba {told['mitsuba']}")
+        # The page of a former run must not be taken for one of this run.
+        options.report.unlink(missing_ok=True)
+        try:
+            requests: list[Request] = []
+            for work in plan.work:
+                request, done = _begun(work, options, chosen)
+                if done is None:
+                    requests.append(request)
+                else:
+                    add(done.case, done.wall)
+                    display.done(done.case, done.remark)
             write()
-        cases = write()
-    write_report(options.out / "report.html", cases, facts)
-    return replace(run, cases=tuple(cases))
+            for outcome in _outcomes(requests, seconds, options, display):
+                case = _case(outcome)
+                add(case, outcome.wall)
+                display.done(case, f"{outcome.wall:.1f} s")
+                write()
+        except (KeyboardInterrupt, SystemExit):
+            write()
+            finish()
+            raise
+        write()
+    finish()
+    return now()
+
+
+class _Done(NamedTuple):
+    """A case that needs no worker;  remark: why not."""
+
+    case: Case
+    wall: float
+    remark: str
+
+
+def _begun(work: Work, options: Options, chosen: Backend) -> tuple[Request, _Done | None]:
+    """The request for a case, and the case itself if its scene is invalid or if it was done
+    before."""
+    request = Request(
+        name=work.name,
+        scene=work.path,
+        changes=work.changes,
+        budget=work.budget,
+        rungs=options.rungs,
+        folder=options.out / "cases" / folder_name(work.name),
+        again=work.again,
+    )
+    try:
+        if isinstance(work.scene, SceneError):
+            raise work.scene
+        key = case_key(work.scene, work.budget, options.rungs, chosen)
+    except SceneError as error:
+        return request, _Done(_without_result(request, "scene", str(error)), 0.0, "not run")
+    request = request.model_copy(update={"key": key})
+    return request, None if options.fresh else _done(request)
 
 
 def _has_one_of(case: Case, rungs: tuple[str, ...]) -> bool:
     """Whether the case could not be run, or any of these rungs says anything about it."""
     said = {tier.name for tier in case.tiers if tier.status != "not-applicable"}
-    return bool(said & {"run", "input", *rungs})
+    return bool(said & {"scene", "run", "input", *rungs})
 
 
-def _request(work: Work, source: Source, options: Options, key: str) -> Request:
+def _again(work: Work, source: Source, options: Options) -> str:
+    """The command that repeats one case of a suite."""
     command = ["reference-rt", "suite", source.argument]
     command += ["--only", work.name, "--fresh", "--out", str(options.out / "again")]
     if work.path.parent != Path("scenes"):
         command += ["--scenes", str(work.path.parent)]
-    return Request(
-        name=work.name,
-        scene=work.path,
-        budget=work.budget,
-        rungs=options.rungs,
-        folder=options.out / "cases" / folder_name(work.name),
-        key=key,
-        again=shlex.join(command),
-    )
+    return shlex.join(command)
 
 
-def _done(request: Request) -> tuple[Case, float] | None:
-    """The case and its seconds, if the record is of what is asked for."""
+def _done(request: Request) -> _Done | None:
+    """The case as recorded, if the record is of what is asked for."""
     try:
         record = read_record(request.folder)
-        return (read_case(request.folder), record.wall) if record.key == request.key else None
+        if record.key != request.key:
+            return None
+        return _Done(read_case(request.folder), record.wall, "done before")
     except ImageError:
         return None
 
@@ -148,21 +228,28 @@ def _outcomes(
 
 
 def _case(outcome: pool.Outcome[Request]) -> Case:
-    """The case as its worker recorded it, or one that says why there is none; that one has no key,
-    so that it is run again next time."""
+    """The case as its worker recorded it, or one that says why there is none."""
     request = outcome.request
     log = request.folder / LOG
     log.unlink(missing_ok=True)
     if outcome.failure is None:
         return read_case(request.folder)
+    if outcome.invalid:
+        return _without_result(request, "scene", outcome.failure, outcome.wall)
     reason = outcome.failure
     if outcome.log:
         log.parent.mkdir(parents=True, exist_ok=True)
         log.write_text(outcome.log, encoding="utf-8")
         reason += f"; see {log}"
-    tier = Tier("run", "invalid", reason)
-    case = Case(request.name, "invalid", f"run: {reason}", (tier,), None, {}, again=request.again)
-    write_case(request.folder, case, wall=outcome.wall)
+    return _without_result(request, "run", reason, outcome.wall)
+
+
+def _without_result(request: Request, rung: str, reason: str, wall: float = 0.0) -> Case:
+    """Record an invalid case, without a key, so that it is run again next time."""
+    tier = Tier(rung, "invalid", reason)
+    reason = f"{rung}: {reason}"
+    case = Case(request.name, "invalid", reason, (tier,), None, {}, again=request.again)
+    write_case(request.folder, case, wall=wall)
     return case
 
 

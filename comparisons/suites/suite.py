@@ -10,10 +10,13 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from comparisons.budget import Budget
+from comparisons.suites.work import Plan, Work, control_name, read
 from reference_rt.description import Description, Positive
 from reference_rt.diagnosis import line_of
 from reference_rt.errors import SceneError, UsageError
 from reference_rt.scene import Scene
+
+_Scenes = dict[str, tuple[Path, Scene | SceneError]]
 
 BUILT_IN = ("smoke", "standard", "full")
 
@@ -59,15 +62,6 @@ class Suite(Part):
     """Mitsuba against itself;  none: no such cases."""
 
 
-class Work(NamedTuple):
-    """One case that is to be run.  name: of the case;  scene: as read, with its file at `path`."""
-
-    name: str
-    path: Path
-    scene: Scene
-    budget: Budget
-
-
 class Source(NamedTuple):
     """A suite, its name, what the command line calls it, and the file it was read from with its
     text, for errors."""
@@ -81,13 +75,6 @@ class Source(NamedTuple):
     def error(self, message: str, *keys: str | int) -> SceneError:
         """An error about the part at `keys`, with file and line."""
         return SceneError(message, keys, self.file, line_of(self.text, keys))
-
-
-class Plan(NamedTuple):
-    """work: the cases, in the order of their names;  skipped: why others are not run, by name."""
-
-    work: tuple[Work, ...]
-    skipped: dict[str, str]
 
 
 def load_suite(name: str) -> Source:
@@ -136,11 +123,12 @@ def parse_suite(text: str, file: str) -> Suite:
 def plan(
     source: Source, folder: Path, only: tuple[str, ...] = (), rungs: tuple[str, ...] = ()
 ) -> Plan:
-    """What the suite means for the scenes of a folder, all of which are read.
+    """What the suite means for the scenes of a folder, all of which are read; cases are in the
+    order of their names.
 
     only: patterns as of a shell, one of which the name of a case must fit;  rungs: only these, all
-    if none.  Raises SceneError: a scene cannot be read, one that is named is not there, or two have
-    one name;  UsageError: there is nothing to run.
+    if none.  A scene that is invalid is a case all the same.  Raises SceneError: the suite names a
+    scene that is not there;  UsageError: there is nothing to run.
     """
     suite = source.suite
     scenes = _scenes(folder)
@@ -151,12 +139,12 @@ def plan(
             continue
         _check_names(part, scenes, source, *(["controls"] if control else []))
         for name, (path, scene) in scenes.items():
-            if part.only is not None and name not in part.only:
+            if part.only is not None and path.stem not in part.only:
                 continue
             case = control_name(name) if control else name
             if only and not any(fnmatchcase(case, pattern) for pattern in only):
                 continue
-            entry = part.scenes.get(name, Entry())
+            entry = part.scenes.get(path.stem, Entry())
             if entry.skip is not None:
                 skipped[case] = entry.skip
                 continue
@@ -169,34 +157,25 @@ def plan(
     return Plan(tuple(sorted(work, key=lambda w: w.name)), skipped)
 
 
-def control_name(scene: str) -> str:
-    """The name of the case that compares Mitsuba with itself."""
-    return f"{scene} (control)"
-
-
-def folder_name(case: str) -> str:
-    """The name of a case as that of a folder which no shell needs quotes for."""
-    return case.replace(" (control)", ".control")
-
-
-def _scenes(folder: Path) -> dict[str, tuple[Path, Scene]]:
-    """The scenes of a folder by name."""
+def _scenes(folder: Path) -> _Scenes:
+    """The scenes of a folder by the names of their cases.  The suite's budgets name scenes without
+    the suffix, so that of two files with the same name only the first is valid."""
     if not folder.is_dir():
         raise UsageError(f"--scenes: there is no folder '{folder}'; expected one with scenes in it")
-    found: dict[str, tuple[Path, Scene]] = {}
+    found: _Scenes = {}
     for path in sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES):
         if path.stem in found:
             other = found[path.stem][0].name
-            raise SceneError(f"has the name of {other}; expected one of its own", file=str(path))
-        found[path.stem] = path, Scene.load(path)
+            reason = f"has the name of {other}; expected one of its own"
+            found[path.name] = path, SceneError(reason, file=str(path))
+        else:
+            found[path.stem] = path, read(path)
     if not found:
         raise UsageError(f"--scenes: '{folder}' holds no scene; expected .yaml or .json files")
     return found
 
 
-def _check_names(
-    part: Part, scenes: dict[str, tuple[Path, Scene]], source: Source, *place: str
-) -> None:
+def _check_names(part: Part, scenes: _Scenes, source: Source, *place: str) -> None:
     """Raise SceneError for a scene that is named but not there."""
     named: list[tuple[str, tuple[str | int, ...]]] = [(n, ("scenes", n)) for n in part.scenes]
     named += [(name, ("only", k)) for k, name in enumerate(part.only or ())]

@@ -22,7 +22,9 @@ from pydantic import BaseModel, ConfigDict
 from comparisons.budget import Budget
 from comparisons.processes.protocol import carry_out, private_stdout, tell
 from comparisons.record import write_case
-from comparisons.results import Case
+from comparisons.results import WARNING, Case
+from comparisons.suites.work import Changes
+from reference_rt.cli import scene_warnings
 from reference_rt.scene import Scene
 
 Runner = Callable[..., Case]
@@ -32,14 +34,15 @@ Runner = Callable[..., Case]
 class Request(BaseModel):
     """A case to run.
 
-    name: of the case;  scene: the scene's file;  folder: where the record goes;  key: what the
-    record says it was made with;  again: the command that repeats the case.
+    name: of the case;  scene: the scene's file;  changes: of the scene;  folder: where the record
+    goes;  key: what the record says it was made with;  again: the command that repeats the case.
     """
 
     model_config = ConfigDict(extra="forbid")
 
     name: str
     scene: Path
+    changes: Changes = Changes()
     budget: Budget
     rungs: tuple[str, ...] = ()
     folder: Path
@@ -70,18 +73,20 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
 
     def run() -> None:
         start = time.perf_counter()
-        case = runner(
-            Scene.load(request.scene),
-            request.budget,
-            lambda text: tell(answers, say=text),
-            threads=threads,
-            rungs=request.rungs,
-        )
+        warned: list[str] = []
+        with scene_warnings(lambda text: warned.append(f"{WARNING}{text}")):
+            case = runner(
+                request.changes.load(request.scene),
+                request.budget,
+                lambda text: tell(answers, say=text),
+                threads=threads,
+                rungs=request.rungs,
+            )
         case = dataclasses.replace(
             case,
             scene=request.name,
             again=request.again,
-            notes=(*case.notes, described(request.budget)),
+            notes=(*dict.fromkeys(warned), *case.notes, described(request.budget)),
         )
         write_case(request.folder, case, request.key, time.perf_counter() - start)
 

@@ -4,6 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 from comparisons.accuracy import accuracy
+from comparisons.mitsuba_plugins.exact_coat import base_error
 from comparisons.translate.textures import Surroundings
 from comparisons.translate.wrappers import has_delta
 from reference_rt.materials import (
@@ -17,6 +18,7 @@ from reference_rt.materials import (
     RoughDielectric,
     RoughPlastic,
 )
+from reference_rt.materials.microfacet import MIN_ALPHA
 from reference_rt.scene import Scene
 
 
@@ -45,25 +47,38 @@ def _(material: RoughConductor | RoughDielectric, around: Surroundings) -> str:
     if material.distribution == "ggx":
         return ""
     return (
-        "Mitsuba's masking of Beckmann microfacets, an approximation up to 0.31 % off, is replaced "
-        "by the exact one"
+        "Mitsuba's masking of Beckmann microfacets, an approximation up to 0.31 % off for each of "
+        "the two directions, is replaced by the exact one"
     )
 
 
 @note_of.register(Plastic)
 def _(material: Plastic, around: Surroundings) -> str:
+    eta = material.interior_ior / material.exterior_ior
     return (
-        "Mitsuba's fit of what a coat mirrors from within, which makes its base 0.1 % brighter at "
-        "an index of 1.5 and 2.7 % at 2.4, is replaced by the integral"
+        f"Mitsuba's fit of what a coat mirrors from within, which makes its base {_off(eta)} at a "
+        f"relative index of {eta:.4g}, is replaced by the integral"
     )
 
 
 @note_of.register(RoughPlastic)
 def _(material: RoughPlastic, around: Surroundings) -> str:
+    eta = material.interior_ior / material.exterior_ior
+    alpha = max(material.alpha, MIN_ALPHA)
     return (
-        "Mitsuba's tables of what a rough coat lets pass and mirrors from within, the latter about "
-        "1 % low, are replaced by finer ones"
+        "Mitsuba's tables of what a rough coat lets pass and mirrors from within, which make its "
+        f"base {_off(eta, material.distribution, alpha)} at alpha {alpha:g} "
+        f"({material.distribution}) and a relative index of {eta:.4g}, are replaced by finer ones"
     )
+
+
+def _off(eta: float, distribution: str = "", alpha: float = 0.0) -> str:
+    """How far the base of Mitsuba's own plastic is from the exact law, in words."""
+    low, high = (100.0 * off for off in base_error(eta, distribution, alpha))
+    if low < 0.0 < high:
+        return f"{-low:.2f} % darker to {high:.2f} % brighter"
+    ends = sorted({f"{abs(low):.2f}", f"{abs(high):.2f}"}, key=float)
+    return f"{' to '.join(ends)} % {'darker' if low < 0.0 else 'brighter'}"
 
 
 @note_of.register(Phong)
@@ -76,8 +91,9 @@ def _(material: Blend, around: Surroundings) -> str:
     if not has_delta(material, around):
         return ""
     return (
-        "Mitsuba's blend is wrong where one of the two mirrors perfectly (it keeps 0.5 / (1 + cos "
-        "/ pi) of half a mirror's light over a diffuse half): one written for it stands in"
+        "Mitsuba's blend is wrong where one of the two mirrors perfectly: a mirror with a share w "
+        "has (w + (1 - w) f) / (w + (1 - w) p) of its light, with f what the other one scatters "
+        "into the mirrored direction and p its density there; one written for it stands in"
     )
 
 

@@ -2,14 +2,21 @@
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from gate_checks import SCENE, pictures
 from PIL import Image
+from suite_runs import RUNNER
+from typer.testing import CliRunner, Result
 
+from comparisons.commands.compare import compare
+from comparisons.commands.report import report
+from comparisons.commands.suite import suite
 from comparisons.gate import reference
 from comparisons.mitsuba_backend import Backend
 from comparisons.report import write_report
@@ -111,6 +118,34 @@ def fake_runners(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
     monkeypatch.setattr(run, "backend", lambda: Backend("llvm_ad_rgb", "0", "", None))
     monkeypatch.setattr(run, "provenance", lambda **more: {"mitsuba": "none", **more})
+
+
+class Program:
+    """`reference-rt suite`, `compare` and `report`, whose workers run what `suite_runners` does;
+    found: what the last run found."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.found: run.Run | None = None
+        self._app = typer.Typer()
+        for command in (suite, compare, report):
+            self._app.command()(command)
+        whole = run.run_cases
+
+        def with_fakes(plan: Any, options: run.Options, *more: Any) -> run.Run:
+            self.found = whole(plan, replace(options, runner=RUNNER), *more)
+            return self.found
+
+        monkeypatch.setattr(run, "run_cases", with_fakes)
+        for name in ("GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"):
+            monkeypatch.delenv(name, raising=False)
+
+    def __call__(self, *arguments: Any) -> Result:
+        return CliRunner().invoke(self._app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def program(fake_runners: None, monkeypatch: pytest.MonkeyPatch) -> Program:
+    return Program(monkeypatch)
 
 
 # ---- the gate -----------------------------------------------------------------------------------

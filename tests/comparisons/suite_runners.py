@@ -35,6 +35,13 @@ def by_name(scene, budget: Budget, say, threads, rungs) -> Case:
         print("stray", flush=True)
         os.write(1, b'\xff\xfe{"failed": "no"}\n')
         subprocess.run([sys.executable, "-c", "print('stray too')"], check=True)
+    if name.startswith("wait"):
+        while (scene.folder / "wait").exists():
+            time.sleep(0.05)
+    if name.startswith("tables"):
+        _ = scene.tables
+    if name.startswith("warn"):
+        scene.warn("is odd", "integrator")
     if name.startswith("slow"):
         time.sleep(1.5)
     status = "differ" if name.startswith("differ") else "agree"

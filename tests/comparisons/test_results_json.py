@@ -41,11 +41,14 @@ def test_everything_is_told(tmp_path):
         tmp_path / "results.json",
         case(rays=np.int64(5), worst=np.float32(0.5), by_kind={"t": np.arange(2)}),
         suite="smoke",
+        missing=["left"],
         not_run={"other": "no reference for it"},
     )
     assert found == {
         "schema": SCHEMA,
         "suite": "smoke",
+        "asked": 2,
+        "missing": ["left"],
         "provenance": {"date": "2025-11-21"},
         "not_run": {"other": "no reference for it"},
         "cases": [

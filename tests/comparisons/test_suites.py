@@ -132,9 +132,6 @@ def test_nothing_to_run_is_no_success(tmp_path):
         plan(suite(), scenes(tmp_path / "empty"))
     with pytest.raises(UsageError, match="there is no folder"):
         plan(suite(), tmp_path / "none")
-    (tmp_path / "a.json").write_text("{}")
-    with pytest.raises(SceneError, match=r"has the name of a\.json"):
-        plan(suite(), tmp_path)
 
 
 def test_only_some_rungs(tmp_path):

@@ -1,42 +1,20 @@
 """The commands `suite` and `report`."""
 
 import json
-from dataclasses import replace
 
 import pytest
-import typer
 from junitparser import JUnitXml
-from suite_runs import RUNNER, SCENES, run_in, scenes
-from typer.testing import CliRunner
-
-from comparisons.commands.report import report
-from comparisons.commands.suite import suite as suite_command
-from comparisons.suites import run
+from suite_runs import SCENES, run_in, scenes
 
 pytestmark = pytest.mark.usefixtures("fake_runners")
 
 
-@pytest.fixture
-def command(monkeypatch):
-    """`reference-rt suite` and `report`, with the runners of tests."""
-    app = typer.Typer()
-    app.command()(suite_command)
-    app.command()(report)
-    whole = run.run_suite
-    monkeypatch.setattr(
-        run, "run_suite", lambda s, p, options: whole(s, p, replace(options, runner=RUNNER))
-    )
-    for name in ("GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"):
-        monkeypatch.delenv(name, raising=False)
-    return lambda *arguments: CliRunner().invoke(app, [str(a) for a in arguments])
-
-
-def test_the_command_as_a_whole(tmp_path, command):
+def test_the_command_as_a_whole(tmp_path, program):
     folder, out = scenes(tmp_path / "scenes", "a", "b", "differ"), tmp_path / "out"
     mine = tmp_path / "mine.yaml"
     mine.write_text("about: mine\nscenes: {b: {skip: it is not needed}}\n")
     common = (mine, "--scenes", folder, "--out", out)
-    result = command("suite", *common, "--junit", tmp_path / "junit.xml", "--jobs", 1)
+    result = program("suite", *common, "--junit", tmp_path / "junit.xml", "--jobs", 1)
     assert result.exit_code == 1, result.output
     assert "a: agree" in result.stderr
     assert "differ: differ" in result.stderr
@@ -45,20 +23,20 @@ def test_the_command_as_a_whole(tmp_path, command):
     assert "::error" not in result.output
     (tests,) = JUnitXml.fromfile(str(tmp_path / "junit.xml"))
     assert (tests.tests, tests.failures, tests.skipped) == (3, 1, 1)
-    assert command("suite", *common, "--only", "a").exit_code == 0
+    assert program("suite", *common, "--only", "a").exit_code == 0
     told = json.loads((out / "results.json").read_text())
     assert [case["scene"] for case in told["cases"]] == ["a"]
     again = told["cases"][0]["again"].split()
     assert again[:6] == ["reference-rt", "suite", str(mine), "--only", "a", "--fresh"]
 
 
-def test_github_is_told_by_itself(tmp_path, command, monkeypatch):
+def test_github_is_told_by_itself(tmp_path, program, monkeypatch):
     folder = scenes(tmp_path / "scenes", "a", "differ")
     mine = tmp_path / "mine.yaml"
     mine.write_text("about: mine\n")
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary.md"))
-    result = command("suite", mine, "--scenes", folder, "--out", tmp_path / "out")
+    result = program("suite", mine, "--scenes", folder, "--out", tmp_path / "out")
     assert f"::error file={folder.as_posix()}/differ.yaml,title=differ%3A differ::" in result.stdout
     assert "**1** differ, **1** agree" in (tmp_path / "summary.md").read_text()
 
@@ -73,41 +51,41 @@ def test_github_is_told_by_itself(tmp_path, command, monkeypatch):
         (("smoke", "--jobs", "0"), 2, "jobs"),
     ],
 )
-def test_wrong_use_is_told(command, arguments, code, told):
+def test_wrong_use_is_told(program, arguments, code, told):
     options = () if "--scenes" in arguments else ("--scenes", SCENES)
-    result = command("suite", *arguments, *options)
+    result = program("suite", *arguments, *options)
     assert result.exit_code == code
     assert told in result.output
 
 
-def test_a_report_is_rendered_again(tmp_path, command):
+def test_a_report_is_rendered_again(tmp_path, program):
     folder, out = scenes(tmp_path / "scenes", "a", "differ"), tmp_path / "out"
     run_in(out, folder)
     before = (out / "results.json").read_text()
     (out / "report.html").unlink()
     page = tmp_path / "page.html"
-    result = command("report", out, "--out", page)
+    result = program("report", out, "--out", page)
     assert result.exit_code == 0, result.output
     assert (out / "results.json").read_text() == before
     assert "differ" in page.read_text(encoding="utf-8")
     (out / "results.json").unlink()
-    assert command("report", out).exit_code == 0  # all records, then
+    assert program("report", out).exit_code == 0  # all records, then
     assert (out / "report.html").exists()
     told = json.loads((out / "results.json").read_text())
     assert [case["scene"] for case in told["cases"]] == ["a", "differ"]
 
 
-def test_a_report_of_what_is_no_suite_is_refused(tmp_path, command):
-    result = command("report", tmp_path)
+def test_a_report_of_what_is_no_suite_is_refused(tmp_path, program):
+    result = program("report", tmp_path)
     assert result.exit_code == 3
     assert "holds no case" in result.output
     (tmp_path / "results.json").write_text("[]")
-    result = command("report", tmp_path)
+    result = program("report", tmp_path)
     assert result.exit_code == 3
     assert "is not what a suite writes" in result.output
     (tmp_path / "results.json").write_text(
         '{"cases": [{"scene": "a"}], "provenance": {}, "suite": null, "not_run": {}}'
     )
-    result = command("report", tmp_path)
+    result = program("report", tmp_path)
     assert result.exit_code == 3
     assert "cannot be read" in result.output

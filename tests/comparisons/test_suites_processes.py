@@ -36,10 +36,11 @@ def test_what_fails_is_told_and_the_others_go_on(tmp_path):
     assert "it said: the last word" in reasons["exit"]
     assert reasons["raise"].startswith("run: KeyError: 'no such\\nthing'")
     assert "Traceback" in (out / "cases" / "raise" / run.LOG).read_text()
-    assert reasons["scene_error"] == "run: x.yaml:3: is not what it must be"
+    assert reasons["scene_error"] == "scene: x.yaml:3: is not what it must be"
     assert exit_code(found.cases) == 4  # some could not run
     for case in found.cases:
-        assert case.tiers[0].name == ("run" if case.scene in reasons else "geometry")
+        rung = "scene" if case.scene == "scene_error" else "run"
+        assert case.tiers[0].name == (rung if case.scene in reasons else "geometry")
     # What could not be run is run again; the rest is not.
     again = run_in(out, folder)
     pids = processes_of(found, "agree")

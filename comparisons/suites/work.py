@@ -1,0 +1,85 @@
+"""The cases that a run is asked for: which scenes, changed how, with which budgets."""
+
+import re
+import warnings
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from pydantic import BaseModel, ConfigDict
+
+from comparisons.budget import Budget
+from reference_rt.cli import adjusted
+from reference_rt.errors import SceneError, SceneWarning
+from reference_rt.scene import Scene
+
+
+class Changes(BaseModel):
+    """What the command line changes of a scene, as `reference_rt.cli.adjusted` takes it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    spp: int | None = None
+    size: str | None = None
+    seed: int | None = None
+
+    def load(self, path: Path) -> Scene:
+        """The scene in the file at `path`, changed.  Raises SceneError, UsageError."""
+        return adjusted(Scene.load(path), self.spp, self.size, None, self.seed)
+
+
+class Work(NamedTuple):
+    """One case that is asked for.
+
+    name: of the case;  path: the scene's file;  scene: as read and changed, or why it cannot be
+    used;  again: the command that repeats the case.
+    """
+
+    name: str
+    path: Path
+    scene: Scene | SceneError
+    budget: Budget
+    changes: Changes = Changes()
+    again: str = ""
+
+
+class Plan(NamedTuple):
+    """work: the cases, in the order they are shown;  skipped: why others are not run, by name."""
+
+    work: tuple[Work, ...]
+    skipped: dict[str, str]
+
+
+def read(path: Path, changes: Changes | None = None) -> Scene | SceneError:
+    """The scene in the file at `path`, or why it is invalid: one bad scene must not keep a run from
+    comparing the others.  Warnings come with the case, from its worker.  Raises UsageError."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)
+        try:
+            return (changes or Changes()).load(path)
+        except SceneError as error:
+            return error
+
+
+def plan_of_files(paths: Iterable[Path], changes: Changes, budget: Budget) -> Plan:
+    """A case for each of these files, in their order, a file that is given twice once.
+
+    A case has the name of its file without the suffix; of files with the same name the second case
+    is called "NAME (2)", and so on.  Raises UsageError for changes that fit no such scene.
+    """
+    work: list[Work] = []
+    for path in dict.fromkeys(paths):
+        double = sum(w.path.stem == path.stem for w in work)
+        name = f"{path.stem} ({double + 1})" if double else path.stem
+        work.append(Work(name, path, read(path, changes), budget, changes))
+    return Plan(tuple(work), {})
+
+
+def control_name(scene: str) -> str:
+    """The name of the case that compares Mitsuba with itself."""
+    return f"{scene} (control)"
+
+
+def folder_name(case: str) -> str:
+    """The name of a case as that of a folder which no shell needs quotes for."""
+    return re.sub(r" \((\w+)\)$", r".\1", case)
