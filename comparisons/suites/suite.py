@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, ValidationError, field_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from comparisons.budget import Budget
+from reference_rt import yaml_text
 from reference_rt.description import Description, Positive
-from reference_rt.diagnosis import first_problem, line_of
+from reference_rt.diagnosis import first_problem
 from reference_rt.errors import SceneError, UsageError
+from reference_rt.files import read_text
 from reference_rt.scene import Scene
 
 BUILT_IN = ("smoke", "standard", "full")
@@ -80,7 +80,7 @@ class Source(NamedTuple):
 
     def error(self, message: str, *keys: str | int) -> SceneError:
         """An error about the part at `keys`, with file and line."""
-        return SceneError(message, keys, self.file, line_of(self.text, keys))
+        return SceneError(message, keys, self.file, yaml_text.line_of(self.text, keys))
 
 
 class Plan(NamedTuple):
@@ -105,7 +105,7 @@ def load_suite(name: str) -> Source:
             f"there is no suite '{name}'; expected {', '.join(BUILT_IN)} or a .yaml file"
         )
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror}", file=name) from None
     except UnicodeDecodeError:
@@ -116,22 +116,16 @@ def load_suite(name: str) -> Source:
 def parse_suite(text: str, file: str) -> Suite:
     """A suite from YAML text; `file` stands in errors.  Raises SceneError."""
     try:
-        data = YAML(typ="safe", pure=True).load(text)
-    except MarkedYAMLError as error:
-        line = None if error.problem_mark is None else error.problem_mark.line + 1
-        problem = " ".join(str(error.problem or error.context).split())
-        raise SceneError(f"malformed: {problem}", file=file, line=line) from None
-    except (YAMLError, ValueError) as error:
-        raise SceneError(f"malformed: {' '.join(str(error).split())}", file=file) from None
-    except RecursionError:
-        raise SceneError("malformed: nested too deeply", file=file) from None
+        data = yaml_text.load(text)
+    except yaml_text.MalformedError as error:
+        raise SceneError(f"malformed: {error}", file=file, line=error.line) from None
     if not isinstance(data, dict):
         raise SceneError("expected keys such as about, defaults, scenes", file=file, line=1)
     try:
         return Suite.model_validate(data)
     except ValidationError as error:
         message, keys = first_problem(Suite, error, data)
-        raise SceneError(message, keys, file, line_of(text, keys)) from None
+        raise SceneError(message, keys, file, yaml_text.line_of(text, keys)) from None
 
 
 def plan(
