@@ -1,20 +1,23 @@
 """`reference-rt`: render, explain, schema; other packages add commands through an entry point."""
 
+import errno
 import functools
 import gc
 import importlib.metadata
 import json
+import os
+import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
 from pydantic import ValidationError
 
-from reference_rt.errors import ImageError, ReferenceRtError, SceneWarning, UsageError
+from reference_rt.errors import ImageError, ReferenceRtError, SceneWarning, UsageError, printable
 from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.scene import Scene
@@ -27,7 +30,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="An independent float64 reference ray tracer.\n\nExit codes: 0 success or agreement, "
     "1 difference, 2 usage, 3 invalid scene or image, 4 reference missing or could not run, "
-    "5 internal error, 130 interrupted.",
+    "5 internal error, 130 interrupted (by "
+    "SIGTERM 143, by SIGHUP 129).",
 )
 
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
@@ -45,15 +49,49 @@ def guarded(command: F) -> F:
             _fail(str(error), error.exit_code)
         except typer.Exit:
             raise
-        except KeyboardInterrupt:
-            _fail("interrupted; nothing unfinished was written", 130)
+        except KeyboardInterrupt as error:
+            _fail("interrupted; nothing unfinished was written", 128 + number_of(error))
         except BrokenPipeError:
             raise
         except Exception as error:
+            if is_output_lost(error):
+                _fail(lost_output(error), ImageError.exit_code)
             message = " ".join(str(error).split())
             _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
 
     return run  # type: ignore[return-value]
+
+
+def say(text: str, err: bool = False) -> None:
+    """Print one line, with escapes in place of what does not print."""
+    typer.echo(printable(text), err=err)
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM or SIGHUP: as Ctrl-C, so that child processes are ended and no file is left half
+    written.  Its argument is the signal's number."""
+
+
+def _terminate(number: int, frame: Any) -> None:
+    signal.signal(number, signal.SIG_DFL)  # a second one ends the process at once
+    raise Terminated(number)
+
+
+def number_of(error: KeyboardInterrupt) -> int:
+    """The number of the signal that an interruption came from."""
+    return int(error.args[0]) if isinstance(error, Terminated) else signal.SIGINT
+
+
+def lost_output(error: BaseException) -> str:
+    """What is said where printing failed."""
+    reason = getattr(error, "strerror", None)
+    return f"standard output cannot be written: {reason}; expected a place with room"
+
+
+def is_output_lost(error: BaseException) -> bool:
+    """Whether printing failed, as on a full disk.  Files that we write raise ImageError."""
+    lost = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+    return isinstance(error, OSError) and error.errno in lost and error.filename is None
 
 
 @contextmanager
@@ -74,7 +112,8 @@ def _printed_warnings() -> Iterator[None]:
 
 
 def _fail(message: str, code: int) -> None:
-    typer.echo(f"error: {message}", err=True)
+    with suppress(OSError):  # of standard error, too, which then tells nothing
+        say(f"error: {message}", err=True)
     raise typer.Exit(code)
 
 
@@ -106,7 +145,7 @@ def render(
         picture = render_scene(description, threads=threads, progress=progress)
     image.write(output, picture, provenance(description))
     seconds = picture.seconds
-    typer.echo(
+    say(
         f"{output}: {description.film.width} x {description.film.height}, "
         f"{seconds['tables']:.2f} s to build, {seconds['compile']:.2f} s to compile or load "
         f"kernels, {seconds['render']:.2f} s to render",
@@ -146,7 +185,7 @@ def explain(scene: SceneArgument) -> None:
             continue
         table = Table(title=title, title_justify="left", show_header=False, box=None)
         for what, why in lines:
-            table.add_row(what, why)
+            table.add_row(printable(what), printable(why))
         console.print(table)
         console.print()
 
@@ -242,6 +281,9 @@ def _add_commands() -> None:
 
 def main() -> None:
     """The `reference-rt` program."""
+    for number in {signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}:
+        if signal.getsignal(number) == signal.SIG_DFL:  # `nohup` ignores SIGHUP
+            signal.signal(number, _terminate)
     try:
         _add_commands()
         gc.freeze()  # what the imports made stays: 0.04 s less of looking through it for garbage
@@ -250,8 +292,16 @@ def main() -> None:
         # two), and 3 MB more.
         gc.set_threshold(20_000)
         app()
-    except KeyboardInterrupt:  # before or after a command, which has its own answer
-        sys.exit(130)
+    except KeyboardInterrupt as error:  # before or after a command, which has its own answer
+        sys.exit(128 + number_of(error))
+    except OSError as error:  # of what prints outside of a command, such as --help
+        if not is_output_lost(error):
+            raise
+        with suppress(OSError):
+            say(f"error: {lost_output(error)}", err=True)
+        # What is left in the buffer would fail again when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.exit(ImageError.exit_code)
 
 
 if __name__ == "__main__":

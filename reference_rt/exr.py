@@ -30,7 +30,7 @@ def write_exr(path: Path, channels: Mapping[str, FloatArray], header: Mapping[st
     settings = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with replacing(path) as temporary:
         try:
-            OpenEXR.File(settings | dict(header), planes).write(str(temporary))
+            OpenEXR.File(settings | dict(header), planes).write(_name(temporary))
         except RuntimeError as error:  # what the library raises for any failure to write
             raise OSError(None, str(error)) from None
 
@@ -71,7 +71,7 @@ def _opened(path: Path, **how: bool) -> tuple[dict[str, Any], dict[str, npt.NDAr
 
     damaged = "cannot be read as EXR: it is truncated or damaged; expected a whole image"
     try:
-        with _silent(), OpenEXR.File(str(path), **how) as file:
+        with _silent(), OpenEXR.File(_name(path), **how) as file:
             planes = {name: channel.pixels for name, channel in file.channels().items()}
             header = dict(file.header())
     except (RuntimeError, OSError, TypeError, ValueError):  # whose reasons tell people nothing
@@ -79,6 +79,11 @@ def _opened(path: Path, **how: bool) -> tuple[dict[str, Any], dict[str, npt.NDAr
     if "separate_channels" in how and not all(hasattr(p, "shape") for p in planes.values()):
         raise ValueError(damaged)  # the library returns channels without pixels
     return header, planes
+
+
+def _name(path: Path) -> str | bytes:
+    """As the library takes it: names of files need not be UTF-8."""
+    return str(path) if sys.platform == "win32" else os.fsencode(path)
 
 
 @contextmanager

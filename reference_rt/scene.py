@@ -18,7 +18,7 @@ from reference_rt.cameras.perspective import Perspective
 from reference_rt.csg import AnyShape, Solid
 from reference_rt.description import Description
 from reference_rt.diagnosis import first_problem
-from reference_rt.errors import SceneError, SceneWarning
+from reference_rt.errors import SceneError, SceneWarning, printable
 from reference_rt.files import read_text
 from reference_rt.film import Film
 from reference_rt.groups import Instance
@@ -162,8 +162,8 @@ class Scene(Description):
 
     @property
     def name(self) -> str:
-        """The scene file's name without its suffix."""
-        return Path(self._source[0]).stem if self._source else "scene"
+        """The scene file's name without its suffix; escapes in place of what does not print."""
+        return printable(Path(self._source[0]).stem) if self._source else "scene"
 
     def error(self, message: str, *path: str | int) -> SceneError:
         """An error about the part at `path`, with file and line where the scene has them."""

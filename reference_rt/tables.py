@@ -67,6 +67,7 @@ def _texture_tables(scene: "Scene") -> tuple[Textures | None, Palette]:
     for name, texture in scene.textures.items():
         code, module = next((c, m) for c, _, d, m in TEXTURE_TABLES if isinstance(texture, d))
         try:
+            table: Any
             if isinstance(texture, bitmap.Bitmap):
                 table = texture.tabulate(scene.folder, room[used:])
                 used += len(table.texels)

@@ -351,7 +351,7 @@ class _Walk(_Events):
 # ---- out ----------------------------------------------------------------------------------------
 
 
-class _Dumper(yaml.SafeDumper):
+class _Dumper(yaml.SafeDumper):  # type: ignore[misc]
     """Quotes texts that would read as something else by the rules above, besides those that are so
     by YAML 1.1, for other programs' sake."""
 

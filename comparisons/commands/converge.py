@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.console import ProgressLine
 from reference_rt.errors import UsageError
 from reference_rt.scene import Scene
@@ -88,18 +88,18 @@ def converge(
         store = Store(out / "rungs" / folder_name(scene.name), key, fresh=fresh)
         with ProgressLine() as progress:
 
-            def say(what: str, part: float, name: str = scene.name) -> None:
+            def tell(what: str, part: float, name: str = scene.name) -> None:
                 progress(what if what == "compile" else f"{name}: {what}", part)
 
-            curves = converge_scene(scene, settings, store, say)
+            curves = converge_scene(scene, settings, store, tell)
         found.append(replace(curves, again=again(path, out, settings)))
         # After each scene, so that an interruption loses none that is finished.
         write_results(files[0], found, settings, facts)
         write_table(files[1], found)
         write_page(files[2], found, settings, facts)
         for line in lines_of(found[-1]):
-            typer.echo(line)
-    typer.echo(", ".join(map(str, files)), err=True)
+            say(line)
+    say(", ".join(map(str, files)), err=True)
 
 
 def _size(size: str | None) -> tuple[int, int] | None:

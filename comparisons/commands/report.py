@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 
 
 @guarded
@@ -26,4 +26,4 @@ def report(
     results = folder / "results.json"
     write_results(results, archive.cases, archive.provenance, archive.suite, archive.not_run)
     write_report(page, archive.cases, archive.provenance)
-    typer.echo(f"{len(archive.cases)} cases: {results}, {page}", err=True)
+    say(f"{len(archive.cases)} cases: {results}, {page}", err=True)

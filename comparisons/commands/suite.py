@@ -9,7 +9,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.results import RUNGS
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.errors import UsageError
 
 MOST_JOBS = 4
@@ -69,5 +69,5 @@ def suite(
         if (summary := github_actions.summary_path()) is not None:
             github_actions.summarise(run.cases, summary, source.name, run.not_run)
     summarise(run.cases, run.walls, run.not_run)
-    typer.echo(f"{folder / 'results.json'}, {folder / 'report.html'}", err=True)
+    say(f"{folder / 'results.json'}, {folder / 'report.html'}", err=True)
     raise typer.Exit(exit_code(run.cases))

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from comparisons.record import CASE, RecordError, read_case
 from comparisons.results import Case
 from comparisons.suites.suite import folder_name
+from reference_rt.files import read_text
 
 
 class Archive(NamedTuple):
@@ -25,7 +26,7 @@ def read_archive(folder: Path) -> Archive:
     path = folder / "results.json"
     records = folder / "cases"
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        told = json.loads(read_text(path))
         names = [folder_name(case["scene"]) for case in told["cases"]]
         provenance, suite, not_run = told["provenance"], told["suite"], told["not_run"]
     except FileNotFoundError:
@@ -33,7 +34,7 @@ def read_archive(folder: Path) -> Archive:
         provenance, suite, not_run = {}, None, {}
     except OSError as error:
         raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise RecordError(f"{path}: is not what a suite writes; expected its results") from None
     if not names:
         raise RecordError(f"{folder}: holds no case; expected what `reference-rt suite` wrote")

@@ -11,7 +11,7 @@ from comparisons.budget import Budget
 from reference_rt import yaml_text
 from reference_rt.description import Description, Positive
 from reference_rt.diagnosis import first_problem
-from reference_rt.errors import SceneError, UsageError
+from reference_rt.errors import SceneError, UsageError, printable
 from reference_rt.files import read_text
 from reference_rt.scene import Scene
 
@@ -110,7 +110,7 @@ def load_suite(name: str) -> Source:
         raise SceneError(f"cannot be read: {error.strerror}", file=name) from None
     except UnicodeDecodeError:
         raise SceneError("is not text; expected UTF-8", file=name) from None
-    return Source(parse_suite(text, name), path.stem, name, name, text)
+    return Source(parse_suite(text, name), printable(path.stem), name, name, text)
 
 
 def parse_suite(text: str, file: str) -> Suite:
@@ -180,10 +180,11 @@ def _scenes(folder: Path) -> dict[str, tuple[Path, Scene]]:
         raise UsageError(f"--scenes: there is no folder '{folder}'; expected one with scenes in it")
     found: dict[str, tuple[Path, Scene]] = {}
     for path in sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES):
-        if path.stem in found:
-            other = found[path.stem][0].name
+        if printable(path.stem) in found:
+            other = found[printable(path.stem)][0].name
             raise SceneError(f"has the name of {other}; expected one of its own", file=str(path))
-        found[path.stem] = path, Scene.load(path)
+        scene = Scene.load(path)
+        found[scene.name] = path, scene
     if not found:
         raise UsageError(f"--scenes: '{folder}' holds no scene; expected .yaml or .json files")
     return found

@@ -101,7 +101,8 @@ def open_with_pillow(path: Path) -> ImageFile:
         gamma = info.get("gamma") if is_png and "srgb" not in info else None
         return PillowFile(
             path,
-            *image.size,
+            image.width,
+            image.height,
             is_integer=mode != "F",
             bits=16 if is_deep or mode in _GREY_OF_16 else 32 if mode == "F" else 8,
             has_opacity=mode in ("RGBA", "LA", "PA", "La", "RGBa") or "transparency" in info,

@@ -83,17 +83,15 @@ def join(parts: list[Bitmaps]) -> Bitmaps:
     moved = [
         part._replace(first=part.first + start) for part, start in zip(parts, starts, strict=True)
     ]
-    whole = parts[0].texels.base
-    in_place = isinstance(whole, np.ndarray) and whole.shape == (sum(counts), 3)
-    for part, start in zip(parts, starts, strict=True):
-        in_place = (
-            in_place
-            and part.texels.base is whole
-            and (part.texels.ctypes.data == whole.ctypes.data + whole.strides[0] * int(start))
-        )
     columns = [np.concatenate(column) for column in zip(*(part[1:] for part in moved), strict=True)]
-    texels = whole if in_place else np.concatenate([part.texels for part in parts])
-    return Bitmaps(texels, *columns)
+    whole = parts[0].texels.base
+    if whole is None or whole.shape != (sum(counts), 3):
+        whole = np.empty((sum(counts), 3))
+    for part, start in zip(parts, starts, strict=True):
+        place = whole[start : start + len(part.texels)]
+        if part.texels.ctypes.data != place.ctypes.data:
+            place[:] = part.texels
+    return Bitmaps(whole, *columns)
 
 
 def greatest(bitmaps: Bitmaps) -> float:
