@@ -26,7 +26,7 @@ from yaml.events import (
 MOST_REPEATED = 1 << 22
 """Values that aliases may stand for, in all.  A few lines of aliases of aliases can stand for any
 number of values.  This many is 100,000 shapes of 40 values each, every one an alias, and takes
-about 1 GB once it is checked.  Values that are written out are bounded by the size of the file."""
+about 0.4 GB once it is checked.  Values that are written out are bounded by the file's size."""
 
 MOST_NESTED = 1000
 """Lists and mappings in each other: as deep as Python nests calls, which bounds JSON, too."""

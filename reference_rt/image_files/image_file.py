@@ -13,7 +13,7 @@ from reference_rt.shapes.shape import FloatArray
 Curve = Callable[[FloatArray], FloatArray]
 """From encoded values to linear ones, number by number."""
 
-_STRIP = 1 << 16
+_STRIP = 1 << 14
 """Pixels that are converted at once: few enough that what is made on the way counts for little."""
 
 

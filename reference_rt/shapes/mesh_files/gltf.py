@@ -177,7 +177,9 @@ class _File:
                 self.files[path] = read_input(path)
             return self.files[path]
         except OSError as error:
-            raise ValueError(f"buffers[{index}], {uri[:60]!r}: {error.strerror}") from None
+            raise ValueError(
+                f"buffers[{index}], {uri[:60]!r}: {error.strerror}; expected a file in its folder"
+            ) from None
 
 
 def _natural(values: dict[str, Any], key: str, default: int | None = None) -> int:
