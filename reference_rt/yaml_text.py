@@ -359,6 +359,13 @@ class _Dumper(yaml.SafeDumper):  # type: ignore[misc]
         return True  # equal parts are written out: files are for people to read
 
 
+def _text(dumper: Any, text: str) -> Any:
+    # Characters that do not print need escapes, which only this style has: U+0085 and U+2028 end
+    # lines for YAML 1.1.
+    return dumper.represent_scalar(_TAG + "str", text, style=None if text.isprintable() else '"')
+
+
+_Dumper.add_representer(str, _text)
 _Dumper.add_implicit_resolver(
     _TAG + "float", re.compile(rf"(?:{_NUMBER.pattern})\Z"), sorted(_NUMBERS_BEGIN)
 )
