@@ -8,6 +8,7 @@ import json
 import os
 import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -50,7 +51,8 @@ def guarded(command: F) -> F:
         except typer.Exit:
             raise
         except KeyboardInterrupt as error:
-            _fail("interrupted; nothing unfinished was written", 128 + number_of(error))
+            code = answered(error)
+            _fail("interrupted; nothing unfinished was written", code)
         except BrokenPipeError:
             raise
         except Exception as error:
@@ -68,18 +70,36 @@ def say(text: str, err: bool = False) -> None:
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM or SIGHUP: as Ctrl-C, so that child processes are ended and no file is left half
+    """SIGINT, SIGTERM or SIGHUP, so that child processes are ended and no file is left half
     written.  Its argument is the signal's number."""
 
 
+_AGAIN = 2.0
+"""Seconds after which a signal is sent again that has not ended the command."""
+
+
 def _terminate(number: int, frame: Any) -> None:
-    signal.signal(number, signal.SIG_DFL)  # a second one ends the process at once
+    # An exception is lost where the signal arrives in a callback that LLVM makes while compiling.
+    again = threading.Timer(_AGAIN, os.kill, (os.getpid(), number))
+    again.daemon = True
+    again.start()
     raise Terminated(number)
 
 
-def number_of(error: KeyboardInterrupt) -> int:
-    """The number of the signal that an interruption came from."""
-    return int(error.args[0]) if isinstance(error, Terminated) else signal.SIGINT
+def answered(error: KeyboardInterrupt) -> int:
+    """The exit code of an interruption that has been caught; it is not sent again."""
+    if not isinstance(error, Terminated):
+        return 130
+    number = int(error.args[0])
+    signal.signal(number, signal.SIG_IGN)
+    return 128 + number
+
+
+def _catch_signals() -> None:
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, _terminate)  # one that is ignored, as by `nohup`, stays so
 
 
 def lost_output(error: BaseException) -> str:
@@ -281,9 +301,7 @@ def _add_commands() -> None:
 
 def main() -> None:
     """The `reference-rt` program."""
-    for number in {signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}:
-        if signal.getsignal(number) == signal.SIG_DFL:  # `nohup` ignores SIGHUP
-            signal.signal(number, _terminate)
+    _catch_signals()
     try:
         _add_commands()
         gc.freeze()  # what the imports made stays: 0.04 s less of looking through it for garbage
@@ -293,7 +311,7 @@ def main() -> None:
         gc.set_threshold(20_000)
         app()
     except KeyboardInterrupt as error:  # before or after a command, which has its own answer
-        sys.exit(128 + number_of(error))
+        sys.exit(answered(error))
     except OSError as error:  # of what prints outside of a command, such as --help
         if not is_output_lost(error):
             raise
