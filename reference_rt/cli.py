@@ -79,7 +79,8 @@ _AGAIN = 2.0
 
 
 def _terminate(number: int, frame: Any) -> None:
-    # An exception is lost where the signal arrives in a callback that LLVM makes while compiling.
+    # An exception is lost where the signal arrives in a callback: of LLVM, which compiles, or of a
+    # fork.
     again = threading.Timer(_AGAIN, os.kill, (os.getpid(), number))
     again.daemon = True
     again.start()
@@ -96,6 +97,13 @@ def answered(error: KeyboardInterrupt) -> int:
 
 
 def _catch_signals() -> None:
+    lost = sys.unraisablehook
+
+    def tell(unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, Terminated):  # which comes again
+            lost(unraisable)
+
+    sys.unraisablehook = tell
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)  # Windows has no SIGHUP
         if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):

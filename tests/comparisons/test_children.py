@@ -136,8 +136,14 @@ def compiling(folder):
 
 
 @linux
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
-@pytest.mark.parametrize("start", [gate, pool, compiling])
+@pytest.mark.parametrize(
+    ("start", "number"),
+    [
+        *((gate, number) for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGKILL)),
+        *((pool, number) for number in (signal.SIGTERM, signal.SIGKILL)),
+        *((compiling, number) for number in (signal.SIGTERM, signal.SIGKILL)),
+    ],
+)
 def test_no_child_outlives_its_parent(tmp_path, start, number):
     process, children = start(tmp_path)
     assert children
