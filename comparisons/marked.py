@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from reference_rt.errors import UsageError
-from reference_rt.files import check_writable, replacing
+from reference_rt.files import check_writable, read_text, replacing
 
 END = "<!-- end -->"
 
@@ -32,7 +32,7 @@ def check(path: Path, name: str) -> None:
 def around(path: Path, name: str) -> tuple[str, str]:
     """What stands before and after the place.  Raises UsageError."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:

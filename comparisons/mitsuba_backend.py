@@ -23,7 +23,9 @@ import platformdirs
 
 from comparisons import llvm_libraries
 from comparisons.llvm_libraries import LIBRARY
+from reference_rt.children import tied
 from reference_rt.errors import ReferenceUnavailableError
+from reference_rt.files import read_text
 
 FORCE = "REFERENCE_RT_MITSUBA_VARIANT"
 
@@ -179,6 +181,7 @@ def prove(variant: str, llvm_path: str | None) -> str | None:
             capture_output=True,
             text=True,
             timeout=_PROOF_SECONDS,
+            **tied(),
             check=False,
         )
     except subprocess.TimeoutExpired:
@@ -226,7 +229,7 @@ def _remembered_proof(version: str, variant: str, path: str) -> str | None:
 
 def _read_memory() -> dict[str, str | None]:
     try:
-        memory = json.loads(_memory_file().read_text(encoding="utf-8"))
+        memory = json.loads(read_text(_memory_file()))
     except (OSError, ValueError):
         return {}
     if not isinstance(memory, dict):

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from comparisons.results import Case, FloatArray, Images
 from reference_rt.errors import ImageError
 from reference_rt.exr import read_exr, write_exr
-from reference_rt.files import replacing
+from reference_rt.files import read_input, read_text, replacing
 
 CASE, PICTURES = "case.json", "pictures.exr"
 
@@ -108,7 +108,7 @@ def read_record(folder: Path) -> Record:
     """What `case.json` says, without the pictures.  Raises RecordError."""
     path = folder / CASE
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_text(path))
         if isinstance(data, dict) and data.get("schema") != SCHEMA:
             raise RecordError(f"{path}: is not of schema {SCHEMA}; expected one of this version")
         data["pictures"] = {name: tuple(size) for name, size in data["pictures"].items()}
@@ -162,7 +162,7 @@ def _read_pictures(path: Path, record: Record) -> Images:
 
 
 def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_input(path)).hexdigest()
 
 
 # ---- values -------------------------------------------------------------------------------------

@@ -1,13 +1,17 @@
 """`reference-rt`: render, explain, schema; other packages add commands through an entry point."""
 
+import errno
 import functools
 import gc
 import importlib.metadata
 import json
+import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -19,6 +23,7 @@ from reference_rt.errors import (
     SceneError,
     SceneWarning,
     UsageError,
+    printable,
 )
 from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
@@ -32,7 +37,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="An independent float64 reference ray tracer.\n\nExit codes: 0 success or agreement, "
     "1 difference, 2 usage, 3 invalid scene or image, 4 reference missing or could not run, "
-    "5 internal error, 130 interrupted.",
+    "5 internal error, 130 interrupted (by "
+    "SIGTERM 143, by SIGHUP 129).",
 )
 
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
@@ -50,15 +56,76 @@ def guarded(command: F) -> F:
             _fail(str(error), error.exit_code)
         except typer.Exit:
             raise
-        except KeyboardInterrupt:
-            _fail("interrupted; nothing unfinished was written", 130)
+        except KeyboardInterrupt as error:
+            code = answered(error)
+            _fail("interrupted; nothing unfinished was written", code)
         except BrokenPipeError:
             raise
         except Exception as error:
+            if is_output_lost(error):
+                _fail(lost_output(error), ImageError.exit_code)
             message = " ".join(str(error).split())
             _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
 
     return run  # type: ignore[return-value]
+
+
+def say(text: str, err: bool = False) -> None:
+    """Print one line, with escapes in place of what does not print."""
+    typer.echo(printable(text), err=err)
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGINT, SIGTERM or SIGHUP, so that child processes are ended and no file is left half
+    written.  Its argument is the signal's number."""
+
+
+_AGAIN = 2.0
+"""Seconds after which a signal is sent again that has not ended the command."""
+
+
+def _terminate(number: int, frame: Any) -> None:
+    # An exception is lost where the signal arrives in a callback: of LLVM, which compiles, or of a
+    # fork.
+    again = threading.Timer(_AGAIN, os.kill, (os.getpid(), number))
+    again.daemon = True
+    again.start()
+    raise Terminated(number)
+
+
+def answered(error: KeyboardInterrupt) -> int:
+    """The exit code of an interruption that has been caught; it is not sent again."""
+    if not isinstance(error, Terminated):
+        return 130
+    number = int(error.args[0])
+    signal.signal(number, signal.SIG_IGN)
+    return 128 + number
+
+
+def _catch_signals() -> None:
+    lost = sys.unraisablehook
+
+    def tell(unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, Terminated):  # which comes again
+            lost(unraisable)
+
+    sys.unraisablehook = tell
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, _terminate)  # one that is ignored, as by `nohup`, stays so
+
+
+def lost_output(error: BaseException) -> str:
+    """What is said where printing failed."""
+    reason = getattr(error, "strerror", None)
+    return f"standard output cannot be written: {reason}; expected a place with room"
+
+
+def is_output_lost(error: BaseException) -> bool:
+    """Whether printing failed, as on a full disk.  Files that we write raise ImageError."""
+    lost = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+    return isinstance(error, OSError) and error.errno in lost and error.filename is None
 
 
 @contextmanager
@@ -79,7 +146,8 @@ def scene_warnings(tell: Callable[[str], None]) -> Iterator[None]:
 
 
 def _fail(message: str, code: int) -> None:
-    typer.echo(f"error: {message}", err=True)
+    with suppress(OSError):  # of standard error, too, which then tells nothing
+        say(f"error: {message}", err=True)
     raise typer.Exit(code)
 
 
@@ -111,7 +179,7 @@ def render(
         picture = render_scene(description, threads=threads, progress=progress)
     image.write(output, picture, provenance(description))
     seconds = picture.seconds
-    typer.echo(
+    say(
         f"{output}: {description.film.width} x {description.film.height}, "
         f"{seconds['tables']:.2f} s to build, {seconds['compile']:.2f} s to compile or load "
         f"kernels, {seconds['render']:.2f} s to render",
@@ -160,7 +228,7 @@ def explain(scene: SceneArgument) -> None:
             continue
         table = Table(title=title, title_justify="left", show_header=False, box=None)
         for what, why in lines:
-            table.add_row(what, why)
+            table.add_row(printable(what), printable(why))
         console.print(table)
         console.print()
 
@@ -255,6 +323,7 @@ def _add_commands() -> None:
 
 def main() -> None:
     """The `reference-rt` program."""
+    _catch_signals()
     try:
         _add_commands()
         gc.freeze()  # what the imports made stays: 0.04 s less of looking through it for garbage
@@ -263,8 +332,16 @@ def main() -> None:
         # two), and 3 MB more.
         gc.set_threshold(20_000)
         app()
-    except KeyboardInterrupt:  # before or after a command, which has its own answer
-        sys.exit(130)
+    except KeyboardInterrupt as error:  # before or after a command, which has its own answer
+        sys.exit(answered(error))
+    except OSError as error:  # of what prints outside of a command, such as --help
+        if not is_output_lost(error):
+            raise
+        with suppress(OSError):
+            say(f"error: {lost_output(error)}", err=True)
+        # What is left in the buffer would fail again when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.exit(ImageError.exit_code)
 
 
 if __name__ == "__main__":

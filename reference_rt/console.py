@@ -15,6 +15,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from reference_rt.errors import printable
+
 _WORDS = {
     "compile": "compiling kernels (once for each kind of scene; kept for later)",
     "render": "rendering",
@@ -55,7 +57,7 @@ class Bar:
 
     def line(self, text: str) -> None:
         """One line that stays."""
-        self._console.print(text, markup=False, soft_wrap=True)
+        self._console.print(printable(text), markup=False, soft_wrap=True)
 
 
 class ProgressLine(Bar):

@@ -4,9 +4,6 @@ from collections.abc import Iterator
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 Keys = tuple[str | int, ...]
 
@@ -117,24 +114,3 @@ def _type_of(model: type[BaseModel]) -> Any:
 
 def _types(models: list[type[BaseModel]]) -> str:
     return ", ".join(str(_type_of(m)) for m in models)
-
-
-def line_of(text: str, keys: Keys) -> int | None:
-    """The line, from 1, of the part at `keys`, or of the closest part around it."""
-    try:
-        node: Node | None = YAML(typ="safe", pure=True).compose(text)
-    except (YAMLError, RecursionError):
-        return None
-    line = 1
-    for key in keys:
-        if isinstance(node, MappingNode):
-            found = [(k, v) for k, v in node.value if k.value == str(key)]
-            if not found:
-                break
-            line, node = found[0][0].start_mark.line + 1, found[0][1]
-        elif isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.value):
-            node = node.value[key]
-            line = node.start_mark.line + 1
-        else:
-            break
-    return line

@@ -3,9 +3,16 @@
 from collections.abc import Sequence
 
 
-def _one_line(text: str) -> str:
-    """The text with escapes for what would break or hide it, as names of files may have."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+def printable(text: str, kept: str = "") -> str:
+    """The text with Python's escapes in place of characters that do not print, such as newlines,
+    terminal codes and lone surrogates (the bytes of a file name that is not UTF-8); but of `kept`.
+
+    Names of files, scenes and materials may hold any.  What shows such a name passes it through
+    here: a terminal would obey it, XML cannot hold it, UTF-8 cannot encode it.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in kept else ascii(c)[1:-1] for c in text)
 
 
 _MOST_KEYS = 16
@@ -18,7 +25,7 @@ class ReferenceRtError(Exception):
     exit_code = 5
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(_one_line(message))
+        super().__init__(printable(message))
 
 
 class UsageError(ReferenceRtError):
@@ -63,7 +70,7 @@ class SceneWarning(UserWarning):
     """
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(_one_line(message))
+        super().__init__(printable(message))
 
 
 class ImageError(ReferenceRtError):

@@ -13,6 +13,7 @@ from typing import Any
 
 from numba.core.compiler_lock import global_compiler_lock
 
+from reference_rt.children import end_with_parent
 from reference_rt.kernel import CACHE_FOLDER, Signature, is_compiled, precompile
 
 PATIENCE = 60.0
@@ -59,6 +60,7 @@ def _fork(calls: Sequence[Call]) -> int:
     """The number of a new process that compiles these and does nothing else."""
     # Nobody else holds the compiler's lock then: the new process has this thread only, and what
     # other threads hold stays locked in it.
+    parent = os.getpid()
     with global_compiler_lock, warnings.catch_warnings():
         # Python 3.12 warns of that.
         warnings.simplefilter("ignore", DeprecationWarning)
@@ -66,6 +68,7 @@ def _fork(calls: Sequence[Call]) -> int:
     if child != 0:
         return child
     try:
+        end_with_parent(parent)
         for call in calls:
             precompile(*call)
     finally:

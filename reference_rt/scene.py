@@ -1,7 +1,6 @@
 """`Scene`: the frozen description of what is rendered; YAML and JSON in and out; JSON Schema."""
 
 import hashlib
-import io
 import json
 import math
 import warnings
@@ -12,16 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, PrivateAttr, model_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from reference_rt import yaml_text
 from reference_rt.arrays import AS_DIGEST
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.perspective import Perspective
 from reference_rt.csg import AnyShape, Solid
 from reference_rt.description import Description
-from reference_rt.diagnosis import line_of
-from reference_rt.errors import SceneError, SceneWarning
+from reference_rt.errors import SceneError, SceneWarning, printable
+from reference_rt.files import read_text
 from reference_rt.film import Film
 from reference_rt.groups import Instance
 from reference_rt.integrators import AnyIntegrator
@@ -169,8 +167,8 @@ class Scene(Description):
 
     @property
     def name(self) -> str:
-        """The scene file's name without its suffix."""
-        return Path(self._source[0]).stem if self._source else "scene"
+        """The scene file's name without its suffix; escapes in place of what does not print."""
+        return printable(Path(self._source[0]).stem) if self._source else "scene"
 
     @property
     def is_from_file(self) -> bool:
@@ -182,7 +180,7 @@ class Scene(Description):
         if self._source is None:
             return SceneError(message, path)
         name, text = self._source
-        return SceneError(message, path, name, line_of(text, path))
+        return SceneError(message, path, name, yaml_text.line_of(text, path))
 
     def warn(self, message: str, *path: str | int) -> None:
         """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`.
@@ -239,7 +237,7 @@ class Scene(Description):
         if path.suffix.lower() not in (".yaml", ".yml", ".json"):
             raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_text(path)
         except OSError as error:
             raise SceneError(
                 f"cannot be read: {error.strerror}; expected a scene file", file=str(path)
@@ -253,16 +251,8 @@ class Scene(Description):
         """A scene from YAML or JSON text; `name` stands in errors, `folder` holds its files."""
         try:
             data = _load_data(text)
-        except MarkedYAMLError as error:
-            line = None if error.problem_mark is None else error.problem_mark.line + 1
-            problem = " ".join(str(error.problem or error.context).split())
-            problem = problem.partition(" with value ")[0]  # of a duplicate key: says nothing
-            if problem.startswith("but ") and error.context:
-                problem = f"{error.context}, {problem}"
-            raise SceneError(f"malformed: {problem}", file=name, line=line) from None
-        except (YAMLError, ValueError) as error:  # ValueError: numbers and dates that are none
-            problem = " ".join(str(error).split())
-            raise SceneError(f"malformed: {problem}", file=name) from None
+        except yaml_text.MalformedError as error:
+            raise SceneError(f"malformed: {error}", file=name, line=error.line) from None
         except RecursionError:
             raise SceneError("malformed: nested too deeply", file=name) from None
         if not isinstance(data, dict):
@@ -270,7 +260,7 @@ class Scene(Description):
         try:
             scene = cls._checked(data)
         except SceneError as error:
-            line = line_of(text, error.path)
+            line = yaml_text.line_of(text, error.path)
             raise SceneError(error.message, error.path, name, line) from None
         scene._folder = Path() if folder is None else folder
         scene._source = (name, text)
@@ -292,11 +282,7 @@ class Scene(Description):
 
     def to_yaml(self) -> str:
         """The scene as YAML text, which `parse` takes."""
-        yaml = YAML()
-        yaml.default_flow_style = None
-        stream = io.StringIO()
-        yaml.dump(json.loads(self.to_json()), stream)
-        return stream.getvalue()
+        return yaml_text.dump(json.loads(self.to_json()))
 
 
 def _load_data(text: str) -> Any:
@@ -306,7 +292,7 @@ def _load_data(text: str) -> Any:
         # pairs of surrogates, and control characters.
         with suppress(ValueError):
             return json.loads(text, object_pairs_hook=_distinct)
-    return YAML(typ="safe", pure=True).load(text)
+    return yaml_text.load(text)
 
 
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

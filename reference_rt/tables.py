@@ -17,7 +17,7 @@ from reference_rt.lights.tables import light_tables
 from reference_rt.materials import Materials
 from reference_rt.materials.tables import material_tables
 from reference_rt.textures import TABLES as TEXTURE_TABLES
-from reference_rt.textures import Palette, Textures
+from reference_rt.textures import Palette, Textures, bitmap
 from reference_rt.textures.parameter import join
 
 if TYPE_CHECKING:
@@ -59,11 +59,20 @@ def _texture_tables(scene: "Scene") -> tuple[Textures | None, Palette]:
     if not scene.textures:
         return None, Palette({}, ())
     parts: dict[int, list[Any]] = {}
+    try:
+        room, used = bitmap.room_for(scene.textures.values(), scene.folder), 0
+    except ValueError as error:
+        raise scene.error(str(error), "textures") from None
     kinds, rows, maps, greatest = [], [], [], []
     for name, texture in scene.textures.items():
         code, module = next((c, m) for c, _, d, m in TEXTURE_TABLES if isinstance(texture, d))
         try:
-            table = texture.tabulate(scene.folder)
+            table: Any
+            if isinstance(texture, bitmap.Bitmap):
+                table = texture.tabulate(scene.folder, room[used:])
+                used += len(table.texels)
+            else:
+                table = texture.tabulate(scene.folder)
         except ValueError as error:
             raise scene.error(str(error), "textures", name) from None
         parts.setdefault(code, []).append(table)

@@ -12,6 +12,7 @@ from comparisons.bench.meshes import MILLION, blob, write_obj, write_ply
 from comparisons.bench.row import Row, within
 from comparisons.bench.setting import Setting
 from comparisons.bench.timing import ROUNDS
+from reference_rt.children import tied
 from reference_rt.errors import ReferenceRtError
 
 BUILD_SECONDS, PEAK_MB = 6.0, 1000.0
@@ -63,6 +64,7 @@ def _run(mesh: Path) -> dict[str, float]:
         capture_output=True,
         text=True,
         timeout=_TIMEOUT,
+        **tied(),
         check=False,
     )
     if run.returncode != 0:

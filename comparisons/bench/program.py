@@ -15,6 +15,7 @@ import numpy as np
 from comparisons.bench.row import Row, within
 from comparisons.bench.setting import Setting
 from comparisons.bench.timing import ROUNDS
+from reference_rt.children import tied
 from reference_rt.errors import ReferenceRtError
 
 SIZE, SPP = "64x64", 16
@@ -72,12 +73,13 @@ class Program:
             capture_output=True,
             text=True,
             timeout=_TIMEOUT,
+            **tied(),
             check=False,
         )
         if run.returncode != 0:
             last = (run.stderr.strip().splitlines() or ["no message"])[-1]
             raise ReferenceRtError(f"reference-rt {' '.join(arguments)}: {last}")
-        return run.stderr
+        return str(run.stderr)
 
 
 def measure_cold(setting: Setting) -> list[Row]:

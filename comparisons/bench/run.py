@@ -17,7 +17,7 @@ from comparisons.bench.setting import Setting
 from comparisons.bench.table import markdown
 from comparisons.sources import sources_digest
 from reference_rt.errors import ReferenceUnavailableError
-from reference_rt.files import check_writable, replacing
+from reference_rt.files import check_writable, read_text, replacing
 
 SCHEMA = 1
 """Raised whenever a reader of the former layout would misread the new one."""
@@ -93,7 +93,7 @@ def key_of(setting: Setting, facts: dict[str, Any]) -> str:
 def read_rows(path: Path, key: str) -> list[Row] | None:
     """The rows that are kept for this key, if any."""
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
+        kept = json.loads(read_text(path))
         return [row_from(row) for row in kept["rows"]] if kept["key"] == key else None
     except (OSError, ValueError, KeyError, TypeError):
         return None

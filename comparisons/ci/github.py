@@ -10,7 +10,7 @@ from typing import TextIO
 from comparisons.ci.ranking import SEVERITY, ranked
 from comparisons.results import INTERRUPTED, Case, how_many
 from comparisons.verdict import PASSING
-from reference_rt.errors import ImageError
+from reference_rt.errors import ImageError, printable
 
 MOST_ANNOTATIONS = 10
 """Of each kind that a step may make; GitHub drops the rest without a word."""
@@ -89,7 +89,9 @@ def _told(case: Case) -> str:
 
 def _data(text: str) -> str:
     """Escapes of a workflow command's message (actions/toolkit, `escapeData`)."""
-    return _utf8(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return (
+        printable(text, kept="\r\n").replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    )
 
 
 def _property(text: str) -> str:
@@ -154,12 +156,9 @@ def _cut(text: str) -> str:
 
 def _markdown(text: str) -> str:
     """`text` as text: on one line, and none of it markup."""
-    return re.sub(r"([\\`*_\[\]<>|~&#!@$])", r"\\\1", " ".join(_utf8(text).split()))
-
-
-def _utf8(text: str) -> str:
-    """`text`, a file name of which need not be UTF-8."""
-    return text.encode("utf-8", "replace").decode("utf-8")
+    return re.sub(
+        r"([\\`*_\[\]<>|~&#!@$])", r"\\\1", " ".join(printable(text, kept="\r\n\t").split())
+    )
 
 
 __all__ = ["annotate", "is_there", "summarise", "summary_path"]

@@ -1,6 +1,5 @@
 """JUnit XML, which build servers show as tests."""
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,10 +8,8 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 from comparisons.ci.ranking import ranked
 from comparisons.results import INTERRUPTED, Case
 from comparisons.verdict import PASSING
+from reference_rt.errors import printable
 from reference_rt.files import replacing
-
-_FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What no XML 1.0 document may hold (section 2.2, Char)."""
 
 _BROKEN = "invalid"
 """The verdict that makes no statement about agreement: an error, where the others are failures."""
@@ -82,5 +79,6 @@ def _details(case: Case) -> list[str]:
 
 
 def _legal(text: str) -> str:
-    """`text` without what XML cannot hold."""
-    return _FORBIDDEN.sub("", text)
+    """`text` with escapes in place of what XML 1.0 cannot hold (section 2.2, Char), and of other
+    characters that do not print."""
+    return printable(text, kept="\n\t")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.errors import SceneError, UsageError
 from reference_rt.scene import Scene
 
@@ -59,7 +59,7 @@ def accept(
         used = None if unused is None else store.used_in(unused)
         for one in found:
             if used is None or one.record.name not in used:
-                typer.echo(_told(one.record, baselines))
+                say(_told(one.record, baselines))
         idle = [one for one in found if used is not None and one.record.name not in used]
         raise typer.Exit(1 if idle else 0)
     if not candidates or name is None or reason is None:
@@ -86,9 +86,9 @@ def accept(
         machine=facts["machine"],
         date=facts["date"],
     )
-    typer.echo(f"{written.folder}: accepted; commit it", err=True)
+    say(f"{written.folder}: accepted; commit it", err=True)
     if len(pictures) == 1 and not noise_free:
-        typer.echo(
+        say(
             "note: of one picture the noise is not known, and gates see less; accept several with "
             "different seeds, or say --noise-free",
             err=True,

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.errors import UsageError
 
 
@@ -62,6 +62,6 @@ def bench(
         written = table.markdown(outcome.rows, outcome.machine, outcome.not_measured)
         marked.rewrite(markdown, "bench", written)
     for name, why in outcome.not_measured.items():
-        typer.echo(f"{name}: not measured: {why}", err=True)
-    typer.echo(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)
+        say(f"{name}: not measured: {why}", err=True)
+    say(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)
     raise typer.Exit(0 if outcome.met else 1)

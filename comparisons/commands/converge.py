@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.console import ProgressLine
 from reference_rt.errors import SceneError, UsageError
 from reference_rt.scene import Scene
@@ -93,10 +93,10 @@ def converge(
         store = Store(out / "rungs" / folder_name(name), key, fresh=fresh)
         with ProgressLine() as progress:
 
-            def say(what: str, part: float) -> None:
+            def tell(what: str, part: float) -> None:
                 progress(what if what == "compile" else f"{name}: {what}", part)
 
-            return converge_scene(scene, settings, store, say)
+            return converge_scene(scene, settings, store, tell)
 
     for k, (path, scene) in enumerate(zip(scenes, described, strict=True)):
         try:
@@ -110,8 +110,8 @@ def converge(
         write_table(files[1], found)
         write_page(files[2], found, settings, facts)
         for line in lines_of(found[k]):
-            typer.echo(line)
-    typer.echo(", ".join(map(str, files)), err=True)
+            say(line)
+    say(", ".join(map(str, files)), err=True)
     if invalid:
         raise typer.Exit(SceneError.exit_code)
 

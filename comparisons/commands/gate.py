@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.console import ProgressLine
-from reference_rt.errors import ReferenceRtError, UsageError
+from reference_rt.errors import ReferenceRtError, UsageError, printable
 from reference_rt.scene import Scene
 
 if TYPE_CHECKING:
@@ -113,11 +113,11 @@ def gate(
         first = 1 if seed is None else seed
         seeds = range(first, first + (replicates or (1 if noiseless else 8)))
 
-    def say(line: str) -> None:
-        typer.echo(line, err=True)
+    def tell(line: str) -> None:
+        say(line, err=True)
 
     name = baseline or ("" if described is None else described.name)
-    name = name or Path((reference or [Path("nothing")])[0]).stem
+    name = printable(name or Path((reference or [Path("nothing")])[0]).stem)
     kept = () if run is None else (out / "candidates" / "a candidate",)
     outputs.prepare(out, *kept, *outputs.ci_files(junit, github))
     start = time.perf_counter()
@@ -136,7 +136,7 @@ def gate(
             name=name,
         )
         if run is not None:
-            pictures = drive(run, seeds, out / "candidates", say)
+            pictures = drive(run, seeds, out / "candidates", tell)
         else:
             pictures = [p for path in candidates or () for p in read_candidates(path, layer)]
         driven = time.perf_counter() - start
@@ -157,8 +157,8 @@ def gate(
     outputs.for_ci(case, junit, "" if scene is None else scene.as_posix(), github)
     if failed is not None:
         raise failed
-    typer.echo(f"{case.scene}: {case.verdict}: {case.reason}")
+    say(f"{case.scene}: {case.verdict}: {case.reason}")
     if case.cause is not None:
-        typer.echo(f"{case.scene}: likeliest cause: {case.cause.name}: {case.cause.evidence}")
-    say(f"{results}, {report}")
+        say(f"{case.scene}: likeliest cause: {case.cause.name}: {case.cause.evidence}")
+    tell(f"{results}, {report}")
     raise typer.Exit(outputs.code_of(case))

@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.errors import UsageError
 
 
@@ -58,4 +58,4 @@ def methods(
         for table in tables([row for row in rows if row.family == name]):
             console.print(table)
             console.print()
-    typer.echo(f"{out / 'results.json'}, results.csv, methods.html", err=True)
+    say(f"{out / 'results.json'}, results.csv, methods.html", err=True)

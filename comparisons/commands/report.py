@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 
 
 @guarded
@@ -35,5 +35,5 @@ def report(
     cases, provenance, suite, not_run, missing = read_archive(folder)
     write_results(results, cases, provenance, suite, not_run, missing)
     write_report(page, cases, provenance, missing=missing)
-    typer.echo(f"{how_many(len(cases), len(missing))}: {results}, {page}", err=True)
+    say(f"{how_many(len(cases), len(missing))}: {results}, {page}", err=True)
     raise typer.Exit(1 if missing else 0)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.errors import UsageError
 
 
@@ -102,8 +102,8 @@ def stability(
         holds &= one.holds
         for f in one.found:
             if f.broken or f.x in one.failed:
-                typer.echo(f"again: {again(f, effort, seed)}", err=True)
+                say(f"again: {again(f, effort, seed)}", err=True)
                 for example in f.ours.examples if f.ours else ():
-                    typer.echo(f"  {dict(example)}", err=True)
-    typer.echo(f"{out / 'results.json'}, results.csv, stability.html", err=True)
+                    say(f"  {dict(example)}", err=True)
+    say(f"{out / 'results.json'}, results.csv, stability.html", err=True)
     raise typer.Exit(0 if holds else 1)

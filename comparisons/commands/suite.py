@@ -9,7 +9,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.results import COMPARED
-from reference_rt.cli import guarded
+from reference_rt.cli import guarded, say
 from reference_rt.errors import UsageError
 
 MOST_JOBS = 4
@@ -77,7 +77,7 @@ def suite(
             title = source.name
             github_actions.summarise(run.cases, summary, title, run.not_run, run.missing)
         summarise(run.cases, run.walls, run.not_run, run.missing)
-        typer.echo(f"{options.results}, {options.report}", err=True)
+        say(f"{options.results}, {options.report}", err=True)
 
     options = Options(folder, rungs, jobs, threads, fresh, tell=tell)
     run = run_suite(source, planned, options)

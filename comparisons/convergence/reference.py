@@ -13,7 +13,7 @@ from comparisons.convergence.data import Reference
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.reference import cache_folder
 from reference_rt.errors import ImageError
-from reference_rt.files import replacing
+from reference_rt.files import open_input, replacing
 from reference_rt.render import render
 from reference_rt.sampling import Sobol
 from reference_rt.scene import Scene
@@ -65,7 +65,7 @@ def _load(path: Path, size: tuple[int, ...]) -> tuple[FloatArray, int, int]:
     be used."""
     with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
         # Opened here, since NumPy leaves a file that is no archive open.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+        with open_input(path) as stream, np.load(stream, allow_pickle=False) as file:
             pictures = np.array(file["pictures"])
             spp, rounds = int(file["spp"]), int(file["rounds"])
         if pictures.shape == size and pictures.dtype == np.float64 and spp > 0:

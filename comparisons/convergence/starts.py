@@ -14,6 +14,7 @@ import platformdirs
 from comparisons.convergence.contestants import Contestant
 from comparisons.convergence.store import Store
 from comparisons.mitsuba_backend import LIBRARY, LLVM, backend
+from reference_rt.children import tied
 from reference_rt.scene import Scene
 
 STAGES = ("start", "load", "build", "compile", "render")
@@ -88,6 +89,7 @@ def _child(
             capture_output=True,
             text=True,
             timeout=TIMEOUT,
+            **tied(),
             check=True,
         )
         times = json.loads(run.stdout.splitlines()[-1])

@@ -17,7 +17,7 @@ from comparisons.convergence.data import Rung
 from comparisons.convergence.reference import key_of
 from comparisons.mitsuba_backend import backend
 from comparisons.suites.keys import files_digest, sources_digest
-from reference_rt.files import replacing
+from reference_rt.files import open_input, read_text, replacing
 from reference_rt.scene import Scene
 
 SCHEMA = 1
@@ -68,7 +68,7 @@ class Store:
         path = self._rung_path(contestant, asked)
         damaged = suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError)
         # Opened here, since NumPy leaves a file that is no archive open.
-        with damaged, path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+        with damaged, open_input(path) as stream, np.load(stream, allow_pickle=False) as file:
             arrays = [np.asarray(file[name], np.float64) for name in _ARRAYS]
             return Rung(int(file["asked"]), int(file["spp"]), *arrays)
         return None
@@ -95,7 +95,7 @@ class Store:
         if self._folder is None:
             return None
         path = self._folder / f"{name}.npy"
-        with suppress(OSError, ValueError, EOFError), path.open("rb") as stream:
+        with suppress(OSError, ValueError, EOFError), open_input(path) as stream:
             return np.load(stream, allow_pickle=False)
         return None
 
@@ -122,7 +122,7 @@ class Store:
         if self._folder is None:
             return None
         with suppress(OSError, ValueError):
-            return json.loads((self._folder / f"{name}.json").read_text(encoding="utf-8"))
+            return json.loads(read_text(self._folder / f"{name}.json"))
         return None
 
     def _write(self, name: str, value: Any) -> None:

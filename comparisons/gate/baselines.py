@@ -27,7 +27,7 @@ from comparisons.gate.reference import Reference, stacked, usable
 from reference_rt.description import Description
 from reference_rt.errors import ImageError, SceneError, UsageError
 from reference_rt.exr import write_exr
-from reference_rt.files import check_writable
+from reference_rt.files import check_writable, read_input, read_text
 from reference_rt.scene import Scene
 
 RECORD = "baseline.json"
@@ -232,8 +232,8 @@ def used_in(results: Path) -> set[str]:
     """The baselines that gates named whose `results.json` are in a folder or below it."""
     found = set()
     for path in results.rglob("results.json"):
-        with suppress(OSError, ValueError, AttributeError):
-            document = json.loads(path.read_text(encoding="utf-8"))
+        with suppress(OSError, ValueError, AttributeError, KeyError, TypeError, RecursionError):
+            document = json.loads(read_text(path))
             found.add(document["provenance"].get("baseline"))
     return {name for name in found if isinstance(name, str)}
 
@@ -241,7 +241,7 @@ def used_in(results: Path) -> set[str]:
 def _source(picture: Picture) -> dict[str, Any]:
     source: dict[str, Any] = {"file": Path(picture.name).name}
     with suppress(OSError):
-        source["sha256"] = hashlib.sha256(Path(picture.name).read_bytes()).hexdigest()
+        source["sha256"] = hashlib.sha256(read_input(Path(picture.name))).hexdigest()
     header = {key: value[:500] for key, value in list(picture.header.items())[:32]}
     return source | ({"header": header} if header else {})
 
@@ -258,12 +258,12 @@ def _seal(data: dict[str, Any]) -> str:
 
 def _record(path: Path) -> Record:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_text(path))
         seal = data.pop("seal")
         if seal != _seal(data):
             raise ValueError("its seal is broken")
         return Record.model_validate(data)
-    except (OSError, ValueError, KeyError, AttributeError, SceneError) as error:
+    except (OSError, ValueError, KeyError, AttributeError, RecursionError, SceneError) as error:
         reason = "its fields" if isinstance(error, SceneError) else str(error)
         raise BaselineEditedError(
             f"{path}: is not what `accept` wrote ({' '.join(reason.split())[:100]}); restore it, "
@@ -273,6 +273,6 @@ def _record(path: Path) -> Record:
 
 def _sha256(path: Path) -> str:
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return hashlib.sha256(read_input(path)).hexdigest()
     except OSError:
         return "missing"

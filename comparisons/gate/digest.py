@@ -13,6 +13,7 @@ from urllib.parse import unquote
 import numpy as np
 
 import reference_rt
+from reference_rt.files import read_input
 from reference_rt.scene import Scene
 
 _URI = re.compile(rb'"uri"\s*:\s*"([^"]+)"')
@@ -29,7 +30,7 @@ def scene_digest(scene: Scene) -> str:
     digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
     for path in _files(description, scene.folder):
         with suppress(OSError):  # a file that is not there is for the loader to tell
-            digest.update(hashlib.sha256(path.read_bytes()).digest())
+            digest.update(hashlib.sha256(read_input(path)).digest())
     return digest.hexdigest()
 
 
@@ -41,7 +42,7 @@ def _files(part: Any, folder: Path) -> Iterator[Path]:
             yield path
             if path.suffix.lower() == ".gltf":
                 with suppress(OSError):
-                    for uri in _URI.findall(path.read_bytes()):
+                    for uri in _URI.findall(read_input(path)):
                         if not uri.startswith(b"data:"):
                             yield path.parent / unquote(uri.decode("utf-8", "replace"))
         for value in part.values():

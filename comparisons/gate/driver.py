@@ -6,6 +6,7 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,6 +15,7 @@ from pathlib import Path
 
 from comparisons.gate.errors import RendererError
 from comparisons.gate.pictures_in import Picture, read_candidate
+from reference_rt.children import tied
 from reference_rt.errors import ImageError, UsageError
 
 PLACEHOLDERS = ("scene", "output", "seed", "spp")
@@ -111,11 +113,13 @@ def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
+                **tied(),
             )
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise RendererError(f"{arguments[0]}: cannot be started: {reason}") from None
     name = Path(arguments[0]).name
+    guard = _guard(process.pid)
     try:
         code = process.wait(seconds)
     except subprocess.TimeoutExpired:
@@ -125,6 +129,8 @@ def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
         ) from None
     finally:
         _kill(process)
+        guard.kill()
+        guard.communicate()
     if code < 0:
         with suppress(ValueError):
             raise RendererError(
@@ -134,6 +140,22 @@ def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
         raise RendererError(
             f"{name} failed with seed {seed}: exit code {code}, expected 0{_last_lines(said)}"
         )
+
+
+def _guard(group: int) -> "subprocess.Popen[bytes]":
+    """A process that outlives this one, if this one is killed, by just long enough to kill the
+    renderer and its children: what it reads ends when this process does."""
+    code = (
+        "import os, signal, sys; sys.stdin.buffer.read(); "
+        "os.killpg(int(sys.argv[1]), signal.SIGKILL)"
+    )
+    return subprocess.Popen(
+        [sys.executable, "-I", "-S", "-c", code, str(group)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,  # not killed with a group that this process is in
+    )
 
 
 def _kill(process: "subprocess.Popen[bytes]") -> None:

@@ -1,22 +1,28 @@
 """Candidates from files and arrays: EXR, PNG, PFM, HDR and NPY as linear radiance."""
 
-import struct
-import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.gate.formats import as_float64, check_size, read_hdr, read_npy, read_pfm
 from reference_rt.errors import ImageError
-from reference_rt.exr import read_exr
+from reference_rt.exr import read_header
+from reference_rt.files import open_input
+from reference_rt.image_files import ImageFile, open_image
+from reference_rt.image_files.exr import ExrFile
+from reference_rt.image_files.image_file import as_float64
+from reference_rt.image_files.npy import map_npy
+from reference_rt.image_files.pillow import PillowFile
 from reference_rt.shapes.shape import FloatArray
 from reference_rt.textures.image_file import linear
 
 KNOWN = "EXR, PNG, PFM, HDR or NPY"
+_BEGINNINGS = (b"v/1\x01", b"\x89PNG\r\n\x1a\n", b"PF", b"Pf", b"#?", b"\x93NUMPY")
+
+MOST_NUMBERS = 1 << 27
+"""Of one file: 8192 x 4096 pixels of four channels, and 1 GiB as float64.  What declares more is
+taken for a mistake or an attack."""
 
 
 @dataclass(frozen=True)
@@ -49,27 +55,18 @@ def read_candidates(path: Path, layer: str = "") -> tuple[Picture, ...]:
     format is told by how the file begins, not by its name.
     """
     try:
-        if not path.exists():
-            raise ValueError("there is no such file; expected an image")
-        if not path.is_file():  # what never ends, such as a pipe, must not be read
-            raise ValueError("is not a file; expected an image")
-        with path.open("rb") as file:
+        with open_input(path) as file:
             start = file.read(16)
-        if not start:
-            raise ValueError("is empty; expected an image")
-        if start.startswith(b"v/1\x01"):
-            return (_exr(path, layer),)
-        if layer:
-            raise ValueError(f"has no layer '{layer}': only EXR has layers")
-        if start.startswith(b"\x89PNG\r\n\x1a\n"):
-            return (_png(path),)
-        if start.startswith(b"\x93NUMPY"):
-            return from_array(read_npy(path), str(path))
-        if start.startswith((b"PF", b"Pf")):
-            return (Picture(read_pfm(path), name=str(path)),)
-        if start.startswith(b"#?"):
-            return (Picture(read_hdr(path), quantised=True, name=str(path)),)
-        raise ValueError(f"is not an image that can be read; expected {KNOWN}")
+        if start and not start.startswith(_BEGINNINGS):
+            raise ValueError(f"is not an image that can be read; expected {KNOWN}")
+        if start.startswith(b"\x93NUMPY") and not layer:
+            array = map_npy(path)
+            _check_shape(array.shape)
+            return from_array(array, str(path))
+        image = open_image(path, layer)
+        return (_picture(image),)
+    except FileNotFoundError:
+        raise ImageError(f"{path}: there is no such file; expected an image") from None
     except ValueError as error:
         raise ImageError(f"{path}: {error}") from None
     except OSError as error:
@@ -78,22 +75,46 @@ def read_candidates(path: Path, layer: str = "") -> tuple[Picture, ...]:
         ) from None
 
 
+def _picture(image: ImageFile) -> Picture:
+    """Raises ValueError, OSError."""
+    channels = 4 if image.has_opacity else 3
+    if isinstance(image, ExrFile):
+        channels = max(channels, image.channels)
+    check_size(image.width, image.height, channels)
+    if isinstance(image, ExrFile) and image.windows[0] != image.windows[1]:
+        ends = [f"({x0}, {y0}) to ({x1}, {y1})" for x0, y0, x1, y1 in image.windows]
+        raise ValueError(f"has pixels from {ends[0]}; expected all of its display, {ends[1]}")
+    if isinstance(image, PillowFile) and abs((image.gamma or 1 / 2.2) - 1 / 2.2) > 0.01:
+        raise ValueError(f"is encoded with gamma {image.gamma:g}; expected sRGB")
+    radiance = np.empty((image.height, image.width, 3))
+    opacity = np.empty(radiance.shape[:2]) if image.has_opacity else None
+    for rows, colours, covered in image.strips(linear if image.is_integer else None, True):
+        radiance[rows] = colours
+        if opacity is not None and covered is not None:
+            opacity[rows] = covered
+            if image.is_integer:
+                # Colours beside a transparent pixel's edge are not its own: what is seen is over
+                # black.
+                radiance[rows] *= covered[..., None]
+    if image.is_integer and opacity is not None and not (opacity < 1.0).any():
+        opacity = None
+    quantised = image.bits == 8
+    return Picture(
+        radiance, opacity, quantised, quantised and image.is_integer, str(image.path), image.text
+    )
+
+
 def from_array(array: npt.ArrayLike, name: str = "array") -> tuple[Picture, ...]:
     """The pictures in an array (height, width, 3 or 4) or (replicates, height, width, 3 or 4) of
     floats; the fourth channel is opacity.  Raises ImageError."""
     values = np.asarray(array)
     if values.dtype.kind != "f":
         raise ImageError(f"{name}: holds {values.dtype}; expected floats of linear radiance")
-    if values.ndim not in (3, 4) or values.shape[-1] not in (3, 4):
-        raise ImageError(
-            f"{name}: has the shape {values.shape}; expected (height, width, 3), with opacity "
-            "(height, width, 4), or (replicates, height, width, 3 or 4)"
-        )
-    pictures = values if values.ndim == 4 else values[None]
     try:
-        check_size(pictures.shape[2], pictures.shape[1], pictures.shape[3], len(pictures))
+        _check_shape(values.shape)
     except ValueError as error:
         raise ImageError(f"{name}: {error}") from None
+    pictures = values if values.ndim == 4 else values[None]
     several = len(pictures) > 1
     return tuple(
         Picture(
@@ -115,120 +136,31 @@ def variance_of(path: Path) -> FloatArray:
     return found
 
 
-def _channel_names(path: Path) -> Sequence[str]:
+def _channel_names(path: Path) -> list[str]:
     try:
-        with path.open("rb") as file:
-            if file.read(4) != b"v/1\x01":
-                return ()
-        return list(read_exr(path)[0])
-    except (OSError, ImageError):
-        return ()  # which reading it says better
+        return [channel.name for channel in read_header(path)["channels"]]
+    except (OSError, ValueError):
+        return []  # reading it as a picture says better what is wrong
 
 
-def _exr(path: Path, layer: str) -> Picture:
-    _check_exr_size(path)
-    try:
-        channels, header = read_exr(path)
-    except ImageError:  # the library does not say which
-        raise ValueError("is truncated or damaged; expected a whole EXR image") from None
-    prefix = f"{layer}." if layer else ""
-    if all(prefix + name in channels for name in "RGB"):
-        radiance = np.stack([channels[prefix + name] for name in "RGB"], axis=-1)
-    elif prefix + "Y" in channels and prefix + "RY" not in channels:
-        radiance = np.repeat(channels[prefix + "Y"][..., None], 3, axis=-1)
-    else:
-        expected = ", ".join(prefix + name for name in "RGB")
-        raise ValueError(f"has channels {_list(channels)}; expected {expected}, or {prefix}Y")
-    text = {key: value for key, value in header.items() if isinstance(value, str)}
-    return Picture(radiance, channels.get(prefix + "A"), name=str(path), header=text)
-
-
-def _check_exr_size(path: Path) -> None:
-    """Refuse what is too large, or has its pixels elsewhere than the picture is."""
-    import OpenEXR
-
-    try:
-        with OpenEXR.File(str(path), header_only=True) as file:
-            header: dict[str, Any] = dict(file.header())
-    except (RuntimeError, OSError, TypeError, ValueError):
-        raise ValueError("has a truncated or damaged header; expected a whole EXR image") from None
-    windows = [header[name] for name in ("dataWindow", "displayWindow")]
-    (x0, y0), (x1, y1) = ([int(n) for n in corner] for corner in windows[0])
-    check_size(x1 - x0 + 1, y1 - y0 + 1, max(len(header["channels"]), 1))
-    if not np.array_equal(windows[0], windows[1]):
-        ends = [" to ".join(str(tuple(map(int, corner))) for corner in w) for w in windows]
-        raise ValueError(f"has pixels from {ends[0]}; expected all of its display, {ends[1]}")
-
-
-def _list(names: Any, most: int = 12) -> str:
-    names = list(names)
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
-
-
-def _png(path: Path) -> Picture:
-    """sRGB by its transfer function, of 8 or 16 bits."""
-    from PIL import Image
-
-    with path.open("rb") as file:
-        head = file.read(26)
-    if len(head) < 26 or head[12:16] != b"IHDR":
-        raise ValueError("cannot be read as PNG: no header; expected a whole image")
-    width, height, bits, _ = struct.unpack(">IIBB", head[16:26])
-    check_size(width, height, 4)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a large size, and of odd metadata
-            with Image.open(path) as image:
-                info = image.info
-                values = _deep(path) if bits == 16 else _shallow(image)
-    except Exception as error:  # decoders raise what they like at rubbish
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+def check_size(width: int, height: int, channels: int, pictures: int = 1) -> None:
+    """Refuse a picture without pixels, or too large a one.  Raises ValueError."""
+    if min(width, height, channels, pictures) < 1:
+        raise ValueError(f"has {width} x {height} pixels; expected at least one")
+    if width * height * channels * pictures > MOST_NUMBERS:
         raise ValueError(
-            f"cannot be read as PNG: {reason or type(error).__name__}; expected a whole image"
-        ) from None
-    gamma = info.get("gamma")
-    if gamma is not None and "srgb" not in info and abs(gamma - 1 / 2.2) > 0.01:
-        raise ValueError(f"is encoded with gamma {gamma:g}; expected sRGB")
-    # Colours beside a transparent pixel's edge are not its own: what is seen is over black.
-    radiance = linear(values[..., :3]) * values[..., 3:]
-    has_opacity = bool((values[..., 3] < 1.0).any())
-    text = {str(key): value for key, value in info.items() if isinstance(value, str)}
-    opacity = values[..., 3] if has_opacity else None
-    return Picture(radiance, opacity, bits < 16, bits < 16, str(path), text)
+            f"declares {width} x {height} pixels of {channels} channels"
+            + (f", {pictures} times" if pictures > 1 else "")
+            + f"; expected at most {MOST_NUMBERS} numbers in all"
+        )
 
 
-def _shallow(image: Any) -> FloatArray:
-    return np.asarray(image.convert("RGBA"), np.float64) / 255.0
-
-
-def _deep(path: Path) -> FloatArray:
-    """(height, width, 4) from 0 to 1 of a PNG file with 16 bits a channel.
-
-    Of colours, Pillow unpacks the high byte of each number.  Told to take them for little-endian
-    it unpacks the low byte: two readings together are all 16 bits.
-    """
-    high, kind = _unpacked(path, None)
-    if kind.startswith("I"):  # grey, for which it has a type
-        grey = high / 65535.0
-        return np.stack([grey, grey, grey, np.ones_like(grey)], axis=-1)
-    if kind.startswith("LA"):  # as if it were four channels of 8 bits
-        bytes_of, _ = _unpacked(path, "RGBA")
-        grey, alpha = (256.0 * bytes_of[..., k] + bytes_of[..., k + 1] for k in (0, 2))
-        return np.stack([grey, grey, grey, alpha], axis=-1) / 65535.0
-    low, _ = _unpacked(path, kind.replace(";16B", ";16L"))
-    values = (256.0 * high + low) / 65535.0
-    if values.shape[2] == 4:
-        return np.asarray(values)
-    return np.concatenate([values, np.ones_like(values[..., :1])], axis=-1)
-
-
-def _unpacked(path: Path, kind: str | None) -> tuple[FloatArray, str]:
-    """What Pillow makes of the pixels, taken for `kind`, and what it takes them for by itself."""
-    from PIL import Image
-
-    with Image.open(path) as image:
-        own = str(image.tile[0][3])
-        if kind is not None:
-            image.tile = [(*tile[:3], kind) for tile in image.tile]  # type: ignore[misc]
-        return np.asarray(image, np.float64), own
+def _check_shape(shape: tuple[int, ...]) -> None:
+    """Raise ValueError unless an array of this shape holds pictures."""
+    if len(shape) not in (3, 4) or shape[-1] not in (3, 4):
+        raise ValueError(
+            f"has the shape {shape}; expected (height, width, 3), with opacity (height, width, 4), "
+            "or (replicates, height, width, 3 or 4)"
+        )
+    pictures = shape[0] if len(shape) == 4 else 1
+    check_size(shape[-2], shape[-3], shape[-1], pictures)

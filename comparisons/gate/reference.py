@@ -15,7 +15,7 @@ import platformdirs
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
 from reference_rt.errors import ImageError, UsageError
-from reference_rt.files import replacing
+from reference_rt.files import open_input, replacing
 from reference_rt.render import render
 from reference_rt.sampling import Grid
 from reference_rt.scene import Scene
@@ -246,7 +246,7 @@ def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
     # A damaged directory asks for what zipfile cannot do: RuntimeError.
     with suppress(OSError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile, EOFError):
         # Opened here, since NumPy leaves a file that is no archive open.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+        with open_input(path) as stream, np.load(stream, allow_pickle=False) as file:
             pictures, rounds = np.array(file["pictures"]), int(file["rounds"])
         if pictures.shape == shape and pictures.dtype == np.float64 and rounds > 0:
             with suppress(OSError):

@@ -15,6 +15,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
+from reference_rt.children import tied
 from reference_rt.errors import ReferenceUnavailableError
 
 MOST_CASES = 40
@@ -141,6 +142,7 @@ class _Worker(Generic[R]):
             stdout=subprocess.PIPE,
             stderr=self._log,
             start_new_session=True,
+            **tied(),
         )
         self._cases = 0
         self._listener = threading.Thread(target=self._listen, daemon=True)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -54,6 +55,8 @@ def write_results(
         "cases": [_case(case) for case in cases],
     }
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    # Valid in JSON, but a terminal would obey them.
+    text = re.sub("[\x7f-\x9f]", lambda found: f"\\u{ord(found[0]):04x}", text)
     with replacing(path) as temporary:
         # A lone surrogate, of a file name that is not UTF-8, becomes JSON's escape for it.
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")

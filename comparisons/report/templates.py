@@ -1,5 +1,6 @@
 """How every page is made: from a template, all text escaped, whole or not at all."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
 from comparisons.report.values import label, shown
+from reference_rt.errors import printable
 from reference_rt.files import replacing
 
 
@@ -26,9 +28,13 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
     return environment.get_template(name)
 
 
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+"""What HTML may not hold: characters that control terminals, and those that are none."""
+
+
 def encoded(page: str) -> bytes:
-    """A lone surrogate, of a file name that is not UTF-8, becomes a reference to no character."""
-    return page.encode(errors="xmlcharrefreplace")
+    """In UTF-8, with escapes in place of what HTML may not hold, as names from outside may."""
+    return _CONTROL.sub(lambda found: printable(found[0]), page).encode()
 
 
 def write(path: Path, page: str) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.selftest.fault import SceneFault
+from reference_rt.files import read_text
 from reference_rt.filters import TentFilter
 from reference_rt.scene import Scene
 from reference_rt.shapes import Mesh
@@ -86,7 +87,7 @@ def _one_face_flipped(scene: Scene) -> Scene:
     mesh = scene.shapes[0]
     assert isinstance(mesh, Mesh)
     assert mesh.file is not None
-    lines = (scene.folder / mesh.file).read_text(encoding="utf-8").splitlines()
+    lines = read_text(scene.folder / mesh.file).splitlines()
     faces = [k for k, line in enumerate(lines) if line.startswith("f ")]
     # The twentieth part of all: a face that the camera sees, and that is no special one.
     flipped = faces[len(faces) // 20]

@@ -20,6 +20,7 @@ from comparisons.judge import Evidence, judge, of_replicates
 from comparisons.results import Case
 from comparisons.selftest.fault import Fault, PictureFault, SceneFault, SourceFault
 from comparisons.selftest.finding import Finding, finding
+from reference_rt.children import tied
 from reference_rt.errors import ReferenceRtError
 from reference_rt.scene import Scene
 
@@ -116,6 +117,7 @@ def _patched(
             capture_output=True,
             text=True,
             timeout=MOST_SECONDS,
+            **tied(),
             check=False,
         )
     if run.returncode != 0:

@@ -12,7 +12,7 @@ import numpy as np
 Data = dict[str, Any]
 
 MESHES = ("ball.obj", "ball.ply", "ball_ascii.ply", "ball.stl", "ball.off", "ball.glb")
-IMAGES = ("tiles.png", "sky.exr", "grey.tif", "photo.jpg")
+IMAGES = ("tiles.png", "sky.exr", "sky.hdr", "sky.pfm", "sky.npy", "grey.tif", "photo.jpg")
 
 _TURN = {"rotate": {"axis": [1.0, 2.0, 3.0], "degrees": 33.0}}
 
@@ -183,7 +183,17 @@ def _images() -> dict[str, bytes]:
         stream = io.BytesIO()
         Image.fromarray(pixels).save(stream, kind)
         found[name] = stream.getvalue()
-    return found | {"sky.exr": _exr(pixels / 255.0)}
+    stream = io.BytesIO()
+    np.save(stream, pixels / 255.0)
+    # Each row of the .hdr as runs, so that the marks and lengths of runs are damaged, too.
+    rows = np.concatenate([pixels, np.full((4, 8, 1), 128, np.uint8)], axis=2).transpose(0, 2, 1)
+    runs = b"".join(b"\2\2\0\x08" + b"".join(b"\x08" + bytes(c) for c in row) for row in rows)
+    return found | {
+        "sky.exr": _exr(pixels / 255.0),
+        "sky.hdr": b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" + runs,
+        "sky.pfm": b"PF\n8 4\n-1\n" + (pixels / 255.0).astype("<f4").tobytes(),
+        "sky.npy": stream.getvalue(),
+    }
 
 
 def _exr(pixels: Any) -> bytes:

@@ -307,7 +307,8 @@ FAMILY = Family(
         Series(
             "images",
             "damages of an image file",
-            "The same of .png, .exr, .tif and .jpg, as a texture and as the light around.",
+            "The same of .png, .exr, .hdr, .pfm, .npy, .tif and .jpg, as a texture and as the "
+            "light around.",
             _COUNTS,
             (2.0,),
             {"quick": 20, "full": 150},

@@ -14,6 +14,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from reference_rt.children import tied
+
 SECONDS = 5.0
 """A case that computes for longer hangs."""
 
@@ -80,6 +82,7 @@ class _Worker:
             stderr=subprocess.DEVNULL,
             text=True,
             env=environment,
+            **tied(),
         )
         self.seconds = PLAIN_SECONDS if plain else SECONDS
         self._send({"seconds": self.seconds})

@@ -14,6 +14,7 @@ from comparisons.stability import f09_scenes as scenes
 from comparisons.stability.f14_bits import MAKES, over, same_bits
 from comparisons.stability.family import OURS, Draw, FloatArray, Outcome
 from reference_rt.bands import render_band
+from reference_rt.children import tied
 
 Outcomes = dict[str, Outcome]
 
@@ -87,7 +88,9 @@ def interrupted(draw: Draw, x: float) -> Outcomes:
     carry_on(draw.folder, *cuts[:2])
     for first, last in pairwise(cuts[1:]):
         command = [sys.executable, "-c", CARRY_ON, str(draw.folder)]
-        subprocess.run([*command, first.hex(), last.hex()], check=True, capture_output=True)
+        subprocess.run(
+            [*command, first.hex(), last.hex()], check=True, capture_output=True, **tied()
+        )
     total = Outcome(0, 0)
     for make in MAKES:
         scene = make(draw.folder)
@@ -135,7 +138,7 @@ def blocks(draw: Draw, x: float) -> Outcomes:
     draw.folder.mkdir(exist_ok=True)
     scenes.write_ball(draw.folder)
     command = [sys.executable, "-c", PLAIN, str(draw.folder), str(block)]
-    subprocess.run(command, check=True, capture_output=True, env=environment)
+    subprocess.run(command, check=True, capture_output=True, env=environment, **tied())
     total = Outcome(0, 0)
     for make in MAKES:
         compiled = rt.render(make(draw.folder).changed(film=TINY)).colour

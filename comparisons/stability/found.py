@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.stability.family import OURS, Outcome
-from reference_rt.files import replacing
+from reference_rt.files import read_text, replacing
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Found:
     def read(cls, path: Path, key: str) -> "Found | None":
         """What was found with this key, if anything."""
         try:
-            document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            document: dict[str, Any] = json.loads(read_text(path))
             if document.pop("key") != key:
                 return None
             outcomes = {

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from comparisons.record import CASE, RecordError, read_case
 from comparisons.results import Case
 from comparisons.suites.work import folder_name
+from reference_rt.files import read_text
 
 
 class Archive(NamedTuple):
@@ -36,7 +37,7 @@ def read_archive(folder: Path) -> Archive:
     records = folder / "cases"
     missing: tuple[str, ...] = ()
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        told = json.loads(read_text(path))
         names = [folder_name(case["scene"]) for case in told["cases"]]
         provenance, suite, not_run = told["provenance"], told["suite"], told["not_run"]
         missing = tuple(told.get("missing", ()))
@@ -45,7 +46,7 @@ def read_archive(folder: Path) -> Archive:
         provenance, suite, not_run = {}, None, {}
     except OSError as error:
         raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise RecordError(f"{path}: is not what a suite writes; expected its results") from None
     if not names and not missing:
         raise RecordError(

@@ -12,6 +12,7 @@ from urllib.parse import unquote
 from comparisons import sources
 from comparisons.budget import Budget
 from comparisons.mitsuba_backend import Backend
+from reference_rt.files import read_input, read_text
 from reference_rt.scene import Scene
 
 _APART = (
@@ -47,7 +48,7 @@ def files_digest(scene: Scene) -> str:
         for path in _with_parts(scene.folder / name):
             digest.update(os.fsencode(path.name) + b"\0")
             try:
-                digest.update(hashlib.sha256(path.read_bytes()).digest())
+                digest.update(hashlib.sha256(read_input(path)).digest())
             except (OSError, ValueError) as error:  # ValueError: a name that no file can have
                 reason = getattr(error, "strerror", None) or error
                 raise scene.error(f"{path}: cannot be read: {reason}", *keys) from None
@@ -72,9 +73,9 @@ def _with_parts(path: Path) -> list[Path]:
     if path.suffix.lower() != ".gltf":
         return [path]
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_text(path))
         uris = [buffer["uri"] for buffer in data["buffers"] if "uri" in buffer]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return [path]
     return [path, *(path.parent / unquote(u) for u in uris if not u.startswith("data:"))]
 

@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, field_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from comparisons.budget import Budget
 from comparisons.suites.work import Plan, Work, control_name, read
+from reference_rt import yaml_text
 from reference_rt.description import Description, Positive
-from reference_rt.diagnosis import line_of
-from reference_rt.errors import SceneError, UsageError
+from reference_rt.errors import SceneError, UsageError, printable
+from reference_rt.files import read_text
 from reference_rt.scene import Scene
 
 _Scenes = dict[str, tuple[Path, Scene | SceneError]]
@@ -74,7 +73,7 @@ class Source(NamedTuple):
 
     def error(self, message: str, *keys: str | int) -> SceneError:
         """An error about the part at `keys`, with file and line."""
-        return SceneError(message, keys, self.file, line_of(self.text, keys))
+        return SceneError(message, keys, self.file, yaml_text.line_of(self.text, keys))
 
 
 def load_suite(name: str) -> Source:
@@ -92,32 +91,27 @@ def load_suite(name: str) -> Source:
             f"there is no suite '{name}'; expected {', '.join(BUILT_IN)} or a .yaml file"
         )
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror}", file=name) from None
     except UnicodeDecodeError:
         raise SceneError("is not text; expected UTF-8", file=name) from None
-    return Source(parse_suite(text, name), path.stem, name, name, text)
+    return Source(parse_suite(text, name), printable(path.stem), name, name, text)
 
 
 def parse_suite(text: str, file: str) -> Suite:
     """A suite from YAML text; `file` stands in errors.  Raises SceneError."""
     try:
-        data = YAML(typ="safe", pure=True).load(text)
-    except MarkedYAMLError as error:
-        line = None if error.problem_mark is None else error.problem_mark.line + 1
-        problem = " ".join(str(error.problem or error.context).split())
-        raise SceneError(f"malformed: {problem}", file=file, line=line) from None
-    except (YAMLError, ValueError) as error:
-        raise SceneError(f"malformed: {' '.join(str(error).split())}", file=file) from None
-    except RecursionError:
-        raise SceneError("malformed: nested too deeply", file=file) from None
+        data = yaml_text.load(text)
+    except yaml_text.MalformedError as error:
+        raise SceneError(f"malformed: {error}", file=file, line=error.line) from None
     if not isinstance(data, dict):
         raise SceneError("expected keys such as about, defaults, scenes", file=file, line=1)
     try:
         return Suite.model_validate(data)
     except SceneError as error:
-        raise SceneError(error.message, error.path, file, line_of(text, error.path)) from None
+        line = yaml_text.line_of(text, error.path)
+        raise SceneError(error.message, error.path, file, line) from None
 
 
 def plan(
@@ -164,12 +158,12 @@ def _scenes(folder: Path) -> _Scenes:
         raise UsageError(f"--scenes: there is no folder '{folder}'; expected one with scenes in it")
     found: _Scenes = {}
     for path in sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES):
-        if path.stem in found:
-            other = found[path.stem][0].name
-            reason = f"has the name of {other}; expected one of its own"
+        name = printable(path.stem)
+        if name in found:
+            reason = f"has the name of {found[name][0].name}; expected one of its own"
             found[path.name] = path, SceneError(reason, file=str(path))
         else:
-            found[path.stem] = path, read(path)
+            found[name] = path, read(path)
     if not found:
         raise UsageError(f"--scenes: '{folder}' holds no scene; expected .yaml or .json files")
     return found

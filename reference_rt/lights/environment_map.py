@@ -18,6 +18,7 @@ from reference_rt.sampling.distribution import (
 )
 from reference_rt.sampling.warp import on_circle
 from reference_rt.shapes.shape import FloatArray
+from reference_rt.textures.image_file import read_image
 from reference_rt.transform import Transform, affine
 from reference_rt.vec3 import Vec3, dot, luminance, triple
 
@@ -28,8 +29,8 @@ class EnvironmentMap(Description):
 
     type: Literal["environment_map"] = "environment_map"
     file: str
-    """.exr (radiance as it is), or .png, .jpg and what Pillow reads besides (sRGB), relative to the
-    scene; twice as wide as high, usually."""
+    """.exr, .hdr, .pfm, .npy (radiance as it is), or .png, .jpg and what Pillow reads besides
+    (sRGB), relative to the scene; twice as wide as high, usually."""
     scale: Positive = 1.0
     """What the image's values are multiplied by: W sr^-1 m^-2, linear sRGB."""
     transform: Transform = ()
@@ -37,14 +38,12 @@ class EnvironmentMap(Description):
 
     def tabulate(self, folder: Path) -> "EnvironmentMaps":
         """One row.  Raises ValueError (what is wrong, what was expected)."""
-        from reference_rt.textures.image_file import read_image  # Pillow and OpenEXR take a while
-
         path = folder / self.file
-        texels = read_image(path, "auto")
+        texels = read_image(path, "auto", self.scale)
         if len(texels) < 2:
             raise ValueError(f"{path}: has one row of pixels; expected two or more")
         with np.errstate(over="ignore", invalid="ignore"):
-            made = tabulate(texels * self.scale, orthogonal(self.transform))
+            made = tabulate(texels, orthogonal(self.transform))
         if not np.isfinite(made.total[0]):
             raise ValueError(f"{path}: its power overflows; expected a smaller scale")
         if made.total[0] == 0.0:
@@ -86,9 +85,10 @@ class EnvironmentMaps(NamedTuple):
 def tabulate(texels: FloatArray, to_world: FloatArray) -> EnvironmentMaps:
     """The table of radiance (h, w, 3) turned by an orthogonal (3, 3)."""
     height, width = texels.shape[:2]
-    light = np.asarray(luminance(Vec3(*np.moveaxis(texels, -1, 0))))
-    cells = 0.5 * (light + np.roll(light, -1, axis=1))
-    row_sums = running_sums(cells)
+    row_sums = np.empty((height, width + 1))
+    for y, row in enumerate(texels):  # one at a time, since the table itself is what memory holds
+        light = np.asarray(luminance(Vec3(*row.T)))
+        row_sums[y] = running_sums(0.5 * (light + np.roll(light, -1)))
     across = row_sums[:, -1] * (2.0 * math.pi / width)
     step = math.pi / (height - 1)
     height_sums = np.zeros(height)

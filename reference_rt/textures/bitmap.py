@@ -1,6 +1,7 @@
 """Bitmap: an image laid over the surface, its top row along v = 1."""
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -8,7 +9,9 @@ import numpy as np
 
 from reference_rt.description import Positive
 from reference_rt.kernel import kernel
+from reference_rt.memory import check_memory
 from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.textures.image_file import MOST_BYTES_PER_PIXEL, pixels_of, read_image
 from reference_rt.textures.texture import Texture
 from reference_rt.vec3 import Vec3, luminance, row
 
@@ -23,7 +26,7 @@ class Bitmap(Texture):
 
     type: Literal["bitmap"] = "bitmap"
     file: str
-    """.png, .jpg, .exr and what Pillow reads besides, relative to the scene."""
+    """.exr, .hdr, .pfm, .npy, .png, .jpg and what Pillow reads besides, relative to the scene."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
     wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
     """What lies beyond (0, 1)."""
@@ -33,13 +36,10 @@ class Bitmap(Texture):
     scale: Positive = 1.0
     """What linear values are multiplied with: lamps and heights may need more than 1."""
 
-    def tabulate(self, folder: Path) -> "Bitmaps":
-        from reference_rt.textures.image_file import read_image  # Pillow and OpenEXR take a while
-
-        with np.errstate(over="ignore"):
-            texels = self.scale * read_image(folder / self.file, self.encoding)
-        if not np.isfinite(texels).all():
-            raise ValueError(f"{folder / self.file}: overflows; expected a smaller scale")
+    def tabulate(self, folder: Path, out: FloatArray | None = None) -> "Bitmaps":
+        """One row.  out: (n, 3), at whose beginning its texels are put, if there is room.  Raises
+        ValueError (what is wrong, what was expected)."""
+        texels = read_image(folder / self.file, self.encoding, self.scale, out)
         height, width = texels.shape[:2]
         return Bitmaps(
             texels=texels.reshape(-1, 3),
@@ -63,14 +63,35 @@ class Bitmaps(NamedTuple):
     wrap: IntArray
 
 
+def room_for(textures: Iterable[Texture], folder: Path) -> FloatArray:
+    """(n, 3), for the texels of all bitmaps among these, one after the other.  Raises ValueError
+    where they would not fit into the machine's memory."""
+    files = [texture.file for texture in textures if isinstance(texture, Bitmap)]
+    pixels = sum(pixels_of(folder / file) for file in files)
+    check_memory(MOST_BYTES_PER_PIXEL * pixels, f"{len(files)} bitmaps of {pixels} pixels in all")
+    return np.empty((pixels, 3))
+
+
 def join(parts: list[Bitmaps]) -> Bitmaps:
-    """One table from several: texels are counted on."""
+    """One table from several: texels are counted on.
+
+    Their texels are not copied where they are already one after the other, in all of one array:
+    every image would be in memory twice.
+    """
     counts = [len(part.texels) for part in parts]
     starts = np.cumsum([0, *counts[:-1]])
     moved = [
         part._replace(first=part.first + start) for part, start in zip(parts, starts, strict=True)
     ]
-    return Bitmaps(*(np.concatenate(column) for column in zip(*moved, strict=True)))
+    columns = [np.concatenate(column) for column in zip(*(part[1:] for part in moved), strict=True)]
+    whole = parts[0].texels.base
+    if whole is None or whole.shape != (sum(counts), 3):
+        whole = np.empty((sum(counts), 3))
+    for part, start in zip(parts, starts, strict=True):
+        place = whole[start : start + len(part.texels)]
+        if part.texels.ctypes.data != place.ctypes.data:
+            place[:] = part.texels
+    return Bitmaps(whole, *columns)
 
 
 def greatest(bitmaps: Bitmaps) -> float:

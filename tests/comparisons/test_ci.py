@@ -117,7 +117,7 @@ def test_each_failure_is_annotated_by_kind():
 
 
 def test_annotations_keep_to_their_line_whatever_the_text():
-    nasty = NASTY.replace("\ud800", "?")
+    nasty = NASTY.replace("\ud800", "\\ud800").replace("\x00", "\\x00").replace("\x1b", "\\x1b")
     ((kind, properties, message),) = annotations([case("differ", NASTY, NASTY)])
     assert kind == "error"
     assert unescaped(properties["title"]) == f"{nasty}: differ"

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from picture_writers import chunk, exr, hdr, npy, pfm, png, rgbe
 
-from comparisons.gate.formats import MOST_NUMBERS
-from comparisons.gate.pictures_in import from_array, read_candidate
+from comparisons.gate.pictures_in import MOST_NUMBERS, from_array, read_candidate
 from reference_rt.errors import ImageError
 
 _HDR = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 20 +X 30\n"
@@ -28,7 +27,10 @@ BAD = {
         "is truncated: 71 bytes of pixels; expected 72",
     ),
     "pfm too long": (b"PF\n3 2\n-1\n" + bytes(73), "has 73 bytes of pixels; expected 72"),
-    "pfm bomb": (b"PF\n300000 200000\n-1\n", "declares 300000 x 200000 pixels of 3 channels"),
+    "pfm bomb": (
+        b"PF\n300000 200000\n-1\n",
+        "is truncated: 0 bytes of pixels; expected 720000000000",
+    ),
     "npy truncated": (npy(np.ones((4, 4, 3)))[:-1], "cannot be read as NPY"),
     "npy header": (b"\x93NUMPY\1\0", "cannot be read as NPY"),
     "npy objects": (
@@ -50,7 +52,7 @@ BAD = {
     "hdr runs": (_HDR + b"\2\2\0\x1e\xff\7" + bytes(400), "is malformed at row 0; expected runs"),
     "hdr row": (_HDR + b"\2\2\0\x1f" + bytes(400), "is malformed at row 0; expected a scanline"),
     "hdr old runs": (_HDR + b"\1" * 2400, "has runs of the old kind"),
-    "hdr bomb": (_HDR.replace(b"30", b"99999999"), "declares 99999999 x 20 pixels of 4 channels"),
+    "hdr bomb": (_HDR.replace(b"30", b"99999999"), "declares 99999999 x 20 pixels of 3 channels"),
     "png header": (b"\x89PNG\r\n\x1a\n1234", "cannot be read as PNG: no header"),
 }
 
@@ -82,10 +84,10 @@ def test_bad_png(tmp_path: Path) -> None:
     for bits, cut in ((16, 4000), (8, 4000)):
         path = png(tmp_path / "a.png", values % (1 << bits), bits)
         path.write_bytes(path.read_bytes()[:-cut])
-        with pytest.raises(ImageError, match=r"cannot be read as PNG: .*expected a whole image"):
+        with pytest.raises(ImageError, match=r"cannot be read: .*expected a whole image"):
             read_candidate(path)
     bomb = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 9**6, 9**6, 8, 2, 0, 0, 0))
-    path.write_bytes(bomb)
+    path.write_bytes(bomb + chunk(b"IDAT", b""))
     with pytest.raises(ImageError, match=f"expected at most {MOST_NUMBERS} numbers in all"):
         read_candidate(path)
     png(path, values % 256, 8, chunk(b"gAMA", struct.pack(">I", 100000)))
@@ -99,10 +101,10 @@ def test_bad_exr(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     whole = path.read_bytes()
     for cut in (1, 200, 20000):
         path.write_bytes(whole[:-cut])
-        with pytest.raises(ImageError, match="is truncated or damaged; expected a whole EXR"):
+        with pytest.raises(ImageError, match="it is truncated or damaged; expected a whole image"):
             read_candidate(path)
     path.write_bytes(whole[:100])
-    with pytest.raises(ImageError, match="truncated or damaged header; expected a whole EXR"):
+    with pytest.raises(ImageError, match="it is truncated or damaged; expected a whole image"):
         read_candidate(path)
 
     def window(name: bytes, size: int) -> None:
@@ -131,7 +133,7 @@ def test_bad_exr(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
 def test_places_that_are_no_files(tmp_path: Path) -> None:
     with pytest.raises(ImageError, match="there is no such file; expected an image"):
         read_candidate(tmp_path / "none.exr")
-    with pytest.raises(ImageError, match="is not a file; expected an image"):
+    with pytest.raises(ImageError, match="Is a directory; expected an image"):
         read_candidate(tmp_path)
     path = tmp_path / "a.pfm"
     path.write_bytes(pfm(np.ones((1, 1, 3)), "-1"))
@@ -144,7 +146,7 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     import os
 
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(ImageError, match="is not a file; expected an image"):
+    with pytest.raises(ImageError, match="is a pipe, not a regular file; expected an image"):
         read_candidate(tmp_path / "pipe")
 
 

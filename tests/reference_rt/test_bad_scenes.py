@@ -3,6 +3,7 @@
 import pytest
 
 import reference_rt as rt
+from reference_rt import yaml_text
 
 SHAPE = "shapes:\n  - type: sphere\n    "
 BOX = "shapes:\n  - type: box\n    transform: "
@@ -18,7 +19,6 @@ WRONG = {
     "number for keys": ("film: 7", 1, "film", "expected keys with values"),
     "list for keys": ("film: [1]", 1, "film", "expected keys with values"),
     "keys for list": ("shapes: {a: 1}", 1, "shapes", "expected a list"),
-    "date for text": ("description: 2001-09-09", 1, "description", "expected a valid string"),
     "zero width": ("film:\n  width: 0", 2, "film.width", "expected greater than or equal to 1"),
     "endless width": ("film: {width: 1" + "0" * 400 + "}", 1, "film.width", "expected less than"),
     "negative radius": (SHAPE + "radius: -1", 3, "shapes[0].radius", "expected greater than 0"),
@@ -191,12 +191,17 @@ WRONG = {
     ),
     "empty": ("", 1, "", "expected keys such as"),
     "a list": ("- 1", 1, "", "expected keys such as"),
-    "open bracket": ("film:\n  filter: [1, 2", 3, "", "malformed: expected ',' or ']'"),
+    "open bracket": (
+        "film:\n  filter: [1, 2",
+        3,
+        "",
+        "malformed: while parsing a flow sequence, did",
+    ),
     "same key twice": (
         "film: {width: 4}\nfilm: {width: 5}",
         2,
         "",
-        'malformed: found duplicate key "film"',
+        "malformed: found duplicate key 'film'",
     ),
     "two documents": (
         "film: {}\n---\nfilm: {}",
@@ -209,25 +214,24 @@ WRONG = {
         "film: !!python/object/apply:os.system ['exit 1']",
         1,
         "",
-        "malformed: could not determine a constructor",
+        "malformed: unknown tag '!!python/",
     ),
     "python name": (
         "film: !!python/name:os.system",
         1,
         "",
-        "malformed: could not determine a constructor",
+        "malformed: unknown tag '!!python/",
     ),
-    "a list in itself": ("shapes: &a [*a]", 1, "shapes[0]", "expected keys with values"),
-    "no date": ("description: 2001-99-99", None, "", "malformed: month must be in 1..12"),
+    "a list in itself": ("shapes: &a [*a]", 1, "", "malformed: the alias 'a' stands inside what"),
     "no number": (
         "description: !!float xyz",
-        None,
+        1,
         "",
-        "malformed: could not convert string to float",
+        "malformed: 'xyz' is no 'float', as its tag says",
     ),
-    "endless number": ("description: " + "9" * 5000, None, "", "malformed: Exceeds the limit"),
-    "nested": ("film: " + "[" * 5000 + "]" * 5000, None, "", "malformed: nested too deeply"),
-    "control character": ('description: "\x07"', None, "", "malformed: unacceptable character"),
+    "endless number": ("description: " + "9" * 5000, 1, "", "malformed: Exceeds the limit"),
+    "nested": ("film: " + "[" * 5000 + "]" * 5000, 1, "", "malformed: nested too deeply"),
+    "control character": ('description: "\x07"', 1, "", "malformed: control characters are"),
 }
 
 
@@ -263,14 +267,14 @@ def test_files_that_are_no_scenes(refused, tmp_path):
 
 
 def test_a_billion_laughs(refused, tmp_path):
-    """9^12 elements through aliases, which nobody must unfold: it would never end."""
+    """9^12 values through aliases, which nobody must unfold: it would never end."""
     laughs = ["description: &a0 [x, x, x, x, x, x, x, x, x]"]
     laughs += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12)]
     file = tmp_path / "laughs.yaml"
     file.write_text("\n".join([*laughs, "shapes: *a11"]))
-    assert refused(3, "explain", str(file)) == f"{file}:1: description: expected a valid string"
-    file.write_text("\n".join([laughs[0].replace("description", "a0"), *laughs[1:]]))
-    assert refused(3, "explain", str(file)).startswith(f"{file}:1: a0: unknown key")
+    assert refused(3, "explain", str(file)) == (
+        f"{file}:7: malformed: aliases stand for more than {yaml_text.MOST_REPEATED} values"
+    )
 
 
 def test_tags_make_data_and_never_run(tmp_path):

@@ -81,7 +81,7 @@ def test_modes_of_images(tmp_path):
 
 
 def test_sixteen_bits(tmp_path):
-    """All bits of grey; colours, of which Pillow would drop half, are refused."""
+    """All bits of grey and of colours, of which Pillow by itself would drop half."""
     values = np.array([[0, 1, 256, 65535]], ">u2")
     (tmp_path / "grey.png").write_bytes(png(4, 1, 16, 0, [values.tobytes()]))
     read = read_image(tmp_path / "grey.png", "raw")
@@ -89,8 +89,7 @@ def test_sixteen_bits(tmp_path):
     for colour_type, channels in ((2, 3), (4, 2), (6, 4)):
         rows = [np.full((2, channels), 257, ">u2").tobytes()]
         (tmp_path / "colour.png").write_bytes(png(2, 1, 16, colour_type, rows))
-        with pytest.raises(ValueError, match="of 16 bits, of which 8 would be lost; expected"):
-            read_image(tmp_path / "colour.png", "raw")
+        assert (read_image(tmp_path / "colour.png", "raw") == 257 / 65535).all()
 
 
 def test_exr_channels(tmp_path):
@@ -101,7 +100,7 @@ def test_exr_channels(tmp_path):
     write_exr(tmp_path / "y.exr", {"Y": rgb[1]}, {})
     assert np.array_equal(read_image(tmp_path / "y.exr", "auto"), rgb[1][..., None].repeat(3, -1))
     write_exr(tmp_path / "layer.exr", {"beauty.R": rgb[1]}, {})
-    with pytest.raises(ValueError, match=r"has channels beauty.R; expected R, G, B or Y"):
+    with pytest.raises(ValueError, match=r"has channels beauty.R; expected R, G, B, or Y"):
         read_image(tmp_path / "layer.exr", "auto")
 
 
@@ -131,12 +130,12 @@ def faults(folder):
         ("cut.jpg", "cannot be read"),
         ("cut.exr", "cannot be read as EXR"),
         ("text.png", "is not an image that can be read"),
-        ("text.exr", "does not begin as one"),
-        ("empty.png", "is not an image that can be read"),
-        ("empty.exr", "does not begin as one"),
+        ("text.exr", "is not an image that can be read"),
+        ("empty.png", "is empty; expected an image"),
+        ("empty.exr", "is empty; expected an image"),
         ("zero.png", "image"),
-        ("nan.exr", "1 pixels are not finite, the first at column 2, row 1; expected finite ones"),
-        ("inf.exr", "1 pixels are not finite, the first at column 2, row 1; expected finite ones"),
+        ("nan.exr", "the pixel at column 2, row 1 is not finite; expected finite ones"),
+        ("inf.exr", "the pixel at column 2, row 1 is not finite; expected finite ones"),
         ("negative.exr", "the pixel at column 2, row 1 is negative; expected"),
         ("folder.png", "cannot be read"),
     ]

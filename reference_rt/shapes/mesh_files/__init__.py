@@ -9,12 +9,12 @@ A file is read as data and nothing else: it runs nothing, and nothing that it na
 the buffers of a .gltf file beside it.
 """
 
-import stat
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from reference_rt.files import read_input
 from reference_rt.shapes.mesh_files import gltf, obj, off, other, ply, stl
 from reference_rt.shapes.mesh_files.data import MeshData, RawMesh, checked
 
@@ -64,12 +64,6 @@ def _parsed(path: Path, reader: Reader, content: bytes) -> RawMesh:
 
 def _content(path: Path) -> bytes:
     try:
-        # Before opening: to read a pipe or a device might never end.
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise ValueError("not a regular file")
-        return path.read_bytes()
+        return read_input(path)
     except OSError as error:
-        reason = error.strerror
-    except ValueError as error:  # of the name, too: a null byte
-        reason = str(error)
-    raise ValueError(f"cannot read mesh {path}: {reason}; expected a file")
+        raise ValueError(f"cannot read mesh {path}: {error.strerror}; expected a file") from None

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt import transform
+from reference_rt.files import read_input
 from reference_rt.shapes.mesh_files.data import RawMesh, fans
 from reference_rt.shapes.mesh_files.join import joined
 
@@ -190,13 +191,15 @@ class _File:
             return base64.b64decode(payload, validate=True)
         try:
             path = (self.folder / unquote(uri)).resolve()
-            if not path.is_relative_to(self.folder.resolve()) or not path.is_file():
+            if not path.is_relative_to(self.folder.resolve()):
                 raise ValueError(f"buffers[{index}] is {uri[:60]!r}; expected a file in its folder")
             if path not in self.files:  # many buffers may be the same file
-                self.files[path] = path.read_bytes()
+                self.files[path] = read_input(path)
             return self.files[path]
         except OSError as error:
-            raise ValueError(f"buffers[{index}], {uri[:60]!r}: {error.strerror}") from None
+            raise ValueError(
+                f"buffers[{index}], {uri[:60]!r}: {error.strerror}; expected a file in its folder"
+            ) from None
 
 
 def _natural(values: dict[str, Any], key: str, default: int | None = None) -> int:
