@@ -141,7 +141,7 @@ def scene_warnings(tell: Callable[[str], None]) -> Iterator[None]:
                 others(message, category, *place, **to)
 
         warnings.simplefilter("always", SceneWarning)
-        warnings.showwarning = show  # type: ignore[assignment]
+        warnings.showwarning = show
         yield
 
 
