@@ -4,6 +4,7 @@ All take samples first..last of the pixels begin..end, counted along rows, and w
 these pixels.
 """
 
+import math
 from typing import Any, NamedTuple
 
 from reference_rt import sampling
@@ -48,8 +49,25 @@ class FilmRay(NamedTuple):
     weight: float
 
 
+class GivenRays(NamedTuple):
+    """In place of a camera, with None for the filter: the ray of pixel x of a single row, from
+    origins o (n, 3) into unit directions d (n, 3)."""
+
+    o: FloatArray
+    d: FloatArray
+
+
 @kernel
 def _film_ray(
+    view: Any, film_filter: Any, sampler: Any, shape: tuple[int, int], x: int, y: int
+) -> FilmRay:
+    if film_filter is None:
+        return FilmRay(Ray(row(view.o, x), row(view.d, x), math.inf), 1.0)
+    return _camera_film_ray(view, film_filter, sampler, shape, x, y)
+
+
+@kernel
+def _camera_film_ray(
     view: Any, film_filter: Any, sampler: Any, shape: tuple[int, int], x: int, y: int
 ) -> FilmRay:
     width, height = shape
@@ -141,6 +159,8 @@ def _add_spread(spread: FloatArray | None, pixel: int, sample: int, one: Vec3, t
 @kernel
 def _finish_spread(spread: FloatArray | None, pixel: int, spp: int) -> None:
     if spread is None:
+        return
+    if spp < 2:  # no estimate
         return
     scale = 1.0 / (spp * (spp - 1.0))
     for k in range(3):

@@ -136,7 +136,9 @@ def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArr
         low, high = component(d_low, k), component(d_high, k)
         width = component(o_high, k) - component(o_low, k) + (high - low) * slope
         together = together and width <= widest and (low > 0.0 or high < 0.0 or low == high)
-        together = together and (k == axis or max(abs(low), abs(high)) < length)
+        # Along `axis` no longer than what `scaled` leaves alone.
+        longest = max(abs(low), abs(high))
+        together = together and (longest <= 1.0 / SHORT if k == axis else longest < length)
     x = _slab(o_low.x, o_high.x, d_low.x, d_high.x, error)
     y = _slab(o_low.y, o_high.y, d_low.y, d_high.y, error)
     z = _slab(o_low.z, o_high.z, d_low.z, d_high.z, error)

@@ -6,6 +6,7 @@ from reference_rt.csg import evaluate
 from reference_rt.csg.tables import Solids
 from reference_rt.kernel import kernel
 from reference_rt.lane_kernels import lowest
+from reference_rt.order import precedes
 from reference_rt.ray import Crossing, Hit, Ray
 from reference_rt.shapes import TRIANGLE, Shapes, triangle
 from reference_rt.shapes.shape import FloatArray
@@ -97,25 +98,9 @@ def _nearer(
     """The nearer of what was found and the closest so far."""
     if found.t <= closest.t:
         hit = Hit(found.t, kind, row, found.u, found.v, instance)
-        if found.t < closest.t or _precedes(shapes, hit, closest):
+        if found.t < closest.t:
+            return hit
+        # t_max itself, which a ray that has met nothing yet starts with, lies beyond the ray's end.
+        if closest.kind >= 0 and precedes(shapes, hit, closest):
             return hit
     return closest
-
-
-@kernel
-def _precedes(shapes: Shapes, hit: Hit, closest: Hit) -> bool:
-    """Which of two hits at the same t counts: by kind, then in the order of the scene, so that no
-    order of traversal can change a picture."""
-    if closest.kind < 0:
-        return hit.t < closest.t  # t_max itself lies beyond the ray's end
-    if hit.instance != closest.instance:
-        return hit.instance < closest.instance
-    if hit.kind != closest.kind:
-        return hit.kind < closest.kind
-    owners = (
-        any_shape.owner(shapes, hit.kind, hit.row),
-        any_shape.owner(shapes, closest.kind, closest.row),
-    )
-    if owners[0] != owners[1]:
-        return owners[0] < owners[1]
-    return any_shape.face(shapes, hit) < any_shape.face(shapes, closest)

@@ -1,6 +1,7 @@
 """What arrays of rays hit, block after block."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -8,10 +9,10 @@ import numpy.typing as npt
 from reference_rt.block_hits import any_hits, closest_hits, hit_of
 from reference_rt.bundles import BUNDLE
 from reference_rt.coherent import ALONE, FOUND, closest_together
-from reference_rt.geometry import Geometry
+from reference_rt.geometry import Geometry, closest_hit
 from reference_rt.kernel import kernel, local_floats, local_integers
-from reference_rt.ray import BLOCK, Ray, at
-from reference_rt.scaled_ray import is_told, scaled
+from reference_rt.ray import BLOCK, Hit, Ray
+from reference_rt.scaled_ray import scaled
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.streams import (
     HIT_FLOATS,
@@ -25,68 +26,64 @@ from reference_rt.streams import (
 from reference_rt.vec3 import row
 
 
+class Primitives(NamedTuple):
+    """What n rays hit, as `Hit`, each with the t of its `scaled` ray: t (n,); codes (n, 3): kind,
+    row and instance, kind -1 for a miss; uv (n, 2)."""
+
+    t: FloatArray
+    codes: IntArray
+    uv: FloatArray
+
+
 @kernel
-def closest_of_rays(
-    geometry: Geometry,
-    o: FloatArray,
-    d: FloatArray,
-    t: FloatArray,
-    kind: IntArray,
-    rows: IntArray,
-    uv: FloatArray,
-) -> None:
-    """What rays from origins o (n, 3) into directions d (n, 3) hit first, see `query.Closest`:
-    neighbours that are alike in bundles, the others in blocks."""
+def closest_of_rays(geometry: Geometry, o: FloatArray, d: FloatArray, found: Primitives) -> None:
+    """What rays from origins o (n, 3) into directions d (n, 3) hit first: neighbours that are alike
+    in bundles, the others in blocks."""
     bundle = Rays(local_floats(RAY_FLOATS))
     rays = Rays(local_floats(RAY_FLOATS))
     hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
-    numbers, units, count = local_integers(BLOCK), local_floats(BLOCK), 0
+    numbers, count = local_integers(BLOCK), 0
     for k in range(RAY_FLOATS):
         rays.numbers[k] = 1.0  # lanes without a ray are traced too
     for begin in range(0, len(o), BUNDLE):
         end = min(begin + BUNDLE, len(o))
         for i in range(begin, end):
-            t[i], kind[i], rows[i], uv[i, 0], uv[i, 1] = math.inf, -1, -1, 0.0, 0.0
+            _put(found, i, Hit(math.inf, -1, -1, 0.0, 0.0, -1))
         outcome = ALONE
         if end == begin + BUNDLE:
             outcome = closest_together(geometry, o, d, begin, bundle, hits)
         if outcome == FOUND:
             for j in range(BUNDLE):
-                _tell(geometry, bundle, 1.0, hits, j, begin + j, t, kind, rows, uv)
+                _put(found, begin + j, hit_of(geometry, ray_of(bundle, j), hits, j))
         elif outcome == ALONE:
             for i in range(begin, end):
-                ray, unit, valid = scaled(row(o, i), row(d, i), math.inf)
+                ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
                 if valid:
                     put_ray(rays, count, ray)
-                    numbers[count], units[count] = i, unit
+                    numbers[count] = i
                     count += 1
         if count > BLOCK - BUNDLE or end == len(o):
             closest_hits(geometry, rays, hits, count)
             for j in range(count):
-                _tell(geometry, rays, units[j], hits, j, numbers[j], t, kind, rows, uv)
+                _put(found, numbers[j], hit_of(geometry, ray_of(rays, j), hits, j))
             count = 0
 
 
 @kernel
-def _tell(
-    geometry: Geometry,
-    rays: Rays,
-    unit: float,
-    hits: Hits,
-    j: int,
-    i: int,
-    t: FloatArray,
-    kind: IntArray,
-    rows: IntArray,
-    uv: FloatArray,
-) -> None:
-    """Write what ray j of a block, number i of all, has hit, if it has; unit: of its t, see
-    `scaled`."""
-    ray = ray_of(rays, j)
-    hit = hit_of(geometry, ray, hits, j)
-    if hit.kind >= 0 and is_told(hit.t * unit, at(ray, hit.t)):
-        t[i], kind[i], rows[i] = hit.t * unit, hit.kind, hit.row
-        uv[i, 0], uv[i, 1] = hit.u, hit.v
+def closest_one_by_one(geometry: Geometry, o: FloatArray, d: FloatArray, found: Primitives) -> None:
+    """The same, ray after ray: the same bits, slower, from far less code."""
+    for i in range(len(o)):
+        ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
+        hit = Hit(math.inf, -1, -1, 0.0, 0.0, -1)
+        if valid:
+            hit = closest_hit(geometry, ray)
+        _put(found, i, hit)
+
+
+@kernel
+def _put(found: Primitives, i: int, hit: Hit) -> None:
+    found.t[i], found.uv[i, 0], found.uv[i, 1] = hit.t, hit.u, hit.v
+    found.codes[i, 0], found.codes[i, 1], found.codes[i, 2] = hit.kind, hit.row, hit.instance
 
 
 @kernel

@@ -14,9 +14,10 @@ from reference_rt.apart import address_of
 from reference_rt.bands import cast_band, first_hits_band, render_band
 from reference_rt.block_hits import tracer_of
 from reference_rt.integrators import Path, RayCast
+from reference_rt.integrators.path import PathSetup
 from reference_rt.kernel import signature_of
 from reference_rt.likely_mistakes import likely_mistakes
-from reference_rt.meanwhile import precompile_all
+from reference_rt.meanwhile import Call, precompile_all
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.tables import SceneTables, build_tables
@@ -96,10 +97,7 @@ def render(
     for mistake in likely_mistakes(scene, tables):
         scene.warn(mistake.message, *mistake.path)
     integrator = scene.integrator
-    tracer = tracer_of(tables.geometry) if isinstance(integrator, Path) else None
-    address = np.zeros(1, np.intp)
-    if tracer is not None:
-        tables = tables._replace(geometry=tables.geometry._replace(tracer=address))
+    tables, tracer = with_tracer(tables, integrator)
     if isinstance(integrator, RayCast):
         shown, (jobs, layers) = integrator.show, _cast_jobs(scene, tables)
     else:
@@ -107,11 +105,7 @@ def render(
     say("compile", 0.0)
     threads = threads or os.cpu_count() or 1
     calls = [(job.band, signature_of(*job.arguments, 0, 0, 0, 0)) for job in jobs]
-    if tracer is None:
-        bands = precompile_all(calls, threads)
-    else:
-        *bands, _ = precompile_all([*calls, tracer], threads)
-        address[0] = address_of(*tracer)
+    bands = compile_bands(calls, tables, tracer, threads)
     say("compile", 1.0)
     clock.append(time.perf_counter())
     pixels = scene.film.width * scene.film.height
@@ -124,6 +118,28 @@ def render(
     clock.append(time.perf_counter())
     seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
     return Picture(layers, shown, seconds)
+
+
+def with_tracer(tables: SceneTables, integrator: Any) -> tuple[SceneTables, Call | None]:
+    """The tables with room for the address of the kernel that traces the rays of paths, and that
+    kernel; None where it is inlined."""
+    tracer = tracer_of(tables.geometry) if isinstance(integrator, Path | PathSetup) else None
+    if tracer is not None:
+        geometry = tables.geometry._replace(tracer=np.zeros(1, np.intp))
+        tables = tables._replace(geometry=geometry)
+    return tables, tracer
+
+
+def compile_bands(
+    calls: Sequence[Call], tables: SceneTables, tracer: Call | None, threads: int
+) -> Sequence[Callable[..., Any]]:
+    """Kernels that are ready to be called, once the tables know where the tracer is."""
+    if tracer is None:
+        return precompile_all(calls, threads)
+    *bands, _ = precompile_all([*calls, tracer], threads)
+    address: Any = tables.geometry.tracer
+    address[0] = address_of(*tracer)
+    return bands
 
 
 def _cast_jobs(scene: Scene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:

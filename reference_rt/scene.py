@@ -2,14 +2,11 @@
 
 import hashlib
 import json
-import math
 import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-import numpy as np
-import numpy.typing as npt
 from pydantic import Field, PrivateAttr, model_validator
 
 from reference_rt import yaml_text
@@ -27,12 +24,12 @@ from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import AnyLight, Constant, EnvironmentMap
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
 from reference_rt.materials.ways import ways
+from reference_rt.oracle import Oracle
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.shapes import Shape
 from reference_rt.textures import AnyTexture, texture_names
 
 if TYPE_CHECKING:
-    from reference_rt.query import Intersections
     from reference_rt.tables import SceneTables
 
 
@@ -41,7 +38,7 @@ MOST_NESTED = 100
 takes two."""
 
 
-class Scene(Description):
+class Scene(Oracle, Description):
     """Everything that determines a picture.  Right-handed world; linear sRGB; scene units."""
 
     description: str = ""
@@ -203,7 +200,7 @@ class Scene(Description):
         """SHA-256 of the description: what pictures name as their source."""
         return hashlib.sha256(self._key().encode()).hexdigest()
 
-    # ---- what rays find -------------------------------------------------------------------------
+    # ---- what kernels see; what rays find is in `Oracle` ----------------------------------------
 
     @property
     def tables(self) -> "SceneTables":
@@ -213,20 +210,6 @@ class Scene(Description):
 
             self._tables = build_tables(self)
         return self._tables
-
-    def intersect(self, origins: npt.ArrayLike, directions: npt.ArrayLike) -> "Intersections":
-        """What rays hit first: see `reference_rt.query.intersect`."""
-        from reference_rt import query
-
-        return query.intersect(self.tables, origins, directions)
-
-    def occluded(
-        self, origins: npt.ArrayLike, directions: npt.ArrayLike, t_max: npt.ArrayLike = math.inf
-    ) -> npt.NDArray[np.bool_]:
-        """Whether anything lies on each ray at 0 < t < t_max: see `reference_rt.query.occluded`."""
-        from reference_rt import query
-
-        return query.occluded(self.tables, origins, directions, t_max)
 
     # ---- in -------------------------------------------------------------------------------------
 

@@ -129,7 +129,7 @@ def _against_mitsuba(kind: str, rays: Rays, subject: Subject, setting: Setting) 
         }
         runs |= {
             "ours": lambda: _rate(
-                len(o), lambda: query.closest(subject.tables, o, d, setting.threads)
+                len(o), lambda: query.first_hits(subject.tables, o, d, threads=setting.threads)
             )
         }
         runs["Mitsuba, not robust"] = _mitsuba_rate(mi, robust[False], rays, kind == "coherent")
@@ -138,7 +138,7 @@ def _against_mitsuba(kind: str, rays: Rays, subject: Subject, setting: Setting) 
         rates = alternate(runs, say=setting.say)
     medians = {name: float(np.median(rate)) for name, rate in rates.items()}
     best = max((name for name in rates if "coherent=" in name), key=lambda name: medians[name])
-    hits = query.closest(subject.tables, o, d).kind >= 0
+    hits = query.first_hits(subject.tables, o, d).hit
     return against(
         f"rays_{kind}",
         f"closest hit, {subject.title}, {kind}: ours (float64) / Mitsuba llvm",
@@ -194,7 +194,9 @@ def _any_hit(rays: Rays, subject: Subject, setting: Setting) -> Row:
     threads = setting.threads
     runs: dict[str, Callable[[], float]] = {
         "any hit": lambda: _rate(n, lambda: query.occluded(subject.tables, o, d, length, threads)),
-        "closest hit": lambda: _rate(n, lambda: query.closest(subject.tables, o, d, threads)),
+        "closest hit": lambda: _rate(
+            n, lambda: query.first_hits(subject.tables, o, d, threads=threads)
+        ),
     }
     for run in runs.values():
         run()  # compile

@@ -86,7 +86,7 @@ def outcome(o: FloatArray, d: FloatArray, right: BoolArray, wanted: str, got: An
 def _ours(draw: Draw, mesh: Closed, o: FloatArray, d: FloatArray, scale: float) -> Outcome:
     file = write(mesh.vertices, mesh.faces, draw.folder / "mesh.ply")
     tables = rt.build_tables(rt.Scene(shapes=(rt.Mesh(file=str(file)),), hierarchy="sah"))
-    t = query.closest(tables, o, d).t
+    t = query.first_hits(tables, o, d).t
     total = outcome(o, d, np.isfinite(t), "a hit", t)
     few = slice(None, None, max(COUNTED, len(o) * len(mesh.faces) // TESTS[draw.effort]))
     number, balance = crossings(tables, o[few], d[few])

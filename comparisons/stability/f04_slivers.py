@@ -52,7 +52,7 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
     )
     tables = rt.build_tables(scene)
     row = getattr(tables.geometry.shapes, trial.kind)._asdict()
-    found = {OURS: query.closest(tables, trial.o, trial.d).t}
+    found = {OURS: query.first_hits(tables, trial.o, trial.d).t}
     if mitsuba:
         from comparisons import frame, translate, twin
 

@@ -122,7 +122,7 @@ def compare(scene: rt.Scene, o: FloatArray, d: FloatArray, singly: bool) -> Outc
     expected = None
     for method in reversed(METHODS):
         tables = rt.build_tables(scene.changed(hierarchy=method))
-        found = query.closest(tables, o, d)
+        found = query.closest_primitives(tables, o, d)
         got = named(tables, found)
         if expected is None:
             expected = named(tables, every(tables, o, d)) if singly else got

@@ -14,7 +14,7 @@ from comparisons.stability.f02_leaving_shapes import matrix
 from comparisons.stability.f02_leaving_shots import PIXELS, lit, picture
 from comparisons.stability.f13_contact_stacks import COUNT, THEIRS, bound, judged, rays_down
 from comparisons.stability.family import EXAMPLES, MITSUBA, OURS, Draw, Outcome, Shot
-from reference_rt.query import whitted_radiance
+from reference_rt.query import radiance_without_noise
 from reference_rt.shapes.shape import IntArray
 from reference_rt.tables import SceneTables
 
@@ -95,7 +95,7 @@ def transmitted(draw: Draw, x: float) -> Mapping[str, Outcome]:
     lamp is seen through all of them alone: (1 - F)^COUNT."""
     o, d = rays_down(draw.rng, draw.cases)
     setup = rt.Whitted(max_depth=COUNT, min_contribution=0.0).setup()
-    found = whitted_radiance(panes(1.0 / x), setup, o + np.array([0.0, 0.0, 0.5]), d)[:, 0]
+    found = radiance_without_noise(panes(1.0 / x), setup, o + np.array([0.0, 0.0, 0.5]), d)[:, 0]
     expected = fresnel(-d[:, 2]) ** COUNT
     error = np.abs(found - expected) / expected
     bad = np.flatnonzero(~(error <= TRANSMITTED))

@@ -10,9 +10,8 @@ from comparisons.mitsuba_backend import mitsuba
 from comparisons.mitsuba_scene import for_rays
 from comparisons.tiers.bounds import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.twin import Twin
-from reference_rt.cameras import LENS_CENTRE, ThinLens, camera_ray
+from reference_rt.cameras import LENS_CENTRE, ThinLens
 from reference_rt.film import Film
-from reference_rt.kernel import entry_kernel
 from reference_rt.scene import Scene
 from reference_rt.shapes.shape import FloatArray
 
@@ -37,26 +36,12 @@ def pixel_centres(film: Film, most: int) -> tuple[FloatArray, FloatArray]:
     return x.ravel() + 0.5, y.ravel() + 0.5
 
 
-@entry_kernel
-def _camera_rays(
-    view: Any, x: FloatArray, y: FloatArray, lens: FloatArray, out: FloatArray
-) -> None:
-    for i in range(len(x)):
-        ray = camera_ray(view, x[i], y[i], (lens[0], lens[1]))
-        out[i, 0], out[i, 1], out[i, 2] = ray.o.x, ray.o.y, ray.o.z
-        out[i, 3], out[i, 4], out[i, 5] = ray.d.x, ray.d.y, ray.d.z
-
-
 def camera_rays(
     scene: Scene, x: FloatArray, y: FloatArray, lens: Sequence[float] = LENS_CENTRE
 ) -> tuple[FloatArray, FloatArray]:
     """Our camera's origins and unit directions (n, 3) of film points in pixels, through one point
     of its lens: the centre, as deterministic integrators have it, or that of the sample `lens`."""
-    film = scene.film
-    out = np.zeros((len(x), 6))
-    view = scene.camera.setup(film.width, film.height)
-    _camera_rays(view, x / film.width, y / film.height, np.array(lens), out)
-    return out[:, :3].copy(), out[:, 3:].copy()
+    return scene.camera_rays(np.column_stack([x, y]) - 0.5, lens=lens)
 
 
 LENS_SAMPLES = (LENS_CENTRE, (0.9, 0.6), (0.2, 0.3), (0.55, 0.99), (0.4, 0.02))

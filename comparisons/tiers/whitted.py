@@ -67,7 +67,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
     integrator = scene.integrator if isinstance(scene.integrator, Whitted) else Whitted()
     rays = pixel_rays(scene, twin.frame, pixels)
     setup = integrator.setup()
-    ours = query.whitted_radiance(tables, setup, rays.o, rays.d)
+    ours = query.radiance_without_noise(tables, setup, rays.o, rays.d)
     theirs_at = plugin_radiance(scene, tables, twin, integrator)
     theirs = theirs_at(rays)
     size = np.maximum(np.abs(ours), np.abs(theirs)).max(axis=1)
@@ -81,14 +81,14 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
         over = np.flatnonzero(~(error <= bound))
         few = Rays(rays.o[over], rays.d[over])
         others = [
-            partial(query.whitted_radiance, tables, setup, other.o, other.d)
+            partial(query.radiance_without_noise, tables, setup, other.o, other.d)
             for other in moved(few, _radii(tables, sizes, few)[0])
         ]
         bound[over] += slopes(ours[over], others, float(lit.max(initial=0.0)))
     outliers = np.flatnonzero(~(error <= bound))
 
     def ours_along(o: FloatArray, d: FloatArray) -> FloatArray:
-        return query.whitted_radiance(tables, setup, o, d)
+        return query.radiance_without_noise(tables, setup, o, d)
 
     def theirs_along(o: FloatArray, d: FloatArray) -> FloatArray:
         return theirs_at(Rays(twin.frame.rounded(o), round32(d)))

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from reference_rt.csg.evaluate import surface_along
 from reference_rt.geometry import Geometry
 from reference_rt.kernel import entry_kernel
-from reference_rt.query import checked_rays
+from reference_rt.order import FROM_THE_START
+from reference_rt.query.rays import checked_rays
 from reference_rt.ray import Ray
 from reference_rt.shapes.shape import FloatArray, IntArray
 from reference_rt.tables import SceneTables
@@ -48,7 +49,17 @@ def _crossings(
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
         count[i], _ = surface_along(
-            solids, geometry.shapes, bvh, solid, ray, math.inf, t[i], widths[i], part[i]
+            solids,
+            geometry.shapes,
+            bvh,
+            solid,
+            ray,
+            math.inf,
+            t[i],
+            widths[i],
+            part[i],
+            -1,
+            FROM_THE_START,
         )
 
 

@@ -15,6 +15,7 @@ from reference_rt.csg.anchor import ray_near
 from reference_rt.csg.mesh_walk import Step, next_crossing, winding
 from reference_rt.csg.tables import AND, NOT, OR, Solids
 from reference_rt.kernel import kernel, local_floats, local_integers
+from reference_rt.order import FROM_THE_START, Crossed, comes_after, crossed, nothing_at
 from reference_rt.ray import Hit, Ray, at, surface_error
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import FloatArray, IntArray
@@ -215,12 +216,15 @@ def surface_along(
     t: FloatArray,
     widths: FloatArray,
     part: IntArray,
-) -> tuple[int, Hit]:
-    """(how many points of the surface of solid s lie at t in (0, t_max], the first as a hit of the
-    operand that it belongs to, at inf for none).
+    instance: int,
+    after: Crossed,
+) -> tuple[int, Crossed]:
+    """(how many points of the surface of solid s lie at t in (0, t_max], the first of them that
+    comes after `after`, as a hit of the operand that it belongs to, at inf for none).
 
     As many of them as there is room for go into t, in order, with their `resolution` and the number
-    of their operand; where there is no room for any, the first ends the walk.
+    of their operand; where there is no room for any, the hit ends the walk.  The ray is that of
+    `instance`, -1 for none.
     """
     ray, begin = ray_near(solids, s, ray)
     first, count = solids.first[s], solids.operands[s]
@@ -241,7 +245,7 @@ def surface_along(
     values = local_integers(solids.depth[s])
     best, hit = begin_all(solids, shapes, bvh, s, ray, walk)
     inside = is_inside(solids, s, walk.state, values)
-    found, closest = 0, Hit(math.inf, -1, -1, 0.0, 0.0, -1)
+    found, closest = 0, nothing_at(math.inf)
     while best >= 0 and begin + hit.t <= t_max:
         best, hit = pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
         was_inside = inside
@@ -249,14 +253,17 @@ def surface_along(
         if inside != was_inside:
             k = which_shows(solids, s, count, walk, values, was_inside)
             kind, at_k = solids.kind[first + k], begin + front.t[k]
-            if found == 0:
-                closest = Hit(at_k, kind, front.row[k], front.u[k], front.v[k], -1)
+            if closest.hit.kind < 0:
+                hit_k = Hit(at_k, kind, front.row[k], front.u[k], front.v[k], instance)
+                one = crossed(shapes, hit_k, found)
+                if comes_after(one, after):
+                    closest = one
             if found < len(t):
                 shown = Hit(front.t[k], kind, front.row[k], front.u[k], front.v[k], -1)
                 t[found], widths[found] = at_k, resolution(shapes, shown, ray)
                 part[found] = k
             found += 1
-            if len(t) == 0:
+            if len(t) == 0 and closest.hit.kind >= 0:
                 break
     return found, closest
 
@@ -272,8 +279,10 @@ def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max:
     """The first point of the surface of solid s at t in (0, t_max], as a hit of the operand that it
     belongs to; at inf for none."""
     none, no_parts = local_floats(0), local_integers(0)
-    _, hit = surface_along(solids, shapes, bvh, s, ray, t_max, none, none, no_parts)
-    return hit
+    _, closest = surface_along(
+        solids, shapes, bvh, s, ray, t_max, none, none, no_parts, -1, FROM_THE_START
+    )
+    return closest.hit
 
 
 @kernel

@@ -130,6 +130,8 @@ def _both(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec
             one = any_leaf.both(materials.leaves, kind, i, shading.at, wo_in, wi_in)
             if lets(layer, wi):
                 value = value + one.value * layer.weight
+            elif layers.number[m] == 1:  # `sample` gives up what it draws there
+                continue
             density += one.density * layer.weight
     return Scattered(value, density / total if total > 0.0 else 0.0)
 

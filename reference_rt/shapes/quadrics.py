@@ -25,6 +25,7 @@ from reference_rt.shapes.shape import (
     Spans,
     Tangents,
     any_tangents,
+    one_span,
 )
 from reference_rt.vec3 import (
     Vec3,
@@ -108,6 +109,17 @@ def intersect(quadrics: Quadrics, i: int, ray: Ray) -> Crossing:
     if t1 > 0.0 and line.t_in <= line.t1 and line.t1 <= line.t_out:
         return Crossing(t1, 0.0, 0.0)
     return miss()
+
+
+@kernel
+def crossings(quadrics: Quadrics, i: int, ray: Ray) -> Spans:
+    """All crossings of the line and quadric i in order, of a surface that is not capped too."""
+    if quadrics.capped[i] != 0:
+        return spans(quadrics, i, ray)
+    line = line_of(quadrics, i, ray)
+    first = in_world(line, line.t0) if line.t_in <= line.t0 <= line.t_out else math.inf
+    second = in_world(line, line.t1) if line.t_in <= line.t1 <= line.t_out else math.inf
+    return one_span(min(first, second), 0.0, max(first, second), 0.0)
 
 
 # ---- where it was met ---------------------------------------------------------------------------

@@ -92,7 +92,7 @@ def test_closest_is_what_intersect_finds_on_any_number_of_threads(tmp_path: Path
     write_ply(path, blob(300))
     tables = scene_of(path).tables
     rays = mesh_rays.incoherent(blob(300).vertices, 40_000)  # three blocks
-    one, two = (query.closest(tables, *rays, threads=n) for n in (1, 2))
+    one, two = (query.closest_primitives(tables, *rays, threads=n) for n in (1, 2))
     full = query.intersect(tables, *rays)
     for field in ("t", "kind", "row", "uv"):
         assert np.array_equal(getattr(one, field), getattr(two, field))

@@ -101,7 +101,7 @@ lights:
     o2, d2 = camera_rays(there, x, y, (0.9, 0.6))
     assert np.allclose(frame.into(o), o2, rtol=0.0, atol=1e-15)
     ours, theirs = (
-        query.whitted_radiance(build_tables(s), Whitted().setup(), *rays)
+        query.radiance_without_noise(build_tables(s), Whitted().setup(), *rays)
         for s, rays in ((here, (o, d)), (there, (o2, d2)))
     )
     assert ours.max() > 0.2

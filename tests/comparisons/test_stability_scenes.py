@@ -106,7 +106,7 @@ def test_mirrorings_multiply() -> None:
     count = int(np.ceil((1.25 / slope - 1.9) / 2.0))
     tables = build_tables(mirrors)
     deep = Whitted(max_depth=1000, min_contribution=0.0)
-    found = query.whitted_radiance(tables, deep.setup(), o, d)[0]
+    found = query.radiance_without_noise(tables, deep.setup(), o, d)[0]
     expected = np.array([0.02, 0.025, 0.04]) * np.array([0.995, 0.98, 0.95]) ** count
     assert np.allclose(found, expected, rtol=1e-11)
 
@@ -115,7 +115,7 @@ def test_cells_look_alike_over_twelve_decades() -> None:
     cells = scene("bright_and_dim")
     o = np.column_stack([np.arange(-6.0, 7.0) + 0.1, np.full(13, -0.3), np.full(13, 5.0)])
     d = np.tile([0.0, 0.0, -1.0], (13, 1))
-    found = query.whitted_radiance(build_tables(cells), Whitted().setup(), o, d)
+    found = query.radiance_without_noise(build_tables(cells), Whitted().setup(), o, d)
     assert (found > 0.01).all()
     assert np.allclose(found, found[0], rtol=1e-12)
 

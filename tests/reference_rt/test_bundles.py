@@ -81,7 +81,7 @@ def assert_same(tables, o, d):
     t, codes, uv = np.empty(n), np.empty((n, 2), np.int64), np.empty((n, 2))
     with np.errstate(all="ignore"):
         _alone(tables.geometry, o, d, t, codes, uv)
-    found = query.closest(tables, o, d)
+    found = query.closest_primitives(tables, o, d)
     assert found.t.tobytes() == t.tobytes()
     assert np.array_equal(np.column_stack([found.kind, found.row]), codes)
     assert found.uv.tobytes() == uv.tobytes()
@@ -175,7 +175,7 @@ def test_other_shapes_in_the_hierarchy(tmp_path, monkeypatch):
     o, d = cones(rng, 2000, rng.uniform(-1.2, 1.2, (2000, 3)), 0.1)
     assert share_together(tables, o, d) > 0.5
     assert_same(tables, o, d)
-    assert len(set(query.closest(tables, o, d).kind)) >= 4
+    assert len(set(query.closest_primitives(tables, o, d).kind)) >= 4
 
 
 @pytest.mark.parametrize("width", [0.0, 0.02, 0.1])
@@ -211,7 +211,7 @@ def write_hits(folder, file):
     tables = mesh_scene(folder, icosphere(2))
     rng = np.random.default_rng(12)
     o, d = cones(rng, 8, rng.uniform(-1, 1, (8, 3)), 0.1)
-    found = query.closest(tables, o, d, threads=1)
+    found = query.closest_primitives(tables, o, d, threads=1)
     np.savez(file, share=share_together(tables, o, d), t=found.t, row=found.row, uv=found.uv)
 
 

@@ -62,7 +62,7 @@ def test_deterministic_lights(name):
     assert np.count_nonzero(expected[:, 0]) > 100
     if name != "point" and name != "directional":
         assert np.count_nonzero(expected[:, 0] == 0) > 100
-    found = query.whitted_radiance(scene.tables, rt.Whitted().setup(), o, d)
+    found = query.radiance_without_noise(scene.tables, rt.Whitted().setup(), o, d)
     # Near a spot's rim the difference of two angles of about 1 remains: relative to the beam.
     scale = np.abs(expected).max(axis=0)
     assert (np.abs(found - expected) <= 1e-12 * np.maximum(expected, 1e-3 * scale)).all()
@@ -104,7 +104,7 @@ def test_phong(half_vector):
             cos = np.sum((to_light * [-1, 1, -1]) * -d, axis=1)  # mirrored at the floor
         lobe = np.maximum(0.0, cos) ** p
         expected += (np.outer(to_light[:, 1], k_d) + np.outer(lobe, k_s)) * across
-    found = query.whitted_radiance(scene.tables, rt.Whitted().setup(), o, d)
+    found = query.radiance_without_noise(scene.tables, rt.Whitted().setup(), o, d)
     # A rounding of the cosine counts p times.
     assert np.allclose(found, expected, rtol=1e-12, atol=0)
 
@@ -138,7 +138,7 @@ def test_a_light_between_mirrors(bounces):
     p = np.array([20.0, y_out, 1.0])
     w = np.array(light.position) - p
     irradiance = np.array([7, 8, 9]) * -w[0] / np.linalg.norm(w) ** 3
-    found = query.whitted_radiance(scene.tables, rt.Whitted().setup(), o, d)
+    found = query.radiance_without_noise(scene.tables, rt.Whitted().setup(), o, d)
     assert np.allclose(found, m**bounces * RHO / math.pi * irradiance, rtol=1e-12, atol=0)
 
 
@@ -165,11 +165,11 @@ def test_a_pane_by_all_its_bounces(ior):
         },
     )
     setup = rt.Whitted(max_depth=200, min_contribution=0.0).setup()
-    found = query.whitted_radiance(scene.tables, setup, [[0.0, 0, 5]], [[0.0, 0, -1]])
+    found = query.radiance_without_noise(scene.tables, setup, [[0.0, 0, 5]], [[0.0, 0, -1]])
     assert np.allclose(found, 1.0, rtol=1e-12)
     for depth in range(1, 8):
         setup = rt.Whitted(max_depth=depth, min_contribution=0.0).setup()
-        found = query.whitted_radiance(scene.tables, setup, [[0.0, 0, 5]], [[0.0, 0, -1]])
+        found = query.radiance_without_noise(scene.tables, setup, [[0.0, 0, 5]], [[0.0, 0, -1]])
         # Depth 1 mirrors outside; depth k >= 2 goes out after k - 2 bounces within.
         through = [(1 - R) ** 2 * R**k for k in range(depth - 1)]
         assert np.allclose(found, R + sum(through), rtol=1e-12)

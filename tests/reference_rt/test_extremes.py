@@ -16,7 +16,7 @@ DOWN = ([[0.0, 1.0, 0.0]], [[0.0, -1.0, 0.0]])
 
 
 def whitted(scene):
-    return query.whitted_radiance(scene.tables, rt.Whitted().setup(), *DOWN)[0]
+    return query.radiance_without_noise(scene.tables, rt.Whitted().setup(), *DOWN)[0]
 
 
 @pytest.mark.parametrize("factor", [2.0**-100, 1e-30, 1e-15, 1e15, 1e30, 2.0**100])

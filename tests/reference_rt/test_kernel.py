@@ -15,8 +15,8 @@ from reference_rt.kernel import entry_kernel, local_floats, local_integers, reci
 _HIT = """
 from reference_rt import Scene, Sphere, build_tables, kernel, query
 found = query.intersect(build_tables(Scene(shapes=(Sphere(),))), [[0, 0, 3.0]], [[0, 0, -1.0]])
-from reference_rt.query import _intersect
-print(kernel.CACHE_FOLDER, found.t[0], sum(_intersect.stats.cache_hits.values()))
+from reference_rt.query.tracing import closest_of_few
+print(kernel.CACHE_FOLDER, found.t[0], sum(closest_of_few.stats.cache_hits.values()))
 """
 
 

@@ -102,7 +102,7 @@ def test_rays_in_a_plane_hit_what_is_there(tmp_path):
     tilt = rng.choice([0.0, 1e-16, 1e-15, 1e-14], (n, 1)) * rng.choice([-1.0, 1.0], (n, 1))
     d = ends[1] - ends[0] + tilt * turn[:, 2]
     o = ends[0] - d * rng.uniform(0.0, 2.0, (n, 1))
-    found = query.closest(scene, o, d)
+    found = query.closest_primitives(scene, o, d)
     hit = found.kind >= 0
     assert 0.8 < hit.mean() < 1.0
     corners = scene.geometry.shapes.triangles.vertices.reshape(-1, 3, 3)[found.row[hit]]

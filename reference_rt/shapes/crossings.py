@@ -1,0 +1,84 @@
+"""All crossings of a ray with one primitive, which path tracing, after the first, does not need."""
+
+import math
+from typing import Any, NamedTuple
+
+from reference_rt.kernel import kernel
+from reference_rt.ray import Ray
+from reference_rt.shapes.dispatch import intersect, spans
+from reference_rt.shapes.quadrics import Quadrics, crossings
+from reference_rt.shapes.shape import Spans, no_spans, one_span
+from reference_rt.shapes.tables import (
+    BOX,
+    DISK,
+    PLANE,
+    POLYGON,
+    QUADRIC,
+    RECTANGLE,
+    SPHERE,
+    TORUS,
+    TRIANGLE,
+    Shapes,
+)
+from reference_rt.shapes.watertight import Shear
+
+MOST = 4
+"""Of one primitive: a torus has so many, and so has a capped quadric of two sheets."""
+
+
+class Along(NamedTuple):
+    """Up to MOST crossings of a ray: `Spans`, with what more its first needs, as `Crossing.v`."""
+
+    spans: Spans
+    v: float
+
+
+@kernel
+def along(shapes: Shapes, kind: int, i: int, ray: Ray, shear: Shear) -> Along:
+    """Those of primitive i of a kind, in order; the t of those of shapes that can have several may
+    be 0 and below."""
+    if kind in (SPHERE, BOX, TORUS):
+        return Along(spans(shapes, kind, i, ray), 0.0)
+    if kind == QUADRIC:
+        return Along(_of_quadric(shapes.quadrics, i, ray), 0.0)
+    found = intersect(shapes, kind, i, ray, shear)
+    return Along(one_span(found.t, found.u, math.inf, 0.0), found.v)
+
+
+@kernel
+def _of_quadric(quadrics: Quadrics | None, i: int, ray: Ray) -> Spans:
+    if quadrics is None:
+        return no_spans()
+    return crossings(quadrics, i, ray)
+
+
+@kernel
+def number_of(shapes: Shapes, kind: int) -> int:
+    """How many primitives of a kind there are."""
+    count = 0
+    if kind == SPHERE:
+        count = _rows(shapes.spheres)
+    elif kind == RECTANGLE:
+        count = _rows(shapes.rectangles)
+    elif kind == BOX:
+        count = _rows(shapes.boxes)
+    elif kind == TRIANGLE:
+        count = _rows(shapes.triangles)
+    elif kind == DISK:
+        count = _rows(shapes.disks)
+    elif kind == PLANE:
+        count = _rows(shapes.planes)
+    elif kind == POLYGON:
+        count = _rows(shapes.polygons)
+    elif kind == QUADRIC:
+        count = _rows(shapes.quadrics)
+    elif kind == TORUS:
+        count = _rows(shapes.tori)
+    return count
+
+
+@kernel
+def _rows(table: Any) -> int:
+    if table is None:
+        return 0
+    return len(table.owner)
