@@ -15,6 +15,7 @@ from typing import Any, get_type_hints
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from comparisons.kept import sealed, unsealed
 from comparisons.results import Case, FloatArray, Images
 from reference_rt.errors import ImageError
 from reference_rt.exr import read_exr, write_exr
@@ -22,7 +23,7 @@ from reference_rt.files import read_input, read_text, replacing
 
 CASE, PICTURES = "case.json", "pictures.exr"
 
-SCHEMA = 1
+SCHEMA = 2
 """Raised whenever a reader of the former layout would misread the new one."""
 
 _NUMBER = "number"
@@ -78,7 +79,7 @@ def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> No
         sizes = _write_pictures(folder / PICTURES, images, {"scene": case.scene, "key": key})
         document["pictures"] = sizes
         document["sha256"] = _digest(folder / PICTURES)
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(sealed(document), indent=1, ensure_ascii=False, allow_nan=False)
     with replacing(folder / CASE) as temporary:
         # A lone surrogate, of a file name that is not UTF-8, becomes JSON's escape for it.
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
@@ -111,6 +112,7 @@ def read_record(folder: Path) -> Record:
         data = json.loads(read_text(path))
         if isinstance(data, dict) and data.get("schema") != SCHEMA:
             raise RecordError(f"{path}: is not of schema {SCHEMA}; expected one of this version")
+        data = unsealed(data)
         data["pictures"] = {name: tuple(size) for name, size in data["pictures"].items()}
         return Record.model_validate(data)
     except OSError as error:

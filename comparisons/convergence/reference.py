@@ -2,7 +2,6 @@
 
 import hashlib
 import time
-import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -12,8 +11,8 @@ import numpy as np
 from comparisons.convergence.data import Reference
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.reference import cache_folder
+from comparisons.kept import read_arrays, write_arrays
 from reference_rt.errors import ImageError
-from reference_rt.files import open_input, replacing
 from reference_rt.render import render
 from reference_rt.sampling import Sobol
 from reference_rt.scene import Scene
@@ -63,19 +62,17 @@ def reference_of(scene: Scene, spp: int, say: Say = lambda what, fraction: None)
 def _load(path: Path, size: tuple[int, ...]) -> tuple[FloatArray, int, int]:
     """Pictures, their samples a pixel and in how many rounds; zeros where there is nothing that can
     be used."""
-    with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
-        # Opened here, since NumPy leaves a file that is no archive open.
-        with open_input(path) as stream, np.load(stream, allow_pickle=False) as file:
-            pictures = np.array(file["pictures"])
-            spp, rounds = int(file["spp"]), int(file["rounds"])
+    with suppress(KeyError):
+        kept = read_arrays(path)
+        pictures, spp, rounds = kept["pictures"], int(kept["spp"]), int(kept["rounds"])
         if pictures.shape == size and pictures.dtype == np.float64 and spp > 0:
             return pictures, spp, rounds
     return np.zeros(size), 0, 0
 
 
 def _save(path: Path, pictures: FloatArray, spp: int, rounds: int) -> None:
-    with suppress(ImageError, OSError), replacing(path) as temporary:
-        np.savez(temporary, pictures=pictures, spp=spp, rounds=rounds)
+    with suppress(ImageError, OSError):
+        write_arrays(path, pictures=pictures, spp=spp, rounds=rounds)
 
 
 __all__ = ["COUNT", "key_of", "reference_of"]

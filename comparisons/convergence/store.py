@@ -6,7 +6,6 @@ import json
 import os
 import platform
 import shutil
-import zipfile
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,13 @@ import numpy as np
 
 from comparisons.convergence.data import Rung
 from comparisons.convergence.reference import key_of
+from comparisons.kept import read_arrays, sealed, unsealed, write_arrays
 from comparisons.mitsuba_backend import backend
 from comparisons.suites.keys import files_digest, sources_digest
-from reference_rt.files import open_input, read_text, replacing
+from reference_rt.files import read_text, replacing
 from reference_rt.scene import Scene
 
-SCHEMA = 1
+SCHEMA = 2
 """Raised whenever what is stored, or what it means, changes."""
 
 _ARRAYS = ("seconds", "mse", "relmse", "mean", "variance")
@@ -65,12 +65,10 @@ class Store:
         """The stored one; None where there is none, or none that can be read."""
         if self._folder is None:
             return None
-        path = self._rung_path(contestant, asked)
-        damaged = suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError)
-        # Opened here, since NumPy leaves a file that is no archive open.
-        with damaged, open_input(path) as stream, np.load(stream, allow_pickle=False) as file:
-            arrays = [np.asarray(file[name], np.float64) for name in _ARRAYS]
-            return Rung(int(file["asked"]), int(file["spp"]), *arrays)
+        kept = read_arrays(self._rung_path(contestant, asked))
+        with suppress(KeyError):
+            arrays = [np.asarray(kept[name], np.float64) for name in _ARRAYS]
+            return Rung(int(kept["asked"]), int(kept["spp"]), *arrays)
         return None
 
     def keep(self, contestant: str, rung: Rung) -> None:
@@ -81,8 +79,8 @@ class Store:
         arrays: dict[str, Any] = {name: getattr(rung, name) for name in _ARRAYS}
         for name in ("mean", "variance"):
             arrays[name] = arrays[name].astype(np.float32)
-        with replacing(self._rung_path(contestant, rung.asked)) as temporary:
-            np.savez(temporary, asked=rung.asked, spp=rung.spp, **arrays)
+        path = self._rung_path(contestant, rung.asked)
+        write_arrays(path, asked=rung.asked, spp=rung.spp, **arrays)
 
     def _rung_path(self, contestant: str, asked: int) -> Path:
         assert self._folder is not None
@@ -94,16 +92,16 @@ class Store:
         """An array kept by `keep_picture`; None where there is none."""
         if self._folder is None:
             return None
-        path = self._folder / f"{name}.npy"
-        with suppress(OSError, ValueError, EOFError), open_input(path) as stream:
-            return np.load(stream, allow_pickle=False)
-        return None
+        return read_arrays(self._picture_path(name)).get("picture")
 
     def keep_picture(self, name: str, picture: Any) -> None:
         """Store an array as float32."""
         if self._folder is not None:
-            with replacing(self._folder / f"{name}.npy") as temporary:
-                np.save(temporary, np.asarray(picture, np.float32), allow_pickle=False)
+            write_arrays(self._picture_path(name), picture=np.asarray(picture, np.float32))
+
+    def _picture_path(self, name: str) -> Path:
+        assert self._folder is not None
+        return self._folder / f"{name}.npz"
 
     # ---- facts ----------------------------------------------------------------------------------
 
@@ -121,14 +119,14 @@ class Store:
     def _read(self, name: str) -> Any:
         if self._folder is None:
             return None
-        with suppress(OSError, ValueError):
-            return json.loads(read_text(self._folder / f"{name}.json"))
+        with suppress(OSError, ValueError, RecursionError):
+            return unsealed(json.loads(read_text(self._folder / f"{name}.json"))).get("value")
         return None
 
     def _write(self, name: str, value: Any) -> None:
         if self._folder is not None:
             with replacing(self._folder / f"{name}.json") as temporary:
-                temporary.write_text(json.dumps(value), encoding="utf-8")
+                temporary.write_text(json.dumps(sealed({"value": value})), encoding="utf-8")
 
 
 __all__ = ["Store", "run_key"]

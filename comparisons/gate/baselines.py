@@ -24,6 +24,7 @@ from pydantic import Field
 from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
+from comparisons.kept import sealed, unsealed
 from reference_rt.description import Description
 from reference_rt.errors import ImageError, SceneError, UsageError
 from reference_rt.exr import write_exr
@@ -248,21 +249,12 @@ def _source(picture: Picture) -> dict[str, Any]:
 
 def _sealed(record: Record) -> str:
     data = record.model_dump(mode="json")
-    return json.dumps(data | {"seal": _seal(data)}, indent=2, ensure_ascii=False) + "\n"
-
-
-def _seal(data: dict[str, Any]) -> str:
-    """Against edits by hand, not against forgers."""
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+    return json.dumps(sealed(data), indent=2, ensure_ascii=False) + "\n"
 
 
 def _record(path: Path) -> Record:
     try:
-        data = json.loads(read_text(path))
-        seal = data.pop("seal")
-        if seal != _seal(data):
-            raise ValueError("its seal is broken")
-        return Record.model_validate(data)
+        return Record.model_validate(unsealed(json.loads(read_text(path))))
     except (OSError, ValueError, KeyError, AttributeError, RecursionError, SceneError) as error:
         reason = "its fields" if isinstance(error, SceneError) else str(error)
         raise BaselineEditedError(

@@ -3,7 +3,6 @@
 import hashlib
 import math
 import os
-import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,8 +13,8 @@ import platformdirs
 
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
+from comparisons.kept import read_arrays, write_arrays
 from reference_rt.errors import ImageError, UsageError
-from reference_rt.files import open_input, replacing
 from reference_rt.render import render
 from reference_rt.sampling import Grid
 from reference_rt.scene import Scene
@@ -243,11 +242,9 @@ def cache_folder() -> Path:
 
 def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
     """What the cache has; zeros and 0 where it has nothing that can be used."""
-    # A damaged directory asks for what zipfile cannot do: RuntimeError.
-    with suppress(OSError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile, EOFError):
-        # Opened here, since NumPy leaves a file that is no archive open.
-        with open_input(path) as stream, np.load(stream, allow_pickle=False) as file:
-            pictures, rounds = np.array(file["pictures"]), int(file["rounds"])
+    with suppress(KeyError):
+        kept = read_arrays(path)
+        pictures, rounds = kept["pictures"], int(kept["rounds"])
         if pictures.shape == shape and pictures.dtype == np.float64 and rounds > 0:
             with suppress(OSError):
                 os.utime(path)
@@ -258,8 +255,7 @@ def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
 def _save(path: Path, pictures: FloatArray, rounds: int) -> None:
     """Keep them, where there is a place for it, and forget what was unused for longest."""
     with suppress(ImageError, OSError):
-        with replacing(path) as temporary:
-            np.savez(temporary, pictures=pictures, rounds=rounds)
+        write_arrays(path, pictures=pictures, rounds=rounds)
         kept = sorted(path.parent.glob("*.npz"), key=lambda file: -file.stat().st_mtime)
         total = 0
         for file in kept:
