@@ -6,9 +6,7 @@ import gc
 import importlib.metadata
 import json
 import os
-import signal
 import sys
-import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -28,6 +26,7 @@ from reference_rt.errors import (
 from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.scene import Scene
+from reference_rt.signals import catch_signals, exit_code_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -37,8 +36,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="An independent float64 reference ray tracer.\n\nExit codes: 0 success or agreement, "
     "1 difference, 2 usage, 3 invalid scene or image, 4 reference missing or could not run, "
-    "5 internal error, 130 interrupted (by "
-    "SIGTERM 143, by SIGHUP 129).",
+    "5 internal error, 130 interrupted (by SIGTERM 143, by SIGHUP 129).",
 )
 
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
@@ -57,7 +55,7 @@ def guarded(command: F) -> F:
         except typer.Exit:
             raise
         except KeyboardInterrupt as error:
-            code = answered(error)
+            code = exit_code_of(error)
             _fail("interrupted; nothing unfinished was written", code)
         except BrokenPipeError:
             raise
@@ -73,47 +71,6 @@ def guarded(command: F) -> F:
 def say(text: str, err: bool = False) -> None:
     """Print one line, with escapes in place of what does not print."""
     typer.echo(printable(text), err=err)
-
-
-class Terminated(KeyboardInterrupt):
-    """SIGINT, SIGTERM or SIGHUP, so that child processes are ended and no file is left half
-    written.  Its argument is the signal's number."""
-
-
-_AGAIN = 2.0
-"""Seconds after which a signal is sent again that has not ended the command."""
-
-
-def _terminate(number: int, frame: Any) -> None:
-    # An exception is lost where the signal arrives in a callback: of LLVM, which compiles, or of a
-    # fork.
-    again = threading.Timer(_AGAIN, os.kill, (os.getpid(), number))
-    again.daemon = True
-    again.start()
-    raise Terminated(number)
-
-
-def answered(error: KeyboardInterrupt) -> int:
-    """The exit code of an interruption that has been caught; it is not sent again."""
-    if not isinstance(error, Terminated):
-        return 130
-    number = int(error.args[0])
-    signal.signal(number, signal.SIG_IGN)
-    return 128 + number
-
-
-def _catch_signals() -> None:
-    lost = sys.unraisablehook
-
-    def tell(unraisable: Any) -> None:
-        if not isinstance(unraisable.exc_value, Terminated):  # which comes again
-            lost(unraisable)
-
-    sys.unraisablehook = tell
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)  # Windows has no SIGHUP
-        if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
-            signal.signal(number, _terminate)  # one that is ignored, as by `nohup`, stays so
 
 
 def lost_output(error: BaseException) -> str:
@@ -323,7 +280,7 @@ def _add_commands() -> None:
 
 def main() -> None:
     """The `reference-rt` program."""
-    _catch_signals()
+    catch_signals()
     try:
         _add_commands()
         gc.freeze()  # what the imports made stays: 0.04 s less of looking through it for garbage
@@ -333,7 +290,7 @@ def main() -> None:
         gc.set_threshold(20_000)
         app()
     except KeyboardInterrupt as error:  # before or after a command, which has its own answer
-        sys.exit(answered(error))
+        sys.exit(exit_code_of(error))
     except OSError as error:  # of what prints outside of a command, such as --help
         if not is_output_lost(error):
             raise

@@ -28,6 +28,7 @@ from reference_rt.oracle import Oracle
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.shapes import Shape
 from reference_rt.textures import AnyTexture, texture_names
+from reference_rt.yaml_lines import line_of
 
 if TYPE_CHECKING:
     from reference_rt.tables import SceneTables
@@ -177,7 +178,7 @@ class Scene(Oracle, Description):
         if self._source is None:
             return SceneError(message, path)
         name, text = self._source
-        return SceneError(message, path, name, yaml_text.line_of(text, path))
+        return SceneError(message, path, name, line_of(text, path))
 
     def warn(self, message: str, *path: str | int) -> None:
         """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`.
@@ -243,7 +244,7 @@ class Scene(Oracle, Description):
         try:
             scene = cls._checked(data)
         except SceneError as error:
-            line = yaml_text.line_of(text, error.path)
+            line = line_of(text, error.path)
             raise SceneError(error.message, error.path, name, line) from None
         scene._folder = Path() if folder is None else folder
         scene._source = (name, text)

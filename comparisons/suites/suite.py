@@ -14,6 +14,7 @@ from reference_rt.description import Description, Positive
 from reference_rt.errors import SceneError, UsageError, printable
 from reference_rt.files import read_text
 from reference_rt.scene import Scene
+from reference_rt.yaml_lines import line_of
 
 _Scenes = dict[str, tuple[Path, Scene | SceneError]]
 
@@ -73,7 +74,7 @@ class Source(NamedTuple):
 
     def error(self, message: str, *keys: str | int) -> SceneError:
         """An error about the part at `keys`, with file and line."""
-        return SceneError(message, keys, self.file, yaml_text.line_of(self.text, keys))
+        return SceneError(message, keys, self.file, line_of(self.text, keys))
 
 
 def load_suite(name: str) -> Source:
@@ -110,7 +111,7 @@ def parse_suite(text: str, file: str) -> Suite:
     try:
         return Suite.model_validate(data)
     except SceneError as error:
-        line = yaml_text.line_of(text, error.path)
+        line = line_of(text, error.path)
         raise SceneError(error.message, error.path, file, line) from None
 
 

@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from reference_rt import yaml_text
+from reference_rt.yaml_lines import line_of
 
 FILES = sorted([*SCENES.glob("*.yaml"), *SCENES.parent.glob("comparisons/suites/*.yaml")])
 
@@ -214,16 +215,16 @@ def by_nodes(text, keys):
     ],
 )
 def test_lines(keys):
-    assert yaml_text.line_of(PLACES, keys) == by_nodes(PLACES, keys)
+    assert line_of(PLACES, keys) == by_nodes(PLACES, keys)
 
 
 def test_lines_behind_aliases():
     """The line of the alias for itself, and of what it names for what is inside."""
-    assert yaml_text.line_of(PLACES, ("again",)) == 15
-    assert yaml_text.line_of(PLACES, ("again", "filter", "type")) == 5
-    assert yaml_text.line_of(PLACES, ("shapes", 2)) == 14
-    assert yaml_text.line_of(PLACES, ("shapes", 2, "transform", 0)) == 13
-    assert yaml_text.line_of("a: \x07", ("a",)) is None
+    assert line_of(PLACES, ("again",)) == 15
+    assert line_of(PLACES, ("again", "filter", "type")) == 5
+    assert line_of(PLACES, ("shapes", 2)) == 14
+    assert line_of(PLACES, ("shapes", 2, "transform", 0)) == 13
+    assert line_of("a: \x07", ("a",)) is None
 
 
 def test_lines_of_every_key_of_a_scene():
@@ -236,7 +237,7 @@ def test_lines_of_every_key_of_a_scene():
                 yield from places(item, *keys, key)
 
     for keys in list(places(yaml_text.load(text)))[::7]:
-        assert yaml_text.line_of(text, keys) == by_nodes(text, keys)
+        assert line_of(text, keys) == by_nodes(text, keys)
 
 
 # ---- bounds -------------------------------------------------------------------------------------
