@@ -20,6 +20,7 @@ from reference_rt.shapes.shape import (
     Spans,
     Tangents,
     lane_vector,
+    lift,
     no_spans,
     one_span,
     pack,
@@ -262,23 +263,27 @@ def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
 
 
 @kernel
-def error_at(boxes: Boxes, i: int, p: Vec3) -> float:
-    """The bound of `SurfacePoint.error` that holds for every point p of box i.
+def lift_of(boxes: Boxes, i: int, p: Vec3) -> float:
+    """See `shape.lift`.
 
-    Of `world_error`, |A| |q| is at most `size` in each component, and what is seen along the local
-    normal, over the length of that normal in the world, at most the length of |A| |q|.
+    Its error holds for every point of the box: of `world_error`, |A| |q| is at most `reach`, and
+    what is seen along the local normal, over the length of that normal in the world, at most the
+    length of `reach`.
     """
-    edges = boxes.edges
-    size = (
-        max_abs(triple(edges, i, 0)) + max_abs(triple(edges, i, 1)) + max_abs(triple(edges, i, 2))
+    a, b, c = triple(boxes.edges, i, 0), triple(boxes.edges, i, 1), triple(boxes.edges, i, 2)
+    center = row(boxes.center, i)
+    reach = Vec3(
+        abs(a.x) + abs(b.x) + abs(c.x),
+        abs(a.y) + abs(b.y) + abs(c.y),
+        abs(a.z) + abs(b.z) + abs(c.z),
     )
-    return surface_error(p, row(boxes.center, i), 2.0 * size)
+    return lift(p - center, reach, surface_error(p, center, 2.0 * max_abs(reach)))
 
 
 @kernel
 def pdf(boxes: Boxes, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, at the point `q` of the box."""
-    return solid_angle_pdf(p, q.p, q.n, area, error_at(boxes, i, p))
+    return solid_angle_pdf(p, q.p, q.n, area, lift_of(boxes, i, p))
 
 
 @kernel

@@ -18,6 +18,7 @@ from reference_rt.shapes.shape import (
     Shape,
     Tangents,
     any_tangents,
+    lift,
     outward,
     solid_angle_pdf,
 )
@@ -102,10 +103,11 @@ def tangents(disks: Disks, ray: Ray, hit: Hit) -> Tangents:
 
 
 @kernel
-def error_at(disks: Disks, i: int, p: Vec3) -> float:
-    """The bound of `SurfacePoint.error` that holds for every point p of disk i."""
-    size = max_abs(row(disks.x_edge, i)) + max_abs(row(disks.y_edge, i))
-    return surface_error(p, row(disks.center, i), size)
+def lift_of(disks: Disks, i: int, p: Vec3) -> float:
+    """See `shape.lift`; its error by the whole size holds for every point of the disk."""
+    a, b, center = row(disks.x_edge, i), row(disks.y_edge, i), row(disks.center, i)
+    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
+    return lift(p - center, reach, surface_error(p, center, max_abs(a) + max_abs(b)))
 
 
 @kernel
@@ -119,4 +121,4 @@ def sample(disks: Disks, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
 @kernel
 def pdf(disks: Disks, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, at the point `q` of the disk."""
-    return solid_angle_pdf(p, q.p, q.n, area, error_at(disks, i, p))
+    return solid_angle_pdf(p, q.p, q.n, area, lift_of(disks, i, p))

@@ -18,6 +18,7 @@ from reference_rt.shapes.shape import (
     Shape,
     Tangents,
     lane_vector,
+    lift,
     outward,
     pack,
     solid_angle_pdf,
@@ -39,6 +40,9 @@ area, the irradiance has a relative variance per sample of 0.002 seen from the f
 _LEAST_SOLID_ANGLE = 2.0**-26
 """Places in it are found by differences of angles, which round by a few u = 2^-53: here half of
 their digits are left.  Below, by area."""
+
+_LEAST_HEIGHT = 2.0**-500
+"""In half diagonals: its square is a float64."""
 
 
 class Rectangle(Shape):
@@ -155,6 +159,14 @@ def error_at(rectangles: Rectangles, i: int, p: Vec3) -> float:
 
 
 @kernel
+def lift_of(rectangles: Rectangles, i: int, p: Vec3) -> float:
+    """See `shape.lift`."""
+    a, b = row(rectangles.x_edge, i), row(rectangles.y_edge, i)
+    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
+    return lift(p - row(rectangles.center, i), reach, error_at(rectangles, i, p))
+
+
+@kernel
 def surface(rectangles: Rectangles, ray: Ray, hit: Hit) -> SurfacePoint:
     i = hit.row
     p = place(rectangles, i, hit.u, hit.v)
@@ -186,10 +198,12 @@ def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
     if dot(w, w) >= _NEAR * _NEAR * half_diagonal2:
         return spherical_rectangle.unseen()
     height_of_p = dot(w, row(rectangles.normal, i))
-    if height_of_p <= error_at(rectangles, i, p):
+    if height_of_p <= lift_of(rectangles, i, p):
         return spherical_rectangle.unseen()  # behind it, or a point of the rectangle itself
     unit = 1.0 / math.sqrt(half_diagonal2)
     h = height_of_p * unit
+    if h <= _LEAST_HEIGHT:
+        return spherical_rectangle.unseen()
     width, height = width * unit, height * unit
     x, y = dot(w, row(rectangles.x_of, i)), dot(w, row(rectangles.y_of, i))
     return spherical_rectangle.see(
@@ -219,7 +233,7 @@ def sample_by_area(
     """A point uniform over the area, as a light for `p`."""
     x, y = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
     q, n = place(rectangles, i, x, y), row(rectangles.normal, i)
-    density = solid_angle_pdf(p, q, n, area, error_at(rectangles, i, p))
+    density = solid_angle_pdf(p, q, n, area, lift_of(rectangles, i, p))
     return LightPoint(q, n, error_at(rectangles, i, q), density, x, y)
 
 
@@ -234,5 +248,5 @@ def pdf(rectangles: Rectangles, i: int, area: float, p: Vec3, q: SurfacePoint) -
     """The density of `sample` per solid angle, at the point `q` of the rectangle."""
     seen = _see(rectangles, i, p)
     if seen.solid_angle < _LEAST_SOLID_ANGLE:
-        return solid_angle_pdf(p, q.p, q.n, area, error_at(rectangles, i, p))
+        return solid_angle_pdf(p, q.p, q.n, area, lift_of(rectangles, i, p))
     return 1.0 / seen.solid_angle

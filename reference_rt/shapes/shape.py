@@ -132,19 +132,34 @@ def no_light_point() -> LightPoint:
 
 
 @kernel
-def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float, error: float) -> float:
+def lift(w: Vec3, reach: Vec3, error: float) -> float:
+    """How far rounding may have lifted a point above a flat shape that it lies on: `error`; 0 for a
+    point that is outside the shape's bounding box.
+
+    w: from the middle of that box to the point;  reach: half the box's size;  error: the bound of
+    `SurfacePoint.error` there.
+    """
+    is_inside = (
+        (abs(w.x) <= reach.x + error)
+        & (abs(w.y) <= reach.y + error)
+        & (abs(w.z) <= reach.z + error)
+    )
+    return error if is_inside else 0.0
+
+
+@kernel
+def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float, lifted: float) -> float:
     """A uniform density over `area`, at its point `q` with unit normal `n`, per solid angle at `p`:
     distance² / (cos area) (e.g. Veach 1997, eq. 8.2).
 
-    0 for a receiver behind the surface, and for one that rounding alone may have lifted above it: a
-    point of the flat surface itself, which sees nothing of it.  `error` is the shape's bound
-    `error_at` p.  Of a point p of the shape, half of that bound is p's distance from the plane; q
-    has at most twice p's bound, since |q| <= |anchor| + size, and half of it again is q's distance;
-    the product with n rounds by less than the other half of p's: 2 `error` in all.
+    0 for a receiver behind the surface, and for a point of the flat surface itself, which sees
+    nothing of it, even if rounding has lifted it above the plane: by at most 2 `lifted`, see
+    `lift`.  Half of that bound is p's distance from the plane; q's own distance is at most twice as
+    much, since |q| <= |anchor| + size; the product with n rounds by less than the other half.
     """
     w = p - q
     height = dot(w, n)
-    if height <= 2.0 * error:
+    if height <= 2.0 * lifted:
         return 0.0
     distance2 = dot(w, w)
     # In this order nothing overflows or underflows where the area is an ordinary float64.

@@ -19,6 +19,7 @@ from reference_rt.shapes.shape import (
     Shape,
     Tangents,
     any_tangents,
+    lift,
     solid_angle_pdf,
 )
 from reference_rt.shapes.watertight import Projection, Shear, exactly, project, project_lane
@@ -231,6 +232,17 @@ def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
 
 
 @kernel
+def lift_of(triangles: Triangles, i: int, p: Vec3) -> float:
+    """See `shape.lift`."""
+    v = triangles.vertices
+    a, b, c = triple(v, i, 0), triple(v, i, 1), triple(v, i, 2)
+    lower = Vec3(min(a.x, b.x, c.x), min(a.y, b.y, c.y), min(a.z, b.z, c.z))
+    upper = Vec3(max(a.x, b.x, c.x), max(a.y, b.y, c.y), max(a.z, b.z, c.z))
+    middle = lower * 0.5 + upper * 0.5
+    return lift(p - middle, upper * 0.5 - lower * 0.5, error_at(triangles, i, p))
+
+
+@kernel
 def shading_normal(normals: FloatArray | None, i: int, u: float, v: float, n: Vec3) -> Vec3:
     """The interpolated vertex normal made unit; `n` where there is none."""
     if normals is None:
@@ -259,14 +271,14 @@ def sample(triangles: Triangles, i: int, area: float, p: Vec3, u0: float, u1: fl
     u, v = root * (1.0 - u1), root * u1
     q = interpolate(triangles.vertices, i, u, v)
     n = normal(triangles, i)
-    density = solid_angle_pdf(p, q, n, area, error_at(triangles, i, p))
+    density = solid_angle_pdf(p, q, n, area, lift_of(triangles, i, p))
     return LightPoint(q, n, error_at(triangles, i, q), density, u, v)
 
 
 @kernel
 def pdf(triangles: Triangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, at the point `q` of the triangle."""
-    return solid_angle_pdf(p, q.p, q.n, area, error_at(triangles, i, p))
+    return solid_angle_pdf(p, q.p, q.n, area, lift_of(triangles, i, p))
 
 
 @kernel

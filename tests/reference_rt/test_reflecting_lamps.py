@@ -60,7 +60,7 @@ def test_kinds_are_all():
 def test_no_convex_lamp_lights_itself(tmp_path):
     """What a ray meets of a lamp, as a receiver of that lamp: of a mesh, of each of its triangles.
 
-    All shapes are convex: their own density is 0, and nothing is other than finite.
+    All shapes are convex: nothing arrives, and nothing is other than finite.
     """
     rng = np.random.default_rng(1701)
     mesh = write_obj(tmp_path / "cube.obj", *cube(1)).name
@@ -84,8 +84,12 @@ def test_no_convex_lamp_lights_itself(tmp_path):
             for u in ((0.5, 0.5), tuple(rng.uniform(size=2))):
                 found = query.direct_light(tables, o[met], d[met], light, u)
                 assert np.isfinite(found.target).all(), (i, kinds[i])
-                assert not found.pdf.any(), (i, kinds[i])
-                assert not found.contribution.any(), (i, kinds[i])
+                assert np.isfinite(found.pdf).all(), (i, kinds[i])
+                # A cube's other triangle of the same face is seen edge-on, from as far above its
+                # plane as positions round, which is 1e-8 sizes 1e8 sizes away.
+                most = 1e-6 if kinds[i] == "mesh" else 0.0
+                assert found.contribution.max(initial=0.0) <= most, (i, kinds[i])
+                assert kinds[i] == "mesh" or not found.pdf.any(), (i, kinds[i])
     assert seen > 0.8 * rays * len(kinds)  # large lamps near the origin hide small ones
 
 
@@ -183,8 +187,9 @@ def test_a_lamp_in_the_plane_of_a_floor_does_not_light_it(tmp_path, seed):
     maps[-1][2, 3] = -3.0  # the concave one is out of sight
     scene = world(tmp_path, floor, maps, whole)
     both, alone = (rendered(scene, how, seed) for how in ("both", "bsdf"))
-    # The same numbers, and nothing but what the camera meets: lamps, or the floor, which is black.
-    assert np.array_equal(both.colour, alone.colour)
+    # The same numbers, and nothing but what the camera meets: lamps, or the floor, which is black,
+    # but for two cosines of what rounding is over the distance to a lamp, some 1e-13 each.
+    assert np.allclose(both.colour, alone.colour, rtol=0.0, atol=1e-24)
     assert 0.0 < both.colour.mean() < 5.0
 
 
