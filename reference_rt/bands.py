@@ -8,13 +8,13 @@ import math
 from typing import Any, NamedTuple
 
 from reference_rt import sampling
-from reference_rt.cameras import LENS_CENTRE, camera_ray, lens_sample
+from reference_rt.cameras import LENS_CENTRE, VIEWS, camera_ray, lens_sample
 from reference_rt.filters import film_offset
 from reference_rt.geometry import closest_hit, surface
 from reference_rt.integrators import radiances
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
-from reference_rt.kernel import entry_kernel, kernel, local_floats, local_integers
+from reference_rt.kernel import ByClass, entry_kernel, kernel, local_floats, local_integers
 from reference_rt.materials import kept_floats
 from reference_rt.ray import BLOCK, Ray
 from reference_rt.sampling import (
@@ -58,12 +58,10 @@ class GivenRays(NamedTuple):
 
 
 @kernel
-def _film_ray(
-    view: Any, film_filter: Any, sampler: Any, shape: tuple[int, int], x: int, y: int
+def _given_ray(
+    rays: GivenRays, film_filter: None, sampler: Any, shape: tuple[int, int], x: int, y: int
 ) -> FilmRay:
-    if film_filter is None:
-        return FilmRay(Ray(row(view.o, x), row(view.d, x), math.inf), 1.0)
-    return _camera_film_ray(view, film_filter, sampler, shape, x, y)
+    return FilmRay(Ray(row(rays.o, x), row(rays.d, x), math.inf), 1.0)
 
 
 @kernel
@@ -77,6 +75,13 @@ def _camera_film_ray(
     lens = lens_sample(view, sampler)
     ray = camera_ray(view, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
     return FilmRay(ray, weight_x * weight_y)
+
+
+_film_rays = ByClass("film_ray")
+_film_rays.register(GivenRays, _given_ray)
+for _view in VIEWS:
+    _film_rays.register(_view, _camera_film_ray)
+_film_ray = _film_rays.function
 
 
 @entry_kernel

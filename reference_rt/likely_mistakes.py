@@ -116,8 +116,8 @@ def _steps(
 def _darkness(scene: Scene, tables: SceneTables) -> Iterator[Mistake]:
     """Nothing that shines: no light to sample, and none that scattered rays could find."""
     lights, integrator = tables.lights, scene.integrator
-    if isinstance(integrator, RayCast) or lights.choice is not None:
-        return
+    if isinstance(integrator, RayCast) or scene.film.layers or lights.choice is not None:
+        return  # layers show surfaces in the dark, too
     if lights.areas is not None and np.any(lights.areas.area == np.inf):
         return
     if lights.ambient is not None and isinstance(integrator, Whitted):

@@ -9,7 +9,7 @@ import typer
 from comparisons.commands.extra import compare_extra
 from reference_rt.cli import guarded, say
 from reference_rt.console import ProgressLine
-from reference_rt.errors import SceneError, UsageError
+from reference_rt.errors import SceneError, UsageError, printable
 from reference_rt.scene import Scene
 
 
@@ -77,7 +77,7 @@ def converge(
     )
     chosen(settings.only)
     described = [read(path) for path in scenes]
-    names = [path.stem for path in scenes]
+    names = [printable(path.stem) for path in scenes]
     if double := [name for name in names if names.count(name) > 1]:
         raise UsageError(f"two scenes are called '{double[0]}'; expected each once")
     invalid = False

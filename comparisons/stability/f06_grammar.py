@@ -87,7 +87,9 @@ class _Writer:
         needed = schema.get("required", [])
         found: dict[str, Any] = {}
         for key, part in schema.get("properties", {}).items():
-            optional = key not in needed and key != "type"
+            if key in _FROM_MEMORY and "file" in found:
+                continue
+            optional = key not in needed and key not in ("type", "file")
             if optional and (depth > DEEPEST or self.rng.random() > _OPTIONAL):
                 continue
             if key in _WITH and _WITH[key] not in found:
@@ -148,6 +150,9 @@ _RANGES: dict[str, dict[str, Any]] = {
 
 _WITH = {"distance": "view"}
 """Keys that another one must be there for."""
+
+_FROM_MEMORY = ("vertices", "faces", "normals", "uv", "colours")
+"""Keys of a mesh without a file: numbers drawn by themselves make none."""
 
 _NUMBER = {"type": "number"}
 _DEEP = (

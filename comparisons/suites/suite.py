@@ -134,12 +134,12 @@ def plan(
             continue
         _check_names(part, scenes, source, *(["controls"] if control else []))
         for name, (path, scene) in scenes.items():
-            if part.only is not None and path.stem not in part.only:
+            if part.only is not None and printable(path.stem) not in part.only:
                 continue
             case = control_name(name) if control else name
             if only and not any(fnmatchcase(case, pattern) for pattern in only):
                 continue
-            entry = part.scenes.get(path.stem, Entry())
+            entry = part.scenes.get(printable(path.stem), Entry())
             if entry.skip is not None:
                 skipped[case] = entry.skip
                 continue

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict
 
 from comparisons.budget import Budget
 from reference_rt.cli import adjusted
-from reference_rt.errors import SceneError, SceneWarning
+from reference_rt.errors import SceneError, SceneWarning, printable
 from reference_rt.scene import Scene
 
 
@@ -69,8 +69,9 @@ def plan_of_files(paths: Iterable[Path], changes: Changes, budget: Budget) -> Pl
     """
     work: list[Work] = []
     for path in dict.fromkeys(paths):
-        double = sum(w.path.stem == path.stem for w in work)
-        name = f"{path.stem} ({double + 1})" if double else path.stem
+        own = printable(path.stem)
+        double = sum(printable(w.path.stem) == own for w in work)
+        name = f"{own} ({double + 1})" if double else own
         work.append(Work(name, path, read(path, changes), budget, changes))
     return Plan(tuple(work), {})
 

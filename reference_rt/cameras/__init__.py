@@ -18,7 +18,10 @@ from reference_rt.kernel import ByClass
 
 AnyCamera = Annotated[Perspective | Orthographic | Pinhole | ThinLens, Field(discriminator="type")]
 
-# A pinhole's rays are those of a perspective view, whose class it shares.
+VIEWS = (PerspectiveView, OrthographicView, ThinLensView)
+"""What kernels see of cameras.  A pinhole's rays are those of a perspective view, whose class it
+shares."""
+
 _ray = ByClass("camera_ray")
 _ray.register(PerspectiveView, perspective.camera_ray)
 _ray.register(OrthographicView, orthographic.camera_ray)
@@ -37,6 +40,7 @@ lens_sample = _lens.function
 
 __all__ = [
     "LENS_CENTRE",
+    "VIEWS",
     "AnyCamera",
     "Orthographic",
     "Perspective",

@@ -38,7 +38,7 @@ def read_image(
             with np.errstate(over="ignore"):
                 np.multiply(values, scale, out=colours[rows])
             if not np.isfinite(colours[rows]).all():
-                raise ValueError("overflows; expected a smaller scale")
+                raise ValueError("a colour times the scale overflows; expected a smaller scale")
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}; expected an image") from None
     except MemoryError:

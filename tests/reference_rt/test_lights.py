@@ -282,4 +282,5 @@ def test_unlimited_paths_without_any_light_are_black():
     scene = rt.Scene(
         film=rt.Film(width=2, height=2), shapes=(rt.Sphere(),), camera=rt.Perspective(eye=(0, 0, 5))
     )
-    assert not rt.render(scene).colour.any()
+    with pytest.warns(rt.SceneWarning, match="no lights"):
+        assert not rt.render(scene).colour.any()

@@ -111,12 +111,15 @@ def test_stiff_scenes_are_within_float64(name: str) -> None:
     assert not any(limit.is_beyond for limit in found)
 
 
+SOUND = "camera: {type: perspective, eye: [0, 0, 5]}\nlights: [{type: constant, radiance: 1}]\n"
+
+
 def test_explain_warns(tmp_path: Path) -> None:
     path = tmp_path / "scene.yaml"
     path.write_text("shapes:\n  - {type: sphere, center: [1.0e+17, 0, 0]}\n", encoding="utf-8")
     shown = CliRunner().invoke(app, ["explain", str(path)]).output
     assert "warning: beyond float64" in shown
-    path.write_text("shapes:\n  - {type: sphere}\n", encoding="utf-8")
+    path.write_text(f"{SOUND}shapes:\n  - {{type: sphere}}\n", encoding="utf-8")
     shown = CliRunner().invoke(app, ["explain", str(path)]).output
     assert "nearest to float64's limits" in shown
     assert "warning" not in shown
