@@ -154,9 +154,7 @@ def test_what_lies_on_arrays_of_rays(tmp_path):
     one_by_one = [query.occluded(tables, o[i], d[i], t_max[i]) for i in ([k] for k in range(300))]
     assert np.array_equal(expected[:300], np.concatenate(one_by_one))
     assert 0.1 < expected.mean() < 0.9
-    with pytest.raises(
-        ValueError, match=r"that broadcast to one, got .* t_max \(7,\)"
-    ):
+    with pytest.raises(ValueError, match=r"that broadcast to one, got .* t_max \(7,\)"):
         query.occluded(tables, o, d, t_max[:7])
     length = 2.0 ** rng.integers(-90, 90, len(o))
     scaled = query.occluded(tables, o, d * length[:, None], t_max / length)
