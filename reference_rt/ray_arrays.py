@@ -35,43 +35,69 @@ class Primitives(NamedTuple):
     uv: FloatArray
 
 
+MOST_ADDED = BLOCK + BUNDLE
+"""Rays that one call of `trace_bundle` may add to what is found."""
+
+
+class Work(NamedTuple):
+    """Buffers of `trace_bundle`.  bundle, hits: of rays that are traced together;  rays, numbers
+    (BLOCK,): rays that wait to be traced as a block, and their numbers."""
+
+    bundle: Rays
+    hits: Hits
+    rays: Rays
+    numbers: IntArray
+
+
 @kernel
-def closest_of_rays(geometry: Geometry, o: FloatArray, d: FloatArray, found: Primitives) -> None:
-    """What rays from origins o (n, 3) into directions d (n, 3) hit first: neighbours that are alike
-    in bundles, the others in blocks."""
-    bundle = Rays(local_floats(RAY_FLOATS))
-    rays = Rays(local_floats(RAY_FLOATS))
-    hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
-    numbers, count = local_integers(BLOCK), 0
-    for k in range(RAY_FLOATS):
-        rays.numbers[k] = 1.0  # lanes without a ray are traced too
-    for begin in range(0, len(o), BUNDLE):
-        end = min(begin + BUNDLE, len(o))
-        for i in range(begin, end):
-            _put(found, i, Hit(math.inf, -1, -1, 0.0, 0.0, -1))
-        outcome = ALONE
-        if end == begin + BUNDLE:
-            outcome = closest_together(geometry, o, d, begin, bundle, hits)
+def trace_bundle(
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    begin: int,
+    work: Work,
+    waiting: int,
+    found: Primitives,
+    numbers: IntArray,
+    filled: int,
+) -> tuple[int, int]:
+    """Trace BUNDLE rays from origins o (n, 3) into directions d (n, 3), from number `begin` on:
+    together where they are alike, else let them wait until there is a block of them.
+
+    What rays meet is added to `found` and their numbers to `numbers`, of which `filled` are used,
+    in any order; with the last of the n rays all are there.  (waiting, filled) afterwards.
+    """
+    end = min(begin + BUNDLE, len(o))
+    outcome = ALONE
+    if end == begin + BUNDLE:
+        outcome = closest_together(geometry, o, d, begin, work.bundle, work.hits)
+    for i in range(begin, end):
+        hit = Hit(math.inf, -1, -1, 0.0, 0.0, -1)
         if outcome == FOUND:
-            for j in range(BUNDLE):
-                _put(found, begin + j, hit_of(geometry, ray_of(bundle, j), hits, j))
+            hit = hit_of(geometry, ray_of(work.bundle, i - begin), work.hits, i - begin)
         elif outcome == ALONE:
-            for i in range(begin, end):
-                ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
-                if valid:
-                    put_ray(rays, count, ray)
-                    numbers[count] = i
-                    count += 1
-        if count > BLOCK - BUNDLE or end == len(o):
-            closest_hits(geometry, rays, hits, count)
-            for j in range(count):
-                _put(found, numbers[j], hit_of(geometry, ray_of(rays, j), hits, j))
-            count = 0
+            ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
+            if valid:
+                put_ray(work.rays, waiting, ray)
+                work.numbers[waiting] = i
+                waiting += 1
+                continue
+        _put(found, filled, hit)
+        numbers[filled] = i
+        filled += 1
+    if waiting > BLOCK - BUNDLE or end == len(o):
+        closest_hits(geometry, work.rays, work.hits, waiting)
+        for j in range(waiting):
+            _put(found, filled, hit_of(geometry, ray_of(work.rays, j), work.hits, j))
+            numbers[filled] = work.numbers[j]
+            filled += 1
+        waiting = 0
+    return waiting, filled
 
 
 @kernel
 def closest_one_by_one(geometry: Geometry, o: FloatArray, d: FloatArray, found: Primitives) -> None:
-    """The same, ray after ray: the same bits, slower, from far less code."""
+    """What rays meet first, ray after ray: the same bits, slower, from far less code."""
     for i in range(len(o)):
         ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
         hit = Hit(math.inf, -1, -1, 0.0, 0.0, -1)

@@ -11,12 +11,10 @@ from reference_rt.geometry import Geometry
 from reference_rt.kernel import entry_kernel
 from reference_rt.query.rays import Rays, checked_rays, in_blocks, rays_of, shaped
 from reference_rt.query.tracing import (
-    EVERY_RAY,
     NO_LIMIT,
-    closest,
-    describe,
     find,
     first_beyond,
+    many,
     no_answers,
     no_primitives,
     part_of,
@@ -180,10 +178,9 @@ def closest_primitives(
     found, out = no_primitives(len(o)), no_answers(len(o), surfaces=False)
 
     def trace(k: slice) -> None:
-        closest(scene.geometry, o[k], d[k], part_of(found, k))
-        describe(
-            scene.geometry, o[k], d[k], EVERY_RAY, NO_LIMIT, part_of(found, k), part_of(out, k)
-        )
+        met = many(scene.geometry, o[k], d[k], NO_LIMIT, part_of(out, k))
+        for whole, part in zip(found, met, strict=True):
+            whole[k] = part
 
     in_blocks(trace, len(o), threads)
     # What float64 has no numbers for is no hit.

@@ -250,7 +250,7 @@ def light_pdf(
     def ask(k: slice) -> None:
         answers = no_answers(len(p[k]), surfaces=False)
         begin = None if rays.t_min is None else rays.t_min[k]
-        found = find(scene.geometry, p[k], d[k], begin, NO_LIMIT, answers, len(p))
+        found = find(scene.geometry, p[k], d[k], begin, NO_LIMIT, answers, len(p), rows=True)
         _pdf(scene.geometry, scene.lights, p[k], n[k], d[k], found, out[k])
 
     in_blocks(ask, len(p), threads)
