@@ -79,9 +79,12 @@ def _angles(scene: Scene) -> Iterator[Mistake]:
 
 
 def _is_round_in_radians(angle: float) -> bool:
+    """Of an angle above 0; at most a full turn."""
+    if angle > 2.0 * math.pi * (1.0 + _DIGITS):
+        return False
     multiple = round(angle / _ROUND)
     is_near = abs(angle - multiple * _ROUND) <= _DIGITS * angle
-    return 0 < multiple <= 24 and is_near and angle != int(angle)
+    return multiple > 0 and is_near and angle != int(angle)
 
 
 def _rotations(scene: Scene) -> Iterator[tuple[float, tuple[str | int, ...]]]:

@@ -79,6 +79,8 @@ MEANT = {
     "a narrow spot": CAMERA + BALL + spot(1),
     "degrees": CAMERA + turned(90, 30, 1.57) + SKY,
     "one degree": CAMERA + turned(1, 2, 3) + SKY,
+    "an enormous turn": CAMERA + turned("1.7e+308") + SKY,
+    "a tiny turn": CAMERA + turned("5.0e-324") + SKY,
     "no turn": CAMERA + turned(0) + SKY,
     "ambient light": CAMERA + BALL + WHITTED + "lights: [{type: ambient, radiance: 1}]\n",
     "a lamp": CAMERA + LAMP + "shapes: [{type: sphere, material: lamp}]\n",
