@@ -87,7 +87,8 @@ def test_no_convex_lamp_lights_itself(tmp_path):
                 assert np.isfinite(found.pdf).all(), (i, kinds[i])
                 # A cube's other triangle of the same face is seen edge-on, from as far above its
                 # plane as positions round, which is 1e-8 sizes 1e8 sizes away.
-                most = 1e-6 if kinds[i] == "mesh" else 0.0
+                # Measured: 1.2e-8, next to an edge.
+                most = 1e-7 if kinds[i] == "mesh" else 0.0
                 assert found.contribution.max(initial=0.0) <= most, (i, kinds[i])
                 assert kinds[i] == "mesh" or not found.pdf.any(), (i, kinds[i])
     assert seen > 0.8 * rays * len(kinds)  # large lamps near the origin hide small ones
@@ -188,8 +189,9 @@ def test_a_lamp_in_the_plane_of_a_floor_does_not_light_it(tmp_path, seed):
     scene = world(tmp_path, floor, maps, whole)
     both, alone = (rendered(scene, how, seed) for how in ("both", "bsdf"))
     # The same numbers, and nothing but what the camera meets: lamps, or the floor, which is black,
-    # but for two cosines of what rounding is over the distance to a lamp, some 1e-13 each.
-    assert np.allclose(both.colour, alone.colour, rtol=0.0, atol=1e-24)
+    # but for a lamp seen edge-on: two cosines of what rounding is over its distance, and a solid
+    # angle that is as small (measured: 3e-32).
+    assert np.allclose(both.colour, alone.colour, rtol=0.0, atol=1e-30)
     assert 0.0 < both.colour.mean() < 5.0
 
 
