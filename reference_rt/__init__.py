@@ -1,16 +1,7 @@
 """reference_rt: an independent float64 reference ray tracer."""
 
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
-from reference_rt.csg import Difference, Intersection, Union
-from reference_rt.errors import (
-    ImageError,
-    ReferenceRtError,
-    ReferenceUnavailableError,
-    SceneError,
-    SceneWarning,
-    UsageError,
-)
-from reference_rt.film import (
+from reference_rt.cameras.film import (
     BoxFilter,
     CatmullRomFilter,
     Film,
@@ -19,8 +10,8 @@ from reference_rt.film import (
     MitchellFilter,
     TentFilter,
 )
-from reference_rt.groups import Instance
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
+from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import Ambient, Constant, Directional, EnvironmentMap, Point, Spot
 from reference_rt.materials import (
     Blend,
@@ -41,9 +32,11 @@ from reference_rt.materials import (
     ThinDielectric,
     TwoSided,
 )
-from reference_rt.render import Picture, render
+from reference_rt.rendering.render import Picture, render
+from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid, Independent, Sobol
-from reference_rt.scene import Scene, json_schema
+from reference_rt.scene.build import build_tables
+from reference_rt.scene.model import json_schema
 from reference_rt.shapes import (
     Box,
     Cone,
@@ -58,8 +51,17 @@ from reference_rt.shapes import (
     Torus,
     Triangle,
 )
-from reference_rt.tables import SceneTables, build_tables
+from reference_rt.shapes.csg import Difference, Intersection, Union
+from reference_rt.shapes.instances import Instance
 from reference_rt.textures import Bitmap, Checker, VertexColours
+from reference_rt.util.errors import (
+    ImageError,
+    ReferenceRtError,
+    ReferenceUnavailableError,
+    SceneError,
+    SceneWarning,
+    UsageError,
+)
 
 __all__ = [
     "Ambient",

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.shapes.mesh_files import read_mesh
+from reference_rt.shapes.meshes.files import read_mesh
 
 Array = npt.NDArray[np.float64]
 

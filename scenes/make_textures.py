@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from reference_rt.exr import write_exr
-from reference_rt.image import srgb
+from reference_rt.core.exr import write_exr
+from reference_rt.rendering.image import srgb
 
 FOLDER = Path(__file__).parent / "textures"
 SIZE = 128

@@ -9,7 +9,7 @@ import pytest
 # package if that is installed as editable.
 sys.path[:] = [path for path in sys.path if Path(path) != Path(__file__).parent]
 
-from reference_rt import meanwhile  # noqa: E402
+from reference_rt.jit import parallel_compile  # noqa: E402
 
 LONGEST_FIRST = (
     "test_extremes",  # compiles for all that stand on `worlds`
@@ -45,7 +45,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option.loadscopereorder = False
     if hasattr(config, "workerinput"):
         # Every core has a process of tests: kernels are compiled by it, not by one more.
-        meanwhile.may_fork = lambda: False
+        parallel_compile.may_fork = lambda: False
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded, say
-from reference_rt.errors import SceneError, UsageError
-from reference_rt.scene import Scene
+from reference_rt.cli.main import guarded, say
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import SceneError, UsageError
 
 if TYPE_CHECKING:
     from comparisons.gate.baselines import Record
@@ -51,7 +51,7 @@ def accept(
         from comparisons.gate.digest import scene_digest
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import check_sizes, is_noise_free
-        from comparisons.provenance import ours
+        from comparisons.runs.provenance import ours
     if listed or unused is not None:
         if candidates or name:
             raise UsageError("--list and --unused accept nothing; expected no candidates")

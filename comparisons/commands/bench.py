@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded, say
-from reference_rt.errors import UsageError
+from reference_rt.cli.main import guarded, say
+from reference_rt.util.errors import UsageError
 
 
 @guarded
@@ -42,12 +42,12 @@ def bench(
     with compare_extra():
         from rich.console import Console
 
-        from comparisons import marked
-        from comparisons.bench import table
-        from comparisons.bench.display import Display
-        from comparisons.bench.groups import chosen
-        from comparisons.bench.run import run
-        from comparisons.bench.setting import Setting
+        from comparisons.experiments.bench import table
+        from comparisons.experiments.bench.display import Display
+        from comparisons.experiments.bench.groups import chosen
+        from comparisons.experiments.bench.run import run
+        from comparisons.experiments.bench.setting import Setting
+        from comparisons.report import marked
 
     groups = chosen(only or ())
     if mesh is not None and not mesh.is_file():

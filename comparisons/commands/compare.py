@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded
+from reference_rt.cli.main import guarded
 
 if TYPE_CHECKING:
     from comparisons.suites.work import Changes
@@ -32,11 +32,11 @@ def compare(
     """Render scenes here and in Mitsuba, and say whether they agree; what is done is not done
     again."""
     with compare_extra():
-        from comparisons.budget import Budget
+        from comparisons.compare.budget import Budget
+        from comparisons.results.verdict import exit_code
         from comparisons.suites.display import summarise
         from comparisons.suites.run import Options, Run, run_cases
         from comparisons.suites.work import Changes, plan_of_files
-        from comparisons.verdict import exit_code
 
     changes = Changes(spp=spp, size=size, seed=seed)
     plan = plan_of_files(scenes, changes, Budget(replicates=replicates))

@@ -7,10 +7,10 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded, say
-from reference_rt.console import ProgressLine
-from reference_rt.errors import SceneError, UsageError, printable
-from reference_rt.scene import Scene
+from reference_rt.cli.main import guarded, say
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.console import ProgressLine
+from reference_rt.util.errors import SceneError, UsageError, printable
 
 
 @guarded
@@ -52,19 +52,19 @@ def converge(
 ) -> None:
     """Error against run time: ours and Mitsuba's; what is done is not done again."""
     with compare_extra():
-        from comparisons.convergence.contestants import chosen
-        from comparisons.convergence.curves import Curves
-        from comparisons.convergence.data import Settings
-        from comparisons.convergence.outputs import write_results, write_table
-        from comparisons.convergence.page import write_page
-        from comparisons.convergence.run import converge as converge_scene
-        from comparisons.convergence.run import prepared
-        from comparisons.convergence.store import Store, run_key
-        from comparisons.convergence.summary import again, lines_of
-        from comparisons.provenance import provenance
-        from comparisons.results import INTERRUPTED
+        from comparisons.experiments.convergence.contestants import chosen
+        from comparisons.experiments.convergence.curves import Curves
+        from comparisons.experiments.convergence.data import Settings
+        from comparisons.experiments.convergence.outputs import write_results, write_table
+        from comparisons.experiments.convergence.page import write_page
+        from comparisons.experiments.convergence.run import converge as converge_scene
+        from comparisons.experiments.convergence.run import prepared
+        from comparisons.experiments.convergence.store import Store, run_key
+        from comparisons.experiments.convergence.summary import again, lines_of
+        from comparisons.results.case import INTERRUPTED
+        from comparisons.runs.provenance import provenance
         from comparisons.suites.work import folder_name, read
-    from reference_rt.files import check_writable
+    from reference_rt.util.files import check_writable
 
     settings = Settings(
         time_limit=time_limit,

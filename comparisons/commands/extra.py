@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from reference_rt.errors import ReferenceUnavailableError
+from reference_rt.util.errors import ReferenceUnavailableError
 
 
 @contextmanager

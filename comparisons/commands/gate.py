@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded, say
-from reference_rt.console import ProgressLine
-from reference_rt.errors import ReferenceRtError, UsageError, printable
-from reference_rt.scene import Scene
+from reference_rt.cli.main import guarded, say
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.console import ProgressLine
+from reference_rt.util.errors import ReferenceRtError, UsageError, printable
 
 if TYPE_CHECKING:
     from comparisons.gate.pictures_in import Picture

@@ -8,8 +8,8 @@ import typer
 from rich.console import Console
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded, say
-from reference_rt.errors import UsageError
+from reference_rt.cli.main import guarded, say
+from reference_rt.util.errors import UsageError
 
 
 @guarded
@@ -29,15 +29,15 @@ def methods(
     """Measure the text-book's ways to intersect: error against nanoseconds per ray."""
     # Imported here: `reference-rt render` must not wait for what only measuring needs.
     with compare_extra("measuring"):
-        from comparisons.methods.page import write_page
-        from comparisons.methods.run import FAMILIES, FULL, QUICK, run
-        from comparisons.methods.terminal import tables
-        from comparisons.methods.written import write
-        from comparisons.provenance import ours
+        from comparisons.experiments.methods.page import write_page
+        from comparisons.experiments.methods.run import FAMILIES, FULL, QUICK, run
+        from comparisons.experiments.methods.terminal import tables
+        from comparisons.experiments.methods.written import write
+        from comparisons.runs.provenance import ours
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
-    from reference_rt.console import ProgressLine
-    from reference_rt.files import check_writable
+    from reference_rt.util.console import ProgressLine
+    from reference_rt.util.files import check_writable
 
     names = list(dict.fromkeys(family or FAMILIES))
     if unknown := [name for name in names if name not in FAMILIES]:

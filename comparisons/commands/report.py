@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded, say
+from reference_rt.cli.main import guarded, say
 
 
 @guarded
@@ -24,9 +24,9 @@ def report(
     """
     with compare_extra():
         from comparisons.report import write_report, write_results
-        from comparisons.results import how_many
+        from comparisons.results.case import how_many
         from comparisons.suites.archive import check_archive, read_archive
-    from reference_rt.files import check_writable
+    from reference_rt.util.files import check_writable
 
     page = out or folder / "report.html"
     results = folder / "results.json"

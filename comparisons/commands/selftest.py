@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from reference_rt.cli import guarded
-from reference_rt.errors import UsageError
+from reference_rt.cli.main import guarded
+from reference_rt.util.errors import UsageError
 
 
 @guarded
@@ -26,9 +26,9 @@ def selftest(
     scenes: Annotated[Path, typer.Option(help="Folder of the scenes.")] = Path("scenes"),
 ) -> None:
     """Plant faults and see whether the suites catch them; count false alarms without any."""
-    from comparisons.selftest import FAULTS
-    from comparisons.selftest.run import SUITES, run
-    from reference_rt.files import check_writable
+    from comparisons.experiments.selftest import FAULTS
+    from comparisons.experiments.selftest.run import SUITES, run
+    from reference_rt.util.files import check_writable
 
     patterns = only or ["*"]
     faults = [f for f in FAULTS if any(fnmatchcase(f.name, pattern) for pattern in patterns)]

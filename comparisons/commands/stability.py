@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli import guarded, say
-from reference_rt.errors import UsageError
+from reference_rt.cli.main import guarded, say
+from reference_rt.util.errors import UsageError
 
 
 @guarded
@@ -49,19 +49,24 @@ def stability(
     with compare_extra():
         from rich.console import Console
 
-        from comparisons import marked
-        from comparisons.provenance import ours, provenance
-        from comparisons.stability import table
-        from comparisons.stability.display import Display
-        from comparisons.stability.families import MODULES
-        from comparisons.stability.families import family as family_of
-        from comparisons.stability.family import Effort
-        from comparisons.stability.page import write_page
-        from comparisons.stability.run import Choice, mitsuba_is_there, run, shoot
-        from comparisons.stability.written import again, write
+        from comparisons.experiments.stability.harness import table
+        from comparisons.experiments.stability.harness.display import Display
+        from comparisons.experiments.stability.harness.families import MODULES
+        from comparisons.experiments.stability.harness.families import family as family_of
+        from comparisons.experiments.stability.harness.family import Effort
+        from comparisons.experiments.stability.harness.page import write_page
+        from comparisons.experiments.stability.harness.results_json import again, write
+        from comparisons.experiments.stability.harness.run import (
+            Choice,
+            mitsuba_is_there,
+            run,
+            shoot,
+        )
+        from comparisons.report import marked
+        from comparisons.runs.provenance import ours, provenance
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
-    from reference_rt.files import check_writable
+    from reference_rt.util.files import check_writable
 
     names = tuple(dict.fromkeys(family or MODULES))
     if unknown := [name for name in names if name not in MODULES]:

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.results import COMPARED
-from reference_rt.cli import guarded, say
-from reference_rt.errors import UsageError
+from comparisons.results.case import COMPARED
+from reference_rt.cli.main import guarded, say
+from reference_rt.util.errors import UsageError
 
 MOST_JOBS = 4
 """At once, where nobody says: each takes up to 2 GB."""
@@ -45,13 +45,13 @@ def suite(
 ) -> None:
     """Compare all scenes of a folder with Mitsuba; what is done is not done again."""
     with compare_extra():
-        from comparisons.ci import github as github_actions
-        from comparisons.ci import junit as junit_xml
+        from comparisons.report.ci import github as github_actions
+        from comparisons.report.ci import junit as junit_xml
+        from comparisons.results.verdict import exit_code
         from comparisons.suites.display import summarise
         from comparisons.suites.run import Options, Run, run_suite
         from comparisons.suites.suite import load_suite, plan
-        from comparisons.verdict import exit_code
-    from reference_rt.files import check_writable
+    from reference_rt.util.files import check_writable
 
     rungs = tuple(tier or ())
     if unknown := [rung for rung in rungs if rung not in COMPARED]:

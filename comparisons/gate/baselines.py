@@ -24,12 +24,12 @@ from pydantic import Field
 from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
-from comparisons.kept import sealed, unsealed
-from reference_rt.description import Description
-from reference_rt.errors import ImageError, SceneError, UsageError
-from reference_rt.exr import write_exr
-from reference_rt.files import check_writable, read_input, read_text
-from reference_rt.scene import Scene
+from comparisons.results.sealed import sealed, unsealed
+from reference_rt.core.exr import write_exr
+from reference_rt.core.model import Description
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import ImageError, SceneError, UsageError
+from reference_rt.util.files import check_writable, read_input, read_text
 
 RECORD = "baseline.json"
 

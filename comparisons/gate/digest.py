@@ -13,8 +13,8 @@ from urllib.parse import unquote
 import numpy as np
 
 import reference_rt
-from reference_rt.files import read_input
-from reference_rt.scene import Scene
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.files import read_input
 
 _URI = re.compile(rb'"uri"\s*:\s*"([^"]+)"')
 

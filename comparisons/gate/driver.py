@@ -15,8 +15,8 @@ from pathlib import Path
 
 from comparisons.gate.errors import RendererError
 from comparisons.gate.pictures_in import Picture, read_candidate
-from reference_rt.children import tied
-from reference_rt.errors import ImageError, UsageError
+from reference_rt.util.child_processes import tied
+from reference_rt.util.errors import ImageError, UsageError
 
 PLACEHOLDERS = ("scene", "output", "seed", "spp")
 

@@ -1,6 +1,6 @@
 """What can keep the gate from judging at all, each with the exit code that it gives."""
 
-from reference_rt.errors import ImageError, ReferenceRtError
+from reference_rt.util.errors import ImageError, ReferenceRtError
 
 
 class RendererError(ReferenceRtError):

@@ -5,18 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from comparisons import causes, statistics
-from comparisons.checks import input_tier
+from comparisons import statistics
+from comparisons.compare import causes
+from comparisons.compare.judge import SURE, Lights
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
-from comparisons.image_rung import images_tier
-from comparisons.judge import SURE, Lights
-from comparisons.metrics import image_metrics
-from comparisons.results import Case, Cause, FloatArray, Images, Metrics, Place, Status, Tier
-from comparisons.verdict import decide
-from reference_rt.errors import ImageError, UsageError
-from reference_rt.image import srgb
+from comparisons.results.case import Case, Cause, FloatArray, Images, Metrics, Place, Status, Tier
+from comparisons.results.verdict import decide
+from comparisons.rungs.images import images_tier
+from comparisons.rungs.input import input_tier
+from comparisons.statistics.metrics import image_metrics
+from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
+from reference_rt.util.errors import ImageError, UsageError
 
 LIMIT = 0.005
 """The smallest relative bias of the image mean that must be visible."""

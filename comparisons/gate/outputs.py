@@ -4,12 +4,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from comparisons.ci import github, junit
-from comparisons.provenance import ours
 from comparisons.report import write_report, write_results
-from comparisons.results import Case
-from comparisons.verdict import exit_code
-from reference_rt.files import check_writable
+from comparisons.report.ci import github, junit
+from comparisons.results.case import Case
+from comparisons.results.verdict import exit_code
+from comparisons.runs.provenance import ours
+from reference_rt.util.files import check_writable
 
 
 def write(

@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.errors import ImageError
-from reference_rt.exr import read_header
-from reference_rt.files import open_input
-from reference_rt.image_files import ImageFile, open_image
-from reference_rt.image_files.exr import ExrFile
-from reference_rt.image_files.image_file import as_float64
-from reference_rt.image_files.npy import map_npy
-from reference_rt.image_files.pillow import PillowFile
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.exr import read_header
+from reference_rt.core.image_files import ImageFile, open_image
+from reference_rt.core.image_files.exr import ExrFile
+from reference_rt.core.image_files.image_file import as_float64
+from reference_rt.core.image_files.npy import map_npy
+from reference_rt.core.image_files.pillow import PillowFile
 from reference_rt.textures.image_file import linear
+from reference_rt.util.errors import ImageError
+from reference_rt.util.files import open_input
 
 KNOWN = "EXR, PNG, PFM, HDR or NPY"
 _BEGINNINGS = (b"v/1\x01", b"\x89PNG\r\n\x1a\n", b"PF", b"Pf", b"#?", b"\x93NUMPY")

@@ -13,13 +13,13 @@ import platformdirs
 
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
-from comparisons.kept import read_arrays, write_arrays
-from reference_rt.errors import ImageError, UsageError
-from reference_rt.render import render
+from comparisons.results.sealed import read_arrays, write_arrays
+from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
-from reference_rt.scene import Scene
-from reference_rt.shapes.shape import FloatArray
-from reference_rt.tables import build_tables
+from reference_rt.scene.build import build_tables
+from reference_rt.util.errors import ImageError, UsageError
 
 REPLICATES = 16
 """Of the reference: its own noise is then known to one part in five (15 degrees of freedom)."""

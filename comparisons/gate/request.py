@@ -4,16 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from comparisons.compare.judge import Lights
+from comparisons.compare.single_lights import single_lights
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, Say, check_sizes
-from comparisons.judge import Lights
-from comparisons.results import Case
-from comparisons.single_lights import single_lights
-from reference_rt.errors import UsageError
-from reference_rt.scene import Scene
+from comparisons.results.case import Case
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import UsageError
 
 LIGHT_SPP = 64
 """Samples per pixel of the pictures of single lights: they only tell which one is missing."""

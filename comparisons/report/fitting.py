@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from comparisons.report.pictures_data import as_json, pack
-from comparisons.results import Images
+from comparisons.results.case import Images
 
 COARSEST = 32
 """Pixels of each side that are averaged into one at most, before float data is left out."""

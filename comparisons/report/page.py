@@ -19,7 +19,7 @@ from comparisons.report.fitting import Fitted, fitted
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, thumbnails
 from comparisons.report.values import shown
-from comparisons.results import RUNGS, Case, Metrics, Status, how_many
+from comparisons.results.case import RUNGS, Case, Metrics, Status, how_many
 
 MOST_BYTES = 15_000_000
 """Of a page, unless the caller says otherwise: what is still mailed and opened without a wait."""

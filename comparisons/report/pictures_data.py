@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.results import FloatArray, Images
+from comparisons.results.case import FloatArray, Images
 
 RADIANCE_BITS, REST_BITS, ERROR_BITS = 11, 6, 4
 """Significant bits, the leading one included; fewer bits are smaller once compressed."""

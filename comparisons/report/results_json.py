@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.results import Case, Tier
-from reference_rt.files import replacing
+from comparisons.results.case import Case, Tier
+from reference_rt.util.files import replacing
 
 SCHEMA = 2
 """Raised whenever a reader of the former layout would misread the new one."""

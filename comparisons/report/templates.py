@@ -8,8 +8,8 @@ from typing import Any
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
 from comparisons.report.values import label, shown
-from reference_rt.errors import printable
-from reference_rt.files import replacing
+from reference_rt.util.errors import printable
+from reference_rt.util.files import replacing
 
 
 def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -> Template:

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from comparisons.metrics import count_nonfinite, encode, nonfinite_pixels, white_level
 from comparisons.report.pictures_data import reduced
-from comparisons.results import FloatArray, Images
+from comparisons.results.case import FloatArray, Images
+from comparisons.statistics.metrics import count_nonfinite, encode, nonfinite_pixels, white_level
 
 DIFFERENCE_PERCENTILE = 99.5
 """Where the difference's colours end: a few fireflies may saturate, the rest stays visible."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.metrics import count_nonfinite
-from comparisons.results import FloatArray, Status, Tier
+from comparisons.results.case import FloatArray, Status, Tier
+from comparisons.statistics.metrics import count_nonfinite
 from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
 from comparisons.statistics.sides import Known, known_side, picture_array, side_of
 from comparisons.statistics.single import single_tests

@@ -3,9 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.metrics import ratio
-from comparisons.results import FloatArray, Place
+from comparisons.results.case import FloatArray, Place
 from comparisons.statistics.decide import findings, read
+from comparisons.statistics.metrics import ratio
 from comparisons.statistics.scales import CHANNELS, DARK, ROUNDING, TILE, Margins, cell_means
 from comparisons.statistics.sides import Known, known_side, neighbourhood, side_of
 from comparisons.statistics.welch import BiasTest, pixel_test

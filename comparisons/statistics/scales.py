@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.results import FloatArray
+from comparisons.results.case import FloatArray
 
 CHANNELS = "RGB"
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import correlate1d
 
-from comparisons.results import FloatArray
+from comparisons.results.case import FloatArray
 from comparisons.statistics.scales import cell_means, cell_pixels, cell_sums
 
 NEIGHBOURS = 5

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.results import FloatArray
+from comparisons.results.case import FloatArray
 from comparisons.statistics.scales import (
     DARK,
     IMAGE_LEVEL,

@@ -21,7 +21,7 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import hadamard
 
-from comparisons.results import FloatArray
+from comparisons.results.case import FloatArray
 from comparisons.statistics.scales import DARK, UNIFORMITY_LEVEL, Margins, cell_means
 from comparisons.statistics.sides import Side
 

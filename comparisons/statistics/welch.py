@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from comparisons.metrics import ratio
-from comparisons.results import FloatArray
+from comparisons.results.case import FloatArray
+from comparisons.statistics.metrics import ratio
 from comparisons.statistics.scales import (
     DARK,
     IMAGE_LEVEL,

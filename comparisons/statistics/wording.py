@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.results import FloatArray
+from comparisons.results.case import FloatArray
 from comparisons.statistics.scales import CHANNELS
 from comparisons.statistics.uniformity import Uniformity
 from comparisons.statistics.welch import BiasTest

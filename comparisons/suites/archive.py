@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from comparisons.record import CASE, RecordError, read_case
-from comparisons.results import Case
+from comparisons.results.case import Case
+from comparisons.results.record import CASE, RecordError, read_case
 from comparisons.suites.work import folder_name
-from reference_rt.files import read_text
+from reference_rt.util.files import read_text
 
 
 class Archive(NamedTuple):

@@ -9,11 +9,11 @@ from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
-from comparisons.ci.ranking import ranked
-from comparisons.results import WARNING, Case, how_many
+from comparisons.report.ci.ranking import ranked
+from comparisons.results.case import WARNING, Case, how_many
+from comparisons.results.verdict import PASSING
 from comparisons.suites.worker import Request
-from comparisons.verdict import PASSING
-from reference_rt.console import Bar
+from reference_rt.util.console import Bar
 
 _STYLES = {
     "agree": "green",

@@ -9,16 +9,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from comparisons import sources
-from comparisons.budget import Budget
-from comparisons.mitsuba_backend import Backend
-from reference_rt.files import read_input, read_text
-from reference_rt.scene import Scene
+from comparisons.compare.budget import Budget
+from comparisons.mitsuba.backend import Backend
+from comparisons.runs import sources
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.files import read_input, read_text
 
-_APART = (
-    "bench", "report", "ci", "commands", "convergence", "gate", "selftest", "stability",
-    "pytest_plugin.py", "cli.py", "marked.py",
-)  # fmt: skip
+_APART = ("report", "commands", "gate", "experiments")
 """Parts of `comparisons` that no verdict of a suite depends on."""
 
 _PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")

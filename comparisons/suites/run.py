@@ -13,19 +13,19 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
-from comparisons.mitsuba_backend import Backend, backend
-from comparisons.processes import pool
-from comparisons.provenance import provenance
-from comparisons.record import read_case, read_record, write_case
+from comparisons.mitsuba.backend import Backend, backend
 from comparisons.report import write_report, write_results
-from comparisons.results import Case, Tier
+from comparisons.results.case import Case, Tier
+from comparisons.results.record import read_case, read_record, write_case
+from comparisons.runs.processes import pool
+from comparisons.runs.provenance import provenance
 from comparisons.suites.display import Display
 from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Source
 from comparisons.suites.work import Plan, Work, folder_name
 from comparisons.suites.worker import Request
-from reference_rt.errors import ImageError, SceneError
-from reference_rt.files import check_writable
+from reference_rt.util.errors import ImageError, SceneError
+from reference_rt.util.files import check_writable
 
 LOG = "stderr.txt"
 """In the folder of a case that could not be carried through: what its process wrote meanwhile."""

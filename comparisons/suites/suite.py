@@ -7,14 +7,14 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, field_validator
 
-from comparisons.budget import Budget
+from comparisons.compare.budget import Budget
 from comparisons.suites.work import Plan, Work, control_name, read
-from reference_rt import yaml_text
-from reference_rt.description import Description, Positive
-from reference_rt.errors import SceneError, UsageError, printable
-from reference_rt.files import read_text
-from reference_rt.scene import Scene
-from reference_rt.yaml_lines import line_of
+from reference_rt.core.model import Description, Positive
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene import yaml_text
+from reference_rt.scene.yaml_lines import line_of
+from reference_rt.util.errors import SceneError, UsageError, printable
+from reference_rt.util.files import read_text
 
 _Scenes = dict[str, tuple[Path, Scene | SceneError]]
 

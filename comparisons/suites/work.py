@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
-from comparisons.budget import Budget
-from reference_rt.cli import adjusted
-from reference_rt.errors import SceneError, SceneWarning, printable
-from reference_rt.scene import Scene
+from comparisons.compare.budget import Budget
+from reference_rt.cli.main import adjusted
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import SceneError, SceneWarning, printable
 
 
 class Changes(BaseModel):
-    """What the command line changes of a scene, as `reference_rt.cli.adjusted` takes it."""
+    """What the command line changes of a scene, as `reference_rt.cli.main.adjusted` takes it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -1,7 +1,7 @@
 """`python -m comparisons.suites.worker`: compares one case after another, as a pool tells it.
 
-It keeps to `comparisons.processes.protocol`; what it is asked for is a `Request`, and the case is
-put in its folder.
+It keeps to `comparisons.runs.processes.protocol`; what it is asked for is a `Request`, and the case
+is put in its folder.
 
 `--runner module:function` puts another function in the place of `compare` (for tests: one that
 crashes, say); `--threads` is how many threads it may use.
@@ -19,13 +19,13 @@ from typing import TextIO
 
 from pydantic import BaseModel, ConfigDict
 
-from comparisons.budget import Budget
-from comparisons.processes.protocol import carry_out, private_stdout, tell
-from comparisons.record import write_case
-from comparisons.results import WARNING, Case
+from comparisons.compare.budget import Budget
+from comparisons.results.case import WARNING, Case
+from comparisons.results.record import write_case
+from comparisons.runs.processes.protocol import carry_out, private_stdout, tell
 from comparisons.suites.work import Changes
-from reference_rt.cli import scene_warnings
-from reference_rt.scene import Scene
+from reference_rt.cli.main import scene_warnings
+from reference_rt.rendering.scene import Scene
 
 Runner = Callable[..., Case]
 """Called as `compare` is."""
@@ -114,9 +114,9 @@ def compare(
     threads: int | None,
     rungs: tuple[str, ...],
 ) -> Case:
-    """`comparisons.compare.compare_scene`, Mitsuba with `threads` threads too."""
-    from comparisons.compare import Subject, compare_scene
-    from comparisons.mitsuba_backend import mitsuba
+    """`comparisons.compare.compare.compare_scene`, Mitsuba with `threads` threads too."""
+    from comparisons.compare.compare import Subject, compare_scene
+    from comparisons.mitsuba.backend import mitsuba
 
     mitsuba()
     if threads is not None:

@@ -1,7 +1,7 @@
 """All cameras: one file each; here, the choice among them.
 
 To add a camera: its file with description, NamedTuple and kernel; `AnyCamera` and the registrations
-below; a translator function in `comparisons.translate`; a scene; a row in the tests' tuple.
+below; a translator function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
 """
 
 from typing import Annotated
@@ -14,7 +14,7 @@ from reference_rt.cameras.orthographic import Orthographic, OrthographicView
 from reference_rt.cameras.perspective import Perspective, PerspectiveView
 from reference_rt.cameras.pinhole import Pinhole
 from reference_rt.cameras.thin_lens import ThinLens, ThinLensView
-from reference_rt.kernel import ByClass
+from reference_rt.jit.kernel import ByClass
 
 AnyCamera = Annotated[Perspective | Orthographic | Pinhole | ThinLens, Field(discriminator="type")]
 

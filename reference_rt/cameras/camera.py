@@ -4,11 +4,11 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
-from reference_rt import transform
-from reference_rt.description import Description, Direction, Vector
-from reference_rt.kernel import kernel
+from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Description, Direction, Vector
+from reference_rt.jit.kernel import kernel
 from reference_rt.sampling import Sample
-from reference_rt.shapes.shape import FloatArray
 
 LENS_CENTRE = (0.5, 0.5)
 """The lens sample that meets the middle of any lens."""

@@ -7,10 +7,10 @@ from pydantic import model_validator
 
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.view_rectangle import Edges, Rectangle, by_width, place, vec3
-from reference_rt.description import Positive
-from reference_rt.kernel import kernel
-from reference_rt.ray import Ray
-from reference_rt.vec3 import Vec3
+from reference_rt.core.model import Positive
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.kernel import kernel
 
 
 class Orthographic(Camera):

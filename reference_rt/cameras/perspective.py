@@ -4,9 +4,9 @@ import math
 from typing import Literal, NamedTuple
 
 from reference_rt.cameras.view_rectangle import CentralCamera, place
-from reference_rt.kernel import kernel
-from reference_rt.ray import Ray
-from reference_rt.vec3 import Vec3, normalize
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import Vec3, normalize
+from reference_rt.jit.kernel import kernel
 
 
 class Perspective(CentralCamera):

@@ -7,8 +7,8 @@ from pydantic import model_validator
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.perspective import PerspectiveView
 from reference_rt.cameras.view_rectangle import at_distance_1, by_width, place
-from reference_rt.description import Positive
-from reference_rt.vec3 import Vec3
+from reference_rt.core.model import Positive
+from reference_rt.core.vec3 import Vec3
 
 
 class Pinhole(Camera):

@@ -6,12 +6,12 @@ from typing import Literal, NamedTuple, Self
 from pydantic import model_validator
 
 from reference_rt.cameras.view_rectangle import STEEPEST, CentralCamera, place, vec3
-from reference_rt.description import Positive
-from reference_rt.kernel import kernel
-from reference_rt.ray import Ray
+from reference_rt.core.model import Positive
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import Vec3, normalize
+from reference_rt.jit.kernel import kernel
 from reference_rt.sampling import LENS, Sample, draw_pair
 from reference_rt.sampling.warp import concentric_disk
-from reference_rt.vec3 import Vec3, normalize
 
 
 class ThinLens(CentralCamera):

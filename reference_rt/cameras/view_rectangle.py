@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, model_validator
 
 from reference_rt.cameras.camera import Camera
-from reference_rt.description import Positive
-from reference_rt.shapes.shape import FloatArray
-from reference_rt.vec3 import Vec3
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Positive
+from reference_rt.core.vec3 import Vec3
 
 
 class Rectangle(NamedTuple):

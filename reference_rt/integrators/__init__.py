@@ -8,16 +8,16 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from reference_rt.core.ray_block import put_vector, ray_of
 from reference_rt.integrators import direct, path, whitted
 from reference_rt.integrators.direct import Direct, DirectSetup
 from reference_rt.integrators.path import Path, PathSetup
 from reference_rt.integrators.ray_cast import RayCast
+from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.scratch import Scratch
 from reference_rt.integrators.whitted import Whitted, WhittedSetup
-from reference_rt.kernel import ByClass, kernel
+from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.sampling import Samplers, sampler_of
-from reference_rt.streams import put_vector, ray_of
-from reference_rt.tables import SceneTables
 
 AnyIntegrator = Annotated[RayCast | Whitted | Direct | Path, Field(discriminator="type")]
 

@@ -7,17 +7,17 @@ from pydantic import Field, model_validator
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt.description import Description
-from reference_rt.geometry import closest_hit, surface
-from reference_rt.integrators.integrator import direct, power_heuristic, receiver
-from reference_rt.kernel import kernel, local_floats
-from reference_rt.lights import area
+from reference_rt.accel.geometry import closest_hit, surface
+from reference_rt.core.model import Description
+from reference_rt.core.ray import Ray, ray_from
+from reference_rt.core.vec3 import Vec3, max_component, to_world
+from reference_rt.integrators.direct_light import direct, power_heuristic, receiver
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.shading import shade, texture_place
+from reference_rt.jit.kernel import kernel, local_floats
+from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
-from reference_rt.ray import Ray, ray_from
 from reference_rt.sampling import draw_pair
-from reference_rt.shading import shade, texture_place
-from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3, max_component, to_world
 
 _Count = Annotated[int, Field(ge=0, le=1024)]
 

@@ -7,21 +7,22 @@ from pydantic import Field
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt.block_hits import any_hits, closest_hits, hit_of
-from reference_rt.description import Description
-from reference_rt.geometry import closest_hit, occluded
-from reference_rt.integrators.integrator import power_heuristic, receiver, unshadowed
+from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
+from reference_rt.accel.geometry import closest_hit, occluded
+from reference_rt.core.model import Description
+from reference_rt.core.ray import Ray, ray_from
+from reference_rt.core.ray_block import add_vector, put_ray, put_vector, ray_of, vector_of
+from reference_rt.core.vec3 import Vec3, is_black, max_component, to_world
+from reference_rt.integrators.direct_light import power_heuristic, receiver, unshadowed
 from reference_rt.integrators.path_state import State, put_state, start, state_of
+from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.scratch import Scratch
-from reference_rt.kernel import kernel, local_floats
-from reference_rt.lights import area, shadow_ray
+from reference_rt.integrators.shading import shade
+from reference_rt.jit.kernel import kernel, local_floats
+from reference_rt.lights import shadow_ray
+from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
-from reference_rt.ray import Ray, ray_from
 from reference_rt.sampling import Samplers, draw_pair, sampler_of
-from reference_rt.shading import shade
-from reference_rt.streams import add_vector, put_ray, put_vector, ray_of, vector_of
-from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3, is_black, max_component, to_world
 
 UNLIMITED = 2**31
 ROULETTE_CAP = 0.999

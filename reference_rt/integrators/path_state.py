@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
+from reference_rt.core.ray import BLOCK, Ray
+from reference_rt.core.ray_block import put_vector, vector_of
+from reference_rt.core.vec3 import Vec3
+from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.scratch import Scratch
-from reference_rt.kernel import kernel
-from reference_rt.ray import BLOCK, Ray
-from reference_rt.streams import put_vector, vector_of
-from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3
+from reference_rt.jit.kernel import kernel
 
 
 class State(NamedTuple):

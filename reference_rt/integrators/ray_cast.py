@@ -2,14 +2,14 @@
 
 from typing import ClassVar, Literal, NamedTuple
 
-from reference_rt.description import Description
-from reference_rt.geometry import closest_hit, colour, owner, surface
-from reference_rt.kernel import kernel
-from reference_rt.ray import Ray
-from reference_rt.shading import texture_place
-from reference_rt.tables import SceneTables
+from reference_rt.accel.geometry import closest_hit, colour, owner, surface
+from reference_rt.core.model import Description
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import Vec3, length
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.shading import texture_place
+from reference_rt.jit.kernel import kernel
 from reference_rt.textures import colour_at
-from reference_rt.vec3 import Vec3, length
 
 LAYERS = ("colour", "distance", "normal", "id", "uv")
 

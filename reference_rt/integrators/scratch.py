@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
-from reference_rt.kernel import kernel
-from reference_rt.ray import BLOCK
-from reference_rt.shapes.shape import FloatArray, IntArray
-from reference_rt.streams import RAY_FLOATS, Hits, Rays
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import BLOCK
+from reference_rt.core.ray_block import RAY_FLOATS, Hits, Rays
+from reference_rt.jit.kernel import kernel
 
 STATE_FLOATS = 11 * BLOCK
 VECTOR_FLOATS = 3 * BLOCK

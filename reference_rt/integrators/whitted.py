@@ -8,17 +8,18 @@ from pydantic import Field
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt.description import Description
-from reference_rt.geometry import closest_hit
-from reference_rt.integrators.integrator import direct_from
-from reference_rt.kernel import kernel, local_floats
-from reference_rt.lights import ENVIRONMENT, Choice, area
+from reference_rt.accel.geometry import closest_hit
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Description
+from reference_rt.core.ray import Ray, ray_from
+from reference_rt.core.vec3 import Vec3, max_component, to_world
+from reference_rt.integrators.direct_light import direct_from
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.shading import shade
+from reference_rt.jit.kernel import kernel, local_floats
+from reference_rt.lights import ENVIRONMENT, Choice
+from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
-from reference_rt.ray import Ray, ray_from
-from reference_rt.shading import shade
-from reference_rt.shapes.shape import FloatArray
-from reference_rt.tables import SceneTables
-from reference_rt.vec3 import Vec3, max_component, to_world
 
 
 class Whitted(Description):

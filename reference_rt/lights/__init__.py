@@ -2,19 +2,13 @@
 
 To add a light: its file with description, table and kernels; a code in `light.py`; in `dispatch.py`
 a field of `Lights` and one `if` in `_sample_one`; below, `AnyLight` and a line in `TABLES`; a
-translator function in `comparisons.translate`; a scene; a row in the tests' tuple.
+translator function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
 """
 
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from reference_rt.lights import directional, point, spot
-from reference_rt.lights.ambient import Ambient
-from reference_rt.lights.area import Areas
-from reference_rt.lights.choice import Choice
-from reference_rt.lights.constant import Constant, Environment
-from reference_rt.lights.directional import Directional
 from reference_rt.lights.dispatch import (
     Lights,
     ambient,
@@ -30,7 +24,14 @@ from reference_rt.lights.dispatch import (
     pick_probability,
     sample_one,
 )
-from reference_rt.lights.environment_map import EnvironmentMap
+from reference_rt.lights.emitters import directional, point, spot
+from reference_rt.lights.emitters.ambient import Ambient
+from reference_rt.lights.emitters.area import Areas
+from reference_rt.lights.emitters.constant import Constant, Environment
+from reference_rt.lights.emitters.directional import Directional
+from reference_rt.lights.emitters.environment_map import EnvironmentMap
+from reference_rt.lights.emitters.point import Point
+from reference_rt.lights.emitters.spot import Spot
 from reference_rt.lights.light import (
     AREA,
     DIRECTIONAL,
@@ -40,9 +41,8 @@ from reference_rt.lights.light import (
     LightSample,
     shadow_ray,
 )
-from reference_rt.lights.light_tree import Pick
-from reference_rt.lights.point import Point
-from reference_rt.lights.spot import Spot
+from reference_rt.lights.selection.choice import Choice
+from reference_rt.lights.selection.tree import Pick
 
 AnyLight = Annotated[
     Point | Spot | Directional | Constant | EnvironmentMap | Ambient, Field(discriminator="type")

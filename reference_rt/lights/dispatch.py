@@ -2,29 +2,23 @@
 
 from typing import Any, NamedTuple
 
-from reference_rt.kernel import ByClass, kernel
-from reference_rt.lights import area, choice, constant, directional, environment_map, point, spot
-from reference_rt.lights.area import Areas
-from reference_rt.lights.choice import Choice
-from reference_rt.lights.constant import Environment
-from reference_rt.lights.directional import Directionals
-from reference_rt.lights.environment_map import EnvironmentMaps
-from reference_rt.lights.light import (
-    AREA,
-    DIRECTIONAL,
-    POINT,
-    SPOT,
-    LightSample,
-    no_light,
-)
-from reference_rt.lights.light_tree import LightTree, Pick
-from reference_rt.lights.point import Points
-from reference_rt.lights.spot import Spots
-from reference_rt.ray import SurfacePoint
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import SurfacePoint
+from reference_rt.core.vec3 import Vec3, row
+from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.lights.emitters import area, constant, directional, environment_map, point, spot
+from reference_rt.lights.emitters.area import Areas
+from reference_rt.lights.emitters.constant import Environment
+from reference_rt.lights.emitters.directional import Directionals
+from reference_rt.lights.emitters.environment_map import EnvironmentMaps
+from reference_rt.lights.emitters.point import Points
+from reference_rt.lights.emitters.spot import Spots
+from reference_rt.lights.light import AREA, DIRECTIONAL, POINT, SPOT, LightSample, no_light
+from reference_rt.lights.selection import choice
+from reference_rt.lights.selection.choice import Choice
+from reference_rt.lights.selection.tree import LightTree, Pick
 from reference_rt.shapes import Shapes
-from reference_rt.shapes.shape import FloatArray
 from reference_rt.textures import Textures
-from reference_rt.vec3 import Vec3, row
 
 
 class Lights(NamedTuple):

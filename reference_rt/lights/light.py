@@ -3,9 +3,9 @@
 import math
 from typing import NamedTuple
 
-from reference_rt.kernel import kernel
-from reference_rt.ray import Ray, SurfacePoint, ray_from, segment_to
-from reference_rt.vec3 import Vec3
+from reference_rt.core.ray import Ray, SurfacePoint, ray_from, segment_to
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.kernel import kernel
 
 # Codes of `Lights.kind`.
 AREA, POINT, SPOT, DIRECTIONAL, ENVIRONMENT = range(5)

@@ -2,18 +2,26 @@
 
 To add a material: its file with description, table and kernels; in `leaves.py` a code, a field of
 `Leaves`, a line in `TABLES` and a branch in the dispatchers; below, `AnyMaterial`; a translator
-function in `comparisons.translate`; a scene; a row in the tests' tuple.  One that is made of others
-(`wrappers.py`) needs a step in `layers.py` instead.
+function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.  One that is made
+of others (`wrappers.py`) needs a step in `nested/flattened.py` instead.
 """
 
 from typing import Annotated
 
 from pydantic import Field
 
-from reference_rt.materials.bump import Bump
-from reference_rt.materials.conductor import Conductor
-from reference_rt.materials.dielectric import Dielectric
-from reference_rt.materials.diffuse import Diffuse
+from reference_rt.materials.bsdfs.conductor import Conductor
+from reference_rt.materials.bsdfs.dielectric import Dielectric
+from reference_rt.materials.bsdfs.diffuse import Diffuse
+from reference_rt.materials.bsdfs.mirror import Mirror
+from reference_rt.materials.bsdfs.phong import Phong
+from reference_rt.materials.bsdfs.plastic import Plastic
+from reference_rt.materials.bsdfs.principled import Principled
+from reference_rt.materials.bsdfs.rough_conductor import RoughConductor
+from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric
+from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic
+from reference_rt.materials.bsdfs.tables import BLACK
+from reference_rt.materials.bsdfs.thin_dielectric import ThinDielectric
 from reference_rt.materials.dispatch import (
     Materials,
     ambient,
@@ -34,23 +42,11 @@ from reference_rt.materials.dispatch import (
     takes_light_from_behind,
 )
 from reference_rt.materials.emissive import Emissive
-from reference_rt.materials.leaves import BLACK
-from reference_rt.materials.material import (
-    Branches,
-    BsdfSample,
-    Material,
-)
-from reference_rt.materials.mirror import Mirror
-from reference_rt.materials.normal_map import NormalMap
-from reference_rt.materials.phong import Phong
-from reference_rt.materials.plastic import Plastic
-from reference_rt.materials.principled import Principled
-from reference_rt.materials.rough_conductor import RoughConductor
-from reference_rt.materials.rough_dielectric import RoughDielectric
-from reference_rt.materials.rough_plastic import RoughPlastic
+from reference_rt.materials.material import Branches, BsdfSample, Material
+from reference_rt.materials.nested.bump import Bump
+from reference_rt.materials.nested.normal_map import NormalMap
+from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided, Wrapper
 from reference_rt.materials.shading import Shading
-from reference_rt.materials.thin_dielectric import ThinDielectric
-from reference_rt.materials.wrappers import Blend, Mask, TwoSided, Wrapper
 
 AnyMaterial = Annotated[
     Diffuse

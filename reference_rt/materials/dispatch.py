@@ -2,17 +2,17 @@
 
 from typing import NamedTuple
 
-from reference_rt.kernel import kernel
-from reference_rt.materials import layers as any_layer
-from reference_rt.materials import leaves as any_leaf
-from reference_rt.materials.layers import Layer, Layers, layer_at, lets
-from reference_rt.materials.leaves import Leaves
+from reference_rt.core.arrays import IntArray
+from reference_rt.core.vec3 import Vec3, to_local, to_world
+from reference_rt.jit.kernel import kernel
+from reference_rt.materials.bsdfs import tables as any_leaf
+from reference_rt.materials.bsdfs.tables import Leaves
 from reference_rt.materials.material import Branches, BsdfSample, Scattered, no_sample
+from reference_rt.materials.nested import flattened as any_layer
+from reference_rt.materials.nested.flattened import Layer, Layers, layer_at, lets
 from reference_rt.materials.shading import Shading
 from reference_rt.materials.textured import Textured, looked_floats
-from reference_rt.shapes.shape import IntArray
 from reference_rt.textures import At, Colours
-from reference_rt.vec3 import Vec3, to_local, to_world
 
 
 class Materials(NamedTuple):

@@ -1,6 +1,6 @@
 """Emissive: a surface that shines, on top of what it scatters.
 
-The shape that wears it becomes an area light: see `reference_rt.lights.area`.
+The shape that wears it becomes an area light: see `reference_rt.lights.emitters.area`.
 """
 
 from typing import Any, Literal

@@ -8,10 +8,10 @@ towards where the radiance goes, `wi` towards where it comes from.  A value of z
 import math
 from typing import Any, ClassVar, NamedTuple
 
-from reference_rt.description import Description
-from reference_rt.kernel import kernel
+from reference_rt.core.model import Description
+from reference_rt.core.vec3 import Vec3, is_black
+from reference_rt.jit.kernel import kernel
 from reference_rt.textures import Palette
-from reference_rt.vec3 import Vec3, is_black
 
 
 class Material(Description):

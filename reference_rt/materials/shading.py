@@ -2,10 +2,11 @@
 
 from typing import NamedTuple
 
-from reference_rt.ray import SurfacePoint
-from reference_rt.shapes.shape import FloatArray, Tangents
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import SurfacePoint
+from reference_rt.core.vec3 import Frame, Vec3
+from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At
-from reference_rt.vec3 import Frame, Vec3
 
 
 class Shading(NamedTuple):

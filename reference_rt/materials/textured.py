@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_rt.kernel import ByClass, kernel
-from reference_rt.materials.bump import Bump
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.materials.emissive import Emissive
 from reference_rt.materials.material import Material
-from reference_rt.materials.wrappers import Wrapper
-from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.materials.nested.bump import Bump
+from reference_rt.materials.nested.wrappers import Wrapper
 from reference_rt.textures import At, Palette, texture_names
 from reference_rt.textures.lookup import Looked, lookup
 

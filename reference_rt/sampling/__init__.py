@@ -9,7 +9,8 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from reference_rt.kernel import ByClass, kernel
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.sampling import blocks, grid, independent, sobol
 from reference_rt.sampling.blocks import FLOATS as PAIR_FLOATS
 from reference_rt.sampling.blocks import INTEGERS as PAIR_INTEGERS
@@ -18,7 +19,6 @@ from reference_rt.sampling.grid import Grid, GridSample, GridSetup
 from reference_rt.sampling.independent import Independent, IndependentSample, IndependentSetup
 from reference_rt.sampling.orders import GROUP
 from reference_rt.sampling.sobol import Sobol, SobolSample, SobolSetup
-from reference_rt.shapes.shape import FloatArray, IntArray
 
 AnySampler = Annotated[Sobol | Independent | Grid, Field(discriminator="type")]
 

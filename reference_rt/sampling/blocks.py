@@ -16,11 +16,11 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from reference_rt.kernel import kernel
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.jit.kernel import kernel
 from reference_rt.sampling import sobol
 from reference_rt.sampling.orders import GROUP, OF_DIGITS
 from reference_rt.sampling.sobol import SobolSetup, pair, reverse_bits, seeds_of
-from reference_rt.shapes.shape import FloatArray, IntArray
 
 TOGETHER = 16
 """Samples of a block."""

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from reference_rt.kernel import kernel
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.core.arrays import FloatArray
+from reference_rt.jit.kernel import kernel
 
 
 def running_sums(values: FloatArray) -> FloatArray:

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from reference_rt.description import Description
-from reference_rt.kernel import kernel
+from reference_rt.core.model import Description
+from reference_rt.jit.kernel import kernel
 
 
 def _square(n: int) -> int:

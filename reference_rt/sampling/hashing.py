@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from reference_rt.kernel import kernel
+from reference_rt.jit.kernel import kernel
 
 LOW32 = np.uint64(0xFFFFFFFF)
 _32 = np.uint64(32)

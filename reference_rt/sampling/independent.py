@@ -5,8 +5,8 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from reference_rt.description import Description
-from reference_rt.kernel import kernel
+from reference_rt.core.model import Description
+from reference_rt.jit.kernel import kernel
 from reference_rt.sampling.hashing import LOW32, combine, mix
 
 _32 = np.uint64(32)

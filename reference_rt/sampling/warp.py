@@ -2,8 +2,8 @@
 
 import math
 
-from reference_rt.kernel import kernel
-from reference_rt.vec3 import Vec3
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.kernel import kernel
 
 # Coefficients of sin(pi/2 r) / r and cos(pi/2 r) in r²: (-1)^k (pi/2)^(2k+1) / (2k+1)! and
 # (-1)^k (pi/2)^(2k) / (2k)!. For |r| <= 1/2 the first terms left out are below 5e-17.

@@ -1,9 +1,13 @@
 """All shapes: one file each.  `tables` says how to add one; `dispatch` chooses among them."""
 
+from reference_rt.core.arrays import IntArray
 from reference_rt.shapes.box import Box
-from reference_rt.shapes.cone import Cone
-from reference_rt.shapes.cylinder import Cylinder
-from reference_rt.shapes.disk import Disk
+from reference_rt.shapes.brute_force import Packets, nearest, nearest_of_ray, nearest_of_rays
+from reference_rt.shapes.curved.cone import Cone
+from reference_rt.shapes.curved.cylinder import Cylinder
+from reference_rt.shapes.curved.quadric import Quadric
+from reference_rt.shapes.curved.sphere import Sphere
+from reference_rt.shapes.curved.torus import Torus
 from reference_rt.shapes.dispatch import (
     face,
     intersect,
@@ -16,14 +20,13 @@ from reference_rt.shapes.dispatch import (
     tangents,
     uv,
 )
-from reference_rt.shapes.few import Packets, nearest, nearest_of_ray, nearest_of_rays
-from reference_rt.shapes.mesh import Mesh
-from reference_rt.shapes.plane import Plane
-from reference_rt.shapes.polygon import Polygon
-from reference_rt.shapes.quadric import Quadric
-from reference_rt.shapes.rectangle import Rectangle
-from reference_rt.shapes.shape import IntArray, Shape
-from reference_rt.shapes.sphere import Sphere
+from reference_rt.shapes.flat.disk import Disk
+from reference_rt.shapes.flat.plane import Plane
+from reference_rt.shapes.flat.polygon import Polygon
+from reference_rt.shapes.flat.rectangle import Rectangle
+from reference_rt.shapes.meshes.mesh import Mesh
+from reference_rt.shapes.meshes.triangle import Triangle
+from reference_rt.shapes.shape import Shape
 from reference_rt.shapes.tables import (
     BOX,
     DISK,
@@ -38,8 +41,6 @@ from reference_rt.shapes.tables import (
     Primitive,
     Shapes,
 )
-from reference_rt.shapes.torus import Torus
-from reference_rt.shapes.triangle import Triangle
 
 __all__ = [
     "BOX",

@@ -5,15 +5,15 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from reference_rt.kernel import kernel
-from reference_rt.lanes import larger, select, smaller
-from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.core.vec3 import Vec3, dot, max_abs, row, triple
+from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd import larger, select, smaller
 from reference_rt.shapes import placement
 from reference_rt.shapes.placement import columns, local_point, world_surface
+from reference_rt.shapes.ray_simd import nearer_by
 from reference_rt.shapes.shape import (
-    Bounds,
-    FloatArray,
-    IntArray,
     LightPoint,
     Place,
     Shape,
@@ -26,8 +26,6 @@ from reference_rt.shapes.shape import (
     pack,
     solid_angle_pdf,
 )
-from reference_rt.shapes.side_by_side import nearer_by
-from reference_rt.vec3 import Vec3, dot, max_abs, row, triple
 
 
 class Box(Shape):

@@ -3,10 +3,11 @@
 import math
 from typing import Any, NamedTuple
 
-from reference_rt.kernel import kernel
-from reference_rt.ray import Ray
+from reference_rt.core.ray import Ray
+from reference_rt.jit.kernel import kernel
+from reference_rt.shapes.curved.quadrics import Quadrics, crossings
 from reference_rt.shapes.dispatch import intersect, spans
-from reference_rt.shapes.quadrics import Quadrics, crossings
+from reference_rt.shapes.meshes.watertight import Shear
 from reference_rt.shapes.shape import Spans, no_spans, one_span
 from reference_rt.shapes.tables import (
     BOX,
@@ -20,7 +21,6 @@ from reference_rt.shapes.tables import (
     TRIANGLE,
     Shapes,
 )
-from reference_rt.shapes.watertight import Shear
 
 MOST = 4
 """Of one primitive: a torus has so many, and so has a capped quadric of two sheets."""

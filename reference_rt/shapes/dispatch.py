@@ -6,15 +6,11 @@ kernel of a table that the scene lacks, is replaced by the one that finds nothin
 
 from typing import Any
 
-from reference_rt.kernel import kernel
-from reference_rt.ray import Crossing, Hit, Ray, SurfacePoint, miss
-from reference_rt.shapes.shape import (
-    LightPoint,
-    Spans,
-    Tangents,
-    no_light_point,
-    no_spans,
-)
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.kernel import kernel
+from reference_rt.shapes.meshes.watertight import Shear
+from reference_rt.shapes.shape import LightPoint, Spans, Tangents, no_light_point, no_spans
 from reference_rt.shapes.tables import (
     BOX,
     DISK,
@@ -28,8 +24,6 @@ from reference_rt.shapes.tables import (
     Shapes,
     of_table,
 )
-from reference_rt.shapes.watertight import Shear
-from reference_rt.vec3 import Vec3
 
 
 @kernel

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from reference_rt.kernel import kernel
-from reference_rt.ray import UNIT_ROUNDOFF, Ray, SurfacePoint
-from reference_rt.shapes.shape import Bounds, FloatArray, Place, outward
-from reference_rt.transform import Affine, invert
-from reference_rt.vec3 import Vec3, dot, length, max_abs, row, triple
+from reference_rt.core.arrays import Bounds, FloatArray
+from reference_rt.core.ray import UNIT_ROUNDOFF, Ray, SurfacePoint
+from reference_rt.core.transform import Affine, invert
+from reference_rt.core.vec3 import Vec3, dot, length, max_abs, row, triple
+from reference_rt.jit.kernel import kernel
+from reference_rt.shapes.shape import Place, outward
 
 
 def columns(m: Affine, place: Place) -> dict[str, Any]:

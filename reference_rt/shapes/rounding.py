@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from reference_rt.kernel import kernel
-from reference_rt.lanes import product_error
-from reference_rt.vec3 import Vec3
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd import product_error
 
 
 @kernel

@@ -3,20 +3,17 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+from pydantic import Field
 
-from reference_rt.description import Description
-from reference_rt.kernel import kernel
-from reference_rt.lanes import LANES
-from reference_rt.transform import IDENTITY, Affine, Transform, affine, compose, invert
-from reference_rt.vec3 import Vec3, dot, frame_from_normal
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-Bounds = tuple[FloatArray, FloatArray]
+from reference_rt.core.arrays import Bounds, FloatArray
+from reference_rt.core.model import Description
+from reference_rt.core.transform import IDENTITY, Affine, Transform, affine, compose, invert
+from reference_rt.core.vec3 import Vec3, dot, frame_from_normal
+from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd import LANES
 
 
 def _unheard(owner: int, message: str) -> None:
@@ -54,15 +51,15 @@ class Shape(Description):
 
     def __and__(self, other: "Shape") -> "Shape":
         """The points that both solids share."""
-        return _solid("Intersection", self, other)
+        return Intersection(of=(self, other))
 
     def __or__(self, other: "Shape") -> "Shape":
         """The points of either solid."""
-        return _solid("Union", self, other)
+        return Union(of=(self, other))
 
     def __sub__(self, other: "Shape") -> "Shape":
         """The points of the first solid that are not in the second."""
-        return _solid("Difference", self, other)
+        return Difference(of=(self, other))
 
     def map_in(self, place: Place) -> Affine:
         """The map from the shape's own coordinates to those of the place.  Raises ValueError for
@@ -74,11 +71,33 @@ class Shape(Description):
         return m
 
 
-def _solid(name: str, *operands: Shape) -> Shape:
-    from reference_rt import csg  # which is made of shapes
+class Solid(Shape):
+    """What union, intersection and difference share: operands, which may be solids themselves.
 
-    made: Shape = getattr(csg, name)(of=operands)
-    return made
+    Operands without a material have that of the solid, so that a cut face looks as what cuts it.
+    """
+
+    of: Annotated[tuple["AnyOperand", ...], Field(strict=False, min_length=1)]  # type: ignore[name-defined]  # noqa: F821
+    """The operands: shapes that enclose space, or trees of them."""
+    # `AnyOperand` names every type of shape: `shapes/csg/description.py` completes the models.
+
+
+class Union(Solid):
+    """All points of any operand."""
+
+    type: Literal["union"] = "union"
+
+
+class Intersection(Solid):
+    """The points that all operands share."""
+
+    type: Literal["intersection"] = "intersection"
+
+
+class Difference(Solid):
+    """The points of the first operand that are in none of the others."""
+
+    type: Literal["difference"] = "difference"
 
 
 def pack(*columns: FloatArray) -> FloatArray:

@@ -2,37 +2,30 @@
 
 To add a shape: its file with description, table and kernels; here, a code, a field of `Shapes`, a
 line in `TABLES`, a member of `Primitive`; in `dispatch.py` one `if` in each kernel; a translator
-function in `comparisons.translate`; a scene; a row in the tests' tuple.
+function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
 """
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from reference_rt.kernel import ByClass
-from reference_rt.shapes import (
-    box,
-    disk,
-    plane,
-    polygon,
-    quadrics,
-    rectangle,
-    sphere,
-    torus,
-    triangle,
-)
+from reference_rt.jit.kernel import ByClass
+from reference_rt.shapes import box
 from reference_rt.shapes.box import Box, Boxes
-from reference_rt.shapes.cone import Cone
-from reference_rt.shapes.cylinder import Cylinder
-from reference_rt.shapes.disk import Disk, Disks
-from reference_rt.shapes.mesh import Mesh
-from reference_rt.shapes.plane import Plane, Planes
-from reference_rt.shapes.polygon import Polygon, Polygons
-from reference_rt.shapes.quadric import Quadric
-from reference_rt.shapes.quadrics import Quadrics
-from reference_rt.shapes.rectangle import Rectangle, Rectangles
-from reference_rt.shapes.sphere import Sphere, Spheres
-from reference_rt.shapes.torus import Tori, Torus
-from reference_rt.shapes.triangle import Triangle, Triangles
+from reference_rt.shapes.curved import quadrics, sphere, torus
+from reference_rt.shapes.curved.cone import Cone
+from reference_rt.shapes.curved.cylinder import Cylinder
+from reference_rt.shapes.curved.quadric import Quadric
+from reference_rt.shapes.curved.quadrics import Quadrics
+from reference_rt.shapes.curved.sphere import Sphere, Spheres
+from reference_rt.shapes.curved.torus import Tori, Torus
+from reference_rt.shapes.flat import disk, plane, polygon, rectangle
+from reference_rt.shapes.flat.disk import Disk, Disks
+from reference_rt.shapes.flat.plane import Plane, Planes
+from reference_rt.shapes.flat.polygon import Polygon, Polygons
+from reference_rt.shapes.flat.rectangle import Rectangle, Rectangles
+from reference_rt.shapes.meshes import triangle
+from reference_rt.shapes.meshes.mesh import Mesh
+from reference_rt.shapes.meshes.triangle import Triangle, Triangles
 
 # Codes of `Hit.kind`: which table a primitive is a row of.
 SPHERE, RECTANGLE, BOX, TRIANGLE, DISK, PLANE, POLYGON, QUADRIC, TORUS = range(9)
@@ -51,7 +44,8 @@ Primitive = (
     | Cone
     | Torus
 )
-"""The descriptions that are primitives by themselves; `reference_rt.csg` adds what is made of them.
+"""The descriptions that are primitives by themselves; `reference_rt.shapes.csg` adds what is made
+of them.
 """
 
 

@@ -2,7 +2,7 @@
 
 To add a texture: its file with description, table and `lookup` kernel; a code in `texture.py`; in
 `lookup.py` a field of `Textures` and a branch; below, `AnyTexture` and a line in `TABLES`; a
-translator function in `comparisons.translate`; a scene; a row in the tests' tuple.
+translator function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
 """
 
 from typing import Annotated, Any

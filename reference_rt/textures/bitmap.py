@@ -7,13 +7,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from reference_rt.description import Positive
-from reference_rt.kernel import kernel
-from reference_rt.memory import check_memory
-from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.model import Positive
+from reference_rt.core.vec3 import Vec3, luminance, row
+from reference_rt.jit.kernel import kernel
 from reference_rt.textures.image_file import MOST_BYTES_PER_PIXEL, pixels_of, read_image
 from reference_rt.textures.texture import Texture
-from reference_rt.vec3 import Vec3, luminance, row
+from reference_rt.util.memory import check_memory
 
 _FILTERS = ("bilinear", "nearest")
 _WRAPS = ("repeat", "clamp", "mirror")

@@ -6,11 +6,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from reference_rt.description import Colour
-from reference_rt.kernel import kernel
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Colour
+from reference_rt.core.vec3 import Vec3, row
+from reference_rt.jit.kernel import kernel
 from reference_rt.textures.texture import Texture
-from reference_rt.vec3 import Vec3, row
 
 
 class Checker(Texture):

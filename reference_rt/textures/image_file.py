@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from reference_rt.memory import check_memory
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.core.arrays import FloatArray
+from reference_rt.util.memory import check_memory
 
 MOST_BYTES_PER_PIXEL = 32
 """That reading an image takes: 24 for its colours, and what the file's reader needs besides."""
@@ -23,7 +23,7 @@ def read_image(
     out: (n, 3), at whose beginning the colours are put, if there is room.  Raises ValueError (what
     is wrong, what was expected).
     """
-    from reference_rt.image_files import open_image  # Pillow takes a while
+    from reference_rt.core.image_files import open_image  # Pillow takes a while
 
     try:
         image = open_image(path)
@@ -50,7 +50,7 @@ def read_image(
 
 def pixels_of(path: Path) -> int:
     """How many pixels a file has by its header; 0 where it cannot be read."""
-    from reference_rt.image_files import open_image
+    from reference_rt.core.image_files import open_image
 
     try:
         image = open_image(path)

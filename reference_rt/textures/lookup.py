@@ -2,14 +2,14 @@
 
 from typing import NamedTuple
 
-from reference_rt.kernel import ByClass, kernel
-from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.vec3 import Vec3, row
+from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.textures import bitmap, checker
 from reference_rt.textures.bitmap import Bitmaps
 from reference_rt.textures.checker import Checkers
 from reference_rt.textures.texture import BITMAP, CHECKER, map_uv
 from reference_rt.textures.vertex_colours import VertexColourTable
-from reference_rt.vec3 import Vec3, row
 
 
 class Textures(NamedTuple):

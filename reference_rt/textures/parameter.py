@@ -6,11 +6,11 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator, Strict, WithJsonSchema
 
-from reference_rt.description import Description, colour, colour_schema, reflectance
-from reference_rt.kernel import kernel
-from reference_rt.shapes.shape import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.model import Description, colour, colour_schema, reflectance
+from reference_rt.core.vec3 import Vec3, luminance, row
+from reference_rt.jit.kernel import kernel
 from reference_rt.textures.lookup import At, lookup
-from reference_rt.vec3 import Vec3, luminance, row
 
 
 class MayBeTexture:

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from reference_rt.description import Description
-from reference_rt.kernel import kernel
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Description
+from reference_rt.jit.kernel import kernel
 
 # Codes of `Textures.kind`.
 CHECKER, BITMAP, VERTEX_COLOURS = 0, 1, 2

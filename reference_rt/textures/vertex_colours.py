@@ -5,8 +5,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from reference_rt.description import Colour, Positive
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Colour, Positive
 from reference_rt.textures.texture import Texture
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
+from builders import HELPERS
 from gate_checks import SCENE, pictures
 from PIL import Image
 from suite_runs import RUNNER
@@ -18,10 +19,10 @@ from comparisons.commands.compare import compare
 from comparisons.commands.report import report
 from comparisons.commands.suite import suite
 from comparisons.gate import reference
-from comparisons.mitsuba_backend import Backend
+from comparisons.mitsuba.backend import Backend
 from comparisons.report import write_report
 from comparisons.suites import run
-from reference_rt.shapes.shape import FloatArray
+from reference_rt.core.arrays import FloatArray
 
 # ---- images that textures and skies are made of ------------------------------------------------
 
@@ -115,7 +116,7 @@ def show(browser, window, tmp_path):
 @pytest.fixture
 def fake_runners(monkeypatch: pytest.MonkeyPatch) -> None:
     """Workers find `suite_runners`, and no backend is looked for."""
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.setenv("PYTHONPATH", str(HELPERS))
     monkeypatch.setattr(run, "backend", lambda: Backend("llvm_ad_rgb", "0", "", None))
     monkeypatch.setattr(run, "provenance", lambda **more: {"mitsuba": "none", **more})
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import settings
 from typer.testing import CliRunner, Result
 
-from reference_rt.cli import app
+from reference_rt.cli.main import app
 
 # The same examples in every run, and no promise of speed: kernels compile inside the first.
 settings.register_profile("fixed", derandomize=True, database=None, deadline=None)

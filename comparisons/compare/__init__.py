@@ -1,0 +1,1 @@
+"""The comparison of one scene with Mitsuba, from its measurements to a verdict."""

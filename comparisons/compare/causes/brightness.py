@@ -1,0 +1,156 @@
+"""Hypotheses about brightness: gain, offset, channels, transfer curves, limits, lights."""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from scipy import optimize
+
+from comparisons.compare.causes.hypothesis import Hypothesis
+from comparisons.compare.causes.misfit import Misfit
+from comparisons.results.case import FloatArray
+from reference_rt.rendering.image import srgb
+from reference_rt.textures.image_file import linear
+
+CHANNELS = ("red", "green", "blue")
+
+REMARKABLE = {
+    2.0: "twice",
+    0.5: "half",
+    math.pi: "pi times",
+    1.0 / math.pi: "1/pi of",
+    4.0 * math.pi: "4 pi times",
+    0.25 / math.pi: "1/(4 pi) of",
+    4.0: "four times",
+    0.25: "a quarter of",
+}
+"""Factors that hint at their origin."""
+
+NEAR = 0.01
+"""How near a fitted factor must be to one that is remarkable."""
+
+
+def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
+    """All of them, fitted."""
+    yield from _gains(misfit)
+    yield from _permutations(misfit)
+    yield from _curves(misfit)
+    yield from _limits(misfit)
+    yield from _lights(misfit, lights)
+
+
+def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
+    r = misfit.reference
+    gain = 1.0 + misfit.amount(r)
+    told = f"the candidate is {gain:.4g} times the reference ({100.0 * (gain - 1.0):+.3g} %)"
+    for factor, name in REMARKABLE.items():
+        if abs(gain / factor - 1.0) < NEAR:
+            told += f", {name} what it should be"
+    yield Hypothesis("gain", f"constant gain of {gain:.4g}", told, gain * r, 1)
+    gains = np.ones(3)
+    for k, channel in enumerate(CHANNELS):
+        alone = np.zeros_like(r)
+        alone[..., k] = r[..., k]
+        amount = misfit.amount(alone)
+        gains[k] += amount
+        told = (
+            f"{channel} is {1.0 + amount:.4g} times the reference's, the other channels are right"
+        )
+        yield Hypothesis(
+            "gain of a channel",
+            f"gain of {channel} of {1 + amount:.4g}",
+            told,
+            r + amount * alone,
+            1,
+        )
+    each = ", ".join(f"{g:.4g}" for g in gains)
+    told = f"red, green and blue are {each} times the reference's"
+    yield Hypothesis("gains", "another gain of each channel", told, gains * r, 3)
+    amount = misfit.amount(np.ones_like(r))
+    told = f"every pixel of the candidate has {amount:+.3g} W/sr/m² more than the reference"
+    yield Hypothesis("offset", f"constant offset of {amount:+.3g}", told, r + amount, 1)
+
+
+def _permutations(misfit: Misfit) -> Iterator[Hypothesis]:
+    for order in itertools.permutations(range(3)):
+        moved = [k for k in range(3) if order[k] != k]
+        if not moved:
+            continue
+        names = " and ".join(CHANNELS[k] for k in moved) if len(moved) == 2 else "all channels"
+        yield Hypothesis(
+            "channels",
+            f"swapped channels: {names}",
+            "the candidate's red, green and blue are the reference's "
+            + ", ".join(CHANNELS[k] for k in order),
+            misfit.reference[..., list(order)],
+            0,
+        )
+
+
+def _curves(misfit: Misfit) -> Iterator[Hypothesis]:
+    r = np.maximum(misfit.reference, 0.0)
+    fit = optimize.minimize_scalar(
+        lambda g: misfit.squares(r ** math.exp(g)),
+        bounds=(-1.2, 1.2),
+        method="bounded",
+        options={"xatol": 1e-4},
+    )
+    gamma = math.exp(float(fit.x))
+    told = f"the candidate is the reference to the power of {gamma:.4g}"
+    yield Hypothesis("gamma", f"gamma of {gamma:.4g}", told, r**gamma, 1)
+    clipped = np.clip(r, 0.0, 1.0)
+    for encoded in (srgb(r), srgb(clipped)):
+        yield Hypothesis(
+            "sRGB",
+            "sRGB-encoded values taken for linear ones",
+            "the candidate is the reference through the sRGB curve",
+            encoded,
+            0,
+        )
+    yield Hypothesis(
+        "sRGB",
+        "linear values taken for sRGB-encoded ones",
+        "the candidate is the reference through the inverse of the sRGB curve",
+        linear(clipped),
+        0,
+    )
+
+
+def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
+    r, top = misfit.reference, float(misfit.candidate.max())
+    above = r > top
+    if above.any() and top > 0.0:
+        count = int(np.count_nonzero(above))
+        told = f"{count} values of the reference are above the candidate's maximum, {top:.6g}"
+        name = f"highlights clamped to {top:.4g}"
+        yield Hypothesis("clamped", name, told, np.minimum(r, top), 1)
+    clipped = np.clip(r, 0.0, 1.0)
+    for name, rounded in (
+        ("sRGB", linear(np.round(255.0 * srgb(clipped)) / 255.0)),
+        ("linear", np.round(255.0 * clipped) / 255.0),
+    ):
+        if len(np.unique(misfit.candidate[..., 0].astype(np.float32))) > 256:
+            continue
+        told = f"the candidate is the reference rounded to 8 bits ({name})"
+        yield Hypothesis("8 bits", f"rounded to 8 bits ({name})", told, rounded, 0)
+
+
+ONE = 0.1
+"""How near to once a light must be missing or there in excess, to be told lost or counted twice."""
+
+
+def _lights(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
+    r = misfit.reference
+    for name, light in lights.items():
+        if light.shape != r.shape or not np.isfinite(light).all() or not light.any():
+            continue
+        amount = misfit.amount(light)
+        if abs(amount + 1.0) < ONE:
+            what = f"lost light: {name}"
+        elif abs(amount - 1.0) < ONE:
+            what = f"light counted twice: {name}"
+        else:
+            what = f"light of another strength: {name}"
+        told = f"the candidate has {1.0 + amount:.3g} times what the reference has of {name}"
+        yield Hypothesis("light", what, told, r + amount * light, 1)

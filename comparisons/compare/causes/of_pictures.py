@@ -1,0 +1,85 @@
+"""The hypothesis that explains the difference of two pictures best, where one clearly does."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from comparisons.compare.causes import brightness, place
+from comparisons.compare.causes.hypothesis import Hypothesis
+from comparisons.compare.causes.misfit import Misfit
+from comparisons.compare.causes.spots import one_place
+from comparisons.results.case import Cause, FloatArray, Images
+from comparisons.statistics.metrics import count_nonfinite
+
+MOST = 0.6
+"""Of the squared difference beyond noise: a cause explains at least so much, more than half and not
+just so."""
+
+CLEARER = 0.7
+"""What a cause leaves unexplained is at most this fraction of what the next one leaves."""
+
+NO_MATTER = 1e-3
+"""What is left unexplained below it is rounding, and does not tell hypotheses apart."""
+
+PENALTY = 0.5
+"""A hypothesis with more parameters must leave less than this fraction of what a simpler one
+leaves: with its own right parameters it always leaves a little less."""
+
+
+GENERALISED = {"gain": "gains", "gain of a channel": "gains", "sRGB": "gamma"}
+"""Which family can nearly or wholly do what another one does: it is no rival."""
+
+
+def likeliest(images: Images, lights: Mapping[str, FloatArray] | None = None) -> Cause | None:
+    """Name the one cause that explains most of the squared difference beyond noise, or None where
+    nothing does so clearly.
+
+    lights: the reference's pictures of single lights (height, width, 3), by name.
+    """
+    if images.candidate.shape != images.reference.shape:
+        return None
+    if count_nonfinite(images.candidate, images.reference):
+        return None
+    misfit = Misfit(images)
+    if not (misfit.clear and misfit.excess > 0.0):
+        return None
+    found = [*brightness.hypotheses(misfit, lights or {}), *place.hypotheses(misfit)]
+    left = np.array([misfit.left(h.picture) for h in found])
+    # Noise may leave less than nothing.
+    left -= min(float(left.min()), 0.0)
+    ranked = list(zip(found, left.tolist(), strict=True))
+    best = _best(ranked, misfit.margin)
+    if best is not None:
+        hypothesis, unexplained = best
+        explained = 1.0 - unexplained
+        told = f"{hypothesis.evidence}: that explains {100.0 * explained:.4g} % of the difference"
+        return Cause(hypothesis.name, told, explained)
+    if left.min() < 1.0 - MOST:
+        return None  # several explain it, and none is clearly the one
+    return one_place(misfit)
+
+
+def _best(found: list[tuple[Hypothesis, float]], margin: float) -> tuple[Hypothesis, float] | None:
+    """The winner and what it leaves unexplained, if it wins clearly, by `margin` at least."""
+    by_family: dict[str, tuple[Hypothesis, float]] = {}
+    for hypothesis, left in found:
+        known = by_family.get(hypothesis.family)
+        if known is None or left < known[1]:
+            by_family[hypothesis.family] = hypothesis, left
+    ranked = sorted(by_family.values(), key=lambda one: (one[0].parameters, one[1]))
+    winner = ranked[0]
+    for other in ranked[1:]:
+        fewer = winner[0].parameters < other[0].parameters
+        less = other[1] < (PENALTY if fewer else 1.0) * winner[1]
+        if less and winner[1] - other[1] > max(NO_MATTER, margin if fewer else 0.0):
+            winner = other
+    if winner[1] > 1.0 - MOST:
+        return None
+    rivals = [
+        left
+        for hypothesis, left in by_family.values()
+        if hypothesis.family not in (winner[0].family, GENERALISED.get(winner[0].family))
+    ]
+    next_one = min(rivals, default=1.0)
+    clear = max(winner[1], NO_MATTER) <= CLEARER * next_one and next_one - winner[1] > margin
+    return winner if clear else None

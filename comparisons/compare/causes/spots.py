@@ -1,0 +1,83 @@
+"""Differences that are in one place: what is wrong is not known, but where."""
+
+import numpy as np
+
+from comparisons.compare.causes.misfit import Misfit
+from comparisons.results.case import Cause, FloatArray
+
+SHARE = 0.9
+"""Of the excess, that one place must have."""
+
+FEW = 1e-3
+"""Of all pixels: so few, or one, are single ones."""
+
+SMALL = 0.1
+"""Of the picture: the largest rectangle that is called a place."""
+
+
+def one_place(misfit: Misfit) -> Cause | None:
+    """The row, column, rectangle or few pixels in which the difference lies, if it does."""
+    for block, excess in misfit.excesses():
+        total = float(excess.sum())
+        found = _rectangle(excess, total, block)
+        if block == 1:
+            found = _line(excess, total) or _pixels(excess, total) or found
+        if found is not None:
+            return found
+    return None
+
+
+def _line(excess: FloatArray, total: float) -> Cause | None:
+    for axis, name in ((1, "row"), (0, "column")):
+        sums = excess.sum(axis=axis)
+        k = int(np.argmax(sums))
+        share = float(sums[k]) / total
+        along = excess[k] if axis == 1 else excess[:, k]
+        # All of it is wrong, not a pixel or two that happen to be in it.
+        if share > SHARE and np.median(along) > EVEN * along.mean():
+            told = f"{_percent(share)} of the difference are in {name} {k}"
+            return Cause(f"one bad {name}", told, min(share, 1.0))
+    return None
+
+
+EVEN = 0.05
+"""Of the mean difference along a line: what the median has at least, if all of it is wrong."""
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * min(share, 1.0):.0f} %"
+
+
+def _pixels(excess: FloatArray, total: float) -> Cause | None:
+    count = max(1, int(FEW * excess.size))
+    order = np.argsort(excess, axis=None)[::-1][:count]
+    shares = np.cumsum(excess.ravel()[order]) / total
+    if shares[-1] < SHARE:
+        return None
+    needed = int(np.argmax(shares >= SHARE)) + 1
+    y, x = (int(i) for i in np.unravel_index(int(order[0]), excess.shape))
+    share = min(float(shares[-1]), 1.0)
+    many = "one pixel" if needed == 1 else f"{needed} pixels"
+    told = f"{_percent(share)} of the difference are in {many}, the worst at x {x}, y {y}"
+    return Cause("a single wrong pixel" if needed == 1 else "a few wrong pixels", told, share)
+
+
+def _rectangle(excess: FloatArray, total: float, block: int) -> Cause | None:
+    """The rows and columns that hold the difference, less the tail at either end."""
+    tail = 0.5 * (1.0 - SHARE) / 2.0
+    edges = []
+    for axis in (0, 1):
+        sums = np.cumsum(excess.sum(axis=axis)) / total
+        edges.append((int(np.argmax(sums > tail)), int(np.argmax(sums > 1.0 - tail)) + 1))
+    (left, right), (top, bottom) = edges
+    inside = float(excess[top:bottom, left:right].sum()) / total
+    width, height = right - left, bottom - top
+    if not (inside > SHARE and 0.0 < width * height < SMALL * excess.size):
+        return None
+    told = (
+        f"{_percent(inside)} of the difference are in the {width * block} x {height * block} "
+        f"pixels at x {left * block}, y {top * block}"
+    )
+    thin = block == 1 and 1 in (width, height) and max(width, height) > 8
+    name = ("one bad row" if height == 1 else "one bad column") if thin else "one bad tile"
+    return Cause(name, told, min(inside, 1.0))

@@ -1,0 +1,193 @@
+"""The comparison of one scene with Mitsuba, rung by rung, from its files to its verdict."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from comparisons import rungs as tiers
+from comparisons.compare import pictures
+from comparisons.compare.budget import Budget
+from comparisons.compare.control import control
+from comparisons.compare.judge import Evidence, Rendered, judge
+from comparisons.compare.single_lights import single_lights
+from comparisons.mitsuba.counterpart import Twin
+from comparisons.mitsuba.notes import notes_of
+from comparisons.mitsuba.translate import UntranslatableError, load
+from comparisons.results.case import Case, Tier
+from reference_rt.cameras.filters import BoxFilter, Filter
+from reference_rt.cli.explain import explain
+from reference_rt.integrators import RayCast, Whitted
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+
+_NO_LIGHT = "ray casting shows surfaces, not light"
+
+LIGHT_SPP = 64
+"""Samples per pixel of pictures of single lights: they are to be recognised, not measured."""
+
+Say = Callable[[str], None]
+"""Is told of each step, a line at a time."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """scene: what we render;  reference: what Mitsuba renders, the same unless a fault is planted
+    in one of them (None stands for the same)."""
+
+    scene: Scene
+    reference: Scene | None = None
+
+
+def compare_scene(
+    subject: Subject,
+    budget: Budget,
+    say: Say,
+    threads: int | None = None,
+    rungs: tuple[str, ...] = (),
+) -> Case:
+    """One scene, rung by rung;  threads: of ours, None for all cores;  rungs: only these, if any.
+
+    Raises SceneError, ImageError, ReferenceUnavailableError.
+    """
+    if budget.control:
+        return control(budgeted(subject.scene, budget), budget, say)
+    evidence = gather(subject, budget, say, threads, rungs)
+    return judge(evidence, budget.limit)
+
+
+def budgeted(scene: Scene, budget: Budget) -> Scene:
+    """The scene with the budget's size and samples, seen through a box filter.
+
+    A filter wider than the pixel shares samples between pixels on Mitsuba's side, and their noise
+    with them: the statistics need independent pixels, and the filter has a rung of its own.
+    """
+    film: dict[str, object] = {"filter": BoxFilter()}
+    if budget.size is not None:
+        film |= dict(zip(("width", "height"), budget.size, strict=True))
+    sampler = scene.resolved_sampler
+    if budget.spp is not None and not scene.integrator.deterministic:
+        sampler = sampler.model_copy(update={"spp": budget.spp})
+    return scene.changed(film=scene.film.model_copy(update=film), sampler=sampler)
+
+
+def gather(
+    subject: Subject,
+    budget: Budget,
+    say: Say,
+    threads: int | None = None,
+    only: tuple[str, ...] = (),
+) -> Evidence:
+    """Climb the deterministic rungs and render the pictures of both sides."""
+    scene = budgeted(subject.scene, budget)
+    clock = time.perf_counter()
+    tables = build_tables(scene)
+    seconds: dict[str, dict[str, float]] = {
+        "candidate": {"load": time.perf_counter() - clock},
+        "reference": {},
+    }
+    left_out = _left_out(scene, tables)
+    judged_by = budgeted(subject.reference or subject.scene, budget)
+    clock = time.perf_counter()
+    try:
+        twin = load(judged_by)
+    except UntranslatableError as error:
+        tier = Tier("geometry", "not-comparable", str(error))
+        return Evidence(scene.name, (tier,), None, seconds, left_out=left_out)
+    seconds["reference"] = {"load": time.perf_counter() - clock}
+
+    notes = [*twin.notes(), *notes_of(scene)]
+    if not isinstance(subject.scene.film.filter, BoxFilter):
+        notes.insert(0, "compared with a box filter")
+    film_filters = (subject.scene.film.filter, (subject.reference or subject.scene).film.filter)
+    found = _deterministic_rungs(scene, tables, twin, film_filters, budget, only, say)
+    pictured = not only or not {"statistics", "images"}.isdisjoint(only)
+    if twin.lacking and not isinstance(scene.integrator, RayCast):
+        found += [Tier(name, "not-comparable", twin.lacking) for name in ("statistics", "images")]
+        pictured = False
+    if not pictured:
+        return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
+    rendered = _pictures(scene, tables, twin, budget, threads, say)
+    for side, times in rendered.seconds.items():
+        seconds[side] = seconds[side] | times
+    notes.extend(rendered.notes)
+    return Evidence(
+        scene.name,
+        tuple(found),
+        rendered,
+        seconds,
+        tuple(notes),
+        left_out,
+        lights=None
+        if scene.integrator.deterministic
+        else lambda: single_lights(judged_by, LIGHT_SPP),
+    )
+
+
+def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:
+    """What the scene does not need, by the reason why."""
+    by_reason: dict[str, list[str]] = {}
+    for what, why in explain(scene, tables)[1]:
+        by_reason.setdefault(why, []).append(what)
+    return tuple(f"{', '.join(names)}: {why}" for why, names in by_reason.items())
+
+
+def _deterministic_rungs(
+    scene: Scene,
+    tables: SceneTables,
+    twin: Twin,
+    film_filters: tuple[Filter, Filter],
+    budget: Budget,
+    only: tuple[str, ...],
+    say: Say,
+) -> list[Tier]:
+    """The filter; geometry, then light, each only where the rung before it holds: a convention that
+    is wrong below must not be reported as light that is wrong above."""
+    climbs: dict[str, Callable[[], Tier]] = {
+        "geometry": lambda: tiers.geometry(scene, tables, twin, budget.pixels),
+        "direct": lambda: tiers.direct(scene, tables, twin, budget.light_pixels),
+        "whitted": lambda: tiers.whitted(scene, tables, twin, budget.pixels),
+    }
+    if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):
+        climbs = {"film": lambda: tiers.film(*film_filters), **climbs}
+    found: list[Tier] = []
+    for name, climb in climbs.items():
+        if only and name not in only:
+            continue
+        broken = next((t for t in found if t.status == "differ"), None)
+        of_light = name in ("direct", "whitted")
+        if broken is not None:
+            tier = Tier(name, "not-applicable", f"the {broken.name} rung below is broken")
+        elif of_light and isinstance(scene.integrator, RayCast):
+            tier = Tier(name, "not-applicable", _NO_LIGHT)
+        elif of_light and twin.lacking:
+            tier = Tier(name, "not-comparable", twin.lacking)
+        else:
+            start = time.perf_counter()
+            tier = climb()
+            say(f"{name}: {tier.status} ({time.perf_counter() - start:.1f} s)")
+        found.append(tier)
+    return found
+
+
+def _pictures(
+    scene: Scene,
+    tables: SceneTables,
+    twin: Twin,
+    budget: Budget,
+    threads: int | None,
+    say: Say,
+) -> Rendered:
+    if isinstance(scene.integrator, RayCast):
+        return pictures.cast(scene, tables, twin)
+    if isinstance(scene.integrator, Whitted):
+        return pictures.whitted(scene, tables, twin)
+    start = time.perf_counter()
+    rendered = pictures.replicates(
+        scene, tables, twin, budget.replicates, budget.reference_spp, threads
+    )
+    say(f"{budget.replicates} + {budget.replicates} pictures ({time.perf_counter() - start:.1f} s)")
+    return rendered
+
+
+__all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]

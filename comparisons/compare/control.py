@@ -1,0 +1,84 @@
+"""The harness's own control: Mitsuba against itself, in another variant and with other seeds.
+
+What differs here is a fault of the comparison, or of Mitsuba, and none of ours.
+"""
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from comparisons.compare import pictures
+from comparisons.compare.budget import Budget
+from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates
+from comparisons.mitsuba import backend
+from comparisons.mitsuba import scene as mitsuba_scene
+from comparisons.mitsuba.translate import UntranslatableError, load
+from comparisons.results.case import Case, FloatArray, Images, Tier
+from reference_rt.integrators import RayCast, Whitted
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+
+MOST_PIXELS = 64 * 48
+"""Of pictures without noise, whose rays scalar variants trace one by one in Python."""
+
+
+def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
+    """Compare the pictures of a scene by two variants of Mitsuba.  Raises SceneError,
+    ReferenceUnavailableError."""
+    if scene.integrator.deterministic:
+        scene = _smaller(scene)
+    chosen = backend.backend().variant
+    variants = {"candidate": backend.SCALAR, "reference": chosen}
+    found: list[FloatArray] = []
+    seconds: dict[str, dict[str, float]] = {}
+    sides = (f"Mitsuba's {backend.SCALAR}", f"Mitsuba's {chosen}")
+    rungs: tuple[Tier, ...] = ()
+    rendered = None
+    try:
+        for number, (side, variant) in enumerate(variants.items()):
+            start = time.perf_counter()
+            with backend.variant(variant):
+                # Seeds far apart: the candidate's replicates share none with the reference's.
+                found.append(_pictures(scene, budget, (1 - number) * 100_000))
+            seconds[side] = {"render": time.perf_counter() - start}
+            say(f"{variant}: {seconds[side]['render']:.1f} s")
+    except (UntranslatableError, _LackingError) as error:
+        rungs = (Tier("statistics", "not-comparable", str(error)),)
+    else:
+        if scene.integrator.deterministic:
+            rendered = Rendered(Images(found[0][0], found[1][0]))
+        else:
+            rendered = of_replicates(found[0], found[1], seconds)
+    return judge(
+        Evidence(f"{scene.name} (control)", rungs, rendered, seconds, sides=sides), budget.limit
+    )
+
+
+def _smaller(scene: Scene) -> Scene:
+    """The scene with MOST_PIXELS at most, its sides in about the same ratio."""
+    film = scene.film
+    factor = min(1.0, math.sqrt(MOST_PIXELS / (film.width * film.height)))
+    sides = {side: max(1, round(factor * getattr(film, side))) for side in ("width", "height")}
+    return scene.changed(film=film.model_copy(update=sides))
+
+
+class _LackingError(Exception):
+    """Mitsuba's scene is not one scene, and so has no light."""
+
+
+def _pictures(scene: Scene, budget: Budget, seed: int) -> FloatArray:
+    """(replicates, height, width, 3), of a deterministic scene one, by the variant that is set."""
+    twin = load(scene)
+    if isinstance(scene.integrator, RayCast):
+        tables = build_tables(scene)
+        ours = render(scene, tables=tables)
+        return pictures.mitsuba_cast(scene, tables, twin, ours)[0][np.newaxis]
+    if twin.lacking:
+        raise _LackingError(twin.lacking)
+    if isinstance(scene.integrator, Whitted):
+        return pictures.mitsuba_whitted(scene, build_tables(scene), twin)[np.newaxis]
+    spp = scene.resolved_sampler.spp
+    return mitsuba_scene.render(twin.mi_scene, budget.replicates, spp, seed).pictures

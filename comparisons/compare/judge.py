@@ -1,0 +1,128 @@
+"""From what was measured of a case to its verdict."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from comparisons import statistics
+from comparisons.compare import causes
+from comparisons.results.case import RUNGS, Case, Cause, FloatArray, Images, Place, Tier
+from comparisons.results.verdict import decide
+from comparisons.rungs.images import images_tier
+from comparisons.rungs.input import input_tier
+from comparisons.rungs.limited import limited
+from comparisons.statistics.metrics import image_metrics
+
+Lights = Callable[[], Mapping[str, FloatArray]]
+"""The reference's pictures of single lights (height, width, 3) by name, rendered when asked for."""
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """images: the two pictures;  seconds: wall clock by side and step;  replicates: the noisy
+    pictures (replicates, height, width, 3) of each side that they are the means of, else None."""
+
+    images: Images
+    seconds: dict[str, dict[str, float]] = field(default_factory=dict)
+    replicates: tuple[FloatArray, FloatArray] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def of_replicates(
+    candidate: FloatArray, reference: FloatArray, seconds: dict[str, dict[str, float]]
+) -> Rendered:
+    """The means of noisy pictures (replicates, height, width, 3), and how exact they are."""
+    if candidate.shape[1:] == reference.shape[1:]:
+        error = statistics.standard_error(candidate, reference)
+    else:
+        error = None
+    means = Images(candidate.mean(axis=0), reference.mean(axis=0), error)
+    return Rendered(means, seconds, (candidate, reference))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a verdict is made from.  name: of the case;  rungs: the deterministic ones;  rendered:
+    the pictures of both sides, None where there are none;  lights: for the likeliest cause;  the
+    rest as in `Case`."""
+
+    name: str
+    rungs: tuple[Tier, ...]
+    rendered: Rendered | None
+    seconds: Mapping[str, Mapping[str, float]]
+    notes: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    sides: tuple[str, str] = ("ours", "Mitsuba's")
+    lights: Lights | None = None
+
+
+def judge(evidence: Evidence, limit: float) -> Case:
+    """The verdict on all rungs; where there is a difference, its likeliest cause and its places.
+
+    limit: the smallest relative bias of the image mean that must be visible.
+    """
+    rungs, rendered = list(evidence.rungs), evidence.rendered
+    metrics, images = None, None
+    if rendered is not None:
+        rungs += picture_rungs(rendered, limit)
+        images = rendered.images
+        if not any(tier.status == "invalid" for tier in rungs):
+            metrics = image_metrics(images)
+            rungs.append(images_tier(images, metrics, rendered.replicates))
+    rungs = limited(rungs)
+    verdict, reason = decide(rungs, metrics)
+    cause: Cause | None = None
+    worst: tuple[Place, ...] = ()
+    if verdict == "differ":
+        cause = causes.of_rungs(rungs)
+        if rendered is not None and metrics is not None:
+            cause = cause or _cause_of(rendered.images, evidence.lights)
+            worst = _places(rendered)
+    return Case(
+        scene=evidence.name,
+        verdict=verdict,
+        reason=reason,
+        tiers=tuple(sorted(rungs, key=lambda tier: RUNGS.index(tier.name))),
+        metrics=metrics,
+        seconds={side: dict(times) for side, times in evidence.seconds.items()},
+        images=images,
+        notes=evidence.notes,
+        sides=evidence.sides,
+        cause=cause,
+        worst=worst,
+        left_out=evidence.left_out,
+    )
+
+
+def picture_rungs(rendered: Rendered, limit: float) -> list[Tier]:
+    """What is wrong with the pictures as such, and, of noisy ones, the statistics."""
+    if rendered.replicates is None:
+        images = rendered.images
+        checked = input_tier(images.candidate, images.reference)
+        return [checked, Tier("statistics", "not-applicable", "deterministic: there is no noise")]
+    checked = input_tier(*rendered.replicates)
+    if checked.status == "invalid":
+        return [checked]
+    return [checked, statistics.compare(*rendered.replicates, limit=limit)]
+
+
+def _cause_of(images: Images, lights: Lights | None) -> Cause | None:
+    plain = causes.likeliest(images)
+    if lights is None or (plain is not None and plain.explained > SURE):
+        return plain
+    return causes.likeliest(images, lights())
+
+
+SURE = 0.98
+"""Of the squared difference: a cause that explains so much needs no pictures of single lights."""
+
+
+def _places(rendered: Rendered) -> tuple[Place, ...]:
+    if rendered.replicates is not None:
+        return statistics.worst_places(*rendered.replicates)
+    images = rendered.images
+    return statistics.worst_places(images.candidate[np.newaxis], images.reference[np.newaxis])
+
+
+__all__ = ["Evidence", "Lights", "Rendered", "judge", "of_replicates", "picture_rungs"]

@@ -1,0 +1,164 @@
+"""The two pictures of a scene, ours and Mitsuba's, as each integrator makes them."""
+
+import time
+
+import numpy as np
+
+from comparisons.compare.judge import Rendered, of_replicates
+from comparisons.mitsuba import scene as mitsuba_scene
+from comparisons.mitsuba.counterpart import Twin, trace
+from comparisons.mitsuba.hits import Answers
+from comparisons.results.case import Images
+from comparisons.rungs.rays.bounds import ShapeSizes
+from comparisons.rungs.rays.camera import camera_rays
+from comparisons.rungs.rays.rays import Rays
+from comparisons.rungs.whitted import plugin_radiance
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.vec3 import row as row_of
+from reference_rt.integrators import Whitted
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit.kernel import entry_kernel
+from reference_rt.rendering.image import display
+from reference_rt.rendering.render import Picture, render
+from reference_rt.rendering.scene import Scene
+from reference_rt.textures import At, colour_at
+
+
+def cast(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
+    """Ray casting: the shown layer as its picture, Mitsuba's from its own hits of the same rays."""
+    ours = render(scene, tables=tables)
+    start = time.perf_counter()
+    theirs, notes = mitsuba_cast(scene, tables, twin, ours)
+    seconds = _seconds(ours, time.perf_counter() - start)
+    return Rendered(Images(display(ours), theirs), seconds, notes=notes)
+
+
+def mitsuba_cast(
+    scene: Scene, tables: SceneTables, twin: Twin, ours: Picture
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """The layer that `ours` shows, as displayed (height, width, 3), from Mitsuba's hits of the rays
+    through the pixels' middles; what a reader should know of it."""
+    film = scene.film
+    y, x = np.mgrid[0 : film.height, 0 : film.width]
+    o, d = camera_rays(scene, x.ravel() + 0.5, y.ravel() + 0.5)
+    hits = trace(twin, o, d)
+    notes = [f"the pictures show the layer '{ours.shown}' as displayed, not radiance"]
+    uv = np.where(hits.has_uv[:, None], hits.uv, ours.layers["uv"].reshape(-1, 2))
+    if ours.shown == "uv" and not hits.has_uv[hits.shape >= 0].all():
+        notes.append(
+            "Mitsuba has other uv, or none, for some shapes: there ours stand on both sides"
+        )
+    layers = {
+        "colour": _colours(scene, tables, hits, uv),
+        "distance": hits.t,
+        "normal": np.where(hits.stands_in[:, None], hits.ns, hits.n),
+        "id": hits.shape.astype(np.float64),
+        "uv": uv,
+    }
+    shaped = {k: v.reshape(film.height, film.width, *v.shape[1:]) for k, v in layers.items()}
+    return display(Picture(shaped, ours.shown)), tuple(notes)
+
+
+def _colours(scene: Scene, tables: SceneTables, hits: Answers, uv: FloatArray) -> FloatArray:
+    """The colour (n, 3) of what was hit: of its material, or of a mesh's vertices at the place."""
+    sizes = ShapeSizes(scene)
+    names = [*scene.materials, None]
+    leaf, local = sizes.leaf_of(hits), sizes.local_points(hits)
+    found = np.zeros((len(hits.t), 3))
+    mixed = np.full((len(hits.t), 3), -1.0)  # negative stands for none
+    material = np.full(len(hits.t), -1)
+    for number in np.unique(leaf[leaf >= 0]).tolist():
+        rows = np.flatnonzero(leaf == number)
+        sizes_of = sizes.leaves[number]
+        material[rows] = names.index(sizes_of.material)
+        if sizes_of.field == "triangles" and sizes_of.table.colours is not None:
+            row = sizes_of.row_of(hits.primitive[rows])
+            weights = _barycentrics(sizes_of.table.vertices[row], local[rows])
+            of_corners = sizes_of.table.colours[row].reshape(-1, 3, 3)
+            has_any = of_corners[:, :1, 0] >= 0.0
+            mixed[rows] = np.where(has_any, np.einsum("nk,nki->ni", weights, of_corners), -1.0)
+    _shown(tables, material, uv, mixed, found)
+    return np.where(mixed[:, :1] >= 0.0, mixed, found)
+
+
+@entry_kernel
+def _shown(
+    tables: SceneTables, material: IntArray, uv: FloatArray, colours: FloatArray, out: FloatArray
+) -> None:
+    """The colours of materials (n,), -1 for none, at surface coordinates (n, 2)."""
+    for i in range(len(material)):
+        if material[i] >= 0:
+            at = At(tables.textures, uv[i, 0], uv[i, 1], row_of(colours, i))
+            out[i, 0], out[i, 1], out[i, 2] = colour_at(tables.materials.shown, material[i], at)
+
+
+def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
+    """(n, 3) weights of the corners of triangles (n, 9), by the areas opposite, for points (n, 3)
+    of their planes."""
+    v = vertices.reshape(-1, 3, 3)
+    normal = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
+    areas = [np.sum(normal * np.cross(v[:, k - 2] - p, v[:, k - 1] - p), axis=1) for k in range(3)]
+    return np.asarray(np.stack(areas, axis=1) / np.sum(normal * normal, axis=1)[:, None])
+
+
+def whitted(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
+    """Recursive ray tracing: Mitsuba's plugin along the rays of our grid of samples."""
+    ours = render(scene, tables=tables)
+    start = time.perf_counter()
+    theirs = mitsuba_whitted(scene, tables, twin)
+    return Rendered(Images(ours.colour, theirs), _seconds(ours, time.perf_counter() - start))
+
+
+def mitsuba_whitted(scene: Scene, tables: SceneTables, twin: Twin) -> FloatArray:
+    """The picture (height, width, 3) by Mitsuba's plugin."""
+    assert isinstance(scene.integrator, Whitted)
+    n = round(scene.resolved_sampler.spp**0.5)
+    height, width = scene.film.height, scene.film.width
+    y, x = np.mgrid[0 : height * n, 0 : width * n]
+    rays = Rays(*camera_rays(scene, (x.ravel() + 0.5) / n, (y.ravel() + 0.5) / n))
+    # Few large pieces: Dr.Jit traces the plugin anew for each.
+    radiance = plugin_radiance(scene, tables, twin, scene.integrator)
+    pieces = [
+        radiance(Rays(rays.o[k : k + AT_ONCE], rays.d[k : k + AT_ONCE]))
+        for k in range(0, len(rays.o), AT_ONCE)
+    ]
+    samples = np.concatenate(pieces).reshape(height, n, width, n, 3)
+    return np.asarray(samples.mean(axis=(1, 3)))
+
+
+AT_ONCE = 1 << 18
+"""Rays that Mitsuba's plugin gets together: a recursion's memory is many times theirs."""
+
+
+def replicates(
+    scene: Scene,
+    tables: SceneTables,
+    twin: Twin,
+    count: int,
+    reference_spp: int | None,
+    threads: int | None,
+) -> Rendered:
+    """Path tracing: `count` pictures on each side with independent seeds; the images are their
+    means.  "render" is the median time of one picture."""
+    sampler = scene.resolved_sampler
+    first = getattr(sampler, "seed", 0)
+    ours, times = [], []
+    for k in range(count):
+        seeded = scene.changed(sampler=sampler.model_copy(update={"seed": first + k}))
+        picture = render(seeded, tables=tables, threads=threads)
+        ours.append(picture.colour)
+        times.append(picture.seconds)
+    theirs = mitsuba_scene.render(twin.mi_scene, count, reference_spp or sampler.spp, first)
+    seconds = {
+        "candidate": {
+            "compile": times[0]["compile"],
+            "render": float(np.median([t["render"] for t in times])),
+        },
+        "reference": {"render": float(np.median(theirs.seconds))},
+    }
+    return of_replicates(np.stack(ours), theirs.pictures, seconds)
+
+
+def _seconds(ours: Picture, mitsuba: float) -> dict[str, dict[str, float]]:
+    times = {step: ours.seconds[step] for step in ("compile", "render")}
+    return {"candidate": times, "reference": {"render": mitsuba}}

@@ -1,0 +1,45 @@
+"""Pictures of a scene by one light at a time: what is missing, or there twice, looks like one."""
+
+from collections.abc import Mapping
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.lights import Ambient
+from reference_rt.materials import AnyMaterial, Emissive
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+
+MOST = 8
+"""Lights: of more, one that is missing is hard to tell from the others."""
+
+DARK = (0.0, 0.0, 0.0)
+
+
+def single_lights(scene: Scene, spp: int, threads: int | None = None) -> Mapping[str, FloatArray]:
+    """Our picture (height, width, 3) of each of the scene's lights and shining materials, alone,
+    by its name; empty where there are fewer than two, or more than MOST."""
+    shining = [name for name, m in scene.materials.items() if isinstance(m, Emissive)]
+    lights = [k for k, light in enumerate(scene.lights) if not isinstance(light, Ambient)]
+    if not 2 <= len(shining) + len(lights) <= MOST:
+        return {}
+    sampler = scene.resolved_sampler
+    if hasattr(sampler, "seed"):
+        sampler = sampler.model_copy(update={"spp": spp})
+    found = {}
+    for name in shining:
+        one = scene.changed(lights=(), materials=_only(scene, name), sampler=sampler)
+        found[f"the material '{name}'"] = render(one, threads=threads).colour
+    for k in lights:
+        light = scene.lights[k]
+        one = scene.changed(lights=(light,), materials=_only(scene, None), sampler=sampler)
+        found[f"lights[{k}] ({light.type})"] = render(one, threads=threads).colour
+    return found
+
+
+def _only(scene: Scene, name: str | None) -> dict[str, AnyMaterial]:
+    """The scene's materials, of which that one alone may shine."""
+    return {
+        other: material.model_copy(update={"radiance": DARK})
+        if isinstance(material, Emissive) and other != name
+        else material
+        for other, material in scene.materials.items()
+    }

@@ -1,0 +1,2 @@
+"""Experiments: stability, convergence, benchmarks, intersection methods, and the harness's own
+test."""

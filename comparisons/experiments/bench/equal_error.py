@@ -1,0 +1,171 @@
+"""Seconds until a relative error of 1 %, over the scenes that are path traced on both sides."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from comparisons.experiments.bench.row import Row
+from comparisons.experiments.bench.setting import Setting
+from reference_rt.integrators import Path as PathTracing
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import ReferenceRtError
+
+TARGET = 0.01
+"""Relative error: the root of relMSE."""
+
+SECONDS = 15.0
+"""Budget of a scene, all contestants together."""
+
+QUICK = ("cornell_box", "many_lights", "mesh_knot", "textured_room")
+
+DEFAULT, BEST = "mitsuba_llvm", "mitsuba_llvm_best"
+MEDIAN_GOAL, WORST_GOAL, BEST_GOAL = 0.5, 1.5, 1.0
+
+
+def measure(setting: Setting) -> list[Row]:
+    """Median and worst against the default sampler, median against the best one.
+
+    Raises ReferenceUnavailableError.
+    """
+    from comparisons.experiments.convergence import reached
+
+    scenes = path_traced(setting)
+    found: dict[str, dict[str, float]] = {}
+    left_out: dict[str, str] = {}
+    extrapolated: dict[str, list[str]] = {}
+    for k, (name, scene) in enumerate(scenes.items()):
+        setting.say(name, k / len(scenes))
+        try:
+            targets = reached(scene, TARGET, SECONDS)
+        except (ValueError, ReferenceRtError) as error:
+            left_out[name] = str(error)
+            continue
+        found[name] = {who: target.seconds.value for who, target in targets.items()}
+        extrapolated[name] = [
+            who for who, target in targets.items() if target.how == "extrapolated"
+        ]
+    return rows(found, left_out, extrapolated)
+
+
+def path_traced(setting: Setting) -> dict[str, Scene]:
+    """The scenes of the standard suite that are path traced, and that Mitsuba can render."""
+    from comparisons.mitsuba.translate import UntranslatableError, load
+    from comparisons.suites.suite import load_suite
+
+    found: dict[str, Scene] = {}
+    for name in load_suite("standard").suite.scenes:
+        scene = setting.load(name)
+        if not isinstance(scene.integrator, PathTracing) or (setting.quick and name not in QUICK):
+            continue
+        try:
+            load(scene)
+        except UntranslatableError:
+            continue
+        found[name] = scene
+    return found
+
+
+def rows(
+    found: dict[str, dict[str, float]],
+    left_out: dict[str, str],
+    extrapolated: Mapping[str, Sequence[str]] | None = None,
+) -> list[Row]:
+    """The rows of times by scene and contestant; `left_out` says why other scenes have none,
+    `extrapolated` which times of a scene lie beyond what was measured."""
+    guessed = extrapolated or {}
+    against_default = _ratios(found, DEFAULT)
+    against_best = _ratios(found, BEST)
+    what = f"time to {TARGET:.0%} relative error"
+    details: dict[str, Any] = {"target": TARGET, "seconds": found, "left_out": left_out}
+    details["extrapolated"] = {name: list(who) for name, who in guessed.items() if who}
+    worst = max(against_default, key=lambda name: against_default[name], default="")
+    return [
+        _row("error_default",
+             f"{what}, median over {_scenes(against_default, DEFAULT, guessed)}: / Mitsuba llvm, "
+             "its default sampler",
+             found, DEFAULT, against_default, MEDIAN_GOAL, details),
+        Row(
+            "error_default_worst",
+            f"the same, the worst scene ({worst}{_worst(worst, DEFAULT, guessed)})",
+            found.get(worst, {}).get("ours", math.nan),
+            found.get(worst, {}).get(DEFAULT, math.nan),
+            "Mitsuba llvm, default sampler",
+            "s",
+            against_default.get(worst, math.nan),
+            WORST_GOAL,
+            "lower",
+            {},
+            {"worst": worst, "ratios": against_default},
+        ),
+        _row("error_best",
+             f"{what}, median over {_scenes(against_best, BEST, guessed)}: / Mitsuba llvm, "
+             "its best sampler",
+             found, BEST, against_best, BEST_GOAL, details),
+    ]  # fmt: skip
+
+
+def _is_extrapolated(scene: str, peer: str, extrapolated: Mapping[str, Sequence[str]]) -> bool:
+    """Whether a time that the ratio of a scene is made of was not measured."""
+    return bool({"ours", peer} & set(extrapolated.get(scene, ())))
+
+
+def _scenes(
+    ratios: Mapping[str, float], peer: str, extrapolated: Mapping[str, Sequence[str]]
+) -> str:
+    """ "scenes", and of how many of them the ratio is extrapolated."""
+    number = sum(_is_extrapolated(scene, peer, extrapolated) for scene in ratios)
+    return f"{len(ratios)} scenes ({number} extrapolated)" if number else "scenes"
+
+
+def _worst(scene: str, peer: str, extrapolated: Mapping[str, Sequence[str]]) -> str:
+    return ", extrapolated" if _is_extrapolated(scene, peer, extrapolated) else ""
+
+
+def _ratios(found: dict[str, dict[str, float]], peer: str) -> dict[str, float]:
+    """Ours over the peer's, by scene; of scenes that at least one of both reaches: an infinite time
+    is that of who never does."""
+    return {
+        name: times["ours"] / times[peer]
+        for name, times in found.items()
+        if times.get(peer, 0.0) > 0.0
+        and min(times.get("ours", math.inf), times[peer]) < math.inf
+        and "ours" in times
+    }
+
+
+def _row(
+    name: str,
+    title: str,
+    found: dict[str, dict[str, float]],
+    peer: str,
+    ratios: dict[str, float],
+    goal: float,
+    details: dict[str, Any],
+) -> Row:
+    """Medians over scenes of both times and of their ratios; the spread is that of the scenes."""
+    sampler = "default" if peer == DEFAULT else "best"
+    low, median, high = (math.nan,) * 3
+    ours = theirs = math.nan
+    if ratios:
+        values = list(ratios.values())
+        # Quartiles that are among the scenes: between an infinite one and another there is none.
+        low = float(np.quantile(values, 0.25, method="lower"))
+        median = float(np.median(values))
+        high = float(np.quantile(values, 0.75, method="higher"))
+        ours = float(np.median([found[scene]["ours"] for scene in ratios]))
+        theirs = float(np.median([found[scene][peer] for scene in ratios]))
+    return Row(
+        name,
+        title,
+        ours,
+        theirs,
+        f"Mitsuba llvm, {sampler} sampler",
+        "s",
+        median,
+        goal,
+        "lower",
+        {"ratio": [low, high]},
+        {**details, "ratios": ratios, "scenes": len(ratios)},
+    )

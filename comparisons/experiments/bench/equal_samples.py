@@ -1,0 +1,59 @@
+"""The Cornell box with the same number of samples: ours against Mitsuba."""
+
+from comparisons.experiments.bench.row import Row, against
+from comparisons.experiments.bench.setting import Setting
+from comparisons.experiments.bench.timing import alternate, seconds
+from reference_rt.cameras.film import BoxFilter, Film
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Sobol
+
+SCENE, SIZE, SPP = "cornell_box", 256, 64
+
+VARIANTS = {"cornell_llvm": ("llvm_ad_rgb", 0.8), "cornell_scalar": ("scalar_rgb", 0.25)}
+"""Variant of Mitsuba and goal, by row."""
+
+
+def measure(setting: Setting) -> list[Row]:
+    """Both rows.  Raises ReferenceUnavailableError."""
+    return [_row(name, setting) for name in VARIANTS]
+
+
+def cornell_box(setting: Setting) -> Scene:
+    """The scene at the size that is measured, a quarter of it for a quick run."""
+    size = SIZE // 2 if setting.quick else SIZE
+    film = Film(width=size, height=size, filter=BoxFilter())
+    return setting.load(SCENE).changed(film=film, sampler=Sobol(spp=SPP))
+
+
+def _row(name: str, setting: Setting) -> Row:
+    from comparisons.mitsuba import scene as mitsuba_scene
+    from comparisons.mitsuba.backend import variant
+    from comparisons.mitsuba.translate import load
+
+    mitsuba_variant, goal = VARIANTS[name]
+    scene = cornell_box(setting)
+    size = scene.film.width
+    with variant(mitsuba_variant):
+        twin = load(scene)
+        seeds = iter(range(1, 1000))
+
+        def ours() -> object:
+            return render(scene, tables=scene.tables, threads=setting.threads)
+
+        def theirs() -> object:
+            return mitsuba_scene.picture(twin.mi_scene, SPP, next(seeds))
+
+        ours(), theirs()  # compile
+        times = alternate(
+            {"ours": lambda: seconds(ours), mitsuba_variant: lambda: seconds(theirs)},
+            say=setting.say,
+        )
+    return against(
+        name,
+        f"{SCENE} {size}x{size}, {SPP} samples per pixel: time / Mitsuba {mitsuba_variant}",
+        times["ours"],
+        (f"Mitsuba {mitsuba_variant}", times[mitsuba_variant]),
+        goal,
+        details={"seconds": times, "threads": setting.threads, "sampler": "sobol / independent"},
+    )

@@ -1,0 +1,62 @@
+"""All groups of rows, in the order of the table.
+
+To add a row: its name and the function that measures it here; the function in a file of its own.
+"""
+
+from collections.abc import Callable, Sequence
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+from comparisons.experiments.bench import (
+    equal_error,
+    equal_samples,
+    mesh_rays,
+    million,
+    program,
+    threads,
+    unused,
+)
+from comparisons.experiments.bench.row import Row
+from comparisons.experiments.bench.setting import Setting
+from reference_rt.util.errors import UsageError
+
+
+class Group(NamedTuple):
+    """Rows that are measured together."""
+
+    name: str
+    rows: tuple[str, ...]
+    measure: Callable[[Setting], list[Row]]
+
+
+GROUPS = (
+    Group("equal_samples", tuple(equal_samples.VARIANTS), equal_samples.measure),
+    Group(
+        "equal_error",
+        ("error_default", "error_default_worst", "error_best"),
+        equal_error.measure,
+    ),
+    Group(
+        "mesh_rays", (*(f"rays_{kind}" for kind in mesh_rays.GOALS), "any_hit"), mesh_rays.measure
+    ),
+    Group("threads", ("threads",), threads.measure),
+    Group("cold", ("cold",), program.measure_cold),
+    Group("warm", ("warm",), program.measure_warm),
+    Group("unused", ("unused",), unused.measure),
+    Group("million", ("million_build", "million_memory"), million.measure),
+)
+
+
+def chosen(patterns: Sequence[str]) -> tuple[Group, ...]:
+    """The groups that have a row of these names, which may be patterns as of a shell; all groups
+    for none.  Raises UsageError for a name that fits nothing."""
+    for pattern in patterns:
+        if not any(fnmatchcase(row, pattern) for group in GROUPS for row in group.rows):
+            known = ", ".join(row for group in GROUPS for row in group.rows)
+            raise UsageError(f"--only: no row is called '{pattern}'; expected some of {known}")
+    return tuple(
+        group
+        for group in GROUPS
+        if not patterns
+        or any(fnmatchcase(row, pattern) for row in group.rows for pattern in patterns)
+    )

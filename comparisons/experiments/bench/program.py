@@ -1,0 +1,127 @@
+"""`reference-rt render` as a process of its own: what a person waits for."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.experiments.bench.row import Row, within
+from comparisons.experiments.bench.setting import Setting
+from comparisons.experiments.bench.timing import ROUNDS
+from reference_rt.util.child_processes import tied
+from reference_rt.util.errors import ReferenceRtError
+
+SIZE, SPP = "64x64", 16
+PICTURE = f"{SIZE}, {SPP} samples per pixel"
+"""A picture that takes next to no time, so that what is measured is everything else."""
+
+COLD_SECONDS, WARM_SECONDS = 15.0, 1.5
+
+WARM = ("cornell_box", "mesh_knot", "textured_room", "material_principled", "whitted_classic")
+"""Scenes that are rendered again and again: few shapes, many triangles, textures, a long material,
+and no random numbers."""
+
+QUICK = ("cornell_box", "mesh_knot", "textured_room")
+
+_TIMEOUT = 600.0
+
+_TOLD = re.compile(r"([\d.]+) s to build, ([\d.]+) s to compile.*?, ([\d.]+) s to render")
+
+
+class Program:
+    """Renders scenes in processes of their own, which have `folder` for their pictures.
+
+    The byte code of our sources is kept there too, as pip does when it installs: where it is told
+    not to be written (PYTHONDONTWRITEBYTECODE) every process would read all sources anew.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.environment = dict(os.environ)
+        self.environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        self.environment["PYTHONPYCACHEPREFIX"] = str(folder / "bytecode")
+
+    def prepare(self) -> None:
+        """Writes the byte code."""
+        self._run(["--help"], None)
+
+    def render(self, scene: Path, cache: str | None = None) -> dict[str, float]:
+        """Seconds of the whole process ("wall"), and what it tells itself, with the kernels of the
+        folder `cache`, or with those of the user.  Raises ReferenceRtError where it fails."""
+        picture = self.folder / "picture.png"
+        start = time.perf_counter()
+        options = ["--size", SIZE, "--spp", str(SPP), "-o", str(picture)]
+        told = self._run(["render", str(scene), *options], cache)
+        found = {"wall": time.perf_counter() - start}
+        if match := _TOLD.search(told):
+            names = ("build", "compile", "render")
+            found |= dict(zip(names, map(float, match.groups()), strict=True))
+        return found
+
+    def _run(self, arguments: Sequence[str], cache: str | None) -> str:
+        own = {} if cache is None else {"REFERENCE_RT_CACHE": str(self.folder / cache)}
+        run = subprocess.run(
+            [sys.executable, "-m", "reference_rt.cli.main", *arguments],
+            env=self.environment | own,
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT,
+            **tied(),
+            check=False,
+        )
+        if run.returncode != 0:
+            last = (run.stderr.strip().splitlines() or ["no message"])[-1]
+            raise ReferenceRtError(f"reference-rt {' '.join(arguments)}: {last}")
+        return str(run.stderr)
+
+
+def measure_cold(setting: Setting) -> list[Row]:
+    """Every scene once, each with an empty cache: compiling takes so long that one time tells."""
+    names = [n for n in setting.names() if not setting.quick or n in QUICK]
+    found: dict[str, dict[str, float]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        program = Program(Path(folder))
+        program.prepare()
+        for k, name in enumerate(names):
+            setting.say(f"{name}, no kernels", k / len(names))
+            found[name] = program.render(setting.file(name), f"cold-{k}")
+    walls = {name: times["wall"] for name, times in found.items()}
+    worst = max(walls, key=lambda name: walls[name])
+    over = [name for name, wall in walls.items() if wall > COLD_SECONDS]
+    details: dict[str, Any] = {
+        "scenes": len(walls),
+        "worst": worst,
+        "median": float(np.median(list(walls.values()))),
+        "over_the_limit": over,
+        "seconds": found,
+    }
+    title = f"first render ever, no kernels compiled, {PICTURE}: worst of {len(walls)} scenes"
+    return [within("cold", title, [walls[worst]], COLD_SECONDS, details=details)]
+
+
+def measure_warm(setting: Setting) -> list[Row]:
+    """Some scenes again and again; the row is the slowest's."""
+    names = [n for n in WARM if not setting.quick or n in QUICK]
+    found: dict[str, list[dict[str, float]]] = {name: [] for name in names}
+    with tempfile.TemporaryDirectory() as folder:
+        program = Program(Path(folder))
+        for name in names:
+            setting.say(f"{name}, compiling", 0.0)
+            program.render(setting.file(name))
+        for k in range(ROUNDS):
+            for i, name in enumerate(names):
+                setting.say(name, (k + i / len(names)) / ROUNDS)
+                found[name].append(program.render(setting.file(name)))
+    walls = {name: [t["wall"] for t in times] for name, times in found.items()}
+    medians = {name: float(np.median(wall)) for name, wall in walls.items()}
+    worst = max(medians, key=lambda name: medians[name])
+    title = f"reference-rt render, warm, {PICTURE}, whole process: worst of {len(names)} scenes"
+    details = {"worst": worst, "medians": medians, "seconds": found}
+    return [within("warm", title, walls[worst], WARM_SECONDS, details=details)]

@@ -1,0 +1,137 @@
+"""The groups of rows, one after another: what is measured already is read, the rest is measured."""
+
+import datetime
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from comparisons.experiments.bench.display import Display
+from comparisons.experiments.bench.groups import GROUPS, Group
+from comparisons.experiments.bench.machine import machine
+from comparisons.experiments.bench.row import Row, row_from
+from comparisons.experiments.bench.setting import Setting
+from comparisons.experiments.bench.table import markdown
+from comparisons.runs.sources import sources_digest
+from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.files import check_writable, read_text, replacing
+
+SCHEMA = 1
+"""Raised whenever a reader of the former layout would misread the new one."""
+
+_PACKAGES = ("numpy", "numba", "mitsuba", "drjit")
+
+
+@dataclass
+class Outcome:
+    """rows: in the order of the table;  not_measured: why others are not, by group;  machine: see
+    `comparisons.experiments.bench.machine`."""
+
+    rows: list[Row] = field(default_factory=list)
+    not_measured: dict[str, str] = field(default_factory=dict)
+    machine: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def met(self) -> bool:
+        """Whether everything that was to be measured was, and every goal is met."""
+        return not self.not_measured and all(row.met for row in self.rows)
+
+
+def run(
+    groups: Sequence[Group],
+    setting: Setting,
+    out: Path,
+    display: Display,
+    fresh: bool = False,
+) -> Outcome:
+    """Measure `groups`, which `display` is told of.
+
+    Each group's rows are kept in `out`/rows as soon as they are known, and not measured again for
+    the same sources, versions, machine and setting unless `fresh`; `results.json` and `bench.md`
+    are whole after each, with all groups that are kept.  Raises UsageError, SceneError, ImageError.
+    """
+    check_writable(out / "results.json", out / "bench.md", out / "rows" / "a row")
+    facts = machine()
+    key = key_of(setting, facts)
+    outcome = Outcome(machine=facts)
+    for group in groups:
+        path = out / "rows" / f"{group.name}.json"
+        rows = None if fresh else read_rows(path, key)
+        if rows is not None:
+            display.done(rows, "measured before")
+            continue
+        display.begin(group.name)
+        try:
+            rows = group.measure(setting)
+        except ReferenceUnavailableError as error:
+            outcome.not_measured[group.name] = str(error)
+            display.line(f"{group.name}: not measured: {error}")
+            continue
+        _write_rows(path, key, rows)
+        display.done(rows)
+        _write(out, outcome, key, setting)
+    _write(out, outcome, key, setting)
+    return outcome
+
+
+def key_of(setting: Setting, facts: dict[str, Any]) -> str:
+    """What rows are measured with: they are read again only where all of this is the same."""
+    digest = hashlib.sha256(sources_digest().encode())
+    for path in sorted(p for p in setting.scenes.rglob("*") if p.is_file()):
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    if setting.mesh is not None:
+        digest.update(hashlib.sha256(setting.mesh.read_bytes()).digest())
+    versions = [importlib.metadata.version(name) for name in _PACKAGES if facts.get(name)]
+    parts = [versions, facts["machine"], facts["cores"], setting.quick, setting.threads]
+    digest.update(json.dumps(parts).encode())
+    return digest.hexdigest()
+
+
+def read_rows(path: Path, key: str) -> list[Row] | None:
+    """The rows that are kept for this key, if any."""
+    try:
+        kept = json.loads(read_text(path))
+        return [row_from(row) for row in kept["rows"]] if kept["key"] == key else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _write_rows(path: Path, key: str, rows: Sequence[Row]) -> None:
+    kept = {"key": key, "date": _now(), "rows": [row.as_json() for row in rows]}
+    _write_json(path, kept)
+
+
+def _write(out: Path, outcome: Outcome, key: str, setting: Setting) -> None:
+    """What is known of all groups, in the order of the table."""
+    kept = {group.name: read_rows(out / "rows" / f"{group.name}.json", key) for group in GROUPS}
+    outcome.rows = [row for rows in kept.values() for row in rows or ()]
+    document = {
+        "schema": SCHEMA,
+        "kind": "bench",
+        "machine": outcome.machine,
+        "setting": {
+            "scenes": str(setting.scenes),
+            "mesh": None if setting.mesh is None else setting.mesh.name,
+            "quick": setting.quick,
+            "threads": setting.threads,
+        },
+        "rows": [row.as_json() for row in outcome.rows],
+        "not_measured": outcome.not_measured,
+    }
+    _write_json(out / "results.json", document)
+    with replacing(out / "bench.md") as temporary:
+        text = markdown(outcome.rows, outcome.machine, outcome.not_measured)
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _write_json(path: Path, document: dict[str, Any]) -> None:
+    with replacing(path) as temporary:
+        text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")

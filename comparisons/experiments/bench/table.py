@@ -1,0 +1,69 @@
+"""The rows as tables: for a terminal, and as Markdown."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+
+from comparisons.experiments.bench.row import LIMIT, Row
+
+_COLUMNS = ("what", "ours", "against", "ratio", "quartiles", "goal", "met")
+
+
+def terminal(rows: Sequence[Row]) -> Table:
+    """A table for people at a terminal."""
+    table = Table(show_edge=False, pad_edge=False)
+    for name in _COLUMNS:
+        table.add_column(name, overflow="fold")
+    for row in rows:
+        cells = _cells(row)
+        table.add_row(*cells, style=None if row.met else "yellow")
+    return table
+
+
+def markdown(
+    rows: Sequence[Row], machine: Mapping[str, Any], not_measured: Mapping[str, str]
+) -> str:
+    """The table with its date and machine."""
+    lines = [described(machine), ""]
+    lines.append("| " + " | ".join(_COLUMNS) + " |")
+    lines.append("|---" * len(_COLUMNS) + "|")
+    lines += ["| " + " | ".join(c.replace("|", "\\|") for c in _cells(row)) + " |" for row in rows]
+    if not_measured:
+        lines += ["", "Not measured: " + "; ".join(f"{k} ({v})" for k, v in not_measured.items())]
+    return "\n".join(lines) + "\n"
+
+
+def described(machine: Mapping[str, Any]) -> str:
+    """The machine in a sentence."""
+    parts = [
+        f"{machine['date'][:10]}",
+        f"{machine['machine']}",
+        f"{machine['cores']} cores",
+        f"{machine['vector_bits']}-bit vectors",
+        f"{machine['memory_gib']} GiB",
+        f"{machine['system']}",
+        f"Python {machine['python']}",
+        f"Numba {machine['numba']}",
+        f"Mitsuba {machine['mitsuba']}",
+    ]
+    return "Measured: " + ", ".join(p for p in parts if "None" not in p) + "."
+
+
+def _cells(row: Row) -> list[str]:
+    around = row.spread.get("ratio")
+    sign = "≤" if row.better == "lower" else "≥"
+    return [
+        row.title,
+        amount(row.ours, row.unit),
+        f"{amount(row.peer, row.unit)} ({row.peer_name})",
+        f"{row.ratio:.2f}",
+        "" if around is None or row.peer_name == LIMIT else f"{around[0]:.2f} to {around[1]:.2f}",
+        f"{sign} {row.goal:g}",
+        "yes" if row.met else "no",
+    ]
+
+
+def amount(value: float, unit: str) -> str:
+    """A number with three digits that count, and its unit."""
+    return f"{value:.0f} {unit}" if value >= 1000.0 else f"{value:.3g} {unit}"

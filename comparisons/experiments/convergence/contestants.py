@@ -1,0 +1,230 @@
+"""Who is timed: ours and Mitsuba's variants, each with its default sampler and its best one."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol, Self
+
+import numpy as np
+
+from comparisons.geometry.flatten import copies_of
+from comparisons.mitsuba.backend import LLVM, SCALAR, backend, mitsuba, variant
+from comparisons.mitsuba.notes import notes_of
+from comparisons.mitsuba.translate import FEW, UntranslatableError, to_mitsuba
+from comparisons.runs.settling import settle
+from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.render import Progress, render
+from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Independent, Sobol
+from reference_rt.util.errors import UsageError
+
+
+class Shot(NamedTuple):
+    """A picture (height, width, 3), the samples a pixel that were taken, and the seconds between
+    asking for it and having it as an array."""
+
+    picture: FloatArray
+    spp: int
+    seconds: float
+
+
+class Renderer(Protocol):
+    """A contestant that is ready to render."""
+
+    def __call__(self, spp: int, replicate: int) -> Shot:
+        """A picture of about `spp` samples a pixel; another `replicate` is independent of it."""
+
+
+MOST_TOLD = 200
+"""Characters of a renderer's message that a reason quotes."""
+
+BEST = "best"
+"""Stands for the sampler that a trial is to find."""
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """name: for files and options;  title: for people;  sampler: its name, or BEST;  side: "ours"
+    or the Mitsuba variant, contestants of which share what is loaded."""
+
+    name: str
+    title: str
+    sampler: str
+    side: str
+
+    @property
+    def is_independent(self) -> bool:
+        """Whether samples are independent of each other: squared errors fall as 1 / n."""
+        return self.sampler == "independent"
+
+    @property
+    def factor(self) -> int:
+        """Between the samples of one rung and the next.
+
+        Powers of four alone where Mitsuba would take other numbers: multijitter takes 35 for 32,
+        which is no power of two, and a third longer for each (measured); ldsampler takes 64.
+        """
+        return 4 if self.sampler in ("multijitter", "ldsampler") else 2
+
+
+def with_sampler(contestant: Contestant, sampler: str) -> Contestant:
+    """The same side of Mitsuba with its best sampler, which is this one."""
+    title = contestant.title.partition(",")[0]
+    return replace(contestant, sampler=sampler, title=f"{title}, {sampler} (best)")
+
+
+CONTESTANTS = (
+    Contestant("ours", "ours, Sobol' (default and best)", "sobol", "ours"),
+    Contestant("ours_independent", "ours, independent", "independent", "ours"),
+    Contestant("mitsuba_llvm", "Mitsuba llvm, independent (default)", "independent", LLVM),
+    Contestant("mitsuba_llvm_best", "Mitsuba llvm, its best sampler", BEST, LLVM),
+    Contestant("mitsuba_scalar", "Mitsuba scalar, independent (default)", "independent", SCALAR),
+    Contestant("mitsuba_scalar_best", "Mitsuba scalar, its best sampler", BEST, SCALAR),
+)
+
+NAMES = tuple(contestant.name for contestant in CONTESTANTS)
+
+
+def chosen(only: tuple[str, ...]) -> tuple[Contestant, ...]:
+    """Those of these names, all if none is given.  Raises UsageError for a name that is none."""
+    if unknown := [name for name in only if name not in NAMES]:
+        raise UsageError(f"--only: expected some of {', '.join(NAMES)}, got '{unknown[0]}'")
+    return tuple(c for c in CONTESTANTS if not only or c.name in only)
+
+
+class AbsentError(Exception):
+    """A contestant cannot render the scene; the message says why."""
+
+
+@contextmanager
+def failing(what: str) -> Iterator[None]:
+    """Turn the exceptions of Mitsuba and Dr.Jit into AbsentError: one contestant that fails must
+    not cost the curves of the others."""
+    try:
+        yield
+    except (RuntimeError, MemoryError) as error:
+        raise AbsentError(f"{what}: {' '.join(str(error).split())[:MOST_TOLD]}") from None
+
+
+def remarks(scene: Scene) -> list[str]:
+    """What a reader should know of Mitsuba's pictures of the scene."""
+    told = ["Mitsuba traces with Embree's robust flag, without which rays pass between triangles"]
+    if notes_of(scene):
+        told.append(
+            "Mitsuba renders with its own materials and their approximations, which `compare` "
+            "replaces: they are part of its bias"
+        )
+    return told
+
+
+class Stable:
+    """Makes contestants ready, and keeps what several of them share; a context, which leaves
+    Mitsuba in the variant that it was in."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._entered = ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._entered.close()
+
+    def _in(self, side: str) -> Any:
+        """Mitsuba in this variant, until another is asked for: switching makes it define all of its
+        own plugins again."""
+        mi = mitsuba()
+        if mi.variant() != side:
+            self._entered.close()
+            if mi.variant() != side:
+                self._entered.enter_context(variant(side))
+        return mi
+
+    def ready(self, contestant: Contestant, progress: Progress | None = None) -> Renderer:
+        """Load and compile.  Raises SceneError, ReferenceUnavailableError, AbsentError."""
+        if contestant.side == "ours":
+            return self._ours(contestant, progress)
+        if contestant.side == LLVM and backend().variant != LLVM:
+            raise AbsentError(f"Mitsuba's variant {LLVM} does not run here: {backend().reason}")
+        copies = copies_of(self._scene)
+        if any(member.tree is not None for copy in copies for member in copy.members):
+            raise AbsentError("Mitsuba has no set operations")
+        try:
+            return self._mitsubas(contestant)
+        except UntranslatableError as error:
+            raise AbsentError(str(error)) from None
+
+    def _ours(self, contestant: Contestant, progress: Progress | None) -> Renderer:
+        scene = self._scene
+        make: Callable[..., Sobol | Independent]
+        make = Sobol if contestant.sampler == "sobol" else Independent
+        tables = scene.tables
+        # Far from the seeds that people choose, and from those of the reference.
+        first = FIRST_SEED if contestant.sampler == "sobol" else 2 * FIRST_SEED
+
+        def shot(spp: int, replicate: int) -> Shot:
+            seeded = scene.changed(sampler=make(spp=spp, seed=first + replicate))
+            settle()
+            start = time.perf_counter()
+            picture = render(seeded, tables=tables).colour
+            return Shot(picture, spp, time.perf_counter() - start)
+
+        small = scene.changed(sampler=make(spp=1, seed=first))
+        render(small, tables=tables, progress=progress)
+        return shot
+
+    def _mitsubas(self, contestant: Contestant) -> Renderer:
+        mi = self._in(contestant.side)
+        description = to_mitsuba(self._scene, native=True)
+        description["sensor"]["sampler"] = {"type": contestant.sampler}
+        parts = [part for part in description.values() if isinstance(part, dict)]
+        instances = sum(part.get("type") == "instance" for part in parts)
+        if contestant.side == LLVM and instances > FEW:
+            raise AbsentError(
+                f"{instances} instances, for which Mitsuba's llvm variant takes minutes to compile"
+            )
+        with failing("Mitsuba cannot load the scene"):
+            mi_scene = mi.load_dict(description)
+        sampler = mi_scene.sensors()[0].sampler()
+
+        def shot(spp: int, replicate: int) -> Shot:
+            mi = self._in(contestant.side)
+            settle()
+            start = time.perf_counter()
+            with failing(f"Mitsuba cannot render {spp} samples a pixel"):
+                # The array is what forces the lazy rendering to happen.
+                found = np.array(mi.render(mi_scene, spp=spp, seed=seed_of(replicate)))
+            seconds = time.perf_counter() - start
+            return Shot(_three(found), int(sampler.sample_count()), seconds)
+
+        return shot
+
+
+FIRST_SEED = 1 << 40
+
+
+def seed_of(replicate: int) -> int:
+    """Mitsuba's 32-bit seeds, far apart (multiples of the golden ratio modulo 1): it numbers the
+    pixels from a seed on, so that near ones may give one picture's numbers to another's pixels."""
+    return (1 + replicate) * 0x9E3779B1 % (1 << 32)
+
+
+def _three(picture: Any) -> FloatArray:
+    return np.asarray(picture, dtype=np.float64)[..., :3]
+
+
+__all__ = [
+    "BEST",
+    "CONTESTANTS",
+    "NAMES",
+    "AbsentError",
+    "Contestant",
+    "Renderer",
+    "Shot",
+    "Stable",
+    "chosen",
+    "remarks",
+    "with_sampler",
+]

@@ -1,0 +1,94 @@
+"""A scene's curves: everything that a run found out about it, as data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from comparisons.experiments.convergence.contestants import Contestant
+from comparisons.experiments.convergence.crops import Crops
+from comparisons.experiments.convergence.data import Reference
+from comparisons.experiments.convergence.findings import Findings, Ratio, compared
+from reference_rt.core.arrays import FloatArray
+
+Starts = Mapping[str, Mapping[str, Mapping[str, float]]]
+"""Seconds by side, "cold" or "warm", and stage: see `starts`."""
+
+
+class GridStep(NamedTuple):
+    """A picture of a deterministic scene with spp samples a pixel on a grid: its seconds, and its
+    errors against the finest grid."""
+
+    spp: int
+    seconds: float
+    mse: float
+    relmse: float
+
+
+class GridPoint(NamedTuple):
+    """Mitsuba's picture of a deterministic scene: its seconds, the samples of its grid, and the
+    errors between it and ours on the same grid."""
+
+    variant: str
+    spp: int
+    seconds: float
+    mse: float
+    relmse: float
+
+
+@dataclass(frozen=True)
+class Grids:
+    """A deterministic scene: ours with finer and finer grids, and Mitsuba's picture.
+
+    finest: samples a pixel of the grid that errors are taken against;  picture: that one.
+    """
+
+    steps: tuple[GridStep, ...]
+    points: tuple[GridPoint, ...]
+    finest: int
+    picture: FloatArray
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Error against time of one scene.
+
+    scene: its name;  size: width and height in pixels;  contestants, findings: by name;  absent:
+    why there are no findings of other contestants, by name;  grids: of a deterministic scene, which
+    has no reference and no findings;  starts: of processes;  crops: pictures at equal time and at
+    equal error;  left_out: what else was not done, and why;  notes: what a reader should know;
+    again: the command that repeats it;  problem: why there is nothing at all, because the scene is
+    invalid, or because the run was interrupted before it.
+    """
+
+    scene: str
+    size: tuple[int, int] = (0, 0)
+    contestants: Mapping[str, Contestant] = field(default_factory=dict)
+    findings: Mapping[str, Findings] = field(default_factory=dict)
+    reference: Reference | None = None
+    grids: Grids | None = None
+    starts: Starts = field(default_factory=dict)
+    crops: tuple[Crops, ...] = ()
+    left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    again: str = ""
+    problem: str = ""
+    absent: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def missing(self) -> list[str]:
+        """A line for each contestant without findings: who, and why."""
+        return [f"{self.contestants[name].title}: {why}" for name, why in self.absent.items()]
+
+    def ratios(self, name: str = "ours") -> dict[str, list[Ratio]]:
+        """Times to the targets of contestant `name` over those of each other, with bands."""
+        if name not in self.findings:
+            return {}
+        mine = self.findings[name].targets
+        return {
+            other: [compared(a, b) for a, b in zip(mine, found.targets, strict=True)]
+            for other, found in self.findings.items()
+            if other != name
+        }
+
+
+__all__ = ["Curves", "GridPoint", "GridStep", "Grids", "Starts"]

@@ -1,0 +1,206 @@
+"""What the rungs of a contestant say: curves, slopes, bias, efficiency, times to targets."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from comparisons.experiments.convergence.data import Reference, Rung, weights
+from comparisons.experiments.convergence.estimates import (
+    Bias,
+    Estimate,
+    bias_of,
+    common_error,
+    mean_of,
+    standard_error,
+)
+from comparisons.experiments.convergence.fits import How, Line, Points, band, log_line, time_to
+from reference_rt.core.arrays import FloatArray
+
+MEDIAN_ERROR = math.sqrt(math.pi / 2.0)
+"""Standard error of a median over that of a mean, for normal scatter and many values."""
+
+
+class Step(NamedTuple):
+    """A rung in numbers.
+
+    seconds: the median of the warm pictures' and their extremes;  mse, relmse: expectations, with
+    bands;  variance: the mean over pixels of the weighted variance of one picture, which relmse is
+    where there is no bias;  efficiency: 1 / (variance times seconds), 1/s.
+    """
+
+    asked: int
+    spp: int
+    replicates: int
+    seconds: Estimate
+    mse: Estimate
+    relmse: Estimate
+    variance: float
+    efficiency: float
+
+
+class Target(NamedTuple):
+    """When the relative error, the root of relMSE, is `error`.
+
+    how: see `How`; of "below", seconds are those of the first rung;  drawn: seconds of curves drawn
+    within the scatter, the measured one first.
+    """
+
+    error: float
+    how: How
+    seconds: Estimate
+    spp: float
+    drawn: FloatArray
+
+
+class Ratio(NamedTuple):
+    """A time to a target over another, and how much it is worth.
+
+    times: the ratio with the band of both, None where it is unknown;  extrapolated: whether a time
+    lies beyond the last rung that was measured;  bound: "at most" where only the first is reached
+    by the first rung already, so that its time is an upper bound, "at least" where only the second
+    is, "neither" where both are;  why: it is unknown, else "".
+    """
+
+    times: Estimate | None
+    extrapolated: bool = False
+    bound: Literal["", "at most", "at least", "neither"] = ""
+    why: str = ""
+
+    @property
+    def shown(self) -> Literal["", "less", "more"]:
+        """ "less" or "more" where measurements, with their bands, show the ratio to be less or more
+        than 1; what is extrapolated shows neither."""
+        if self.times is None or self.extrapolated or self.bound == "neither":
+            return ""
+        if self.times.high < 1.0 and self.bound != "at least":
+            return "less"
+        return "more" if self.times.low > 1.0 and self.bound != "at most" else ""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What is known of a contestant.
+
+    slopes: of "mse" and "relmse" over "spp" and "seconds", None where there are too few rungs;
+    bias, relative_bias: from the last rung, the latter weighted as relMSE is.
+    """
+
+    steps: tuple[Step, ...]
+    slopes: Mapping[str, Mapping[str, Line | None]]
+    bias: Bias
+    relative_bias: Bias
+    targets: tuple[Target, ...]
+
+
+def findings_of(
+    rungs: Sequence[Rung], reference: Reference, targets: Sequence[float], independent: bool
+) -> Findings:
+    """Everything about a contestant that has at least one rung; independent: whether its samples
+    are."""
+    weight = weights(reference.mean)
+    steps = tuple(_step(rung, reference, weight) for rung in rungs)
+    points = {
+        "mse": points_of(rungs, "mse", common_error(reference, 1.0)),
+        "relmse": points_of(rungs, "relmse", common_error(reference, weight)),
+    }
+    slopes = {
+        name: {"spp": _slope(p, p.spp), "seconds": _slope(p, p.seconds)}
+        for name, p in points.items()
+    }
+    relative_bias = bias_of(rungs[-1], reference, weight)
+    return Findings(
+        steps,
+        slopes,
+        bias_of(rungs[-1], reference),
+        relative_bias,
+        tuple(_target(points["relmse"], error, relative_bias, independent) for error in targets),
+    )
+
+
+def _step(rung: Rung, reference: Reference, weight: FloatArray) -> Step:
+    warm = rung.warm
+    seconds = Estimate(float(np.median(warm)), float(warm.min()), float(warm.max()))
+    variance = float((weight * rung.variance).mean())
+    return Step(
+        rung.asked,
+        rung.spp,
+        rung.replicates,
+        seconds,
+        mean_of(rung.mse, common_error(reference, 1.0)),
+        mean_of(rung.relmse, common_error(reference, weight)),
+        variance,
+        1.0 / (variance * seconds.value) if variance > 0.0 else math.inf,
+    )
+
+
+def points_of(rungs: Sequence[Rung], name: str, common: float = 0.0) -> Points:
+    """The curve of "mse" or "relmse", of the rungs where it is above zero; common: a standard error
+    that all rungs share."""
+    used = [r for r in rungs if r.replicates > 1 and getattr(r, name).mean() > 0.0]
+    rows = [(r.spp, np.median(r.warm), getattr(r, name).mean()) for r in used]
+    spp, seconds, errors = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+    scatter = [
+        (
+            MEDIAN_ERROR * standard_error(np.log(r.warm)) if len(r.warm) > 1 else 0.0,
+            math.hypot(standard_error(getattr(r, name)), common) / getattr(r, name).mean(),
+        )
+        for r in used
+    ]
+    of_seconds, of_errors = np.array(scatter, dtype=np.float64).reshape(-1, 2).T
+    freedom = min((r.replicates - 1 for r in used), default=1)
+    return Points(spp, seconds, errors, of_seconds, of_errors, freedom)
+
+
+def _slope(points: Points, over: FloatArray) -> Line | None:
+    return log_line(over, points.errors, points.log_errors_error, points.freedom)
+
+
+def _target(points: Points, error: float, bias: Bias, independent: bool) -> Target:
+    never = Estimate(math.inf, math.inf, math.inf)
+    reached = time_to(points, error**2, independent)
+    if bias.low > error**2 and (reached is None or reached.how == "extrapolated"):
+        return Target(error, "bias", never, math.inf, np.array([math.inf]))
+    if reached is None:
+        unknown = Estimate(math.nan, math.nan, math.nan)
+        return Target(error, "unknown", unknown, math.nan, np.array([math.nan]))
+    drawn = np.exp(reached.log_seconds)
+    return Target(error, reached.how, reached.seconds, reached.spp, drawn)
+
+
+def ratio(mine: Target, theirs: Target) -> Estimate | None:
+    """Times to one target, mine over theirs, with the band of both; None where one is unknown or
+    both are never."""
+    if len(mine.drawn) != len(theirs.drawn):
+        if "unknown" in (mine.how, theirs.how):
+            return None
+        never = math.inf if mine.how == "bias" else 0.0
+        return Estimate(never, never, never)
+    if not (math.isfinite(mine.seconds.value) and math.isfinite(theirs.seconds.value)):
+        return None
+    with np.errstate(invalid="ignore"):
+        # The draws of one are shuffled against those of the other: both used the same numbers.
+        order = np.random.default_rng(len(mine.drawn)).permutation(len(mine.drawn) - 1) + 1
+        drawn = mine.drawn / theirs.drawn[np.concatenate([[0], order])]
+    return band(drawn[np.isfinite(drawn)])
+
+
+def compared(mine: Target, theirs: Target) -> Ratio:
+    """Times to one target, mine over theirs."""
+    first = mine.how == "below", theirs.how == "below"
+    unknown = [who for who, t in (("ours", mine), ("theirs", theirs)) if t.how == "unknown"]
+    times = ratio(mine, theirs)
+    why = f"{' and '.join(unknown)}: too few rungs, or the error does not fall" if unknown else ""
+    if not why and times is None:
+        why = "neither reaches it"
+    return Ratio(
+        times,
+        "extrapolated" in (mine.how, theirs.how),
+        "neither" if all(first) else "at most" if first[0] else "at least" if first[1] else "",
+        why,
+    )
+
+
+__all__ = ["Findings", "Ratio", "Step", "Target", "compared", "findings_of", "points_of", "ratio"]

@@ -1,0 +1,227 @@
+"""`results.json` and `results.csv` of `reference-rt converge`."""
+
+import csv
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.experiments.convergence.curves import Curves
+from comparisons.experiments.convergence.data import Settings
+from comparisons.experiments.convergence.findings import Findings, Target
+from comparisons.experiments.convergence.fits import Line
+from reference_rt.util.files import replacing
+
+SCHEMA = 1
+"""Raised whenever a reader of the former layout would misread the new one."""
+
+KIND = "convergence"
+
+COLUMNS = (
+    "scene", "width", "height", "contestant", "sampler", "asked_spp", "spp", "replicates",
+    "seconds", "seconds_min", "seconds_max", "mse", "mse_low", "mse_high",
+    "relmse", "relmse_low", "relmse_high", "relative_variance", "efficiency",
+)  # fmt: skip
+"""Of results.csv: one row for each contestant and rung.  A grid of a deterministic scene is a rung
+of ours with one replicate and neither bands nor variance."""
+
+
+def write_results(
+    path: Path, curves: Sequence[Curves], settings: Settings, provenance: Mapping[str, Any]
+) -> None:
+    """Write `results.json`, at once or not at all.
+
+        {"schema": 1, "kind": "convergence", "provenance": {...}, "settings": {...},
+         "scenes": [{"scene", "size": [width, height], "again": command,
+                     "reference": {"spp", "pictures", "relmse", "seconds"} or null,
+                     "contestants": {name: {"title", "sampler", "side",
+                         "rungs": [{"asked_spp", "spp", "replicates",
+                                    "seconds": {"median", "min", "max"},
+                                    "mse", "relmse": {"value", "low", "high"},
+                                    "relative_variance", "efficiency"}],
+                         "slopes": {"mse" and "relmse": {"spp" and "seconds":
+                                    {"value", "low", "high"} or null}},
+                         "bias" and "relative_bias": {"squared", "low", "high", "seen"},
+                         "targets": [{"error", "how", "spp",
+                                      "seconds": {"value", "low", "high"}}]}},
+                     "absent": {name of another contestant: why it has no findings},
+                     "ratios": {name: [{"error", "value", "low", "high", "extrapolated": whether a
+                                        time lies beyond the measured rungs, "bound": "at most" or
+                                        "at least" or "neither" where times of first rungs are
+                                        upper bounds, else ""} or null]},
+                     "grids": {"finest_spp", "steps": [...], "mitsuba": [...]} or null,
+                     "starts": {side: {"cold" and "warm": {stage: seconds}}},
+                     "crops": [{"kind", "level", "corner", "size",
+                                "shown": {name: {"spp", "seconds", "error"}}}],
+                     "left_out": [...], "notes": [...],
+                     "problem": why there is nothing about the scene, "" for most}]}
+
+    Bands hold the value with a confidence of 95 %; a squared bias lies above "low" with 99.99 % and
+    below "high" with 99 %.  "ratios" are ours over the contestant's.  Strict JSON (RFC 8259): NaN
+    and the infinities become null, so a null number says "undefined or unbounded".
+    """
+    document = {
+        "schema": SCHEMA,
+        "kind": KIND,
+        "provenance": dict(provenance),
+        "settings": asdict(settings),
+        "scenes": [_scene(one) for one in curves],
+    }
+    text = json.dumps(plain(document), indent=2, ensure_ascii=False, allow_nan=False)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def write_table(path: Path, curves: Sequence[Curves]) -> None:
+    """Write `results.csv`, of COLUMNS, at once or not at all; what is undefined is empty."""
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for one in curves:
+            writer.writerows([_cell(value) for value in row] for row in _rows(one))
+
+
+def plain(value: Any) -> Any:
+    """What JSON can hold: lists, dicts, strings, finite numbers and None for others."""
+    match value:
+        case float() | np.floating():
+            return float(value) if math.isfinite(value) else None
+        case np.integer():
+            return int(value)
+        case Mapping():
+            return {str(key): plain(item) for key, item in value.items()}
+        case list() | tuple():
+            return [plain(item) for item in value]
+        case _:
+            return value
+
+
+def _scene(one: Curves) -> dict[str, Any]:
+    reference = one.reference
+    return {
+        "scene": one.scene,
+        "size": one.size,
+        "again": one.again,
+        "reference": None
+        if reference is None
+        else {
+            "spp": reference.spp,
+            "pictures": reference.count,
+            "relmse": reference.relmse,
+            "seconds": reference.seconds,
+        },
+        "contestants": {name: _contestant(one, name) for name in one.findings},
+        "absent": one.absent,
+        "ratios": _ratios(one),
+        "grids": None
+        if one.grids is None
+        else {
+            "finest_spp": one.grids.finest,
+            "steps": [step._asdict() for step in one.grids.steps],
+            "mitsuba": [point._asdict() for point in one.grids.points],
+        },
+        "starts": one.starts,
+        "crops": [
+            {
+                "kind": crops.kind,
+                "level": crops.level,
+                "corner": crops.corner,
+                "size": crops.size,
+                "shown": {
+                    name: {"spp": s.spp, "seconds": s.seconds, "error": s.error}
+                    for name, s in crops.shown.items()
+                },
+            }
+            for crops in one.crops
+        ],
+        "left_out": one.left_out,
+        "notes": one.notes,
+        "problem": one.problem,
+    }
+
+
+def _contestant(one: Curves, name: str) -> dict[str, Any]:
+    contestant, found = one.contestants[name], one.findings[name]
+    return {
+        "title": contestant.title,
+        "sampler": contestant.sampler,
+        "side": contestant.side,
+        "rungs": [
+            {
+                "asked_spp": step.asked,
+                "spp": step.spp,
+                "replicates": step.replicates,
+                "seconds": dict(zip(("median", "min", "max"), step.seconds, strict=True)),
+                "mse": step.mse._asdict(),
+                "relmse": step.relmse._asdict(),
+                "relative_variance": step.variance,
+                "efficiency": step.efficiency,
+            }
+            for step in found.steps
+        ],
+        "slopes": _slopes(found),
+        "bias": {**found.bias._asdict(), "seen": found.bias.is_seen},
+        "relative_bias": {**found.relative_bias._asdict(), "seen": found.relative_bias.is_seen},
+        "targets": [_target(target) for target in found.targets],
+    }
+
+
+def _slopes(found: Findings) -> dict[str, Any]:
+    def told(line: Line | None) -> Any:
+        return line and {"value": line.slope, "low": line.low, "high": line.high}
+
+    return {
+        error: {over: told(line) for over, line in lines.items()}
+        for error, lines in found.slopes.items()
+    }
+
+
+def _target(target: Target) -> dict[str, Any]:
+    return {
+        "error": target.error,
+        "how": target.how,
+        "seconds": target.seconds._asdict(),
+        "spp": target.spp,
+    }
+
+
+def _ratios(one: Curves) -> dict[str, Any]:
+    if "ours" not in one.findings:
+        return {}
+    errors = [target.error for target in one.findings["ours"].targets]
+    return {
+        name: [
+            found.times
+            and {"error": error, **found.times._asdict()}
+            | {"extrapolated": found.extrapolated, "bound": found.bound}
+            for error, found in zip(errors, ratios, strict=True)
+        ]
+        for name, ratios in one.ratios().items()
+    }
+
+
+def _rows(one: Curves) -> Iterator[list[Any]]:
+    for name, found in one.findings.items():
+        for step in found.steps:
+            yield [
+                one.scene, *one.size, name, one.contestants[name].sampler, step.asked, step.spp,
+                step.replicates, *step.seconds, *step.mse, *step.relmse, step.variance,
+                step.efficiency,
+            ]  # fmt: skip
+    if one.grids is not None:
+        for grid in one.grids.steps:
+            yield [
+                one.scene, *one.size, "ours", "grid", grid.spp, grid.spp, 1, grid.seconds, None,
+                None, grid.mse, None, None, grid.relmse, None, None, None, None,
+            ]  # fmt: skip
+
+
+def _cell(value: Any) -> Any:
+    return "" if isinstance(value, float) and not math.isfinite(value) else plain(value)
+
+
+__all__ = ["COLUMNS", "KIND", "SCHEMA", "plain", "write_results", "write_table"]

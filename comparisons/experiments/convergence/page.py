@@ -1,0 +1,293 @@
+"""One HTML page about error against time: offline, a single file, no script."""
+
+import base64
+import io
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from markupsafe import Markup
+from PIL import Image
+
+from comparisons.experiments.convergence.crops import Crops
+from comparisons.experiments.convergence.curves import Curves
+from comparisons.experiments.convergence.data import Settings
+from comparisons.experiments.convergence.estimates import Bias
+from comparisons.experiments.convergence.findings import Ratio, Target
+from comparisons.experiments.convergence.fits import Line
+from comparisons.experiments.convergence.starts import STAGES
+from comparisons.report.plots import Curve, log_log
+from comparisons.report.templates import template, write
+from comparisons.report.values import percent, shown
+from comparisons.statistics.metrics import encode, white_level
+from reference_rt.core.arrays import FloatArray
+
+SECONDS = "render time of a picture, s"
+SAMPLES = "samples a pixel"
+
+LOWEST = 1e-3
+"""Of the lowest point of a curve: what lies further below would leave no room for the curve."""
+
+
+class Cell(NamedTuple):
+    """Of a table: what is said, what in small type beside it, and a class for its look."""
+
+    text: str
+    small: str = ""
+    look: str = ""
+
+
+def write_page(
+    path: Path, curves: Sequence[Curves], settings: Settings, provenance: Mapping[str, Any]
+) -> None:
+    """Write the page about `curves`, at once or not at all; all text is escaped."""
+    page = template("convergence.html.jinja").render(
+        provenance=provenance,
+        settings=settings,
+        targets=[percent(target) for target in settings.targets],
+        summary=_summary(curves, settings),
+        scenes=[_view(one) for one in curves],
+        stages=STAGES,
+    )
+    write(path, page)
+
+
+def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
+    """Ours against each other contestant at one target, scene by scene, and the medians."""
+    targets = list(settings.targets)
+    if not targets:
+        return {"target": "", "columns": [], "rows": [], "medians": [], "absent": []}
+    place = targets.index(0.01) if 0.01 in targets else len(targets) - 1
+    titles = {name: c.title for one in curves for name, c in one.contestants.items()}
+    names = [name for name in titles if name != "ours"]
+    rows = []
+    known: dict[str, list[Ratio]] = {name: [] for name in names}
+    for number, one in enumerate(curves, 1):
+        found = {name: ratios[place] for name, ratios in one.ratios().items()}
+        cells = [_ratio(found[n]) if n in found else _without_ratio(one, n) for n in names]
+        rows.append((number, one.scene, _instead(one), cells))
+        for name, ratio in found.items():
+            known[name].append(ratio)
+    return {
+        "target": percent(targets[place]),
+        "columns": [titles[name] for name in names],
+        "rows": rows,
+        "medians": [_median(ratios) for ratios in known.values()],
+        "absent": [f"{one.scene}: {line}" for one in curves for line in one.missing],
+    }
+
+
+def _instead(one: Curves) -> str:
+    """What is said of a scene that has no ladder."""
+    if one.problem:
+        return one.problem
+    if one.grids is None:
+        return ""
+    return "; ".join(["deterministic: a grid of samples, no ladder", *one.left_out])
+
+
+def _without_ratio(one: Curves, name: str) -> Cell:
+    """Of a scene and a contestant one of which was not asked for, or has no data."""
+    who = next((n for n in ("ours", name) if n in one.absent), None)
+    if who is None:
+        return Cell("–", "ours is not there" if name in one.findings else "not asked for")
+    return Cell("no data", "of ours" if who == "ours" else "see below", "bad")
+
+
+def _median(ratios: Sequence[Ratio]) -> Cell:
+    """Over scenes; "never" counts as 0 or as infinity."""
+    values = [ratio.times.value for ratio in ratios if ratio.times is not None]
+    if not values:
+        return Cell("–")
+    extrapolated = sum(ratio.extrapolated for ratio in ratios if ratio.times is not None)
+    scenes = f"of {len(values)} scene{'s' if len(values) != 1 else ''}"
+    told = [scenes, *([f"{extrapolated} extrapolated"] if extrapolated else [])]
+    median = float(np.median(values))
+    look = "extrapolated" if extrapolated else ""
+    return Cell(f"{median:.2f}" if math.isfinite(median) else "∞", ", ".join(told), look)
+
+
+def _view(one: Curves) -> dict[str, Any]:
+    """What the template shows of a scene."""
+    view: dict[str, Any] = {"one": one, "plots": [], "picture": "", "crops": []}
+    if one.reference is not None:
+        white = white_level(one.reference.mean)
+        view["picture"] = _png(one.reference.mean, white)
+        view["plots"] = _ladder_plots(one)
+        view["crops"] = [_crops(one, crops, white) for crops in one.crops]
+        view["reference"] = (
+            f"{one.reference.count} pictures of {one.reference.spp:,} samples a pixel; its own "
+            f"noise, relative error {percent(math.sqrt(max(one.reference.relmse, 0.0)))}, "
+            "is subtracted"
+        )
+    if one.grids is not None:
+        view["picture"] = _png(one.grids.picture, white_level(one.grids.picture))
+        view["plots"] = _grid_plots(one)
+    ratios = one.ratios()
+    view["targets"] = [
+        (
+            one.contestants[name].title,
+            [_reached(target) for target in found.targets],
+            [_ratio(ratio) for ratio in ratios[name]] if name in ratios else None,
+        )
+        for name, found in one.findings.items()
+    ]
+    view["laws"] = [
+        (
+            one.contestants[name].title,
+            [
+                _slope(found.slopes["relmse"]["spp"]),
+                _slope(found.slopes["relmse"]["seconds"]),
+                _slope(found.slopes["mse"]["spp"]),
+                _slope(found.slopes["mse"]["seconds"]),
+                _bias(found.relative_bias),
+                Cell(shown(found.steps[-1].efficiency)),
+            ],
+        )
+        for name, found in one.findings.items()
+    ]
+    return view
+
+
+# ---- plots --------------------------------------------------------------------------------------
+
+
+def _ladder_plots(one: Curves) -> list[Markup]:
+    levels = {
+        percent(t.error): t.error**2 for found in one.findings.values() for t in found.targets
+    }
+    plots = []
+    for name, text, marks in (("relmse", "E[relMSE]", levels), ("mse", "E[MSE]", {})):
+        for over, x_label in (("seconds", SECONDS), ("spp", SAMPLES)):
+            curves = []
+            for number, (contestant, found) in enumerate(one.findings.items()):
+                bands = [getattr(step, name) for step in found.steps]
+                x = [s.seconds.value if over == "seconds" else s.spp for s in found.steps]
+                curves.append(
+                    Curve(
+                        one.contestants[contestant].title,
+                        x,
+                        [band.value for band in bands],
+                        [band.low for band in bands],
+                        [band.high for band in bands],
+                        colour=number,
+                    )
+                )
+            plots.append(Markup(log_log(curves, x_label, text, levels=marks)))
+    return plots
+
+
+def _grid_plots(one: Curves) -> list[Markup]:
+    assert one.grids is not None
+    steps = one.grids.steps
+    plots = []
+    for text, values in (("relMSE", [s.relmse for s in steps]), ("MSE", [s.mse for s in steps])):
+        for x_label, x in (
+            (SECONDS, [s.seconds for s in steps]),
+            (SAMPLES, [float(s.spp) for s in steps]),
+        ):
+            curves = [Curve("ours, against our finest grid", x, values)]
+            for number, point in enumerate(one.grids.points, 2):
+                at = point.seconds if x_label == SECONDS else float(point.spp)
+                error = point.relmse if text == "relMSE" else point.mse
+                if error < min(values) * LOWEST:
+                    continue  # the table has it
+                title = f"Mitsuba {point.variant}, against ours on the same grid"
+                curves.append(Curve(title, [at], [error], colour=number))
+            plots.append(Markup(log_log(curves, x_label, text)))
+    return plots
+
+
+# ---- cells --------------------------------------------------------------------------------------
+
+
+def _reached(target: Target) -> Cell:
+    match target.how:
+        case "bias":
+            return Cell("never", "bias", "never")
+        case "unknown":
+            return Cell("–", "too few rungs")
+        case "below":
+            return Cell(f"≤ {_seconds(target.seconds.value)}", "first rung")
+    small = f"{_seconds(target.seconds.low)} to {_seconds(target.seconds.high)}"
+    if target.how == "extrapolated":
+        small = f"extrapolated, {small}"
+        return Cell(f"≈ {_seconds(target.seconds.value)}", small, "extrapolated")
+    return Cell(_seconds(target.seconds.value), small)
+
+
+def _seconds(value: float) -> str:
+    return f"{shown(float(f'{value:.3g}'))} s" if math.isfinite(value) else "∞"
+
+
+def _ratio(found: Ratio) -> Cell:
+    """Green or red only where what was measured says so."""
+    times = found.times
+    if times is None:
+        return Cell("–", found.why)
+    look = {"less": "good", "more": "bad", "": ""}[found.shown]
+    if times.low == times.high:
+        return Cell("0" if times.value == 0.0 else "∞", "bias", look)
+    sign = {"at most": "≤ ", "at least": "≥ ", "neither": "≈ ", "": ""}[found.bound]
+    told = [f"{times.low:.2f} to {times.high:.2f}"]
+    if found.bound:
+        told.insert(0, "first rungs" if found.bound == "neither" else "first rung")
+    if found.extrapolated:
+        sign, look = sign or "≈ ", "extrapolated"
+        told.insert(0, "extrapolated")
+    return Cell(f"{sign}{times.value:.2f}", ", ".join(told), look)
+
+
+def _slope(line: Line | None) -> Cell:
+    if line is None:
+        return Cell("–")
+    text, *ends = (f"{value:.2f}".replace("-", "−") for value in line[:3])
+    return Cell(text, " to ".join(ends))
+
+
+def _bias(bias: Bias) -> Cell:
+    """Its root: a relative error."""
+    most = percent(math.sqrt(max(bias.high, 0.0)))
+    if bias.is_seen:
+        return Cell(
+            percent(math.sqrt(bias.squared)),
+            f"seen; {percent(math.sqrt(bias.low))} to {most}",
+            "bad",
+        )
+    return Cell(f"< {most}", "not seen")
+
+
+# ---- pictures -----------------------------------------------------------------------------------
+
+
+def _crops(one: Curves, crops: Crops, white: float) -> dict[str, Any]:
+    assert one.reference is not None
+    (x, y), (width, height) = crops.corner, crops.size
+    area = (slice(y, y + height), slice(x, x + width))
+    figures = [("the reference", "", one.reference.mean)]
+    for name, found in crops.shown.items():
+        caption = f"{found.spp:,} samples, {_seconds(found.seconds)}, {percent(found.error)}"
+        figures.append((one.contestants[name].title, caption, found.picture))
+    return {
+        "title": f"About {_seconds(crops.level)} each"
+        if crops.kind == "time"
+        else f"About {percent(crops.level)} of relative error each",
+        "where": f"{width} × {height} pixels at ({x}, {y}), where the noise is largest",
+        "figures": [
+            (title, caption, _png(picture, white), _png(picture[area], white))
+            for title, caption, picture in figures
+        ],
+    }
+
+
+def _png(picture: FloatArray, white: float) -> str:
+    """The data: URL of a picture, exposed for `white`."""
+    pixels = np.rint(255.0 * encode(np.nan_to_num(picture), white)).astype(np.uint8)
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+__all__ = ["write_page"]

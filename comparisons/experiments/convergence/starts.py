@@ -1,0 +1,101 @@
+"""How long processes take until their first picture, by stage, with caches empty and full."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import platformdirs
+
+from comparisons.experiments.convergence.contestants import Contestant
+from comparisons.experiments.convergence.store import Store
+from comparisons.mitsuba.backend import LIBRARY, LLVM, backend
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.child_processes import tied
+
+STAGES = ("start", "load", "build", "compile", "render")
+"""start: the interpreter and what it imports;  load: the scene's file read, for Mitsuba also
+translated;  build: tables and hierarchy, or `mitsuba.load_dict`;  compile: kernels compiled, or
+read from the cache; of Mitsuba what the first picture takes more than the second;  render: the
+second picture, with 16 samples a pixel."""
+
+SPP = 16
+
+TIMEOUT = 300.0
+"""Seconds: compiling takes ten, on a machine that others keep busy a few times that."""
+
+Say = Callable[[str, float], None]
+"""Is told what is being done, and the fraction of it that is done."""
+
+
+def starts_of(
+    scene: Scene, contestants: Iterable[Contestant], store: Store, say: Say
+) -> dict[str, dict[str, dict[str, float]]]:
+    """Seconds by side, "cold" or "warm", and stage; nothing of a side whose processes failed.
+
+    Cold are the caches of compiled kernels alone: the system has the programs' files in memory.
+    """
+    sides = list(dict.fromkeys(contestant.side for contestant in contestants))
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for number, side in enumerate(sides):
+        say("starts of processes", number / len(sides))
+        stored = store.fact(f"starts-{side}")
+        times = stored if stored is not None else _start(scene, side)
+        if times is None:
+            found[side] = {}
+            continue
+        store.keep_fact(f"starts-{side}", times)
+        found[side] = times
+    if sides:
+        say("starts of processes", 1.0)
+    return found
+
+
+def _start(scene: Scene, side: str) -> dict[str, dict[str, float]] | None:
+    """Two processes one after the other, the first with empty caches."""
+    with tempfile.TemporaryDirectory(prefix="reference_rt-") as folder:
+        path = Path(folder) / "scene.json"
+        path.write_text(scene.to_json(), encoding="utf-8")
+        environment = dict(os.environ)
+        own = environment.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
+        environment["REFERENCE_RT_CACHE"] = folder if side == "ours" else own
+        if side != "ours":
+            environment["HOME"] = folder  # below which Dr.Jit keeps its kernels
+        if side == LLVM:
+            environment[LIBRARY] = str(backend().llvm_path)
+        found = {}
+        for state in ("cold", "warm"):
+            times = _child(path, scene.folder, side, environment)
+            if times is None:
+                return None
+            found[state] = times
+    return found
+
+
+def _child(
+    path: Path, folder: Path, side: str, environment: dict[str, str]
+) -> dict[str, float] | None:
+    command = [sys.executable, "-m", "comparisons.experiments.convergence.start_worker"]
+    command += [side, str(path), str(folder.resolve()), str(SPP)]
+    begun = time.time()
+    try:
+        run = subprocess.run(
+            [*command, repr(begun)],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+            **tied(),
+            check=True,
+        )
+        times = json.loads(run.stdout.splitlines()[-1])
+    except (subprocess.SubprocessError, ValueError, IndexError):
+        return None
+    return {stage: float(times[stage]) for stage in STAGES}
+
+
+__all__ = ["SPP", "STAGES", "starts_of"]

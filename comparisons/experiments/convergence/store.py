@@ -1,0 +1,132 @@
+"""Finished rungs in a folder: what is done is not done again."""
+
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.experiments.convergence.data import Rung
+from comparisons.experiments.convergence.reference import key_of
+from comparisons.mitsuba.backend import backend
+from comparisons.results.sealed import read_arrays, sealed, unsealed, write_arrays
+from comparisons.suites.keys import files_digest, sources_digest
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.files import read_text, replacing
+
+SCHEMA = 2
+"""Raised whenever what is stored, or what it means, changes."""
+
+_ARRAYS = ("seconds", "mse", "relmse", "mean", "variance")
+"""Of a rung, in the order of its fields, after the two numbers."""
+
+_PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
+
+
+def run_key(scene: Scene, replicates: int) -> str:
+    """SHA-256 of all that rungs depend on: the scene as it is rendered and its files, our sources,
+    the versions of what computes, the machine, and how many replicates there are."""
+    chosen = backend()
+    parts = {
+        "schema": SCHEMA,
+        "scene": scene.digest(),
+        "files": files_digest(scene),
+        "sources": sources_digest(),
+        "reference": key_of(scene),
+        "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
+        "mitsuba": (chosen.variant, chosen.llvm_path),
+        "machine": (platform.node(), platform.machine(), os.cpu_count()),
+        "replicates": replicates,
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+class Store:
+    """Rungs, and small facts by name, of one scene; everything of another key is deleted.
+
+    folder: None keeps nothing.
+    """
+
+    def __init__(self, folder: Path | None, key: str, *, fresh: bool = False) -> None:
+        self._folder, self._key = folder, key
+        if folder is not None and (fresh or self._read("key") != key):
+            shutil.rmtree(folder, ignore_errors=True)
+            self._write("key", key)
+
+    # ---- rungs ----------------------------------------------------------------------------------
+
+    def rung(self, contestant: str, asked: int) -> Rung | None:
+        """The stored one; None where there is none, or none that can be read."""
+        if self._folder is None:
+            return None
+        kept = read_arrays(self._rung_path(contestant, asked))
+        with suppress(KeyError):
+            arrays = [np.asarray(kept[name], np.float64) for name in _ARRAYS]
+            return Rung(int(kept["asked"]), int(kept["spp"]), *arrays)
+        return None
+
+    def keep(self, contestant: str, rung: Rung) -> None:
+        """Store a rung, whole or not at all; its pictures as float32, whose rounding is far below
+        their noise.  Raises ImageError where the folder cannot be written."""
+        if self._folder is None:
+            return
+        arrays: dict[str, Any] = {name: getattr(rung, name) for name in _ARRAYS}
+        for name in ("mean", "variance"):
+            arrays[name] = arrays[name].astype(np.float32)
+        path = self._rung_path(contestant, rung.asked)
+        write_arrays(path, asked=rung.asked, spp=rung.spp, **arrays)
+
+    def _rung_path(self, contestant: str, asked: int) -> Path:
+        assert self._folder is not None
+        return self._folder / f"{contestant}-{asked}.npz"
+
+    # ---- pictures -------------------------------------------------------------------------------
+
+    def picture(self, name: str) -> Any:
+        """An array kept by `keep_picture`; None where there is none."""
+        if self._folder is None:
+            return None
+        return read_arrays(self._picture_path(name)).get("picture")
+
+    def keep_picture(self, name: str, picture: Any) -> None:
+        """Store an array as float32."""
+        if self._folder is not None:
+            write_arrays(self._picture_path(name), picture=np.asarray(picture, np.float32))
+
+    def _picture_path(self, name: str) -> Path:
+        assert self._folder is not None
+        return self._folder / f"{name}.npz"
+
+    # ---- facts ----------------------------------------------------------------------------------
+
+    def fact(self, name: str, settings: Any = None) -> Any:
+        """What `keep_fact` stored, if it was for the same settings; else None."""
+        found = self._read(name)
+        if isinstance(found, dict) and found.get("settings") == json.loads(json.dumps(settings)):
+            return found.get("fact")
+        return None
+
+    def keep_fact(self, name: str, fact: Any, settings: Any = None) -> None:
+        """Store what JSON can hold."""
+        self._write(name, {"settings": settings, "fact": fact})
+
+    def _read(self, name: str) -> Any:
+        if self._folder is None:
+            return None
+        with suppress(OSError, ValueError, RecursionError):
+            return unsealed(json.loads(read_text(self._folder / f"{name}.json"))).get("value")
+        return None
+
+    def _write(self, name: str, value: Any) -> None:
+        if self._folder is not None:
+            with replacing(self._folder / f"{name}.json") as temporary:
+                temporary.write_text(json.dumps(sealed({"value": value})), encoding="utf-8")
+
+
+__all__ = ["Store", "run_key"]

@@ -1,0 +1,88 @@
+"""Nanoseconds per ray, of methods in turn."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from comparisons.experiments.methods.setting import FloatArray, Trial
+from reference_rt.textbook import Method
+
+LONGEST = 15e6
+"""Nanoseconds of one run: fewer rays are traced where all would take longer."""
+
+PROBE = 64
+"""Rays of each trial that tell how long all would take."""
+
+
+class Prepared:
+    """A method that is ready to be asked about trials again and again."""
+
+    def __init__(self, method: Method, trials: list[Trial]) -> None:
+        self.method = method
+        with np.errstate(all="ignore"):
+            self.parts = [[method.prepare(part) for part in trial.parts] for trial in trials]
+        self.trials = trials
+        self._t = np.empty(max(len(trial.o) for trial in trials))
+
+    def answer(self, trial: Trial, rays: int) -> FloatArray:
+        """t (n,) of the first n rays: the first over all parts, inf for a miss."""
+        (number,) = (k for k, other in enumerate(self.trials) if other is trial)
+        o, d, t = trial.o[:rays], trial.d[:rays], np.empty(rays)
+        closest = np.full(rays, np.inf)
+        with np.errstate(all="ignore"):
+            for part in self.parts[number]:
+                self.method.run(part, o, d, t)
+                np.fmin(closest, t, out=closest)
+        return closest
+
+    def nanoseconds(self, rays: int) -> float:
+        """Of one run over the first rays of all trials, for each ray and part."""
+        asked, jobs = 0, list[tuple[Any, FloatArray, FloatArray, FloatArray]]()
+        for trial, parts in zip(self.trials, self.parts, strict=True):
+            o, d = trial.o[:rays], trial.d[:rays]
+            jobs += [(part, o, d, self._t[: len(o)]) for part in parts]
+            asked += len(o) * len(parts)
+        run = self.method.run
+        with np.errstate(all="ignore"):
+            begin = time.perf_counter_ns()
+            for job in jobs:
+                run(*job)
+            return (time.perf_counter_ns() - begin) / asked
+
+
+@dataclass(frozen=True)
+class Time:
+    """Nanoseconds per ray and shape: median and quartiles of `runs` runs of `rays` rays."""
+
+    median: float
+    low: float
+    high: float
+    runs: int
+    rays: int
+
+
+def measure(prepared: Mapping[str, Prepared], runs: int) -> dict[str, Time]:
+    """By method.  All take turns, so that what slows the machine for a while slows all of them."""
+    rays = {name: _affordable(method) for name, method in prepared.items()}
+    found: dict[str, list[float]] = {name: [] for name in prepared}
+    for _ in range(runs):
+        for name, method in prepared.items():
+            found[name].append(method.nanoseconds(rays[name]))
+    times = {}
+    for name, values in found.items():
+        low, median, high = (float(q) for q in np.quantile(values, (0.25, 0.5, 0.75)))
+        asked = sum(min(rays[name], len(trial.o)) for trial in prepared[name].trials)
+        times[name] = Time(median, low, high, runs, asked)
+    return times
+
+
+def _affordable(method: Prepared) -> int:
+    """Rays of each trial; the first runs compile or load the kernel and warm it up."""
+    method.nanoseconds(1)
+    expected = method.nanoseconds(PROBE)
+    shapes = sum(map(len, method.parts))
+    longest = max(len(trial.o) for trial in method.trials)
+    return int(min(max(LONGEST / (expected * shapes), PROBE), longest))

@@ -1,0 +1,83 @@
+"""How strong a fault must be: the fraction of runs that catch it, by its size."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Say, Subject, gather
+from comparisons.compare.judge import Evidence, of_replicates, picture_rungs
+from comparisons.experiments.selftest.fault import PictureFault
+from comparisons.experiments.selftest.finding import CAUGHT
+from comparisons.experiments.selftest.of_pictures import (
+    SCENE,
+    black_level,
+    blurred,
+    dark_tile,
+    gain,
+    shifted,
+)
+from comparisons.rungs.images import images_tier
+from comparisons.statistics.metrics import image_metrics
+from reference_rt.rendering.scene import Scene
+
+RUNS = 10
+POOL = 3
+"""Times as many replicates are rendered as one run uses: runs draw from them at random."""
+
+CURVES: Mapping[str, tuple[Callable[[float], PictureFault], tuple[float, ...]]] = {
+    "gain, %": (lambda x: gain(1.0 + x / 100.0), (0.05, 0.1, 0.2, 0.3, 0.5, 1.0)),
+    "gain of red, %": (lambda x: gain(1.0 + x / 100.0, 0), (0.05, 0.1, 0.2, 0.3, 0.5, 1.0)),
+    "shift, px": (lambda x: shifted(x, 0.0), (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)),
+    "blur, px": (blurred, (0.1, 0.2, 0.3, 0.4, 0.5)),
+    "one dark tile, %": (lambda x: dark_tile(x / 100.0), (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)),
+    "black level, 1e-3 W/sr/m²": (lambda x: black_level(1e-3 * x), (0.05, 0.1, 0.2, 0.5, 1.0)),
+}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """fault: what, and in which unit;  sizes;  caught: the fraction of runs that caught each size;
+    runs: of each."""
+
+    fault: str
+    sizes: tuple[float, ...]
+    caught: tuple[float, ...]
+    runs: int
+
+    def as_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def power_curves(budget: Budget, scenes: Path, say: Say) -> list[Curve]:
+    """Of the faults in CURVES, on pictures of one scene with a suite's budget."""
+    scene = Scene.load(scenes / f"{SCENE}.yaml")
+    many = budget.model_copy(update={"replicates": POOL * budget.replicates})
+    pool = gather(Subject(scene), many, say, only=("statistics", "images"))
+    rng = np.random.default_rng(0)
+    curves = []
+    for name, (fault_of, sizes) in CURVES.items():
+        caught = [
+            sum(_caught(pool, fault_of(size), budget, rng) for _ in range(RUNS)) / RUNS
+            for size in sizes
+        ]
+        curves.append(Curve(name, sizes, tuple(caught), RUNS))
+        say(f"{name}: {', '.join(f'{s:g}: {c:.0%}' for s, c in zip(sizes, caught, strict=True))}")
+    return curves
+
+
+def _caught(pool: Evidence, fault: PictureFault, budget: Budget, rng: np.random.Generator) -> bool:
+    assert pool.rendered is not None
+    assert pool.rendered.replicates is not None
+    ours, reference = (
+        side[rng.choice(len(side), budget.replicates, replace=False)]
+        for side in pool.rendered.replicates
+    )
+    rendered = of_replicates(fault.change(ours), reference, {})
+    if any(tier.status in CAUGHT for tier in picture_rungs(rendered, budget.limit)):
+        return True
+    metrics = image_metrics(rendered.images)
+    return images_tier(rendered.images, metrics, rendered.replicates).status in CAUGHT

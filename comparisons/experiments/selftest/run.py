@@ -1,0 +1,132 @@
+"""The whole self-test: sensitivity, power, specificity, and the tables made of them."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Say
+from comparisons.experiments.selftest.fault import Fault
+from comparisons.experiments.selftest.finding import Finding
+from comparisons.experiments.selftest.power import Curve, power_curves
+from comparisons.experiments.selftest.sensitivity import Budgets, sensitivity
+from comparisons.experiments.selftest.specificity import Alarms, specificity
+from comparisons.runs.provenance import provenance
+from comparisons.suites.suite import load_suite, plan
+from reference_rt.util.files import replacing
+
+SUITES = ("standard", "smoke")
+
+SMOKE_SHARE = 0.9
+"""Of the faults: what the short suite must catch; the standard one must catch all."""
+
+
+@dataclass
+class Outcome:
+    """What was found so far; whether it is enough is said by `holds`."""
+
+    findings: list[Finding] = field(default_factory=list)
+    curves: list[Curve] = field(default_factory=list)
+    alarms: Sequence[Alarms] = ()
+
+    def share(self, suite: str) -> tuple[int, int]:
+        """How many faults the suite caught, of how many."""
+        of_suite = [f for f in self.findings if f.suite == suite]
+        return sum(f.caught for f in of_suite), len(of_suite)
+
+    @property
+    def holds(self) -> bool:
+        """Whether standard catches all, smoke nearly all, and false alarms are as rare as said."""
+        standard, smoke = (self.share(suite) for suite in SUITES)
+        return (
+            standard[0] == standard[1]
+            and smoke[0] >= SMOKE_SHARE * smoke[1]
+            and all(alarms.holds for alarms in self.alarms)
+        )
+
+
+def budgets_of(scenes: Path) -> Budgets:
+    """The budgets of each suite's scenes."""
+    return {
+        suite: {w.path.stem: w.budget for w in plan(load_suite(suite), scenes).work
+                if not w.budget.control}
+        for suite in SUITES
+    }  # fmt: skip
+
+
+def run(
+    faults: Sequence[Fault], scenes: Path, seeds: int, out: Path, say: Say, with_power: bool
+) -> Outcome:
+    """Plant `faults`, then count false alarms over `seeds` seeds; `out` is whole after each."""
+    budgets = budgets_of(scenes)
+    outcome = Outcome()
+    for found in sensitivity(faults, budgets, scenes, say):
+        outcome.findings.append(found)
+        said = f"{found.rung}, {found.strength}" if found.caught else f"MISSED: {found.strength}"
+        say(f"{found.fault} ({found.suite}): {said}")
+        _write(out, outcome)
+    if with_power:
+        outcome.curves = power_curves(_smoke(budgets), scenes, say)
+        _write(out, outcome)
+    if seeds:
+        outcome.alarms = specificity(seeds, scenes, say)
+        _write(out, outcome)
+    return outcome
+
+
+def _smoke(budgets: Budgets) -> Budget:
+    from comparisons.experiments.selftest.of_pictures import SCENE
+
+    return budgets["smoke"][SCENE]
+
+
+def _write(out: Path, outcome: Outcome) -> None:
+    document: dict[str, Any] = {
+        "schema": 1,
+        "provenance": provenance(),
+        "caught": {suite: outcome.share(suite) for suite in SUITES},
+        "findings": [found.as_json() for found in outcome.findings],
+        "power": [curve.as_json() for curve in outcome.curves],
+        "specificity": [alarms.as_json() for alarms in outcome.alarms],
+    }
+    with replacing(out / "selftest.json") as temporary:
+        temporary.write_text(json.dumps(document, indent=1, ensure_ascii=False), encoding="utf-8")
+    with replacing(out / "selftest.md") as temporary:
+        temporary.write_text(markdown(outcome), encoding="utf-8")
+
+
+def markdown(outcome: Outcome) -> str:
+    """The tables, as the README shows them."""
+    lines = ["| fault | planted in | scene | standard: rung, strength | smoke: rung, strength |"]
+    lines.append("|---|---|---|---|---|")
+    by_name: dict[str, dict[str, Finding]] = {}
+    for found in outcome.findings:
+        by_name.setdefault(found.fault, {})[found.suite] = found
+    for name, of in by_name.items():
+        one = next(iter(of.values()))
+        cells = [_cell(of.get(suite)) for suite in SUITES]
+        if cells[1] == cells[0]:
+            cells[1] = "the same"
+        lines.append(f"| {name} | {one.kind} | {one.scene} | {cells[0]} | {cells[1]} |")
+    if outcome.curves:
+        lines += ["", "| fault | caught by a run of `smoke`, by size |", "|---|---|"]
+        for curve in outcome.curves:
+            sizes = ", ".join(
+                f"{size:g}: {caught:.0%}"
+                for size, caught in zip(curve.sizes, curve.caught, strict=True)
+            )
+            lines.append(f"| {curve.fault} | {sizes} |")
+    if outcome.alarms:
+        lines += ["", "| scene | runs | false alarms | at most (95 %) |", "|---|---|---|---|"]
+        for a in outcome.alarms:
+            lines.append(f"| {a.scene} | {a.runs:,} | {a.false_alarms} | {a.upper:.2%} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(found: Finding | None) -> str:
+    if found is None:
+        return ""
+    strength = found.strength.replace("|", "\\|")
+    return f"{found.rung}: {strength}" if found.caught else "**missed**"

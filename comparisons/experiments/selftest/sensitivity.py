@@ -1,0 +1,127 @@
+"""Faults are planted, and each suite is asked what it makes of them."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import reference_rt
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Say, Subject, compare_scene, gather
+from comparisons.compare.judge import Evidence, judge, of_replicates
+from comparisons.experiments.selftest.fault import Fault, PictureFault, SceneFault, SourceFault
+from comparisons.experiments.selftest.finding import Finding, finding
+from comparisons.results.case import Case
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.child_processes import tied
+from reference_rt.util.errors import ReferenceRtError
+
+Budgets = Mapping[str, Mapping[str, Budget]]
+"""By suite and scene."""
+
+MOST_SECONDS = 900.0
+"""Of one patched renderer, whose kernels are compiled anew."""
+
+
+class StaleFaultError(ReferenceRtError):
+    """The text that a fault replaces no longer stands in the source."""
+
+
+def sensitivity(
+    faults: Sequence[Fault], budgets: Budgets, scenes: Path, say: Say, jobs: int = 2
+) -> Iterator[Finding]:
+    """What each suite makes of each fault, in the order in which they are done."""
+    right = {}
+    for fault in faults:
+        for suite, by_scene in budgets.items():
+            budget = by_scene[fault.scene]
+            if isinstance(fault, PictureFault):
+                key = (suite, fault.scene)
+                if key not in right:
+                    scene = Scene.load(scenes / f"{fault.scene}.yaml")
+                    right[key] = gather(Subject(scene), budget, _silent)
+                yield finding(fault, suite, _altered(right[key], fault, budget))
+            elif isinstance(fault, SceneFault):
+                scene = Scene.load(scenes / f"{fault.scene}.yaml")
+                subject = Subject(fault.change(scene), scene)
+                yield finding(fault, suite, compare_scene(subject, budget, _silent))
+    sources = [fault for fault in faults if isinstance(fault, SourceFault)]
+    threads = max(1, (os.cpu_count() or 1) // jobs)
+    with ThreadPoolExecutor(jobs) as pool:
+        tasks = [
+            pool.submit(
+                _patched, fault, {s: b[fault.scene] for s, b in budgets.items()}, scenes, threads
+            )
+            for fault in sources
+        ]
+        for fault, task in zip(sources, tasks, strict=True):
+            say(f"waiting for: {fault.name}")
+            yield from task.result()
+
+
+def _silent(step: str) -> None:
+    pass
+
+
+def _altered(evidence: Evidence, fault: PictureFault, budget: Budget) -> Case:
+    rendered = evidence.rendered
+    assert rendered is not None
+    assert rendered.replicates is not None
+    ours, reference = rendered.replicates
+    with np.errstate(all="ignore"):
+        altered = of_replicates(fault.change(ours), reference, rendered.seconds)
+    return judge(replace(evidence, rendered=altered), budget.limit)
+
+
+def patched_text(fault: SourceFault) -> str:
+    """The patched source.  Raises StaleFaultError."""
+    file = Path(reference_rt.__file__).parent / fault.file
+    text = file.read_text(encoding="utf-8")
+    if text.count(fault.old) != 1:
+        raise StaleFaultError(
+            f"selftest: '{fault.name}': {fault.file} holds the text that it replaces "
+            f"{text.count(fault.old)} times; expected once"
+        )
+    return text.replace(fault.old, fault.new)
+
+
+def _patched(
+    fault: SourceFault, budgets: Mapping[str, Budget], scenes: Path, threads: int
+) -> list[Finding]:
+    """Judge a copy of the renderer that has the fault, in a process of its own."""
+    text = patched_text(fault)
+    with tempfile.TemporaryDirectory(prefix="reference_rt_selftest_") as folder:
+        package = Path(folder) / "reference_rt"
+        skipped = shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc")
+        shutil.copytree(Path(reference_rt.__file__).parent, package, ignore=skipped)
+        (package / fault.file).write_text(text, encoding="utf-8")
+        task = {
+            "fault": fault.name,
+            "scenes": str(scenes.resolve()),
+            "budgets": {suite: budget.model_dump() for suite, budget in budgets.items()},
+            "threads": threads,
+        }
+        run = subprocess.run(
+            # -P: the current folder, where a reference_rt may lie, is not searched.
+            [sys.executable, "-P", "-m", "comparisons.experiments.selftest.source_worker"],
+            input=json.dumps(task),
+            env={**os.environ, "PYTHONPATH": folder, "REFERENCE_RT_CACHE": f"{folder}/cache"},
+            capture_output=True,
+            text=True,
+            timeout=MOST_SECONDS,
+            **tied(),
+            check=False,
+        )
+    if run.returncode != 0:
+        lines = [line for line in run.stderr.splitlines() if line.strip()]
+        told = lines[-1] if lines else f"exit code {run.returncode}"
+        raise ReferenceRtError(f"selftest: '{fault.name}' could not be judged: {told}")
+    return [Finding(**fields) for fields in json.loads(run.stdout)]

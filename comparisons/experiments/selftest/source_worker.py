@@ -1,0 +1,29 @@
+"""Runs in a process whose `reference_rt` is a patched copy: one fault of the source, judged with
+the budgets that it is told.  Reads and writes JSON."""
+
+import json
+import sys
+from pathlib import Path
+
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, compare_scene
+from comparisons.experiments.selftest import FAULTS
+from comparisons.experiments.selftest.finding import finding
+from reference_rt.rendering.scene import Scene
+
+
+def main() -> None:
+    """{"fault", "scenes", "budgets": {suite: budget}} on standard input."""
+    task = json.load(sys.stdin)
+    fault = next(f for f in FAULTS if f.name == task["fault"])
+    scene = Scene.load(Path(task["scenes"]) / f"{fault.scene}.yaml")
+    found = []
+    for suite, fields in task["budgets"].items():
+        budget = Budget.model_validate(fields)
+        case = compare_scene(Subject(scene), budget, lambda step: None, threads=task["threads"])
+        found.append(finding(fault, suite, case).as_json())
+    json.dump(found, sys.stdout)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""How often the right renderer is said to be wrong, over many seeds."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Say, budgeted
+from comparisons.compare.judge import Evidence, judge, of_replicates
+from comparisons.experiments.selftest.finding import CAUGHT
+from comparisons.mitsuba import scene as mitsuba_scene
+from comparisons.mitsuba.translate import load
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+
+SCENES: tuple[tuple[str, Budget], ...] = (
+    ("cornell_box", Budget(size=(32, 32), spp=16)),
+    ("caustic_glass", Budget(size=(32, 24), spp=64)),
+)
+"""Small pictures, of which thousands can be rendered; the second one's noise is heavy-tailed."""
+
+ALLOWED = 1e-3
+"""False alarms a case."""
+
+
+@dataclass(frozen=True)
+class Alarms:
+    """runs: comparisons of fresh replicates;  false_alarms: verdicts `differ` and `invalid`;
+    rungs: of these;  upper: the 95 % confidence bound on their rate (Clopper and Pearson 1934)."""
+
+    scene: str
+    runs: int
+    replicates: int
+    false_alarms: int
+    rungs: dict[str, int]
+    upper: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether no more than ALLOWED were seen."""
+        return self.false_alarms <= ALLOWED * self.runs
+
+    def as_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def specificity(runs: int, scenes: Path, say: Say) -> Sequence[Alarms]:
+    """Judge `runs` sets of replicates a scene, no seed used twice."""
+    return [_of_scene(scenes / f"{name}.yaml", budget, runs, say) for name, budget in SCENES]
+
+
+def _of_scene(path: Path, budget: Budget, runs: int, say: Say) -> Alarms:
+    scene = budgeted(Scene.load(path), budget)
+    tables, twin = build_tables(scene), load(scene)
+    sampler, count = scene.resolved_sampler, budget.replicates
+    found: Counter[str] = Counter()
+    for run in range(runs):
+        seeds = range(run * count, (run + 1) * count)
+        ours = np.stack(
+            [
+                render(
+                    scene.changed(sampler=sampler.model_copy(update={"seed": seed})), tables=tables
+                ).colour
+                for seed in seeds
+            ]
+        )
+        reference = np.stack(
+            [mitsuba_scene.picture(twin.mi_scene, sampler.spp, seed) for seed in seeds]
+        )
+        case = judge(Evidence(scene.name, (), of_replicates(ours, reference, {}), {}), budget.limit)
+        if case.verdict in CAUGHT:
+            found[case.reason.partition(":")[0]] += 1
+        if (run + 1) % 100 == 0:
+            say(f"{scene.name}: {sum(found.values())} false alarms in {run + 1} runs")
+    alarms = sum(found.values())
+    upper = float(stats.beta.ppf(0.95, alarms + 1, runs - alarms)) if alarms < runs else 1.0
+    return Alarms(scene.name, runs, count, alarms, dict(found), upper)

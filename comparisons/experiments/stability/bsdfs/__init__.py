@@ -1,0 +1,1 @@
+"""F11: BSDFs: reciprocity, energy, densities."""

@@ -1,0 +1,1 @@
+"""F13: surfaces that touch."""

@@ -1,0 +1,170 @@
+"""Stacks of surfaces that are close to each other, and the order in which rays meet them."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.experiments.methods.errors import U
+from comparisons.experiments.methods.setting import FloatArray
+from comparisons.experiments.stability.harness.family import EXAMPLES, MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.leaving.judge import hexed
+from comparisons.experiments.stability.leaving.shapes import matrix
+from comparisons.geometry import frame
+from comparisons.mitsuba import translate
+from comparisons.mitsuba.backend import scalar
+from reference_rt.accel.geometry import Geometry, closest_hit, owner, surface
+from reference_rt.core.arrays import IntArray
+from reference_rt.core.ray import Ray, ray_from
+from reference_rt.core.vec3 import row
+from reference_rt.jit.kernel import entry_kernel
+
+COUNT = 8
+"""Surfaces in a stack."""
+
+FAR = 1000.0
+"""Scales between the origin and the scenes that are far away."""
+
+THEIRS = 40
+"""Rays of a setting that Mitsuba is asked about, in its scalar variant."""
+
+
+@entry_kernel
+def _follow(geometry: Geometry, o: FloatArray, d: FloatArray, out: IntArray) -> None:
+    """Into out (n, steps): the shapes that a ray meets, one after another; -1 after the last."""
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        for k in range(out.shape[1]):
+            hit = closest_hit(geometry, ray)
+            if hit.kind < 0:
+                break
+            out[i, k] = owner(geometry, ray, hit).shape
+            ray = ray_from(surface(geometry, ray, hit), ray.d)
+
+
+class Stack(NamedTuple):
+    """A scene, rays (n, 3) and the shapes that each meets, in order (n, steps)."""
+
+    scene: rt.Scene
+    o: FloatArray
+    d: FloatArray
+    expected: IntArray
+
+
+def bound(distance: float) -> float:
+    """B of scenes of half width 1."""
+    return 17.0 * math.sqrt(3.0) * U * (2.0 * distance + 6.0)
+
+
+def follow(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int) -> IntArray:
+    """The shapes that rays meet on their way straight through, -1 after the last."""
+    out = np.full((len(o), steps), -1)
+    _follow(rt.build_tables(scene).geometry, o, d, out)
+    return out
+
+
+def follow_in_mitsuba(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int) -> IntArray:
+    """The same in Mitsuba, by `si.spawn_ray`."""
+    out = np.full((len(o), steps), -1)
+    with scalar() as mi:
+        twin = translate.load(scene, frame.OURS)
+        for i in range(len(o)):
+            ray = mi.Ray3f(mi.Point3f(o[i].tolist()), mi.Vector3f(d[i].tolist()))
+            for k in range(steps):
+                si = twin.mi_scene.ray_intersect(ray)
+                if not si.is_valid():
+                    break
+                out[i, k] = twin.pieces[si.shape.id()].shape
+                ray = si.spawn_ray(mi.Vector3f(d[i].tolist()))
+    return out
+
+
+def _axes(rng: np.random.Generator) -> FloatArray:
+    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return np.asarray(q * np.sign(np.linalg.det(q)))
+
+
+def rays_down(
+    rng: np.random.Generator, n: int, steepest: float = 0.4
+) -> tuple[FloatArray, FloatArray]:
+    """(o, d) from above through the middle of the square [-1, 1]², at up to this tangent."""
+    middle = np.column_stack([rng.uniform(-0.2, 0.2, (n, 2)), np.zeros(n)])
+    d = np.column_stack([rng.uniform(-steepest, steepest, (n, 2)), -np.ones(n)])
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    return middle - 1.5 * d, d
+
+
+def plates(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
+    """Parallel squares, tilted."""
+    axes, center = _axes(rng), _axes(rng)[0] * distance
+    squares = tuple(
+        rt.Rectangle(transform=matrix(axes, center - axes[:, 2] * (k * gap))) for k in range(COUNT)
+    )
+    o, d = rays_down(rng, n, 0.3)
+    o, d = o @ axes.T + center, d @ axes.T
+    return Stack(rt.Scene(shapes=squares), o, d, np.tile(np.arange(COUNT), (n, 1)))
+
+
+def shells(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
+    """Spheres in spheres; rays pass near enough to the middle to meet all, twice."""
+    center = _axes(rng)[0] * distance
+    balls = tuple(
+        rt.Sphere(center=tuple(center.tolist()), radius=1.0 - k * gap) for k in range(COUNT)
+    )
+    o, d = rays_down(rng, n)
+    numbers = np.arange(COUNT)
+    expected = np.tile(np.concatenate([numbers, numbers[::-1]]), (n, 1))
+    return Stack(rt.Scene(shapes=balls), o + center, d, expected)
+
+
+def slots(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
+    """A cube cut in two by a slot, and a square in the middle of that: in, out, the square, in,
+    out."""
+    axes, center = _axes(rng), _axes(rng)[0] * distance
+    cut = rt.Box(transform=matrix(np.diag([4.0, 4.0, gap]), np.zeros(3)))
+    cube = rt.Difference(of=(rt.Box(), cut), transform=matrix(axes, center))
+    square = rt.Rectangle(transform=matrix(axes, center))
+    o, d = rays_down(rng, n)
+    o, d = (o - 1.5 * d) @ axes.T + center, d @ axes.T
+    expected = np.tile([0, 0, 1, 0, 0], (n, 1))
+    return Stack(rt.Scene(shapes=(cube, square)), o, d, expected)
+
+
+def judged(expected: IntArray, found: IntArray, note: Callable[[int], dict[str, Any]]) -> Outcome:
+    """Each ray is a case."""
+    bad = np.flatnonzero((expected != found).reshape(len(expected), -1).any(axis=1))
+    examples = tuple(
+        note(i) | {"expected": expected[i].tolist(), "found": found[i].tolist()}
+        for i in bad[:EXAMPLES].tolist()
+    )
+    return Outcome(len(expected), len(bad), examples=examples)
+
+
+def ordered(
+    make: Callable[..., Stack], distance: float = 0.0, theirs: bool = True
+) -> Callable[[Draw, float], Mapping[str, Outcome]]:
+    """Rays straight through a stack with gaps of 1 / x."""
+
+    def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
+        stacks = 4
+        outcomes: dict[str, Outcome] = {}
+        for _ in range(stacks):
+            stack = make(draw.rng, draw.cases // stacks, 1.0 / x, distance)
+            found = {OURS: follow(stack.scene, stack.o, stack.d, stack.expected.shape[1])}
+            if draw.mitsuba and theirs:
+                few = slice(0, THEIRS)
+                found[MITSUBA] = follow_in_mitsuba(
+                    stack.scene, stack.o[few], stack.d[few], stack.expected.shape[1]
+                )
+            for name, met in found.items():
+                outcome = judged(stack.expected[: len(met)], met, _ofrays_down(stack, x))
+                outcomes[name] = outcomes[name] + outcome if name in outcomes else outcome
+        return outcomes
+
+    return measure
+
+
+def _ofrays_down(stack: Stack, x: float) -> Callable[[int], dict[str, Any]]:
+    return lambda i: {"gap": (1.0 / x).hex(), "o": hexed(stack.o[i]), "d": hexed(stack.d[i])}

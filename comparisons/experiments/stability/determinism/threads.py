@@ -1,0 +1,70 @@
+"""Pictures by any number of threads, ours and Mitsuba's."""
+
+import importlib
+from typing import Any
+
+import reference_rt as rt
+from comparisons.experiments.stability.harness import scenes
+from comparisons.experiments.stability.harness.bits import MAKES, over, same_bits
+from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw, Outcome
+from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
+from comparisons.mitsuba.scene import picture
+from comparisons.mitsuba.translate import load
+
+# The package has a function of this name.
+_module: Any = importlib.import_module("reference_rt.rendering.render")
+
+Outcomes = dict[str, Outcome]
+
+SMALL_BAND = 64
+
+
+def threads(draw: Draw, x: float) -> Outcomes:
+    """In bands so small that threads have something to share."""
+    previous = _module.SAMPLES_PER_BAND
+    _module.SAMPLES_PER_BAND = SMALL_BAND
+    try:
+        found = {OURS: over(draw, lambda scene: rt.render(scene, threads=int(x)).colour)}
+    finally:
+        _module.SAMPLES_PER_BAND = previous
+    if draw.mitsuba:
+        found[MITSUBA] = _mitsuba_threads(draw, SCALAR, rt.BoxFilter(), int(x))
+    return found
+
+
+def wide_filter(variant_name: str, draw: Draw, x: float) -> Outcomes:
+    """Ours has no samples that pixels share: each pixel's filter draws its own."""
+
+    def wide(scene: rt.Scene) -> rt.Scene:
+        return scene.changed(film=scene.film.model_copy(update={"filter": rt.GaussianFilter()}))
+
+    total = Outcome(0, 0)
+    for make in MAKES:
+        scene = wide(make(draw.folder))
+        first, again = (rt.render(scene, threads=n).colour for n in (1, int(x)))
+        total += same_bits(first, again)
+    found = {OURS: total}
+    if draw.mitsuba and (variant_name == SCALAR or backend().variant == LLVM):
+        found[MITSUBA] = _mitsuba_threads(draw, variant_name, rt.GaussianFilter(), int(x))
+    return found
+
+
+def _mitsuba_threads(draw: Draw, name: str, film_filter: Any, count: int) -> Outcome:
+    """The path-traced scene, one seed: one thread, then others, each count three times."""
+    import drjit as dr
+
+    scene = scenes.path(draw.folder)
+    film = scene.film.model_copy(update={"filter": film_filter, "width": 96, "height": 72})
+    with variant(name):
+        mi_scene = load(scene.changed(film=film)).mi_scene
+        before = dr.thread_count()
+        try:
+            dr.set_thread_count(1)
+            first = picture(mi_scene, 4, seed=1)
+            dr.set_thread_count(count)
+            total = Outcome(0, 0)
+            for _ in range(3):
+                total += same_bits(first, picture(mi_scene, 4, seed=1))
+        finally:
+            dr.set_thread_count(before)
+    return total

@@ -1,0 +1,1 @@
+"""F10: furnaces, where every radiance is known."""

@@ -1,0 +1,53 @@
+"""The curves of a series: failure rate and worst error against the extreme."""
+
+import math
+
+from comparisons.experiments.stability.harness.summary import SeriesSummary, contestants, named
+from comparisons.report.plots import Curve, log_log
+
+SIZE = (4.8, 3.7)
+"""Inches."""
+
+LEAST, MOST = 1e-2, 1e30
+"""Of worst errors, of the series' unit: an axis knows no zero, and where a text-book's 1 - R says
+1e-16 in place of 0, the error is some 1e297."""
+
+
+def of_series(one: SeriesSummary) -> list[str]:
+    """None where there is one setting alone, or nothing went wrong and there is no error."""
+    if not one.series.axis or len(one.found) < 2:
+        return []
+    names = contestants(one.found)
+    ends = {}
+    if not math.isinf(one.series.holds_to):
+        ends["float64 ends"] = one.series.holds_to
+    plots = []
+    axis = one.series.axis
+    if any(some.failures for f in one.found for some in f.outcomes.values()):
+        seen = _least(one)
+        curves = [_rates(one, name, k) for k, name in enumerate(names)]
+        level = {"none seen": seen}
+        plots.append(log_log(curves, axis, "share of cases", "Failures", level, SIZE, ends))
+    if any(some.worst is not None for f in one.found for some in f.outcomes.values()):
+        curves = [_errors(one, name, k) for k, name in enumerate(names)]
+        unit = f"worst error, {one.series.unit}" if one.series.unit else "worst error"
+        plots.append(log_log(curves, axis, unit, "Worst error", None, SIZE, ends))
+    return plots
+
+
+def _rates(one: SeriesSummary, name: str, colour: int) -> Curve:
+    some = [(f.x, f.outcomes[name]) for f in one.found if name in f.outcomes]
+    y = [max(o.failures / max(o.cases, 1), _least(one)) for _, o in some]
+    return Curve(named(name), [x for x, _ in some], y, colour=colour)
+
+
+def _least(one: SeriesSummary) -> float:
+    """Where none is drawn: at half a case of the most that were asked."""
+    return 0.5 / max(1, *(some.cases for f in one.found for some in f.outcomes.values()))
+
+
+def _errors(one: SeriesSummary, name: str, colour: int) -> Curve:
+    some = [(f.x, f.outcomes[name].worst) for f in one.found if name in f.outcomes]
+    known = [(x, worst) for x, worst in some if worst is not None and math.isfinite(worst)]
+    shown = [min(max(worst, LEAST), MOST) for _, worst in known]
+    return Curve(named(name), [x for x, _ in known], shown, colour=colour)

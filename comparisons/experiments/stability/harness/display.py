@@ -1,0 +1,34 @@
+"""Progress for people: a bar on a terminal, a line a setting without one."""
+
+from rich.progress import MofNCompleteColumn, TimeElapsedColumn
+
+from comparisons.experiments.stability.harness.family import MITSUBA, OURS
+from comparisons.experiments.stability.harness.result import Found
+from reference_rt.util.console import Bar
+
+
+class Display(Bar):
+    """Told of each setting as it is known."""
+
+    def __init__(self, settings: int) -> None:
+        super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
+        self._task = self._bar.add_task("", total=settings)
+
+    def done(self, found: Found, remark: str) -> None:
+        """A setting is known."""
+        self._bar.update(self._task, advance=1, description=f"{found.family} {found.series}")
+        bad = found.broken or (found.ours is not None and found.ours.failures)
+        if not self._console.is_terminal or bad:
+            self.line(f"{found.family} {found.series} {found.x:g}: {said(found)} ({remark})")
+
+
+def said(found: Found) -> str:
+    """The outcomes of a setting in a line."""
+    if found.broken:
+        return f"not measured: {found.broken}"
+    told = []
+    for name in sorted(found.outcomes, key=lambda n: (n != OURS, n != MITSUBA, n)):
+        some = found.outcomes[name]
+        worst = "" if some.worst is None else f", worst {some.worst:.2g}"
+        told.append(f"{name} {some.failures:,} of {some.cases:,}{worst}")
+    return "; ".join(told)

@@ -1,0 +1,51 @@
+"""What was found in one setting, in a file of its own: what is found is not measured again."""
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from comparisons.experiments.stability.harness.family import OURS, Outcome
+from reference_rt.util.files import read_text, replacing
+
+
+@dataclass(frozen=True)
+class Found:
+    """outcomes: by contestant;  seconds: that it took, compiling included;  broken: why there are
+    no outcomes, "" where there are."""
+
+    family: str
+    series: str
+    x: float
+    outcomes: dict[str, Outcome]
+    seconds: float
+    broken: str = ""
+
+    @property
+    def ours(self) -> Outcome | None:
+        return self.outcomes.get(OURS)
+
+    def write(self, path: Path, key: str) -> None:
+        """At once or not at all."""
+        document = dataclasses.asdict(self) | {"key": key}
+        with replacing(path) as temporary:
+            # Infinity, which is no JSON, is for our own eyes; `results.json` has none.  NumPy's
+            # numbers become Python's.
+            text = json.dumps(document, indent=1, default=lambda value: value.item())
+            temporary.write_text(text, encoding="utf-8")
+
+    @classmethod
+    def read(cls, path: Path, key: str) -> "Found | None":
+        """What was found with this key, if anything."""
+        try:
+            document: dict[str, Any] = json.loads(read_text(path))
+            if document.pop("key") != key:
+                return None
+            outcomes = {
+                name: Outcome(**(some | {"examples": tuple(some["examples"])}))
+                for name, some in document.pop("outcomes").items()
+            }
+            return cls(outcomes=outcomes, **document)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return None

@@ -1,0 +1,116 @@
+"""The table of all series: for a terminal, and as Markdown."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from comparisons.experiments.stability.harness.families import family
+from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Effort
+from comparisons.experiments.stability.harness.result import Found
+from comparisons.experiments.stability.harness.summary import (
+    SeriesSummary,
+    contestants,
+    first_failure,
+    found_of,
+    named,
+    summarise,
+    total,
+)
+from comparisons.report.values import power_of_ten
+
+COLUMNS = ("family", "series", "to", "cases", "failures", "worst", "ours", "Mitsuba", "others")
+
+
+def summaries(found: Sequence[Found]) -> dict[str, list[SeriesSummary]]:
+    """By the ids of families."""
+    names = dict.fromkeys(f.family for f in found)
+    return {name: summarise(family(name), found_of(found, name)) for name in names}
+
+
+def cells(name: str, one: SeriesSummary) -> list[str]:
+    """Of one series, as text."""
+    ours = total(one.found, OURS)
+    others = [c for c in contestants(one.found) if c not in (OURS, MITSUBA)]
+    told = [f"{named(c)} {where(one, c)}" for c in others]
+    return [
+        f"{name} {family(name).name}",
+        one.series.name,
+        f"{one.series.axis} {number(one.last)}" if one.series.axis else "",
+        f"{ours.cases:,}" if ours else "–",
+        f"{ours.failures:,}" if ours else "not measured",
+        worst(one, OURS),
+        where(one, OURS),
+        where(one, MITSUBA),
+        ", ".join(told),
+    ]
+
+
+def where(one: SeriesSummary, contestant: str) -> str:
+    """At which x a contestant starts to fail; of ours whether that is where float64 ends."""
+    some = total(one.found, contestant)
+    if some is None:
+        return "–"
+    if not some.failures:
+        return "holds"
+    share = f"{some.failures:,} of {some.cases:,}"
+    x = first_failure(one.found, contestant)
+    assert x is not None
+    if contestant == OURS and one.holds:
+        return f"holds to float64's end, {number(one.series.holds_to)}"
+    return f"fails from {number(x)} on" if one.series.axis else share
+
+
+def worst(one: SeriesSummary, contestant: str) -> str:
+    """The largest error, with its unit."""
+    some = total(one.found, contestant)
+    if some is None or some.worst is None:
+        return "–"
+    return f"{number(some.worst)} {one.series.unit}".rstrip()
+
+
+def number(value: float) -> str:
+    """Two digits, powers of ten as such."""
+    if value == 0.0 or math.isinf(value):
+        return "0" if value == 0.0 else "∞"
+    if 1e-3 <= value < 1e4:
+        return f"{value:.2g}" if value < 100.0 else f"{value:,.0f}"
+    return power_of_ten(value)
+
+
+def terminal(found: Sequence[Found]) -> Table:
+    """For people at a terminal."""
+    table = Table(show_edge=False, pad_edge=False)
+    for name in COLUMNS:
+        if name != "failures":  # where each fails is told
+            table.add_column(name, overflow="fold", justify="right" if name == "cases" else "left")
+    for name, series in summaries(found).items():
+        for one in series:
+            style = None if one.holds else "bold red"
+            _, series_name, to, cases, _, *rest = cells(name, one)
+            row = (name, series_name, to, cases, *rest)
+            table.add_row(*map(Text, row), style=style)
+    return table
+
+
+def markdown(
+    found: Sequence[Found], effort: Effort, seed: int, provenance: Mapping[str, Any]
+) -> str:
+    """The table with its date and machine, for a README."""
+    told = [
+        f"`reference-rt stability --{effort} --seed {seed}`",
+        str(provenance["date"])[:10],
+        str(provenance["machine"]),
+        f"{provenance['cores']} cores",
+        f"Mitsuba {provenance.get('mitsuba', 'absent')}".partition(":")[0],
+        f"{sum(f.seconds for f in found) / 60.0:.0f} minutes of one process",
+    ]
+    lines = ["Measured: " + ", ".join(told) + ".", ""]
+    lines += ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
+    for name, series in summaries(found).items():
+        for one in series:
+            row = [cell.replace("|", "\\|") for cell in cells(name, one)]
+            lines.append("| " + " | ".join(row) + " |")
+    return "\n".join(lines) + "\n"

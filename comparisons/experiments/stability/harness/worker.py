@@ -1,0 +1,94 @@
+"""`python -m comparisons.experiments.stability.harness.worker`: measures one setting after another,
+as a pool asks.
+
+It keeps to `comparisons.runs.processes.protocol`.  A process, since extreme numbers are what brings
+native libraries down.
+"""
+
+import faulthandler
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+from PIL import Image
+from pydantic import BaseModel, ConfigDict
+
+from comparisons.experiments.stability.harness.families import family
+from comparisons.experiments.stability.harness.family import OURS, Draw, Effort, generator
+from comparisons.experiments.stability.harness.result import Found
+from comparisons.runs.processes.protocol import carry_out, private_stdout
+from reference_rt.util.errors import SceneWarning
+from reference_rt.util.files import replacing
+
+
+class Request(BaseModel):
+    """A setting to measure, or, where `shoot` names a contestant, a picture of it to make.
+
+    out: the file of what is found, or of the picture, a .png that holds its caption;  key: what the
+    file says it was made with.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    family: str
+    series: str
+    x: float
+    seed: int
+    effort: Effort
+    mitsuba: bool
+    out: Path
+    key: str
+    shoot: str = ""
+
+
+def measure(request: Request) -> None:
+    """Measure a setting and write what was found."""
+    series = family(request.family).by_name[request.series]
+    start = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="reference_rt_stability_") as folder:
+        draw = Draw(
+            generator(request.seed, request.family, request.series, request.x),
+            series.cases[request.effort],
+            request.mitsuba,
+            Path(folder),
+            request.effort,
+        )
+        outcomes = series.measure(draw, request.x)
+    if OURS not in outcomes:
+        raise RuntimeError(f"{request.family} {request.series}: nothing was said about ours")
+    seconds = time.perf_counter() - start
+    Found(request.family, request.series, request.x, dict(outcomes), seconds).write(
+        request.out, request.key
+    )
+
+
+def shoot(request: Request) -> None:
+    """Make a picture and write it."""
+    series = family(request.family).by_name[request.series]
+    assert series.shoot is not None
+    shot = series.shoot(request.shoot, request.x)
+    from PIL.PngImagePlugin import PngInfo
+
+    facts = PngInfo()
+    facts.add_text("caption", shot.caption)
+    facts.add_text("key", request.key)
+    with replacing(request.out) as temporary:
+        Image.fromarray(shot.pixels).save(temporary, pnginfo=facts)
+
+
+def main() -> None:
+    """Answer until standard input ends."""
+    faulthandler.enable()
+    # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
+    warnings.simplefilter("ignore", SceneWarning)
+    answers = private_stdout()
+    for line in sys.stdin:
+        request = Request.model_validate_json(line)
+        task = shoot if request.shoot else measure
+        carry_out(lambda task=task, request=request: task(request), answers)  # type: ignore[misc]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,159 @@
+"""Scenes whose every pixel has one known radiance, rendered by ours and by Mitsuba.
+
+All have the same kinds of shapes, materials and lights, some of them black and too small to be met,
+so that ours compiles its kernels once.  Mitsuba's have only what counts.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.experiments.stability.harness import chance
+from comparisons.experiments.stability.harness.family import (
+    MITSUBA,
+    OURS,
+    Draw,
+    FloatArray,
+    Outcome,
+)
+from comparisons.geometry import frame
+from comparisons.mitsuba.backend import scalar
+from comparisons.mitsuba.scene import picture
+from comparisons.mitsuba.translate import load
+from reference_rt.core import transform
+
+_TINY = transform.Scale(scale=(1e-30, 1e-30, 1e-30))
+
+
+def at(x: float, y: float, z: float) -> transform.Translate:
+    return transform.Translate(translate=(x, y, z))
+
+
+def facing(axis: tuple[float, float, float], degrees: float) -> transform.Rotate:
+    return transform.Rotate(rotate=transform.Turn(axis=axis, degrees=degrees))
+
+
+def grey(x: float) -> tuple[float, float, float]:
+    return x, x, x
+
+
+_HIDDEN = (
+    rt.Rectangle(material="nothing", transform=(_TINY, at(0.01, -900.0, 0.01))),
+    rt.Sphere(material="glass", center=(0.02, -900.0, 0.01), radius=1e-30),
+    rt.Disk(material="black", transform=(_TINY, at(0.03, -900.0, 0.01))),
+    rt.Triangle(
+        material="black",
+        v0=(0.04, -900.0, 0.01),
+        v1=(0.04, -900.0, 0.01 + 1e-9),
+        v2=(0.04 + 1e-9, -900.0, 0.01),
+    ),
+)
+_MATERIALS: Mapping[str, Any] = {
+    "black": rt.Diffuse(reflectance=grey(0.0)),
+    "glass": rt.Dielectric(),
+    "nothing": rt.Emissive(radiance=grey(0.0)),
+}
+
+
+class World(NamedTuple):
+    """shapes, materials: what counts;  sky: radiance from all sides;  expected: what every pixel
+    sees;  path: fields of the integrator;  rounding: of what is expected, relatively, per u."""
+
+    shapes: tuple[Any, ...]
+    materials: Mapping[str, Any]
+    camera: Any
+    expected: float
+    path: Mapping[str, Any]
+    sky: float = 0.0
+    rounding: float = 64.0
+
+
+def scene_of(world: World, pixels: int, spp: int, seed: int, hidden: bool) -> rt.Scene:
+    """pixels: along either side of the picture."""
+    lights = (rt.Constant(radiance=grey(world.sky)),) if hidden or world.sky > 0.0 else ()
+    return rt.Scene(
+        camera=world.camera,
+        film=rt.Film(width=pixels, height=pixels, filter=rt.BoxFilter()),
+        sampler=rt.Sobol(spp=spp, seed=seed) if hidden else rt.Independent(spp=spp, seed=seed),
+        integrator=rt.Path(**world.path),
+        hierarchy="sah",
+        materials={**(_MATERIALS if hidden else {}), **world.materials},
+        shapes=(*(_HIDDEN if hidden else ()), *world.shapes),
+        lights=lights,
+    )
+
+
+def ours(world: World, pixels: int, spp: int, seed: int) -> FloatArray:
+    """(pixels², 3)."""
+    scene = scene_of(world, pixels, spp, seed, hidden=True)
+    return rt.render(scene).colour.reshape(-1, 3)
+
+
+def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> FloatArray:
+    def render() -> FloatArray:
+        twin = load(scene_of(world, pixels, spp, seed, hidden=False), frame.OURS)
+        return picture(twin.mi_scene, spp, seed).reshape(-1, 3)
+
+    if not in_scalar:
+        return render()
+    with scalar():
+        return render()
+
+
+MOST = 0.1
+"""What a picture's mean may be off by, relatively, whatever its noise."""
+
+Render = Callable[[int, int], FloatArray]
+"""Pixels (n, 3) of a picture by its seed and its samples per pixel."""
+
+
+def judge(
+    rendered: Mapping[str, Render],
+    seeds: tuple[int, int],
+    spp: int,
+    expected: float,
+    rounding: Callable[[str], float],
+    told: Mapping[str, Any],
+) -> dict[str, Outcome]:
+    """One case: the mean is finite and, in two stages of `chance`, the expected one, to noise, of
+    `MOST` at most, and rounding.  The worst is relative."""
+    found = {}
+    for who, render in rendered.items():
+
+        def sample(stage: int, render: Render = render) -> chance.Mean:
+            one = render(seeds[stage], spp * (1, chance.AGAIN)[stage]).mean(axis=1)
+            return chance.Mean(float(one.mean()), float(one.std(ddof=1)) / math.sqrt(len(one)))
+
+        limits = rounding(who) * expected, MOST * expected
+        failed, (mean, error) = chance.fails(sample, expected, *limits)
+        off = abs(mean - expected) / expected
+        seen = {"expected": expected, "found": mean, "standard error": error, "seeds": seeds}
+        examples = ({**told, **seen},) if failed else ()
+        worst = off if math.isfinite(off) else math.inf
+        found[who] = Outcome(1, int(failed), worst, examples=examples)
+    return found
+
+
+def measure(
+    world: World,
+    draw: Draw,
+    spp: int,
+    rounding: Callable[[str], float],
+    told: Mapping[str, Any],
+    pixels: int = 32,
+    in_scalar: bool = True,
+    their_pixels: int = 16,
+) -> dict[str, Outcome]:
+    first, again = draw.rng.integers(1, 2**31, 2).tolist()
+
+    def mitsubas(seed: int, spp: int) -> FloatArray:
+        with np.errstate(all="ignore"):
+            return theirs(world, their_pixels, spp, seed, in_scalar)
+
+    rendered: dict[str, Render] = {OURS: lambda seed, spp: ours(world, pixels, spp, seed)}
+    if draw.mitsuba:
+        rendered[MITSUBA] = mitsubas
+    return judge(rendered, (first, again), spp, world.expected, rounding, told)

@@ -1,0 +1,1 @@
+"""F5: every hierarchy finds what testing every primitive finds."""

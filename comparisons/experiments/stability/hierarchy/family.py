@@ -1,0 +1,184 @@
+"""F5, hierarchies: what rays find through one is what testing every primitive finds.
+
+Law: the same shape, the same face, the same bits of t and of the coordinates there, whichever of
+the four hierarchies (sah, median, spatial, none) leads to it; and the any-hit query says that
+something is there before infinity and just beyond t, and nothing before t.
+
+Range: 1 to 1e6 triangles, a third of them on a lattice; 1 to 1e4 copies in one place; slivers of
+aspect 1 to 1e15, with rays in their planes; assorted shapes at offsets of 1 to 1e15 and of sizes of
+1e-70 to 1e300 (spheres and triangles alone from 1e80 on, where the others are refused; from 1e160
+on nothing is hit); and a scene with everything, which the quick run leaves out, as its kernels take
+half a minute to compile.  Rays: anywhere, through vertices, along axes and diagonals with both
+zeros in the planes of boxes, from vertices.  Counts: quick 4,000 rays, full 1,000,000, fewer where
+rays times primitives exceed 2e7, eight at once 2e8.  Each ray is a case for each hierarchy.
+Passes: no difference.
+
+Above 2,000 primitives "none" stands for all of them: it tests every triangle, eight at once, and is
+itself compared with single tests below that.  Mitsuba does not take part: it cannot trace without
+Embree's hierarchy.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.experiments.stability.harness.family import (
+    OURS,
+    Draw,
+    Effort,
+    Family,
+    FloatArray,
+    Outcome,
+    Series,
+    decades,
+)
+from comparisons.experiments.stability.hierarchy import scenes
+from comparisons.experiments.stability.hierarchy.every import compare, compare_all
+
+SINGLY = 2_000
+"""Primitives up to which each is tested by itself."""
+
+TESTS: Mapping[Effort, float] = {"quick": 2e6, "full": 2e7}
+"""Most single tests of a setting, some 15 ns each; eight at once ten times as many."""
+
+
+def rays(draw: Draw, primitives: int) -> int:
+    """How many a setting can afford."""
+    most = TESTS[draw.effort] * (1.0 if primitives <= SINGLY else 10.0) / primitives
+    return int(min(draw.cases, max(most, 500.0)))
+
+
+def _of(draw: Draw, corners: FloatArray, o: FloatArray, d: FloatArray) -> Mapping[str, Outcome]:
+    scene = rt.Scene(shapes=(scenes.soup(corners, draw.folder / "soup.ply"),))
+    return {OURS: compare(scene, o, d, singly=len(corners) <= SINGLY)}
+
+
+def measure_primitives(draw: Draw, x: float) -> Mapping[str, Outcome]:
+    corners = scenes.strewn(draw.rng, int(x))
+    o, d = scenes.hard_rays(draw.rng, corners.reshape(-1, 3), rays(draw, int(x)))
+    return _of(draw, corners, o, d)
+
+
+def measure_copies(draw: Draw, x: float) -> Mapping[str, Outcome]:
+    """Three triangles, two of which are in one plane and overlap."""
+    three = np.array(
+        [
+            [[-1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [-1.0, 3.0, 0.0]],
+            [[-2.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 3.0, 0.0]],
+            draw.rng.uniform(-1.0, 1.0, (3, 3)),
+        ]
+    )
+    corners = np.repeat(three, int(x), axis=0)
+    # In one place they are all tested whatever leads to them: by four hierarchies, not by one.
+    o, d = scenes.hard_rays(draw.rng, three.reshape(-1, 3), rays(draw, 4 * len(corners)))
+    return _of(draw, corners, o, d)
+
+
+def measure_slivers(draw: Draw, x: float) -> Mapping[str, Outcome]:
+    corners = scenes.slivers(draw.rng, x, 400)
+    o, d = scenes.grazing_rays(draw.rng, corners, rays(draw, len(corners)))
+    return _of(draw, corners, o, d)
+
+
+def _assorted(draw: Draw, scale: float, at: FloatArray) -> Mapping[str, Outcome]:
+    count = 150
+    shapes = scenes.assorted(draw.rng, count, scale, at)
+    points = at + scale * draw.rng.uniform(-10.0, 10.0, (1000, 3))
+    o, d = scenes.hard_rays(draw.rng, points, rays(draw, count))
+    return {OURS: compare(rt.Scene(shapes=shapes), o, d, singly=True)}
+
+
+def measure_offset(draw: Draw, x: float) -> Mapping[str, Outcome]:
+    return _assorted(draw, 1.0, x * np.array([1.0, -0.7, 0.3]))
+
+
+def measure_size(draw: Draw, x: float) -> Mapping[str, Outcome]:
+    return _assorted(draw, x, np.zeros(3))
+
+
+def measure_smallness(draw: Draw, x: float) -> Mapping[str, Outcome]:
+    return _assorted(draw, 1.0 / x, np.zeros(3))
+
+
+def measure_everything(draw: Draw, _x: float) -> Mapping[str, Outcome]:
+    scene = scenes.everything(draw.rng, draw.folder)
+    return {OURS: compare_all(scene, *scenes.lattice_rays(draw.rng, draw.cases))}
+
+
+CASES: Mapping[Effort, int] = {"quick": 4_000, "full": 1_000_000}
+
+FAMILY = Family(
+    id="F5",
+    name="hierarchies",
+    law="the same shape, face and bits of t as testing every primitive; any-hit agrees",
+    anchors="Embree's verify builds hierarchies of degenerate input, and does not compare hits",
+    series=(
+        Series(
+            name="primitives",
+            axis="triangles",
+            about="Triangles strewn in a cube, some on a lattice; rays also in the planes of boxes"
+            " and from vertices.",
+            values=decades(0, 6),
+            quick=(1.0, 100.0, 1e4),
+            cases=CASES,
+            measure=measure_primitives,
+        ),
+        Series(
+            name="copies",
+            axis="copies of each of three triangles",
+            about="All in one place, two of the three in one plane.",
+            values=decades(0, 4),
+            quick=(1.0, 100.0),
+            cases=CASES,
+            measure=measure_copies,
+        ),
+        Series(
+            name="slivers",
+            axis="length / height",
+            about="A bundle of slivers along one line and strips of one plane; rays in their"
+            " planes, and up to 1e-8 out of them.",
+            values=decades(0, 15, 3),
+            quick=(1.0, 1e9, 1e15),
+            cases=CASES,
+            measure=measure_slivers,
+        ),
+        Series(
+            name="offset",
+            axis="offset from the origin, of shapes of size 1",
+            about="Assorted shapes within 10 of a point far away.",
+            values=decades(0, 15, 3),
+            quick=(1.0, 1e12),
+            cases=CASES,
+            measure=measure_offset,
+        ),
+        Series(
+            name="size",
+            axis="size",
+            about="Assorted shapes, ever larger.",
+            values=decades(0, 300, 50),
+            quick=(1.0, 1e50, 1e300),
+            cases=CASES,
+            measure=measure_size,
+        ),
+        Series(
+            name="smallness",
+            axis="1 / size",
+            about="Assorted shapes, ever smaller.",
+            values=decades(0, 70, 35),
+            quick=(1.0, 1e70),
+            cases=CASES,
+            measure=measure_smallness,
+        ),
+        Series(
+            name="everything",
+            axis="",
+            about="Shapes of every kind, groups and solids, a third of them on a lattice; half of"
+            " the rays at lattice points, along axes and diagonals.",
+            values=(1.0,),
+            quick=(),
+            cases=CASES,
+            measure=measure_everything,
+        ),
+    ),
+)

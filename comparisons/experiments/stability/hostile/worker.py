@@ -1,0 +1,142 @@
+"""A process that renders hostile scenes, one after another, as `reference-rt render` does.
+
+Its first line of standard input is the settings, each other one a case: {"scene": path,
+"signature": ...}; it answers each with one line: what came of it.  A case that takes longer than it
+may ends the process: by SIGPROF where it computes, by SIGALRM where it waits.
+"""
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import resource
+import signal
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TextIO
+
+import numba
+import numpy as np
+import typer
+
+from reference_rt.cli.main import adjusted, guarded, provenance
+from reference_rt.integrators import RayCast
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering import image
+from reference_rt.rendering.render import Picture, render
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+from reference_rt.util.errors import ImageError
+
+SIZE, SAMPLES = "8x8", 1
+
+MOST_MEMORY = 12 << 30
+"""Bytes of address space: what asks for more raises instead of taking the machine's."""
+
+WAITING = 40.0
+"""Times as long a case may take when it does not compute, on a machine that is busy."""
+
+
+def serve(outcome: Callable[[Path, str | None, "Clock"], dict[str, Any]]) -> None:
+    """Answers cases until there are none."""
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    warnings.simplefilter("ignore")
+    answers = os.fdopen(os.dup(1), "w")
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)  # what libraries print is no answer
+    seconds = float(json.loads(sys.stdin.readline())["seconds"])
+    clock = Clock(seconds)
+    for line in sys.stdin:
+        case = json.loads(line)
+        answer = outcome(Path(case["scene"]), case.get("signature"), clock)
+        _say(answers, answer)
+
+
+def _say(answers: TextIO, answer: dict[str, Any]) -> None:
+    answers.write(json.dumps(answer) + "\n")
+    answers.flush()
+
+
+class Clock:
+    """Ends the process when a case takes too long; compiling does not count."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+
+    def start(self) -> None:
+        signal.setitimer(signal.ITIMER_PROF, self.seconds)
+        signal.setitimer(signal.ITIMER_REAL, self.seconds * WAITING)
+
+    def stop(self) -> None:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def _outcome(path: Path, signature: str | None, clock: Clock) -> dict[str, Any]:
+    """exit: the code that the command would return;  said: what it would write to standard error;
+    nonfinite: the pixels that files would show as not finite;  signature: of the kernels;
+    rendered: whether it came to a picture."""
+    found: dict[str, Any] = {"exit": 0, "said": "", "nonfinite": 0, "rendered": False}
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            clock.start()
+            _render(path, signature, found, clock)
+    except typer.Exit as stopped:
+        found["exit"] = stopped.exit_code
+    finally:
+        clock.stop()
+    found["said"] = said.getvalue().strip()
+    return found
+
+
+@guarded
+def _render(path: Path, wanted: str | None, found: dict[str, Any], clock: Clock) -> None:
+    """As the command of the same name, without a file.  Where `wanted` is another combination of
+    kernels, stops before they are compiled."""
+    scene = adjusted(Scene.load(path), SAMPLES, SIZE)
+    tables = build_tables(scene)
+    found["signature"] = signature = signature_of(scene, tables)
+    if wanted is not None and signature != wanted:
+        return
+
+    def progress(what: str, fraction: float) -> None:
+        if what == "compile":
+            (clock.stop if fraction == 0.0 else clock.start)()
+
+    provenance(scene)
+    picture = render(scene, threads=1, tables=tables, progress=progress)
+    found["rendered"] = True
+    found["nonfinite"] = count_nonfinite(picture)
+    bad = picture.nonfinite_pixels
+    if len(bad) > 0:
+        raise ImageError(f"{path}: {len(bad)} pixels are not finite; expected light that is")
+
+
+def count_nonfinite(picture: Picture) -> int:
+    """Pixels of which the file would hold a number that is not finite; of the distances, which are
+    infinite for a miss, NaN alone."""
+    bad = np.zeros(picture.colour.shape[:2], bool)
+    with np.errstate(over="ignore"):
+        for name, plane in image.channels(picture.layers).items():
+            values = plane.astype(np.float32)
+            far = name in ("distance.Z", "depth.Z")
+            bad |= np.isnan(values) if far else ~np.isfinite(values)
+    return int(bad.sum())
+
+
+def signature_of(scene: Scene, tables: SceneTables) -> str:
+    """Scenes of one signature are rendered by the same compiled kernels."""
+    film = scene.film
+    parts: list[Any] = [tables, scene.camera.setup(film.width, film.height), film.filter.setup()]
+    if not isinstance(scene.integrator, RayCast):
+        parts += [scene.integrator.setup(), scene.resolved_sampler.setup()]
+    names = f"{scene.integrator.type} {film.layers} {numba.typeof(tuple(parts))}"
+    return hashlib.sha256(names.encode()).hexdigest()
+
+
+if __name__ == "__main__":
+    serve(_outcome)

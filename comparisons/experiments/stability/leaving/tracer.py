@@ -1,0 +1,179 @@
+"""Rays that meet a shape, leave it, and are followed: the compiled loops."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.experiments.methods.setting import FloatArray
+from comparisons.experiments.stability.leaving.shapes import GROUPS, KINDS, Placed, Rays
+from reference_rt import shapes as any_shape
+from reference_rt.accel.geometry import Geometry, closest_hit, surface
+from reference_rt.core.arrays import IntArray
+from reference_rt.core.ray import Hit, Ray, SurfacePoint, at, ray_from
+from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, row, to_world
+from reference_rt.jit.kernel import entry_kernel, kernel
+from reference_rt.shapes.meshes.watertight import shear_of
+from reference_rt.shapes.tables import TABLES
+
+
+class Ways(NamedTuple):
+    """Where rays leave to, seen from the surface: local (n, 3), unit vectors with +z along the
+    outward normal."""
+
+    local: FloatArray
+
+    @property
+    def outer(self) -> Any:
+        return self.local[:, 2] > 0.0
+
+
+class Departures(NamedTuple):
+    """t (n,): where the first rays meet the shape, inf for a miss;  p, n, start, w (n, 3): the
+    point, its normal, and the ray that leaves;  again (n,): where that meets the shape;  cosine
+    (n,): of w to the normal there."""
+
+    t: FloatArray
+    p: FloatArray
+    n: FloatArray
+    start: FloatArray
+    w: FloatArray
+    again: FloatArray
+    cosine: FloatArray
+
+    @classmethod
+    def of(cls, out: FloatArray) -> "Departures":
+        """Of the columns that the kernels write."""
+        return cls(
+            out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7:10], out[:, 10:13], out[:, 13], out[:, 14]
+        )
+
+
+COLUMNS = 15
+
+EPSILON = 1e-4
+"""Of the text-book's offset."""
+
+
+@kernel
+def _leaving(ray: Ray, t: float, point: SurfacePoint, w: Vec3, epsilon: float) -> Ray:
+    """Ours, or for an epsilon above 0 the text-book's ray: it begins at o + t d, and what is nearer
+    than epsilon does not count, so that it might as well begin there."""
+    if epsilon > 0.0:
+        return Ray(at(ray, t) + w * epsilon, w, math.inf)
+    return ray_from(point, w)
+
+
+@kernel
+def _write(
+    out: FloatArray, i: int, t: float, point: SurfacePoint, leaving: Ray, again: float, n: Vec3
+) -> None:
+    out[i, 0] = t
+    out[i, 1], out[i, 2], out[i, 3] = point.p
+    out[i, 4], out[i, 5], out[i, 6] = point.n
+    out[i, 7], out[i, 8], out[i, 9] = leaving.o
+    out[i, 10], out[i, 11], out[i, 12] = leaving.d
+    out[i, 13], out[i, 14] = again, dot(leaving.d, n)
+
+
+@kernel
+def _meet(geometry: Geometry, kind: int, i: int, ray: Ray) -> Hit:
+    """One row of a table alone, of kind -1: the whole scene."""
+    if kind < 0:
+        return closest_hit(geometry, ray)
+    t, u, v = any_shape.intersect(geometry.shapes, kind, i, ray, shear_of(ray))
+    return Hit(t, kind if t < math.inf else -1, i, u, v, -1)
+
+
+@entry_kernel
+def _depart(
+    geometry: Geometry,
+    kind: int,
+    rows: IntArray,
+    o: FloatArray,
+    d: FloatArray,
+    ways: FloatArray,
+    epsilon: float,
+    out: FloatArray,
+) -> None:
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        hit = _meet(geometry, kind, rows[i], ray)
+        out[i, 0] = math.inf
+        out[i, 13] = math.inf
+        if hit.kind < 0:
+            continue
+        point = surface(geometry, ray, hit)
+        w = to_world(frame_from_normal(point.n), row(ways, i))
+        leaving = _leaving(ray, hit.t, point, w, epsilon)
+        met = _meet(geometry, kind, rows[i], leaving)
+        n = Vec3(0.0, 0.0, 0.0)
+        again = math.inf
+        if met.kind >= 0:
+            n, again = surface(geometry, leaving, met).n, met.t
+        _write(out, i, hit.t, point, leaving, again, n)
+
+
+COMPANY = (
+    rt.Sphere(),
+    rt.Rectangle(),
+    rt.Disk(),
+    rt.Triangle(v0=(0, 0, 0), v1=(1, 0, 0), v2=(0, 1, 0)),
+    rt.Polygon(rings=(((0, 0, 0), (1, 0, 0), (0, 1, 0)),)),
+    rt.Plane(),
+    rt.Box(),
+    rt.Cylinder(),
+    rt.Torus(),
+)
+"""One of each table, so that one kernel serves them all."""
+
+
+class Subject(NamedTuple):
+    """A shape to be left: its geometry, and where it stands in it; kind -1: alone in a scene."""
+
+    geometry: Geometry
+    field: str
+    kind: int
+    row: int
+
+    @property
+    def table(self) -> Any:
+        return getattr(self.geometry.shapes, self.field)
+
+
+def subjects(kind: str, placed: list[Placed]) -> list[Subject]:
+    """Shapes of one kind."""
+    if kind in ("mesh", "solid", "instance"):
+        return [Subject(_scene(p).geometry, "", -1, 0) for p in placed]
+    shapes = (*(p.shape for p in placed), *COMPANY)
+    geometry = rt.build_tables(rt.Scene(shapes=shapes)).geometry
+    found = []
+    for code, field, _, _ in TABLES:
+        table = getattr(geometry.shapes, field)
+        for i, owner in enumerate(table.owner.tolist()):
+            if owner < len(placed):
+                found.append((owner, Subject(geometry, field, code, i)))
+    return [subject for _, subject in sorted(found, key=lambda pair: pair[0])]
+
+
+def scene_of(placed: Placed) -> rt.Scene:
+    """The shape alone."""
+    groups: Any = GROUPS if placed.kind == "instance" else {}
+    return rt.Scene(shapes=(placed.shape,), groups=groups)
+
+
+def _scene(placed: Placed) -> Any:
+    return rt.build_tables(scene_of(placed))
+
+
+def depart(subject: Subject, rays: Rays, ways: Ways, epsilon: float = 0.0) -> Departures:
+    """Rays meet the shape and leave it; with an epsilon above 0, as text-books do."""
+    out = np.zeros((len(rays.o), COLUMNS))
+    rows = np.full(len(rays.o), subject.row)
+    with np.errstate(all="ignore"):
+        _depart(subject.geometry, subject.kind, rows, rays.o, rays.d, ways.local, epsilon, out)
+    return Departures.of(out)
+
+
+__all__ = ["EPSILON", "KINDS", "Departures", "Subject", "Ways", "depart", "scene_of", "subjects"]

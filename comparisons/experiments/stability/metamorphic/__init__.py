@@ -1,0 +1,1 @@
+"""F9: scenes that are described differently and must look the same."""

@@ -1,0 +1,257 @@
+"""What rays hit in a scene and in the same scene transformed."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+import reference_rt as rt
+from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.stability.harness.scenes import GRID
+from comparisons.experiments.stability.metamorphic.motion import Motion
+from comparisons.experiments.stability.metamorphic.solids import Judge
+from comparisons.geometry import frame
+from comparisons.mitsuba.backend import scalar
+from comparisons.mitsuba.counterpart import trace
+from comparisons.mitsuba.translate import load
+from comparisons.rungs.rays.arbiter import directions
+from reference_rt.core.ray import UNIT_ROUNDOFF
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering import query
+from reference_rt.rendering.query import Intersections
+
+BoolArray = npt.NDArray[np.bool_]
+Identities = npt.NDArray[np.int64]
+
+Outcomes = dict[str, Outcome]
+
+HALVINGS = 50
+"""Steps that close in on an edge: until two rays differ by float64's rounding."""
+
+
+class Rays(NamedTuple):
+    """o, d (n, 3): dyadic origins, directions of about unit length;  coarse (n,): those that
+    float32 holds and that pass every edge at 2^-14 of the way or more, which Mitsuba is asked."""
+
+    o: FloatArray
+    d: FloatArray
+    coarse: BoolArray
+
+
+class Found(NamedTuple):
+    """t (n,), inf for a miss, and identities (n, 4): shape, instance, part, primitive; -1 in the
+    first for a miss."""
+
+    t: FloatArray
+    identities: Identities
+
+
+def found_of(hits: Intersections) -> Found:
+    columns = (hits.shape, hits.instance, hits.part, hits.primitive)
+    return Found(hits.t, np.where(hits.shape[:, None] < 0, -1, np.column_stack(columns)))
+
+
+def ours(tables: SceneTables, o: FloatArray, d: FloatArray) -> Found:
+    return found_of(query.intersect(tables, o, d))
+
+
+def mitsubas(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Found:
+    """Mitsuba's scalar variant, which solves spheres and cylinders in float64; -2 for every shape
+    where it refuses the scene."""
+    try:
+        with scalar(), np.errstate(over="ignore", invalid="ignore"):
+            # What float32 cannot hold becomes infinite.
+            return found_of(trace(load(scene, frame.OURS), o, d))
+    except RuntimeError:
+        return Found(np.full(len(o), np.inf), np.full((len(o), 4), -2))
+
+
+def aimed(tables: SceneTables, n: int, rng: np.random.Generator) -> Rays:
+    """A third anywhere, a third at edges (silhouettes, borders of faces and triangles), at 2^-4 to
+    2^-14 of the way to them, a third at edges down to float64's rounding.
+
+    An edge is where two rays from one origin hit different things: between them by bisection.
+    """
+    o = (1.0, 2.0, 7.0) + np.rint(rng.uniform(-1.0, 1.0, (n, 3)) * GRID) / GRID
+    ends = rng.uniform(-3.0, 3.0, (2, n, 3)) - o
+    a, b = (round32(unit(end)) for end in ends)
+    kind = np.arange(n) % 3
+    pairs = np.flatnonzero((kind > 0) & differ(ours(tables, o, a), ours(tables, o, b)))
+    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    p, q, e = a[pairs], b[pairs], o[pairs]
+    first = ours(tables, e, p)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        other = differ(ours(tables, e, p + middle[:, None] * (q - p)), first)
+        low, high = np.where(other, low, middle), np.where(other, middle, high)
+    far = kind[pairs] == 1
+    depth = np.where(far, rng.uniform(4, 14, len(pairs)), rng.uniform(14, HALVINGS, len(pairs)))
+    side = rng.choice([-1.0, 1.0], len(pairs))
+    d = p + (0.5 * (low + high) + side * 2.0**-depth)[:, None] * (q - p)
+    a[pairs] = np.where(far[:, None], round32(d), d)
+    coarse = np.ones(n, bool)
+    coarse[pairs[~far]] = False
+    return Rays(o, a, coarse)
+
+
+def unit(v: FloatArray) -> FloatArray:
+    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
+
+
+def round32(v: FloatArray) -> FloatArray:
+    return v.astype(np.float32).astype(np.float64)
+
+
+def differ(a: Found, b: Found) -> BoolArray:
+    """Which rays do not hit the same thing."""
+    return np.asarray((a.identities != b.identities).any(axis=1))
+
+
+def through(motion: Motion, rays: Rays) -> tuple[FloatArray, FloatArray]:
+    """Origins and directions, transformed as the scene is; t grows by the factor."""
+    o = np.array([motion.point(p) for p in rays.o.tolist()]).reshape(-1, 3)
+    d = np.array([motion.vector(v) for v in rays.d.tolist()]).reshape(-1, 3)
+    return o, d
+
+
+class Asked(NamedTuple):
+    """Rays, and what they found in a scene;  names: the identities in terms of the scene that this
+    one is compared with, where shapes have other numbers there."""
+
+    scene: rt.Scene
+    o: FloatArray
+    d: FloatArray
+    found: Found
+    names: Identities | None = None
+
+
+def _changed(before: Asked, after: Asked) -> BoolArray:
+    names = after.found.identities if after.names is None else after.names
+    return differ(before.found, Found(after.found.t, names))
+
+
+BAND = 8.0
+"""Roundings u, of the largest coordinate L, by which a ray may have been moved relative to the
+surface that it meets.  Exact arithmetic takes ray and tables as they are in float64, rounded
+already; what is left is how a shape sees the ray: o - anchor rounds by u |o - anchor|, products
+with unit rows and their sums by 3 u |o - anchor|.  No anchor is further than 12 from an origin here
+and L is 6 at least: 4 u 12 = 8 u 6.  What is then solved rounds more; to allow less is stricter."""
+
+AROUND = np.concatenate([directions(16), 0.3 * directions(8)])
+"""Moves, of that size, that a differing ray is asked with."""
+
+
+def judged(
+    before: Asked, after: Asked, factor: float, exact: bool, unmoved: bool = False
+) -> Outcome:
+    """Ours.  exact: the transformed numbers are the numbers meant, and the answers must be the
+    same to the last bit of t;  else where answers differ each must be right in its own scene, by
+    exact arithmetic: where rounding the scene has really changed what is there, both are;
+    unmoved: each must be right in the scene before.
+    """
+    changed = _changed(before, after)
+    t0, t1 = before.found.t, after.found.t / factor
+    same = np.isfinite(t0) & ~changed
+    off = np.abs(t1[same] - t0[same]) / t0[same]
+    worst = float(off.max(initial=0.0))
+    open_ = np.zeros(len(t0), bool)
+    if exact:
+        wrong = changed | (same & (t0 != t1))
+    else:
+        wrong = changed.copy()
+        rows = np.flatnonzero(changed)
+        judged_as = before._replace(found=after.found) if unmoved else after
+        right, open_[rows] = _both_right(before, judged_as, rows)
+        wrong[rows[right]] = False
+    wrong &= ~open_
+    rows = np.flatnonzero(wrong)[:EXAMPLES]
+    return Outcome(
+        int(len(t0) - np.count_nonzero(open_)),
+        int(np.count_nonzero(wrong)),
+        worst,
+        int(np.count_nonzero(open_)),
+        tuple(_example(before, after, int(k)) for k in rows),
+    )
+
+
+def _both_right(
+    before: Asked, after: Asked, rows: npt.NDArray[np.int64]
+) -> tuple[BoolArray, BoolArray]:
+    """Of some rays: whether both answers are those of exact arithmetic for a ray within BAND, and
+    whether the arbiter leaves one open."""
+    right, touching = np.ones(len(rows), bool), np.zeros(len(rows), bool)
+    for asked in (before, after):
+        # What is wrong before is wrong.
+        left = np.flatnonzero(right)
+        right[left], touching[left] = _right(asked, rows[left])
+    return right, touching
+
+
+def _right(asked: Asked, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolArray]:
+    """Most are right for the very ray: only others, some 3 ms each, are asked around it."""
+    if len(rows) == 0:
+        return np.ones(0, bool), np.zeros(0, bool)
+    judge, o, d = Judge(asked.scene), asked.o[rows], asked.d[rows]
+    names, t = asked.found.identities[rows], asked.found.t[rows]
+    met = judge.decide(o, d)
+    right = np.array([m.allows(*answer) for m, *answer in zip(met, names, t, strict=True)])
+    touching = np.array([m.touching for m in met])
+    rest = np.flatnonzero(~right)
+    # An infinite plane counts as far as the ray goes.
+    extent = np.maximum(np.abs(o).max(axis=1), np.abs(judge.bounds).max())
+    moves = BAND * UNIT_ROUNDOFF * extent[rest, None, None] * AROUND
+    origins = (o[rest, None] + moves).reshape(-1, 3)
+    met = judge.decide(origins, np.repeat(d[rest], len(AROUND), axis=0))
+    for k, ray in enumerate(rest.tolist()):
+        some = met[k * len(AROUND) : (k + 1) * len(AROUND)]
+        right[ray] = any(m.allows(names[ray], t[ray]) for m in some)
+    return right, touching
+
+
+def judged_mitsuba(before: Asked, after: Asked, factor: float) -> Outcome:
+    """Its rays pass every edge at more than 1e-5 of the way: what float64's rounding of the scene
+    moves, 1e-16 of its size, changes none of them."""
+    wrong = _changed(before, after)
+    t0, t1 = before.found.t, after.found.t / factor
+    same = np.isfinite(t0) & ~wrong
+    worst = float((np.abs(t1[same] - t0[same]) / t0[same]).max(initial=0.0))
+    rows = np.flatnonzero(wrong)[:EXAMPLES]
+    examples = tuple(_example(before, after, int(k)) for k in rows)
+    return Outcome(len(wrong), int(np.count_nonzero(wrong)), worst, 0, examples)
+
+
+def _example(before: Asked, after: Asked, k: int) -> dict[str, Any]:
+    def told(asked: Asked) -> dict[str, Any]:
+        return {
+            "o": [x.hex() for x in asked.o[k].tolist()],
+            "d": [x.hex() for x in asked.d[k].tolist()],
+            "t": float(asked.found.t[k]).hex(),
+            "shape, instance, part, primitive": asked.found.identities[k].tolist(),
+        }
+
+    return {"before": told(before), "after": told(after)}
+
+
+def added(one: Mapping[str, Outcome], other: Mapping[str, Outcome]) -> Outcomes:
+    """Contestant by contestant."""
+    found = dict(one)
+    for name, outcome in other.items():
+        found[name] = found[name] + outcome if name in found else outcome
+    return found
+
+
+class Bench:
+    """A scene, its rays, and what they find in it before it is transformed."""
+
+    def __init__(
+        self, scene: rt.Scene, cases: int, rng: np.random.Generator, mitsuba: bool = False
+    ) -> None:
+        tables = rt.build_tables(scene)
+        self.rays = aimed(tables, cases, rng)
+        o, d, coarse = self.rays
+        self.ours = Asked(scene, o, d, ours(tables, o, d))
+        self.mitsuba = None
+        if mitsuba:
+            o, d = o[coarse], d[coarse]
+            self.mitsuba = Asked(scene, o, d, mitsubas(scene, o, d))

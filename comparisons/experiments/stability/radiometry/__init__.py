@@ -1,0 +1,1 @@
+"""F12: light at extreme sizes and distances."""

@@ -1,0 +1,1 @@
+"""F8: the roots of quadratics and quartics."""

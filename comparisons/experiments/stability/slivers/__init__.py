@@ -1,0 +1,1 @@
+"""F4: thin triangles and needles."""

@@ -1,0 +1,1 @@
+"""F7: CSG solids."""

@@ -1,0 +1,74 @@
+"""Volumes by chords against those of another kernel."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.experiments.stability.harness.family import OURS, Draw, Outcome
+from comparisons.experiments.stability.solids import lists
+from comparisons.experiments.stability.solids.trees import Shapes, Tree, leaf, placed, write_mesh
+from reference_rt.core import transform
+from reference_rt.shapes.meshes.files import read_mesh
+
+RAYS = 10_000
+HALF = 2.5
+"""Half the side of the square beam: no operand reaches further."""
+
+SIGMAS = 4.0
+"""A right answer is further off once in 16 000 solids."""
+
+
+def volumes(draw: Draw, x: float) -> Mapping[str, Outcome]:
+    write_mesh(draw.folder)
+    off: dict[str, list[float]] = {OURS: [], lists.INTERVALS: []}
+    for _ in range(draw.cases):
+        shapes, tree, volume = _solid(draw, int(x))
+        o = np.column_stack([draw.rng.uniform(-HALF, HALF, (RAYS, 2)), np.full(RAYS, -10.0)])
+        d = np.tile([0.0, 0.0, 1.0], (RAYS, 1))
+        solid = shapes.solid(tree)
+        for name, t in (
+            (OURS, lists.ours(solid, draw.folder, o, d).t),
+            (lists.INTERVALS, lists.intervals(solid, draw.folder, o, d)),
+        ):
+            even = t[:, : t.shape[1] // 2 * 2]
+            chords = np.where(np.isfinite(even), even, 0.0)
+            length = (chords[:, 1::2] - chords[:, 0::2]).sum(axis=1) * (2.0 * HALF) ** 2
+            error = max(float(length.std()) / np.sqrt(RAYS), 1e-300)
+            off[name].append(abs(float(length.mean()) - volume) / error)
+    return {
+        name: Outcome(len(some), int(np.count_nonzero(np.array(some) > SIGMAS)), max(some))
+        for name, some in off.items()
+    }
+
+
+def _solid(draw: Draw, operands: int) -> tuple[Shapes, Tree, float]:
+    """Shapes, a tree of all, and its volume."""
+    import manifold3d
+
+    leaves, solids = [], []
+    size = 1.2 * operands ** (-1.0 / 3.0)
+    for k in range(operands):
+        kind = ("box", "mesh")[k % 2]
+        shape = leaf(draw.rng, kind, placed(draw.rng, size * (0.7 if kind == "box" else 1.0), 0.7))
+        leaves.append(shape)
+        solids.append(_manifold(manifold3d, draw, shape))
+    tree: Tree = 0
+    whole = solids[0]
+    for k in range(1, operands):
+        operation = str(draw.rng.choice(["|", "|", "-", "|"])) if k > 1 else "|"
+        tree = (operation, tree, k)
+        whole = whole + solids[k] if operation == "|" else whole - solids[k]
+    return Shapes(leaves), tree, float(whole.volume())
+
+
+def _manifold(manifold3d: Any, draw: Draw, shape: Any) -> Any:
+    m = transform.affine(shape.transform)
+    if isinstance(shape, rt.Box):
+        cube = manifold3d.Manifold.cube((2.0, 2.0, 2.0), True)
+        return cube.transform(m)
+    data = read_mesh(draw.folder / shape.file)
+    points = transform.apply_points(m, data.vertices)
+    mesh = manifold3d.Mesh64(points, data.faces.astype(np.uint64))
+    return manifold3d.Manifold(mesh)

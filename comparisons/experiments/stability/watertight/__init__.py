@@ -1,0 +1,1 @@
+"""F3: closed meshes do not leak."""

@@ -1,0 +1,105 @@
+"""Who traces rays in a closed mesh: ours, Mitsuba three ways, methods a triangle at a time."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from comparisons.experiments.stability.harness.family import MITSUBA, FloatArray
+from comparisons.experiments.stability.harness.meshes import Closed
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.scene import for_rays
+from reference_rt import textbook
+from reference_rt.core.arrays import IntArray
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import row
+from reference_rt.jit.kernel import entry_kernel
+from reference_rt.shapes.meshes import triangle
+from reference_rt.shapes.meshes.triangle import Triangles
+from reference_rt.shapes.meshes.watertight import shear_of
+
+BoolArray = npt.NDArray[np.bool_]
+Tracer = Callable[[FloatArray, FloatArray], BoolArray]
+
+NOT_ROBUST, INSTANCED = "mitsuba, not robust", "mitsuba, instanced"
+
+COARSEST = 0.1
+"""The spacing of float32 at which a mesh of radius 1 to 6 is no longer what is meant."""
+
+
+@entry_kernel
+def _count(
+    triangles: Triangles, o: FloatArray, d: FloatArray, crossings: IntArray, balance: IntArray
+) -> None:
+    for i in range(len(o)):
+        shear = shear_of(Ray(row(o, i), row(d, i), np.inf))
+        for k in range(len(triangles.vertices)):
+            if triangle.intersect(triangles, k, shear).t < np.inf:
+                crossings[i] += 1
+                balance[i] += triangle.enters(triangles, k, shear)
+
+
+def crossings(tables: Any, o: FloatArray, d: FloatArray) -> tuple[IntArray, IntArray]:
+    """How many triangles of a scene each ray crosses, each tested by itself, and how many more
+    times it goes in than out."""
+    number, balance = np.zeros((2, len(o)), np.int64)
+    with np.errstate(all="ignore"):
+        _count(tables.geometry.shapes.triangles, o, d, number, balance)
+    return number, balance
+
+
+def fits(coordinates: FloatArray) -> bool:
+    """Whether float32 knows coordinates of this size to COARSEST."""
+    return bool(np.spacing(np.float32(np.abs(coordinates).max())) < COARSEST)
+
+
+def mitsubas(mesh: Closed) -> dict[str, Tracer]:
+    """Whether rays hit a mesh whose vertices are rounded to float32: with Embree's robust flag, as
+    the translation has it, without, and in a group, which ignores it."""
+    mi = mitsuba()
+
+    def scene(is_robust: bool, **shapes: Any) -> Any:
+        flags = {"type": "scene", "embree_use_robust_intersections": is_robust}
+        return mi.load_dict({**flags, **shapes}, optimize=False)
+
+    group = {"type": "shapegroup", "member": _mesh(mi, mesh)}
+    copy = {"type": "instance", "group": {"type": "ref", "id": "group"}}
+    return {
+        MITSUBA: _tracer(mi, scene(True, mesh=_mesh(mi, mesh))),
+        NOT_ROBUST: _tracer(mi, scene(False, mesh=_mesh(mi, mesh))),
+        INSTANCED: _tracer(mi, scene(True, group=group, copy=copy)),
+    }
+
+
+def _mesh(mi: Any, mesh: Closed) -> Any:
+    made = mi.Mesh("mesh", len(mesh.vertices), len(mesh.faces))
+    values = mi.traverse(made)
+    values["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
+    values["faces"] = mesh.faces.astype(np.uint32).ravel()
+    values.update()
+    return made
+
+
+def _tracer(mi: Any, scene: Any) -> Tracer:
+    def hits(origin: Any, direction: Any) -> tuple[Any, ...]:
+        return (scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), direction)).t,)
+
+    def trace(o: FloatArray, d: FloatArray) -> BoolArray:
+        (t,) = for_rays(hits, o, d)
+        return np.asarray(np.isfinite(t))
+
+    return trace
+
+
+def by_method(name: str, mesh: Closed) -> Tracer:
+    """One of the text-book's tests of a triangle, of all of a mesh's."""
+
+    def trace(o: FloatArray, d: FloatArray) -> BoolArray:
+        met = np.zeros(len(o), np.bool_)
+        for corners in mesh.vertices[mesh.faces]:
+            t = textbook.intersect(name, textbook.TriangleParameters(*corners), o, d)
+            met |= np.isfinite(t)
+        return met
+
+    return trace

@@ -1,0 +1,195 @@
+"""pytest plugin: the fixture `image_gate`, which judges a picture in one line of a test.
+
+    def test_cornell_box(image_gate):
+        image_gate(my_renderer("scenes/cornell_box.yaml"), scene="scenes/cornell_box.yaml")
+
+It imports nothing beyond pytest until it is used.
+"""
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from comparisons.gate.pictures_in import Picture
+    from comparisons.results.case import Case
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--image-gate-out` and `--image-gate-baselines`."""
+    group = parser.getgroup("image_gate", "pictures against scenes and baselines (reference-rt)")
+    group.addoption(
+        "--image-gate-out",
+        metavar="DIR",
+        default="image-gate",
+        help="where results.json and, of failures, the pictures and a page go, a folder per test "
+        "(default: image-gate, in the root folder)",
+    )
+    group.addoption(
+        "--image-gate-baselines",
+        metavar="DIR",
+        default="baselines",
+        help="the folder of baselines (default: baselines, in the root folder)",
+    )
+
+
+@pytest.fixture
+def image_gate(request: pytest.FixtureRequest) -> "ImageGate":
+    """Judges pictures: see `ImageGate.__call__`."""
+    return ImageGate(request.node, request.config)
+
+
+class ImageGate:
+    """The gate for one test; each call has a folder of its own."""
+
+    def __init__(self, node: pytest.Item, config: pytest.Config) -> None:
+        self._node, self._root, self._calls = node, config.rootpath, 0
+        self._out = self._root / str(config.getoption("--image-gate-out"))
+        self._baselines = self._root / str(config.getoption("--image-gate-baselines"))
+
+    def __call__(
+        self,
+        candidate: Any,
+        *,
+        scene: str | Path | None = None,
+        baseline: str = "",
+        reference: Any = None,
+        variance: str | Path | None = None,
+        limit: float = 0.005,
+        noise_free: bool = False,
+    ) -> "Case":
+        """Fail the test unless `candidate` agrees with what it is judged by.
+
+        candidate: linear radiance, an array (height, width, 3), with opacity (height, width, 4), or
+        (replicates, height, width, 3 or 4), or a file (EXR, PNG, PFM, HDR, NPY), or a list of
+        these, which are replicates;  scene: a scene file, in the root folder unless absolute, of
+        which we render the reference;  baseline: the name of one that `reference-rt accept` wrote;
+        reference: pictures, like `candidate`;  variance: a file, of one reference;  limit: the
+        smallest relative bias of the image mean that must be visible;  noise_free: the pictures are
+        made without random numbers.
+
+        Too noisy to tell is a failure too.  Returns what was found, a
+        `comparisons.results.case.Case`.
+        """
+        __tracebackhide__ = True
+        self._calls += 1
+        try:
+            from comparisons.gate.request import Request, gated
+            from reference_rt.rendering.scene import Scene
+            from reference_rt.util.errors import ReferenceRtError
+        except ModuleNotFoundError as error:
+            pytest.fail(f"image_gate needs {error.name}: pip install 'reference-rt[compare]'")
+
+        given: list[tuple[Picture, Path | None]] = []
+        try:
+            folder = self._folder()
+            given = _pictures(candidate, folder)
+            judge = Request(
+                scene=None if scene is None else Scene.load(self._root / scene),
+                references=tuple(p for p, _ in _pictures(reference)),
+                variance=None if variance is None else Path(variance),
+                baseline=baseline,
+                baselines=self._baselines,
+                limit=limit,
+                noise_free=noise_free,
+                name=self._node.nodeid + (f" [{self._calls}]" if self._calls > 1 else ""),
+            )
+            case = gated(judge, [picture for picture, _ in given])
+            passed = self._write(case, folder, baseline)
+        except ReferenceRtError as error:
+            kept = _keep(given)
+            pytest.fail(f"image_gate: {error}" + (f"\nkept: {', '.join(kept)}" if kept else ""))
+        self._node.user_properties.append(("image_gate", f"{case.verdict}: {case.reason}"))
+        if not passed:
+            _keep(given)
+            pytest.fail(_told(case, _relative(folder, self._root)))
+        return case
+
+    def _folder(self) -> Path:
+        """A folder of this call alone, the same in each run; what a run left there is removed.
+        Raises ImageError where it cannot be written."""
+        from reference_rt.util.files import check_writable
+
+        nodeid = self._node.nodeid
+        plain = re.sub(r"[^A-Za-z0-9._-]+", "-", nodeid.rpartition("/")[2]).strip("-.")
+        # Names that differ in what was replaced must not meet.
+        unique = hashlib.sha256(nodeid.encode()).hexdigest()[:8]
+        folder = self._out / f"{plain[:80]}-{unique}-{self._calls}"
+        files = [folder / n for n in ("results.json", "report.html", "case.json", "pictures.exr")]
+        check_writable(*files)
+        for file in files:
+            file.unlink(missing_ok=True)
+        for old in folder.glob("candidate-*.exr"):
+            old.unlink()
+        return folder
+
+    def _write(self, case: "Case", folder: Path, baseline: str) -> bool:
+        """results.json, and of a failure the page and the pictures; whether it passes."""
+        from comparisons.gate import outputs
+        from comparisons.results.record import write_case
+
+        passed = outputs.code_of(case) == 0
+        outputs.write(case, folder, {"baseline": baseline} if baseline else {}, page=not passed)
+        if not passed:
+            write_case(folder, case)
+        return passed
+
+
+def _pictures(given: Any, folder: Path = Path()) -> "list[tuple[Picture, Path | None]]":
+    """The pictures in what was given, and for those from arrays the file in `folder` that they will
+    be if they fail, so that they can be looked at and accepted.  Raises ImageError."""
+    from comparisons.gate.pictures_in import from_array, read_candidates
+
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    found: list[tuple[Picture, Path | None]] = []
+    for one in given if several else [] if given is None else [given]:
+        if isinstance(one, str | Path):
+            found += [(picture, None) for picture in read_candidates(Path(one))]
+            continue
+        for picture in from_array(one):
+            path = folder / f"candidate-{len(found):02d}.exr"
+            found.append((replace(picture, name=str(path)), path))
+    return found
+
+
+def _keep(given: "Sequence[tuple[Picture, Path | None]]") -> list[str]:
+    """Write what came as arrays; the names of the files.  Raises ImageError."""
+    from reference_rt.core.exr import write_exr
+
+    for picture, path in given:
+        if path is not None:
+            channels = {name: picture.radiance[..., k] for k, name in enumerate("RGB")}
+            if picture.opacity is not None:
+                channels["A"] = picture.opacity
+            write_exr(path, channels, {})
+    return [str(path) for _, path in given if path is not None]
+
+
+def _relative(path: Path, root: Path) -> Path:
+    """As people look for it: from the root folder, if it is there."""
+    return path.relative_to(root) if path.is_relative_to(root) else path
+
+
+def _told(case: "Case", folder: Path) -> str:
+    """What a failed test says: verdict, reason, cause, numbers, and where the pictures are."""
+    lines = [f"image_gate: {case.verdict}: {case.reason}"]
+    if case.cause is not None:
+        lines.append(f"likeliest cause: {case.cause.name}: {case.cause.evidence}")
+    if case.metrics is not None:
+        found = case.metrics
+        bias = ", ".join(f"{100.0 * b:+.3g} %" for b in found.mean_bias)
+        lines.append(
+            f"bias of the mean (R, G, B): {bias}; SSIM {found.ssim:.4f}, FLIP {found.flip:.4f}, "
+            f"PSNR {found.psnr:.1f} dB, RMSE {found.rmse:.3g}, relMSE {found.relmse:.3g}"
+        )
+    lines += [
+        f"{place.width} x {place.height} pixels at ({place.x}, {place.y}): {place.what}"
+        for place in case.worst[:3]
+    ]
+    lines.append(f"pictures: {folder / 'pictures.exr'}; page: {folder / 'report.html'}")
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Geometry that comparing takes: exact arithmetic, float32, lengths and frames."""

@@ -1,0 +1,197 @@
+"""Exact crossings of solids: spheres, boxes, quadrics, tori."""
+
+import itertools
+from typing import Any
+
+import flint
+import numpy as np
+
+from comparisons.geometry.exact.crossings import Crossings, Row, column, in_local, ordered, where
+from comparisons.geometry.exact.dyadic import (
+    CERTAIN,
+    FRACTION,
+    NEVER,
+    BoolArray,
+    Dyadic,
+    Fixed,
+    Integers,
+    dot,
+    quotient,
+    roots,
+    tied,
+)
+
+
+def spheres(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
+    f, r = o - column(row, "center"), column(row, "radius")
+    sign, near, far = roots(dot(d, d), dot(f, d), dot(f, f) - r * r)
+    t = [where(sign >= 0, near), where(sign >= 0, far)]
+    return ordered(t, [np.array(True), np.array(False)], [0, 0], sign == 0)
+
+
+class Slabs:
+    """Where lines are between pairs of planes across the axes: from t_in, through the face
+    code_in, to t_out, code_out;  misses: nowhere;  touching: through an edge, or in a face."""
+
+    def __init__(self, q: Dyadic, e: Dyadic, lower: Dyadic, upper: Dyadic, clipped: Any) -> None:
+        n = len(q.n)
+        self.t_in, self.t_out = (np.full(n, x, dtype=object) for x in (-NEVER, NEVER))
+        self.code_in, self.code_out = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        self.misses, self.touching = np.zeros(n, bool), np.zeros(n, bool)
+        for k in range(3):
+            clips = np.broadcast_to(np.asarray(clipped)[..., k], n).astype(bool)
+            self._clip(k, clips, q[..., k], e[..., k], lower[..., k], upper[..., k])
+        self.touching |= ~self.misses & tied(self.t_in, self.t_out)
+        self.misses |= self.t_in > self.t_out
+
+    def _clip(
+        self, k: int, clips: BoolArray, q: Dyadic, e: Dyadic, low: Dyadic, high: Dyadic
+    ) -> None:
+        still = e.sign() == 0
+        below, above = (low - q).sign(), (high - q).sign()
+        self.misses |= clips & still & ((below > 0) | (above < 0))
+        self.touching |= clips & still & ((below == 0) | (above == 0))
+        moves = clips & ~still
+        up = e.sign() > 0
+        at_low, at_high = quotient(low - q, e), quotient(high - q, e)
+        enter, leave = np.where(up, at_low, at_high), np.where(up, at_high, at_low)
+        later = moves & (enter > self.t_in)
+        self.t_in = np.where(later, enter, self.t_in)
+        self.code_in = np.where(later, np.where(up, k, k + 3), self.code_in)
+        earlier = moves & (leave < self.t_out)
+        self.t_out = np.where(earlier, leave, self.t_out)
+        self.code_out = np.where(earlier, np.where(up, k + 3, k), self.code_out)
+
+
+def boxes(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
+    """Codes: the axis, + 3 on the positive side."""
+    q, e = in_local(row, o, d)
+    one = Dyadic.of(np.ones((1, 3)))
+    s = Slabs(q, e, -one, one, np.ones(3))
+    t = [where(~s.misses, s.t_in), where(~s.misses, s.t_out)]
+    return ordered(t, [np.array(True), np.array(False)], [s.code_in, s.code_out], s.touching)
+
+
+def quadrics(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
+    """Codes: 0 for f's surface, else 1 + the face of the clip box.
+
+    Entering is, for what is not capped, coming from where f > 0.
+    """
+    q, e = in_local(row, o, d)
+    k = column(row, "coefficients")
+    a, b, c = _along(k, q, e)
+    sign, near, far = roots(a, b, c)
+    s = Slabs(q, e, column(row, "lower"), column(row, "upper"), row["clipped"])
+    capped = np.broadcast_to(np.asarray(row["capped"]) != 0, len(q.n))
+    between = a.sign() >= 0  # f <= 0 between the roots, else outside of them
+    real, never = sign >= 0, np.full(len(q.n), NEVER, dtype=object)
+    touching = s.touching | (~s.misses & (sign == 0))
+    for t in (near, far):
+        touching |= real & ~s.misses & (tied(t, s.t_in) | tied(t, s.t_out))
+    # Where f <= 0, as two stretches; the line everywhere or nowhere where there are no roots.
+    constant_in = ~real & (c.sign() <= 0)
+    start = [
+        np.where(real & between, near, np.where((real & ~between) | constant_in, -never, never)),
+        np.where(real & ~between, far, never),
+    ]
+    end = [
+        np.where(real & between, far, np.where(real & ~between, near, never)),
+        np.where(real & ~between, never, never),
+    ]
+    times, enters, codes = [], [], []
+    for low, high in zip(start, end, strict=True):
+        inside_low, inside_high = np.maximum(low, s.t_in), np.minimum(high, s.t_out)
+        some = ~s.misses & (inside_low < inside_high)
+        for t, on_f, cap, way in (
+            (inside_low, low >= s.t_in, s.code_in, True),
+            (inside_high, high <= s.t_out, s.code_out, False),
+        ):
+            shown = some & (on_f | capped) & (abs(t) < NEVER)
+            times.append(where(shown, t))
+            enters.append(np.array(way))
+            codes.append(np.where(on_f, 0, 1 + cap))
+    return ordered(times, enters, codes, touching)
+
+
+def _along(k: Dyadic, q: Dyadic, e: Dyadic) -> tuple[Dyadic, Dyadic, Dyadic]:
+    """f(q + t e) = a t² + 2 b t + c; f's coefficients in the order x² y² z² xy yz xz x y z 1."""
+    pairs = list(itertools.chain(((i, i) for i in range(3)), ((0, 1), (1, 2), (0, 2))))
+
+    def quadratic(u: Dyadic, v: Dyadic) -> Dyadic:
+        terms = [k[..., n] * u[..., i] * v[..., j] for n, (i, j) in enumerate(pairs)]
+        return _total(terms)
+
+    def linear(u: Dyadic) -> Dyadic:
+        return _total([k[..., 6 + i] * u[..., i] for i in range(3)])
+
+    half = Dyadic.of(0.5)
+    b = half * (quadratic(q, e) + quadratic(e, q) + linear(e))
+    return quadratic(e, e), b, quadratic(q, q) + linear(q) + k[..., 9]
+
+
+def _total(terms: list[Dyadic]) -> Dyadic:
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def torus_quartic(row: Row, o: Dyadic, d: Dyadic) -> Integers:
+    """Up to a factor, the coefficients (n, 5) of (|p|² + R² - r²)² - 4 R² (x² + y²) along the rays,
+    the constant term first."""
+    q, e = in_local(row, o, d)
+    major, minor = column(row, "major"), column(row, "minor")
+    alpha, beta = dot(e, e), Dyadic.of(2.0) * dot(q, e)
+    gamma = dot(q, q) + major * major - minor * minor
+    four = Dyadic.of(4.0) * major * major
+    flat_q, flat_e = q[..., :2], e[..., :2]
+    ring = [
+        dot(flat_q, flat_q) * four,
+        Dyadic.of(2.0) * dot(flat_q, flat_e) * four,
+        dot(flat_e, flat_e) * four,
+    ]
+    coefficients = [
+        gamma * gamma - ring[0],
+        Dyadic.of(2.0) * beta * gamma - ring[1],
+        beta * beta + Dyadic.of(2.0) * alpha * gamma - ring[2],
+        Dyadic.of(2.0) * alpha * beta,
+        alpha * alpha,
+    ]
+    exponent = min(c.e for c in coefficients)
+    return np.stack([np.broadcast_to(c.to(exponent).n, len(q.n)) for c in coefficients], axis=1)
+
+
+def tori(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
+    """Roots of the quartic, isolated and certified by FLINT (fmpz_poly_complex_roots)."""
+    q, e = in_local(row, o, d)
+    integers = torus_quartic(row, o, d)
+    # Rays that stay off the ball around the torus meet nothing.
+    size = column(row, "major") + column(row, "minor")
+    ball, _, _ = roots(dot(e, e), dot(q, e), dot(q, q) - size * size)
+    t = np.full((len(q.n), 4), NEVER, dtype=object)
+    touching = np.zeros(len(q.n), bool)
+    for i in np.flatnonzero(ball > 0).tolist():
+        found = _real_roots(integers[i].tolist())
+        simple = [t for t, times in found if times % 2 == 1]
+        touching[i] = any(times > 1 for _, times in found)
+        t[i, : len(simple)] = sorted(simple)
+    ways = [np.array(k % 2 == 0) for k in range(4)]
+    return ordered([t[:, k] for k in range(4)], ways, [0] * 4, touching)
+
+
+def _real_roots(coefficients: list[int]) -> list[tuple[int, int]]:
+    """(t as fixed-point number, multiplicity) of the real roots, the constant term first."""
+    precision = flint.ctx.prec
+    flint.ctx.prec = CERTAIN + 32
+    try:
+        found = flint.fmpz_poly(coefficients).complex_roots()
+        real = [(z.real, times) for z, times in found if z.imag == 0]
+        one = flint.arb(2) ** FRACTION
+        return [(int((x * one).mid().floor().unique_fmpz()), times) for x, times in real]
+    finally:
+        flint.ctx.prec = precision
+
+
+EXACT: dict[str, Any] = {"spheres": spheres, "boxes": boxes, "quadrics": quadrics, "tori": tori}
+
+__all__ = ["EXACT", "Fixed", "boxes", "quadrics", "spheres", "tori", "torus_quartic"]

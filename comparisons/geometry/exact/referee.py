@@ -1,0 +1,230 @@
+"""Who is right about what a ray hits first in a scene: exact arithmetic says."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from comparisons.geometry.exact import KINDS
+from comparisons.geometry.exact.crossings import Crossings, IntArray
+from comparisons.geometry.exact.dyadic import (
+    CERTAIN,
+    NEVER,
+    SLACK,
+    BoolArray,
+    Dyadic,
+    FloatArray,
+    apply,
+    nearest,
+)
+from comparisons.geometry.flatten import Copy, Member, Tree
+from comparisons.geometry.sizes import LeafSizes, ShapeSizes, corners_of
+from reference_rt.rendering.query import Intersections
+
+MARGIN = 1e-9
+"""Of a scene's size, by which boxes and triangles are made larger where floats choose what is worth
+asking: a thousand times what these round by, and more."""
+
+Identity = tuple[int, int, int, int]
+"""(shape, instance, part, primitive)."""
+
+
+class Crossing(NamedTuple):
+    """One crossing of one ray: t as a fixed-point number, whose surface, whether it goes in."""
+
+    t: int
+    identity: Identity
+    enters: bool
+
+
+@dataclass
+class Truth:
+    """What a ray meets first: t as a fixed-point number, the surfaces there, more than one where
+    some are in one place;  touching: the ray runs exactly through an edge of something."""
+
+    t: int
+    identities: list[Identity]
+    touching: bool = False
+
+    def agrees(self, hits: Intersections, k: int, slack: float) -> bool:
+        """Whether hit k of these is it, t to within `slack`."""
+        if hits.shape[k] < 0:
+            return not self.identities
+        found = tuple(int(getattr(hits, n)[k]) for n in ("shape", "instance", "part", "primitive"))
+        t = float(nearest(np.array([self.t], dtype=object))[0])
+        return found in self.identities and abs(float(hits.t[k]) - t) <= slack
+
+
+class Referee:
+    """Decides for rays of one scene, from its description alone."""
+
+    def __init__(self, sizes: ShapeSizes) -> None:
+        self.sizes = sizes
+        self.margin = MARGIN * float(np.abs([sizes.lower, sizes.upper]).max())
+        boxes = [_box(copy, sizes.leaves_of(copy)) for copy in sizes.copies]
+        self.lower, self.upper = (np.array(side) for side in zip(*boxes, strict=True))
+
+    def decide(self, o: FloatArray, d: FloatArray) -> list[Truth]:
+        """What each ray meets first."""
+        truths = [Truth(int(NEVER), []) for _ in o]
+        reach = np.abs(o).max(axis=1, keepdims=True) * MARGIN + self.margin
+        for number, copy in enumerate(self.sizes.copies):
+            near = _meets_box(o, d, self.lower[number] - reach, self.upper[number] + reach)
+            rays = np.flatnonzero(near)
+            if len(rays):
+                self._add(copy, rays, o[rays], d[rays], truths)
+        return truths
+
+    def _add(
+        self, copy: Copy, rays: IntArray, o: FloatArray, d: FloatArray, truths: list[Truth]
+    ) -> None:
+        exact_o, exact_d = Dyadic.of(o), Dyadic.of(d)
+        if copy.instance >= 0:
+            # The inverse as our tables have it: rounded once, and taken for exact from there on.
+            m = Dyadic.of(np.linalg.inv(copy.outer[:, :3]).reshape(1, 9))
+            exact_o = apply(m, exact_o - Dyadic.of(copy.outer[None, :, 3]))
+            exact_d = apply(m, exact_d)
+            o, d = exact_o.floats(), exact_d.floats()
+        leaves = self.sizes.by_part(copy)
+        for member in copy.members:
+            per_leaf = [
+                crossings_of(leaves[leaf.part], (o, d), (exact_o, exact_d))
+                for leaf in member.leaves
+            ]
+            for k, ray in enumerate(rays.tolist()):
+                found = [
+                    [Crossing(t, (copy.shape, copy.instance, leaf.part, code), enters)
+                     for t, code, enters in lists[k]]
+                    for leaf, (lists, _) in zip(member.leaves, per_leaf, strict=True)
+                ]  # fmt: skip
+                touching = any(bool(flags[k]) for _, flags in per_leaf)
+                _merge(truths[ray], _first(member, found), touching)
+
+
+def _box(copy: Copy, leaves: list[LeafSizes]) -> tuple[FloatArray, FloatArray]:
+    """A box around everything of a copy, infinite where something is."""
+    if not all(leaf.is_finite for leaf in leaves):
+        return np.full(3, -np.inf), np.full(3, np.inf)
+    corners = np.concatenate([corners_of(leaf.bounds, copy.outer) for leaf in leaves])
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def _meets_box(o: FloatArray, d: FloatArray, lower: FloatArray, upper: FloatArray) -> BoolArray:
+    """Whether lines come near boxes: by floats, generously."""
+    # Rays along the planes, and infinite boxes.
+    with np.errstate(all="ignore"):
+        a, b = (lower - o) / d, (upper - o) / d
+        low = np.nan_to_num(np.minimum(a, b), nan=-np.inf).max(axis=1)
+        high = np.nan_to_num(np.maximum(a, b), nan=np.inf).min(axis=1)
+        return np.asarray(low <= high + MARGIN * (1.0 + np.abs(high)))
+
+
+Lists = tuple[list[list[tuple[int, int, bool]]], BoolArray]
+"""(t, code, enters) of each ray, and which touch."""
+
+
+def crossings_of(
+    leaf: LeafSizes, rays: tuple[FloatArray, FloatArray], exact: tuple[Dyadic, Dyadic]
+) -> Lists:
+    """All crossings of a leaf, over all t, in order."""
+    row = leaf.table._asdict()
+    n = len(rays[0])
+    lists: list[list[tuple[int, int, bool]]] = [[] for _ in range(n)]
+    touching = np.zeros(n, bool)
+    if leaf.field != "triangles":
+        found = KINDS[leaf.field](row, *exact)
+        for k, t, code, enters in _entries(found):
+            lists[k].append((t, code, enters))
+        # A line along an infinite plane says nothing about its side.
+        along = [leaf.field == "planes" and not some for some in lists]
+        return lists, found.touching | along
+    for k in range(n):
+        near = _near_triangles(row["vertices"], rays[0][k], rays[1][k])
+        if len(near) == 0:
+            continue
+        some = {"vertices": row["vertices"][near], "face": row["face"][near]}
+        found = KINDS["triangles"](some, exact[0][k : k + 1], exact[1][k : k + 1])
+        lists[k] = sorted((t, code, enters) for _, t, code, enters in _entries(found))
+        touching[k] = found.touching.any()
+    return lists, touching
+
+
+def _entries(found: Crossings) -> Iterator[tuple[int, int, int, bool]]:
+    for k, j in zip(*np.nonzero(found.t != NEVER), strict=True):
+        yield int(k), int(found.t[k, j]), int(found.code[k, j]), bool(found.enters[k, j])
+
+
+def _near_triangles(vertices: FloatArray, o: FloatArray, d: FloatArray) -> IntArray:
+    """Triangles that a line may pass through: all but those that it is clearly beside."""
+    v = vertices.reshape(-1, 3, 3) - o
+    size = np.linalg.norm(v, axis=2) + np.abs(o).max()
+    volumes, slack = np.empty((2, 3, len(v)))
+    for k in range(3):
+        a, b = v[:, k], v[:, (k + 1) % 3]
+        volumes[k] = np.cross(a, b) @ d
+        slack[k] = 1e-13 * np.linalg.norm(d) * size[:, k] * size[:, (k + 1) % 3]
+    return np.flatnonzero((volumes >= -slack).all(axis=0) | (volumes <= slack).all(axis=0))
+
+
+def _first(member: Member, found: list[list[Crossing]]) -> tuple[int, list[Identity]]:
+    """t and whose surfaces are met first beyond t = 0."""
+    if member.tree is None:
+        ahead = [c for c in found[0] if c.t > 0]
+        if not ahead:
+            return int(NEVER), []
+        t = min(c.t for c in ahead)
+        return t, [c.identity for c in ahead if _tied(c.t, t)]
+    states = [_begins_inside(crossings) for crossings in found]
+    events = sorted((c.t, k, c) for k, crossings in enumerate(found) for c in crossings if c.t > 0)
+    inside = evaluated(member.tree, states)
+    position = 0
+    while position < len(events):
+        t, group = events[position][0], []
+        while position < len(events) and _tied(events[position][0], t):
+            _, k, crossing = events[position]
+            states[k] += 1 if crossing.enters else -1
+            group.append(crossing.identity)
+            position += 1
+        if evaluated(member.tree, states) != inside:
+            return t, group
+    return int(NEVER), []
+
+
+def _begins_inside(crossings: list[Crossing]) -> int:
+    """How many times an operand goes round t = 0, from what lies ahead."""
+    ahead = [c for c in crossings if c.t > 0]
+    if ahead:
+        return (
+            sum(-1 if c.enters else 1 for c in ahead)
+            if len(ahead) > 1
+            else int(not ahead[0].enters)
+        )
+    return int(bool(crossings) and max(crossings, key=lambda c: c.t).enters)
+
+
+def evaluated(tree: Tree | int, states: list[int]) -> bool:
+    if isinstance(tree, int):
+        return states[tree] != 0
+    values = [evaluated(part, states) for part in tree.of]
+    if tree.operation == "union":
+        return any(values)
+    if tree.operation == "intersection":
+        return all(values)
+    return values[0] and not any(values[1:])
+
+
+def _merge(truth: Truth, first: tuple[int, list[Identity]], touching: bool) -> None:
+    t, identities = first
+    truth.touching |= touching
+    if not identities:
+        return
+    if truth.identities and _tied(t, truth.t):
+        truth.identities += identities
+    elif t < truth.t:
+        truth.t, truth.identities = t, identities
+
+
+def _tied(a: int, b: int) -> bool:
+    """As `dyadic.tied`."""
+    return abs(a - b) <= (max(abs(a), abs(b)) >> CERTAIN) + SLACK

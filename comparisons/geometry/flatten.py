@@ -1,0 +1,113 @@
+"""Which primitives a scene is made of: its groups, instances and solids taken apart.
+
+Made from the description alone, not from our tables: what those make of nested groups and of trees
+of solids is compared too.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from reference_rt.core import transform
+from reference_rt.core.transform import Affine
+from reference_rt.rendering.scene import Scene
+from reference_rt.shapes.csg import Difference, Solid, Union
+from reference_rt.shapes.instances import Instance
+from reference_rt.shapes.shape import Place, Shape
+
+
+class Leaf(NamedTuple):
+    """A primitive shape: its description, the map that its own transform is followed by, the name
+    of its material;  part: its number in its group or its solid."""
+
+    shape: Shape
+    outer: Affine
+    material: str | None
+    part: int
+
+
+class Tree(NamedTuple):
+    """A set operation, "union", "intersection" or "difference", of trees and of leaves, which stand
+    there by their numbers."""
+
+    operation: str
+    of: tuple["Tree | int", ...]
+
+
+class Member(NamedTuple):
+    """A shape of the scene or of a group: one leaf, or all the leaves of a solid and its tree."""
+
+    leaves: tuple[Leaf, ...]
+    tree: Tree | None
+
+
+class Copy(NamedTuple):
+    """Shapes as they stand in the scene.
+
+    shape: index in the scene;  instance: number of the copy, -1 for what is no instance;  group:
+    its name, "" likewise;  members, in the group's coordinates, and the map to the scene's.
+    """
+
+    shape: int
+    instance: int
+    group: str
+    members: tuple[Member, ...]
+    outer: Affine
+
+
+def place_of(scene: Scene, leaf: Leaf, outer: Affine) -> Place:
+    """As what a leaf is tabulated, where `outer` takes its group."""
+    return Place(folder=scene.folder, outer=transform.compose(leaf.outer, outer))
+
+
+def copies_of(scene: Scene) -> list[Copy]:
+    """Everything that rays can hit.  A group of groups stands for its own shapes first, then for
+    those of its instances, one after another."""
+    groups = {
+        name: tuple(
+            member_of(shape, k) for k, shape in enumerate(shapes) if not isinstance(shape, Instance)
+        )
+        for name, shapes in scene.groups.items()
+    }
+    found: list[Copy] = []
+    for i, shape in enumerate(scene.shapes):
+        if isinstance(shape, Instance):
+            expanded = _expanded(scene, shape, transform.identity())
+            found += [Copy(i, k, g, groups[g], m) for k, (g, m) in enumerate(expanded)]
+        else:
+            found.append(Copy(i, -1, "", (member_of(shape, 0),), transform.identity()))
+    return found
+
+
+def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple[str, Affine]]:
+    """(group, map to the scene) of each copy of shapes that an instance stands for."""
+    outer = transform.compose(transform.affine(instance.transform), outer)
+    shapes = scene.groups[instance.group]
+    if not all(isinstance(shape, Instance) for shape in shapes):
+        yield instance.group, outer
+    for shape in shapes:
+        if isinstance(shape, Instance):
+            yield from _expanded(scene, shape, outer)
+
+
+def member_of(shape: Shape, number: int) -> Member:
+    """A shape that is no instance, number `number` of its group."""
+    if not isinstance(shape, Solid):
+        leaf = Leaf(shape, transform.identity(), shape.material, number)
+        return Member((leaf,), None)
+    leaves: list[Leaf] = []
+    tree = _tree(shape, transform.identity(), None, leaves)
+    assert isinstance(tree, Tree)
+    return Member(tuple(leaves), tree)
+
+
+def _tree(shape: Shape, outer: Affine, material: str | None, leaves: list[Leaf]) -> Tree | int:
+    """Puts the operands into `leaves`, from left to right."""
+    material = shape.material if shape.material is not None else material
+    if not isinstance(shape, Solid):
+        leaves.append(Leaf(shape, outer, material, len(leaves)))
+        return len(leaves) - 1
+    outer = transform.compose(transform.affine(shape.transform), outer)
+    of = tuple(_tree(operand, outer, material, leaves) for operand in shape.of)
+    if isinstance(shape, Difference):
+        return Tree("difference", of)
+    return Tree("union" if isinstance(shape, Union) else "intersection", of)

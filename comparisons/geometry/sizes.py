@@ -1,0 +1,194 @@
+"""The primitives of a scene one by one, and their lengths, which bounds are made of."""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.geometry.flatten import Copy, copies_of, place_of
+from comparisons.geometry.frame import OURS, Frame
+from reference_rt.core import transform
+from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.rendering.query import Intersections
+from reference_rt.rendering.scene import Scene
+from reference_rt.shapes import TABLES
+from reference_rt.shapes.shape import Shape
+
+
+class LeafSizes:
+    """Lengths of one primitive shape, in its group's coordinates: `feature` is the smallest over
+    which its surface coordinates and its normal change.
+
+    shape: the description;  material: its name;  table: its rows, of field `field` of `Shapes`;
+    bounds: (3,), (3,).
+    """
+
+    def __init__(self, shape: Shape, material: str | None, table: Any) -> None:
+        self.shape, self.material, self.table = shape, material, table
+        self.field, module = next((f, m) for _, f, t, m in TABLES if t is type(table))
+        lower, upper = module.bounds(table)
+        self.bounds: Bounds = lower.min(axis=0), upper.max(axis=0)
+        self.is_finite = bool(np.isfinite(self.bounds).all())
+        self._faces = None if self.field == "quadrics" else _features(self.field, table)
+
+    def feature_at(self, p: FloatArray, primitive: IntArray) -> FloatArray:
+        """(n,) for points p of the faces `primitive`."""
+        if self._faces is None:
+            return _quadric_features(self.table, p, primitive)
+        return np.asarray(self._faces[np.clip(self.row_of(primitive), 0, len(self._faces) - 1)])
+
+    def row_of(self, primitive: IntArray) -> IntArray:
+        """The rows (n,) of the table whose faces have the numbers `primitive`: of a mesh those of
+        its file, of which the table lacks those without area."""
+        if self.field != "triangles":
+            return primitive
+        return np.searchsorted(self.table.face, primitive)
+
+
+class ShapeSizes:
+    """Lengths of a scene's shapes, for bounds.
+
+    reach (shapes,): the largest coordinate on each shape, counted from the middle of `frame`, 0 on
+    infinite ones;  lower, upper (3,): the bounds of all that is finite;  copies: of the scene;
+    leaves: the different primitives;  frame: the coordinates of the scene's twin.
+    """
+
+    def __init__(self, scene: Scene, frame: Frame = OURS) -> None:
+        self.frame = frame
+        self.copies = copies_of(scene)
+        self.reach = np.zeros(len(scene.shapes))
+        self.lower, self.upper = np.full(3, np.inf), np.full(3, -np.inf)
+        self.leaves: list[LeafSizes] = []
+        # Of each group, or of a shape that is no instance: the leaf of each part.
+        self._parts: dict[str, list[int]] = {}
+        for copy in self.copies:
+            self._add(scene, copy)
+        maps = np.array([copy.outer for copy in self.copies]).reshape(-1, 3, 4)
+        self._offset, self._inverse = maps[:, :, 3], np.linalg.inv(maps[:, :, :3])
+        # A map shrinks lengths by its smallest singular value at most.
+        self._least = np.linalg.svd(maps[:, :, :3], compute_uv=False)[:, -1]
+        self._first_copy = np.searchsorted(
+            [c.shape for c in self.copies], np.arange(len(self.reach))
+        )
+        most = max(map(len, self._parts.values()), default=1)
+        groups = {name: k for k, name in enumerate(self._parts)}
+        self._leaf_of = np.array([x + [-1] * (most - len(x)) for x in self._parts.values()])
+        self._group_of = np.array([groups[_name(copy)] for copy in self.copies], np.int64)
+        if not np.isfinite(self.lower).all():  # infinite planes alone
+            eye, target = np.array(scene.camera.eye), np.array(scene.camera.target)
+            size = np.abs(eye - target).max()
+            self.lower = np.minimum(eye, target) - size
+            self.upper = np.maximum(eye, target) + size
+
+    def _add(self, scene: Scene, copy: Copy) -> None:
+        leaves = [leaf for member in copy.members for leaf in member.leaves]
+        name = _name(copy)
+        if name not in self._parts:
+            numbers = self._parts[name] = [-1] * (max(leaf.part for leaf in leaves) + 1)
+            for leaf in leaves:
+                numbers[leaf.part] = len(self.leaves)
+                place = place_of(scene, leaf, transform.identity())
+                table = leaf.shape.tabulate(place)
+                self.leaves.append(LeafSizes(leaf.shape, leaf.material, table))
+        for sizes in self.leaves_of(copy):
+            if sizes.is_finite:
+                corners = corners_of(sizes.bounds, copy.outer)
+                self.lower = np.minimum(self.lower, corners.min(axis=0))
+                self.upper = np.maximum(self.upper, corners.max(axis=0))
+                reach = float(self.frame.largest(corners).max())
+                self.reach[copy.shape] = max(self.reach[copy.shape], reach)
+
+    def leaves_of(self, copy: Copy) -> list[LeafSizes]:
+        """The primitives of a copy of shapes."""
+        return [self.leaves[number] for number in self._parts[_name(copy)] if number >= 0]
+
+    def by_part(self, copy: Copy) -> dict[int, LeafSizes]:
+        """The same, by their parts."""
+        numbers = enumerate(self._parts[_name(copy)])
+        return {part: self.leaves[number] for part, number in numbers if number >= 0}
+
+    def reach_of(self, shape: IntArray) -> FloatArray:
+        """(n,): 0 for no shape."""
+        return np.asarray(np.append(self.reach, 0.0)[shape])
+
+    def copy_of(self, hits: Intersections) -> IntArray:
+        """(n,): which of `copies` was hit; of no meaning for a miss."""
+        shape = np.maximum(hits.shape, 0)
+        return np.asarray(self._first_copy[shape] + np.maximum(hits.instance, 0))
+
+    def leaf_of(self, hits: Intersections) -> IntArray:
+        """(n,): which of `leaves` was hit, -1 for none."""
+        known = hits.shape >= 0
+        numbers = np.full(len(known), -1)
+        group = self._group_of[self.copy_of(hits)[known]]
+        numbers[known] = self._leaf_of[group, hits.part[known]]
+        return numbers
+
+    def local_points(self, hits: Intersections) -> FloatArray:
+        """(n, 3): the points that were hit, in the coordinates of their groups."""
+        copy = self.copy_of(hits)
+        moved = hits.p - self._offset[copy]
+        return np.asarray(np.einsum("nij,nj->ni", self._inverse[copy], moved))
+
+    def feature_of(self, hits: Intersections) -> FloatArray:
+        """(n,): infinite for no shape."""
+        found = np.full(len(hits.t), np.inf)
+        copy, leaf, local = self.copy_of(hits), self.leaf_of(hits), self.local_points(hits)
+        for number in np.unique(leaf[leaf >= 0]).tolist():
+            rows = np.flatnonzero(leaf == number)
+            feature = self.leaves[number].feature_at(local[rows], hits.primitive[rows])
+            found[rows] = self._least[copy[rows]] * feature
+        return found
+
+
+def _name(copy: Copy) -> str:
+    """Of what a copy has in common with others: no group has a number for its name and a colon."""
+    return copy.group if copy.instance >= 0 else f"{copy.shape}:"
+
+
+def corners_of(bounds: Bounds, m: transform.Affine) -> FloatArray:
+    """The eight corners of a box where a map takes them."""
+    ends = np.stack(bounds)
+    pick = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    return transform.apply_points(m, ends[pick, [0, 1, 2]])
+
+
+def _features(field: str, table: Any) -> FloatArray:
+    """(faces,): the smallest length of each face; of a shape that is all alike, of one."""
+    if field == "spheres":
+        return np.asarray(table.radius)
+    if field in ("rectangles", "disks", "planes"):
+        heights = [1.0 / np.linalg.norm(getattr(table, k)[0]) for k in ("x_of", "y_of")]
+        return np.array([2.0 * min(heights) if field == "rectangles" else min(heights)])
+    if field == "polygons":
+        sides = (table.upper - table.lower)[0]
+        heights = [
+            side / np.linalg.norm(covector[0])
+            for side, covector in zip(sides, (table.x_of, table.y_of), strict=True)
+        ]
+        return np.array([min(heights)])
+    if field == "triangles":
+        v = table.vertices.reshape(-1, 3, 3)
+        edges = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1)
+        double_area = np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
+        height = np.divide(double_area, edges, out=np.zeros_like(edges), where=edges > 0.0)
+        return np.asarray(height)
+    least = np.linalg.norm(table.to_local.reshape(3, 3), axis=1).max()  # of a box, a torus
+    if field == "tori":
+        return np.asarray(table.minor / np.linalg.norm(table.to_local.reshape(3, 3), 2))
+    return np.array([2.0 / least])
+
+
+def _quadric_features(table: Any, p: FloatArray, primitive: IntArray) -> FloatArray:
+    """The length over which f's gradient turns, |grad f| / |Hessian|, in the group's coordinates;
+    of a cap, the smallest height of the clip box."""
+    m = table.to_local[0].reshape(3, 3)
+    k = table.coefficients[0]
+    hessian = np.array([[2 * k[0], k[3], k[5]], [k[3], 2 * k[1], k[4]], [k[5], k[4], 2 * k[2]]])
+    q = (p - table.center[0]) @ m.T
+    gradient = (q @ hessian + k[6:9]) @ m
+    bend = np.linalg.norm(m.T @ hessian @ m, 2)
+    with np.errstate(divide="ignore"):
+        feature = np.linalg.norm(gradient, axis=1) / bend
+    heights = (table.upper - table.lower)[0] / np.linalg.norm(m, axis=1)
+    least = heights.min()
+    return np.asarray(np.where(primitive > 0, least, np.minimum(feature, least)))

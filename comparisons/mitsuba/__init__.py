@@ -1,0 +1,1 @@
+"""Mitsuba: how it is loaded, scenes as it sees them, and what rays hit there."""

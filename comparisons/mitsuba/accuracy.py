@@ -1,0 +1,103 @@
+"""How exact materials are, where ours are tables or Mitsuba's formulas lose digits: what a
+comparison must allow for."""
+
+import functools
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.geometry.float32 import UNIT_ROUNDOFF
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.scene import for_rays
+from comparisons.mitsuba.translate.materials import translate_material
+from comparisons.mitsuba.translate.textures import Surroundings
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.vec3 import Vec3
+from reference_rt.materials import Emissive, Material, Principled, RoughPlastic, Wrapper
+from reference_rt.rendering.scene import Scene
+from reference_rt.textures import NO_TEXTURES, At
+
+PAIRS = 256
+"""Pairs of directions at which tables are compared with the integrals they stand for."""
+
+MARGIN = 1.5
+"""Of the largest difference found: what a finer set of directions may add."""
+
+MOST = 5e-3
+"""Tables that are off by more are wrong, not coarse."""
+
+
+def accuracy(scene: Scene, name: str | None) -> float:
+    """How far, relatively, what material `name` sends may be off by our tables or in Mitsuba."""
+    if name is None:
+        return 0.0
+    material: Material = scene.materials[name]
+    if isinstance(material, Wrapper):
+        bases = [getattr(material, field) for field in material.bases]
+    elif isinstance(material, Emissive):
+        bases = [material.base]
+    elif isinstance(material, RoughPlastic):
+        # The base alone is from tables.  White: how it bounces between base and coat counts most.
+        white = {"reflectance": (1.0, 1.0, 1.0), "specular": (0.0, 0.0, 0.0)}
+        return min(MOST, MARGIN * table_error(material.model_copy(update=white)))
+    elif isinstance(material, Principled) and material.clearcoat != 0.0:
+        return min(MOST, clearcoat_error(material))
+    else:
+        return 0.0
+    return max((accuracy(scene, base) for base in bases if base is not None), default=0.0)
+
+
+def clearcoat_error(material: Principled) -> float:
+    """Of Mitsuba's clear coat, relatively: 1 + (alpha² - 1) cos² in float32 is off by some 4 u, and
+    is alpha² where it is least."""
+    gloss = 1.0 if isinstance(material.clearcoat_gloss, str) else material.clearcoat_gloss
+    alpha = 0.1 + (0.001 - 0.1) * gloss
+    return 4.0 * UNIT_ROUNDOFF / alpha**2
+
+
+@functools.lru_cache(maxsize=64)
+def table_error(material: RoughPlastic) -> float:
+    """The largest relative difference of our rough plastic from its twin of finer tables."""
+    ours, theirs = both_sides(material, *directions(PAIRS, seed=0))
+    return float((np.abs(ours - theirs) / theirs).max())
+
+
+def directions(n: int, seed: int, both: bool = False) -> tuple[FloatArray, FloatArray]:
+    """n pairs of unit vectors (n, 3), float32 values, z > 0 unless `both` sides are wanted."""
+    rng = np.random.default_rng(seed)
+    v = rng.normal(size=(2, n, 3))
+    v /= np.linalg.norm(v, axis=-1, keepdims=True)
+    if not both:
+        v[..., 2] = np.maximum(np.abs(v[..., 2]), 1e-3)
+    v = v.astype(np.float32).astype(np.float64)
+    return v[0], v[1]
+
+
+def both_sides(
+    material: Material, wo: FloatArray, wi: FloatArray, theirs: bool = True
+) -> tuple[FloatArray, FloatArray]:
+    """f cos (n, 3) for local directions (n, 3) by our kernels and by the twin, where `theirs` is
+    wanted, without textures."""
+    import drjit as dr
+
+    kernels = import_module(type(material).__module__)
+    table = material.tabulate(NO_TEXTURES)
+    at = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
+    ours = [
+        tuple(kernels.evaluate(table, 0, at, Vec3(*o), Vec3(*i)))
+        for o, i in zip(wo.tolist(), wi.tolist(), strict=True)
+    ]
+    if not theirs:
+        return np.array(ours), np.zeros(0)
+    mi = mitsuba()
+    bsdf = mi.load_dict(translate_material(material, Surroundings({}, {}, Path())))
+    context = mi.BSDFContext()
+
+    def value(o: Any, i: Any) -> tuple[Any, ...]:
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.t, si.wi = 1.0, o
+        return (bsdf.eval(context, si, i),)
+
+    return np.array(ours), for_rays(value, wo, wi)[0]

@@ -1,0 +1,252 @@
+"""Which Mitsuba variant runs here: llvm_ad_rgb where an LLVM is proven to work, else scalar_rgb.
+
+A libLLVM that does not fit the machine aborts the process instead of raising, so a library is
+tried in a child process before this one depends on it.
+"""
+
+import contextlib
+import functools
+import importlib.metadata
+import importlib.util
+import json
+import os
+import platform
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import platformdirs
+
+from comparisons.mitsuba import llvm_libraries
+from comparisons.mitsuba.llvm_libraries import LIBRARY
+from reference_rt.util.child_processes import tied
+from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.files import read_text
+
+FORCE = "REFERENCE_RT_MITSUBA_VARIANT"
+
+SCALAR, LLVM = "scalar_rgb", "llvm_ad_rgb"
+
+_PROOF_SECONDS = 120.0
+"""A proof takes 1 to 3 s alone; the rest is for a machine that others keep busy."""
+
+_MOST_PROOFS = 4
+"""Libraries that are tried: each costs seconds."""
+
+_PROOF = """
+import ctypes
+import sys
+for library in sys.argv[2:]:
+    ctypes.CDLL(library)
+import numpy as np
+import mitsuba as mi
+mi.set_variant(sys.argv[1])
+scene = mi.load_dict({
+    "type": "scene",
+    "integrator": {"type": "path", "max_depth": 3},
+    "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
+    "ball": {"type": "sphere", "center": [0, 0, 3], "bsdf": {"type": "dielectric"}},
+    "wall": {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, 9])},
+    "sky": {"type": "constant"},
+})
+image = np.array(mi.render(scene, spp=4))
+sys.exit(0 if np.isfinite(image).all() and image.max() > 0 else 3)
+"""
+
+
+@dataclass(frozen=True)
+class Backend:
+    """The Mitsuba that comparisons run against.
+
+    variant: what `mitsuba.set_variant` gets;  version: of the mitsuba package;  reason: one line,
+    why this variant;  llvm_path: the library it needs, None for variants without LLVM.
+    """
+
+    variant: str
+    version: str
+    reason: str
+    llvm_path: str | None
+
+
+def choose() -> Backend:
+    """Find the best variant that works, without loading Mitsuba into this process.
+
+    The environment variable REFERENCE_RT_MITSUBA_VARIANT forces a variant.  Libraries are tried in
+    the order of `llvm_libraries.candidates`.  Raises ReferenceUnavailableError: Mitsuba is not
+    installed, or the forced variant does not run.
+    """
+    version = _version()
+    forced = os.environ.get(FORCE)
+    if forced and "llvm" not in forced:
+        problem = None if forced.startswith("scalar") else prove(forced, None)
+        if problem:
+            raise ReferenceUnavailableError(f"{FORCE}={forced}: {problem}")
+        return Backend(forced, version, f"forced by {FORCE}", None)
+    variant = forced or LLVM
+    tried = []
+    for path in llvm_libraries.candidates()[:_MOST_PROOFS]:
+        problem = _remembered_proof(version, variant, path)
+        if problem is None:
+            why = f"forced by {FORCE}" if forced else "the fastest variant that works here"
+            return Backend(variant, version, f"{why}, with {path}", path)
+        tried.append(f"{path} {problem}")
+    found = "; ".join(tried) or "no libLLVM was found"
+    advice = f"to get llvm: {llvm_libraries.ADVICE}"
+    if forced:
+        raise ReferenceUnavailableError(f"{FORCE}={forced}: {found}; {advice}")
+    return Backend(SCALAR, version, f"{found}; {advice}", None)
+
+
+@functools.cache
+def backend() -> Backend:
+    """`choose`, once per process."""
+    return choose()
+
+
+@functools.cache
+def mitsuba() -> Any:
+    """The module `mitsuba`, its variant set and our plugins registered.
+
+    Raises ReferenceUnavailableError.
+    """
+    chosen = backend()
+    try:
+        if chosen.llvm_path is not None:
+            os.environ[LIBRARY] = chosen.llvm_path
+            llvm_libraries.load_needed(chosen.llvm_path)
+        import mitsuba as mi
+
+        mi.set_variant(chosen.variant)
+    except (ImportError, AttributeError, RuntimeError, OSError) as error:
+        raise ReferenceUnavailableError(f"Mitsuba does not start: {error}") from None
+    # Plugins log a warning per load in scalar variants ("terrible performance"): known, and told
+    # by `Backend.reason`.
+    mi.set_log_level(mi.LogLevel.Error)
+    _register_once(chosen.variant)
+    return mi
+
+
+@contextlib.contextmanager
+def variant(name: str) -> Iterator[Any]:
+    """Mitsuba in another variant, our plugins registered there too, while the context lasts."""
+    mi = mitsuba()
+    chosen = mi.variant()
+    _set_variant(mi, name)
+    try:
+        _register_once(name)
+        yield mi
+    finally:
+        _set_variant(mi, chosen)
+
+
+def _set_variant(mi: Any, name: str) -> None:
+    """Mitsuba defines all of its own plugins anew, and after a thousand definitions Dr.Jit warns,
+    each time, that this is slow."""
+    if mi.variant() != name:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            mi.set_variant(name)
+
+
+@functools.cache
+def _register_once(name: str) -> None:
+    import mitsuba as mi
+
+    from comparisons.mitsuba.plugins import register
+
+    assert mi.variant() == name
+    register(mi)
+
+
+def scalar() -> contextlib.AbstractContextManager[Any]:
+    """Mitsuba in its scalar variant, while the context lasts."""
+    return variant(SCALAR)
+
+
+def prove(variant: str, llvm_path: str | None) -> str | None:
+    """Render a small scene in a child process: None if it works, else what happened."""
+    environment = dict(os.environ)
+    needed: list[str] = []
+    if llvm_path is not None:
+        environment[LIBRARY] = llvm_path
+        needed = llvm_libraries.needed_by(llvm_path)
+    try:
+        run = subprocess.run(
+            [sys.executable, "-c", _PROOF, variant, *needed],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=_PROOF_SECONDS,
+            **tied(),
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"did not answer within {_PROOF_SECONDS:.0f} s"
+    if run.returncode == 0:
+        return None
+    if run.returncode < 0:
+        return f"ends the process by signal {-run.returncode}"
+    lines = [line.strip() for line in run.stderr.splitlines() if line.strip()]
+    return f"fails: {lines[-1][:200]}" if lines else "renders a wrong picture"
+
+
+def _version() -> str:
+    """Mitsuba's version, from its metadata: importing it takes half a second."""
+    if importlib.util.find_spec("mitsuba") is None:
+        raise ReferenceUnavailableError(
+            "Mitsuba is not installed; expected: pip install 'reference-rt[compare]'"
+        )
+    return importlib.metadata.version("mitsuba")
+
+
+# ---- what was proven before ---------------------------------------------------------------------
+
+
+def _memory_file() -> Path:
+    root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
+    return Path(root) / "mitsuba_llvm.json"
+
+
+def _remembered_proof(version: str, variant: str, path: str) -> str | None:
+    """`prove`, remembered for this machine, Mitsuba and file."""
+    try:
+        modified = Path(path).stat().st_mtime_ns
+    except OSError:
+        modified = 0
+    key = "|".join((platform.node(), platform.machine(), version, variant, path, str(modified)))
+    memory = _read_memory()
+    if key in memory:
+        return memory[key]
+    problem = prove(variant, path)
+    if problem is None or "did not answer" not in problem:  # a busy machine proves nothing
+        _write_memory(_read_memory() | {key: problem})
+    return problem
+
+
+def _read_memory() -> dict[str, str | None]:
+    try:
+        memory = json.loads(read_text(_memory_file()))
+    except (OSError, ValueError):
+        return {}
+    if not isinstance(memory, dict):
+        return {}
+    return {key: found for key, found in memory.items() if found is None or isinstance(found, str)}
+
+
+def _write_memory(memory: dict[str, str | None]) -> None:
+    """By renaming, so that no other process reads half a file; without a folder nothing is kept."""
+    file = _memory_file()
+    part = file.with_suffix(f".{os.getpid()}")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(json.dumps(memory, indent=1), encoding="utf-8")
+        part.replace(file)
+    except OSError:
+        part.unlink(missing_ok=True)
+
+
+__all__ = ["LIBRARY", "Backend", "backend", "choose", "mitsuba", "prove", "scalar", "variant"]

@@ -1,0 +1,216 @@
+"""Plastic and rough plastic without Mitsuba's tables: `{"type": "exact_coat"}`.
+
+Mitsuba's diffuse base under a coat, rho / (1 - c R) T(wi) T(wo) / (eta² pi), has R, what the coat
+mirrors from within, from a fit for smooth plastic, made for indices up to 2, and for rough plastic
+as the mean over 64 cosines from 0 to 1, both ends included, in place of the integral, which is
+about R / 64 too little; T by linear interpolation between these 64.  Here both are integrals in
+float64: `comparisons.mitsuba.plastic_error` measures how much brighter or darker Mitsuba's base is.
+ The mirrored part is Mitsuba's, with the exact masking of `exact_beckmann`.
+"""
+
+import functools
+import math
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from comparisons.mitsuba.plugins import exact_beckmann, parameters
+from reference_rt.core.arrays import FloatArray
+
+CELLS = 512
+"""Of T's table, evenly in the root of the cosine: linear between, to 1e-5."""
+
+
+_legendre = functools.cache(special.roots_legendre)
+"""Without numpy's dense eigenvalues, which take several threads of a busy machine a second."""
+
+
+def _rule(n: int, low: float = 0.0, high: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """Gauss and Legendre's nodes and weights for an interval."""
+    nodes, weights = _legendre(n)
+    return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights
+
+
+def fresnel(cosine: FloatArray, eta: float) -> FloatArray:
+    """Unpolarised reflectance from outside a medium of index eta, in float64."""
+    cosine_t = np.sqrt(np.maximum(1.0 - (1.0 - cosine * cosine) / (eta * eta), 0.0))
+    s = (cosine - eta * cosine_t) / (cosine + eta * cosine_t)
+    p = (eta * cosine - cosine_t) / (eta * cosine + cosine_t)
+    return np.asarray(np.where(cosine_t > 0.0, 0.5 * (s * s + p * p), 1.0))
+
+
+def smooth_reflectance(eta: float) -> float:
+    """The integral of 2 F cos over the cosines, from within a medium of index eta > 1.
+
+    From outside by quadrature over the root of the cosine; from within by reciprocity, 1 / eta²
+    of what passes from outside.
+    """
+    if eta < 1.0:
+        x, weight = _rule(400)
+        return float(np.sum(weight * 4.0 * x**3 * fresnel(x * x, 1.0 / eta)))
+    x, weight = _rule(400)
+    outside = float(np.sum(weight * 4.0 * x**3 * fresnel(x * x, eta)))
+    return 1.0 - (1.0 - outside) / (eta * eta)
+
+
+class RoughCoat:
+    """T at CELLS + 1 cosines, and R, of a rough coat of index `eta`, by quadrature in float64."""
+
+    def __init__(self, distribution: str, alpha: float, eta: float) -> None:
+        self.is_beckmann, self.alpha = distribution == "beckmann", alpha
+        self.nodes = 64, 32
+        self.transmittance = self.scattered(np.linspace(0.0, 1.0, CELLS + 1) ** 2, eta, True)
+        critical = math.sqrt(1.0 - 1.0 / (eta * eta)) if eta > 1.0 else 0.5
+        parts = (_rule(64, 0.0, critical), _rule(64, critical, 1.0))
+        nodes, weights = (np.concatenate(column) for column in zip(*parts, strict=True))
+        self.nodes = 192, 64  # total reflection begins with a root's slope
+        within = self.scattered(nodes, 1.0 / eta, False)
+        self.reflectance = float(np.sum(2.0 * nodes * weights * within))
+
+    def scattered(self, cosines: FloatArray, eta: float, through: bool) -> FloatArray:
+        """What microfacets let through, or mirror, of light at each cosine (n,): the mean over the
+        normals that are seen from there."""
+        return np.array([self._scattered(max(float(c), 1e-6), eta, through) for c in cosines])
+
+    def _scattered(self, cosine: float, eta: float, through: bool) -> float:
+        sine = math.sqrt((1.0 - cosine) * (1.0 + cosine))
+        x, z, weight = self._seen(cosine, sine)
+        of_normal = np.minimum(sine * x + cosine * z, 1.0)  # the cosine of light and normal
+        share = fresnel(of_normal, eta)
+        if through:
+            share = 1.0 - share
+            cosine_t = np.sqrt(np.maximum(1.0 - (1.0 - of_normal**2) / (eta * eta), 0.0))
+            turned = of_normal / eta - cosine_t
+            wo_z = -(turned * z - cosine / eta)
+        else:
+            wo_z = 2.0 * of_normal * z - cosine
+        up = wo_z > 0.0
+        slope = np.sqrt(np.maximum(1.0 - wo_z * wo_z, 1e-30)) * self.alpha
+        a = np.where(up, wo_z, 1.0) / slope
+        g1 = exact_beckmann.exact_g1(np.minimum(a, 26.0)) if self.is_beckmann else _ggx_g1(a)
+        return float(np.sum(weight * np.where(up, share * g1, 0.0)))
+
+    def _seen(self, cosine: float, sine: float) -> tuple[FloatArray, ...]:
+        """Of unit normals that are seen from (sine, 0, cosine): x, z, and weights of sum 1.
+
+        Beckmann: slopes a and b over alpha, of density (cosine - alpha sine a) exp(-a² - b²).
+        GGX: of roughness 1 they mirror the stretched direction to an even cap (Dupuy & Benyoub
+        2023).
+        """
+        if self.is_beckmann:
+            last = min(6.0, cosine / max(self.alpha * sine, 1e-12))
+            (a, of_a), (b, of_b) = _rule(self.nodes[0], -6.0, last), _rule(self.nodes[1], 0.0, 6.0)
+            a, b = (g.ravel() for g in np.meshgrid(a, b, indexing="ij"))
+            weight = np.outer(of_a, of_b).ravel() * np.exp(-a * a - b * b)
+            weight *= cosine - self.alpha * sine * a
+            normal = np.stack([-self.alpha * a, self.alpha * b, np.ones_like(a)])
+        else:
+            stretched = np.array([self.alpha * sine, 0.0, cosine])
+            stretched /= np.linalg.norm(stretched)
+            # Squared: the cap's rim is reached with a root's slope.
+            (v, of_v), (phi, of_phi) = _rule(self.nodes[0]), _rule(self.nodes[1], 0.0, math.pi)
+            weight = np.outer(2.0 * of_v * v, of_phi).ravel()
+            v, phi = (g.ravel() for g in np.meshgrid(v, phi, indexing="ij"))
+            down = v * v * (1.0 + stretched[2])
+            r = np.sqrt(np.maximum(down * (2.0 - down), 0.0))
+            cap = np.stack([r * np.cos(phi), r * np.sin(phi), 1.0 - down])
+            normal = (cap + stretched[:, None]) * np.array([[self.alpha], [self.alpha], [1.0]])
+        x, _, z = normal / np.linalg.norm(normal, axis=0)
+        return x, z, weight / weight.sum()
+
+
+rough_coat = functools.cache(RoughCoat)
+
+
+def _ggx_g1(a: FloatArray) -> FloatArray:
+    """Smith's for GGX, with a = 1 / (alpha tan theta) (Walter et al. 2007, eq. 34)."""
+    return np.asarray(2.0 / (1.0 + np.sqrt(1.0 + 1.0 / (a * a))))
+
+
+def register(mi: Any) -> None:
+    """Define the material for the variant that is set, and register it."""
+    import drjit as dr
+
+    everything = 0xFFFFFFFF
+    diffuse = int(mi.BSDFFlags.DiffuseReflection)
+
+    class ExactCoat(mi.BSDF):  # type: ignore[misc]
+        """Parameters: nested, Mitsuba's own material; its reflectance, nonlinear, eta; where it is
+        rough its distribution and alpha."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.nested = properties["nested"]
+            self.base = parameters.colour(mi, properties["reflectance"])
+            self.nonlinear = properties["nonlinear"]
+            self.eta = float(properties["eta"])
+            self.distribution = properties.get("distribution", "")
+            self.alpha = max(float(properties.get("alpha", 0.0)), 1e-4)
+            if self.distribution:
+                coat = rough_coat(self.distribution, self.alpha, self.eta)
+                self.r, values = coat.reflectance, coat.transmittance
+                self.table = (
+                    mi.Float(values.astype(np.float32)) if parameters.is_wide(mi) else values
+                )
+            else:
+                self.r = smooth_reflectance(self.eta)
+            count = self.nested.component_count()
+            self.m_components = [self.nested.flags(k) for k in range(count)]
+            self.m_flags = self.nested.flags()
+
+        def passing(self, cosine: Any) -> Any:
+            """T at a cosine above 0."""
+            if not self.distribution:
+                return 1.0 - mi.fresnel(cosine, self.eta)[0]
+            x = dr.sqrt(dr.clip(cosine, 0.0, 1.0)) * CELLS
+            if not parameters.is_wide(mi):
+                k = min(int(x), CELLS - 1)
+                low, high = float(self.table[k]), float(self.table[k + 1])
+            else:
+                k = dr.minimum(mi.UInt32(x), CELLS - 1)
+                low, high = (dr.gather(mi.Float, self.table, i) for i in (k, k + 1))
+            return low + (x - mi.Float(k)) * (high - low)
+
+        def scattered(self, si: Any, wo: Any, active: Any) -> Any:
+            """By the base."""
+            rho = self.base(si, active)
+            value = rho / (1.0 - (rho if self.nonlinear else mi.Color3f(1.0)) * self.r)
+            passing = self.passing(si.wi.z) * self.passing(wo.z)
+            value *= passing * wo.z / (math.pi * self.eta * self.eta)
+            lit = dr.select(si.wi.z > 0.0, wo.z > 0.0, False)
+            return dr.select(lit, value, mi.Color3f(0.0))
+
+        def sample(
+            self, context: Any, si: Any, sample1: Any, sample2: Any, active: Any = True
+        ) -> tuple[Any, Any]:
+            drawn, value = self.nested.sample(context, si, sample1, sample2, active)
+            perfect = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
+            smooth = self.eval(context, si, drawn.wo, active) / dr.maximum(drawn.pdf, 1e-30)
+            smooth = dr.select(drawn.pdf > 0.0, smooth, mi.Color3f(0.0))
+            return drawn, dr.select(perfect, value, smooth)
+
+        def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            total = mi.Color3f(0.0)
+            if self.distribution and context.component in (everything, 0):
+                glossy = mi.BSDFContext(context.mode)
+                glossy.type_mask = context.type_mask
+                glossy.component = 0
+                total += self.nested.eval(glossy, si, wo, active)
+                if self.distribution == "beckmann":
+                    for v in (si.wi, wo):
+                        total *= exact_beckmann.correction(mi, self.alpha, self.alpha, v)
+            if context.component in (everything, 1) and context.type_mask & diffuse == diffuse:
+                total += self.scattered(si, wo, active)
+            return total
+
+        def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.nested.pdf(context, si, wo, active)
+
+        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
+            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
+
+        def to_string(self) -> str:
+            return f"ExactCoat[{self.nested}]"
+
+    mi.register_bsdf("exact_coat", ExactCoat)

@@ -1,0 +1,142 @@
+"""Blends and masks whose parts can be asked one by one, and sampled where they are mirrors.
+
+Mitsuba's own, as of 3.9.1: a blend joins the probability of a mirrored direction and the density of
+the other material there as if they were the same thing, which takes light away from mirrors: one
+with a share w has (w + (1 - w) f) / (w + (1 - w) p) of its light, with f the value of the other
+material in the mirrored direction (its cosine included) and p its density there; a
+mask that is asked for one of its components takes the wrong one.  Everything else here is
+Mitsuba's.
+"""
+
+from typing import Any
+
+from comparisons.mitsuba.plugins import parameters
+
+
+def register(mi: Any) -> None:
+    """Define the materials for the variant that is set, and register them."""
+    import drjit as dr
+
+    def share(value: Any) -> parameters.Parameter:
+        found = parameters.number(mi, value)
+        return lambda si, active: dr.clip(found(si, active), 0.0, 1.0)
+
+    def one_of(context: Any, component: int) -> Any:
+        found = mi.BSDFContext(context.mode)
+        found.type_mask, found.component = context.type_mask, component
+        return found
+
+    class MixtureBlend(mi.BSDF):  # type: ignore[misc]
+        """(1 - weight) first + weight second."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.nested = (properties["first"], properties["second"])
+            self.weight = share(properties["weight"])
+            self.first_count = self.nested[0].component_count()
+            self.m_components = [
+                bsdf.flags(k) for bsdf in self.nested for k in range(bsdf.component_count())
+            ]
+            self.m_flags = self.nested[0].flags() | self.nested[1].flags()
+
+        def shares(self, si: Any, active: Any) -> tuple[Any, Any]:
+            weight = self.weight(si, active)
+            return 1.0 - weight, weight
+
+        def part(self, context: Any) -> tuple[int, Any]:
+            """Which of the two has the component asked for, and the context for it."""
+            k = context.component
+            which = 0 if k < self.first_count else 1
+            return which, one_of(context, k - which * self.first_count)
+
+        def sample(
+            self, context: Any, si: Any, sample1: Any, sample2: Any, active: Any = True
+        ) -> tuple[Any, Any]:
+            shares = self.shares(si, active)
+            if context.component != 0xFFFFFFFF:
+                which, inner = self.part(context)
+                drawn, value = self.nested[which].sample(inner, si, sample1, sample2, active)
+                return drawn, value * shares[which]
+            rest, weight = shares
+            take = sample1 < weight
+            inner1 = dr.select(
+                take,
+                sample1 / dr.maximum(weight, 1e-20),
+                (sample1 - weight) / dr.maximum(rest, 1e-20),
+            )
+            drawn0, value0 = self.nested[0].sample(context, si, inner1, sample2, active)
+            drawn1, value1 = self.nested[1].sample(context, si, inner1, sample2, active)
+            drawn = dr.select(take, drawn1, drawn0)
+            value = dr.select(take, value1, value0)
+            perfect = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
+            all_value, all_pdf = self.eval_pdf(context, si, drawn.wo, active)
+            smooth = dr.select(
+                all_pdf > 0.0, all_value / dr.maximum(all_pdf, 1e-30), mi.Color3f(0.0)
+            )
+            drawn.pdf = dr.select(perfect, drawn.pdf * dr.select(take, weight, rest), all_pdf)
+            found = dr.any(value != 0.0)
+            return drawn, dr.select(perfect, value, dr.select(found, smooth, mi.Color3f(0.0)))
+
+        def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            shares = self.shares(si, active)
+            if context.component != 0xFFFFFFFF:
+                which, inner = self.part(context)
+                return self.nested[which].eval(inner, si, wo, active) * shares[which]
+            first, second = (bsdf.eval(context, si, wo, active) for bsdf in self.nested)
+            return first * shares[0] + second * shares[1]
+
+        def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            shares = self.shares(si, active)
+            first, second = (bsdf.pdf(context, si, wo, active) for bsdf in self.nested)
+            return first * shares[0] + second * shares[1]
+
+        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
+            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
+
+        def to_string(self) -> str:
+            return f"MixtureBlend[{self.nested[0]}, {self.nested[1]}]"
+
+    class MixtureMask(mi.BSDF):  # type: ignore[misc]
+        """Mitsuba's own mask, but for what it answers of single components."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.nested = properties["base"]
+            self.opacity = share(properties["opacity"])
+            self.own = mi.load_dict(
+                {"type": "mask", "opacity": properties["opacity"], "base": self.nested}
+            )
+            count = self.own.component_count()
+            self.m_components = [self.own.flags(k) for k in range(count)]
+            self.m_flags = self.own.flags()
+
+        def sample(
+            self, context: Any, si: Any, sample1: Any, sample2: Any, active: Any = True
+        ) -> tuple[Any, Any]:
+            if context.component == 0xFFFFFFFF:
+                drawn, value = self.own.sample(context, si, sample1, sample2, active)
+                return drawn, value
+            opacity = self.opacity(si, active)
+            last = len(self.m_components) - 1
+            if context.component != last:
+                drawn, value = self.nested.sample(context, si, sample1, sample2, active)
+                return drawn, value * opacity
+            drawn = dr.zeros(mi.BSDFSample3f)
+            drawn.wo, drawn.eta, drawn.pdf = -si.wi, 1.0, 1.0
+            drawn.sampled_type, drawn.sampled_component = +mi.BSDFFlags.Null, last
+            return drawn, mi.Color3f(1.0 - opacity)
+
+        def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.own.eval(context, si, wo, active)
+
+        def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.own.pdf(context, si, wo, active)
+
+        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
+            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
+
+        def to_string(self) -> str:
+            return f"MixtureMask[{self.own}]"
+
+    mi.register_bsdf("mixture_blend", MixtureBlend)
+    mi.register_bsdf("mixture_mask", MixtureMask)

@@ -1,0 +1,183 @@
+"""Rays and pictures out of a Mitsuba scene, as float64 NumPy arrays, in any variant.
+
+llvm and cuda variants take all rays at once; scalar variants take one at a time: the functions that
+are passed to `for_rays` are written once for both.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from comparisons.mitsuba.backend import mitsuba
+from reference_rt.core.arrays import FloatArray, IntArray
+
+_SHAPE = "shape_"
+_LIGHT = "light_"
+
+
+def shape_id(i: int) -> str:
+    """Mitsuba's id of our shape i."""
+    return f"{_SHAPE}{i}"
+
+
+def light_id(i: int) -> str:
+    """Mitsuba's id of entry i of our scene's lights."""
+    return f"{_LIGHT}{i}"
+
+
+class Replicates(NamedTuple):
+    """Independent pictures (replicates, height, width, 3), row 0 on top, and the wall-clock seconds
+    (replicates,) of each."""
+
+    pictures: FloatArray
+    seconds: FloatArray
+
+
+def for_rays(
+    function: Callable[..., tuple[Any, ...]], *columns: npt.NDArray[Any]
+) -> tuple[npt.NDArray[Any], ...]:
+    """`function` of Mitsuba values, applied to arrays: (n, 3) become Vector3f, (n,) Float.
+
+    What it returns, a tuple of Mitsuba numbers and vectors, comes back as arrays (n,) and (n, k).
+    """
+    mi = mitsuba()
+    n = len(columns[0])
+    if mi.variant().startswith("scalar"):
+        rows = [
+            [_scalar_result(x) for x in function(*arguments)]
+            for arguments in zip(*(_scalars(mi, c) for c in columns), strict=True)
+        ]
+        return tuple(np.array(column) for column in zip(*rows, strict=True))
+    wide = (mi.Vector3f(_float32(c).T) if c.ndim == 2 else mi.Float(_float32(c)) for c in columns)
+    return tuple(_array(result, n) for result in function(*wide))
+
+
+def _float32(column: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    return np.ascontiguousarray(column, dtype=np.float32)
+
+
+def _scalars(mi: Any, column: npt.NDArray[Any]) -> list[Any]:
+    rows = column.tolist()
+    return [mi.Vector3f(row) for row in rows] if column.ndim == 2 else rows
+
+
+def _scalar_result(value: Any) -> Any:
+    return value if isinstance(value, bool | int | float) else list(value)
+
+
+def _array(value: Any, n: int) -> npt.NDArray[Any]:
+    """(n,) or (n, k); what does not depend on the ray is repeated."""
+    array = np.array(value)
+    if array.dtype == np.float32:
+        array = array.astype(np.float64)
+    return np.broadcast_to(array, (*array.shape[:-1], n)).T.copy()
+
+
+class Hits(NamedTuple):
+    """What rays hit in a Mitsuba scene.
+
+    t (n,), inf for a miss;  which (n,): number of the id among those asked for, -1 for a miss;
+    prim (n,): Mitsuba's prim_index;  p, n, ns (n, 3), uv (n, 2).
+    """
+
+    t: FloatArray
+    which: IntArray
+    prim: IntArray
+    p: FloatArray
+    n: FloatArray
+    ns: FloatArray
+    uv: FloatArray
+
+
+def first_hits(mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArray) -> Hits:
+    """What Mitsuba hits first; `ids` are the numbers of its shapes, of an instance its own.
+
+    Mitsuba sees the rays rounded to float32.
+    """
+    mi = mitsuba()
+    number = _shape_numbers(ids)
+
+    def hit(origin: Any, direction: Any) -> tuple[Any, ...]:
+        si = mi_scene.ray_intersect(mi.Ray3f(mi.Point3f(origin), direction))
+        return si.t, number(si), si.prim_index, si.p, si.n, si.sh_frame.n, si.uv
+
+    t, number_found, prim, p, n, ns, uv = for_rays(hit, o, d)
+    which = _decoded(mi_scene, ids, number_found)
+    missed = which < 0
+    for array in (prim, p, n, ns, uv):
+        array[missed] = 0
+    return Hits(np.where(missed, np.inf, t), which, prim.astype(np.int64), p, n, ns, uv)
+
+
+def _shape_numbers(ids: Mapping[str, int]) -> Callable[[Any], Any]:
+    """How to tell the shape, or instance, of a hit: its number in scalar variants, its registry id
+    otherwise."""
+    mi = mitsuba()
+    if mi.variant().startswith("scalar"):
+
+        def number(hit: Any) -> int:
+            met = hit.shape if hit.instance is None else hit.instance
+            return -1 if met is None else ids[met.id()]
+
+        return number
+    import drjit as dr
+
+    def registry_id(hit: Any) -> Any:
+        shape = dr.reinterpret_array(mi.UInt32, hit.shape)
+        instance = dr.reinterpret_array(mi.UInt32, hit.instance)
+        return dr.select(instance != 0, instance, shape)
+
+    return registry_id
+
+
+def _decoded(mi_scene: Any, ids: Mapping[str, int], numbers: npt.NDArray[Any]) -> IntArray:
+    mi = mitsuba()
+    if mi.variant().startswith("scalar"):
+        return numbers.astype(np.int64)
+    import drjit as dr
+
+    registered = np.array(dr.reinterpret_array(mi.UInt32, mi_scene.shapes_dr()))
+    ours = np.full(int(max(registered, default=0)) + 1, -1)  # 0 is Mitsuba's "no shape"
+    for registry_id, shape in zip(registered, mi_scene.shapes(), strict=True):
+        ours[registry_id] = ids[shape.id()]
+    return np.asarray(ours[numbers])
+
+
+def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicates:
+    """Pictures with the seeds seed, seed + 1, ...
+
+    A small picture goes before and is thrown away: it compiles the kernels, which a run time must
+    not count.
+    """
+    mi = mitsuba()
+    if not mi.variant().startswith("scalar"):
+        # Dr.Jit divides by powers of two in another way: those are kernels of their own.
+        alike = 1 if spp & (spp - 1) == 0 else 3
+        picture(mi_scene, alike, seed + replicates)
+    pictures, seconds = [], []
+    for k in range(replicates):
+        start = time.perf_counter()
+        pictures.append(picture(mi_scene, spp, seed + k))
+        seconds.append(time.perf_counter() - start)
+    return Replicates(np.stack(pictures), np.array(seconds))
+
+
+def picture(mi_scene: Any, spp: int, seed: int) -> FloatArray:
+    """One picture (height, width, 3)."""
+    # The array is what forces the lazy rendering to happen.
+    return np.array(mitsuba().render(mi_scene, spp=spp, seed=seed), dtype=np.float64)[..., :3]
+
+
+__all__ = [
+    "Hits",
+    "Replicates",
+    "first_hits",
+    "for_rays",
+    "light_id",
+    "picture",
+    "render",
+    "shape_id",
+]

@@ -1,0 +1,189 @@
+"""Scene -> Mitsuba: one `singledispatch` function per public type.
+
+To translate a new type: register a function for it in the file of its kind; until then it raises
+`UntranslatableError`, which makes a scene `not-comparable`.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
+from comparisons.geometry.frame import Frame
+from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.counterpart import Crowd, Twin
+from comparisons.mitsuba.csg import Operand, SolidTwin
+from comparisons.mitsuba.scene import light_id, shape_id
+from comparisons.mitsuba.stand_ins import Piece, Plugin, same_uv
+from comparisons.mitsuba.translate.cameras import translate_camera
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.film import translate_film, translate_sampler
+from comparisons.mitsuba.translate.integrators import translate_integrator
+from comparisons.mitsuba.translate.lights import translate_light
+from comparisons.mitsuba.translate.moved import frame_of, moved
+from comparisons.mitsuba.translate.shapes import Site, translate_shape
+from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.mitsuba.translate.wrappers import coloured_parts_of, is_textured, parts_of
+from reference_rt.rendering.scene import Scene
+
+# Without it Embree drops rays that meet a shared edge (Mitsuba issue 1149).
+ROBUST = {"embree_use_robust_intersections": True}
+
+
+class _Translated(NamedTuple):
+    plain: dict[str, Any]
+    pieces: dict[str, Piece]
+    solids: list[SolidTwin]
+
+
+def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
+    """The scene as a dict for `mitsuba.load_dict`, without its solids; shape i of ours has the id
+    "shape_<i>", or several such with suffixes.
+
+    Meshes are Mitsuba objects already, made of the very triangles of our tables.  There is no
+    integrator where ours is ray casting.  native: with Mitsuba's own materials also where ours are
+    more exact, whose speed would not be Mitsuba's.  Raises UntranslatableError, SceneError for a
+    file that cannot be used, ReferenceUnavailableError without Mitsuba.
+    """
+    found = _translated(scene, native)
+    return {**_groups(found.pieces), **found.plain}
+
+
+def load(scene: Scene, frame: Frame | None = None) -> Twin:
+    """The scene in Mitsuba, its shapes not merged, in the coordinates of `Twin.frame`: those that
+    suit float32 best, or `frame`.  Raises as `to_mitsuba` does."""
+    frame = frame_of(scene) if frame is None else frame
+    found = _translated(moved(scene, frame))
+    crowd = _crowd(found)
+    plain = {**_groups(found.pieces), **found.plain}
+    mi_scene = mitsuba().load_dict(plain, optimize=False)
+    return Twin(mi_scene, found.pieces, tuple(found.solids), crowd, frame)
+
+
+FEW = 32
+"""Instances that a scene of Mitsuba's fast variants may have: see `Crowd`."""
+
+
+def _crowd(found: _Translated) -> Crowd | None:
+    """Takes the instances out, where they are more than a few."""
+    names = [name for name, piece in found.pieces.items() if piece.plugin.within is not None]
+    if len(names) <= FEW:
+        return None
+    pieces = {name: found.pieces.pop(name) for name in names}
+    instances = {name: found.plain.pop(name) for name in names}
+    with scalar() as mi:
+        groups = _groups(pieces)
+        mi_scene = mi.load_dict({"type": "scene", **ROBUST, **groups, **instances}, optimize=False)
+    return Crowd(mi_scene, pieces)
+
+
+def _groups(pieces: Mapping[str, Piece]) -> dict[str, Any]:
+    """The groups that these are instances of, in the variant that is set."""
+    within = {p.plugin.within.name: p.plugin.within for p in pieces.values() if p.plugin.within}
+    return {
+        name: {"type": "shapegroup", "member": w.member() if callable(w.member) else w.member}
+        for name, w in within.items()
+    }
+
+
+def _translated(scene: Scene, native: bool = False) -> _Translated:
+    sensor = translate_camera(scene.camera, scene.film)
+    sensor["film"] = translate_film(scene.film)
+    sensor["sampler"] = translate_sampler(scene.resolved_sampler)
+    plain: dict[str, Any] = {"type": "scene", **ROBUST, "sensor": sensor}
+    integrator = translate_integrator(scene.integrator)
+    if integrator is not None:
+        plain["integrator"] = integrator
+    result = _Translated(plain, {}, [])
+    copies = copies_of(scene)
+    count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
+    shared: dict[Any, Any] = {}
+    around = Surroundings.of(scene, native)
+    reach = _reach(scene, copies)
+    for copy in copies:
+        try:
+            of_group = count[copy.group] if copy.group else 1
+            _add(result, scene, copy, of_group, shared, around, reach)
+        except ValueError as error:
+            raise scene.error(str(error), "shapes", copy.shape) from None
+    for i, light in enumerate(scene.lights):
+        emitter = translate_light(light, around)
+        if emitter is not None:
+            plain[light_id(i)] = emitter
+    return result
+
+
+def _reach(scene: Scene, copies: list[Copy]) -> float:
+    """About the largest coordinate: of the eye, and of unit shapes where they stand."""
+    found = float(np.abs([scene.camera.eye, scene.camera.target]).max())
+    for copy in copies:
+        for leaf in (leaf for member in copy.members for leaf in member.leaves):
+            m = leaf.shape.map_in(place_of(scene, leaf, copy.outer))
+            found = max(found, float((np.abs(m[:, 3]) + np.abs(m[:, :3]).sum(axis=1)).max()))
+    return found
+
+
+def _add(
+    result: _Translated,
+    scene: Scene,
+    copy: Copy,
+    count: int,
+    shared: dict[Any, Any],
+    around: Surroundings,
+    reach: float,
+) -> None:
+    """Puts the shapes of one copy, of `count` of its group, into what is translated."""
+    mirrored = bool(np.linalg.det(copy.outer[:, :3]) < 0.0)
+    for number, member in enumerate(copy.members):
+        name = shape_id(copy.shape)
+        if copy.instance >= 0:
+            name += f"_{copy.instance}_{number}"
+        operands = []
+        for leaf in member.leaves:
+            place = place_of(scene, leaf, copy.outer)
+            parts = parts_of(leaf.material, around)
+            site = Site(
+                place=place,
+                mirrored=mirrored,
+                parts=parts,
+                coloured=coloured_parts_of(leaf.material, around) or parts,
+                textured=is_textured(leaf.material, around),
+                material=leaf.material,
+                copies=count,
+                shared=shared,
+                reach=reach,
+            )
+            plugins = translate_shape(leaf.shape, site)
+            if site.textured and any(plugin.uv is not same_uv for plugin in plugins):
+                kind = type(leaf.shape).__name__
+                raise UntranslatableError(f"{kind} under a texture, with other uv,", "shape")
+            if member.tree is None:
+                values, pieces = _named(plugins, name, copy, leaf)
+                result.plain.update(values)
+                result.pieces.update(pieces)
+            else:
+                values, pieces = _named(plugins, f"{name}_part{leaf.part}", copy, leaf)
+                groups = _groups(pieces)
+                mi_scene = mitsuba().load_dict(
+                    {"type": "scene", **ROBUST, **groups, **values}, optimize=False
+                )
+                operands.append(Operand(mi_scene, pieces, leaf, place))
+        if member.tree is not None:
+            result.solids.append(SolidTwin(tuple(operands), member.tree))
+
+
+def _named(
+    plugins: list[Plugin], name: str, copy: Copy, leaf: Leaf
+) -> tuple[dict[str, Any], dict[str, Piece]]:
+    values, pieces = {}, {}
+    for plugin in plugins:
+        key = name + plugin.suffix
+        values[key] = plugin.value
+        pieces[key] = Piece(
+            copy.shape, leaf.part, copy.instance, leaf.shape, plugin._replace(value=None)
+        )
+    return values, pieces
+
+
+__all__ = ["UntranslatableError", "load", "to_mitsuba"]

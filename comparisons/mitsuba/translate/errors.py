@@ -1,0 +1,22 @@
+"""What has no twin in Mitsuba."""
+
+from typing import Any
+
+from reference_rt.util.errors import ReferenceRtError
+
+
+class UntranslatableError(ReferenceRtError):
+    """A part of a scene that Mitsuba has nothing for: the scene is `not-comparable`.
+
+    The exit code is that of a reference that could not run.
+    """
+
+    exit_code = 4
+
+    def __init__(self, part: Any, kind: str) -> None:
+        name = part if isinstance(part, str) else type(part).__name__
+        self.part = name
+        super().__init__(
+            f"the {kind} {name} cannot be compared: comparisons.mitsuba.translate has no "
+            "translation for it"
+        )

@@ -1,0 +1,50 @@
+"""Integrators."""
+
+from functools import singledispatch
+from typing import Any
+
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from reference_rt.integrators import Direct, Path, RayCast, Whitted
+
+
+@singledispatch
+def translate_integrator(integrator: Any) -> dict[str, Any] | None:
+    """An integrator's dict; None where there is no picture to compare.
+
+    Raises UntranslatableError.
+    """
+    raise UntranslatableError(integrator, "integrator")
+
+
+@translate_integrator.register
+def _(integrator: Path) -> dict[str, Any]:
+    """Which samples ours takes is no question of what the mean is."""
+    return {
+        "type": "path",
+        "max_depth": -1 if integrator.max_depth is None else integrator.max_depth,
+        "rr_depth": integrator.rr_depth,
+    }
+
+
+@translate_integrator.register
+def _(integrator: Direct) -> dict[str, Any]:
+    return {
+        "type": "direct",
+        "emitter_samples": integrator.light_samples,
+        "bsdf_samples": integrator.bsdf_samples,
+    }
+
+
+@translate_integrator.register
+def _(integrator: Whitted) -> dict[str, Any]:
+    """Our plugin: `comparisons.mitsuba.plugins.whitted`; its lights are told by the rung."""
+    return {
+        "type": "whitted",
+        "max_depth": integrator.max_depth,
+        "min_contribution": integrator.min_contribution,
+    }
+
+
+@translate_integrator.register
+def _(integrator: RayCast) -> None:
+    """Everything that ray casting shows is compared ray by ray: the rung of geometry."""

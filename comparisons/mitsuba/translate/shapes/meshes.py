@@ -1,0 +1,130 @@
+"""Meshes: the very triangles of our tables, in our order, so that Mitsuba's prim_index counts the
+rows of our table.  These are numbered as in the file, of which they lack triangles without area."""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.stand_ins import Plugin, same_uv
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.shapes.choice import translate_shape
+from comparisons.mitsuba.translate.shapes.plugins import Site, instance_of
+from comparisons.mitsuba.translate.textures import VERTEX_COLOUR, VERTEX_LUMINANCE
+from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.vec3 import Vec3, luminance
+from reference_rt.shapes import Mesh, Triangle
+from reference_rt.shapes.meshes.triangle import Triangles
+from reference_rt.shapes.shape import Place
+
+MOST_TRIANGLES = 4_000_000
+"""That all copies of a mesh may have together: 0.3 kB each.  Where there are more Mitsuba gets
+instances, which it traces less exactly: within groups it ignores the flag without which rays pass
+between triangles (of 100,000 rays at edges 7,226 did; without a group, 15)."""
+
+
+class Soup:
+    """Triangles with corners of their own: positions (3 n, 3), and of the corners, None for none,
+    unit normals (3 n, 3), uv (3 n, 2), colours (3 n, 3);  numbers (n,): ours of the triangles, None
+    where they are counted."""
+
+    def __init__(
+        self,
+        positions: FloatArray,
+        normals: FloatArray | None = None,
+        uvs: FloatArray | None = None,
+        colours: FloatArray | None = None,
+        faces: IntArray | None = None,
+        numbers: IntArray | None = None,
+    ) -> None:
+        self.numbers = numbers
+        self.positions, self.normals, self.uvs, self.colours = positions, normals, uvs, colours
+        self.faces = np.arange(len(positions)).reshape(-1, 3) if faces is None else faces
+
+    def moved(self, m: transform.Affine, mirrored: bool) -> "Soup":
+        """Under an affine map; `mirrored` turns the corners' order, and so the front, round."""
+        normals = None if self.normals is None else transform.apply_normals(m, self.normals)
+        positions = transform.apply_points(m, self.positions)
+        if not mirrored:
+            return Soup(positions, normals, self.uvs, self.colours, self.faces)
+        uvs = self.uvs
+        if uvs is None and len(positions) == 3 * len(self.faces):
+            # Mitsuba's own are the barycentrics in its order of the corners.
+            uvs = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (len(self.faces), 1))
+        return Soup(positions, normals, uvs, self.colours, self.faces[:, [0, 2, 1]])
+
+    def all_of_face(self, number: int) -> IntArray:
+        """For triangles that are one face of ours: its number, by theirs."""
+        return np.full(len(self.faces), number)
+
+    def mesh(self, parts: dict[str, Any]) -> Any:
+        """As Mitsuba's object, of `parts`."""
+        mi = mitsuba()
+        properties = mi.Properties()
+        for name, part in parts.items():
+            properties[name] = mi.load_dict(part)
+        mesh = mi.Mesh(
+            "mesh",
+            len(self.positions),
+            len(self.faces),
+            has_vertex_normals=self.normals is not None,
+            has_vertex_texcoords=self.uvs is not None,
+            props=properties,
+        )
+        values = mi.traverse(mesh)
+        values["vertex_positions"] = self.positions.astype(np.float32).ravel()
+        values["faces"] = self.faces.astype(np.uint32).ravel()
+        if self.normals is not None:
+            values["vertex_normals"] = self.normals.astype(np.float32).ravel()
+        if self.uvs is not None:
+            values["vertex_texcoords"] = self.uvs.astype(np.float32).ravel()
+        values.update()
+        if self.colours is not None:
+            grey = np.asarray(luminance(Vec3(*self.colours.T)))
+            for name, column in ((VERTEX_COLOUR, self.colours), (VERTEX_LUMINANCE, grey)):
+                mesh.add_attribute(
+                    name, column.size // len(grey), column.astype(np.float32).ravel()
+                )
+        return mesh
+
+
+@translate_shape.register(Triangle)
+@translate_shape.register(Mesh)
+def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
+    key = ("triangles", id(shape))
+    if key not in site.shared:
+        site.shared[key] = _soup(shape.tabulate(Place(folder=site.place.folder)))
+    soup: Soup = site.shared[key]
+    if soup.colours is not None and (soup.colours < 0.0).any() and site.coloured is not site.parts:
+        raise UntranslatableError("Mesh with colours of some of its vertices", "shape")
+    if "emitter" in site.parts and soup.normals is not None:
+        # Which side shines: ours by the geometric normal, Mitsuba's by the shading normal.
+        raise UntranslatableError("Mesh that shines and has vertex normals", "shape")
+    if "emitter" in site.parts and site.coloured["emitter"]["radiance"]["type"] != "rgb":
+        # It finds points of textured lights by their uv, which a mesh may use twice or never
+        # (measured with all at one uv: two thirds of the light were lost).
+        raise UntranslatableError("Mesh that shines by a texture", "shape")
+    key = ("mesh", id(shape))
+    plugin = placed(soup, key, site.place.outer, site.mirrored, site)
+    return [plugin._replace(uv=same_uv, faces=soup.numbers)]
+
+
+def placed(soup: Soup, key: Any, m: transform.Affine, mirrored: bool, site: Site) -> Plugin:
+    """Triangles where the map m takes them: a mesh, or an instance where there are many copies, of
+    the one mesh for `key`.  `mirrored`: see `Soup.moved`."""
+    parts = site.parts if soup.colours is None else site.coloured
+    if site.copies == 1 or site.copies * len(soup.faces) <= MOST_TRIANGLES:
+        return Plugin(soup.moved(m, mirrored).mesh(parts))
+    # Mitsuba maps normals as ours are mapped: the front stays the front.
+    return instance_of(str(key), lambda: soup.mesh(parts), m, site)
+
+
+def _soup(table: Triangles) -> Soup:
+    return Soup(
+        table.vertices.reshape(-1, 3),
+        None if table.normals is None else table.normals.reshape(-1, 3),
+        None if table.uvs is None else table.uvs.reshape(-1, 2),
+        None if table.colours is None else table.colours.reshape(-1, 3),
+        numbers=table.face,
+    )

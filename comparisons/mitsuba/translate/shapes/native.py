@@ -1,0 +1,141 @@
+"""Shapes that Mitsuba has too, from the float64 numbers that our own tables hold.
+
+Mitsuba's rectangles, cubes and spheres turn inside out, or disagree with themselves (a rectangle's
+geometric normal follows the winding, its shading normal the transform), where a transform mirrors
+space; ours keep their outward side.  So a mirroring transform is never passed on to these.  Its
+disks are right under every affine map; its spheres only under one that keeps them round.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.geometry.float32 import UNIT_ROUNDOFF
+from comparisons.mitsuba.hits import CURVED
+from comparisons.mitsuba.stand_ins import Plugin, same_uv
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.shapes.choice import translate_shape
+from comparisons.mitsuba.translate.shapes.meshes import Soup
+from comparisons.mitsuba.translate.shapes.plugins import (
+    Site,
+    curved_instance,
+    in_float32,
+    is_similarity,
+    to_world,
+)
+from comparisons.mitsuba.translate.shapes.stand_ins import Implicit, Patch, stand_in
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.transform import Affine, apply_points
+from reference_rt.shapes import Box, Disk, Rectangle, Sphere
+
+CELLS = (384, 192)
+"""Around a thin ellipsoid's axis and along it."""
+
+CUBE_FACES = (1, 4, 3, 5, 0, 2)
+"""Our numbers of the faces of Mitsuba's cube, which are -y +y +x +z -x -z, two triangles each
+(src/shapes/cube.cpp)."""
+
+
+@translate_shape.register
+def _(shape: Sphere, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    if not is_similarity(m[:, :3]):
+        m = m @ np.vstack([np.column_stack([shape.radius * np.eye(3), shape.center]), [0, 0, 0, 1]])
+        least = float(np.linalg.svd(m[:, :3], compute_uv=False)[-1])
+        if in_float32(least) > 0.0 and CURVED * UNIT_ROUNDOFF * site.reach**2 > least**2:
+            # Mitsuba's own would be off by more than it is thick.
+            return [_ellipsoid(shape, site)]
+        return [curved_instance("sphere", m, site)._replace(uv=same_uv)]
+    table: Any = shape.tabulate(site.place)
+    rotation = np.linalg.inv(table.to_local[0].reshape(3, 3))
+    plugin = {
+        "type": "sphere",
+        "to_world": to_world(rotation * table.radius[0], table.center[0]),
+        # A mirrored sphere keeps its mirrored uv; turned over once more, its normals are outward.
+        "flip_normals": bool(np.linalg.det(rotation) < 0.0),
+        **site.parts,
+    }
+    return [Plugin(plugin, uv=same_uv)]
+
+
+def _ellipsoid(shape: Sphere, site: Site) -> Plugin:
+    """As a mesh: of a thin one float32 holds the corners better than it solves the quadratic."""
+    center, radius = np.array(shape.center), shape.radius
+
+    def point(u: FloatArray, v: FloatArray) -> FloatArray:
+        phi, theta = 2.0 * np.pi * u, np.pi * v
+        s = np.sin(theta)
+        unit = np.stack([s * np.cos(phi), s * np.sin(phi), np.cos(theta)], axis=-1)
+        return np.asarray(center + radius * unit)
+
+    surface = Implicit(
+        value=lambda p: np.asarray(np.linalg.norm(p - center, axis=-1) - radius),
+        gradient=lambda p: np.asarray(p - center),
+    )
+    return stand_in(shape, [Patch(point, CELLS)], surface, None, site)
+
+
+@translate_shape.register
+def _(shape: Rectangle, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
+    # The third column moves nothing: any that makes the map proper will do.
+    columns = np.column_stack([m[:, 0], m[:, 1], -m[:, 2] if mirrored else m[:, 2]])
+    plugin = {
+        "type": "rectangle",
+        "to_world": to_world(columns, m[:, 3]),
+        "flip_normals": mirrored,
+        **site.parts,
+    }
+    return [Plugin(plugin, faces=np.zeros(2, np.int64), uv=same_uv)]  # two triangles
+
+
+@translate_shape.register
+def _(shape: Disk, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    return [
+        Plugin({"type": "disk", "to_world": to_world(m[:, :3], m[:, 3]), **site.parts}, uv=same_uv)
+    ]
+
+
+@translate_shape.register
+def _(shape: Box, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    if site.textured:
+        return [_box_of_triangles(m, site)]
+    edges = m[:, :3].copy()
+    faces = np.array(CUBE_FACES)
+    if np.linalg.det(edges) < 0.0:
+        # The same box.  Where it is a light of Whitted's, the point that stands for it lies in the
+        # middle along this axis, and stays (see comparisons.mitsuba.plugins.light_points).
+        turned = _middle_axis(edges)
+        edges[:, turned] *= -1.0
+        faces = np.where(faces % 3 == turned, (faces + 3) % 6, faces)
+    plugin = {"type": "cube", "to_world": to_world(edges, m[:, 3]), **site.parts}
+    return [Plugin(plugin, faces=np.repeat(faces, 2))]
+
+
+def _box_of_triangles(m: Affine, site: Site) -> Plugin:
+    """With our uv: of each face the two other coordinates in the order x, y, z, from 0 to 1."""
+    if "emitter" in site.parts:
+        # As a light of Whitted's a mesh is as many points as it has triangles.
+        raise UntranslatableError("emissive material with a texture on a Box", "material")
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    positions, faces = np.empty((6, 4, 3)), []
+    for face in range(6):
+        axis, sign = face % 3, 1.0 if face >= 3 else -1.0
+        a, b = (k for k in range(3) if k != axis)
+        positions[face][:, [a, b]] = 2.0 * square - 1.0
+        positions[face][:, axis] = sign
+        triangles = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * face
+        # a, b and the outward normal are right-handed for +x, -y, +z; a mirror turns all round.
+        outward = sign * (-1.0 if axis == 1 else 1.0) * np.linalg.det(m[:, :3])
+        faces.append(triangles if outward > 0.0 else triangles[:, ::-1])
+    uvs = np.tile(square, (6, 1))
+    soup = Soup(apply_points(m, positions.reshape(-1, 3)), uvs=uvs, faces=np.concatenate(faces))
+    return Plugin(soup.mesh(site.parts), faces=np.repeat(np.arange(6), 2), uv=same_uv)
+
+
+def _middle_axis(edges: FloatArray) -> int:
+    areas = np.linalg.norm(np.cross(edges.T[[1, 2, 0]], edges.T[[2, 0, 1]]), axis=1)
+    return 1 if areas[2] >= areas[0] + areas[1] else 2

@@ -1,0 +1,154 @@
+"""Cylinders, which Mitsuba has; cones and other quadrics, as meshes."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from comparisons.mitsuba.stand_ins import Plugin, same_uv
+from comparisons.mitsuba.translate.shapes.canonical import patches_of
+from comparisons.mitsuba.translate.shapes.caps import cap_faces
+from comparisons.mitsuba.translate.shapes.choice import translate_shape
+from comparisons.mitsuba.translate.shapes.meshes import placed
+from comparisons.mitsuba.translate.shapes.plugins import (
+    Site,
+    curved_instance,
+    in_float32,
+    is_similarity,
+    to_world,
+)
+from comparisons.mitsuba.translate.shapes.stand_ins import Implicit, Patch, stand_in
+from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray
+from reference_rt.shapes import Cone, Cylinder, Quadric
+
+ANGLES = 4096
+"""Around a cone, which is straight the other way."""
+
+THIN = 64.0
+"""Cylinders this many times smaller than the scene are meshes in llvm variants: Mitsuba's own,
+which it solves for in float32, are off by some u D² / r (see `answers.CURVED`), and with
+D / r = 1000 are missed by every other ray."""
+
+BOTTOM, TOP = 3, 6
+"""Faces: 0 is the surface itself, of the others 1 + the axis, + 3 on the positive side."""
+
+
+@translate_shape.register
+def _(shape: Cylinder, site: Site) -> list[Plugin]:
+    m = shape.map_in(site.place)
+    r, height = shape.radius, shape.z_max - shape.z_min
+    unit = _followed(m, np.array([r, r, height]), shape.z_min)
+    least = np.linalg.svd(m[:, :2], compute_uv=False)[-1] * r
+    if least * THIN < site.reach and in_float32(least) > 0.0:
+        patch = Patch(_side(r, r, shape.z_min, height), (ANGLES, 1))
+        side = stand_in(shape, [patch], _round(r, 0.0), None, site)
+    elif _is_round(unit[:, :3]):
+        place = to_world(unit[:, :3], unit[:, 3])
+        plugin = {"type": "cylinder", "to_world": place, **site.parts}
+        side = Plugin(plugin, uv=same_uv, curved=in_float32(least))
+    else:
+        side = curved_instance("cylinder", unit, site)._replace(uv=same_uv)
+    found = [side]
+    if shape.capped:
+        found.append(_disk(m, r, shape.z_min, BOTTOM, r, site))
+        found.append(_disk(m, r, shape.z_max, TOP, r, site))
+    return found
+
+
+def _is_round(linear: FloatArray) -> bool:
+    """Whether a map takes a circular cylinder along z to one: its height may change by itself."""
+    x, y, z = linear.T
+    z = z * np.linalg.norm(x) / np.linalg.norm(z)
+    return is_similarity(np.column_stack([x, y, z]))
+
+
+def _followed(m: transform.Affine, scale: FloatArray, z: float) -> transform.Affine:
+    """Scales, moves along z, then m."""
+    return transform.compose(transform.scale(tuple(scale)), transform.translate((0.0, 0.0, z)), m)
+
+
+def _disk(
+    m: transform.Affine, radius: float, z: float, face: int, reach: float, site: Site
+) -> Plugin:
+    """A cap across the axis, whose uv are x and y over a square of half side `reach`."""
+    place = _followed(m, np.array([radius, radius, radius]), z)
+    plugin = {
+        "type": "disk",
+        "to_world": to_world(place[:, :3], place[:, 3]),
+        "flip_normals": face == BOTTOM,
+        **site.parts,
+    }
+
+    def over_square(uv: FloatArray) -> FloatArray:
+        phi = 2.0 * np.pi * uv[:, 1]
+        x_y = (uv[:, 0] * radius / reach)[:, None] * np.column_stack([np.cos(phi), np.sin(phi)])
+        return np.asarray(0.5 * (1.0 + x_y))
+
+    return Plugin(plugin, suffix=f"_cap{face}", faces=np.array([face]), uv=over_square)
+
+
+@translate_shape.register
+def _(shape: Cone, site: Site) -> list[Plugin]:
+    bottom, top, height = shape.radius, shape.top_radius, shape.height
+    patch = Patch(_side(bottom, top, 0.0, height), (ANGLES, 1))
+    found = [stand_in(shape, [patch], _round(bottom, (top - bottom) / height), None, site)]
+    if shape.capped:
+        m, reach = shape.map_in(site.place), max(bottom, top)
+        found.append(_disk(m, bottom, 0.0, BOTTOM, reach, site))
+        if top > 0.0:
+            found.append(_disk(m, top, height, TOP, reach, site))
+    return found
+
+
+def _side(
+    bottom: float, top: float, z: float, height: float
+) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    """The side of a cone or a cylinder from z upwards."""
+
+    def point(u: FloatArray, v: FloatArray) -> FloatArray:
+        phi, r = 2.0 * np.pi * u, bottom + (top - bottom) * v
+        return np.stack([r * np.cos(phi), r * np.sin(phi), z + height * v], axis=-1)
+
+    return point
+
+
+def _round(radius: float, slope: float) -> Implicit:
+    """The distance from the z axis is radius + slope z."""
+
+    def value(p: FloatArray) -> FloatArray:
+        return np.asarray(np.hypot(p[..., 0], p[..., 1]) - (radius + slope * p[..., 2]))
+
+    def gradient(p: FloatArray) -> FloatArray:
+        rho = np.hypot(p[..., 0], p[..., 1])[..., None]
+        out = np.divide(p[..., :2], rho, out=np.zeros_like(p[..., :2]), where=rho > 0.0)
+        return np.concatenate([out, np.where(rho > 0.0, -slope, 0.0)], axis=-1)
+
+    return Implicit(value, gradient)
+
+
+@translate_shape.register
+def _(shape: Quadric, site: Site) -> list[Plugin]:
+    a, b, c, d, e, f, g, h, i, j = shape.coefficients
+    matrix = np.array([[a, d / 2, f / 2], [d / 2, b, e / 2], [f / 2, e / 2, c]])
+    linear = np.array([g, h, i])
+    box = np.array(shape.lower), np.array(shape.upper)
+
+    def value(p: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("...i,ij,...j->...", p, matrix, p) + p @ linear + j)
+
+    surface = Implicit(value, lambda p: np.asarray(2.0 * p @ matrix + linear))
+    found = []
+    patches = patches_of(matrix, linear, j, box)
+    if patches:
+        found.append(stand_in(shape, patches, surface, box, site))
+    if shape.capped:
+        key = ("caps", id(shape))
+        if key not in site.shared:
+            site.shared[key] = cap_faces(value, box)
+        soup, faces = site.shared[key]
+        if len(faces) > 0:
+            m = shape.map_in(site.place)
+            mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
+            plugin = placed(soup, key, m, mirrored, site)
+            found.append(plugin._replace(suffix="_caps", faces=faces, uv=same_uv, faceted=True))
+    return found

@@ -1,0 +1,145 @@
+"""Textures, and the parameters of materials that may be any."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.vec3 import Vec3, luminance
+from reference_rt.materials.material import Material
+from reference_rt.rendering.scene import Scene
+from reference_rt.textures import Bitmap, Checker, Texture, VertexColours
+from reference_rt.textures.texture import UvMap
+
+VERTEX_COLOUR, VERTEX_LUMINANCE = "vertex_color", "vertex_luminance"
+"""Names of the attributes of meshes."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What materials are translated with: those of the scene and its textures, by name; the folder
+    of its files;  has_colours: whether what wears them is a mesh with colours of its vertices;
+    native: Mitsuba's own materials, also where one written for it would be more exact;  images:
+    Mitsuba's, by texture so far."""
+
+    materials: Mapping[str, Material]
+    textures: Mapping[str, Texture]
+    folder: Path
+    has_colours: bool = False
+    native: bool = False
+    images: dict[Any, Any] = field(default_factory=dict)
+
+    @staticmethod
+    def of(scene: Scene, native: bool = False) -> "Surroundings":
+        return Surroundings(scene.materials, scene.textures, scene.folder, native=native)
+
+
+def rgb(colour: tuple[float, float, float]) -> dict[str, Any]:
+    """Linear sRGB, which the rgb variants use as it is."""
+    return {"type": "rgb", "value": list(colour)}
+
+
+def colour(value: tuple[float, float, float] | str, around: Surroundings) -> dict[str, Any]:
+    """A colour or the texture of that name.  Raises UntranslatableError, ValueError for a file that
+    cannot be used."""
+    if isinstance(value, str):
+        return translate_texture(around.textures[value], value, around, False)
+    return rgb(value)
+
+
+def number(value: float | str, around: Surroundings) -> float | dict[str, Any]:
+    """A number or the texture of that name, whose luminance it is.
+
+    Mitsuba gets one channel, our luminance: its own weights end after other digits (0.212671 for
+    0.2126).  Raises as `colour` does.
+    """
+    if isinstance(value, str):
+        return translate_texture(around.textures[value], value, around, True)
+    return value
+
+
+@singledispatch
+def translate_texture(
+    texture: Any, name: str, around: Surroundings, as_number: bool
+) -> dict[str, Any]:
+    """A texture's dict, of colours or of numbers.  Raises as `colour` does."""
+    raise UntranslatableError(texture, "texture")
+
+
+@translate_texture.register
+def _(texture: Checker, name: str, around: Surroundings, as_number: bool) -> dict[str, Any]:
+    first, second = texture.first, texture.second
+    if max(*first, *second) > 1.0:
+        # For Mitsuba's checkerboard these are reflectances.  Its image of four texels is the same.
+        rows = np.array([[second, first], [first, second]])
+        return _lookup(_image(rows, as_number), "nearest", "repeat", texture.uv)
+    places: tuple[Any, Any] = (rgb(first), rgb(second))
+    if as_number:
+        # Mitsuba's `eval_1` has the two the other way round than its `eval` (3.9.1).
+        places = (float(luminance(Vec3(*second))), float(luminance(Vec3(*first))))
+    return {
+        "type": "checkerboard",
+        "color0": places[0],
+        "color1": places[1],
+        "to_uv": _to_uv(_homogeneous(texture.uv)),
+    }
+
+
+@translate_texture.register
+def _(texture: Bitmap, name: str, around: Surroundings, as_number: bool) -> dict[str, Any]:
+    """From our own linear texels: decoding files is not what is compared."""
+    key = (name, as_number)
+    if key not in around.images:
+        table = texture.tabulate(around.folder)
+        shape = (int(table.height[0]), int(table.width[0]), 3)
+        around.images[key] = _image(table.texels.reshape(shape), as_number)
+    return _lookup(around.images[key], texture.filter, texture.wrap, texture.uv)
+
+
+@translate_texture.register
+def _(texture: VertexColours, name: str, around: Surroundings, as_number: bool) -> dict[str, Any]:
+    if not around.has_colours:
+        if as_number:
+            return {"type": "uniform", "value": float(luminance(Vec3(*texture.without)))}
+        return rgb(texture.without)
+    attribute = VERTEX_LUMINANCE if as_number else VERTEX_COLOUR
+    return {"type": "mesh_attribute", "name": attribute, "scale": texture.scale}
+
+
+def _image(texels: FloatArray, as_number: bool) -> Any:
+    if as_number:
+        texels = np.asarray(luminance(Vec3(*np.moveaxis(texels, -1, 0))))[..., None]
+    return mitsuba().Bitmap(np.ascontiguousarray(texels, dtype=np.float32))
+
+
+def _lookup(image: Any, filter_type: str, wrap: str, uv: UvMap) -> dict[str, Any]:
+    # Mitsuba's v = 0 is the top row.
+    flipped = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+    return {
+        "type": "bitmap",
+        "bitmap": image,
+        "raw": True,
+        "format": "variant",  # never half floats
+        "filter_type": filter_type,
+        "wrap_mode": wrap,
+        "to_uv": _to_uv(flipped @ _homogeneous(uv)),
+    }
+
+
+def _homogeneous(uv: UvMap) -> FloatArray:
+    return np.vstack([uv.matrix().reshape(2, 3), [0.0, 0.0, 1.0]])
+
+
+def _to_uv(matrix: FloatArray) -> Any:
+    return mitsuba().ScalarTransform3f(matrix)
+
+
+def depends_on_uv(texture: Texture) -> bool:
+    """Whether it needs a surface's coordinates."""
+    return not isinstance(texture, VertexColours)

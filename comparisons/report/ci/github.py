@@ -1,0 +1,164 @@
+"""GitHub Actions: annotations on the run, and its summary, within their limits."""
+
+import os
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TextIO
+
+from comparisons.report.ci.ranking import SEVERITY, ranked
+from comparisons.results.case import INTERRUPTED, Case, how_many
+from comparisons.results.verdict import PASSING
+from reference_rt.util.errors import ImageError, printable
+
+MOST_ANNOTATIONS = 10
+"""Of each kind that a step may make; GitHub drops the rest without a word."""
+
+MOST_BYTES = 1 << 20
+"""Of the summary of a step; GitHub drops a longer one as a whole."""
+
+_ROOM = 256
+"""Bytes for the line that says how many cases were dropped."""
+
+_MOST_CHARACTERS = 1000
+"""Of a reason: what is longer is in results.json."""
+
+_KINDS = {"invalid": "error", "differ": "error", "inconclusive": "warning"} | {
+    "not-comparable": "warning"
+}
+
+
+def is_there() -> bool:
+    """Whether this runs as a step of GitHub Actions."""
+    return os.environ.get("GITHUB_ACTIONS") == "true"
+
+
+def summary_path() -> Path | None:
+    """Where the step's summary goes, None where GitHub wants none."""
+    path = os.environ.get("GITHUB_STEP_SUMMARY")
+    return Path(path) if path else None
+
+
+def annotate(
+    cases: Sequence[Case],
+    stream: TextIO,
+    files: Mapping[str, str] | None = None,
+    missing: Sequence[str] = (),
+) -> None:
+    """Write an annotation for each case that fails, the worst first: errors for what is invalid or
+    differs, warnings for what could not be told.
+
+    files: the file that a case is about, by the case's name;  missing: names of cases that an
+    interrupted run did not come to: one error.  Where there are more cases than annotations, the
+    last one says how many.
+    """
+    if missing:
+        title = {"title": how_many(len(cases), len(missing))}
+        _command(stream, "error", title, _cut(f"Missing: {', '.join(missing)}"))
+    for kind in ("error", "warning"):
+        failed = [case for case in ranked(cases) if _KINDS.get(case.verdict) == kind]
+        most = MOST_ANNOTATIONS - (1 if missing and kind == "error" else 0)
+        shown = failed if len(failed) <= most else failed[: most - 1]
+        for case in shown:
+            where = {"title": f"{case.scene}: {case.verdict}"}
+            if files and case.scene in files:
+                where = {"file": files[case.scene], **where}
+            _command(stream, kind, where, _told(case))
+        if len(failed) > len(shown):
+            number = len(failed) - len(shown)
+            title = {"title": f"{number} more cases"}
+            names = ", ".join(case.scene for case in failed[len(shown) :])
+            _command(stream, kind, title, _cut(f"Not shown here: {names}"))
+
+
+def _command(stream: TextIO, kind: str, properties: Mapping[str, str], message: str) -> None:
+    told = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
+    stream.write(f"::{kind} {told}::{_data(message)}\n")
+    stream.flush()
+
+
+def _told(case: Case) -> str:
+    lines = [_cut(case.reason)]
+    if case.cause:
+        lines.append(_cut(f"Likeliest cause: {case.cause.name}: {case.cause.evidence}"))
+    if case.again:
+        lines.append(f"Again: {case.again}")
+    return "\n".join(lines)
+
+
+def _data(text: str) -> str:
+    """Escapes of a workflow command's message (actions/toolkit, `escapeData`)."""
+    return (
+        printable(text, kept="\r\n").replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    )
+
+
+def _property(text: str) -> str:
+    """Escapes of a workflow command's property (actions/toolkit, `escapeProperty`)."""
+    return _data(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def summarise(
+    cases: Sequence[Case],
+    path: Path,
+    title: str,
+    not_run: Mapping[str, str] | None = None,
+    missing: Sequence[str] = (),
+) -> None:
+    """Append a summary in Markdown: counts, then a table of the cases, the worst first, as many as
+    there is room for.  missing: names of cases that an interrupted run did not come to.  Raises
+    ImageError where the file cannot be written."""
+    counts = Counter(case.verdict for case in cases)
+    told = ", ".join(f"**{counts[v]}** {v}" for v in SEVERITY if counts[v]) or "no case was run"
+    head = f"## {_markdown(title)}\n\n{how_many(len(cases), len(missing))}: {told}\n\n"
+    head += "| case | verdict | why |\n| --- | --- | --- |\n"
+    rows = [f"| {_markdown(name)} | ❌ missing | {INTERRUPTED} |\n" for name in missing]
+    rows += [_row(case) for case in ranked(cases)]
+    rows += [
+        f"| {_markdown(name)} | not run | {_markdown(_cut(why))} |\n"
+        for name, why in (not_run or {}).items()
+    ]
+    try:
+        used = path.stat().st_size if path.exists() else 0
+        text = head + _fitting(rows, MOST_BYTES - used - len(head.encode()) - _ROOM)
+        if used + len(text.encode()) > MOST_BYTES:
+            return  # one that is too long costs what is there already
+        with path.open("a", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+    except OSError as error:
+        raise ImageError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _fitting(rows: Sequence[str], room: int) -> str:
+    kept: list[str] = []
+    for row in rows:
+        room -= len(row.encode())
+        if room < 0:
+            break
+        kept.append(row)
+    if len(kept) < len(rows):
+        kept.append(f"\n{len(rows) - len(kept)} more cases were dropped: no room.\n")
+    return "".join([*kept, "\n"])
+
+
+def _row(case: Case) -> str:
+    why = _cut(case.reason)
+    if case.cause and case.verdict not in PASSING:
+        why += f"; likeliest cause: {_cut(case.cause.name)}"
+    sign = "✅" if case.verdict in PASSING else "❌"
+    return f"| {_markdown(case.scene)} | {sign} {case.verdict} | {_markdown(why)} |\n"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _MOST_CHARACTERS else f"{text[:_MOST_CHARACTERS]} ..."
+
+
+def _markdown(text: str) -> str:
+    """`text` as text: on one line, and none of it markup."""
+    return re.sub(
+        r"([\\`*_\[\]<>|~&#!@$])", r"\\\1", " ".join(printable(text, kept="\r\n\t").split())
+    )
+
+
+__all__ = ["annotate", "is_there", "summarise", "summary_path"]

@@ -1,0 +1,29 @@
+"""The worst first: what a reader must see where there is no room for all."""
+
+from collections.abc import Sequence
+
+from comparisons.results.case import RUNGS, Case, Status
+
+SEVERITY: tuple[Status, ...] = (
+    "invalid",
+    "differ",
+    "inconclusive",
+    "not-comparable",
+    "reference-limited",
+    "not-applicable",
+    "agree",
+)
+"""Verdicts, the worst first."""
+
+
+def ranked(cases: Sequence[Case]) -> list[Case]:
+    """Cases by verdict, those that break at a lower rung first, then by name."""
+    return sorted(cases, key=lambda c: (SEVERITY.index(c.verdict), _first_rung(c), c.scene))
+
+
+def _first_rung(case: Case) -> int:
+    """The place in the ladder of the first rung that has the verdict of the case."""
+    return min(
+        (RUNGS.index(t.name) for t in case.tiers if t.status == case.verdict and t.name in RUNGS),
+        default=len(RUNGS),
+    )

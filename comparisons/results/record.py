@@ -1,0 +1,203 @@
+"""A case on disk: `case.json`, exact and strict, and `pictures.exr`; both whole or it is not read.
+
+`results.json` is for others to read; this is for us to read again: to render a report once more,
+and not to do again what is done.
+"""
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from comparisons.results.case import Case, FloatArray, Images
+from comparisons.results.sealed import sealed, unsealed
+from reference_rt.core.exr import read_exr, write_exr
+from reference_rt.util.errors import ImageError
+from reference_rt.util.files import read_input, read_text, replacing
+
+CASE, PICTURES = "case.json", "pictures.exr"
+
+SCHEMA = 2
+"""Raised whenever a reader of the former layout would misread the new one."""
+
+_NUMBER = "number"
+"""The only key of an object that stands for a number which JSON has not: {"number": "nan"}."""
+
+_CHANNELS = "RGB"
+
+_hints = get_type_hints(Case)
+_CaseFields: type[BaseModel] = create_model(  # type: ignore[call-overload]
+    "_CaseFields",
+    __config__=ConfigDict(extra="forbid"),
+    **{f.name: (_hints[f.name], ...) for f in dataclasses.fields(Case) if f.name != "images"},
+)
+
+
+class RecordError(ImageError):
+    """A record is missing, damaged, or not of this version."""
+
+
+class Record(BaseModel):
+    """What `case.json` holds."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    version: int = Field(alias="schema")
+    key: str
+    """What the case was made with, as `comparisons.suites.keys` tells; "" if nobody asked."""
+    wall: float
+    """Seconds that the case took, all in all."""
+    case: dict[str, Any]
+    pictures: dict[str, tuple[int, int]]
+    """Height and width of each picture in `pictures.exr`, by name; none without pictures."""
+    sha256: str
+    """Of `pictures.exr`, "" without."""
+
+
+def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> None:
+    """Write `case` into `folder`, replacing the one that is there.  Raises ImageError.
+
+    An interruption leaves the former record, the new one, or one that `read_case` refuses.
+    """
+    fields = {f.name: getattr(case, f.name) for f in dataclasses.fields(case)}
+    images = fields.pop("images")
+    document = {
+        "schema": SCHEMA,
+        "key": key,
+        "wall": wall,
+        "case": _encoded(fields),
+        "pictures": {},
+        "sha256": "",
+    }
+    if images is not None:
+        sizes = _write_pictures(folder / PICTURES, images, {"scene": case.scene, "key": key})
+        document["pictures"] = sizes
+        document["sha256"] = _digest(folder / PICTURES)
+    text = json.dumps(sealed(document), indent=1, ensure_ascii=False, allow_nan=False)
+    with replacing(folder / CASE) as temporary:
+        # A lone surrogate, of a file name that is not UTF-8, becomes JSON's escape for it.
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+    if images is None:
+        (folder / PICTURES).unlink(missing_ok=True)
+
+
+def read_case(folder: Path) -> Case:
+    """The case that `write_case` wrote.  Raises RecordError.
+
+    Pictures come back as float32 holds them; arrays and tuples among the numbers of a tier as
+    lists.
+    """
+    path = folder / CASE
+    record = read_record(folder)
+    try:
+        fields = _CaseFields.model_validate(_decoded(record.case))
+    except ValidationError as error:
+        raise RecordError(f"{path}: is not a record of a case: {_first(error)}") from None
+    images = _read_pictures(folder / PICTURES, record) if record.pictures else None
+    return Case(
+        **{name: getattr(fields, name) for name in type(fields).model_fields}, images=images
+    )
+
+
+def read_record(folder: Path) -> Record:
+    """What `case.json` says, without the pictures.  Raises RecordError."""
+    path = folder / CASE
+    try:
+        data = json.loads(read_text(path))
+        if isinstance(data, dict) and data.get("schema") != SCHEMA:
+            raise RecordError(f"{path}: is not of schema {SCHEMA}; expected one of this version")
+        data = unsealed(data)
+        data["pictures"] = {name: tuple(size) for name, size in data["pictures"].items()}
+        return Record.model_validate(data)
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValidationError as error:
+        raise RecordError(f"{path}: is not a record of a case: {_first(error)}") from None
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise RecordError(f"{path}: is not a record of a case") from None
+
+
+# ---- pictures -----------------------------------------------------------------------------------
+
+
+def _write_pictures(
+    path: Path, images: Images, header: Mapping[str, str]
+) -> dict[str, tuple[int, int]]:
+    """All pictures as channels of one file, at its upper left; the rest of a smaller one is NaN."""
+    pictures = {f.name: getattr(images, f.name) for f in dataclasses.fields(images)}
+    pictures = {name: picture for name, picture in pictures.items() if picture is not None}
+    for name, picture in pictures.items():
+        if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
+            raise ValueError(f"{name}: expected (height, width, 3), got {picture.shape}")
+    height, width = (max(p.shape[axis] for p in pictures.values()) for axis in (0, 1))
+    channels: dict[str, FloatArray] = {}
+    for name, picture in pictures.items():
+        for k, letter in enumerate(_CHANNELS):
+            plane = np.full((height, width), np.nan)
+            plane[: picture.shape[0], : picture.shape[1]] = picture[..., k]
+            channels[f"{name}.{letter}"] = plane
+    write_exr(path, channels, header)
+    return {name: picture.shape[:2] for name, picture in pictures.items()}
+
+
+def _read_pictures(path: Path, record: Record) -> Images:
+    try:
+        if _digest(path) != record.sha256:
+            raise RecordError(f"{path}: is not the file that {CASE} tells of")
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
+    channels, _ = read_exr(path)
+    try:
+        pictures = {
+            name: np.stack([channels[f"{name}.{c}"][:height, :width] for c in _CHANNELS], axis=-1)
+            for name, (height, width) in record.pictures.items()
+        }
+        return Images(**pictures)
+    except (KeyError, TypeError):
+        raise RecordError(f"{path}: lacks a picture that {CASE} tells of") from None
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(read_input(path)).hexdigest()
+
+
+# ---- values -------------------------------------------------------------------------------------
+
+
+def _encoded(value: Any) -> Any:
+    """`value` in the types of strict JSON."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _encoded(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, np.ndarray | np.generic):
+        return _encoded(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): _encoded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_encoded(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return {_NUMBER: str(value)}
+    return value
+
+
+def _decoded(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_decoded(item) for item in value]
+    if isinstance(value, dict):
+        if value.keys() == {_NUMBER} and value[_NUMBER] in ("nan", "inf", "-inf"):
+            return float(value[_NUMBER])
+        return {key: _decoded(item) for key, item in value.items()}
+    return value
+
+
+def _first(error: ValidationError) -> str:
+    first = error.errors()[0]
+    return f"{'.'.join(str(key) for key in first['loc'])}: {first['msg']}"
+
+
+__all__ = ["CASE", "PICTURES", "Record", "RecordError", "read_case", "read_record", "write_case"]

@@ -1,0 +1,207 @@
+"""The rung of the pictures as wholes: every metric against what noise alone would give.
+
+Without noise each metric has a fixed threshold.  With noise the threshold is what noise alone would
+give, see `comparisons.statistics.metric_null`, and an allowance.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from comparisons.results.case import FloatArray, Images, Metrics, Tier
+from comparisons.statistics.metric_null import (
+    LEVEL,
+    NOISE_LIMIT,
+    can_draw,
+    is_known,
+    noise_alone,
+    noise_ratio,
+)
+from comparisons.statistics.metrics import decibels
+
+MEAN_BIAS = 0.001
+"""Of a channel's mean: what is left to Mitsuba's ray epsilon, as in the statistics; without noise
+6e-5 was measured.  A gain of 0.5 %, the least that matters, is five times that."""
+
+DARK = 0.1
+"""Of the mean over all channels: the floor of what a channel's bias is relative to."""
+
+NOISE_FREE = {
+    "ssim": (
+        0.9999,
+        "float32 moves an edge across a sample here and there (measured: 0.999996 and better); a "
+        "shift by a tenth of a pixel gives 0.997",
+    ),
+    "flip": (
+        0.001,
+        "a pixel in a thousand that is wholly another; a gain of 0.5 % gives 0.013, a shift by a "
+        "fiftieth of a pixel 0.002 to 0.005",
+    ),
+    "psnr": (
+        50.0,
+        "dB; a pixel in 10^5 that is wholly another (measured: 65 and better); a gain of 2 % "
+        "gives 45",
+    ),
+    "relative_rmse": (
+        0.005,
+        "of the reference's root mean square: a gain of 0.5 %",
+    ),
+    "relmse": (
+        1e-4,
+        "a gain of 1 % (measured: 9e-6 and less)",
+    ),
+}
+"""Thresholds of pictures without noise, and their reasons.  With noise none is stricter."""
+
+
+class Gate(NamedTuple):
+    """One metric: its value, what noise alone gives, its threshold, and whether it passed; NaN for
+    what is not known, and for the threshold where the metric is not judged."""
+
+    value: float
+    by_noise: float
+    threshold: float
+    passed: bool
+
+    def as_json(self) -> dict[str, Any]:
+        return {name: _finite(value) for name, value in self._asdict().items()}
+
+
+def images_tier(
+    images: Images, metrics: Metrics, replicates: tuple[FloatArray, FloatArray] | None
+) -> Tier:
+    """Judge the means of the two sides: what the rungs below cannot see, an error that averages
+    out.
+
+    replicates: the noisy pictures (replicates, height, width, 3) of the candidate and the
+    reference, two or more of each, that `images` are the means of;  None for pictures without
+    noise.  The pictures differ if any one metric is beyond its threshold.
+    """
+    if metrics.nonfinite:
+        return Tier("images", "invalid", f"{metrics.nonfinite} pixels are not finite")
+    if np.array_equal(images.candidate, images.reference):
+        return Tier("images", "agree", "the pictures are equal", {"noisy": replicates is not None})
+    numbers: dict[str, Any] = {"noisy": replicates is not None}
+    told, failed = [], []
+    if replicates is not None:
+        ratio, standard_error = noise_ratio(*replicates)
+        numbers |= {
+            "difference_over_noise": _finite(ratio),
+            "standard_error": standard_error,
+            "difference_over_noise_limit": NOISE_LIMIT,
+        }
+        told.append(
+            f"the squared difference is {ratio:.3g} ± {standard_error:.2g} times that of the noise"
+        )
+        # Five standard errors: the mean over tiles is near normal, one false alarm in 10^6.
+        if ratio - 5.0 * standard_error > NOISE_LIMIT:
+            failed.append(f"{told[0]}, expected {NOISE_LIMIT} at most")
+    gates = {**_metric_gates(images, metrics, replicates), "bias": _bias(images, replicates)}
+    numbers |= {name: gate.as_json() for name, gate in gates.items()}
+    for name, gate in gates.items():
+        if not gate.passed:
+            failed.append(f"{LABEL[name]} {gate.value:.4g}, expected {_expected(name, gate)}")
+    if failed:
+        return Tier("images", "differ", "; ".join(failed), numbers)
+    told.append(", ".join(f"{LABEL[name]} {gate.value:.4g}" for name, gate in gates.items()))
+    return Tier("images", "agree", "; ".join(told), numbers)
+
+
+LABEL = {
+    "ssim": "SSIM",
+    "flip": "FLIP",
+    "psnr": "PSNR",
+    "relative_rmse": "RMSE over the reference's",
+    "relmse": "relMSE",
+    "bias": "bias of the mean",
+}
+
+MORE_IS_BETTER = ("ssim", "psnr")
+
+
+def _expected(name: str, gate: Gate) -> str:
+    told = f"{gate.threshold:.4g} at {'least' if name in MORE_IS_BETTER else 'most'}"
+    return f"{told} (noise alone: {gate.by_noise:.4g})" if math.isfinite(gate.by_noise) else told
+
+
+def _metric_gates(
+    images: Images, metrics: Metrics, replicates: tuple[FloatArray, FloatArray] | None
+) -> dict[str, Gate]:
+    size = math.sqrt(float((images.reference**2).mean()))
+
+    def values(errors: FloatArray) -> dict[str, float]:
+        """The metrics from the means of their maps."""
+        dissimilarity, flip, encoded2, squared, relative2 = errors.tolist()
+        return {
+            "ssim": 1.0 - dissimilarity,
+            "flip": flip,
+            "psnr": decibels(encoded2),
+            "relative_rmse": math.sqrt(squared) / size if size else math.inf,
+            "relmse": relative2,
+        }
+
+    measured = {
+        "ssim": metrics.ssim,
+        "flip": metrics.flip,
+        "psnr": metrics.psnr,
+        "relative_rmse": metrics.rmse / size if size else math.inf,
+        "relmse": metrics.relmse,
+    }
+    by_noise = dict.fromkeys(measured, math.nan)
+    worst = {name: threshold for name, (threshold, _) in NOISE_FREE.items()}
+    if replicates is not None and not can_draw(replicates):
+        return {name: Gate(value, math.nan, math.nan, True) for name, value in measured.items()}
+    if replicates is not None:
+        found, expected, highest = noise_alone(images, replicates)
+        measured, by_noise = values(found), values(expected)
+        for name, value in values(highest).items():
+            better = min if name in MORE_IS_BETTER else max
+            worst[name] = better(worst[name], value)
+    gates = {}
+    for name, value in measured.items():
+        passed = value >= worst[name] if name in MORE_IS_BETTER else value <= worst[name]
+        # SSIM is not defined for pictures below 3 x 3 pixels; the others judge these.
+        gates[name] = Gate(value, by_noise[name], worst[name], passed or math.isnan(value))
+    return gates
+
+
+def _bias(images: Images, replicates: tuple[FloatArray, FloatArray] | None) -> Gate:
+    """The largest bias of a channel's mean, relative to the reference's."""
+    mean = images.reference.mean(axis=(0, 1))
+    difference = np.abs(images.candidate.mean(axis=(0, 1)) - mean)
+    scale = np.maximum(np.abs(mean), DARK * abs(float(mean.mean())))
+    noise = np.zeros(3)
+    quantile = 0.0
+    if replicates is not None:
+        noise = np.hypot(*(_error_of_mean(x) for x in replicates))
+        dof = min(_BY_PIXELS if is_known(x) else len(x) - 1 for x in replicates)
+        quantile = float(stats.t.isf(LEVEL / 6.0, dof))  # three channels, two sides
+    excess = difference - MEAN_BIAS * scale - quantile * noise
+    worst = int(np.argmax(excess))
+    if not scale[worst]:
+        value = math.inf if difference[worst] else 0.0
+        return Gate(value, math.nan, MEAN_BIAS, not excess[worst] > 0.0)
+    value, by_noise = difference[worst] / scale[worst], noise[worst] / scale[worst]
+    threshold = MEAN_BIAS + quantile * by_noise
+    return Gate(float(value), float(by_noise), float(threshold), not excess[worst] > 0.0)
+
+
+_BY_PIXELS = 1000
+"""Degrees of freedom where the error comes from many pixels."""
+
+
+def _error_of_mean(pictures: FloatArray) -> FloatArray:
+    """(3,): the standard error of the mean over replicates and pixels."""
+    if is_known(pictures):
+        pixels = pictures[0, ..., 0].size
+        sums = ((pictures[0] - pictures[1]) ** 2).sum(axis=(0, 1)) / 4.0
+        return np.asarray(np.sqrt(sums) / pixels)
+    means = pictures.mean(axis=(1, 2))
+    return np.asarray(means.std(axis=0, ddof=1) / math.sqrt(len(pictures)))
+
+
+def _finite(value: float) -> float | None:
+    """For JSON, which has neither NaN nor infinity."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,281 @@
+"""The rung of the input: what is wrong with pictures as such, before anything is compared."""
+
+import math
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from comparisons.results.case import FloatArray, Status, Tier
+from comparisons.statistics.metrics import nonfinite_pixels, white_level
+from comparisons.statistics.shared_noise import common_noise, largest_correlation
+
+DIM = 1e-3
+"""Of the reference's white: a pixel above it is lit."""
+
+CODES = 255.0
+"""The largest code of 8 bits."""
+
+ON_GRID = 0.07
+"""Of a code: how far a value may be from one.  Half floats round by 2^-12 at most, which is 0.062
+of a code; of values that are not quantised 14 % are so near to one by chance."""
+
+FEWEST_CODES = 16
+"""Different values: a picture of fewer may be of flat colours, which are no sign of 8 bits."""
+
+CLAMPED = 1.05
+"""How far, as a factor, the reference is above values that are said to be clamped."""
+
+FEWEST_CLAMPED = 16
+"""Values that share a maximum, and may be so by chance or by the flat radiance of a lamp."""
+
+
+def input_tier(
+    candidate: npt.ArrayLike, reference: npt.ArrayLike, opacity: npt.ArrayLike | None = None
+) -> Tier:
+    """Say what first is wrong with the pictures, if anything.
+
+    candidate: (R, height, width, 3) replicates, or one picture (height, width, 3) without noise;
+    reference: likewise, or the mean of noisy ones;  opacity: the candidate's alpha, (R, height,
+    width) or (height, width).  `invalid` if no statement about agreement is possible, `differ` if
+    the candidate is the wrong picture for sure.
+    """
+    a, b = np.asarray(candidate, dtype=np.float64), np.asarray(reference, dtype=np.float64)
+    alone = a.ndim == 3
+    if problem := _of_shapes(a, b) or _of_sizes(a, b):
+        return _tier("invalid", problem)
+    a, b = (x[None] if x.ndim == 3 else x for x in (a, b))
+    numbers: dict[str, Any] = {
+        "width": a.shape[2],
+        "height": a.shape[1],
+        "replicates_candidate": len(a),
+        "replicates_reference": len(b),
+        "negative_values": int(np.count_nonzero(a < 0.0)) if not (b < 0.0).any() else 0,
+    }
+    alpha = None if opacity is None else np.asarray(opacity, dtype=np.float64)
+    problem = (
+        _not_finite("the candidate", a)
+        or _not_finite("the reference", b)
+        or (None if alpha is None else _transparent(alpha, a, b))
+        or _black(a, b)
+        or _constant(a, b)
+        or (None if alone else _repeated(a, b))
+        or _sharing_noise(a, b)
+        or _quantised(a, b)
+    )
+    if problem is not None:
+        return _tier("invalid", problem, numbers)
+    problem = _clamped(a, b)
+    if problem is not None:
+        return _tier("differ", problem, numbers)
+    told = f"{a.shape[2]} x {a.shape[1]} pixels, all finite"
+    if numbers["negative_values"]:
+        told += f"; {numbers['negative_values']} negative values, where the reference has none"
+    return _tier("agree", told, numbers)
+
+
+def _tier(status: Status, reason: str, numbers: dict[str, Any] | None = None) -> Tier:
+    return Tier("input", status, reason, numbers or {})
+
+
+def _of_shapes(a: FloatArray, b: FloatArray) -> str | None:
+    for name, x in (("candidate", a), ("reference", b)):
+        if x.ndim not in (3, 4) or x.shape[-1] != 3:
+            channels = f"{x.shape[-1]} channels" if x.ndim in (3, 4) else f"{x.ndim} dimensions"
+            return (
+                f"the {name} has {channels}, its shape is {x.shape}; expected R, G and B: (height, "
+                "width, 3) or (replicates, height, width, 3)"
+            )
+        if x.size == 0:
+            return f"the {name} is empty, its shape is {x.shape}; expected one pixel at least"
+    return None
+
+
+def _of_sizes(a: FloatArray, b: FloatArray) -> str | None:
+    (h, w), (y, x) = a.shape[-3:-1], b.shape[-3:-1]
+    if (h, w) == (y, x):
+        return None
+    told = f"the candidate is {w} x {h} pixels; expected {x} x {y}, as the reference"
+    if (h, w) == (x, y):
+        return f"{told}; width and height are exchanged"
+    if w * y == x * h:
+        return f"{told}; it is the same view, {_times(w / x)} as large"
+    return told
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.3g} times" if factor >= 1.0 else f"1/{1.0 / factor:.3g}"
+
+
+def _where(at: npt.NDArray[np.bool_]) -> str:
+    """The first place in (replicates, height, width)."""
+    k, y, x = (int(i[0]) for i in np.nonzero(at))
+    return f"column {x}, row {y}" + (f" of replicate {k}" if len(at) > 1 else "")
+
+
+def _counted(count: int, what: str = "pixel") -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _not_finite(whose: str, x: FloatArray) -> str | None:
+    bad = nonfinite_pixels(x)
+    if not bad.any():
+        return None
+    k, row, column = (int(i[0]) for i in np.nonzero(bad))
+    value = next(v for v in x[k, row, column] if not np.isfinite(v))
+    told = f"{_counted(int(np.count_nonzero(bad)))} of {whose}"
+    return f"{told} not finite, the first {value} at {_where(bad)}; expected finite radiance"
+
+
+def _transparent(alpha: FloatArray, a: FloatArray, b: FloatArray) -> str | None:
+    alpha = alpha[None] if alpha.ndim == 2 else alpha
+    if alpha.shape not in (a.shape[:3], (1, *a.shape[1:3])):
+        return f"the opacity's shape is {alpha.shape}; expected that of the pictures, {a.shape[:3]}"
+    bad = ~np.isfinite(alpha)
+    if bad.any():
+        return f"the opacity is not finite at {_where(bad)}; expected 0 to 1"
+    if not alpha.any():
+        return "the candidate is transparent throughout; expected an opaque picture"
+    lit = b.mean(axis=0).max(axis=-1) > DIM * white_level(b)
+    holes = (alpha <= 0.0) & lit & (a.max(axis=-1) <= 0.0)
+    if not holes.any():
+        return None
+    return (
+        f"{_counted(int(np.count_nonzero(holes)))} of the candidate transparent and black where "
+        f"the reference is lit, the first at {_where(holes)}; expected an opaque picture"
+    )
+
+
+def _replicates(which: list[int], total: int) -> str:
+    """For example "replicates 2 and 5 of 16"."""
+    if len(which) == total:
+        return "all replicates" if total > 1 else "the picture"
+    shown = ", ".join(map(str, which[:8])) + (", ..." if len(which) > 8 else "")
+    return f"replicate{'s' if len(which) > 1 else ''} {shown} of {total}"
+
+
+def _black(a: FloatArray, b: FloatArray) -> str | None:
+    black = [k for k, picture in enumerate(a) if not picture.any()]
+    if not black or not b.any():
+        return None
+    mean = f"{b.mean():.3g} W/sr/m² on average"
+    return f"the candidate is black throughout ({_replicates(black, len(a))}); expected {mean}"
+
+
+def _constant(a: FloatArray, b: FloatArray) -> str | None:
+    flat = [k for k, picture in enumerate(a) if (picture == picture[0, 0]).all()]
+    pixels = a.shape[1] * a.shape[2]
+    if not flat or pixels == 1 or any((picture == picture[0, 0]).all() for picture in b):
+        return None
+    colour = ", ".join(f"{v:.3g}" for v in a[flat[0], 0, 0])
+    return (
+        f"every pixel of the candidate is ({colour}) ({_replicates(flat, len(a))}); expected a "
+        "picture, as the reference is"
+    )
+
+
+def _same_pairs(x: FloatArray) -> list[tuple[int, int]]:
+    return [(i, j) for i, j in combinations(range(len(x)), 2) if np.array_equal(x[i], x[j])]
+
+
+def _repeated(a: FloatArray, b: FloatArray) -> str | None:
+    """Replicates that are the same, although the other side shows that there is noise."""
+    same = {"candidate": _same_pairs(a), "reference": _same_pairs(b)}
+    if same["candidate"] and len(b) > 1 and same["reference"]:
+        return None  # there is no noise, or so little that both repeat themselves
+    for name, x in (("candidate", a), ("reference", b)):
+        if same[name] and not (name == "reference" and len(a) == 1):
+            which = sorted({k for pair in same[name] for k in pair})
+            return (
+                f"{_replicates(which, len(x))} of the {name} are the same bit for bit; expected "
+                "independent noise, a seed of its own for each"
+            )
+    return None
+
+
+CORRELATED = 0.1
+"""Of the noise of two replicates: above it they are said to share noise.  Independent ones of
+1,000 pixels or more stay below 0.1 (measured: 0.04 of 64 x 64 pixels)."""
+
+COMMON = 0.05
+"""Of a replicate's variance: common noise above it is told.  At 16 replicates the mean's error is
+then underestimated by a third."""
+
+
+def _sharing_noise(a: FloatArray, b: FloatArray) -> str | None:
+    if len(a) < 2:
+        return None
+    advice = "expected independent noise, a seed of its own for each replicate"
+    if len(a) > 2 and (found := largest_correlation(a)) is not None:
+        i, j, correlation = found
+        usual = largest_correlation(b) if len(b) > 2 else None
+        if correlation > max(CORRELATED, 2.0 * usual[2] if usual else 0.0):
+            return (
+                f"replicates {i} and {j} of the candidate share noise (correlation "
+                f"{correlation:.2f}); {advice}"
+            )
+    common = common_noise(a, b) if len(b) > 1 else None
+    if common is not None and common > COMMON:
+        share = common / (1.0 + common)
+        return (
+            f"the candidate's replicates share noise: {100.0 * share:.0f} % of their variance is "
+            f"the same in all; {advice}"
+        )
+    return None
+
+
+def _codes(x: FloatArray) -> dict[str, FloatArray]:
+    """Values in [0, 1] as codes of 8 bits, by encoding."""
+    srgb = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0) ** (1.0 / 2.4) - 0.055)
+    return {
+        "sRGB": CODES * srgb,
+        "linear": CODES * x,
+        "gamma 2.2": CODES * np.maximum(x, 0.0) ** (1.0 / 2.2),
+    }
+
+
+def _encoding(x: FloatArray) -> str | None:
+    """The encoding on whose 8-bit grid all values of a picture are, None if they are on none."""
+    if x.min() < 0.0 or x.max() > 1.0 + 1e-3:
+        return None
+    values = np.unique(x.astype(np.float32)).astype(np.float64)
+    # Half floats do not make more different values of a code.
+    if not FEWEST_CODES <= len(values) <= CODES + 1:
+        return None
+    for name, codes in _codes(values).items():
+        if (np.abs(codes - np.round(codes)) <= ON_GRID).all():
+            return name
+    return None
+
+
+def _quantised(a: FloatArray, b: FloatArray) -> str | None:
+    encoding = _encoding(a[0])
+    if encoding is None or _encoding(b[0]) is not None:
+        return None
+    # A reference of few values is one of flat colours, and so is the candidate then.
+    values = [len(np.unique(x.astype(np.float32))) for x in (a[0], b[0])]
+    if values[1] < 2 * values[0]:
+        return None
+    return (
+        f"the candidate has {values[0]} different values, all of them 8-bit {encoding} codes: it "
+        "is rounded, and clipped at 1; expected floating-point radiance (EXR, PFM, HDR or NPY)"
+    )
+
+
+def _clamped(a: FloatArray, b: FloatArray) -> str | None:
+    top = float(a.max())
+    at = (a == top).mean(axis=0) > 0.5
+    count = int(np.count_nonzero(at))
+    there = b.mean(axis=0)[at]
+    if count < FEWEST_CLAMPED or not top > 0.0:
+        return None
+    above = there > CLAMPED * top
+    # The reference's must vary: a lamp that is dimmer is as flat, and is no clamped one.
+    if above.mean() < 0.9 or np.ptp(there) < 0.05 * top or not math.isfinite(top):
+        return None
+    return (
+        f"{_counted(count, 'value')} of the candidate {'is' if count == 1 else 'are'} exactly "
+        f"{top:.6g}, its maximum, where the reference has {there.min():.3g} to {there.max():.3g}: "
+        "highlights are clamped; expected radiance without an upper limit"
+    )

@@ -1,0 +1,1 @@
+"""Rays that both renderers trace, and the error bounds that their hits must keep."""

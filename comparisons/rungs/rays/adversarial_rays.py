@@ -1,0 +1,131 @@
+"""Rays aimed at what is hard to hit right: edges, corners, silhouettes."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from comparisons.geometry.float32 import round32
+from comparisons.rungs.rays.bounds import LeafSizes, ShapeSizes
+from comparisons.rungs.rays.rays import Rays, random_rays
+from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering import query
+from reference_rt.rendering.query import Intersections
+
+EXPONENTS = (-7.0, -2.0)
+"""Of ten: how far beside its aim a ray goes, as a fraction of the distance."""
+
+HALVINGS = 26
+"""Of the angle between two rays: what is left is below float32's own step."""
+
+MOST_SPOTS = 4096
+"""Corners that are aimed at, of a shape; copies that are."""
+
+
+def aimed_rays(tables: SceneTables, sizes: ShapeSizes, n: int, seed: int) -> Rays:
+    """At most n rays: half at where two rays from one origin, that find different things, part;
+    half at corners and the middles of edges, a third of these exactly."""
+    rng = np.random.default_rng([seed, 1])
+    spots = _spots(sizes, rng)
+    at_spots = n // 2 if len(spots) else 0
+    parts = (_parting(tables, sizes, n - at_spots, rng), _at_spots(sizes, spots, at_spots, rng))
+    o, d = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Rays(o, d)
+
+
+def _parting(tables: SceneTables, sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
+    """Beside the directions in which what is hit changes, found by halving."""
+    tries = random_rays(sizes, 8 * n, rng)
+    # The same origin for four rays, each of which is paired with the next.
+    o = np.repeat(tries.o[::4], 4, axis=0)
+    d = tries.d
+    hits = query.intersect(tables, o, d)
+    following = np.arange(len(o)) // 4 * 4 + (np.arange(len(o)) + 1) % 4
+    differ = _identity(hits) != _identity(hits)[following]
+    turned_away = np.sum(d * d[following], axis=1) < -0.9
+    pairs = np.flatnonzero(differ & ~turned_away)[:n]
+    o, a, b = o[pairs], d[pairs], d[following[pairs]]
+    at_a = _identity(hits)[pairs]
+    for _ in range(HALVINGS):
+        middle = a + b
+        middle /= np.linalg.norm(middle, axis=1)[:, None]
+        same = _identity(query.intersect(tables, o, middle)) == at_a
+        a, b = np.where(same[:, None], middle, a), np.where(same[:, None], b, middle)
+    return Rays(o, round32(_beside(a, rng)))
+
+
+def _identity(hits: Intersections) -> FloatArray:
+    """A number (n,) that is another where another thing is hit."""
+    columns = np.column_stack([hits.shape, hits.instance, hits.part, hits.primitive])
+    weights = np.array([1.0, np.pi, np.e, np.sqrt(2.0)])
+    return np.asarray((columns * weights).sum(axis=1))
+
+
+def _beside(d: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Unit directions, turned by 10^U of EXPONENTS radians any way."""
+    angle = 10.0 ** rng.uniform(*EXPONENTS, (len(d), 1))
+    way = rng.normal(size=d.shape)
+    way -= np.sum(way * d, axis=1)[:, None] * d
+    turned = d + angle * way / np.linalg.norm(way, axis=1)[:, None]
+    return np.asarray(turned / np.linalg.norm(turned, axis=1)[:, None])
+
+
+def _at_spots(sizes: ShapeSizes, spots: FloatArray, n: int, rng: np.random.Generator) -> Rays:
+    if n == 0:
+        return Rays(np.zeros((0, 3)), np.zeros((0, 3)))
+    o = random_rays(sizes, n, rng).o
+    d = spots[rng.integers(0, len(spots), n)] - o
+    length = np.linalg.norm(d, axis=1)
+    o, d = o[length > 0.0], d[length > 0.0] / length[length > 0.0, None]
+    exactly = rng.uniform(size=(len(d), 1)) < 1.0 / 3.0
+    return Rays(o, round32(np.where(exactly, d, _beside(d, rng))))
+
+
+def _spots(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
+    """Corners and middles of edges (n, 3) of all shapes that have any."""
+    found = [np.zeros((0, 3))]
+    copies = sizes.copies
+    if len(copies) > MOST_SPOTS:
+        copies = [copies[k] for k in rng.choice(len(copies), MOST_SPOTS, replace=False)]
+    local: dict[int, FloatArray] = {}
+    share = max(1, 16 * MOST_SPOTS // max(1, len(copies)))
+    for copy in copies:
+        for leaf in sizes.leaves_of(copy):
+            if id(leaf) not in local:
+                spots = np.concatenate([np.zeros((0, 3)), *_spots_of(leaf)])
+                if len(spots) > MOST_SPOTS:
+                    spots = spots[rng.choice(len(spots), MOST_SPOTS, replace=False)]
+                local[id(leaf)] = spots
+            found.append(transform.apply_points(copy.outer, local[id(leaf)][:share]))
+    return np.concatenate(found)
+
+
+def _spots_of(leaf: LeafSizes) -> Iterator[FloatArray]:
+    """Corners and middles of edges (n, 3) of a shape, in its group's coordinates."""
+    table = leaf.table
+    if leaf.field == "triangles":
+        v = table.vertices.reshape(-1, 3, 3)
+        yield v.reshape(-1, 3)
+        yield (0.5 * (v + np.roll(v, 1, axis=1))).reshape(-1, 3)
+    elif leaf.field == "boxes":
+        ends = np.array([[x, y, z] for x in _TICKS for y in _TICKS for z in _TICKS])
+        q = ends[np.count_nonzero(ends, axis=1) >= 2]
+        yield table.center[0] + q @ table.edges[0].reshape(3, 3)
+    elif leaf.field == "polygons":
+        yield from _flat(table, table.outline[:, :2])
+        yield from _flat(table, 0.5 * (table.outline[:, :2] + table.outline[:, 2:]))
+    elif leaf.field in ("rectangles", "disks"):
+        square = np.array([[x, y] for x in _TICKS for y in _TICKS if x or y])
+        if leaf.field == "disks":
+            phi = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+            square = np.column_stack([np.cos(phi), np.sin(phi)])
+        yield from _flat(table, square)
+
+
+_TICKS = (-1.0, 0.0, 1.0)
+
+
+def _flat(table: object, xy: FloatArray) -> Iterator[FloatArray]:
+    edges = np.array([table.x_edge[0], table.y_edge[0]])  # type: ignore[attr-defined]
+    yield table.center[0] + xy @ edges  # type: ignore[attr-defined]

@@ -1,0 +1,101 @@
+"""The arbiter: what our float64 tracer says of rays next to one on which the two disagree.
+
+Mitsuba answers for a ray somewhere within its error bound of the one asked for.  If ours gives
+Mitsuba's answer there too, the ray is one that the reference cannot resolve: an edge, a silhouette.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from reference_rt.core.arrays import FloatArray, IntArray
+
+BoolArray = npt.NDArray[np.bool_]
+
+NEIGHBOURS = 48
+"""Moved rays for each radius.  So many points on a sphere leave no cap empty that is higher than a
+twelfth of the radius: an edge that cuts off more than that has a moved ray beyond it."""
+
+MOST = 20_000
+"""Rays that are arbitrated; the rest count as they are, against agreement."""
+
+RADII = (1.0, 0.5)
+
+SEARCHES = ((MOST, NEIGHBOURS, RADII), (500, 400, (1.0, 0.5, 0.2)))
+"""(at most so many rays, moves, radii): first as said, then finer for the few that are left, which
+pass through a corner, or a face seen edge-on."""
+
+LIMIT = 0.01
+"""The fraction of rays that may need the arbiter.  Edges and silhouettes, a float32 bound wide,
+take 1e-4 of a picture or less; past a hundredth the reference's precision is what is compared."""
+
+SURE = 1e-4
+"""The chance at which a fraction of rays is said to be beyond a limit that it does not exceed."""
+
+AT_ONCE = 2000
+"""Moved rays that are asked for together, where fewer rays than these are left."""
+
+
+def too_many(count: int, total: int, limit: float = LIMIT) -> bool:
+    """Whether `count` of `total` rays prove that more than the fraction `limit` are such: of few
+    rays one may be one too many by chance (binomial test)."""
+    return bool(stats.binom.sf(count - 1, total, limit) < SURE)
+
+
+def directions(n: int) -> FloatArray:
+    """n unit vectors (n, 3) spread evenly over the sphere (the golden spiral)."""
+    k = np.arange(n) + 0.5
+    z = 1.0 - 2.0 * k / n
+    phi = np.pi * (1.0 + np.sqrt(5.0)) * k
+    r = np.sqrt(1.0 - z * z)
+    return np.column_stack([r * np.cos(phi), r * np.sin(phi), z])
+
+
+def explained(
+    rays: IntArray, radius: FloatArray, like_theirs: Callable[[IntArray, FloatArray], BoolArray]
+) -> BoolArray:
+    """Which of `rays` (m,), numbers of rays, a move by up to `radius` (m,) explains.
+
+    `like_theirs(rays, offsets)` traces the rays (k,) moved by offsets (k, 3) and tells which now
+    agree with Mitsuba.  False for all beyond the first MOST.
+    """
+    found = np.zeros(len(rays), bool)
+    for most, count, radii in SEARCHES:
+        moves = np.concatenate([factor * directions(count) for factor in radii])
+        done = 0
+        while done < len(moves):
+            open_ = np.flatnonzero(~found[:MOST])
+            if len(open_) == 0 or len(open_) > most:
+                break
+            some = moves[done : done + max(1, AT_ONCE // len(open_))]
+            offsets = some * radius[open_][:, None, None]
+            agree = like_theirs(np.repeat(rays[open_], len(some)), offsets.reshape(-1, 3))
+            found[open_] = agree.reshape(len(open_), -1).any(axis=1)
+            done += len(some)
+    return found
+
+
+def values_around(
+    o: FloatArray,
+    d: FloatArray,
+    radius: FloatArray,
+    turn: float,
+    value: Callable[[FloatArray, FloatArray], FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """The least and the greatest, (m, 3), of `value(origins, directions)` around m rays.
+
+    Origins move by up to `radius` (m,); unit directions turn by `turn`, the opposite way round the
+    sphere, or stay.  All moves of all rays are asked for at once.
+    """
+    moves = directions(NEIGHBOURS)
+    ways = np.roll(moves, NEIGHBOURS // 2, axis=0)
+    still = np.zeros((1, 3))
+    move = np.concatenate([still, *(factor * moves for factor in RADII for _ in (0, 1))])
+    way = np.concatenate([still, *(size * ways for _ in RADII for size in (0.0, turn))])
+    origins = o[:, None] + move * radius[:, None, None]
+    turned = d[:, None] + way
+    turned /= np.linalg.norm(turned, axis=2, keepdims=True)
+    found = value(origins.reshape(-1, 3), turned.reshape(-1, 3)).reshape(len(o), -1, 3)
+    return found.min(axis=1), found.max(axis=1)

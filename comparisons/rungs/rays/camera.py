@@ -1,0 +1,120 @@
+"""The camera: our rays against those of Mitsuba's sensor."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.counterpart import Twin
+from comparisons.mitsuba.scene import for_rays
+from comparisons.rungs.rays.bounds import ROUNDINGS, UNIT_ROUNDOFF
+from reference_rt.cameras import LENS_CENTRE, ThinLens
+from reference_rt.cameras.film import Film
+from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.scene import Scene
+
+
+@dataclass(frozen=True)
+class CameraComparison:
+    """What was measured, and one line on what is wrong, empty where nothing is."""
+
+    numbers: dict[str, Any]
+    problem: str
+
+
+def pixel_centres(film: Film, most: int) -> tuple[FloatArray, FloatArray]:
+    """x, y (n,) in pixels of the centres of at most `most` pixels, every k-th of each row and
+    column."""
+    step = 1
+    while -(-film.width // step) * -(-film.height // step) > most:
+        step += 1
+    y, x = np.mgrid[step // 2 : film.height : step, step // 2 : film.width : step]
+    if x.size == 0:  # a side shorter than the stride
+        y, x = np.mgrid[0 : film.height : step, 0 : film.width : step]
+    return x.ravel() + 0.5, y.ravel() + 0.5
+
+
+def camera_rays(
+    scene: Scene, x: FloatArray, y: FloatArray, lens: Sequence[float] = LENS_CENTRE
+) -> tuple[FloatArray, FloatArray]:
+    """Our camera's origins and unit directions (n, 3) of film points in pixels, through one point
+    of its lens: the centre, as deterministic integrators have it, or that of the sample `lens`."""
+    return scene.camera_rays(np.column_stack([x, y]) - 0.5, lens=lens)
+
+
+LENS_SAMPLES = (LENS_CENTRE, (0.9, 0.6), (0.2, 0.3), (0.55, 0.99), (0.4, 0.02))
+"""Points of a lens that rays are compared through: the middle and one in each triangle of the
+map from square to disk."""
+
+
+def sensor_rays(
+    mi_scene: Any, x: FloatArray, y: FloatArray, lens: Sequence[float]
+) -> tuple[FloatArray, FloatArray]:
+    """The same rays of Mitsuba's sensor; origins lie on the near plane."""
+    mi = mitsuba()
+    sensor = mi_scene.sensors()[0]
+    width, height = (int(s) for s in sensor.film().crop_size())
+    # Its x is to the left on the lens too; the map from square to disk keeps mirror images.
+    aperture = mi.Point2f(1.0 - lens[0], lens[1])
+
+    def ray(u: Any, v: Any) -> tuple[Any, ...]:
+        found, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(u, v), aperture)
+        return found.o, found.d
+
+    o, d = for_rays(ray, x / width, y / height)
+    return o, d
+
+
+def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
+    """Directions, and how far Mitsuba's origins lie off our rays, at pixel centres, for a lens
+    through several of its points.
+
+    Bounds: a direction passes matrices whose entries reach the tan of the largest angle to the
+    axis, an origin one whose entries reach the eye's coordinates and half the picture's width.
+    """
+    camera, film = scene.camera, scene.film
+    x, y = pixel_centres(film, most)
+    samples = LENS_SAMPLES if isinstance(camera, ThinLens) else (LENS_CENTRE,)
+    o, d = _stacked(camera_rays(scene, x, y, lens) for lens in samples)
+    their_o, their_d = _stacked(sensor_rays(twin, x, y, lens) for lens in samples)
+    their_o = twin.frame.out(their_o)
+    forward = -camera.basis[2]
+    # Before it is made unit a direction is 1 long along the axis and tan across: rounded numbers as
+    # large as in the picture's farthest corner, 1 / cos there, and then shortened by its own
+    # cosine. A lens takes the point on it, over the focus distance, from that.
+    corners = np.array([[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]])
+    _, rim = camera_rays(scene, corners[0] * film.width, corners[1] * film.height)
+    steepest = 1.0 / (rim @ forward).min()
+    if isinstance(camera, ThinLens):
+        steepest += camera.aperture_radius / camera.focus
+    direction = np.linalg.norm(their_d - d, axis=1)
+    direction_bound = ROUNDINGS * UNIT_ROUNDOFF * (1.0 + (d @ forward) * steepest)
+    apart = their_o - o
+    off_line = np.linalg.norm(apart - np.sum(apart * d, axis=1)[:, None] * d, axis=1)
+    eye = np.array([camera.eye], dtype=np.float64)
+    # Mitsuba's origin lies on the near plane, along its own direction.
+    near = np.linalg.norm(apart, axis=1) * direction_bound
+    origin_bound = twin.frame.delta(o, eye, np.zeros(1)).max() + near
+    numbers = {
+        "max_camera_direction_error": float(direction.max()),
+        "max_camera_direction_error_over_bound": float((direction / direction_bound).max()),
+        "max_camera_origin_error": float(off_line.max()),
+    }
+    wrong = (direction > direction_bound) | (off_line > origin_bound)
+    if not wrong.any():
+        return CameraComparison(numbers, "")
+    k = int(np.argmax(wrong))
+    at = k % len(x)
+    problem = (
+        f"the camera: {np.count_nonzero(wrong)} of {len(o)} rays differ; the first at film point "
+        f"({x[at]:g}, {y[at]:g}): ours from {o[k]} along {d[k]}, Mitsuba's from {their_o[k]} along "
+        f"{their_d[k]}"
+    )
+    return CameraComparison(numbers, problem)
+
+
+def _stacked(rays: Iterable[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    o, d = zip(*rays, strict=True)
+    return np.concatenate(o), np.concatenate(d)

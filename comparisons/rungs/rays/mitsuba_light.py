@@ -1,0 +1,84 @@
+"""Mitsuba's side of direct light: its value, and where its epsilons make it dark."""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.geometry.frame import SHADOW_EPSILON
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.plugins.whitted import emitted, without
+from comparisons.mitsuba.scene import for_rays, light_id
+from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.rays import Rays
+from comparisons.rungs.rays.setting import POINT_LIKE, Setting, kind_of, number_of
+from reference_rt.core.arrays import FloatArray
+from reference_rt.lights import DIRECTIONAL, ENVIRONMENT
+from reference_rt.rendering import query
+from reference_rt.rendering.query import Intersections
+
+
+def mitsuba_direct(
+    setting: Setting, light: int, rays: Rays, target: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """f cos L (n, 3) and the cosine at the surface (n,): Mitsuba's hit, BSDF, visibility, light."""
+    import drjit as dr
+
+    mi, scene, kind = mitsuba(), setting.twin.mi_scene, kind_of(setting, light)
+    emitter = _point_emitter(setting, light) if kind in POINT_LIKE else None
+    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+
+    def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
+        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(o), d))
+        active = si.is_valid()
+        if not dr.any(active):
+            return mi.Color3f(0.0), mi.Float(0.0)
+        wi = at if is_far else dr.normalize(at - si.p)
+        ray = si.spawn_ray(wi) if is_far else si.spawn_ray_to(mi.Point3f(at))
+        visible = without(active, scene.ray_test(ray, active))
+        if emitter is not None:
+            sample, radiance = emitter.sample_direction(si, mi.Point2f(0.5, 0.5), active)
+            wi = sample.d
+        else:
+            ray.maxt = dr.inf
+            # Behind the shadow test's end there must be the light itself, its front towards us.
+            found = scene.ray_intersect(ray, visible)
+            radiance = emitted(mi, scene, found, visible)
+        local = si.to_local(wi)
+        f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
+        return dr.select(visible, f_cos * radiance, 0.0), local.z
+
+    frame = setting.twin.frame
+    there = target if is_far else frame.into(target)
+    contribution, cosine = for_rays(value, frame.into(rays.o), rays.d, there)
+    return contribution, cosine
+
+
+def _point_emitter(setting: Setting, light: int) -> Any:
+    """Mitsuba's emitter of such a light."""
+    wanted = light_id(number_of(setting, light))
+    for emitter in setting.twin.mi_scene.emitters():
+        if emitter.id() == wanted:
+            return emitter
+    raise LookupError(f"Mitsuba's scene has no emitter {wanted}")
+
+
+def is_dark(
+    setting: Setting, light: int, hits: Intersections, target: FloatArray, offsets: FloatArray
+) -> arbiter.BoolArray:
+    """Whether ours finds Mitsuba's shadow ray dark: begun and ended as Mitsuba does it."""
+    kind = kind_of(setting, light)
+    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+    w = target if is_far else target - hits.p
+    side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
+    height = side * setting.twin.frame.epsilon(hits.p)
+    o = hits.p + hits.n * height[:, None] + offsets
+    if is_far:
+        return query.occluded(setting.tables, o, w)
+    if kind in POINT_LIKE:
+        return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)
+    # Seen from the moved origin a light may turn its back, or its rim be missed; float32 holds the
+    # point on it no better than the origin, so that a light smaller than that is passed by.
+    met = query.intersect(setting.tables, o, target - offsets - o)
+    facing = np.sum(met.n * (target - o), axis=1) < 0.0
+    passed_by = met.t > 1.0 + SHADOW_EPSILON
+    return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | passed_by | ~facing)

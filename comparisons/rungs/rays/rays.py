@@ -1,0 +1,62 @@
+"""The rays that the rungs compare: of the camera, at random, from what was hit."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from comparisons.geometry.float32 import round32
+from comparisons.geometry.frame import Frame
+from comparisons.rungs.rays.bounds import ShapeSizes
+from comparisons.rungs.rays.camera import camera_rays, pixel_centres
+from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering import query
+from reference_rt.rendering.scene import Scene
+
+
+class Rays(NamedTuple):
+    """Origins and directions (n, 3), float32 values held in float64."""
+
+    o: FloatArray
+    d: FloatArray
+
+
+def pixel_rays(scene: Scene, frame: Frame, most: int) -> Rays:
+    """Camera rays through at most `most` pixel centres, as float32 holds them there."""
+    o, d = camera_rays(scene, *pixel_centres(scene.film, most))
+    return Rays(frame.rounded(o), round32(d))
+
+
+def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, seed: int) -> Rays:
+    """3 `most` rays: at most `most` of the camera, `most` in random directions from what these and
+    others hit, and for the rest random ones through the scene's bounds."""
+    camera = pixel_rays(scene, sizes.frame, most)
+    if len(scene.shapes) == 0:
+        return camera
+    rng = np.random.default_rng(seed)
+    through = random_rays(sizes, 3 * most - len(camera.o), rng)
+    first = Rays(*(np.concatenate(pair) for pair in zip(camera, through, strict=True)))
+    hits = query.intersect(tables, first.o, first.d)
+    hit = np.flatnonzero(hits.shape >= 0)[:most]
+    out = rng.normal(size=(len(hit), 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    # Off the surface as far as Mitsuba's own rays: an origin within float32's error of a surface
+    # would be on no defined side of it.
+    side = np.sign(np.sum(out * hits.n[hit], axis=1))
+    height = side * sizes.frame.epsilon(hits.p[hit])
+    start = hits.p[hit] + hits.n[hit] * height[:, None]
+    from_hits = Rays(sizes.frame.rounded(start), round32(out))
+    rest = 3 * most - len(camera.o) - len(hit)
+    parts = (camera, Rays(through.o[:rest], through.d[:rest]), from_hits)
+    o, d = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Rays(o, d)
+
+
+def random_rays(sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
+    """From a point in the scene's bounds, or beside, towards another."""
+    margin = 0.1 * (sizes.upper - sizes.lower)  # so that some begin outside
+    start, end = rng.uniform(sizes.lower - margin, sizes.upper + margin, (2, n, 3))
+    d = end - start
+    length = np.linalg.norm(d, axis=1)[:, None]
+    d = np.divide(d, length, out=np.tile([0.0, 0.0, 1.0], (n, 1)), where=length > 0.0)
+    return Rays(sizes.frame.rounded(start), round32(d))

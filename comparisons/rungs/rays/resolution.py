@@ -1,0 +1,212 @@
+"""What Mitsuba cannot resolve of a scene: foretold from its precision, and found.
+
+A ray that leaves a surface at p begins h = (1 + max |p|) RAY_EPSILON off it, and float32 may put
+the surface e = `Frame.delta` to either side.  Between h - e and h + e anything may be where it
+begins: gaps and features thinner than that are jumped over, and where e exceeds h the ray begins
+behind its own surface and meets it again.  Our own tracer, begun there, foretells which departures
+meet something else than they should, or two surfaces in one place; Mitsuba's, begun as Mitsuba
+does, tells which do.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from comparisons.geometry.sizes import ShapeSizes
+from comparisons.mitsuba.counterpart import Twin, trace
+from comparisons.mitsuba.hits import BoolArray, rows_of
+from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.rays import Rays, mixed_rays
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import UNIT_ROUNDOFF
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.lights import Directional, Point, Spot
+from reference_rt.materials import Dielectric, RoughDielectric, ThinDielectric
+from reference_rt.rendering import query
+from reference_rt.rendering.query import Intersections
+from reference_rt.rendering.scene import Scene
+
+RAYS = 2000
+"""A third of the rays whose hits are left again."""
+
+STRAIGHT_ON = 4
+"""Surfaces that are looked through, where they are clear, for more hits to leave."""
+
+STEEPEST = 64.0
+"""Of one over the cosine under which what is met next is met, beside where it should be."""
+
+MOST_LIGHTS = 4
+"""Points and directions of light that every hit is left towards."""
+
+
+class Resolution(NamedTuple):
+    """Of `hits` that were left: how many Mitsuba is foretold not to resolve, how many it did not,
+    and how many of the latter were not foretold;  epsilon, rounding: the medians of h and e, of
+    those foretold where there are any."""
+
+    hits: int
+    foretold: int
+    found: int
+    missed: int
+    epsilon: float
+    rounding: float
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether so many hits are foretold and found to be unresolved that what is seen from
+        surfaces is the reference's precision, not the scene."""
+        return all(arbiter.too_many(count, self.hits) for count in (self.foretold, self.found))
+
+    @property
+    def told(self) -> str:
+        return (
+            f"of {self.hits} hits {self.foretold} are foretold to be left for something else than "
+            f"what is there, {self.found} are: rays begin {self.epsilon:.2g} off surfaces, which "
+            f"float32 knows to {self.rounding:.2g}"
+        )
+
+
+def resolution(scene: Scene, tables: SceneTables, twin: Twin, seed: int = 0) -> Resolution:
+    """Leaves what camera, random and secondary rays hit, and what stands behind clear surfaces:
+    towards lights, at random, and through glass."""
+    sizes = ShapeSizes(scene, twin.frame)
+    rays = mixed_rays(scene, tables, sizes, RAYS, seed)
+    d = rays.d
+    ours, theirs = query.intersect(tables, rays.o, d), trace(twin, rays.o, d)
+    # Hits in other places, as of rays that begin behind what they should meet, are left from there.
+    slack = STEEPEST * twin.frame.delta(rays.o, ours.p, sizes.reach_of(ours.shape))
+    same = np.flatnonzero((ours.shape >= 0) & ~_differs(ours, theirs, slack))
+    leavings = [_left_behind(tables, twin, sizes, Rays(rays.o[same], d[same]),
+                             rows_of(ours, same), rows_of(theirs, same), seed, scene)]  # fmt: skip
+    hits, d = rows_of(ours, same), d[same]
+    for _ in range(STRAIGHT_ON):
+        clear = np.flatnonzero(_is_clear(scene, sizes, hits))
+        hits, d = rows_of(hits, clear), d[clear]
+        o = _off(sizes, hits, d)
+        hits = query.intersect(tables, o, d)
+        met = np.flatnonzero(hits.shape >= 0)
+        o, d, hits = o[met], d[met], rows_of(hits, met)
+        if len(hits.t) == 0:
+            break
+        leavings.append(_left_behind(tables, twin, sizes, Rays(o, d), hits, hits, seed, scene))
+    columns = [np.concatenate(column) for column in zip(*leavings, strict=True)]
+    foretold, found, missed, height, rounding = columns
+    counts = (int(np.count_nonzero(some)) for some in (foretold, found, missed))
+    few = foretold if foretold.any() else np.ones(len(foretold), bool)
+    medians = (float(np.median(x[few])) if len(x) else 0.0 for x in (height, rounding))
+    return Resolution(len(foretold), *counts, *medians)
+
+
+def _left_behind(
+    tables: SceneTables,
+    twin: Twin,
+    sizes: ShapeSizes,
+    rays: Rays,
+    ours: Intersections,
+    theirs: Intersections,
+    seed: int,
+    scene: Scene,
+) -> tuple[BoolArray, BoolArray, BoolArray, FloatArray, FloatArray]:
+    """For each hit: whether it is foretold to be left wrongly, whether it is, and was not foretold;
+    h and e."""
+    frame, count = sizes.frame, len(ours.t)
+    height = frame.epsilon(ours.p)
+    rounding = frame.delta(rays.o, ours.p, sizes.reach_of(ours.shape))
+    foretold, found, missed = np.zeros((3, count), bool)
+    for w in _ways(scene, sizes, rays.d, ours, seed):
+        leaves = np.flatnonzero(np.any(w != 0.0, axis=1))
+        if len(leaves) == 0:
+            continue
+        w, hits, met = w[leaves], rows_of(ours, leaves), rows_of(theirs, leaves)
+        right = query.intersect(tables, _off(sizes, hits, w), w)
+        e = frame.delta(hits.p, right.p, sizes.reach_of(right.shape))
+        slack = STEEPEST * ((height + rounding)[leaves] + e)
+        expected = _doubled(tables, sizes, right, w, e)
+        # What is met next may be put behind the ray's origin.
+        there_is = right.shape >= 0
+        height_there = np.where(there_is, right.t, 0.0) * np.abs(np.sum(right.n * w, axis=1))
+        expected |= there_is & (height_there <= e)
+        for start in (height - rounding, height, height + rounding):
+            o = hits.p + _side(hits, w) * start[leaves, None]
+            expected |= _differs(right, query.intersect(tables, o, w), slack)
+        o = met.p + _side(met, w) * frame.epsilon(met.p)[:, None]
+        there = _differs(right, trace(twin, o, w), slack)
+        foretold[leaves] |= expected
+        found[leaves] |= there
+        missed[leaves] |= there & ~expected
+    return foretold, found, missed, height, rounding
+
+
+def _doubled(
+    tables: SceneTables, sizes: ShapeSizes, right: Intersections, w: FloatArray, e: FloatArray
+) -> BoolArray:
+    """(n,): whether rays along w meet two surfaces that float32 cannot tell apart: 2 e or less from
+    each other, seen along the normal."""
+    met = np.flatnonzero(right.shape >= 0)
+    found = np.zeros(len(w), bool)
+    if len(met):
+        front, along = rows_of(right, met), w[met]
+        behind = query.intersect(tables, _off(sizes, front, along), along)
+        found[met] = behind.t * np.abs(np.sum(front.n * along, axis=1)) <= 2.0 * e[met]
+    return found
+
+
+def _side(hits: Intersections, w: FloatArray) -> FloatArray:
+    """(n, 3): the normals, on the side of w."""
+    return np.asarray(hits.n * np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)[:, None])
+
+
+def _off(sizes: ShapeSizes, hits: Intersections, w: FloatArray) -> FloatArray:
+    """(n, 3): origins on w's side of what was hit, as near as float64 allows."""
+    return np.asarray(hits.p + _side(hits, w) * _own_error(sizes, hits)[:, None])
+
+
+def _own_error(sizes: ShapeSizes, hits: Intersections) -> FloatArray:
+    """(n,): as `reference_rt.core.ray.surface_error` has it, with the largest coordinates there
+    are."""
+    reach = np.abs([sizes.lower, sizes.upper]).max()
+    return np.asarray(16.0 * 3.0**0.5 * UNIT_ROUNDOFF * (np.abs(hits.p).max(axis=1) + 2.0 * reach))
+
+
+def _differs(a: Intersections, b: Intersections, slack: FloatArray | float) -> BoolArray:
+    """(n,): another shape is met, or none, or the same further than `slack` away.  Which operand of
+    a solid is met in one place says nothing: operands may share their faces."""
+    other = (a.shape != b.shape) | (a.instance != b.instance)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(other | (np.linalg.norm(a.p - b.p, axis=1) > slack))
+
+
+def _ways(
+    scene: Scene, sizes: ShapeSizes, d: FloatArray, hits: Intersections, seed: int
+) -> list[FloatArray]:
+    """Unit directions (n, 3) in which hits are left, 0 for those that are not."""
+    rng = np.random.default_rng([seed, 2])
+    front = hits.n * np.where(np.sum(d * hits.n, axis=1) > 0.0, -1.0, 1.0)[:, None]
+    random = rng.normal(size=d.shape)
+    random /= np.linalg.norm(random, axis=1)[:, None]
+    random *= np.where(np.sum(random * front, axis=1) < 0.0, -1.0, 1.0)[:, None]
+    found = [random]
+    lights = [light for light in scene.lights if isinstance(light, Directional | Point | Spot)]
+    for light in lights[:MOST_LIGHTS]:
+        if isinstance(light, Directional):
+            to_light = np.broadcast_to(-np.array(light.direction), d.shape)
+        else:
+            to_light = (light.position if isinstance(light, Point) else light.origin) - hits.p
+        length = np.linalg.norm(to_light, axis=1)[:, None]
+        faces = np.sum(to_light * front, axis=1) > 0.0
+        found.append(np.where(faces[:, None], to_light / length, 0.0))
+    through = _is_clear(scene, sizes, hits)
+    if through.any():
+        found.append(np.where(through[:, None], d, 0.0))
+    return found
+
+
+def _is_clear(scene: Scene, sizes: ShapeSizes, hits: Intersections) -> BoolArray:
+    """(n,): whether light passes what was hit."""
+    names = [leaf.material for leaf in sizes.leaves]
+    clear = [
+        name is not None
+        and isinstance(scene.materials[name], Dielectric | RoughDielectric | ThinDielectric)
+        for name in names
+    ]
+    return np.array([*clear, False])[sizes.leaf_of(hits)]

@@ -1,0 +1,192 @@
+"""The third rung: the Whitted tree, ray for ray."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba.accuracy import accuracy
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.counterpart import Twin
+from comparisons.mitsuba.scene import for_rays
+from comparisons.mitsuba.translate.integrators import translate_integrator
+from comparisons.mitsuba.translate.lights import ambient_of
+from comparisons.results.case import Tier
+from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.bounds import ROUNDINGS, UNIT_ROUNDOFF, ShapeSizes, round32
+from comparisons.rungs.rays.rays import Rays, pixel_rays
+from comparisons.rungs.rays.slopes import is_steep, moved, slopes
+from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators import Whitted
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.lights import ENVIRONMENT
+from reference_rt.materials import most_branches
+from reference_rt.rendering import query
+from reference_rt.rendering.scene import Scene
+from reference_rt.shapes import Box, Disk, Mesh, Rectangle, Sphere, Triangle
+
+PIXELS = 128 * 128
+"""Pixels that are compared at most, evenly strided."""
+
+MOST_LIGHTS = 256
+"""Each light is a shadow ray at every surface: with more the rung would take minutes."""
+
+MOST_OUTLIERS = (200, 32)
+"""Pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 trees for each radius,
+which in scalar variants of Mitsuba are 30 ms.  The rest count against agreement."""
+
+TOLERANCE = 1e-5
+"""Of a pixel, or of the picture's white (the 99th percentile of lit pixels) where it is darker.
+What a light sends to a point is off by 4 e / r at most (see `comparisons.rungs.direct`) with
+e = 8 * 2^-24 (|o| + |p| + reach): 1e-5 where these three are 1.7 times the light's distance each.
+What lies closer to a light, or is fanned out by curved mirrors, goes to the arbiter.  Measured on
+the project's scenes: 0.6e-5."""
+
+
+def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS) -> Tier:
+    """Compare the radiance through pixel centres with that of our Whitted plugin in Mitsuba.
+
+    With the scene's own depth where its integrator is Whitted, else the default's.  Outliers are
+    put to the arbiter: both along rays moved by float32's bound, then by Mitsuba's epsilon.
+    """
+    choice = tables.lights.choice
+    if choice is None:
+        return Tier("whitted", "not-applicable", "the scene has no light")
+    lights = int(np.count_nonzero(choice.kind != ENVIRONMENT))
+    if lights > MOST_LIGHTS:
+        reason = f"{lights} lights, each a shadow ray at every surface: more than {MOST_LIGHTS}"
+        return Tier("whitted", "not-applicable", reason)
+    if twin.lacking:
+        return Tier("whitted", "not-comparable", twin.lacking)
+    integrator = scene.integrator if isinstance(scene.integrator, Whitted) else Whitted()
+    rays = pixel_rays(scene, twin.frame, pixels)
+    setup = integrator.setup()
+    ours = query.radiance_without_noise(tables, setup, rays.o, rays.d)
+    theirs_at = plugin_radiance(scene, tables, twin, integrator)
+    theirs = theirs_at(rays)
+    size = np.maximum(np.abs(ours), np.abs(theirs)).max(axis=1)
+    lit = size[np.isfinite(size) & (size > 0.0)]
+    bound = TOLERANCE * np.maximum(size, np.percentile(lit, 99.0) if len(lit) else 0.0)
+    tables_off = max((accuracy(scene, name) for name in scene.materials), default=0.0)
+    bound += tables_off * size
+    error = np.abs(theirs - ours).max(axis=1)
+    sizes = ShapeSizes(scene, twin.frame)
+    if is_steep(scene):
+        over = np.flatnonzero(~(error <= bound))
+        few = Rays(rays.o[over], rays.d[over])
+        others = [
+            partial(query.radiance_without_noise, tables, setup, other.o, other.d)
+            for other in moved(few, _radii(tables, sizes, few)[0])
+        ]
+        bound[over] += slopes(ours[over], others, float(lit.max(initial=0.0)))
+    outliers = np.flatnonzero(~(error <= bound))
+
+    def ours_along(o: FloatArray, d: FloatArray) -> FloatArray:
+        return query.radiance_without_noise(tables, setup, o, d)
+
+    def theirs_along(o: FloatArray, d: FloatArray) -> FloatArray:
+        return theirs_at(Rays(twin.frame.rounded(o), round32(d)))
+
+    some = Rays(rays.o[outliers], rays.d[outliers])
+    settled = _explained(
+        some,
+        ((ours[outliers], ours_along), (theirs[outliers], theirs_along)),
+        _radii(tables, sizes, some),
+        bound[outliers],
+    )
+    unexplained = outliers[~settled]
+    right = error <= bound
+    ratio = np.divide(error, bound, out=np.zeros_like(error), where=bound > 0.0)[right]
+    numbers: dict[str, Any] = {
+        "pixels": len(rays.o),
+        "max_depth": integrator.max_depth,
+        "max_error": float(error[right].max(initial=0.0)),
+        "max_error_over_bound": float(ratio.max(initial=0.0)),
+        "explained": int(np.count_nonzero(settled)),
+        "unexplained": len(unexplained),
+    }
+    if len(unexplained):
+        k = int(unexplained[np.argmax(np.nan_to_num(error[unexplained], nan=np.inf))])
+        reason = (
+            f"{len(unexplained)} of {len(rays.o)} pixels differ; the most, from "
+            f"{rays.o[k].tolist()} along {rays.d[k].tolist()}: ours {ours[k]}, "
+            f"Mitsuba's {theirs[k]}"
+        )
+        return Tier("whitted", "differ", reason, numbers)
+    edges = f"{numbers['explained']} of {len(rays.o)} lie on edges within float32 or its epsilons"
+    if arbiter.too_many(numbers["explained"], len(rays.o)):
+        return Tier("whitted", "reference-limited", edges, numbers)
+    reason = f"pixels agree to {numbers['max_error']:.2g} W/sr/m²; {edges}"
+    return Tier("whitted", "agree", reason, numbers)
+
+
+def _radii(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> tuple[FloatArray, FloatArray]:
+    """How far rays are moved: float32's bound, then Mitsuba's epsilon."""
+    p = query.intersect(tables, rays.o, rays.d).p
+    reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
+    return sizes.frame.delta(rays.o, p, reach), sizes.frame.epsilon(p)
+
+
+SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
+"""Shapes that are lights where they shine.  Others, and parts of groups, are seen to shine, but
+light nothing in Whitted's ray tracing."""
+
+
+def plugin_radiance(
+    scene: Scene, tables: SceneTables, twin: Twin, integrator: Whitted
+) -> Callable[[Rays], FloatArray]:
+    """Mitsuba's side of the tree: rays -> radiance (n, 3)."""
+    mi = mitsuba()
+    unlit = [
+        name
+        for name, piece in twin.pieces.items()
+        if piece.instance >= 0 or not isinstance(piece.leaf, SAMPLED)
+    ]
+    ambient = dict(
+        zip(("ambient_r", "ambient_g", "ambient_b"), ambient_of(scene.lights), strict=True)
+    )
+    described = {
+        **(translate_integrator(integrator) or {}),
+        **ambient,
+        # Of a layer a mirrored and a refracted direction, or what is there of it.
+        "components": 2 * most_branches(tables.materials),
+        "unlit": " ".join(unlit),
+    }
+
+    def radiance(o: Any, d: Any) -> tuple[Any, ...]:
+        # Anew for each call: Dr.Jit makes the lights' numbers as wide as the first call's rays.
+        plugin = mi.load_dict(described)
+        return (plugin.sample(twin.mi_scene, None, mi.Ray3f(mi.Point3f(o), d))[0],)
+
+    return lambda rays: for_rays(radiance, twin.frame.into(rays.o), rays.d)[0]
+
+
+Radiance = Callable[[FloatArray, FloatArray], FloatArray]
+"""(origins, unit directions) -> radiance, all (n, 3)."""
+
+
+def _explained(
+    rays: Rays,
+    sides: tuple[tuple[FloatArray, Radiance], tuple[FloatArray, Radiance]],
+    radii: tuple[FloatArray, ...],
+    bound: FloatArray,
+) -> arbiter.BoolArray:
+    """Which of the outliers (m,) are rays next to which one side takes on the other's value.
+
+    `sides` are ours and Mitsuba's: the value along each ray, and how to have others.  Where it is
+    Mitsuba's that changes within its own rounding, it is not sure of its value.
+    """
+    settled = np.zeros(len(bound), bool)
+    for radius in radii:
+        for k in (0, 1):
+            radiance, wanted = sides[k][1], sides[1 - k][0]
+            rows = np.flatnonzero(~settled)[: MOST_OUTLIERS[k]]
+            if len(rows) == 0:
+                return settled
+            low, high = arbiter.values_around(
+                rays.o[rows], rays.d[rows], radius[rows], ROUNDINGS * UNIT_ROUNDOFF, radiance
+            )
+            slack, wanted = bound[rows][:, None], wanted[rows]
+            settled[rows] = ((wanted >= low - slack) & (wanted <= high + slack)).all(axis=1)
+    return settled

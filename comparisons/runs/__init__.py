@@ -1,0 +1,1 @@
+"""What every run needs: worker processes, provenance, the digest of our sources."""

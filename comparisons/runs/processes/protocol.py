@@ -1,0 +1,51 @@
+"""What a worker says to its pool.
+
+Each line of its standard input is a JSON object that asks for something; each line of its standard
+output one that answers:
+
+    {"say": text}          any number of times, what is being done
+    {"done": true}         what was asked for is where it was to be put
+    {"failed": text}       it could not be made, and why
+    {"invalid": text}      the same, because a scene, or a file that it names, is invalid
+    {"unavailable": text}  nothing can be made here, and why
+"""
+
+import json
+import os
+import traceback
+from collections.abc import Callable
+from typing import Any, TextIO
+
+from reference_rt.util.errors import ReferenceRtError, ReferenceUnavailableError, SceneError
+
+
+def private_stdout() -> TextIO:
+    """Standard output, of which nobody else knows from now on: what anyone prints, in Python or
+    not, goes to standard error."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    return answers
+
+
+def tell(answers: TextIO, **message: Any) -> None:
+    """Write one line of the protocol."""
+    print(json.dumps(message), file=answers, flush=True)
+
+
+def carry_out(task: Callable[[], None], answers: TextIO) -> None:
+    """Do it, and say how it went."""
+    try:
+        task()
+    except BrokenPipeError:  # nobody listens any more
+        raise
+    except ReferenceUnavailableError as error:
+        tell(answers, unavailable=str(error))
+    except SceneError as error:
+        tell(answers, invalid=str(error))
+    except ReferenceRtError as error:
+        tell(answers, failed=str(error))
+    except (Exception, SystemExit) as error:
+        traceback.print_exc()
+        tell(answers, failed=f"{type(error).__name__}: {' '.join(str(error).split())}")
+    else:
+        tell(answers, done=True)

@@ -1,0 +1,24 @@
+"""Our own sources as one number: a change of any line may change what was found."""
+
+import functools
+import hashlib
+from pathlib import Path
+
+import reference_rt
+
+_COMPARISONS = Path(__file__).parents[1]
+
+
+@functools.cache
+def sources_digest(*apart: str) -> str:
+    """SHA-256 of the sources of both packages, without these modules and packages of
+    `comparisons`."""
+    digest = hashlib.sha256()
+    for root in (Path(reference_rt.__path__[0]), _COMPARISONS):
+        for source in sorted(root.rglob("*.py")):
+            name = source.relative_to(root)
+            if root == _COMPARISONS and name.parts[0] in apart:
+                continue
+            digest.update(name.as_posix().encode() + b"\0")
+            digest.update(hashlib.sha256(source.read_bytes()).digest())
+    return digest.hexdigest()

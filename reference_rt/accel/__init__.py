@@ -1,0 +1,1 @@
+"""Acceleration structures and the traversals that find what a ray hits."""

@@ -1,0 +1,96 @@
+"""What the rays of a block hit: side by side, on their ways together, or one after another."""
+
+import numba
+import numpy as np
+
+from reference_rt import shapes as any_shape
+from reference_rt.accel.bvh import Bvh
+from reference_rt.accel.geometry import Geometry, closest_hit, occluded
+from reference_rt.accel.stream.traversal import any_of_block, closest_of_block, trace_block
+from reference_rt.core.ray import Hit, Ray
+from reference_rt.core.ray_block import (
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    Hits,
+    Rays,
+    put_hit,
+    ray_of,
+)
+from reference_rt.core.ray_block import hit_of as kept_hit
+from reference_rt.jit.function_pointer import Address, call_at
+from reference_rt.jit.kernel import kernel, signature_of
+from reference_rt.jit.parallel_compile import Call
+from reference_rt.shapes.instances import Instances
+
+
+def tracer_of(geometry: Geometry) -> Call | None:
+    """The kernel that is to stand at `geometry.tracer`; None for none, where it is inlined or there
+    is no hierarchy.
+
+    A few shapes were compiled by themselves too: nothing was won that the noise would show, and
+    spheres were 1 to 2 % slower (measured).
+    """
+    bvh, shapes, solids = geometry.bvh, geometry.shapes, geometry.solids
+    if numba.config.DISABLE_JIT or bvh is None or geometry.instances is not None:
+        return None
+    rays = Rays(np.empty(RAY_FLOATS))
+    hits = Hits(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
+    return trace_block, signature_of(bvh, shapes, solids, rays, hits, 0, False)
+
+
+@kernel
+def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
+    """`closest_hit` of the first n rays: what `hit_of` tells."""
+    _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, False)
+
+
+@kernel
+def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
+    """`occluded` of the first n rays: of the hits, only whether there is any is meant."""
+    _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, True)
+
+
+@kernel
+def _trace(
+    bvh: Bvh | None,
+    instances: Instances | None,
+    tracer: Address | None,
+    geometry: Geometry,
+    rays: Rays,
+    hits: Hits,
+    n: int,
+    any_hit: bool,
+) -> None:
+    shapes, solids = geometry.shapes, geometry.solids
+    if bvh is None:
+        any_shape.nearest_of_rays(shapes, rays, hits, n, any_hit)
+        return
+    if instances is not None:
+        # Rays have directions and origins of their own in each, which change on their ways.
+        for j in range(n):
+            if any_hit:
+                hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
+            else:
+                put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
+        return
+    if tracer is not None:
+        call_at(tracer[0], (bvh, shapes, solids, rays, hits, n, any_hit))
+        return
+    if any_hit:
+        any_of_block(bvh, shapes, solids, rays, hits, n)
+    else:
+        closest_of_block(bvh, shapes, solids, rays, hits, n)
+
+
+@kernel
+def hit_of(geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
+    """What ray number j has found."""
+    return _hit_of(geometry.bvh, geometry, ray, hits, j)
+
+
+@kernel
+def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
+    if bvh is None:
+        return any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
+    return kept_hit(hits, j)

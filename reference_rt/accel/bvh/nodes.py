@@ -1,0 +1,130 @@
+"""What every builder makes, how deep it may go, and the boxes that all of them work on.
+
+A box is six numbers, lower corner and upper corner; an empty one is +inf and -inf.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import UNIT_ROUNDOFF
+from reference_rt.jit.kernel import entry_kernel, kernel
+
+LEAF_SIZE = 4
+"""Most references of a leaf, but for "none": more are always split, fewer where it pays."""
+SAH_DEPTH = 40
+"""Nodes this deep and deeper are halved by count."""
+STACK_SIZE = 72
+"""No input makes a deeper tree.  A node at SAH_DEPTH holds at most 2^32 references, whose scratch
+would fill 224 GiB, and 30 halvings leave LEAF_SIZE of these: no leaf is below depth 70, the root's
+being 0; the median's trees are halved from the root on.  A traversal keeps at most one sibling for
+each level above the node it is at, 70; a builder as many jobs and one for the node itself, 71."""
+
+FAR_SLACK = 1.0 + 2.0 * (3.0 * UNIT_ROUNDOFF) / (1.0 - 3.0 * UNIT_ROUNDOFF)
+"""(plane - o) * (1/d) rounds three times: a far distance stretched by twice gamma_3 cannot make a
+ray miss a box that it meets (Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2))."""
+
+
+class Nodes(NamedTuple):
+    """boxes (n, 6): lower and upper corners;  first (n,): left child, its sibling follows, or the
+    leaf's first reference;  size (n,): references of a leaf, 0 for an inner node.  Node 0 is the
+    root, and children come after their parents."""
+
+    boxes: FloatArray
+    first: IntArray
+    size: IntArray
+
+
+@kernel
+def clear(box: FloatArray) -> None:
+    """Make `box` empty."""
+    for k in range(3):
+        box[k] = np.inf
+        box[3 + k] = -np.inf
+
+
+@kernel
+def is_empty(box: FloatArray) -> bool:
+    """Whether no point is in `box`."""
+    return bool(box[0] > box[3] or box[1] > box[4] or box[2] > box[5])
+
+
+@kernel
+def assign(into: FloatArray, box: FloatArray) -> None:
+    """Copy `box`."""
+    for k in range(6):
+        into[k] = box[k]
+
+
+@kernel
+def merge(into: FloatArray, box: FloatArray) -> None:
+    """Grow `into` until it holds `box`."""
+    for k in range(3):
+        into[k] = min(into[k], box[k])
+        into[3 + k] = max(into[3 + k], box[3 + k])
+
+
+@kernel
+def half_area(box: FloatArray) -> float:
+    """Half the surface area of a box (6,), 0 for an empty one."""
+    if is_empty(box):
+        return 0.0
+    x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
+    return float(x * y + y * z + z * x)
+
+
+@kernel
+def joint_half_area(a: FloatArray, b: FloatArray) -> float:
+    """Half the surface area of the box around two."""
+    x = max(a[3], b[3]) - min(a[0], b[0])
+    y = max(a[4], b[4]) - min(a[1], b[1])
+    z = max(a[5], b[5]) - min(a[2], b[2])
+    return float(x * y + y * z + z * x)
+
+
+@kernel
+def center(box: FloatArray, axis: int) -> float:
+    """The middle of a box along an axis; halved before it is summed, which cannot overflow."""
+    return float(0.5 * box[axis] + 0.5 * box[3 + axis])
+
+
+@kernel
+def push(jobs: IntArray, top: int, a: int, b: int, c: int) -> int:
+    """Put three numbers on a builder's stack of nodes to make; the new top."""
+    jobs[top, 0], jobs[top, 1], jobs[top, 2] = a, b, c
+    return top + 1
+
+
+@kernel
+def swap(refs: FloatArray, ids: IntArray, i: int, j: int) -> None:
+    """Exchange references i and j: boxes (m, 6) and primitives' numbers (m,)."""
+    for k in range(6):
+        refs[i, k], refs[j, k] = refs[j, k], refs[i, k]
+    ids[i], ids[j] = ids[j], ids[i]
+
+
+def new_nodes(m: int) -> Nodes:
+    """Uninitialised nodes for m >= 1 references: every leaf holds one, and as many inner nodes as
+    leaves but one join them."""
+    return Nodes(np.empty((2 * m, 6)), np.empty(2 * m, np.int64), np.empty(2 * m, np.int64))
+
+
+def trimmed(nodes: Nodes, count: int) -> Nodes:
+    """The first `count` of the nodes, without the memory of the rest."""
+    boxes, first, size = nodes
+    return Nodes(boxes[:count].copy(), first[:count].copy(), size[:count].copy())
+
+
+@entry_kernel
+def fit(nodes: Nodes, references: IntArray, primitives: FloatArray) -> None:
+    """Fill the nodes' boxes from the primitives' (n, 6), leaves first."""
+    for i in range(len(nodes.first)):
+        node = len(nodes.first) - 1 - i
+        box, first, size = nodes.boxes[node], nodes.first[node], nodes.size[node]
+        clear(box)
+        if size == 0:
+            merge(box, nodes.boxes[first])
+            merge(box, nodes.boxes[first + 1])
+        for k in range(first, first + size):
+            merge(box, primitives[references[k]])

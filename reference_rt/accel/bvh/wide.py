@@ -1,0 +1,183 @@
+"""The hierarchy that rays go through: nodes of up to eight children, made from a binary one.
+
+A node's eight boxes are met or missed at once (`reference_rt.accel.single_ray`), and so are the
+triangles of a leaf (`shapes.watertight.see`): half as many steps as in the binary tree, and
+measured on the Stanford bunny twice as many rays.  `widening` makes it; this file is what it is.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.accel.bvh.nodes import STACK_SIZE
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd import LANES
+
+Singles = npt.NDArray[np.float32]
+Codes = npt.NDArray[np.int32]
+
+NODE_SINGLES = 64
+"""How many float32 or int32 numbers a node takes, in four cache lines."""
+CHILDREN = 48
+"""The number of a node with the first child's code; the planes of boxes stand before it."""
+CENTER = 28
+"""The column of `Bvh.frames` with a tree's centre; its size follows."""
+MOST_REFERENCES = 2**26
+"""More do not fit into the codes of leaves."""
+WIDE_STACK = (LANES - 1) * (STACK_SIZE + 1)
+"""A node has at least one binary node's depth, and leaves seven siblings at most."""
+
+LEAF_SHARE = LANES
+"""Most references of a leaf."""
+
+
+class Bvh(NamedTuple):
+    """One hierarchy or several one after another, as a traversal takes them.
+
+    A node is a row of 256 bytes, seen as
+    boxes (n, 64): float32, lower x of LANES children, lower y, lower z, upper x, y and z, relative
+    to the tree's centre and rounded outwards: boxes only cull, and so half the memory will do;
+    children (64 n,): int32, of each node from CHILDREN on the children's codes;
+    frames (n, 32): float64, of a tree's root from CENTER on the centre and the largest coordinate.
+
+    The code of a node is its row, that of a leaf `leaf_code`.  references (m, 2): kind and row of
+    what each is, leaf after leaf;  corners (9 m + 8,): of leaves of triangles alone the vertices,
+    see `shapes.watertight.see`, None where there is no such leaf;  unbounded: the node of
+    what has no finite box, -1 for none.
+    """
+
+    boxes: Singles
+    children: Codes
+    frames: FloatArray
+    references: Codes
+    corners: FloatArray | None
+    unbounded: int
+
+
+class Wide(NamedTuple):
+    """One hierarchy: boxes (n, 6, LANES) in world coordinates, codes (n, LANES)."""
+
+    boxes: FloatArray
+    codes: IntArray
+
+
+NOTHING = -1
+"""The code of a leaf without references."""
+
+
+@kernel
+def leaf_code(first: int, size: int, is_packet: bool) -> int:
+    """The code of a leaf of references first..first + size, at most LEAF_SHARE;  is_packet: they
+    are triangles, whose vertices lie in `Bvh.corners`."""
+    return -1 - (32 * first + 2 * size + int(is_packet))
+
+
+@kernel
+def first_of(code: int) -> int:
+    """The first reference of a leaf."""
+    return (-1 - code) >> 5
+
+
+@kernel
+def size_of(code: int) -> int:
+    """How many references a leaf has."""
+    return ((-1 - code) >> 1) & 15
+
+
+@kernel
+def is_packet(code: int) -> bool:
+    """Whether a leaf's references are triangles, side by side in `Bvh.corners`."""
+    return (-1 - code) & 1 == 1
+
+
+@kernel
+def child_of(bvh: Bvh, node: int, lane: int) -> int:
+    """The code of a node's child."""
+    code: int = np.int64(bvh.children[node * NODE_SINGLES + CHILDREN + lane])  # type: ignore[assignment]
+    return code
+
+
+def codes_of(bvh: Bvh) -> Codes:
+    """The codes of all nodes' children (n, LANES)."""
+    return bvh.children.reshape(-1, NODE_SINGLES)[:, CHILDREN : CHILDREN + LANES]
+
+
+@kernel
+def kind_of(bvh: Bvh, reference: int) -> int:
+    """The kind of a reference."""
+    kind: int = np.int64(bvh.references[reference, 0])  # type: ignore[assignment]
+    return kind
+
+
+@kernel
+def row_of(bvh: Bvh, reference: int) -> int:
+    """The row of a reference in the table of its kind."""
+    row: int = np.int64(bvh.references[reference, 1])  # type: ignore[assignment]
+    return row
+
+
+def joined(
+    trees: Sequence[Wide],
+    kinds: Sequence[IntArray],
+    rows: Sequence[IntArray],
+    vertices: FloatArray | None,
+) -> Bvh:
+    """The trees one after another, with their references' kinds (m,) and rows (m,); vertices (n, 9)
+    of the scene's triangles."""
+    if sum(map(len, rows)) > MOST_REFERENCES:
+        raise ValueError(f"over {MOST_REFERENCES:,} primitives; expected fewer")
+    frames = _aligned(sum(len(tree.codes) for tree in trees))
+    boxes, children = frames.view(np.float32), frames.view(np.int32)
+    node, reference = 0, 0
+    for tree, of_tree in zip(trees, rows, strict=True):
+        here = slice(node, node + len(tree.codes))
+        # Unused lanes hold nothing.
+        lower, upper = tree.boxes[0, :3].min(axis=1), tree.boxes[0, 3:].max(axis=1)
+        center = np.zeros(3)
+        if np.isfinite(lower).all() and np.isfinite(upper).all():
+            center = 0.5 * lower + 0.5 * upper
+            frames[node, CENTER + 3] = max(np.abs(lower).max(), np.abs(upper).max())
+        frames[node, CENTER : CENTER + 3] = center
+        boxes[here, : CHILDREN // 2] = _below(tree.boxes[:, :3], center)
+        boxes[here, CHILDREN // 2 : CHILDREN] = -_below(-tree.boxes[:, 3:], -center)
+        codes = np.where(tree.codes < NOTHING, tree.codes - 32 * reference, tree.codes)
+        children[here, CHILDREN : CHILDREN + LANES] = np.where(codes >= 0, codes + node, codes)
+        node, reference = here.stop, reference + len(of_tree)
+    codes = children[:, CHILDREN : CHILDREN + LANES].astype(np.int64)
+    references = np.column_stack([np.concatenate(kinds), np.concatenate(rows)]).astype(np.int32)
+    corners = None if vertices is None else _packets(vertices, codes, references[:, 1])
+    return Bvh(boxes, children.reshape(-1), frames, references, corners, -1)
+
+
+def _aligned(n: int) -> FloatArray:
+    """(n, 32) zeros, each row four whole cache lines."""
+    memory = np.zeros((n + 1) * 32)
+    skipped = (-memory.ctypes.data % 64) // 8
+    return memory[skipped : skipped + 32 * n].reshape(n, 32)
+
+
+def _below(planes: FloatArray, center: FloatArray) -> Singles:
+    """float32 numbers (n, 3 LANES) that are nowhere above planes (n, 3, LANES) less the centre."""
+    with np.errstate(over="ignore"):
+        exact = np.nextafter(planes - center[None, :, None], -np.inf)
+        rounded = exact.astype(np.float32)
+    lower = np.nextafter(rounded, np.float32(-np.inf))
+    return np.where(rounded > exact, lower, rounded).reshape(len(planes), -1)
+
+
+def _packets(vertices: FloatArray, codes: IntArray, rows: Codes) -> FloatArray | None:
+    """`Bvh.corners` of the leaves among codes, whose references name these rows (m,) of vertices
+    (n, 9)."""
+    leaves = codes[(codes < NOTHING) & ((-1 - codes) & 1 == 1)]
+    if len(leaves) == 0:
+        return None
+    first, size = (-1 - leaves) >> 5, ((-1 - leaves) >> 1) & 15
+    corners = np.zeros(9 * len(rows) + LANES)
+    for s in range(1, LEAF_SHARE + 1):
+        at = first[size == s][:, None]
+        lanes = vertices[rows[at + np.arange(s)]].transpose(0, 2, 1)
+        corners[9 * at + np.arange(9 * s)] = lanes.reshape(len(at), 9 * s)
+    return corners

@@ -1,0 +1,313 @@
+"""Solids along a ray: the crossings of the operands in order, and a program on who is inside.
+
+The operands' crossings are passed one after another; after each, the postfix program says from the
+operands' states whether the point is inside the solid.  Where that changes is the solid's surface.
+Crossings that rounding cannot tell apart are passed at once: faces that coincide leave no film of
+rounding error between them.
+"""
+
+import math
+from typing import NamedTuple
+
+from reference_rt import shapes as any_shape
+from reference_rt.accel.bvh import Bvh
+from reference_rt.accel.crossing_order import (
+    FROM_THE_START,
+    Crossed,
+    comes_after,
+    crossed,
+    nothing_at,
+)
+from reference_rt.accel.csg.mesh_walk import Step, next_crossing, winding
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import Hit, Ray, at, surface_error
+from reference_rt.core.vec3 import dot, length
+from reference_rt.jit.kernel import kernel, local_floats, local_integers
+from reference_rt.shapes import Shapes
+from reference_rt.shapes.csg.anchor import ray_near
+from reference_rt.shapes.csg.tables import AND, NOT, OR, Solids
+
+CROSSINGS = 4
+"""Of an operand that is not a mesh: the ends of its `Spans`."""
+
+GRAZING = 2.0**20
+"""Crossings further apart than this many times the rounding of what is met head-on are not asked
+for their angles: they would have to be met at less than 1e-6 radians to be one."""
+
+
+class Walk(NamedTuple):
+    """Where the operands of a solid stand along a ray.
+
+    t, u (CROSSINGS k + j): crossing j of operand k, a mesh's next one at j = 0;  v, row, sign (k,):
+    more of a mesh's: its triangle, and +1 where it is entered;  passed (k,): crossings behind;
+    state (k,): 0 outside;  before, met (k,): the state before the crossings that are being passed,
+    and whether one is the operand's.
+    """
+
+    t: FloatArray
+    u: FloatArray
+    v: FloatArray
+    row: IntArray
+    sign: IntArray
+    passed: IntArray
+    state: IntArray
+    before: IntArray
+    met: IntArray
+
+
+@kernel
+def is_inside(solids: Solids, s: int, state: IntArray, values: IntArray) -> bool:
+    """The program of solid s on its operands' states, 0 for outside; `values` is its stack."""
+    top = 0
+    first = solids.step_first[s]
+    for k in range(first, first + solids.step_count[s]):
+        step = solids.steps[k]
+        if step >= 0:
+            values[top] = 1 if state[step] != 0 else 0
+            top += 1
+        elif step == NOT:
+            values[top - 1] = 1 - values[top - 1]
+        else:
+            top -= 1
+            if step == OR:
+                values[top - 1] |= values[top]
+            elif step == AND:
+                values[top - 1] &= values[top]
+    return bool(values[0] != 0)
+
+
+@kernel
+def _next_of_mesh(walk: Walk, k: int, step: Step) -> None:
+    walk.t[CROSSINGS * k], walk.u[CROSSINGS * k] = step.t, step.u
+    walk.v[k], walk.row[k], walk.sign[k] = step.v, step.row, step.sign
+
+
+@kernel
+def _begin(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, walk: Walk) -> None:
+    """Operand k of a solid, row o of the operands, as the ray's origin finds it."""
+    walk.passed[k] = 0
+    if solids.row[o] < 0:
+        _next_of_mesh(walk, k, next_crossing(shapes.triangles, bvh, solids.root[o], ray, 0.0, -1))
+        walk.state[k] = winding(shapes.triangles, bvh, solids.root[o], ray)
+        return
+    spans = any_shape.spans(shapes, solids.kind[o], solids.row[o], ray)
+    j = CROSSINGS * k
+    walk.t[j], walk.u[j], walk.t[j + 1], walk.u[j + 1] = spans.t0, spans.u0, spans.t1, spans.u1
+    walk.t[j + 2], walk.u[j + 2] = spans.t2, spans.u2
+    walk.t[j + 3], walk.u[j + 3] = spans.t3, spans.u3
+    while walk.passed[k] < CROSSINGS and walk.t[j + walk.passed[k]] <= 0.0:
+        walk.passed[k] += 1
+    walk.state[k] = walk.passed[k] % 2
+
+
+@kernel
+def _next(solids: Solids, o: int, k: int, walk: Walk) -> Hit:
+    """The crossing that operand k comes to next, as a hit; at inf where there is none."""
+    j = walk.passed[k]
+    if j == CROSSINGS:
+        return Hit(math.inf, -1, -1, 0.0, 0.0, -1)
+    j += CROSSINGS * k
+    row = solids.row[o]
+    if row < 0:
+        return Hit(walk.t[j], solids.kind[o], walk.row[k], walk.u[j], walk.v[k], -1)
+    return Hit(walk.t[j], solids.kind[o], row, walk.u[j], 0.0, -1)
+
+
+@kernel
+def _pass(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, walk: Walk) -> None:
+    """Operand k goes through its next crossing."""
+    if solids.row[o] < 0:
+        walk.state[k] += walk.sign[k]
+        t, row = walk.t[CROSSINGS * k], walk.row[k]
+        step = next_crossing(shapes.triangles, bvh, solids.root[o], ray, t, row)
+        _next_of_mesh(walk, k, step)
+    else:
+        walk.passed[k] += 1
+        walk.state[k] = walk.passed[k] % 2
+
+
+@kernel
+def _nearest(solids: Solids, first: int, count: int, walk: Walk) -> tuple[int, Hit]:
+    """The operand whose next crossing is the first of all, and that; -1 for none."""
+    best, closest = -1, Hit(math.inf, -1, -1, 0.0, 0.0, -1)
+    for k in range(count):
+        hit = _next(solids, first + k, k, walk)
+        if hit.t < closest.t:
+            best, closest = k, hit
+    return best, closest
+
+
+@kernel
+def head_on(ray: Ray, t: float) -> float:
+    """The rounding, in t, of a crossing at t that is met head-on."""
+    return surface_error(ray.o, at(ray, t), 0.0) / length(ray.d)
+
+
+@kernel
+def width(shapes: Shapes, hit: Hit, ray: Ray) -> float:
+    """How far rounding may have moved a crossing along the ray, in t: the error of the surface and
+    of the ray's own arithmetic, over the cosine."""
+    point = any_shape.surface(shapes, ray, hit)
+    cosine = abs(dot(point.n, ray.d))
+    error = point.error + surface_error(ray.o, point.p, 0.0)
+    return error / cosine if cosine > 0.0 else math.inf
+
+
+class Front(NamedTuple):
+    """Of the crossings that were passed at once, the last of each operand, which is the one that
+    may show: t, u, v, row (k,)."""
+
+    t: FloatArray
+    u: FloatArray
+    v: FloatArray
+    row: IntArray
+
+
+@kernel
+def begin_all(
+    solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, walk: Walk
+) -> tuple[int, Hit]:
+    """All operands as the ray's origin finds them, and the first crossing of all."""
+    first, count = solids.first[s], solids.operands[s]
+    at_origin = GRAZING * head_on(ray, 0.0)
+    for k in range(count):
+        _begin(solids, shapes, bvh, first + k, k, ray, walk)
+        # What is within rounding of the origin is where the ray comes from.
+        hit = _next(solids, first + k, k, walk)
+        if hit.t < at_origin and hit.t <= width(shapes, hit, ray):
+            _pass(solids, shapes, bvh, first + k, k, ray, walk)
+    return _nearest(solids, first, count, walk)
+
+
+@kernel
+def pass_together(
+    solids: Solids,
+    shapes: Shapes,
+    bvh: Bvh,
+    s: int,
+    ray: Ray,
+    walk: Walk,
+    front: Front,
+    best: int,
+    hit: Hit,
+) -> tuple[int, Hit]:
+    """Passes a crossing and all that rounding cannot tell apart from it; the next one."""
+    first, count = solids.first[s], solids.operands[s]
+    for k in range(count):
+        walk.before[k], walk.met[k] = walk.state[k], 0
+    reach = hit.t
+    while best >= 0:
+        front.t[best], front.u[best], front.v[best] = hit.t, hit.u, hit.v
+        front.row[best] = hit.row
+        walk.met[best] = 1
+        _pass(solids, shapes, bvh, first + best, best, ray, walk)
+        previous = hit
+        best, hit = _nearest(solids, first, count, walk)
+        if best < 0 or hit.t - previous.t > GRAZING * head_on(ray, hit.t):
+            break
+        reach = max(reach, previous.t + width(shapes, previous, ray))
+        if hit.t - width(shapes, hit, ray) > reach:
+            break
+    return best, hit
+
+
+@kernel
+def surface_along(
+    solids: Solids,
+    shapes: Shapes,
+    bvh: Bvh,
+    s: int,
+    ray: Ray,
+    t_max: float,
+    t: FloatArray,
+    widths: FloatArray,
+    part: IntArray,
+    instance: int,
+    after: Crossed,
+) -> tuple[int, Crossed]:
+    """(how many points of the surface of solid s lie at t in (0, t_max], the first of them that
+    comes after `after`, as a hit of the operand that it belongs to, at inf for none).
+
+    As many of them as there is room for go into t, in order, with their `resolution` and the number
+    of their operand; where there is no room for any, the hit ends the walk.  The ray is that of
+    `instance`, -1 for none.
+    """
+    ray, begin = ray_near(solids, s, ray)
+    first, count = solids.first[s], solids.operands[s]
+    walk = Walk(
+        local_floats(CROSSINGS * count),
+        local_floats(CROSSINGS * count),
+        local_floats(count),
+        local_integers(count),
+        local_integers(count),
+        local_integers(count),
+        local_integers(count),
+        local_integers(count),
+        local_integers(count),
+    )
+    front = Front(
+        local_floats(count), local_floats(count), local_floats(count), local_integers(count)
+    )
+    values = local_integers(solids.depth[s])
+    best, hit = begin_all(solids, shapes, bvh, s, ray, walk)
+    inside = is_inside(solids, s, walk.state, values)
+    found, closest = 0, nothing_at(math.inf)
+    while best >= 0 and begin + hit.t <= t_max:
+        best, hit = pass_together(solids, shapes, bvh, s, ray, walk, front, best, hit)
+        was_inside = inside
+        inside = is_inside(solids, s, walk.state, values)
+        if inside != was_inside:
+            k = which_shows(solids, s, count, walk, values, was_inside)
+            kind, at_k = solids.kind[first + k], begin + front.t[k]
+            if closest.hit.kind < 0:
+                hit_k = Hit(at_k, kind, front.row[k], front.u[k], front.v[k], instance)
+                one = crossed(shapes, hit_k, found)
+                if comes_after(one, after):
+                    closest = one
+            if found < len(t):
+                shown = Hit(front.t[k], kind, front.row[k], front.u[k], front.v[k], -1)
+                t[found], widths[found] = at_k, resolution(shapes, shown, ray)
+                part[found] = k
+            found += 1
+            if len(t) == 0 and closest.hit.kind >= 0:
+                break
+    return found, closest
+
+
+@kernel
+def resolution(shapes: Shapes, hit: Hit, ray: Ray) -> float:
+    """Crossings whose distance, in t, is more than the sum of theirs are told apart."""
+    return min(width(shapes, hit, ray), 0.5 * GRAZING * head_on(ray, hit.t))
+
+
+@kernel
+def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max: float) -> Hit:
+    """The first point of the surface of solid s at t in (0, t_max], as a hit of the operand that it
+    belongs to; at inf for none."""
+    none, no_parts = local_floats(0), local_integers(0)
+    _, closest = surface_along(
+        solids, shapes, bvh, s, ray, t_max, none, none, no_parts, -1, FROM_THE_START
+    )
+    return closest.hit
+
+
+@kernel
+def which_shows(
+    solids: Solids, s: int, count: int, walk: Walk, values: IntArray, inside: bool
+) -> int:
+    """The operand whose crossing shows, of those that were passed at once and changed `inside`: the
+    first in the scene's order that changes it alone, or without which nothing would change."""
+    last = -1
+    for k in range(count):
+        if walk.met[k] != 0:
+            last = k
+            was, now = walk.before[k], walk.state[k]
+            walk.before[k] = now
+            alone = is_inside(solids, s, walk.before, values) != inside
+            walk.before[k] = was
+            walk.state[k] = was
+            needed = is_inside(solids, s, walk.state, values) == inside
+            walk.state[k] = now
+            if alone or needed:
+                return k
+    return last

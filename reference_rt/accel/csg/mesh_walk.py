@@ -1,0 +1,75 @@
+"""Closed meshes as operands: the crossings of a ray, one after another."""
+
+import math
+from typing import NamedTuple
+
+from reference_rt.accel.bvh import NOTHING, WIDE_STACK, Bvh, first_of, row_of, size_of
+from reference_rt.accel.single_ray import enter, nearest_child, view_of
+from reference_rt.core.ray import Ray
+from reference_rt.jit.kernel import kernel, local_floats, local_integers
+from reference_rt.jit.simd import LANES
+from reference_rt.shapes.meshes import triangle
+from reference_rt.shapes.meshes.triangle import Triangles
+from reference_rt.shapes.meshes.watertight import shear_of
+
+
+class Step(NamedTuple):
+    """A crossing: t, inf for none; the triangle and its barycentrics; sign, +1 where the ray goes
+    in, -1 where it comes out."""
+
+    t: float
+    row: int
+    u: float
+    v: float
+    sign: int
+
+
+@kernel
+def next_crossing(
+    triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray, after: float, row: int
+) -> Step:
+    """The first crossing of a mesh that comes after (`after`, `row`), ordered by t and then by the
+    triangles' rows, so that none is left out where several have the same t."""
+    found, _ = _walk(triangles, bvh, root, ray, after, row, False)
+    return found
+
+
+@kernel
+def winding(triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray) -> int:
+    """How many times a closed mesh goes round the origin of a ray: 0 outside, 1 inside."""
+    _, total = _walk(triangles, bvh, root, ray, 0.0, -1, True)
+    return -total
+
+
+@kernel
+def _walk(
+    triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray, after: float, row: int, total: bool
+) -> tuple[Step, int]:
+    """The next crossing, and with `total` the sum of the signs of all that come."""
+    found, balance = Step(math.inf, -1, 0.0, 0.0, 0), 0
+    if triangles is None:
+        return found, balance
+    stack, waiting = local_integers(WIDE_STACK), local_floats(WIDE_STACK)
+    distances = local_floats(LANES)
+    view, shear = view_of(bvh, root, ray), shear_of(ray)
+    node, top = root, 0
+    while True:
+        while node >= 0:
+            met = enter(bvh, node, view, math.inf if total else found.t, distances)
+            if met == 0:
+                node = NOTHING
+            else:
+                node, top = nearest_child(bvh, node, met, distances, stack, waiting, top)
+        begin = first_of(node)
+        for k in range(begin, begin + size_of(node)):
+            i = row_of(bvh, k)
+            t, u, v = triangle.intersect(triangles, i, shear)
+            if t < math.inf and (t > after or (t == after and i > row)):
+                if t < found.t or (t == found.t and i < found.row):
+                    found = Step(t, i, u, v, triangle.enters(triangles, i, shear))
+                if total:
+                    balance += triangle.enters(triangles, i, shear)
+        if top == 0:
+            return found, balance
+        top -= 1
+        node = stack[top]

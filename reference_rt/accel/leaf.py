@@ -1,0 +1,107 @@
+"""What a ray finds in a leaf of a hierarchy."""
+
+from reference_rt import shapes as any_shape
+from reference_rt.accel.bvh import Bvh, first_of, is_packet, kind_of, row_of, size_of
+from reference_rt.accel.crossing_order import precedes
+from reference_rt.accel.csg import evaluate
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import Crossing, Hit, Ray
+from reference_rt.core.ray_block import Hits, Rays, hit_of, put_hit, ray_of
+from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd_kernels import lowest
+from reference_rt.shapes import TRIANGLE, Shapes
+from reference_rt.shapes.csg.tables import Solids
+from reference_rt.shapes.meshes import triangle
+from reference_rt.shapes.meshes.watertight import Shear, see
+
+SOLID, INSTANCE = 100, 101
+"""Codes of references that are not rows of a shape's table, but of `Solids` or `Instances`.  Rays
+hit the primitives in these: no `Hit` has such a kind."""
+
+
+@kernel
+def nearest_of_leaf(
+    bvh: Bvh,
+    shapes: Shapes,
+    solids: Solids | None,
+    leaf: int,
+    rays: Rays,
+    j: int,
+    shear: Shear,
+    seen: FloatArray,
+    hits: Hits,
+) -> Hit:
+    """The nearer of hit j, which it becomes, and what ray j of a block meets in a leaf without
+    instances."""
+    closest = hit_of(hits, j)
+    if is_packet(leaf):
+        closest = nearest_of_packet(bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest)
+    else:
+        ray, first = ray_of(rays, j), first_of(leaf)
+        for k in range(first, first + size_of(leaf)):
+            kind, row = kind_of(bvh, k), row_of(bvh, k)
+            closest = nearer_primitive(bvh, shapes, solids, kind, row, ray, shear, -1, closest)
+    put_hit(hits, j, closest)
+    return closest
+
+
+@kernel
+def nearer_primitive(
+    bvh: Bvh,
+    shapes: Shapes,
+    solids: Solids | None,
+    kind: int,
+    row: int,
+    ray: Ray,
+    shear: Shear,
+    instance: int,
+    closest: Hit,
+) -> Hit:
+    """The nearer of `closest` and what a reference of a leaf stands for."""
+    if solids is not None:
+        if kind == SOLID:
+            hit = evaluate.intersect(solids, shapes, bvh, row, ray, closest.t)
+            found = Crossing(hit.t, hit.u, hit.v)
+            return _nearer(shapes, found, hit.kind, hit.row, instance, closest)
+    found = any_shape.intersect(shapes, kind, row, ray, shear)
+    return _nearer(shapes, found, kind, row, instance, closest)
+
+
+@kernel
+def nearest_of_packet(
+    corners: FloatArray | None,
+    bvh: Bvh,
+    shapes: Shapes,
+    node: int,
+    shear: Shear,
+    seen: FloatArray,
+    instance: int,
+    closest: Hit,
+) -> Hit:
+    """The nearest of `closest` and the triangles of a leaf;  seen (SEEN_FLOATS,) is scratch."""
+    if corners is None:
+        return closest
+    first, size = first_of(node), size_of(node)
+    met = see(corners, first, size, shear, seen)
+    while met != 0:
+        lane = lowest(met)
+        met &= met - 1
+        found = triangle.intersect_lane(corners, first, size, lane, shear, seen)
+        row = row_of(bvh, first + lane)
+        closest = _nearer(shapes, found, TRIANGLE, row, instance, closest)
+    return closest
+
+
+@kernel
+def _nearer(
+    shapes: Shapes, found: Crossing, kind: int, row: int, instance: int, closest: Hit
+) -> Hit:
+    """The nearer of what was found and the closest so far."""
+    if found.t <= closest.t:
+        hit = Hit(found.t, kind, row, found.u, found.v, instance)
+        if found.t < closest.t:
+            return hit
+        # t_max itself, which a ray that has met nothing yet starts with, lies beyond the ray's end.
+        if closest.kind >= 0 and precedes(shapes, hit, closest):
+            return hit
+    return closest

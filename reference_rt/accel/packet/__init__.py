@@ -1,0 +1,1 @@
+"""Packet traversal: coherent rays go through the hierarchy together."""

@@ -1,0 +1,1 @@
+"""Stream traversal: all rays of a block go through the hierarchy in turns."""

@@ -1,0 +1,58 @@
+"""Film: the picture's size, its reconstruction filter and the layers beside its colour."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from reference_rt.cameras.filters import (
+    AnyFilter,
+    BoxFilter,
+    CatmullRomFilter,
+    GaussianFilter,
+    LanczosFilter,
+    MitchellFilter,
+    TentFilter,
+)
+from reference_rt.core.model import Description
+
+LayerName = Literal["albedo", "normal", "depth", "id", "variance"]
+
+
+def _each_once(value: Any) -> Any:
+    if not isinstance(value, list | tuple):
+        raise ValueError("expected a list of layers, such as [albedo, normal]")
+    for i, name in enumerate(value):
+        if name in value[:i]:
+            raise ValueError(f"'{name}' is named twice; expected each layer once")
+    return tuple(value)
+
+
+class Film(Description):
+    """The picture: its size in pixels, its reconstruction filter and its layers."""
+
+    width: Annotated[int, Field(ge=1, lt=2**31)] = 256
+    height: Annotated[int, Field(ge=1, lt=2**31)] = 256
+    filter: AnyFilter = BoxFilter()
+    layers: Annotated[tuple[LayerName, ...], BeforeValidator(_each_once)] = ()
+    """What is written beside the colour.
+
+    Of what the eye's rays hit first, holes of a mask too, as the filter weighs them and with 0 for
+    misses: albedo, the material's own colour, and normal, the shading normal without bump and
+    normal maps.  Of the ray through the centres of pixel and lens: depth, the distance from the
+    eye, inf for a miss, and id, the shape's index, -1 for a miss.  variance: that of the pixel's
+    mean, from the spread of its samples; for `sobol` and `grid`, whose samples lie more evenly than
+    chance would have them, an upper estimate.  Ray casting writes its own layers instead.
+    """
+
+
+__all__ = [
+    "AnyFilter",
+    "BoxFilter",
+    "CatmullRomFilter",
+    "Film",
+    "GaussianFilter",
+    "LanczosFilter",
+    "LayerName",
+    "MitchellFilter",
+    "TentFilter",
+]

@@ -1,0 +1,270 @@
+"""Where float64 itself ends: what of a scene is about as small as the error of what rays hit.
+
+The law is that of `reference_rt.core.ray.surface_error`: a point p on a surface is known to
+16 sqrt(3) u (|anchor| + |p| + size).  A shape that is smaller, a gap that is narrower, or an index
+that is as near to 1 as it is rounded, is not resolved.  Products of coordinates must be finite.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import UNIT_ROUNDOFF, surface_error
+from reference_rt.core.transform import Affine
+from reference_rt.core.vec3 import Vec3
+from reference_rt.rendering.scene import Scene
+from reference_rt.shapes import TABLES, Mesh
+from reference_rt.shapes.csg import Solid
+from reference_rt.shapes.csg.description import operands_of
+from reference_rt.shapes.instances import Instance
+from reference_rt.shapes.shape import Place, Shape
+
+MOST = 2000
+"""Shapes that are looked at, copies of groups and operands of solids included; of a mesh in a group
+the first copy alone, as each copy's table is made for it."""
+
+LISTED = 10
+"""Of what is beyond a law, the worst are named."""
+
+
+class Limit(NamedTuple):
+    """Something of `size` that must be told apart, where float64's error is at most `bound`."""
+
+    law: str
+    what: str
+    size: float
+    bound: float
+
+    @property
+    def margin(self) -> float:
+        """How many times the bound fits: 1 or less is beyond float64."""
+        return self.size / self.bound if self.bound > 0.0 else math.inf
+
+    @property
+    def is_beyond(self) -> bool:
+        return self.margin <= 1.0
+
+
+class Leaf(NamedTuple):
+    """A primitive shape where it stands.  name: for people;  field, table: its rows;  lower, upper
+    (n, 3): their bounds;  error (n,): how far off the points are that rays from the eye hit."""
+
+    name: str
+    field: str
+    table: Any
+    lower: FloatArray
+    upper: FloatArray
+    error: FloatArray
+
+
+def limits_of(scene: Scene) -> list[Limit]:
+    """The nearest that the scene comes to float64's limits, by law, and all (at most LISTED) that
+    is beyond; the least margin first."""
+    leaves: list[Leaf] = []
+    for name, shape, outer in _placed(scene):
+        if len(leaves) == MOST:
+            break
+        leaves.append(_leaf(name, shape, outer, scene))
+    found = [*_thin(leaves), *_contacts(leaves), *_indices(scene), *_large(leaves)]
+    found.sort(key=lambda limit: limit.margin)
+    beyond = [limit for limit in found if limit.is_beyond][:LISTED]
+    nearest = {limit.law: limit for limit in reversed(found)}
+    kept = [*beyond, *(limit for limit in nearest.values() if limit not in beyond)]
+    return sorted(kept, key=lambda limit: limit.margin)
+
+
+def _placed(scene: Scene) -> Iterator[tuple[str, Shape, Affine]]:
+    """(name, primitive, the map that its own transform is followed by) of all there is."""
+
+    seen: set[int] = set()
+
+    def of(name: str, shape: Shape, outer: Affine) -> Iterator[tuple[str, Shape, Affine]]:
+        if isinstance(shape, Instance):
+            inner = transform.compose(transform.affine(shape.transform), outer)
+            for k, member in enumerate(scene.groups[shape.group]):
+                if isinstance(member, Mesh):
+                    if id(member) in seen:
+                        continue
+                    seen.add(id(member))
+                yield from of(f"{name}, {shape.group}[{k}]", member, inner)
+        elif isinstance(shape, Solid):
+            for k, (leaf, inner, _, _) in enumerate(operands_of(shape, outer, None)):
+                yield f"{name}, operand {k}", leaf, inner
+        else:
+            yield name, shape, outer
+
+    for i, shape in enumerate(scene.shapes):
+        yield from of(f"shapes[{i}]", shape, transform.identity())
+
+
+def _leaf(name: str, shape: Shape, outer: Affine, scene: Scene) -> Leaf:
+    table = shape.tabulate(Place(folder=scene.folder, outer=outer))
+    field, module = next((f, m) for _, f, t, m in TABLES if t is type(table))
+    lower, upper = module.bounds(table)
+    far = np.maximum(np.abs(lower), np.abs(upper)).max(axis=1)
+    extent = (upper - lower).max(axis=1)
+    # A ray begins at the eye, whose coordinates are rounded as those of the hit are.
+    eye = max(map(abs, scene.camera.eye))
+    far = np.where(np.isfinite(far), far, eye)
+    error = LAW * (far + np.maximum(far, eye) + np.where(np.isfinite(extent), extent, 0.0))
+    return Leaf(f"{name} ({type(shape).__name__.lower()})", field, table, lower, upper, error)
+
+
+LAW = surface_error(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0)
+"""16 sqrt(3) u."""
+
+
+# ---- sizes --------------------------------------------------------------------------------------
+
+
+def _thin(leaves: list[Leaf]) -> Iterator[Limit]:
+    """Each shape's thinnest part against the error of the points on it."""
+    for leaf in leaves:
+        size = _thickness(leaf)
+        k = int(np.argmin(size / leaf.error))
+        if math.isfinite(size[k]):
+            name = f"{leaf.name}, face {k}" if len(size) > 1 else leaf.name
+            yield Limit("size", name, float(size[k]), float(leaf.error[k]))
+
+
+def _thickness(leaf: Leaf) -> FloatArray:
+    """(n,): the shortest way through or across each row; inf for what has none."""
+    table = leaf.table
+    if leaf.field == "spheres":
+        return np.asarray(2.0 * table.radius)
+    if leaf.field == "triangles":
+        v = table.vertices.reshape(-1, 3, 3)
+        longest = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1)
+        area = np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
+        # One without area is met by no ray: nothing is lost with it.
+        height = np.divide(area, longest, out=np.full_like(area, np.inf), where=area > 0.0)
+        return np.asarray(height)
+    if leaf.field in ("rectangles", "disks"):
+        steepest = np.maximum(*(np.linalg.norm(x, axis=1) for x in (table.x_of, table.y_of)))
+        return np.asarray(2.0 / steepest)
+    if leaf.field in ("boxes", "quadrics", "tori"):
+        rows = np.linalg.norm(table.to_local.reshape(-1, 3, 3), axis=2).max(axis=1)
+        if leaf.field == "tori":
+            return np.asarray(2.0 * table.minor / rows)
+        if leaf.field == "boxes":
+            return np.asarray(2.0 / rows)
+    side = leaf.upper - leaf.lower
+    side = np.where(side > 4.0 * UNIT_ROUNDOFF * np.abs(leaf.upper), side, np.inf)
+    return np.asarray(side.min(axis=1))
+
+
+LARGEST = 2.0**510 / 6.0
+"""Of coordinates, 5.6e152: the edge functions of rays at a triangle that is six times as far away
+are sums of 16 products of two, which are to be finite."""
+
+
+def _large(leaves: list[Leaf]) -> Iterator[Limit]:
+    """The largest coordinate of each shape that has an end."""
+    for leaf in leaves:
+        reach = float(np.maximum(np.abs(leaf.lower), np.abs(leaf.upper)).max())
+        if math.isfinite(reach):
+            yield Limit(RANGE, leaf.name, LARGEST, reach)
+
+
+RANGE = "range"
+
+
+# ---- gaps ---------------------------------------------------------------------------------------
+
+
+def _contacts(leaves: list[Leaf]) -> Iterator[Limit]:
+    """The gaps between spheres, and between parallel planes of boxes, rectangles and disks: two
+    surfaces, each known to its own error, are apart by more than both together.  What is exactly in
+    one place is no gap."""
+    spheres = [leaf for leaf in leaves if leaf.field == "spheres"]
+    if len(spheres) > 1:
+        center = np.concatenate([leaf.table.center for leaf in spheres])
+        radius = np.concatenate([leaf.table.radius for leaf in spheres])
+        error = np.concatenate([leaf.error for leaf in spheres])
+        for i in range(len(spheres) - 1):
+            apart = np.linalg.norm(center[i + 1 :] - center[i], axis=1)
+            rest = radius[i + 1 :]
+            gap = np.minimum(
+                np.abs(apart - (radius[i] + rest)), np.abs(apart - np.abs(radius[i] - rest))
+            )
+            bound = error[i] + error[i + 1 :]
+            # Less than what these few operations round by is exactly in one place.
+            rounding = 8.0 * UNIT_ROUNDOFF * (apart + radius[i] + rest)
+            yield from _gaps(spheres, i, gap, bound, rounding)
+    faces = [face for leaf in leaves for face in _faces(leaf)][:MOST_FACES]
+    for i, (leaf, c, n) in enumerate(faces):
+        near = [
+            (other, abs(float((at - c) @ n)))
+            for other, at, along in faces[i + 1 :]
+            if other is not leaf and abs(float(along @ n)) > 1.0 - PARALLEL and _near(leaf, other)
+        ]
+        for other, gap in near:
+            bound = float(leaf.error[0] + other.error[0])
+            if gap > 16.0 * UNIT_ROUNDOFF * float(np.abs([c, other.upper[0]]).max()):
+                yield Limit("gap", f"{leaf.name} and {other.name}", gap, bound)
+
+
+PARALLEL = 2.0**-40
+"""Of a cosine: planes turned by less than a millionth."""
+
+MOST_FACES = 400
+"""Planes that are compared with each other."""
+
+
+def _gaps(
+    leaves: list[Leaf], i: int, gap: FloatArray, bound: FloatArray, rounding: FloatArray
+) -> Iterator[Limit]:
+    ratio = np.where(gap > rounding, gap / bound, np.inf)
+    k = int(np.argmin(ratio))
+    if math.isfinite(ratio[k]):
+        what = f"{leaves[i].name} and {leaves[i + 1 + k].name}"
+        yield Limit("gap", what, float(gap[k]), float(bound[k]))
+
+
+def _faces(leaf: Leaf) -> Iterator[tuple[Leaf, FloatArray, FloatArray]]:
+    """(leaf, a point, the unit normal) of each plane that bounds a flat shape."""
+    if leaf.field in ("rectangles", "disks"):
+        yield leaf, leaf.table.center[0], leaf.table.normal[0]
+    elif leaf.field == "boxes":
+        edges, rows = leaf.table.edges[0].reshape(3, 3), leaf.table.to_local[0].reshape(3, 3)
+        for edge, row in zip(edges, rows, strict=True):
+            n = row / np.linalg.norm(row)
+            yield leaf, leaf.table.center[0] - edge, n
+            yield leaf, leaf.table.center[0] + edge, n
+
+
+def _near(a: Leaf, b: Leaf) -> bool:
+    """Whether the boxes of two shapes come as near as their errors."""
+    slack = a.error[0] + b.error[0]
+    low, high = np.maximum(a.lower[0], b.lower[0]), np.minimum(a.upper[0], b.upper[0])
+    return bool((low <= high + slack).all())
+
+
+# ---- indices ------------------------------------------------------------------------------------
+
+
+def _indices(scene: Scene) -> Iterator[Limit]:
+    """What bends rays bends them by eta - 1, where each index is rounded when it is read, and their
+    quotient when it is made: three times u."""
+    for name, material in scene.materials.items():
+        inside = getattr(material, "interior_ior", None)
+        outside = getattr(material, "exterior_ior", None)
+        if inside is not None and outside is not None and inside != outside:
+            away = abs(inside - outside) / outside
+            yield Limit("index", f"materials.{name}: eta - 1", away, 3.0 * UNIT_ROUNDOFF)
+
+
+def told(limit: Limit) -> str:
+    """A limit in words."""
+    if limit.law == RANGE:
+        return f"{limit.what}: reaches {limit.bound:.3g}, float64's products {limit.size:.3g}"
+    if limit.is_beyond:
+        return f"{limit.what}: {limit.size:.3g}, float64's error is {limit.bound:.3g}"
+    return f"{limit.what}: {limit.size:.3g} is {limit.margin:.2g} times float64's error"
+
+
+__all__ = ["Limit", "limits_of", "told"]

@@ -1,0 +1,1 @@
+"""Vectors, rays, transforms, the base of all descriptions, image files."""

@@ -1,0 +1,106 @@
+"""OpenEXR files: named float32 channels, and text in the header."""
+
+import ctypes
+import io
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.util.errors import ImageError
+from reference_rt.util.files import open_input, replacing
+
+_MAGIC = b"v/1\x01"
+
+
+def write_exr(path: Path, channels: Mapping[str, FloatArray], header: Mapping[str, str]) -> None:
+    """Channels (height, width) by name as float32, whole or not at all.  Raises ImageError."""
+    import OpenEXR
+
+    with np.errstate(over="ignore"):  # beyond float32 is infinity, which stays visible as such
+        planes: dict[str, Any] = {
+            name: np.ascontiguousarray(plane, np.float32) for name, plane in channels.items()
+        }
+    settings = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with replacing(path) as temporary:
+        try:
+            OpenEXR.File(settings | dict(header), planes).write(_name(temporary))
+        except RuntimeError as error:  # what the library raises for any failure to write
+            raise OSError(None, str(error)) from None
+
+
+def read_exr(path: Path) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Channels (height, width) by name, as float64, and the header.  Raises ImageError."""
+    try:
+        header = read_header(path)
+        channels = {n: np.array(plane, np.float64) for n, plane in read_planes(path).items()}
+        if len({plane.shape for plane in channels.values()}) > 1 or not channels:
+            raise ValueError("cannot be read as EXR: expected channels of one size")
+    except OSError as error:
+        raise ImageError(f"{path}: cannot be read as EXR: {error.strerror}") from None
+    except ValueError as error:
+        raise ImageError(f"{path}: {error}") from None
+    return channels, header
+
+
+def read_header(path: Path) -> dict[str, Any]:
+    """The header.  Raises ValueError (what is wrong), OSError."""
+    with open_input(path) as start:
+        if start.read(4) != _MAGIC:
+            raise ValueError("cannot be read as EXR: it does not begin as one")
+    header, _ = _opened(path, header_only=True)
+    return header
+
+
+def read_planes(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """Channels by name, (height, width) unless they are subsampled, in the file's own type.  Raises
+    ValueError (what is wrong), OSError."""
+    open_input(path).close()
+    _, planes = _opened(path, separate_channels=True)
+    return planes
+
+
+def _opened(path: Path, **how: bool) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    import OpenEXR
+
+    damaged = "cannot be read as EXR: it is truncated or damaged; expected a whole image"
+    try:
+        with _silent(), OpenEXR.File(_name(path), **how) as file:
+            planes = {name: channel.pixels for name, channel in file.channels().items()}
+            header = dict(file.header())
+    except (RuntimeError, OSError, TypeError, ValueError):  # whose reasons tell people nothing
+        raise ValueError(damaged) from None
+    if "separate_channels" in how and not all(hasattr(p, "shape") for p in planes.values()):
+        raise ValueError(damaged)  # the library returns channels without pixels
+    return header, planes
+
+
+def _name(path: Path) -> str | bytes:
+    """As the library takes it: names of files need not be UTF-8."""
+    return str(path) if sys.platform == "win32" else os.fsencode(path)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Nothing on standard output and error, which the library writes to from C++ and from Python:
+    a damaged file is told in one line by those who read it."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    kept = os.dup(1), os.dup(2)
+    try:
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            for number in (1, 2):
+                os.dup2(nowhere, number)
+            yield
+    finally:
+        if sys.platform != "win32":
+            ctypes.CDLL(None).fflush(None)  # what C still has in its buffers
+        for number, own in zip((1, 2), kept, strict=True):
+            os.dup2(own, number)
+        for number in (nowhere, *kept):
+            os.close(number)

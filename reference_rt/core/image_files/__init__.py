@@ -1,0 +1,46 @@
+"""Image files: `open_image` reads the header of one and tells which kind it is; one module a kind.
+
+Bitmaps, environment maps and the gate read with these.  A kind is told by how a file begins, not by
+its name.
+"""
+
+from pathlib import Path
+
+from reference_rt.core.image_files.exr import open_exr
+from reference_rt.core.image_files.hdr import open_hdr
+from reference_rt.core.image_files.image_file import ImageFile, Strip
+from reference_rt.core.image_files.npy import open_npy
+from reference_rt.core.image_files.pfm import open_pfm
+from reference_rt.core.image_files.pillow import open_with_pillow
+from reference_rt.util.files import open_input
+
+__all__ = ["ImageFile", "Strip", "open_image"]
+
+_BEGINNINGS = (
+    (b"v/1\x01", open_exr),
+    (b"PF", open_pfm),
+    (b"Pf", open_pfm),
+    (b"#?", open_hdr),
+    (b"\x93NUMPY", open_npy),
+)
+
+
+def open_image(path: Path, layer: str = "") -> ImageFile:
+    """The image in a file: its size, and its pixels to come.
+
+    layer: of an EXR file, the prefix of its channels' names.  Raises ValueError (what is wrong,
+    what was expected) and OSError.
+    """
+    with open_input(path) as file:
+        start = file.read(16)
+    if not start:
+        raise ValueError("is empty; expected an image")
+    if layer and not start.startswith(_BEGINNINGS[0][0]):
+        raise ValueError(f"has no layer '{layer}': only EXR has layers")
+    if layer:
+        return open_exr(path, layer)
+    reader = next((open_ for beginning, open_ in _BEGINNINGS if start.startswith(beginning)), None)
+    found = open_with_pillow(path) if reader is None else reader(path)
+    if min(found.width, found.height) < 1:
+        raise ValueError(f"has {found.width} x {found.height} pixels; expected at least one")
+    return found

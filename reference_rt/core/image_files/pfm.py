@@ -1,0 +1,68 @@
+"""Portable Float Maps, .pfm: float32, grey or in colour, in either order of bytes."""
+
+import math
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from reference_rt.core.image_files.image_file import (
+    Curve,
+    ImageFile,
+    Strip,
+    check_length,
+    in_colour,
+)
+from reference_rt.util.files import open_input
+
+_HEADER = 4096
+"""Bytes that a header may take: it is searched for its end, and no further."""
+
+_PATTERN = re.compile(rb"P([Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,32})\s")
+
+
+@dataclass(frozen=True)
+class PfmFile(ImageFile):
+    """start: of the pixels, in bytes;  kind: of a number;  channels: 1 or 3."""
+
+    start: int = 0
+    kind: str = "<f4"
+    channels: int = 3
+
+    def strips(self, curve: Curve | None = None, with_opacity: bool = False) -> Iterator[Strip]:
+        row = self.width * self.channels
+        with open_input(self.path) as file:
+            for rows in self.row_ranges():
+                # Written from the bottom up.
+                file.seek(self.start + 4 * row * (self.height - rows.stop))
+                values = np.fromfile(file, self.kind, row * (rows.stop - rows.start))
+                shape = (rows.stop - rows.start, self.width, self.channels)
+                upwards = values.reshape(shape if self.channels == 3 else shape[:2])
+                yield Strip(rows, in_colour(upwards[::-1], curve), None)
+
+
+def open_pfm(path: Path) -> ImageFile:
+    """Raises ValueError (what is wrong, what was expected)."""
+    with open_input(path) as file:
+        match = _PATTERN.match(file.read(_HEADER))
+        size = os.fstat(file.fileno()).st_size
+    if match is None:
+        raise ValueError("has a malformed PFM header; expected PF, width, height and scale")
+    channels = 3 if match[1] == b"F" else 1
+    width, height = int(match[2]), int(match[3])
+    try:
+        scale = float(match[4])
+    except ValueError:
+        scale = math.nan
+    if abs(scale) != 1.0:
+        raise ValueError(
+            f"has the scale {match[4].decode()}, which readers do not agree upon; expected 1 "
+            "(big-endian) or -1 (little-endian)"
+        )
+    if min(width, height) > 0:  # without pixels is refused for that
+        check_length(size - match.end(), width * height * channels * 4)
+    kind = "<f4" if scale < 0.0 else ">f4"
+    return PfmFile(path, width, height, start=match.end(), kind=kind, channels=channels)

@@ -1,0 +1,158 @@
+"""What Pillow reads: PNG, JPEG, TIFF, WebP and many more; the first picture of several."""
+
+import logging
+import struct
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.image_files.image_file import Curve, ImageFile, Strip, decoding, in_colour
+from reference_rt.util.files import open_input
+
+_SILENT = logging.NullHandler()
+
+_GREY_OF_16 = ("I", "I;16", "I;16B", "I;16L")
+
+_PNG = b"\x89PNG\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class PillowFile(ImageFile):
+    """mode: Pillow's, of what it makes of the pixels;  packed: how it takes them for packed in a
+    PNG file;  gamma: in the header of a PNG file that does not call itself sRGB, else None."""
+
+    mode: str = "RGB"
+    packed: str = ""
+    gamma: float | None = None
+
+    def strips(self, curve: Curve | None = None, with_opacity: bool = False) -> Iterator[Strip]:
+        if self.bits == 16 and self.mode not in _GREY_OF_16:
+            yield from self._deep_strips(decoding(16, curve), with_opacity)
+            return
+        values = None if self.mode == "F" else decoding(self.bits, curve)
+        image = _decoded(self.path)
+        for rows in self.row_ranges():
+            part = image.crop((0, rows.start, self.width, rows.stop))
+            if values is None:
+                yield Strip(rows, in_colour(np.asarray(part), curve), None)
+            elif self.bits == 16:
+                codes = np.asarray(part, np.int64)
+                if codes.min() < 0 or codes.max() > 65535:
+                    raise ValueError("has grey values of more than 16 bits; expected 8 or 16")
+                yield Strip(rows, in_colour(values[codes], None), None)
+            else:
+                codes = np.asarray(part.convert("RGBA"))
+                opacity = codes[..., 3] / 255.0 if self.has_opacity and with_opacity else None
+                yield Strip(rows, values[codes[..., :3]], opacity)
+
+    def _deep_strips(self, values: FloatArray, with_opacity: bool) -> Iterator[Strip]:
+        """Of a PNG file with 16 bits in each of several channels.
+
+        Of these, Pillow unpacks the high byte.  Told to take them for little-endian it unpacks the
+        low byte: two readings together are all 16 bits.  Of grey with opacity it unpacks all four
+        bytes when told that these are four channels.
+        """
+        if self.packed.startswith("LA"):
+            image = _decoded(self.path, "RGBA")
+            for rows in self.row_ranges():
+                part = image.crop((0, rows.start, self.width, rows.stop))
+                pairs = np.asarray(part).astype(np.int64)
+                grey, alpha = (256 * pairs[..., k] + pairs[..., k + 1] for k in (0, 2))
+                yield Strip(rows, in_colour(values[grey], None), alpha / 65535.0)
+            return
+        channels = 4 if with_opacity and self.has_opacity else 3
+        high = np.empty((self.height, self.width, channels), np.uint8)
+        image = _decoded(self.path)
+        for rows in self.row_ranges():
+            part = image.crop((0, rows.start, self.width, rows.stop))
+            high[rows] = np.asarray(part)[..., :channels]
+        del image  # before the next one is decoded
+        image = _decoded(self.path, self.packed.replace(";16B", ";16L"))
+        for rows in self.row_ranges():
+            part = image.crop((0, rows.start, self.width, rows.stop))
+            codes = 256 * high[rows].astype(np.int64) + np.asarray(part)[..., :channels]
+            opacity = codes[..., 3] / 65535.0 if channels == 4 else None
+            yield Strip(rows, values[codes[..., :3]], opacity)
+
+
+def open_with_pillow(path: Path) -> ImageFile:
+    """Raises ValueError (what is wrong, what was expected), OSError."""
+    with open_input(path) as file:
+        head = file.read(26)
+    is_png = head.startswith(_PNG)
+    if is_png and (len(head) < 26 or head[12:16] != b"IHDR"):
+        raise ValueError("cannot be read as PNG: no header; expected a whole image")
+    bits = struct.unpack(">B", head[24:25])[0] if is_png else 8
+    with _opened(path) as image:
+        mode, info = str(image.mode), image.info
+        packed = str(image.tile[0][3]) if image.tile else ""
+        is_deep = bits == 16 or any(";16" in str(tile[3]) for tile in image.tile)
+        if is_deep and not is_png and mode not in _GREY_OF_16:
+            raise ValueError(
+                "has colours of 16 bits, of which 8 would be lost; expected colours of 8, .png or "
+                ".exr"
+            )
+        gamma = info.get("gamma") if is_png and "srgb" not in info else None
+        return PillowFile(
+            path,
+            image.width,
+            image.height,
+            is_integer=mode != "F",
+            bits=16 if is_deep or mode in _GREY_OF_16 else 32 if mode == "F" else 8,
+            has_opacity=mode in ("RGBA", "LA", "PA", "La", "RGBa") or "transparency" in info,
+            text={str(key): value for key, value in info.items() if isinstance(value, str)},
+            mode=mode,
+            packed=packed,
+            gamma=gamma,
+        )
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Pillow's image, of which only the header has been read.  Raises ValueError, OSError."""
+    from PIL import Image, UnidentifiedImageError
+
+    # What Pillow logs of a damaged file would stand beside the one line of the error.
+    logging.getLogger("PIL").addHandler(_SILENT)
+    most = Image.MAX_IMAGE_PIXELS
+    try:
+        # Its limit is a constant; ours, of those who open a file, is the machine's memory.
+        Image.MAX_IMAGE_PIXELS = None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of odd metadata
+            with open_input(path) as file, Image.open(file) as image:
+                yield image
+    except UnidentifiedImageError:
+        raise ValueError("is not an image that can be read; expected one") from None
+    except (ValueError, OSError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        message = str(error)
+        raise ValueError(
+            message if "; expected" in message else _unreadable(message, error)
+        ) from None
+    except Exception as error:  # decoders raise what they like at rubbish
+        raise ValueError(_unreadable(str(error), error)) from None
+    finally:
+        Image.MAX_IMAGE_PIXELS = most
+
+
+def _unreadable(message: str, error: Exception) -> str:
+    reason = " ".join(message.split()) or type(error).__name__
+    return f"cannot be read: {reason}; expected a whole image"
+
+
+def _decoded(path: Path, packed: str | None = None) -> Any:
+    """Pillow's image with its pixels, taken for `packed` in the file.  Raises ValueError,
+    OSError."""
+    with _opened(path) as image:
+        if packed is not None:
+            image.tile = [(*tile[:3], packed) for tile in image.tile]
+        image.load()
+    return image

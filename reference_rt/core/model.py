@@ -1,0 +1,203 @@
+"""What every description in a scene file is made of: the frozen base model and the field types."""
+
+import ast
+import inspect
+import json
+import math
+import textwrap
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    Strict,
+    ValidationError,
+    WithJsonSchema,
+)
+
+from reference_rt.core.diagnosis import first_problem
+from reference_rt.core.numpy_fields import plain
+from reference_rt.util.errors import SceneError
+
+
+class Description(BaseModel):
+    """A frozen part of a scene.  Unknown keys, wrong types, NaN and infinity are errors.
+
+    In Python, arrays, NumPy scalars and paths stand for lists, numbers and strings.  Whatever is
+    wrong is a `SceneError`, whose `path` is the way to it from the description that is made.
+    """
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False
+    )
+    array_fields: ClassVar[frozenset[str]] = frozenset()
+    """The fields that keep arrays as arrays."""
+
+    def __init__(self, /, **fields: Any) -> None:
+        kept = type(self).array_fields
+        self._checked(
+            {name: v if name in kept else _plain(v) for name, v in fields.items()}, instance=self
+        )
+
+    # Without this, pydantic would call `__init__` for every part of a scene file: files hold plain
+    # data, and scenes of 100,000 shapes must not wait for the conversion.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def _checked(cls, data: Any, instance: Self | None = None) -> Self:
+        """A description from plain data.  Raises SceneError with the keys of the culprit."""
+        try:
+            found: Self = cls.__pydantic_validator__.validate_python(data, self_instance=instance)
+        except ValidationError as error:
+            raise SceneError(*first_problem(cls, error, data)) from None
+        return found
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """A description from a dictionary.  Raises SceneError, as making one does."""
+        data = _plain(obj)
+        try:
+            return super().model_validate(data, **options)
+        except ValidationError as error:
+            raise SceneError(*first_problem(cls, error, data)) from None
+
+    @classmethod
+    def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
+        """A description from JSON text.  Raises SceneError, as making one does."""
+        try:
+            data = json.loads(json_data)
+        except ValueError as error:
+            raise SceneError(f"malformed JSON: {error}") from None
+        return cls.model_validate(data, **options)
+
+    if not TYPE_CHECKING:  # type checkers know that fields are frozen
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            try:
+                super().__setattr__(name, value)
+            except ValidationError:
+                raise _frozen(self, name) from None
+
+        def __delattr__(self, name: str) -> None:
+            try:
+                super().__delattr__(name)
+            except ValidationError:
+                raise _frozen(self, name) from None
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: Any, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """The schema, with the strings below the fields as their descriptions.
+
+        `use_attribute_docstrings` would parse all sources whenever they are imported: 0.13 s of
+        every start.
+        """
+        schema = handler(core_schema)
+        properties = handler.resolve_ref_schema(schema).get("properties", {})
+        for model in reversed(cls.__mro__):
+            if issubclass(model, Description):
+                for field, text in _strings_below(model).items():
+                    if field in properties:
+                        properties[field]["description"] = text
+        return schema
+
+
+def _plain(value: Any) -> Any:
+    try:
+        return plain(value)
+    except RecursionError:
+        raise SceneError("nested too deeply; expected fewer levels") from None
+
+
+def _frozen(description: Description, name: str) -> SceneError:
+    kind = type(description).__name__
+    return SceneError(f"a {kind} is frozen; expected a new {kind} with another '{name}'", (name,))
+
+
+def _strings_below(cls: type) -> dict[str, str]:
+    """The string that stands below each annotated name in the body of a class."""
+    (tree,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+    assert isinstance(tree, ast.ClassDef)
+    return {
+        line.target.id: inspect.cleandoc(below.value.value)
+        for line, below in pairwise(tree.body)
+        if isinstance(line, ast.AnnAssign)
+        and isinstance(line.target, ast.Name)
+        and isinstance(below, ast.Expr)
+        and isinstance(below.value, ast.Constant)
+        and isinstance(below.value.value, str)
+    }
+
+
+def _three_numbers(value: Any) -> Any:
+    is_number = [isinstance(x, int | float) and not isinstance(x, bool) for x in _items(value)]
+    if len(is_number) != 3 or not all(is_number):
+        raise ValueError("expected three numbers [x, y, z]")
+    try:
+        return tuple(float(x) for x in value)
+    except OverflowError:
+        raise ValueError("expected finite numbers") from None
+
+
+def colour(value: Any) -> Any:
+    """Linear sRGB of at least 0 from one number or three.  Raises ValueError."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        value = (value, value, value)
+    try:
+        rgb = _three_numbers(value)
+    except ValueError:
+        raise ValueError("expected one number or three [r, g, b] (linear sRGB)") from None
+    if not all(x >= 0.0 for x in rgb):  # also refuses NaN
+        raise ValueError("expected numbers of at least 0")
+    return rgb
+
+
+def reflectance(value: Any) -> Any:
+    """The same, of at most 1."""
+    rgb = colour(value)
+    if max(rgb) > 1.0:
+        raise ValueError("expected numbers from 0 to 1: more would create energy")
+    return rgb
+
+
+def _unit_free_direction(value: Any) -> Any:
+    v = _three_numbers(value)
+    if not 0.0 < math.hypot(*v) < math.inf:
+        raise ValueError("expected a direction, which is not zero and of a finite length")
+    return v
+
+
+def _items(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+_Triple = Annotated[tuple[float, float, float], Strict(False)]
+_VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+
+
+def colour_schema(maximum: float | None) -> dict[str, Any]:
+    """The JSON Schema of a colour of at most `maximum`."""
+    number: dict[str, Any] = {"type": "number", "minimum": 0}
+    if maximum is not None:
+        number["maximum"] = maximum
+    return {"anyOf": [number, {**_VECTOR, "items": number}]}
+
+
+Vector = Annotated[_Triple, BeforeValidator(_three_numbers), WithJsonSchema(_VECTOR)]
+"""[x, y, z] in scene units."""
+
+Direction = Annotated[_Triple, BeforeValidator(_unit_free_direction), WithJsonSchema(_VECTOR)]
+"""[x, y, z], not zero, of any length."""
+
+Colour = Annotated[_Triple, BeforeValidator(colour), WithJsonSchema(colour_schema(None))]
+"""Linear sRGB, each at least 0; a single number stands for grey."""
+
+Reflectance = Annotated[_Triple, BeforeValidator(reflectance), WithJsonSchema(colour_schema(1.0))]
+"""Linear sRGB, each from 0 to 1; a single number stands for grey."""
+
+Positive = Annotated[float, Field(gt=0)]

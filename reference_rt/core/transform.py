@@ -1,0 +1,223 @@
+"""Affine maps: identity, translate, rotate, scale, look_at, compose, invert; and their YAML form.
+
+An affine map is a (3, 4) float64 array [A | b]: p -> A p + b for points, v -> A v for vectors,
+n -> A^-T n for normals.
+"""
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
+
+from reference_rt.core.model import Description, Direction, Vector
+
+Affine = npt.NDArray[np.float64]
+
+
+IDENTITY: Affine = np.eye(3, 4)
+
+FLAT = "the transform is singular: it flattens space; expected one that can be undone"
+"""What is said of a map that has no inverse."""
+
+
+def identity() -> Affine:
+    return IDENTITY.copy()
+
+
+def translate(offset: Vector) -> Affine:
+    return np.column_stack([np.eye(3), offset])
+
+
+def scale(factors: Vector) -> Affine:
+    return np.column_stack([np.diag(factors), np.zeros(3)])
+
+
+def rotate(axis: Direction, degrees: float) -> Affine:
+    """Rotation about `axis` through the origin, counter-clockwise seen against it (Rodrigues).
+
+    Quarter turns are exact: their sines and cosines are integers.
+    """
+    k = np.asarray(axis) / math.hypot(*axis)
+    quarter, rest = divmod(degrees, 90.0)
+    if rest == 0.0:
+        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter) % 4]
+    else:
+        c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    cross = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+    matrix = c * np.eye(3) + s * cross + (1.0 - c) * np.outer(k, k)
+    return np.column_stack([matrix, np.zeros(3)])
+
+
+def look_at(eye: Vector, target: Vector, up: Direction) -> Affine:
+    """The map whose columns are right, up, back, eye: the text-book's basis u, v, w at e.
+
+    w = -(target - eye) normalised, u = up x w normalised, v = w x u.  Raises ValueError where
+    these are not defined.
+    """
+    w = np.array([e - t for e, t in zip(eye, target, strict=True)], np.float64)
+    distance = math.hypot(*w)
+    if distance == 0.0:
+        raise ValueError("eye and target are the same point; expected two")
+    if distance == math.inf:
+        raise ValueError("eye and target are too far apart; expected a finite distance")
+    w /= distance
+    u = np.cross(np.asarray(up) / math.hypot(*up), w)
+    # The sine of the angle between up and w: below this its direction is rounding error alone.
+    sine = math.hypot(*u)
+    if sine < 16.0 * np.finfo(float).eps:
+        raise ValueError("up is parallel to the view direction; expected another direction")
+    u /= sine
+    return np.column_stack([u, np.cross(w, u), w, eye])
+
+
+def compose(*maps: Affine) -> Affine:
+    """The map that applies `maps` in the order given: the first one first."""
+    total = identity()
+    for m in maps:
+        total = np.column_stack([m[:, :3] @ total[:, :3], m[:, :3] @ total[:, 3] + m[:, 3]])
+    return total
+
+
+def invert(m: Affine) -> Affine:
+    """The inverse map.  Raises ValueError where the map flattens space."""
+    linear = m[:, :3]
+    # Row scaling removes the units of each axis: what is left of the condition number beyond 1/u
+    # means that the rows are dependent to within float64's own rounding.
+    norms = np.abs(linear).max(axis=1)
+    if not (np.all(np.isfinite(m)) and np.all(norms > 0.0)):
+        raise ValueError(FLAT)
+    if np.linalg.cond(linear / norms[:, None]) > 2.0**52:
+        raise ValueError(FLAT)
+    inverse = np.linalg.inv(linear)
+    return np.column_stack([inverse, -inverse @ m[:, 3]])
+
+
+def mirrors(m: Affine) -> bool:
+    """Whether the map turns right-handed into left-handed."""
+    return bool(np.linalg.slogdet(m[:, :3])[0] < 0.0)  # determinants of extreme scales overflow
+
+
+def apply_points(m: Affine, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """(n, 3) points, mapped: each by the same operations, so that equal points stay equal.
+
+    A product of matrices rounds by where in the array a point stands.
+    """
+    x, y, z = points[:, :1], points[:, 1:2], points[:, 2:]
+    return np.asarray(x * m[:, 0] + y * m[:, 1] + z * m[:, 2] + m[:, 3])
+
+
+def apply_normals(m: Affine, normals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """(n, 3) unit normals, mapped by the inverse transpose and made unit again."""
+    mapped = normals @ invert(m)[:, :3]
+    mapped /= np.abs(mapped).max(axis=1, keepdims=True)  # squares of extreme scales overflow
+    return np.asarray(mapped / np.linalg.norm(mapped, axis=1, keepdims=True))
+
+
+# ---- the YAML form ------------------------------------------------------------------------------
+
+
+class Translate(Description):
+    """Moves by [x, y, z]."""
+
+    translate: Vector
+
+    def matrix_of(self) -> Affine:
+        return translate(self.translate)
+
+
+def _factors(value: Any) -> Any:
+    return (value,) * 3 if isinstance(value, int | float) else value
+
+
+class Scale(Description):
+    """Scales by one factor, or by three along the axes."""
+
+    scale: Annotated[
+        Vector,
+        BeforeValidator(_factors),
+        WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "array"}]}),
+    ]
+
+    def matrix_of(self) -> Affine:
+        return scale(self.scale)
+
+
+class Turn(Description):
+    """An axis and an angle in degrees, counter-clockwise seen against the axis."""
+
+    axis: Direction
+    degrees: float
+
+
+class Rotate(Description):
+    """Rotates about an axis through the origin."""
+
+    rotate: Turn
+
+    def matrix_of(self) -> Affine:
+        return rotate(self.rotate.axis, self.rotate.degrees)
+
+
+def _rows(value: Any) -> Any:
+    """The three rows of a matrix (3, 4), or of an affine one (4, 4)."""
+    rows = list(value) if isinstance(value, list | tuple) else []
+    if len(rows) not in (3, 4) or not all(map(_is_row, rows)):
+        raise ValueError("expected three rows of four numbers, or four of an affine matrix")
+    if len(rows) == 4 and list(rows.pop()) != [0.0, 0.0, 0.0, 1.0]:
+        raise ValueError("expected an affine matrix, whose last row is [0, 0, 0, 1]")
+    return tuple(map(tuple, rows))
+
+
+def _is_row(value: Any) -> bool:
+    return isinstance(value, list | tuple) and len(value) == 4
+
+
+Row = tuple[float, float, float, float]
+
+
+class Matrix(Description):
+    """Applies a (3, 4) matrix [A | b], given by rows; or a (4, 4) one with the last row 0 0 0 1."""
+
+    matrix: Annotated[
+        tuple[Row, Row, Row], BeforeValidator(_rows), WithJsonSchema({"type": "array"})
+    ]
+
+    def matrix_of(self) -> Affine:
+        return np.array(self.matrix)
+
+
+def _kind_of_step(step: Any) -> str | None:
+    keys = list(step if isinstance(step, dict) else getattr(type(step), "model_fields", ()))
+    return str(keys[0]) if len(keys) == 1 else None
+
+
+Step = Annotated[
+    Annotated[Translate, Tag("translate")]
+    | Annotated[Scale, Tag("scale")]
+    | Annotated[Rotate, Tag("rotate")]
+    | Annotated[Matrix, Tag("matrix")],
+    Discriminator(
+        _kind_of_step,
+        custom_error_type="transform_step",
+        custom_error_message="expected one of 'translate', 'scale', 'rotate', 'matrix'",
+    ),
+]
+
+
+def _steps(value: Any) -> Any:
+    """A matrix alone as a list of one step."""
+    if isinstance(value, list | tuple) and value and all(map(_is_row, value)):
+        return ({"matrix": value},)
+    return value
+
+
+Transform = Annotated[tuple[Step, ...], Field(strict=False), BeforeValidator(_steps)]
+"""A list of steps, applied in the order written: the first one first; or one matrix, as in
+`Matrix`."""
+
+
+def affine(steps: Transform) -> Affine:
+    """The map that a description's transform stands for."""
+    return compose(*(step.matrix_of() for step in steps))

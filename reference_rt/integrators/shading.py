@@ -1,0 +1,65 @@
+"""From a hit to what materials are asked about: the point, its frame, where textures are asked."""
+
+from reference_rt.accel.geometry import Geometry, coordinates, surface, tangents
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import Hit, Ray
+from reference_rt.core.vec3 import Frame, Vec3, frame_from_normal, to_local
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit.kernel import kernel
+from reference_rt.materials import Shading, asks_textures, prepare
+from reference_rt.materials.frame import oriented_frame
+from reference_rt.materials.textured import look, looked_floats
+from reference_rt.shapes.shape import Tangents
+from reference_rt.textures import At, Textures
+
+_NO_COLOUR = Vec3(-1.0, -1.0, -1.0)
+
+
+@kernel
+def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
+    """What the material at a hit (which must be one) is asked about, seen along the ray.
+
+    `kept` (`materials.kept_floats`,) is scratch that the answer lives in.
+    """
+    point = surface(scene.geometry, ray, hit)
+    world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
+    frame = _frame(scene.materials.oriented, point.ns, world)
+    local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))
+    at = _place(scene, point.material, ray, hit)
+    looked = look(scene.materials.textured, point.material, at, kept)
+    layers = kept[looked_floats(scene.materials.textured) :]
+    shading = Shading(point, frame, to_local(frame, -ray.d), looked, local, layers)
+    prepare(scene.materials, shading, at)
+    return shading
+
+
+@kernel
+def _place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
+    """Where the textures of material m are asked at a hit; anywhere, if it has none."""
+    if not asks_textures(scene.materials, m):
+        return At(scene.textures, 0.0, 0.0, _NO_COLOUR)
+    return texture_place(scene.textures, scene.geometry, ray, hit)
+
+
+@kernel
+def texture_place(textures: Textures | None, geometry: Geometry, ray: Ray, hit: Hit) -> At:
+    """Where textures are asked at a hit: computed only where the scene has any."""
+    if textures is None:
+        return At(textures, 0.0, 0.0, _NO_COLOUR)
+    found = coordinates(geometry, ray, hit)
+    return At(textures, found.u, found.v, found.colour)
+
+
+@kernel
+def _tangents(oriented: IntArray | None, geometry: Geometry, ray: Ray, hit: Hit) -> Tangents:
+    if oriented is None:
+        zero = Vec3(0.0, 0.0, 0.0)
+        return Tangents(zero, zero)
+    return tangents(geometry, ray, hit)
+
+
+@kernel
+def _frame(oriented: IntArray | None, ns: Vec3, world: Tangents) -> Frame:
+    if oriented is None:
+        return frame_from_normal(ns)
+    return oriented_frame(ns, world)

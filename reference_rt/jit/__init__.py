@@ -1,0 +1,1 @@
+"""The compiler: which functions Numba compiles, how, and where compiled kernels are cached."""

@@ -1,0 +1,189 @@
+"""`@kernel`, `@entry_kernel`: the one way to compile; `ByClass` for choice.
+
+Compiled code is kept on disk (`kernel_cache.py`).
+
+A kernel is plain scalar code on floats, integers, arrays and NamedTuples of these.  With
+``NUMBA_DISABLE_JIT=1`` the same text runs as plain Python with bit-identical results; the rules
+that this asks for are few:
+
+- IEEE arithmetic only: no fastmath, no ``**`` (Python's ``pow`` and LLVM's differ in the last bit);
+- no allocation: arrays come from outside, scratch from `local_floats` and `local_integers`;
+- integers that wrap are ``np.uint64`` throughout, constants included;
+- ``math.sqrt`` of what may be negative, and division of two Python floats by what may be zero,
+  are guarded (`reciprocal`): Python raises where the machine returns NaN or infinity.
+"""
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from numba import njit, types
+from numba.extending import intrinsic, overload, register_jitable
+from numba.np import arrayobj
+
+from reference_rt.jit import compiler
+from reference_rt.jit.kernel_cache import KernelCache, prepare_folder
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+COMPILER = compiler.choose()
+
+CACHE_FOLDER = prepare_folder(COMPILER.name)
+
+
+def kernel(function: F) -> F:
+    """Let compiled code call `function`, inlined; called from Python it runs as plain Python.
+
+    IEEE arithmetic in the order written.  The machine's calling convention would pass the scene's
+    tables field by field, some 400 words a call: hence the inlining (measured: 1.5 times faster).
+    How it comes about, without compiling anything twice, is in `jit/numba_pipeline.py`;
+    `compiler.py` chooses between that and Numba's own compiler.
+    """
+    inlined: F = register_jitable(**COMPILER.kernel)(function)
+    return inlined
+
+
+def overload_kernel(function: Any) -> Callable[[F], F]:
+    """`numba.extending.overload` for what kernels call: decorates a function of the types of the
+    arguments that returns the kernel to be run for them, None for none."""
+    decorate: Callable[[F], F] = overload(function, jit_options=COMPILER.kernel, strict=False)
+    return decorate
+
+
+def entry_kernel(function: F) -> F:
+    """Compile `function`, which Python calls with arrays, on first call for each set of argument
+    types; keep the result on disk.  Releases the GIL."""
+    compiled: F = njit(**COMPILER.entry)(function)
+    if CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
+        with suppress(OSError):  # without a source file
+            compiled._cache = KernelCache(function, CACHE_FOLDER)  # type: ignore[attr-defined]
+    return compiled
+
+
+Signature = tuple[Any, ...]
+"""The types of a kernel's arguments."""
+
+
+def signature_of(*args: Any) -> Signature:
+    """Numba's types of arguments: of a scene's tables more than 1 ms (measured)."""
+    return () if numba.config.DISABLE_JIT else tuple(numba.typeof(a) for a in args)
+
+
+def precompile(compiled: Callable[..., Any], signature: Signature) -> Callable[..., Any]:
+    """Compile `compiled` for arguments of these types, or load it from the cache, without running
+    it.
+
+    What is returned runs it for such arguments, which must be right: of a scene's tables Numba asks
+    some 400 types at every call otherwise (34 us against 2, measured).
+    """
+    if numba.config.DISABLE_JIT:
+        return compiled
+    ready: Callable[..., Any] = compiled.compile(signature)  # type: ignore[attr-defined]
+    return ready
+
+
+def is_compiled(compiled: Callable[..., Any], signature: Signature) -> bool:
+    """Whether it is compiled for arguments of these types, in this process or in the cache."""
+    if numba.config.DISABLE_JIT or signature in compiled.overloads:  # type: ignore[attr-defined]
+        return True
+    cache, codegen = compiled._cache, compiled.targetctx.codegen()  # type: ignore[attr-defined]
+    return isinstance(cache, KernelCache) and cache.has(signature, codegen)
+
+
+def is_named_tuple(numba_type: Any, cls: type) -> bool:
+    """Whether a Numba type is that of instances of the NamedTuple `cls`."""
+    return isinstance(numba_type, types.BaseNamedTuple) and numba_type.instance_class is cls
+
+
+class ByClass:
+    """A function that runs the kernel registered for the class of its first argument.
+
+    For choices made once per render (camera, sampler, filter, integrator; a table or its absence):
+    the first argument is a NamedTuple or None, its class is known when the caller compiles, and the
+    choice costs nothing at run time.  Register kernels with `register`; see `reference_rt.cameras`.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._kernels: dict[type, Callable[..., Any]] = {}
+
+        def choose(first: Any, *rest: Any) -> Any:
+            return self._kernels[type(first)](first, *rest)
+
+        choose.__name__ = name
+        self.function: Callable[..., Any] = choose
+
+        @overload_kernel(choose)
+        def _compiled(first: Any, *rest: Any) -> Callable[..., Any] | None:
+            for cls, function in self._kernels.items():
+                if is_named_tuple(first, cls) or (
+                    cls is type(None) and isinstance(first, types.NoneType)
+                ):
+                    return function
+            return None
+
+    def register(self, cls: type, function: Callable[..., Any]) -> None:
+        """Run `function` where the first argument is a `cls`; type(None) stands for None."""
+        self._kernels[cls] = function
+
+
+def _local_array(dtype: Any) -> Any:
+    """An intrinsic that makes an uninitialised 1-D array on the machine's stack.
+
+    It lives as long as the kernel that asks for it, once per call: not inside loops.
+    """
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def allocate(typing_context: Any, n: Any) -> Any:
+        array_type = types.Array(dtype, 1, "C")
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            item = context.get_data_type(dtype)
+            data = builder.alloca(item, size=arguments[0])
+            data.align = 64  # a line of the cache: vectors that cross its end take longer
+            item_size = context.get_constant(types.intp, context.get_abi_sizeof(item))
+            array = context.make_array(array_type)(context, builder)
+            arrayobj.populate_array(
+                array,
+                data=data,
+                shape=[arguments[0]],
+                strides=[item_size],
+                itemsize=item_size,
+                meminfo=None,
+            )
+            return array._getvalue()
+
+        return array_type(types.intp), generate
+
+    return allocate
+
+
+if numba.config.DISABLE_JIT:
+
+    def local_floats(n: int) -> npt.NDArray[np.float64]:
+        """Scratch for `n` floats that lives as long as the calling kernel; not for use in loops."""
+        return np.empty(n)
+
+    def local_integers(n: int) -> npt.NDArray[np.int64]:
+        """Scratch for `n` integers, likewise."""
+        return np.empty(n, np.int64)
+
+    def local_naturals(n: int) -> npt.NDArray[np.uint32]:
+        """Scratch for `n` integers that are not negative, likewise."""
+        return np.empty(n, np.uint32)
+
+else:
+    local_floats = _local_array(types.float64)
+    local_integers = _local_array(types.int64)
+    local_naturals = _local_array(types.uint32)
+
+
+@kernel
+def reciprocal(x: float) -> float:
+    """1/x as IEEE says, 1/±0 = ±inf, also in plain Python."""
+    if x == 0.0:
+        return math.copysign(math.inf, x)
+    return 1.0 / x

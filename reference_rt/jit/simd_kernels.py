@@ -1,0 +1,180 @@
+"""Texts for LANES numbers at once as functions that kernels call: see `lanes`."""
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from reference_rt.jit.simd import I32, I64, LANES, REALS, Lanes, in_all_lanes
+
+
+class _Index:
+    """An integer of the code that is being written."""
+
+    def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
+        self.builder, self.value = builder, value
+
+    def of(self, x: Any) -> ir.Value:
+        return x.value if isinstance(x, _Index) else I64(x)
+
+    def __add__(self, other: Any) -> "_Index":
+        return _Index(self.builder, self.builder.add(self.value, self.of(other)))
+
+    def __mul__(self, other: Any) -> "_Index":
+        return _Index(self.builder, self.builder.mul(self.value, self.of(other)))
+
+    def __rsub__(self, other: Any) -> "_Index":
+        return _Index(self.builder, self.builder.sub(self.of(other), self.value))
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+class _Memory:
+    """An array of which LANES numbers are loaded and stored at once."""
+
+    def __init__(self, builder: ir.IRBuilder, data: ir.Value, is_single: bool) -> None:
+        self.builder, self.data, self.is_single = builder, data, is_single
+
+    def load(self, start: Any) -> Lanes:
+        of = ir.VectorType(ir.FloatType(), LANES) if self.is_single else REALS
+        value = self.builder.load(self._place(start, of), align=4 if self.is_single else 8)
+        return Lanes(self.builder, self.builder.fpext(value, REALS) if self.is_single else value)
+
+    def everywhere(self, i: Any) -> Lanes:
+        value = self.builder.load(self._place(i, ir.DoubleType()))
+        return Lanes(self.builder, in_all_lanes(self.builder, value))
+
+    def natural(self, i: Any) -> _Index:
+        value = self.builder.load(self._place(i, I32))
+        return _Index(self.builder, self.builder.zext(value, I64))
+
+    def store(self, start: Any, lanes: Lanes) -> None:
+        self.builder.store(lanes.value, self._place(start, REALS), align=8)
+
+    def _place(self, start: Any, of: ir.Type) -> ir.Value:
+        at = start.value if isinstance(start, _Index) else I64(start)
+        return self.builder.bitcast(self.builder.gep(self.data, [at]), of.as_pointer())
+
+
+class _PlainMemory:
+    def __init__(self, array: Any) -> None:
+        self.flat = array.reshape(-1)
+
+    def load(self, start: int) -> Any:
+        return self.flat[start : start + LANES].astype(np.float64)
+
+    def everywhere(self, i: int) -> Any:
+        return np.full(LANES, self.flat[i])
+
+    def natural(self, i: int) -> int:
+        return int(self.flat[i])
+
+    def store(self, start: int, lanes: Any) -> None:
+        self.flat[start : start + LANES] = lanes
+
+
+def _conditions(found: Any) -> tuple[Any, ...]:
+    return found if isinstance(found, tuple) else (found,)
+
+
+def plain(function: Callable[..., Any]) -> Callable[..., int]:
+    """A lane kernel as plain Python on NumPy's arrays."""
+
+    @functools.wraps(function)
+    def run(*arguments: Any) -> int:
+        wrapped: list[Any] = [
+            _PlainMemory(a)
+            if isinstance(a, np.ndarray)
+            else (np.full(LANES, a) if isinstance(a, float) else int(a))
+            for a in arguments
+        ]
+        lanes = np.concatenate(_conditions(function(*wrapped)))
+        return int.from_bytes(np.packbits(lanes, bitorder="little").tobytes(), "little")
+
+    return run
+
+
+def lane_kernel(function: Callable[..., Any]) -> Callable[..., int]:
+    """Let kernels call `function`, which returns the lanes that fulfil a condition, as bits; of
+    several conditions the first's are the lowest.
+
+    Its arguments are C-contiguous arrays of float64 or float32, with load(i) of LANES numbers from
+    number i on, everywhere(i) of number i in every lane, and store(i, lanes) (float64 only), or of
+    uint32, with natural(i); float64 numbers, which stand in every lane; and integers, which may be
+    added and multiplied.
+    """
+    if numba.config.DISABLE_JIT:
+        return plain(function)
+
+    def typed(typing_context: Any, *arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            written: list[Any] = []
+            for of, value in zip(signature.args, values, strict=True):
+                if isinstance(of, types.Array):
+                    data = context.make_array(of)(context, builder, value).data
+                    written.append(_Memory(builder, data, of.dtype == types.float32))
+                elif of == types.float64:
+                    written.append(Lanes(builder, in_all_lanes(builder, value)))
+                else:
+                    written.append(_Index(builder, value))
+            bits = I64(0)
+            for k, condition in enumerate(_conditions(function(*written))):
+                of_lanes = builder.bitcast(condition.value, ir.IntType(LANES))
+                bits = builder.or_(bits, builder.shl(builder.zext(of_lanes, I64), I64(k * LANES)))
+            return bits
+
+        return types.int64(*map(_taken_as, arguments)), generate
+
+    # Numba asks how many arguments there are.
+    names = ("typing_context", *inspect.signature(function).parameters)
+    kind = inspect.Parameter.POSITIONAL_ONLY
+    typed.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [inspect.Parameter(name, kind) for name in names]
+    )
+    made: Callable[..., int] = intrinsic(typed)
+    return made
+
+
+def _taken_as(of: Any) -> Any:
+    if isinstance(of, types.Array):
+        return of
+    return types.float64 if isinstance(of, types.Float) else types.int64
+
+
+if numba.config.DISABLE_JIT:
+
+    def lowest(bits: int) -> int:
+        """The number of the lowest bit that is set (one must be)."""
+        return int(bits & -bits).bit_length() - 1
+
+    def prefetch(array: Any, start: int) -> None:
+        """Ask for a number of an array, which will be read soon."""
+
+else:
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def lowest(typing_context: Any, bits: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            return builder.cttz(values[0], ir.IntType(1)(1))
+
+        return types.int64(types.int64), generate
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def prefetch(typing_context: Any, array: Any, start: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            data = context.make_array(array)(context, builder, values[0]).data
+            byte = ir.IntType(8).as_pointer()
+            of_type = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
+            function = builder.module.declare_intrinsic("llvm.prefetch", [byte], of_type)
+            place = builder.bitcast(builder.gep(data, [values[1]]), byte)
+            # To be read, kept in all caches, data.
+            builder.call(function, [place, I32(0), I32(3), I32(1)])
+            return context.get_dummy_value()
+
+        return types.void(array, types.int64), generate

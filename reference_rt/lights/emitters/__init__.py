@@ -1,0 +1,1 @@
+"""The types of lights, one to a file."""

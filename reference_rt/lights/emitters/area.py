@@ -1,0 +1,99 @@
+"""Area lights: every primitive whose material is emissive."""
+
+import math
+from typing import NamedTuple
+
+from reference_rt import shapes as any_shape
+from reference_rt.accel.geometry import colour
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import Hit, Ray, SurfacePoint
+from reference_rt.core.vec3 import Vec3, dot
+from reference_rt.jit.kernel import kernel
+from reference_rt.lights.light import LightSample, no_light
+from reference_rt.shapes import Shapes
+from reference_rt.shapes.shape import LightPoint
+from reference_rt.textures import At, Colours, Textures, colour_at
+
+
+class Areas(NamedTuple):
+    """n emissive primitives: kind and row say which, radiance (n), area (n,), inf for one that only
+    scattered rays find: the choice gives it no probability."""
+
+    kind: IntArray
+    row: IntArray
+    radiance: Colours
+    area: FloatArray
+
+
+@kernel
+def sample(
+    areas: Areas, i: int, shapes: Shapes, textures: Textures | None, p: Vec3, u0: float, u1: float
+) -> LightSample:
+    """A point of the light's surface; only its front shines."""
+    q = any_shape.sample(shapes, areas.kind[i], areas.row[i], areas.area[i], p, u0, u1)
+    return _from_point(areas, i, shapes, textures, p, q)
+
+
+@kernel
+def middle(areas: Areas, i: int, shapes: Shapes, textures: Textures | None, p: Vec3) -> LightSample:
+    """The one point that stands for all of the light."""
+    q = any_shape.middle(shapes, areas.kind[i], areas.row[i], areas.area[i], p)
+    return _from_point(areas, i, shapes, textures, p, q)
+
+
+@kernel
+def _from_point(
+    areas: Areas, i: int, shapes: Shapes, textures: Textures | None, p: Vec3, q: LightPoint
+) -> LightSample:
+    if q.pdf == 0.0:
+        return no_light()
+    w = q.p - p
+    distance = math.sqrt(dot(w, w))
+    at = _place(textures, areas, i, shapes, p, w, q)
+    return LightSample(
+        w * (1.0 / distance),
+        colour_at(areas.radiance, i, at),
+        q.pdf,
+        q.p + q.n * q.error,
+        distance,
+        False,
+    )
+
+
+@kernel
+def _place(
+    textures: Textures | None,
+    areas: Areas,
+    i: int,
+    shapes: Shapes,
+    p: Vec3,
+    w: Vec3,
+    q: LightPoint,
+) -> At:
+    """Where textures are asked at a point q of light i."""
+    none = Vec3(-1.0, -1.0, -1.0)
+    if textures is None:
+        return At(textures, 0.0, 0.0, none)
+    hit = Hit(1.0, areas.kind[i], areas.row[i], q.u, q.v, -1)
+    u, v = any_shape.uv(shapes, Ray(p, w, math.inf), hit)
+    return At(textures, u, v, colour(shapes, hit, none))
+
+
+@kernel
+def pdf(areas: Areas, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> float:
+    """The density per solid angle with which `sample` picks, from `p`, the point `q` on light i."""
+    return any_shape.pdf(shapes, areas.kind[i], areas.row[i], areas.area[i], p, q)
+
+
+@kernel
+def emitted(areas: Areas | None, q: SurfacePoint, at: At, w: Vec3) -> Vec3:
+    """The radiance that the surface at `q` emits towards `w`.
+
+    The front is the geometric one: a shading normal does not change where light comes from.
+    Mitsuba asks the shading normal.
+    """
+    if areas is None:
+        return Vec3(0.0, 0.0, 0.0)
+    if q.light < 0 or dot(q.n, w) <= 0.0:
+        return Vec3(0.0, 0.0, 0.0)
+    return colour_at(areas.radiance, q.light, at)

@@ -1,0 +1,49 @@
+"""Point light: equal intensity to all sides."""
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Colour, Description, Vector
+from reference_rt.core.vec3 import Vec3, dot, luminance, row
+from reference_rt.jit.kernel import kernel
+from reference_rt.lights.light import LightSample, no_light
+
+
+class Point(Description):
+    """A point that shines equally to all sides."""
+
+    type: Literal["point"] = "point"
+    position: Vector
+    intensity: Colour
+    """Radiant intensity, W sr^-1, linear sRGB."""
+
+    def tabulate(self) -> "Points":
+        return Points(np.array([self.position]), np.array([self.intensity]))
+
+
+class Points(NamedTuple):
+    """position (n, 3), intensity (n, 3) in W sr^-1."""
+
+    position: FloatArray
+    intensity: FloatArray
+
+
+@kernel
+def sample(points: Points, i: int, p: Vec3) -> LightSample:
+    """The one direction; intensity / distance² arrives (the inverse square law)."""
+    target = row(points.position, i)
+    w = target - p
+    distance2 = dot(w, w)
+    if distance2 == 0.0:
+        return no_light()  # no direction leads there
+    distance = math.sqrt(distance2)
+    radiance = row(points.intensity, i) * (1.0 / distance2)
+    return LightSample(w * (1.0 / distance), radiance, 1.0, target, distance, True)
+
+
+def power(points: Points, scene_radius: float) -> FloatArray:
+    """Luminance of the power (n,): 4 pi I."""
+    return np.asarray(4.0 * math.pi * luminance(Vec3(*points.intensity.T)))

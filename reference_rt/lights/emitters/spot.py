@@ -1,0 +1,107 @@
+"""Spot light: a point that shines into a cone, less towards its rim."""
+
+import math
+from typing import Annotated, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Colour, Description, Vector
+from reference_rt.core.vec3 import Vec3, cross, dot, length, luminance, row
+from reference_rt.jit.kernel import kernel
+from reference_rt.lights.light import LightSample, no_light
+
+
+class Spot(Description):
+    """A point that shines from `origin` towards `target`: with its whole intensity within
+    `beam_width` of the axis, with none beyond `cutoff_angle`, linear in the angle between the two.
+    """
+
+    type: Literal["spot"] = "spot"
+    origin: Vector
+    target: Vector
+    intensity: Colour
+    """Radiant intensity on the axis, W sr^-1, linear sRGB."""
+    cutoff_angle: Annotated[float, Field(gt=0, le=180)] = 20.0
+    """Degrees from the axis: half of the cone's opening."""
+    beam_width: Annotated[float, Field(ge=0, le=180)] | None = None
+    """Degrees from the axis; none stands for three quarters of the cutoff."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not 0.0 < math.dist(self.origin, self.target) < math.inf:
+            raise ValueError("origin and target give no direction; expected two different points")
+        if self.beam_width is not None and self.beam_width > self.cutoff_angle:
+            raise ValueError(
+                f"beam_width {self.beam_width:g} is more than cutoff_angle {self.cutoff_angle:g}; "
+                "expected at most that"
+            )
+        return self
+
+    def tabulate(self) -> "Spots":
+        axis = np.subtract(self.target, self.origin) / math.dist(self.target, self.origin)
+        beam = 0.75 * self.cutoff_angle if self.beam_width is None else self.beam_width
+        return Spots(
+            position=np.array([self.origin]),
+            axis=axis[None],
+            intensity=np.array([self.intensity]),
+            cutoff=np.array([math.radians(self.cutoff_angle)]),
+            beam=np.array([math.radians(beam)]),
+        )
+
+
+class Spots(NamedTuple):
+    """position (n, 3), unit axis (n, 3), intensity (n, 3) in W sr^-1; the angles from the axis
+    where the light ends and where it begins to fall off, cutoff (n,) and beam (n,), radians."""
+
+    position: FloatArray
+    axis: FloatArray
+    intensity: FloatArray
+    cutoff: FloatArray
+    beam: FloatArray
+
+
+@kernel
+def falloff(spots: Spots, i: int, w: Vec3) -> float:
+    """The part of the intensity that goes towards `w` of any length.
+
+    The angle from sine and cosine: from the cosine alone it would lose half of its digits near the
+    axis.
+    """
+    axis = row(spots.axis, i)
+    angle = math.atan2(length(cross(axis, w)), dot(axis, w))
+    if angle <= spots.beam[i]:
+        return 1.0
+    if angle >= spots.cutoff[i]:
+        return 0.0
+    return float((spots.cutoff[i] - angle) / (spots.cutoff[i] - spots.beam[i]))
+
+
+@kernel
+def sample(spots: Spots, i: int, p: Vec3) -> LightSample:
+    """The one direction; intensity / distance² arrives, as from a point light."""
+    target = row(spots.position, i)
+    w = target - p
+    distance2 = dot(w, w)
+    if distance2 == 0.0:
+        return no_light()  # no direction leads there
+    distance = math.sqrt(distance2)
+    shining = falloff(spots, i, -w)
+    radiance = row(spots.intensity, i) * (shining / distance2)
+    pdf = 1.0 if shining > 0.0 else 0.0
+    return LightSample(w * (1.0 / distance), radiance, pdf, target, distance, True)
+
+
+def power(spots: Spots, scene_radius: float) -> FloatArray:
+    """Luminance of the power (n,): 2 pi I times the integral of the falloff f sin from 0 to the
+    cutoff c, which with the beam's edge b is 1 - (sin c - sin b) / (c - b).
+
+    Written with the middle m and half the width h of the ring, 1 - cos m sin h / h, for h = 0 too;
+    that as 2 sin²(m/2) + cos m (1 - sin h / h), which is not 0 for the thinnest beam.
+    """
+    middle = 0.5 * (spots.cutoff + spots.beam)
+    half_width = 0.5 * (spots.cutoff - spots.beam)
+    integral = 2.0 * np.sin(0.5 * middle) ** 2
+    integral += np.cos(middle) * (1.0 - np.sinc(half_width / math.pi))
+    return np.asarray(2.0 * math.pi * integral * luminance(Vec3(*spots.intensity.T)))

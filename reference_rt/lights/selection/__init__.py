@@ -1,0 +1,1 @@
+"""Light samplers: which light a shadow ray is sent to."""

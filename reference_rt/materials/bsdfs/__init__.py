@@ -1,0 +1,1 @@
+"""The materials that scatter by a law of their own, one to a file."""

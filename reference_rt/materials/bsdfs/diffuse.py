@@ -1,0 +1,64 @@
+"""Diffuse: Lambert's law, f = reflectance / pi, on the front side."""
+
+from typing import ClassVar, Literal, NamedTuple
+
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.kernel import kernel
+from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
+from reference_rt.sampling.warp import cosine_hemisphere
+from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+
+
+class Diffuse(Material):
+    """Scatters equally to all sides of its front; its back is black."""
+
+    smooth: ClassVar[bool] = True
+    chooses: ClassVar[bool] = False
+    type: Literal["diffuse"] = "diffuse"
+    reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
+
+    @property
+    def colour(self) -> tuple[float, float, float] | str:
+        return self.reflectance
+
+    def tabulate(self, palette: Palette) -> "Diffuses":
+        return Diffuses(palette.colours(self.reflectance))
+
+
+class Diffuses(NamedTuple):
+    """reflectance (n), linear sRGB."""
+
+    reflectance: Colours
+
+
+@kernel
+def both(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """`evaluate` and `pdf`, with one question after the sides (measured: 1 % of spheres under a
+    sky)."""
+    if wo.z <= 0.0 or wi.z <= 0.0:
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    density = wi.z * INV_PI
+    return Scattered(colour_at(diffuses.reflectance, i, at) * density, density)
+
+
+@kernel
+def evaluate(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
+    """f(wo, wi) cos wi."""
+    return both(diffuses, i, at, wo, wi).value
+
+
+@kernel
+def pdf(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
+    """The density of `sample` per solid angle: cos wi / pi."""
+    return both(diffuses, i, at, wo, wi).density
+
+
+@kernel
+def sample(
+    diffuses: Diffuses, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
+) -> BsdfSample:
+    """A direction with density cos / pi: the weight is the reflectance."""
+    if wo.z <= 0.0:
+        return no_sample()
+    wi = cosine_hemisphere(u0, u1)
+    return BsdfSample(wi, colour_at(diffuses.reflectance, i, at), wi.z * INV_PI, 1.0, False)

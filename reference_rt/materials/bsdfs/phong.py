@@ -1,0 +1,220 @@
+"""Phong: the text-book's local shading (Phong 1975; Blinn 1977 with the half vector).
+
+    f cos = k_d max(0, l·n) + k_s max(0, e·r)^p      r: the direction of the light l mirrored at n
+    f cos = k_d max(0, l·n) + k_s max(0, h·n)^p      h: half way between l and e (`half_vector`)
+
+for lights in front of the surface.  The highlight is not multiplied with the cosine, so that f is
+not reciprocal (f cos is symmetric instead), and nothing keeps the sum of the constants from
+creating energy: see `energy_bound`.
+"""
+
+import math
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.model import Positive
+from reference_rt.core.vec3 import (
+    Vec3,
+    dot,
+    frame_from_normal,
+    max_component,
+    normalize,
+    reflect,
+    to_world,
+)
+from reference_rt.jit.kernel import kernel
+from reference_rt.materials.material import (
+    INV_PI,
+    Branches,
+    BsdfSample,
+    Material,
+    no_branches,
+    no_sample,
+    reflection,
+)
+from reference_rt.sampling.warp import cosine_hemisphere, on_circle
+from reference_rt.textures import At, ColourParameter, Colours, Palette, colour_at
+
+
+class Phong(Material):
+    """Ambient, diffuse and specular constants, and a mirror; its back is black."""
+
+    smooth: ClassVar[bool] = True
+    delta: ClassVar[bool] = True
+    type: Literal["phong"] = "phong"
+    ambient: ColourParameter = (0.0, 0.0, 0.0)
+    """k_a: of the ambient light, in Whitted's integrator."""
+    diffuse: ColourParameter
+    """k_d."""
+    specular: ColourParameter = (0.0, 0.0, 0.0)
+    """k_s."""
+    exponent: Positive = 32.0
+    """p: how narrow the highlight is."""
+    half_vector: bool = False
+    """Whether the highlight is where the half vector is near the normal."""
+    mirror: ColourParameter = (0.0, 0.0, 0.0)
+    """k_r: of what is seen in the mirrored direction."""
+
+    @property
+    def colour(self) -> tuple[float, float, float] | str:
+        return self.diffuse
+
+    def tabulate(self, palette: Palette) -> "Phongs":
+        return Phongs(
+            palette.colours(self.ambient, math.inf),
+            palette.colours(self.diffuse, math.inf),
+            palette.colours(self.specular, math.inf),
+            palette.colours(self.mirror, math.inf),
+            np.array([self.exponent]),
+            np.array([int(self.half_vector)]),
+        )
+
+    def energy_bound(self, palette: Palette) -> float:
+        """No direction gets more than this times the power: pi k_d + 2 pi k_s / (p + 1) + k_r in
+        the brightest channel, 8 pi k_s / (p + 1) with the half vector.
+
+        The lobe's integral over the sphere, a part of which is below the surface; for half vectors
+        with dwi = 4 (wo·h) dh and wo·h <= 1.  Of textures the greatest value counts.
+        """
+        lobe = (8.0 if self.half_vector else 2.0) * math.pi / (self.exponent + 1.0)
+        d, s, r = (
+            np.full(3, palette.greatest[palette.numbers_of[value]])
+            if isinstance(value, str)
+            else np.array(value)
+            for value in (self.diffuse, self.specular, self.mirror)
+        )
+        return float(np.max(math.pi * d + lobe * s + r))
+
+
+class Phongs(NamedTuple):
+    """ambient, diffuse, specular, mirror (n): k_a, k_d, k_s, k_r;  exponent (n,);  half_vector
+    (n,): 0 or 1."""
+
+    ambient: Colours
+    diffuse: Colours
+    specular: Colours
+    mirror: Colours
+    exponent: FloatArray
+    half_vector: IntArray
+
+
+@kernel
+def power(x: float, p: float) -> float:
+    """max(0, x)^p for p > 0, relatively right to p |log x| u."""
+    if x <= 0.0:
+        return 0.0
+    return math.exp(p * math.log(x))
+
+
+class Shares(NamedTuple):
+    """The probabilities of the lobes, which add to 1, or are 0 where the material is black."""
+
+    diffuse: float
+    specular: float
+    mirror: float
+
+
+@kernel
+def _shares(phongs: Phongs, i: int, at: At) -> Shares:
+    """In proportion to the bounds of their power, brightest channels."""
+    lobe = 8.0 if phongs.half_vector[i] != 0 else 2.0
+    d = math.pi * max_component(colour_at(phongs.diffuse, i, at))
+    s = lobe * math.pi * max_component(colour_at(phongs.specular, i, at))
+    s = s / (phongs.exponent[i] + 1.0)
+    r = max_component(colour_at(phongs.mirror, i, at))
+    total = d + s + r
+    if not total > 0.0:
+        return Shares(0.0, 0.0, 0.0)
+    return Shares(d / total, s / total, r / total)
+
+
+@kernel
+def _half(wo: Vec3, wi: Vec3) -> Vec3:
+    """The half vector of two directions above the surface."""
+    return normalize(wo + wi)
+
+
+@kernel
+def evaluate(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
+    """f(wo, wi) cos wi, without the mirror."""
+    if wo.z <= 0.0 or wi.z <= 0.0:
+        return Vec3(0.0, 0.0, 0.0)
+    half_vector = phongs.half_vector[i] != 0
+    cosine = _half(wo, wi).z if half_vector else dot(wo, Vec3(-wi.x, -wi.y, wi.z))
+    highlight = power(min(cosine, 1.0), phongs.exponent[i])
+    k_d, k_s = colour_at(phongs.diffuse, i, at), colour_at(phongs.specular, i, at)
+    return k_d * wi.z + k_s * highlight
+
+
+@kernel
+def pdf(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
+    """The density of `sample` per solid angle, without the mirrored direction.
+
+    Around the mirrored direction (p + 1) / (2 pi) (e·r)^p; with half vectors
+    (p + 1) / (2 pi) (h·n)^p dh/dwi, and dh/dwi = 1 / (4 wo·h).
+    """
+    if wo.z <= 0.0 or wi.z <= 0.0:
+        return 0.0
+    shares = _shares(phongs, i, at)
+    p = float(phongs.exponent[i])
+    if phongs.half_vector[i] != 0:
+        h = _half(wo, wi)
+        lobe = power(min(h.z, 1.0), p) / (4.0 * dot(wo, h))
+    else:
+        lobe = power(min(dot(wo, Vec3(-wi.x, -wi.y, wi.z)), 1.0), p)
+    return shares.diffuse * (wi.z * INV_PI) + shares.specular * lobe * (p + 1.0) * (0.5 * INV_PI)
+
+
+@kernel
+def _cosine_power(p: float, u0: float, u1: float) -> Vec3:
+    """A direction around z with density (p + 1) / (2 pi) cos^p: cos = (1 - u0)^(1 / (p + 1))."""
+    log_cosine = math.log(1.0 - u0) / (p + 1.0)
+    sine = math.sqrt(-math.expm1(2.0 * log_cosine))
+    cos_phi, sin_phi = on_circle(u1)
+    return Vec3(sine * cos_phi, sine * sin_phi, math.exp(log_cosine))
+
+
+@kernel
+def sample(
+    phongs: Phongs, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
+) -> BsdfSample:
+    """The mirrored direction, one of the highlight's lobe, which fails where it points below the
+    surface, or a cosine-distributed one."""
+    shares = _shares(phongs, i, at)
+    if wo.z <= 0.0 or shares.diffuse + shares.specular + shares.mirror == 0.0:
+        return no_sample()
+    mirrored = Vec3(-wo.x, -wo.y, wo.z)
+    if u_lobe < shares.mirror:
+        weight = colour_at(phongs.mirror, i, at) * (1.0 / shares.mirror)
+        return BsdfSample(mirrored, weight, shares.mirror, 1.0, True)
+    wi = Vec3(0.0, 0.0, 0.0)
+    if u_lobe < shares.mirror + shares.specular:
+        lobe = _cosine_power(phongs.exponent[i], u0, u1)
+        if phongs.half_vector[i] != 0:
+            if dot(wo, lobe) > 0.0:
+                wi = reflect(wo, lobe)
+        else:
+            wi = to_world(frame_from_normal(mirrored), lobe)
+    else:
+        wi = cosine_hemisphere(u0, u1)
+    density = pdf(phongs, i, at, wo, wi)
+    if not density > 0.0:
+        return no_sample()
+    weight = evaluate(phongs, i, at, wo, wi) * (1.0 / density)
+    return BsdfSample(wi, weight, density, 1.0, False)
+
+
+@kernel
+def branches(phongs: Phongs, i: int, at: At, wo: Vec3) -> Branches:
+    """The mirrored direction."""
+    if wo.z <= 0.0:
+        return no_branches()
+    return reflection(wo, colour_at(phongs.mirror, i, at))
+
+
+@kernel
+def ambient(phongs: Phongs, i: int, at: At) -> Vec3:
+    """k_a."""
+    return colour_at(phongs.ambient, i, at)

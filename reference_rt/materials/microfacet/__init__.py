@@ -1,0 +1,1 @@
+"""What materials share: Fresnel's equations and distributions of microfacets."""

@@ -1,0 +1,256 @@
+"""Microfacets: a rough boundary as a height field of tiny mirrors, of which only statistics are
+known (Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz 2014,
+"Understanding the Masking-Shadowing Function").
+
+Two distributions of slopes, both anisotropic: GGX, which is Trowbridge & Reitz's of 1975, and
+Beckmann's.  `alpha` is the root of twice the mean square slope for Beckmann and a scale of slopes
+for GGX, along x and along y.  Masking and shadowing count as independent, G(wo, wi) = G1(wo)
+G1(wi), as Mitsuba has it: the separable form, not the height-correlated one.  Light that meets a
+second microfacet is lost.  G1 is Smith's, exact for both.  (Mitsuba has a rational approximation of
+Beckmann's: up to 0.31 % off.)
+
+Directions are in the shading frame; `v` may be on either side, and the microfacets are those that
+this side sees.  Nothing here is NaN or infinite for unit vectors and MIN_ALPHA <= alpha <=
+MAX_ALPHA.
+"""
+
+import math
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import BeforeValidator, Strict, WithJsonSchema
+
+from reference_rt.core.arrays import IntArray
+from reference_rt.core.vec3 import Vec3, dot, normalize
+from reference_rt.jit.kernel import kernel
+from reference_rt.materials.microfacet.beckmann import FAR, SQRT_PI, visible_beckmann
+from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
+from reference_rt.sampling.warp import on_circle
+from reference_rt.textures import At, Numbers, Palette, number_at
+from reference_rt.textures.parameter import MayBeTexture
+
+GGX, BECKMANN = 0, 1
+_KINDS = ("ggx", "beckmann")
+
+MIN_ALPHA = 1e-4
+"""Smaller ones count as this: the lobe, a hundredth of a degree wide, is a mirror's to the eye, and
+half vectors, which are off by a few u, still resolve it to 1e-10."""
+
+MAX_ALPHA = 10.0
+"""Slopes of 84 degrees: no surface is rougher; larger ones are refused."""
+
+
+def _alpha(value: Any) -> Any:
+    if isinstance(value, str):
+        return value
+    both = list(value) if isinstance(value, list | tuple) else [value, value]
+    if len(both) != 2 or any(isinstance(a, bool) or not isinstance(a, int | float) for a in both):
+        raise ValueError(
+            "expected a number, two of them [alpha_u, alpha_v], or the name of a texture"
+        )
+    for a in both:
+        if not 0.0 < a <= MAX_ALPHA:  # also refuses NaN
+            raise ValueError(f"expected a roughness above 0 and at most {MAX_ALPHA:g}, got {a:g}")
+    return tuple(float(a) for a in both)
+
+
+_ALPHA = {"type": "number", "exclusiveMinimum": 0, "maximum": MAX_ALPHA}
+
+AlphaParameter = Annotated[
+    Annotated[tuple[float, float], Strict(False)] | str,
+    MayBeTexture(),
+    BeforeValidator(_alpha),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                _ALPHA,
+                {"type": "array", "items": _ALPHA, "minItems": 2, "maxItems": 2},
+                {"type": "string", "description": "the name of a texture"},
+            ]
+        }
+    ),
+]
+"""Roughness above 0: a number, [alpha_u, alpha_v], or the name of a texture.  What is below
+MIN_ALPHA, zeros of a texture too, counts as MIN_ALPHA."""
+
+Distribution = Literal["ggx", "beckmann"]
+
+
+class Roughnesses(NamedTuple):
+    """Parameters of n materials: kind (n,), GGX or BECKMANN; alpha_x (n), alpha_y (n)."""
+
+    kind: IntArray
+    alpha_x: Numbers
+    alpha_y: Numbers
+
+
+def roughnesses(
+    distribution: Distribution, alpha: tuple[float, float] | str, palette: Palette
+) -> Roughnesses:
+    """One row.  Raises ValueError for a texture with values above MAX_ALPHA."""
+    along_x, along_y = (alpha, alpha) if isinstance(alpha, str) else alpha
+    return Roughnesses(
+        np.array([_KINDS.index(distribution)]),
+        palette.numbers(along_x, most=MAX_ALPHA),
+        palette.numbers(along_y, most=MAX_ALPHA),
+    )
+
+
+def is_anisotropic(alpha: tuple[float, float] | str) -> bool:
+    return not isinstance(alpha, str) and alpha[0] != alpha[1]
+
+
+class Microfacets(NamedTuple):
+    """The distribution at one place: kind, GGX or BECKMANN; roughness along x and along y."""
+
+    kind: int
+    alpha_x: float
+    alpha_y: float
+
+
+@kernel
+def microfacets_at(table: Roughnesses, i: int, at: At) -> Microfacets:
+    """Those of row i at a place of a surface."""
+    return Microfacets(
+        table.kind[i],
+        max(MIN_ALPHA, number_at(table.alpha_x, i, at)),
+        max(MIN_ALPHA, number_at(table.alpha_y, i, at)),
+    )
+
+
+class Half(NamedTuple):
+    """h: the normal that mirrors wo to wi, 0 for opposite directions;  cosine: wo·h = wi·h, the
+    same bits for both, and not lost where all are grazing."""
+
+    h: Vec3
+    cosine: float
+
+
+@kernel
+def half_vector(wo: Vec3, wi: Vec3) -> Half:
+    """Between unit vectors, whose sum is 2 wo·h long."""
+    total = wo + wi
+    length2 = dot(total, total)
+    if length2 < 1e-280:  # a root of what underflows
+        return Half(Vec3(0.0, 0.0, 0.0), 0.0)
+    length = math.sqrt(length2)
+    return Half(total * (1.0 / length), min(1.0, 0.5 * length))
+
+
+@kernel
+def density(m: Microfacets, h: Vec3) -> float:
+    """D(h): the area of microfacets with normal h, per area of the surface and solid angle.
+
+    Heitz 2014, appendix A, with tan² multiplied out.  0 for h.z <= 0.
+    """
+    if h.z <= 0.0:
+        return 0.0
+    x, y = h.x / m.alpha_x, h.y / m.alpha_y
+    slope2, z2 = x * x + y * y, h.z * h.z
+    area = math.pi * m.alpha_x * m.alpha_y
+    if m.kind == GGX:
+        norm = slope2 + z2
+        return 1.0 / (area * norm * norm)
+    if slope2 > 700.0 * z2:
+        return 0.0  # below e^-700
+    return math.exp(-slope2 / z2) / (area * z2 * z2)
+
+
+@kernel
+def g1_over_cos(m: Microfacets, v: Vec3) -> float:
+    """G1(v) / |v.z|: how many times their own projected area the visible microfacets fill, finite
+    at grazing angles.
+
+    Smith's G1 = 1 / (1 + Lambda) (Heitz 2014, appendix A; Beckmann's with exp and erf), numerator
+    and denominator multiplied by what grows.
+    """
+    z = abs(v.z)
+    x, y = m.alpha_x * v.x, m.alpha_y * v.y
+    s = math.sqrt(x * x + y * y)  # alpha sin: a = z / s
+    if m.kind == GGX:
+        return 2.0 / (z + math.sqrt(s * s + z * z))
+    if z > FAR * s:
+        return 1.0 / z
+    a = z / s
+    return 2.0 * SQRT_PI / (s * (a * SQRT_PI * (1.0 + math.erf(a)) + math.exp(-a * a)))
+
+
+@kernel
+def g1(m: Microfacets, v: Vec3) -> float:
+    """The fraction of microfacets facing `v` that others do not hide from it."""
+    return min(1.0, abs(v.z) * g1_over_cos(m, v))
+
+
+@kernel
+def visible_density(m: Microfacets, v: Vec3, h: Vec3) -> float:
+    """Of the normals h that `v` sees, per solid angle: G1(v) max(0, v·h) D(h) / |v.z| (Heitz
+    2014), for v on the side of h."""
+    return g1_over_cos(m, v) * max(0.0, dot(v, h)) * density(m, h)
+
+
+@kernel
+def sample_visible(m: Microfacets, v: Vec3, u0: float, u1: float) -> Vec3:
+    """A normal with `visible_density`, for v.z >= 0.
+
+    Stretched by alpha, the surface has roughness 1 in all directions; slopes shrink back (Heitz
+    2014).
+    """
+    w = normalize(Vec3(m.alpha_x * v.x, m.alpha_y * v.y, v.z))
+    h = _visible_ggx(w, u0, u1) if m.kind == GGX else visible_beckmann(w, u0, u1)
+    return normalize(Vec3(m.alpha_x * h.x, m.alpha_y * h.y, h.z))
+
+
+@kernel
+def _visible_ggx(w: Vec3, u0: float, u1: float) -> Vec3:
+    """Of roughness 1, not of unit length: microfacets of a hemisphere mirror w to a spherical cap,
+    uniformly (Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps")."""
+    down = u1 * (1.0 + w.z)  # 1 - z of the point of the cap
+    r = math.sqrt(down * (2.0 - down))
+    cos_phi, sin_phi = on_circle(u0)
+    return Vec3(r * cos_phi + w.x, r * sin_phi + w.y, (1.0 - u1) * (1.0 + w.z))
+
+
+@kernel
+def refract(wo: Vec3, h: Vec3, refraction: Refraction) -> Vec3:
+    """wo refracted by a normal, for what `fresnel` says of the two.
+
+    Rounding leaves its length off by some 10 u times the index; a step of Newton's method for
+    1 / sqrt(x) at 1 puts that right.
+    """
+    wi = h * refraction.gap - wo * (1.0 / refraction.eta)
+    return wi * (1.5 - 0.5 * dot(wi, wi))
+
+
+class Bend(NamedTuple):
+    """A refraction: its normal, and how much solid angle of wi there is to one of normals, times
+    wo·h / eta²;  0 where no microfacet refracts wo to wi;  refraction: by it, as it is seen from
+    the side of the smaller index, where nothing cancels."""
+
+    h: Vec3
+    spread: float
+    refraction: Refraction
+
+
+@kernel
+def bend(wo: Vec3, wi: Vec3, n: float, is_outside: bool) -> Bend:
+    """Walter et al. 2007, eq. 16 and 17; n is the index inside over that outside, where wo is or
+    is not.
+
+    From either side by the same operations, so that light goes either way alike: the normal is
+    along outer + n inner, as (outer + inner) + (n - 1) inner, which for n near 1 loses nothing.
+    """
+    outer, inner = (wo, wi) if is_outside else (wi, wo)
+    scaled = (outer + inner) + inner * (n - 1.0)  # at least |n - 1| long
+    length2 = dot(scaled, scaled)
+    if length2 < 1e-280:
+        return Bend(Vec3(0.0, 0.0, 0.0), 0.0, fresnel(0.0, n))
+    h = scaled * (1.0 / math.sqrt(length2))
+    if h.z < 0.0:
+        h = -h
+    cos_o, cos_i = dot(wo, h), dot(wi, h)
+    thin = dot(outer, h) if n > 1.0 else dot(inner, h)
+    refraction = fresnel(math.copysign(thin, n - 1.0), n)
+    if cos_o <= 0.0 or cos_i >= 0.0:
+        return Bend(h, 0.0, refraction)
+    scale = 1.0 if is_outside else n * n  # |wo + eta wi| is |outer + n inner| / n from inside
+    return Bend(h, cos_o * -cos_i * scale / length2, refraction)

@@ -1,0 +1,81 @@
+"""Bump: a surface that is shaded as if it were raised by a height, without moving a point.
+
+Blinn 1978, "Simulation of Wrinkled Surfaces": the point p + h n has the derivatives dp/du + dh/du n
+and dp/dv + dh/dv n, but for terms in h times the curvature, which are left out; their cross product
+is its normal.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.vec3 import Frame, Vec3, cross, dot, max_abs, normalize
+from reference_rt.jit.kernel import kernel
+from reference_rt.materials.frame import frame_along
+from reference_rt.materials.nested.wrappers import Wrapper
+from reference_rt.shapes.shape import Tangents
+from reference_rt.textures import Palette, TextureName
+from reference_rt.textures.lookup import At, lookup_gradient
+
+
+class Bump(Wrapper):
+    """Its base, under normals that tilt as if the surface were raised along them by a texture's
+    luminance.
+
+    Only a bitmap with the filter `bilinear` has slopes: a checker's steps have none, nor have
+    colours of vertices.
+    """
+
+    type: Literal["bump"] = "bump"
+    base: str
+    height: TextureName
+    """A texture; of an image file of integers, most likely one with `encoding: raw`."""
+    scale: float = 1.0
+    """What a luminance of 1 stands for, in units of the scene, also for the copies of a group."""
+
+    @property
+    def oriented(self) -> bool:
+        return True
+
+    def tabulate(self, palette: Palette) -> "Bumps":
+        texture = palette.number(self.height, math.inf)
+        return Bumps(np.array([texture]), np.array([self.scale], dtype=np.float64))
+
+
+class Bumps(NamedTuple):
+    """texture (n,): the number of the height's; scale (n,)."""
+
+    texture: IntArray
+    scale: FloatArray
+
+
+@kernel
+def basis(bumps: Bumps, i: int, at: At, tangents: Tangents) -> Frame:
+    """The tilted frame in coordinates of the shading frame, in which the tangents are too; its s is
+    along dp/du."""
+    dhdu, dhdv = lookup_gradient(bumps.texture[i], at)
+    scale = bumps.scale[i]
+    return frame_along(tilted(scale * dhdu, scale * dhdv, tangents), tangents.dpdu)
+
+
+@kernel
+def tilted(dhdu: float, dhdv: float, tangents: Tangents) -> Vec3:
+    """The unit normal of the raised surface, (0, 0, 1) being that of the surface itself.
+
+    As Mitsuba has it, the tangents are made orthogonal to the shading normal first, and the result
+    is turned to the side of the geometric normal, here taken to be that one normal to both tangents
+    that is less than 90 degrees from the shading normal.
+    """
+    size_u, size_v = max_abs(tangents.dpdu), max_abs(tangents.dpdv)
+    if not (size_u > 0.0 and size_v > 0.0):
+        return Vec3(0.0, 0.0, 1.0)
+    u, v = tangents.dpdu / size_u, tangents.dpdv / size_v
+    n = cross(Vec3(u.x, u.y, dhdu / size_u), Vec3(v.x, v.y, dhdv / size_v))
+    size = max_abs(n)
+    if not (size > 0.0 and size < math.inf):
+        return Vec3(0.0, 0.0, 1.0)
+    n = normalize(n / size)
+    geometric = cross(u, v)
+    return -n if dot(n, geometric) * geometric.z < 0.0 else n

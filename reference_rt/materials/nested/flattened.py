@@ -1,0 +1,242 @@
+"""Layers: materials that are made of others, taken apart.
+
+Masks, blends, two-sided materials, bump and normal maps may stand in each other.  Each way from
+such a material down to one that scatters by itself, a leaf, is a layer: a list of steps, which give
+its share and turn its frame.  What the material scatters is the sum of its layers.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference_rt.core.arrays import IntArray
+from reference_rt.core.vec3 import Frame, Vec3, to_local, to_world
+from reference_rt.jit.kernel import kernel
+from reference_rt.materials.material import Material
+from reference_rt.materials.nested import bump, normal_map
+from reference_rt.materials.nested.bump import Bumps
+from reference_rt.materials.nested.normal_map import NormalMaps
+from reference_rt.materials.nested.paths import BACK, BUMP, FRONT, REST, TAKE, TURN, Way
+from reference_rt.materials.shading import Shading
+from reference_rt.shapes.shape import Tangents
+from reference_rt.textures import At, Numbers, Palette, number_at
+from reference_rt.textures.parameter import join
+
+
+class Layers(NamedTuple):
+    """Of each material m: first (m,) and number (m,) of its layers.  Of each layer k: its leaf,
+    kind (k,) and row (k,), and step_first (k,), step_count (k,).  Of each step s: its code (s,),
+    and the row (s,) of its parameters in the tables that follow, None for absent ones."""
+
+    first: IntArray
+    number: IntArray
+    kind: IntArray
+    row: IntArray
+    step_first: IntArray
+    step_count: IntArray
+    step: IntArray
+    step_row: IntArray
+    weights: Numbers | None
+    bumps: Bumps | None
+    normal_maps: NormalMaps | None
+
+
+class Layer(NamedTuple):
+    """A layer at a point: the share that it has of the whole;  basis: its frame, in coordinates of
+    the shading frame;  side: 0 where its frame is not tilted by a bump or normal map; else 1, or -1
+    where it is turned to the other side."""
+
+    weight: float
+    basis: Frame
+    side: float
+
+
+class LayerTables:
+    """Collects the layers of a scene's materials."""
+
+    def __init__(self, palette: Palette) -> None:
+        self.palette = palette
+        self.first: list[int] = []
+        self.count: list[int] = []
+        self.leaves: list[tuple[int, int]] = []
+        self.step_counts: list[int] = []
+        self.steps: list[tuple[int, int]] = []
+        self.rows: dict[type, list[Any]] = {}
+
+    def add(self, layers: list[tuple[Way, tuple[int, int]]]) -> None:
+        """The layers of the next material, each with (kind, row) of its leaf.
+
+        Raises ValueError.
+        """
+        self.first.append(len(self.leaves))
+        self.count.append(len(layers))
+        for way, leaf in layers:
+            self.leaves.append(leaf)
+            self.step_counts.append(len(way.steps))
+            self.steps += [(step.code, self._row(step.parameter)) for step in way.steps]
+
+    def _row(self, parameter: Any) -> int:
+        """The row of a step's parameter, which is put into its table."""
+        if parameter is None:
+            return -1
+        if isinstance(parameter, Material):
+            table = parameter.tabulate(self.palette)
+        else:
+            table = self.palette.numbers(parameter)
+        rows = self.rows.setdefault(type(table), [])
+        rows.append(table)
+        return len(rows) - 1
+
+    def tables(self) -> Layers | None:
+        """None where no material is made of others."""
+        if not self.steps:
+            return None
+        counts = np.array(self.step_counts)
+        kind, row = zip(*self.leaves, strict=True)
+        code, step_row = zip(*self.steps, strict=True)
+
+        def table(cls: type) -> Any:
+            return join(self.rows[cls]) if cls in self.rows else None
+
+        return Layers(
+            first=np.array(self.first),
+            number=np.array(self.count),
+            kind=np.array(kind),
+            row=np.array(row),
+            step_first=np.cumsum(counts) - counts,
+            step_count=counts,
+            step=np.array(code),
+            step_row=np.array(step_row),
+            weights=table(Numbers),
+            bumps=table(Bumps),
+            normal_maps=table(NormalMaps),
+        )
+
+
+SIZE = 11
+"""Floats of a layer that is kept: weight, s, t and n of the basis, side."""
+
+
+@kernel
+def most(layers: Layers | None) -> int:
+    """The largest number of layers of a material."""
+    if layers is None:
+        return 0
+    found = 0
+    for m in range(len(layers.number)):
+        found = max(found, layers.number[m])
+    return found
+
+
+@kernel
+def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
+    """Keeps the layers of the material in `shading.layers`.
+
+    They depend on the point and on the viewer, not on where light comes from: found once, they
+    serve every question about the point, and their code is compiled once.
+    """
+    if layers is None:
+        return
+    m = shading.point.material
+    for k in range(layers.number[m]):
+        found = _layer(layers, layers.first[m] + k, shading, at)
+        kept = shading.layers[SIZE * k : SIZE * (k + 1)]
+        kept[0], kept[10] = found.weight, found.side
+        kept[1], kept[2], kept[3] = found.basis.s
+        kept[4], kept[5], kept[6] = found.basis.t
+        kept[7], kept[8], kept[9] = found.basis.n
+
+
+@kernel
+def layer_at(shading: Shading, k: int) -> Layer:
+    """Layer k of the material, as it was prepared."""
+    kept = shading.layers[SIZE * k : SIZE * (k + 1)]
+    basis = Frame(
+        Vec3(kept[1], kept[2], kept[3]),
+        Vec3(kept[4], kept[5], kept[6]),
+        Vec3(kept[7], kept[8], kept[9]),
+    )
+    return Layer(kept[0], basis, kept[10])
+
+
+@kernel
+def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
+    """Layer k of all at a point, seen from `shading.wo`."""
+    weight, side, tilted = 1.0, 1.0, False
+    basis = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
+    begin = layers.step_first[k]
+    for s in range(begin, begin + layers.step_count[k]):
+        code, i = layers.step[s], layers.step_row[s]
+        above = to_local(basis, shading.wo).z > 0.0
+        if code in (TAKE, REST):
+            w = _weight(layers.weights, i, shading)
+            weight *= w if code == TAKE else 1.0 - w
+        elif code == FRONT:
+            weight = weight if above else 0.0
+        elif code == BACK:
+            weight = 0.0 if above else weight
+        elif code == TURN:
+            if not above:
+                # Mitsuba's mirror: z alone changes sign, so that the basis becomes left-handed.
+                basis = Frame(basis.s, basis.t, -basis.n)
+                side = -side
+        else:
+            tilted = True
+            local = Tangents(
+                to_local(basis, shading.tangents.dpdu), to_local(basis, shading.tangents.dpdv)
+            )
+            if code == BUMP:
+                turned = _bumped(layers.bumps, i, at, local)
+            else:
+                turned = _mapped(layers.normal_maps, i, shading, local)
+            basis = Frame(
+                to_world(basis, turned.s), to_world(basis, turned.t), to_world(basis, turned.n)
+            )
+    return Layer(weight, basis, side if tilted else 0.0)
+
+
+@kernel
+def _weight(weights: Numbers | None, i: int, shading: Shading) -> float:
+    if weights is None:
+        return 1.0
+    return min(1.0, number_at(weights, i, shading.at))
+
+
+@kernel
+def _identity() -> Frame:
+    return Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
+
+
+@kernel
+def _bumped(bumps: Bumps | None, i: int, at: At, tangents: Tangents) -> Frame:
+    if bumps is None:
+        return _identity()
+    return bump.basis(bumps, i, at, tangents)
+
+
+@kernel
+def _mapped(maps: NormalMaps | None, i: int, shading: Shading, tangents: Tangents) -> Frame:
+    if maps is None:
+        return _identity()
+    return normal_map.basis(maps, i, shading.at, tangents)
+
+
+@kernel
+def lets(layer: Layer, wi: Vec3) -> bool:
+    """Whether a layer has anything to do with the local `wi`: not where the tilt of its frame puts
+    `wi` to the other side of the surface (Mitsuba's rule)."""
+    if layer.side == 0.0:
+        return True
+    return layer.side * wi.z * to_local(layer.basis, wi).z > 0.0
+
+
+__all__ = [
+    "SIZE",
+    "Layer",
+    "LayerTables",
+    "Layers",
+    "layer_at",
+    "lets",
+    "most",
+    "prepare",
+]

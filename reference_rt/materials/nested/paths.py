@@ -1,0 +1,97 @@
+"""Ways down: materials that are made of others, as described.
+
+A way leads from such a material to one that scatters by itself, a leaf, in steps, each of which
+gives its share or turns its frame; `nested/flattened.py` has the tables and the kernels.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from reference_rt.materials.material import Material
+from reference_rt.materials.nested.bump import Bump
+from reference_rt.materials.nested.normal_map import NormalMap
+from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided
+
+# Codes of steps.  TAKE, REST: the share w, 1 - w, of a number of `weights`; FRONT, BACK: nothing
+# when seen from the other side; TURN: the frame turned to the viewer; BUMP, NORMAL_MAP: tilted.
+TAKE, REST, FRONT, BACK, TURN, BUMP, NORMAL_MAP = range(7)
+
+MOST_LAYERS = 64
+"""That a material may have: a blend doubles them."""
+
+
+class Step(NamedTuple):
+    """A step of a way down, as described."""
+
+    code: int
+    parameter: Any
+
+
+class Way(NamedTuple):
+    """A layer as described: its steps and the name of its leaf, None for what is not there."""
+
+    steps: tuple[Step, ...]
+    leaf: str | None
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is seen from behind too."""
+        return any(step.code in (TURN, BACK) for step in self.steps)
+
+
+def ways(name: str, materials: Mapping[str, Material]) -> list[Way]:
+    """The layers of a material.  Raises ValueError (what is wrong, what was expected)."""
+    return _ways(name, materials, ())
+
+
+def _ways(name: str, materials: Mapping[str, Material], above: tuple[str, ...]) -> list[Way]:
+    if name in above:
+        raise ValueError(f"contains itself: {' -> '.join([*above, name])}; expected no circle")
+    above = (*above, name)
+    if len(above) > MOST_LAYERS:
+        raise ValueError(f"is nested too deeply; expected at most {MOST_LAYERS} materials")
+    material = materials[name]
+
+    def below(base: str, *steps: Step) -> list[Way]:
+        return [Way((*steps, *way.steps), way.leaf) for way in _ways(base, materials, above)]
+
+    found = [Way((), name)]
+    if isinstance(material, Mask):
+        clear = Way((Step(REST, material.opacity),), None)
+        found = [*below(material.base, Step(TAKE, material.opacity)), clear]
+    elif isinstance(material, Blend):
+        rest, take = Step(REST, material.weight), Step(TAKE, material.weight)
+        found = [*below(material.first, rest), *below(material.second, take)]
+    elif isinstance(material, TwoSided):
+        found = below(material.base, Step(TURN if material.back is None else FRONT, None))
+        _check_one_sided(material.base, found, materials)
+        if material.back is not None:
+            behind = below(material.back, Step(BACK, None), Step(TURN, None))
+            _check_one_sided(material.back, behind, materials)
+            found += behind
+    elif isinstance(material, Bump | NormalMap):
+        code = BUMP if isinstance(material, Bump) else NORMAL_MAP
+        found = below(material.base, Step(code, material))
+        if any(sum(s.code in (BUMP, NORMAL_MAP) for s in way.steps) > 1 for way in found):
+            raise ValueError(f"'{material.base}' is tilted already; expected one map at most")
+    if len(found) > MOST_LAYERS:
+        raise ValueError(f"'{name}' has {len(found)} layers; expected at most {MOST_LAYERS}")
+    return found
+
+
+def _check_one_sided(name: str, found: list[Way], materials: Mapping[str, Material]) -> None:
+    if any(transmits(way, materials) for way in found):
+        raise ValueError(
+            f"'{name}' lets light pass; expected materials with one side to make two of"
+        )
+
+
+def transmits(way: Way, materials: Mapping[str, Material]) -> bool:
+    """Whether a layer lets light pass."""
+    return way.leaf is None or materials[way.leaf].transmits
+
+
+def needs_tangents(way: Way, materials: Mapping[str, Material]) -> bool:
+    """Whether what a layer scatters depends on where u and v point."""
+    tilted = any(step.code in (BUMP, NORMAL_MAP) for step in way.steps)
+    return tilted or (way.leaf is not None and materials[way.leaf].oriented)

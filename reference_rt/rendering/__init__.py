@@ -1,0 +1,1 @@
+"""Rendering a scene, and queries of it with arrays."""

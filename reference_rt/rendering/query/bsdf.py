@@ -1,0 +1,202 @@
+"""What a material scatters: its BSDF, in the shading frame of a surface."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt import materials as any_material
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import SurfacePoint
+from reference_rt.core.scaled_ray import scaled
+from reference_rt.core.vec3 import Frame, Vec3, normalize, row
+from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
+from reference_rt.materials import Materials, Shading, kept_floats
+from reference_rt.materials.textured import look, looked_floats
+from reference_rt.rendering.query.hits import BoolArray
+from reference_rt.rendering.query.rays import in_blocks, numbers, shaped, together
+from reference_rt.scene.build import BuiltScene
+from reference_rt.shapes import Sphere
+from reference_rt.shapes.shape import Tangents
+from reference_rt.textures import At, Textures
+from reference_rt.util.errors import SceneError
+
+
+@dataclass(frozen=True)
+class BsdfSamples:
+    """Directions that a material draws for `wo`.
+
+    wi (..., 3): unit directions;  weight (..., 3): f(wo, wi) |cos wi| / pdf;  pdf (...): density
+    per solid angle, 0 where nothing is scattered, or light goes nowhere that counts;  eta (...):
+    index of refraction of wi's side over wo's, 1 unless it went through;  is_delta (...): whether
+    the direction is one of a few (mirrored, refracted, straight on): pdf is then its probability.
+    """
+
+    wi: FloatArray
+    weight: FloatArray
+    pdf: FloatArray
+    eta: FloatArray
+    is_delta: BoolArray
+
+
+@kernel
+def _shading(
+    materials: Materials, textures: Textures | None, m: int, wo: Vec3, at: FloatArray,
+    kept: FloatArray,
+) -> Shading:  # fmt: skip
+    """A point whose shading frame is that of the world;  at (11,): u, v, colour, dp/du, dp/dv."""
+    zero, z = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 1.0)
+    frame = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), z)
+    tangents = Tangents(Vec3(at[5], at[6], at[7]), Vec3(at[8], at[9], at[10]))
+    place = At(textures, at[0], at[1], Vec3(at[2], at[3], at[4]))
+    looked = look(materials.textured, m, place, kept)
+    point = SurfacePoint(zero, z, z, 0.0, m, -1)
+    layers = kept[looked_floats(materials.textured) :]
+    shading = Shading(point, frame, wo, looked, tangents, layers)
+    any_material.prepare(materials, shading, place)
+    return shading
+
+
+# It takes the materials and the textures alone: scenes of other shapes and lights share it.
+@entry_kernel
+def _scatter(
+    materials: Materials,
+    textures: Textures | None,
+    m: int,
+    wo: FloatArray,
+    wi: FloatArray,
+    u: FloatArray,
+    at: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Into out (n, 4): value and density towards wi;  or, where u has rows, into out (n, 9): wi,
+    weight, density, eta and whether it is one of a few, of what u draws."""
+    kept = local_floats(kept_floats(materials))
+    origin = Vec3(0.0, 0.0, 0.0)
+    for i in range(len(wo)):
+        for k in range(out.shape[1]):
+            out[i, k] = 0.0
+        back, _, seen = scaled(origin, row(wo, i), math.inf)
+        if not seen:
+            continue
+        shading = _shading(materials, textures, m, normalize(back.d), at[i], kept)
+        if len(u) == 0:
+            forth, _, valid = scaled(origin, row(wi, i), math.inf)
+            if valid:
+                both = any_material.both(materials, shading, normalize(forth.d))
+                out[i, 0], out[i, 1], out[i, 2] = both.value
+                out[i, 3] = both.density
+            continue
+        drawn = any_material.sample(materials, shading, u[i, 0], u[i, 1], u[i, 2])
+        out[i, 7] = 1.0
+        if drawn.pdf > 0.0:
+            out[i, 0], out[i, 1], out[i, 2] = drawn.wi
+            out[i, 3], out[i, 4], out[i, 5] = drawn.weight
+            out[i, 6], out[i, 7] = drawn.pdf, drawn.eta
+            out[i, 8] = 1.0 if drawn.is_delta else 0.0
+
+
+NOTHING = np.empty((0, 3))
+
+
+class Bsdf:
+    """What one material of a scene scatters, whatever it is made of.
+
+    All directions are in the shading frame, z along the shading normal, x along dp/du, and point
+    away from the surface: `wo` to where the radiance goes (the viewer), `wi` to where it comes from
+    (the light).  They may have any length; along what is no direction nothing is scattered.
+    Mitsuba gives the two names the other way round.  Values are those of radiance, not of
+    importance: what enters glass of index eta is multiplied by 1 / eta².
+
+    Where on the surface textures are asked, every method takes as `uv` (..., 2); `colour` (..., 3),
+    the interpolated colour of a mesh's vertices, negative for none; `dpdu` and `dpdv` (..., 3), how
+    the point moves with u and v, which bump and normal maps ask.  All arrays broadcast; single
+    directions give numbers.  Raises ValueError for arrays of other shapes.
+    """
+
+    def __init__(self, scene: BuiltScene, name: str | None) -> None:
+        """Of material `name`; none: what shapes without a material are made of.  Raises SceneError
+        where there is no such material."""
+        if name is None:
+            scene, number = BuiltScene(shapes=(Sphere(),)), 0
+        elif name in scene.materials:
+            number = list(scene.materials).index(name)
+        else:
+            known = ", ".join(f"'{m}'" for m in scene.materials) or "none"
+            raise SceneError(f"there is no material '{name}'; expected one of: {known}")
+        self._tables, self._number = scene.tables, number
+
+    def evaluate(
+        self,
+        wo: npt.ArrayLike,
+        wi: npt.ArrayLike,
+        uv: npt.ArrayLike = (0.0, 0.0),
+        colour: npt.ArrayLike = (-1.0, -1.0, -1.0),
+        dpdu: npt.ArrayLike = (1.0, 0.0, 0.0),
+        dpdv: npt.ArrayLike = (0.0, 1.0, 0.0),
+        threads: int | None = None,
+    ) -> FloatArray:
+        """f(wo, wi) |cos wi| (..., 3), the cosine included, without what is mirrored or refracted
+        perfectly: that has no finite value, and only `sample` finds it."""
+        out, shape = self._ask(wo, wi, None, (uv, colour, dpdu, dpdv), threads)
+        return shaped(out[:, :3], shape)  # type: ignore[no-any-return]
+
+    def pdf(
+        self,
+        wo: npt.ArrayLike,
+        wi: npt.ArrayLike,
+        uv: npt.ArrayLike = (0.0, 0.0),
+        colour: npt.ArrayLike = (-1.0, -1.0, -1.0),
+        dpdu: npt.ArrayLike = (1.0, 0.0, 0.0),
+        dpdv: npt.ArrayLike = (0.0, 1.0, 0.0),
+        threads: int | None = None,
+    ) -> FloatArray:
+        """The density per solid angle (...) with which `sample` draws wi, perfect mirrors and glass
+        apart: where it draws those too, the density's integral is less than 1."""
+        out, shape = self._ask(wo, wi, None, (uv, colour, dpdu, dpdv), threads)
+        return shaped(out[:, 3], shape)  # type: ignore[no-any-return]
+
+    def sample(
+        self,
+        wo: npt.ArrayLike,
+        u: npt.ArrayLike,
+        uv: npt.ArrayLike = (0.0, 0.0),
+        colour: npt.ArrayLike = (-1.0, -1.0, -1.0),
+        dpdu: npt.ArrayLike = (1.0, 0.0, 0.0),
+        dpdv: npt.ArrayLike = (0.0, 1.0, 0.0),
+        threads: int | None = None,
+    ) -> BsdfSamples:
+        """A direction drawn for wo;  u (..., 3): numbers in [0, 1), the first for the choice among
+        lobes, two for the direction in one."""
+        out, shape = self._ask(wo, None, u, (uv, colour, dpdu, dpdv), threads)
+        columns = (out[:, 0:3], out[:, 3:6], out[:, 6], out[:, 7], out[:, 8] != 0.0)
+        return BsdfSamples(*(shaped(column, shape) for column in columns))
+
+    def _ask(
+        self,
+        wo: npt.ArrayLike,
+        wi: npt.ArrayLike | None,
+        u: npt.ArrayLike | None,
+        place: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
+        threads: int | None,
+    ) -> tuple[FloatArray, tuple[int, ...]]:
+        second, name = (wi, "wi") if u is None else (u, "u")
+        assert second is not None
+        arrays = [("wo", numbers("wo", wo, 3), 1), (name, numbers(name, second, 3), 1)]
+        sizes = (("uv", 2), ("colour", 3), ("dpdu", 3), ("dpdv", 3))
+        for (label, size), values in zip(sizes, place, strict=True):
+            arrays.append((label, numbers(label, values, size), 1))
+        shape, (back, other, *at) = together(*arrays)
+        if u is not None and not ((other >= 0.0) & (other < 1.0)).all():
+            raise ValueError("u: expected numbers from 0 up to, not including, 1")
+        where = np.concatenate(at, axis=1)
+        out = np.empty((len(back), 4 if u is None else 9))
+        materials, textures = self._tables.materials, self._tables.textures
+
+        def ask(k: slice) -> None:
+            wi_of, u_of = (other[k], NOTHING) if u is None else (NOTHING, other[k])
+            _scatter(materials, textures, self._number, back[k], wi_of, u_of, where[k], out[k])
+
+        in_blocks(ask, len(back), threads)
+        return out, shape

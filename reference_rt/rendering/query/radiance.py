@@ -1,0 +1,160 @@
+"""The light that arrives along given rays, by any of the integrators."""
+
+import math
+import os
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import UNIT_ROUNDOFF, Ray
+from reference_rt.core.vec3 import row
+from reference_rt.integrators import AnyIntegrator, Path, RayCast
+from reference_rt.integrators.ray_cast import cast
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit.kernel import entry_kernel, signature_of
+from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
+from reference_rt.rendering.render import compile_bands, run_bands, with_tracer
+from reference_rt.rendering.tiles import GivenRays, render_band
+from reference_rt.sampling import Independent
+from reference_rt.scene.build import BuiltScene
+
+
+class Radiance(NamedTuple):
+    """mean (..., 3): the radiance along each ray, linear sRGB;  standard_error (..., 3): the
+    estimate of the mean's standard deviation: 0 for integrators that draw no random numbers, inf
+    for a single sample of one that does."""
+
+    mean: FloatArray
+    standard_error: FloatArray
+
+
+@entry_kernel
+def _cast(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
+    for i in range(len(o)):
+        found = cast(scene, Ray(row(o, i), row(d, i), math.inf))
+        out[i, 0], out[i, 1], out[i, 2] = found.colour
+
+
+def radiance(
+    scene: BuiltScene,
+    origins: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    spp: int | None = None,
+    seed: int = 0,
+    integrator: AnyIntegrator | None = None,
+    threads: int | None = None,
+) -> Radiance:
+    """The radiance that arrives at each origin from the direction that its ray goes.
+
+    Rays as for `intersect`: directions may have any length, and along what is no ray nothing
+    arrives.  integrator: another than the scene's; with `Path(max_depth=1)` what is seen directly.
+    Of `RayCast`, the colour that it shows.  spp: samples for each ray (none: as many as the scene's
+    sampler takes for a pixel; one suffices where nothing is random).  Their numbers are a pure
+    function of (seed, number of the ray along the rows, sample): independent ones, as the standard
+    error asks for.  The result has the same bits on any number of `threads` (default: all cores).
+    Raises ValueError, SceneError.
+    """
+    integrator = scene.integrator if integrator is None else integrator
+    if spp is None:
+        spp = 1 if integrator.deterministic else scene.resolved_sampler.spp
+    tables = _tables_for(scene, integrator)
+    rays = rays_of(origins, directions)
+    if isinstance(integrator, RayCast):
+        if integrator.show != "colour":
+            raise ValueError(
+                f"integrator: shows '{integrator.show}', which is no light; expected 'colour', or "
+                "see `intersect`"
+            )
+        mean = _colours(tables, rays, threads)
+        return Radiance(shaped(mean, rays.shape), shaped(np.zeros_like(mean), rays.shape))
+    setup = integrator.setup()
+    mean, error = estimate(tables, setup, rays, spp, seed, threads)
+    if integrator.deterministic:
+        error = np.zeros_like(mean)
+    return Radiance(shaped(mean, rays.shape), shaped(error, rays.shape))
+
+
+def _tables_for(scene: BuiltScene, integrator: AnyIntegrator) -> SceneTables:
+    """The scene's own where they would be the same for the other integrator."""
+    own = scene.integrator
+    if own.follows_scattered == integrator.follows_scattered and (
+        isinstance(own, Path) or not isinstance(integrator, Path)
+    ):
+        return scene.tables
+    return scene.changed(integrator=integrator, sampler=None).tables
+
+
+class _UnitRays(NamedTuple):
+    o: FloatArray
+    d: FloatArray
+    valid: npt.NDArray[np.bool_]
+
+
+def _unit(rays: Rays) -> _UnitRays:
+    """Rays with directions of length 1, some ray in the place of what is none.
+
+    What has unit length already, to within the rounding of making it so, is left alone: rays of a
+    camera are then the same bits that are rendered with.
+    """
+    with np.errstate(all="ignore"):
+        size = np.abs(rays.d).max(axis=1, initial=0.0, keepdims=True)
+        valid = np.isfinite(rays.o).all(axis=1) & np.isfinite(size[:, 0]) & (size[:, 0] > 0.0)
+        # By a power of two, so that no square leaves float64's range.
+        d = np.ldexp(rays.d, -np.frexp(np.where(valid[:, None], size, 1.0))[1])
+        made = d / np.linalg.norm(d, axis=1, keepdims=True)
+        # The sum of three squares rounds by 3 u: its root by 2.5 u, the inverse of that by 3.5 u
+        # and the vector made unit by 4.5 u, the square of whose length, by 3 u more, is seen.
+        is_unit = np.abs(np.square(rays.d).sum(axis=1) - 1.0) <= 12.0 * UNIT_ROUNDOFF
+    d = np.where(is_unit[:, None], rays.d, made)
+    o = rays.o
+    if not valid.all():
+        o = np.where(valid[:, None], o, 0.0)
+        d = np.where(valid[:, None], d, (0.0, 0.0, 1.0))
+    return _UnitRays(o, np.ascontiguousarray(d), valid)
+
+
+def _colours(tables: SceneTables, rays: Rays, threads: int | None) -> FloatArray:
+    o, d, valid = _unit(rays)
+    out = np.empty_like(o)
+
+    def trace(k: slice) -> None:
+        _cast(tables, o[k], d[k], out[k])
+
+    in_blocks(trace, len(o), threads)
+    out[~valid] = 0.0
+    return out
+
+
+def estimate(
+    tables: SceneTables, setup: Any, rays: Rays, spp: int, seed: int, threads: int | None
+) -> tuple[FloatArray, FloatArray]:
+    """The mean (n, 3) of samples of an integrator's `setup()`, and its standard error (n, 3)."""
+    sampler = Independent(spp=spp, seed=seed)
+    o, d, valid = _unit(rays)
+    n = len(o)
+    mean, spread = np.zeros((n, 3)), np.zeros((n, 3))
+    threads = threads or os.cpu_count() or 1
+    if n > 0:
+        tables, tracer = with_tracer(tables, setup)
+        arguments = (
+            *(setup, tables, GivenRays(o, d), None, sampler.setup(), (n, 1), spp),
+            *(mean, spread),
+        )
+        call = render_band, signature_of(*arguments, 0, 0, 0, 0)
+        (band,) = compile_bands([call], tables, tracer, threads)
+        run_bands(band, arguments, n, spp, threads, lambda what, fraction: None)
+    if spp == 1:
+        spread[:] = math.inf
+    mean[~valid], spread[~valid] = 0.0, 0.0
+    return mean, np.sqrt(spread)
+
+
+def radiance_without_noise(
+    tables: SceneTables, setup: Any, origins: npt.ArrayLike, directions: npt.ArrayLike
+) -> FloatArray:
+    """The radiance (..., 3) by the `setup()` of an integrator that draws no random numbers."""
+    rays = rays_of(origins, directions)
+    mean, _ = estimate(tables, setup, rays, 1, 0, None)
+    return shaped(mean, rays.shape)  # type: ignore[no-any-return]

@@ -1,0 +1,85 @@
+"""All crossings of rays and a solid, not the first alone: what its laws are tested by."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.accel.crossing_order import FROM_THE_START
+from reference_rt.accel.csg.evaluate import surface_along
+from reference_rt.accel.geometry import Geometry
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import row
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit.kernel import entry_kernel
+from reference_rt.rendering.query.rays import checked_rays
+
+
+@dataclass(frozen=True)
+class SolidCrossings:
+    """Where n rays go in and out of a solid, in order, over all t > 0.
+
+    t (n, k): inf where there are fewer than k;  width (n, k): how far rounding may have moved t:
+    crossings closer together than the sum of theirs are passed at once, and what is between them,
+    material or gap, is not told;  part (n, k): number of the operand that shows;  count (n,).
+    """
+
+    t: FloatArray
+    width: FloatArray
+    part: IntArray
+    count: IntArray
+
+
+@entry_kernel
+def _crossings(
+    geometry: Geometry,
+    solid: int,
+    o: FloatArray,
+    d: FloatArray,
+    t: FloatArray,
+    widths: FloatArray,
+    part: IntArray,
+    count: IntArray,
+) -> None:
+    solids: Any = geometry.solids
+    bvh: Any = geometry.bvh
+    for i in range(len(o)):
+        ray = Ray(row(o, i), row(d, i), math.inf)
+        count[i], _ = surface_along(
+            solids,
+            geometry.shapes,
+            bvh,
+            solid,
+            ray,
+            math.inf,
+            t[i],
+            widths[i],
+            part[i],
+            -1,
+            FROM_THE_START,
+        )
+
+
+def crossings(
+    scene: SceneTables,
+    solid: int,
+    origins: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    most: int = 64,
+) -> SolidCrossings:
+    """All crossings of each ray with the solid of that number, in the scene's order; `most` of
+    them, though `count` counts all."""
+    solids = scene.geometry.solids
+    if solids is None or not 0 <= solid < len(solids.first):
+        known = 0 if solids is None else len(solids.first)
+        raise ValueError(f"there is no solid {solid}; expected one of the scene's {known}")
+    o, d = checked_rays(origins, directions)
+    t, widths = np.full((2, len(o), most), math.inf)
+    part = np.full((len(o), most), -1)
+    count = np.zeros(len(o), np.int64)
+    with np.errstate(all="ignore"):
+        _crossings(scene.geometry, solid, o, d, t, widths, part, count)
+    return SolidCrossings(t, widths, part, count)

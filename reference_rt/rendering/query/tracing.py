@@ -1,0 +1,288 @@
+"""From arrays of rays to what they meet: the entry kernels, and how they follow each other."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference_rt.accel.array_query import (
+    MOST_ADDED,
+    Primitives,
+    Work,
+    closest_one_by_one,
+    trace_bundle,
+)
+from reference_rt.accel.crossing_order import nothing_at
+from reference_rt.accel.geometry import Geometry, owner, surface
+from reference_rt.accel.next_crossing import next_crossing
+from reference_rt.accel.packet.packet import BUNDLE
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import BLOCK, Hit, at
+from reference_rt.core.ray_block import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, Hits, Rays
+from reference_rt.core.scaled_ray import is_told, scaled
+from reference_rt.core.vec3 import row
+from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_integers
+
+
+class Answers(NamedTuple):
+    """The arrays of `Intersections` as kernels fill them; those of surfaces are empty where only
+    `Hits` are asked for."""
+
+    t: FloatArray
+    shape: IntArray
+    primitive: IntArray
+    part: IntArray
+    instance: IntArray
+    p: FloatArray
+    n: FloatArray
+    ns: FloatArray
+    uv: FloatArray
+
+
+def no_answers(n: int, surfaces: bool) -> Answers:
+    """Room for n, not filled."""
+    m = n if surfaces else 0
+    shape, primitive, part, instance = np.empty((4, n), np.int64)
+    p, normal, ns = np.empty((3, m, 3))
+    return Answers(np.empty(n), shape, primitive, part, instance, p, normal, ns, np.empty((m, 2)))
+
+
+def no_primitives(n: int) -> Primitives:
+    """Room for n, not filled."""
+    return Primitives(np.empty(n), np.empty((n, 3), np.int64), np.empty((n, 2)))
+
+
+def part_of(arrays: Any, k: slice | IntArray) -> Any:
+    """Rows k of each array of a NamedTuple; those of no rows stay as they are."""
+    return type(arrays)(*(a[k] if len(a) > 0 else a for a in arrays))
+
+
+EVERY_RAY = np.empty(0, np.int64)
+"""In place of the numbers of rays: each hit is of the ray of its own number."""
+
+NO_LIMIT = np.empty(0)
+"""In place of a t for each ray."""
+
+
+# The kernels take the geometry alone: scenes of other materials and lights share them.
+@entry_kernel
+def closest(
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    t_max: FloatArray,
+    found: Primitives,
+    numbers: IntArray,
+    out: Answers,
+) -> None:
+    """What rays meet first, into `out`.
+
+    found, numbers: buffers of at least MOST_ADDED.  Hits are described while they are in the
+    processor's cache: a pass of its own over all of them took a third longer (measured).  Of
+    len(o) + MOST_ADDED, they keep all that was found.
+    """
+    work = Work(
+        Rays(local_floats(RAY_FLOATS)),
+        Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
+        Rays(local_floats(RAY_FLOATS)),
+        local_integers(BLOCK),
+    )
+    for k in range(RAY_FLOATS):
+        work.rays.numbers[k] = 1.0  # lanes without a ray are traced too
+    waiting, filled = 0, 0
+    for begin in range(0, len(o), BUNDLE):
+        waiting, filled = trace_bundle(geometry, o, d, begin, work, waiting, found, numbers, filled)
+        if filled > len(numbers) - MOST_ADDED or begin + BUNDLE >= len(o):
+            for k in range(filled):
+                _describe(geometry, o, d, numbers[k], t_max, found, k, out, numbers[k])
+            filled = 0
+
+
+@entry_kernel
+def closest_of_few(geometry: Geometry, o: FloatArray, d: FloatArray, found: Primitives) -> None:
+    closest_one_by_one(geometry, o, d, found)
+
+
+BUFFER = 256
+"""Hits between which `closest` describes what it found: their 14 KiB stay in the cache."""
+
+FEW = 1 << 12
+"""Rays that are traced one by one: `closest` would find the same some milliseconds earlier, but
+takes 3 to 5 s longer to compile for a kind of scene (measured)."""
+
+
+@entry_kernel
+def describe(
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    rays: IntArray,
+    t_max: FloatArray,
+    found: Primitives,
+    out: Answers,
+) -> None:
+    """rays: number of each hit's ray, or `EVERY_RAY`;  t_max (len(o),), or `NO_LIMIT`."""
+    for i in range(len(out.t)):
+        r = rays[i] if len(rays) > 0 else i
+        _describe(geometry, o, d, r, t_max, found, i, out, i)
+
+
+@kernel
+def _describe(
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    r: int,
+    t_max: FloatArray,
+    found: Primitives,
+    k: int,
+    out: Answers,
+    i: int,
+) -> None:
+    """Hit k of ray r as answer i: the one place where hits get the numbers that the public sees."""
+    kind = found.codes[k, 0]
+    if kind < 0:
+        _put_miss(out, i)
+        return
+    ray, unit, _ = scaled(row(o, r), row(d, r), math.inf)
+    hit = Hit(
+        found.t[k], kind, found.codes[k, 1], found.uv[k, 0], found.uv[k, 1], found.codes[k, 2]
+    )
+    t = hit.t * unit
+    if len(t_max) > 0 and not t < t_max[r]:
+        _put_miss(out, i)
+        return
+    p = at(ray, hit.t)
+    if len(out.p) > 0:
+        point = surface(geometry, ray, hit)
+        p = point.p
+        out.p[i, 0], out.p[i, 1], out.p[i, 2] = point.p
+        out.n[i, 0], out.n[i, 1], out.n[i, 2] = point.n
+        out.ns[i, 0], out.ns[i, 1], out.ns[i, 2] = point.ns
+    if not is_told(t, p):
+        _put_miss(out, i)
+        return
+    whose = owner(geometry, ray, hit)
+    out.t[i], out.shape[i], out.primitive[i] = t, whose.shape, whose.face
+    out.part[i], out.instance[i] = whose.part, whose.instance
+    if len(out.p) > 0:
+        out.uv[i, 0], out.uv[i, 1] = whose.u, whose.v
+
+
+@kernel
+def _put_miss(out: Answers, i: int) -> None:
+    out.t[i], out.shape[i], out.primitive[i] = math.inf, -1, -1
+    out.part[i], out.instance[i] = -1, -1
+    if len(out.p) > 0:
+        out.p[i, 0], out.p[i, 1], out.p[i, 2] = 0.0, 0.0, 0.0
+        out.n[i, 0], out.n[i, 1], out.n[i, 2] = 0.0, 0.0, 0.0
+        out.ns[i, 0], out.ns[i, 1], out.ns[i, 2] = 0.0, 0.0, 0.0
+        out.uv[i, 0], out.uv[i, 1] = 0.0, 0.0
+
+
+@entry_kernel
+def cross(
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    t_min: FloatArray,
+    t_max: FloatArray,
+    begin: int,
+    most: int,
+    counts: IntArray,
+    rays: IntArray,
+    found: Primitives,
+) -> int:
+    """The crossings of rays from number `begin` on at t_min < t < t_max, at most `most` of each:
+    how many each has, into counts (len(o),), and the rays and crossings, one ray after another,
+    while there is room.  The number of the first ray for which there was none."""
+    filled = 0
+    for i in range(begin, len(o)):
+        first = filled
+        counts[i] = 0
+        ray, unit, valid = scaled(row(o, i), row(d, i), t_max[i])
+        if not valid:
+            continue
+        after = nothing_at(t_min[i] / unit)
+        while filled - first < most:
+            after = next_crossing(geometry, ray, after)
+            hit, t = after.hit, after.hit.t * unit
+            if hit.kind < 0 or not (t < t_max[i] and is_told(t, at(ray, hit.t))):
+                break
+            if not t > t_min[i]:  # where the quotient by `unit` was too small for float64
+                continue
+            if filled == len(rays):
+                return i
+            rays[filled], found.t[filled] = i, hit.t
+            found.codes[filled, 0] = hit.kind
+            found.codes[filled, 1] = hit.row
+            found.codes[filled, 2] = hit.instance
+            found.uv[filled, 0], found.uv[filled, 1] = hit.u, hit.v
+            filled += 1
+        counts[i] = filled - first
+    return len(o)
+
+
+def many(
+    geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: Answers
+) -> Primitives:
+    """`closest`, and what it found in the order of the rays."""
+    size = len(o) + MOST_ADDED
+    unordered, numbers = no_primitives(size), np.empty(size, np.int64)
+    closest(geometry, o, d, t_max, unordered, numbers, out)
+    found = no_primitives(len(o))
+    for ordered, values in zip(found, unordered, strict=True):
+        ordered[numbers[: len(o)]] = values[: len(o)]
+    return found
+
+
+def find(
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    t_min: FloatArray | None,
+    t_max: FloatArray,
+    out: Answers,
+    total: int,
+    rows: bool = False,
+) -> Primitives:
+    """What rays, of `total` in all, meet first, into `out`; where `rows` are asked for, also as it
+    stands in the tables."""
+    found = no_primitives(0)
+    if total <= FEW:
+        found = no_primitives(len(o))
+        closest_of_few(geometry, o, d, found)
+        describe(geometry, o, d, EVERY_RAY, t_max, found, out)
+    elif rows:
+        found = many(geometry, o, d, t_max, out)
+    else:
+        buffer = no_primitives(BUFFER), np.empty(BUFFER, np.int64)
+        closest(geometry, o, d, t_max, *buffer, out)
+    if t_min is None:
+        return found
+    again = np.flatnonzero(out.t <= t_min)
+    if len(again) > 0:
+        n, o, d, t_min = len(again), o[again], d[again], t_min[again]
+        t_max = np.full(n, math.inf) if t_max is NO_LIMIT else t_max[again]
+        beyond = first_beyond(geometry, o, d, t_min, t_max)
+        answers = no_answers(n, len(out.p) > 0)
+        describe(geometry, o, d, EVERY_RAY, t_max, beyond, answers)
+        for whole, part in zip((*found, *out), (*beyond, *answers), strict=True):
+            if len(whole) > 0:
+                whole[again] = part
+    return found
+
+
+def first_beyond(
+    geometry: Geometry, o: FloatArray, d: FloatArray, t_min: FloatArray, t_max: FloatArray
+) -> Primitives:
+    """The first crossing of each ray at t_min < t < t_max."""
+    n = len(o)
+    met, rays, counts = no_primitives(n), np.empty(n, np.int64), np.empty(n, np.int64)
+    cross(geometry, o, d, t_min, t_max, 0, 1, counts, rays, met)
+    m = int(counts.sum())
+    found = no_primitives(n)
+    found.codes[:] = -1
+    for whole, part in zip(found, met, strict=True):
+        whole[rays[:m]] = part[:m]
+    return found

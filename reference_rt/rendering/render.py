@@ -1,0 +1,243 @@
+"""Rendering: bands of pixels on all cores, with progress and a clean stop."""
+
+import os
+import threading
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference_rt.accel.block_query import tracer_of
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.integrators import Path, RayCast
+from reference_rt.integrators.path import PathSetup
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit.function_pointer import address_of
+from reference_rt.jit.kernel import signature_of
+from reference_rt.jit.parallel_compile import Call, precompile_all
+from reference_rt.rendering.tiles import cast_band, first_hits_band, render_band
+from reference_rt.scene.build import BuiltScene, build_tables
+from reference_rt.scene.likely_mistakes import likely_mistakes
+
+SAMPLES_PER_BAND = 1 << 15
+"""A band takes some 20 ms: short enough for progress and Ctrl-C, long against the 0.1 ms that
+handing it to a thread costs."""
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done ("compile", "render") and the fraction of it that is done."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A rendered scene.
+
+    layers: (height, width, 3) float64 linear radiance as "colour", and what `Film.layers` asks for:
+    albedo, normal and variance (height, width, 3), depth and id (height, width); or for ray casting
+    all of colour (height, width, 3), distance (height, width), normal (height, width, 3), id
+    (height, width) and uv (height, width, 2);  shown: the layer that is the picture;  seconds: wall
+    clock of "tables" (files, arrays, hierarchy), "compile" (or loading what was compiled before)
+    and "render".
+    """
+
+    layers: dict[str, FloatArray]
+    shown: str = "colour"
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def colour(self) -> FloatArray:
+        """(height, width, 3), row 0 on top."""
+        return self.layers["colour"]
+
+    @property
+    def nonfinite_pixels(self) -> IntArray:
+        """(n, 2) column and row, along rows, of the pixels with a NaN, or with more than float32,
+        which files hold, can; in all layers but the depth, which is inf for a miss."""
+        most = np.finfo(np.float32).max
+        bad = np.zeros(self.colour.shape[:2], np.bool_)
+        for name, layer in self.layers.items():
+            if name not in ("depth", "distance"):
+                bad |= ~(np.abs(layer.reshape(*bad.shape, -1)) <= most).all(axis=-1)
+        return np.argwhere(bad)[:, ::-1]
+
+    @property
+    def nonfinite(self) -> int:
+        """The number of `nonfinite_pixels`."""
+        return len(self.nonfinite_pixels)
+
+
+class _Job(NamedTuple):
+    """A kernel of `bands`, its arguments but for the last four, and its samples per pixel."""
+
+    band: Any
+    arguments: tuple[Any, ...]
+    spp: int
+
+
+def render(
+    scene: BuiltScene,
+    *,
+    threads: int | None = None,
+    tables: SceneTables | None = None,
+    progress: Progress | None = None,
+) -> Picture:
+    """Render a scene.
+
+    The same scene gives the same bits for any number of `threads` (default: all cores).  `tables`
+    spares building them again.  Ctrl-C stops within a band.  Raises SceneError; issues a
+    SceneWarning for what looks like a mistake (`likely_mistakes`).
+    """
+    say = progress or (lambda what, fraction: None)
+    _check(scene)
+    clock = [time.perf_counter()]
+    tables = build_tables(scene) if tables is None else tables
+    clock.append(time.perf_counter())
+    for mistake in likely_mistakes(scene, tables):
+        scene.warn(mistake.message, *mistake.path)
+    integrator = scene.integrator
+    tables, tracer = with_tracer(tables, integrator)
+    if isinstance(integrator, RayCast):
+        shown, (jobs, layers) = integrator.show, _cast_jobs(scene, tables)
+    else:
+        shown, (jobs, layers) = "colour", _render_jobs(scene, integrator.setup(), tables)
+    say("compile", 0.0)
+    threads = threads or os.cpu_count() or 1
+    calls = [(job.band, signature_of(*job.arguments, 0, 0, 0, 0)) for job in jobs]
+    bands = compile_bands(calls, tables, tracer, threads)
+    say("compile", 1.0)
+    clock.append(time.perf_counter())
+    pixels = scene.film.width * scene.film.height
+    for k, (band, job) in enumerate(zip(bands, jobs, strict=True)):
+
+        def say_part(what: str, fraction: float, k: int = k) -> None:
+            say(what, (k + fraction) / len(jobs))
+
+        run_bands(band, job.arguments, pixels, job.spp, threads, say_part)
+    clock.append(time.perf_counter())
+    seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
+    return Picture(layers, shown, seconds)
+
+
+def with_tracer(tables: SceneTables, integrator: Any) -> tuple[SceneTables, Call | None]:
+    """The tables with room for the address of the kernel that traces the rays of paths, and that
+    kernel; None where it is inlined."""
+    tracer = tracer_of(tables.geometry) if isinstance(integrator, Path | PathSetup) else None
+    if tracer is not None:
+        geometry = tables.geometry._replace(tracer=np.zeros(1, np.intp))
+        tables = tables._replace(geometry=geometry)
+    return tables, tracer
+
+
+def compile_bands(
+    calls: Sequence[Call], tables: SceneTables, tracer: Call | None, threads: int
+) -> Sequence[Callable[..., Any]]:
+    """Kernels that are ready to be called, once the tables know where the tracer is."""
+    if tracer is None:
+        return precompile_all(calls, threads)
+    *bands, _ = precompile_all([*calls, tracer], threads)
+    address: Any = tables.geometry.tracer
+    address[0] = address_of(*tracer)
+    return bands
+
+
+def _cast_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:
+    """What fills the layers of ray casting, and these layers."""
+    film = scene.film
+    out = np.zeros((film.height, film.width, 10))
+    view = scene.camera.setup(film.width, film.height)
+    job = _Job(cast_band, (tables, view, (film.width, film.height), out.reshape(-1, 10)), 1)
+    layers = {
+        "colour": out[..., 0:3],
+        "distance": out[..., 3],
+        "normal": out[..., 4:7],
+        "id": out[..., 7],
+        "uv": out[..., 8:10],
+    }
+    return [job], layers
+
+
+def _render_jobs(
+    scene: BuiltScene, integrator: Any, tables: SceneTables
+) -> tuple[list[_Job], dict[str, FloatArray]]:
+    """What fills the picture and the layers that the film asks for, and these."""
+    film, sampler = scene.film, scene.resolved_sampler
+    shape, spp = (film.width, film.height), sampler.spp
+    out = np.zeros((film.height, film.width, 3))
+    spread = np.zeros_like(out) if "variance" in film.layers else None
+    rows = None if spread is None else spread.reshape(-1, 3)
+    view = scene.camera.setup(*shape)
+    setups = (tables, view, film.filter.setup(), sampler.setup(), shape, spp)
+    arguments = (integrator, *setups, out.reshape(-1, 3), rows)
+    jobs, layers = [_Job(render_band, arguments, spp)], {"colour": out}
+    if spread is not None:
+        layers["variance"] = spread
+    if {"albedo", "normal"} & set(film.layers):
+        layers |= {"albedo": np.zeros_like(out), "normal": np.zeros_like(out)}
+        hits = [layers[name].reshape(-1, 3) for name in ("albedo", "normal")]
+        jobs.append(_Job(first_hits_band, (*setups, *hits), spp))
+    if {"depth", "id"} & set(film.layers):
+        centres, cast = _cast_jobs(scene, tables)
+        jobs += centres
+        layers |= {"depth": cast["distance"], "id": cast["id"]}
+    return jobs, {name: layers[name] for name in ("colour", *film.layers)}
+
+
+def _check(scene: BuiltScene) -> None:
+    """Refuse a picture that cannot fit, before anything is allocated, or cannot be estimated."""
+    film = scene.film
+    casts = isinstance(scene.integrator, RayCast)
+    if "variance" in film.layers and scene.resolved_sampler.spp < 2 and not casts:
+        raise scene.error(
+            "one sample per pixel has no variance; expected at least 2", "film", "layers"
+        )
+    # At most 10 channels of float64, 22 with layers, and as much again while files are written.
+    needed = film.width * film.height * (22 if film.layers else 10) * 2 * 8
+    try:
+        available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):  # not every system tells
+        available = 1 << 36
+    if needed > available:
+        raise scene.error(
+            f"{film.width} x {film.height} pixels need {needed / 2**30:.3g} GiB; "
+            f"expected at most the {available / 2**30:.3g} GiB that this machine has",
+            "film",
+        )
+
+
+def run_bands(
+    band: Any, arguments: Sequence[Any], pixels: int, spp: int, threads: int, say: Progress
+) -> None:
+    """Bands on a pool.  Kernels release the GIL; the main thread reports and listens to Ctrl-C."""
+    stop = threading.Event()
+
+    def run(begin: int, end: int) -> None:
+        # In plain Python (NUMBA_DISABLE_JIT=1) NumPy would warn of the infinities that IEEE
+        # division and wrapping hashes are meant to make.
+        with np.errstate(all="ignore"):
+            for first in range(0, spp, SAMPLES_PER_BAND):
+                if stop.is_set():
+                    return
+                band(*arguments, begin, end, first, min(first + SAMPLES_PER_BAND, spp))
+
+    step = max(1, min(pixels, SAMPLES_PER_BAND // spp))
+    say("render", 0.0)
+    pool = ThreadPoolExecutor(threads, thread_name_prefix="band")
+    try:
+        waiting = {pool.submit(run, k, min(k + step, pixels)) for k in range(0, pixels, step)}
+        total = len(waiting)
+        while waiting:
+            # Woken for each of 256 bands, this thread takes 0.1 s to ask what is left (measured).
+            done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_EXCEPTION)
+            for future in done:
+                future.result()
+            say("render", 1.0 - len(waiting) / total)
+    except BaseException:
+        stop.set()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+__all__ = ["Picture", "Progress", "render"]

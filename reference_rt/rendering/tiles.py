@@ -1,0 +1,232 @@
+"""What is computed for a band of pixels: the kernels that `render` hands to threads.
+
+All take samples first..last of the pixels begin..end, counted along rows, and write the rows of
+these pixels.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from reference_rt import sampling
+from reference_rt.accel.geometry import closest_hit, surface
+from reference_rt.cameras import LENS_CENTRE, VIEWS, camera_ray, lens_sample
+from reference_rt.cameras.filters import film_offset
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import BLOCK, Ray
+from reference_rt.core.ray_block import (
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    Hits,
+    Rays,
+    put_ray,
+    vector_of,
+)
+from reference_rt.core.vec3 import Vec3, row
+from reference_rt.integrators import radiances
+from reference_rt.integrators.ray_cast import cast
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
+from reference_rt.integrators.shading import texture_place
+from reference_rt.jit.kernel import ByClass, entry_kernel, kernel, local_floats, local_integers
+from reference_rt.materials import kept_floats
+from reference_rt.sampling import (
+    PAIR_FLOATS,
+    PAIR_INTEGERS,
+    Samplers,
+    draw_pair,
+    forget_pairs,
+    sampler_of,
+    start_sample,
+)
+from reference_rt.textures import colour_at
+
+
+class FilmRay(NamedTuple):
+    """A ray through a point near a pixel, and the weight of what it brings there."""
+
+    ray: Ray
+    weight: float
+
+
+class GivenRays(NamedTuple):
+    """In place of a camera, with None for the filter: the ray of pixel x of a single row, from
+    origins o (n, 3) into unit directions d (n, 3)."""
+
+    o: FloatArray
+    d: FloatArray
+
+
+@kernel
+def _given_ray(
+    rays: GivenRays, film_filter: None, sampler: Any, shape: tuple[int, int], x: int, y: int
+) -> FilmRay:
+    return FilmRay(Ray(row(rays.o, x), row(rays.d, x), math.inf), 1.0)
+
+
+@kernel
+def _camera_film_ray(
+    view: Any, film_filter: Any, sampler: Any, shape: tuple[int, int], x: int, y: int
+) -> FilmRay:
+    width, height = shape
+    u0, u1 = draw_pair(sampler, sampling.FILM)
+    dx, weight_x = film_offset(film_filter, u0)
+    dy, weight_y = film_offset(film_filter, u1)
+    lens = lens_sample(view, sampler)
+    ray = camera_ray(view, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
+    return FilmRay(ray, weight_x * weight_y)
+
+
+_film_rays = ByClass("film_ray")
+_film_rays.register(GivenRays, _given_ray)
+for _view in VIEWS:
+    _film_rays.register(_view, _camera_film_ray)
+_film_ray = _film_rays.function
+
+
+@entry_kernel
+def render_band(
+    integrator: Any,
+    scene: SceneTables,
+    view: Any,
+    film_filter: Any,
+    sampler_setup: Any,
+    shape: tuple[int, int],
+    spp: int,
+    out: FloatArray,
+    spread: FloatArray | None,
+    begin: int,
+    end: int,
+    first: int,
+    last: int,
+) -> None:
+    """Radiance, added to out (n, 3); with the last of all `spp` samples the sum becomes the mean,
+    and spread (n, 3) the estimate of the mean's variance."""
+    scratch = Scratch(
+        rays=Rays(local_floats(RAY_FLOATS)),
+        totals=local_floats(VECTOR_FLOATS),
+        shadows=Rays(local_floats(RAY_FLOATS)),
+        lights=local_floats(VECTOR_FLOATS),
+        lit=local_integers(BLOCK),
+        hits=Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
+        states=local_floats(STATE_FLOATS),
+        samples=local_integers(BLOCK),
+        kept=local_floats(kept_floats(scene.materials)),
+    )
+    weights = local_floats(BLOCK)
+    samplers = Samplers(
+        sampler_setup,
+        local_integers(BLOCK),
+        local_integers(BLOCK),
+        local_floats(PAIR_FLOATS),
+        local_integers(PAIR_INTEGERS),
+    )
+    prepare(scratch)
+    forget_pairs(samplers)
+    count = last - first
+    paths = (end - begin) * count
+    for start in range(0, paths, BLOCK):
+        n = min(BLOCK, paths - start)
+        for k in range(n):
+            pixel = begin + (start + k) // count
+            samplers.pixels[k], samplers.numbers[k] = pixel, first + (start + k) % count
+            y, x = pixel // shape[0], pixel % shape[0]
+            seen = _film_ray(view, film_filter, sampler_of(samplers, k), shape, x, y)
+            put_ray(scratch.rays, k, seen.ray)
+            weights[k] = seen.weight
+        radiances(integrator, scene, samplers, n, scratch)
+        for k in range(n):
+            pixel, sample = samplers.pixels[k], samplers.numbers[k]
+            one = vector_of(scratch.totals, 0, k) * weights[k]
+            total = row(out, pixel) + one
+            _add_spread(spread, pixel, sample, one, total)
+            if sample + 1 == spp:
+                total = total / spp
+                _finish_spread(spread, pixel, spp)
+            out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
+
+
+@kernel
+def _add_spread(spread: FloatArray | None, pixel: int, sample: int, one: Vec3, total: Vec3) -> None:
+    """The sum of squared differences from the mean, with number `sample`; total: the sum with it
+    (Youngs & Cramer 1971: squares of differences, so that nothing cancels)."""
+    if spread is None:
+        return
+    if sample > 0:
+        count = sample + 1.0
+        off = one * count - total
+        scale = 1.0 / (count * sample)
+        spread[pixel, 0] += off.x * off.x * scale
+        spread[pixel, 1] += off.y * off.y * scale
+        spread[pixel, 2] += off.z * off.z * scale
+
+
+@kernel
+def _finish_spread(spread: FloatArray | None, pixel: int, spp: int) -> None:
+    if spread is None:
+        return
+    if spp < 2:  # no estimate
+        return
+    scale = 1.0 / (spp * (spp - 1.0))
+    for k in range(3):
+        spread[pixel, k] *= scale
+
+
+@entry_kernel
+def first_hits_band(
+    scene: SceneTables,
+    view: Any,
+    film_filter: Any,
+    sampler_setup: Any,
+    shape: tuple[int, int],
+    spp: int,
+    albedos: FloatArray,
+    normals: FloatArray,
+    begin: int,
+    end: int,
+    first: int,
+    last: int,
+) -> None:
+    """Albedo and shading normal of what the rays of `render_band` hit first, their means into
+    albedos (n, 3) and normals (n, 3)."""
+    for pixel in range(begin, end):
+        y, x = pixel // shape[0], pixel % shape[0]
+        albedo, normal = row(albedos, pixel), row(normals, pixel)
+        for sample in range(first, last):
+            sampler = start_sample(sampler_setup, pixel, sample)
+            seen = _film_ray(view, film_filter, sampler, shape, x, y)
+            hit = closest_hit(scene.geometry, seen.ray)
+            if hit.kind >= 0:
+                point = surface(scene.geometry, seen.ray, hit)
+                at = texture_place(scene.textures, scene.geometry, seen.ray, hit)
+                own = colour_at(scene.materials.shown, point.material, at)
+                albedo = albedo + own * seen.weight
+                normal = normal + point.ns * seen.weight
+        if last == spp:
+            albedo, normal = albedo / spp, normal / spp
+        albedos[pixel, 0], albedos[pixel, 1], albedos[pixel, 2] = albedo
+        normals[pixel, 0], normals[pixel, 1], normals[pixel, 2] = normal
+
+
+@entry_kernel
+def cast_band(
+    scene: SceneTables,
+    view: Any,
+    shape: tuple[int, int],
+    out: FloatArray,
+    begin: int,
+    end: int,
+    first: int,
+    last: int,
+) -> None:
+    """All layers of ray casting at the pixels' centres, into out (n, 10); `first` and `last` are
+    there for the likeness to `render_band`."""
+    width, height = shape
+    for pixel in range(begin, end):
+        y, x = pixel // width, pixel % width
+        ray = camera_ray(view, (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
+        found = cast(scene, ray)
+        out[pixel, 0], out[pixel, 1], out[pixel, 2] = found.colour
+        out[pixel, 3] = found.distance
+        out[pixel, 4], out[pixel, 5], out[pixel, 6] = found.n
+        out[pixel, 7], out[pixel, 8], out[pixel, 9] = found.id, found.u, found.v

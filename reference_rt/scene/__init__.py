@@ -1,0 +1,1 @@
+"""Scenes: their description, how files are read, and how kernels' tables are built of them."""

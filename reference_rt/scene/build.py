@@ -1,0 +1,95 @@
+"""Scene -> SceneTables: the only place that makes a scene's arrays.
+
+Every array is float64 or int64, C-contiguous and writable, so that one feature set is one set of
+Numba types and compiles once.  What a scene lacks is None: the kernels' branches for it vanish at
+compile time.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pydantic import PrivateAttr
+
+from reference_rt.accel.geometry import Geometry
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.scene.build_geometry import assemble
+from reference_rt.scene.build_lights import light_tables
+from reference_rt.scene.build_materials import material_tables
+from reference_rt.scene.model import SceneModel
+from reference_rt.textures import TABLES as TEXTURE_TABLES
+from reference_rt.textures import Palette, Textures, bitmap
+from reference_rt.textures.parameter import join
+
+
+class BuiltScene(SceneModel):
+    """A description together with the tables that are built of it."""
+
+    _tables: SceneTables | None = PrivateAttr(default=None)
+
+    @property
+    def tables(self) -> SceneTables:
+        """What kernels see, built once.  Raises SceneError for files that cannot be used."""
+        if self._tables is None:
+            self._tables = build_tables(self)
+        return self._tables
+
+
+def build_tables(scene: SceneModel) -> SceneTables:
+    """The tables of a scene.  Raises SceneError, with the place in the scene file."""
+    numbers: dict[str | None, int] = {name: i for i, name in enumerate(scene.materials)}
+    numbers[None] = len(numbers)
+    textures, palette = _texture_tables(scene)
+    with np.errstate(over="ignore", invalid="ignore"):  # found as what is not finite
+        geometry = assemble(scene, numbers)
+        return SceneTables(
+            geometry=geometry,
+            materials=material_tables(scene, palette, _has_material(geometry, numbers[None])),
+            lights=light_tables(scene, geometry, palette),
+            textures=textures,
+        )
+
+
+def _has_material(geometry: Geometry, number: int) -> bool:
+    """Whether any primitive is made of a material."""
+    tables = [table for table in geometry.shapes if table is not None]
+    return any(bool((table.material == number).any()) for table in tables)
+
+
+def _texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
+    """The textures, and how parameters name them."""
+    if not scene.textures:
+        return None, Palette({}, ())
+    parts: dict[int, list[Any]] = {}
+    try:
+        room, used = bitmap.room_for(scene.textures.values(), scene.folder), 0
+    except ValueError as error:
+        raise scene.error(str(error), "textures") from None
+    kinds, rows, maps, greatest = [], [], [], []
+    for name, texture in scene.textures.items():
+        code, module = next((c, m) for c, _, d, m in TEXTURE_TABLES if isinstance(texture, d))
+        try:
+            table: Any
+            if isinstance(texture, bitmap.Bitmap):
+                table = texture.tabulate(scene.folder, room[used:])
+                used += len(table.texels)
+            else:
+                table = texture.tabulate(scene.folder)
+        except ValueError as error:
+            raise scene.error(str(error), "textures", name) from None
+        parts.setdefault(code, []).append(table)
+        kinds.append(code)
+        rows.append(len(parts[code]) - 1)
+        maps.append(texture.uv.matrix())
+        greatest.append(module.greatest(table))
+    tables = {
+        field: _joined(module, parts[code]) if code in parts else None
+        for code, field, _, module in TEXTURE_TABLES
+    }
+    numbers = {name: k for k, name in enumerate(scene.textures)}
+    textures = Textures(np.array(kinds), np.array(rows), np.array(maps), **tables)
+    return textures, Palette(numbers, greatest)
+
+
+def _joined(module: Any, parts: Sequence[Any]) -> Any:
+    return getattr(module, "join", join)(parts)

@@ -1,0 +1,314 @@
+"""All shapes of a scene, its groups and solids -> Geometry: the tables and what leads to them."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from reference_rt.accel.geometry import Geometry
+from reference_rt.accel.leaf import SOLID
+from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.transform import Affine, affine, identity, invert
+from reference_rt.scene.build_hierarchies import Copies, Reference, Trees
+from reference_rt.scene.model import SceneModel
+from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes, csg
+from reference_rt.shapes.csg import NOT, OR, Solid
+from reference_rt.shapes.csg.tables import Parts, Solids
+from reference_rt.shapes.instances import Instance
+from reference_rt.shapes.meshes.topology import describe_boundary
+from reference_rt.shapes.shape import Place, outward
+
+_CODES = {table: code for code, _, table, _ in TABLES}
+
+MOST_INSTANCES = 1_000_000
+"""Copies that a group may expand to: some 500 bytes each while the scene is built."""
+
+
+def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
+    """The geometry of a scene; `materials` are the rows of its materials.
+
+    Raises SceneError, with the place in the scene file.
+    """
+    work = _Assembly(scene, materials)
+    top: list[Reference] = []
+    copies: list[Copies] = []
+    for i, shape in enumerate(scene.shapes):
+        try:
+            if isinstance(shape, Instance):
+                numbers, maps = work.expand(shape.group)
+                copies.append(Copies(i, numbers, _composed(maps, _map_of(shape))))
+            else:
+                top.append(work.member(shape, i, None))
+        except ValueError as error:
+            raise scene.error(str(error), "shapes", i) from None
+    tables: dict[str, Any] = {}
+    bounds: dict[int, Bounds] = {}
+    for code, field, _, module in TABLES:
+        tables[field] = None
+        if work.tables[code]:  # taken out: of a large mesh no two copies are kept
+            table = tables[field] = _concatenate(work.tables.pop(code))
+            work.check_finite(table)
+            bounds[code] = module.bounds(table)
+    if work.solids:
+        bounds[SOLID] = _concatenated_bounds([solid.bounds for solid in work.solids])
+    trees = Trees(scene.hierarchy, tables, bounds)
+    roots = [trees.add(references, whole=whole) for references, whole in work.trees]
+    trees.finish(top, copies, roots)
+    solids = work.solid_tables(trees, roots)
+    return Geometry(
+        Shapes(**trees.tables),
+        trees.packets(),
+        trees.hierarchy(),
+        solids,
+        trees.instances(),
+        work.part_table(),
+    )
+
+
+class _Program:
+    """A solid: its first operand and their number, its program, where they are seen from and how
+    far from there they reach; its box (1, 3), (1, 3), in the world."""
+
+    def __init__(
+        self, first: int, steps: list[int], boxes: Sequence[Bounds], anchor: FloatArray
+    ) -> None:
+        self.first, self.count, self.steps, self.anchor = first, len(boxes), steps, anchor
+        (lower, upper), self.depth = _solid_bounds(steps, boxes)
+        self.bounds = outward(lower + anchor, upper + anchor)
+        # Of a corner; twice, so that no rounding of it counts.
+        self.reach = 2.0 * math.sqrt(3.0) * float(np.abs(boxes).max())
+
+
+class _Assembly:
+    """Collects the primitives of a scene, its groups and its solids."""
+
+    def __init__(self, scene: SceneModel, materials: dict[str | None, int]) -> None:
+        self.scene, self.materials = scene, materials
+        self.tables: dict[int, list[Any]] = {code: [] for code, _, _, _ in TABLES}
+        self.rows = dict.fromkeys(self.tables, 0)
+        # What each hierarchy but the scene's own is over, and whether it must not cut primitives.
+        self.trees: list[tuple[list[Reference], bool]] = []
+        # Where in the scene file owners are that are not shapes of the scene.
+        self.paths: dict[int, tuple[str | int, ...]] = {}
+        # (shape, part, solid, turned) by owner number: the scene's shapes first.
+        self.parts = [(i, 0, -1, 0) for i in range(len(scene.shapes))]
+        self.solids: list[_Program] = []
+        # (kind, row, number of the tree) of each operand.
+        self.operands: list[tuple[int, int, int]] = []
+        self.expansions: dict[str, tuple[IntArray, FloatArray]] = {}
+
+    def add(self, shape: Shape, place: Place) -> Reference:
+        """A primitive shape's rows, put into their table."""
+        table = shape.tabulate(place)
+        code = _CODES[type(table)]
+        first = self.rows[code]
+        self.rows[code] += len(table.owner)
+        self.tables[code].append(table)
+        return Reference(code, np.arange(first, self.rows[code]))
+
+    def check_finite(self, table: Any) -> None:
+        """Raises SceneError for a shape whose numbers overflowed."""
+        for column in table:
+            if column is not None and not np.all(np.isfinite(column)):
+                finite = np.isfinite(column.reshape(len(column), -1)).all(axis=1)
+                owner = table.owner[~finite][0] if len(finite) == len(table.owner) else 0
+                raise self.scene.error(
+                    "its coordinates overflow; expected finite numbers",
+                    *self.path_of(int(owner)),
+                )
+
+    def member(self, shape: Shape, owner: int, material: str | None) -> Reference:
+        """Any shape of the scene, or of a group, but an instance."""
+        name = shape.material if shape.material is not None else material
+        if isinstance(shape, Solid):
+            return Reference(SOLID, np.array([self.solid(shape, owner, name)]))
+        return self.add(shape, self.place(owner, name))
+
+    def part(
+        self, shape: int, number: int, material: str | None, solid: int = -1, turned: bool = False
+    ) -> Place:
+        """The place of a part of a shape, with an owner number of its own."""
+        self.parts.append((shape, number, solid, int(turned)))
+        return self.place(len(self.parts) - 1, material)
+
+    def place(self, owner: int, material: str | None) -> Place:
+        return Place(owner, self.materials[material], self.scene.folder, warn=self.warn)
+
+    def path_of(self, owner: int) -> tuple[str | int, ...]:
+        """Where in the scene file an owner is."""
+        return self.paths.get(owner, ("shapes", owner))
+
+    def warn(self, owner: int, message: str) -> None:
+        self.scene.warn(message, *self.path_of(owner))
+
+    # ---- solids ---------------------------------------------------------------------------------
+
+    def solid(self, shape: Solid, owner: int, material: str | None) -> int:
+        """The number of a solid, whose operands become primitives that no hierarchy of shapes
+        leads to."""
+        first, boxes = len(self.operands), []
+        operands = csg.operands_of(shape, identity(), material)
+        anchor, seen = csg.anchored(shape)
+        for k, (_, _, name, turned) in enumerate(operands):
+            operand, outer = seen[k]
+            try:
+                place = self.part(self.parts[owner][0], k, name, len(self.solids), turned)
+                self.paths[place.owner] = self.path_of(owner)
+                boxes.append(self.operand(operand, place._replace(outer=outer)))
+            except ValueError as error:
+                raise ValueError(f"operand {k}, a {_type_of(operand)}: {error}") from None
+        self.solids.append(_Program(first, csg.postfix(shape), boxes, anchor))
+        return len(self.solids) - 1
+
+    def operand(self, shape: Shape, place: Place) -> Bounds:
+        """Adds an operand; its box (3,), (3,)."""
+        reference = self.add(shape, place)
+        code = reference.kind
+        table, module = self.tables[code][-1], TABLES[code][3]
+        if code == TRIANGLE:
+            problem = describe_boundary(table.vertices)
+            if problem:
+                raise ValueError(problem)
+            # A walk through it counts triangles, each once.
+            self.trees.append(([reference], True))
+            self.operands.append((code, -1, len(self.trees) - 1))
+        elif hasattr(module, "spans") and getattr(module, "is_solid", lambda _: True)(table):
+            self.operands.append((code, int(reference.rows[0]), -1))
+        else:
+            raise ValueError("it encloses no space; expected a solid")
+        lower, upper = module.bounds(table)
+        return lower.min(axis=0), upper.max(axis=0)
+
+    def box_of(self, reference: Reference) -> Bounds:
+        """The boxes of what was added last."""
+        if reference.kind == SOLID:
+            return self.solids[-1].bounds
+        bounds: Bounds = TABLES[reference.kind][3].bounds(self.tables[reference.kind][-1])
+        return bounds
+
+    def solid_tables(self, trees: Trees, roots: Sequence[int]) -> Solids | None:
+        if not self.solids:
+            return None
+        counts = np.array([len(s.steps) for s in self.solids])
+        rows = [trees.new_row(kind, row) if row >= 0 else -1 for kind, row, _ in self.operands]
+        return Solids(
+            first=np.array([s.first for s in self.solids]),
+            operands=np.array([s.count for s in self.solids]),
+            step_first=np.cumsum(counts) - counts,
+            step_count=counts,
+            depth=np.array([s.depth for s in self.solids]),
+            steps=np.array([step for s in self.solids for step in s.steps]),
+            kind=np.array([kind for kind, _, _ in self.operands]),
+            row=np.array(rows),
+            root=np.array([trees.start(roots[k]) if k >= 0 else -1 for _, _, k in self.operands]),
+            anchor=np.array([s.anchor for s in self.solids]),
+            reach=np.array([s.reach for s in self.solids]),
+        )
+
+    def part_table(self) -> Parts | None:
+        if len(self.parts) == len(self.scene.shapes):
+            return None
+        return Parts(*(np.array(column) for column in zip(*self.parts, strict=True)))
+
+    # ---- groups ---------------------------------------------------------------------------------
+
+    def expand(self, name: str, path: Sequence[str] = ()) -> tuple[IntArray, FloatArray]:
+        """Trees (k,) and maps (k, 3, 4) of all that an instance of a group stands for."""
+        if name in path:
+            raise ValueError(
+                f"the group contains itself: {' -> '.join([*path, name])}; expected no circle"
+            )
+        if name not in self.expansions:
+            self.expansions[name] = self._expansion(name, (*path, name))
+        return self.expansions[name]
+
+    def _expansion(self, name: str, path: Sequence[str]) -> tuple[IntArray, FloatArray]:
+        references: list[Reference] = []
+        trees, maps = [], []
+        for k, shape in enumerate(self.scene.groups[name]):
+            try:
+                if isinstance(shape, Instance):
+                    inner_trees, inner = self.expand(shape.group, path)
+                    trees.append(inner_trees)
+                    count = sum(map(len, trees))
+                    if count > MOST_INSTANCES:
+                        raise ValueError(f"over {MOST_INSTANCES:,} copies; expected fewer")
+                    maps.append(_composed(inner, _map_of(shape)))
+                else:
+                    owner = self.part(-1, k, shape.material).owner
+                    self.paths[owner] = ("groups", name, k)
+                    reference = self.member(shape, owner, None)
+                    if not np.isfinite(self.box_of(reference)).all():
+                        raise ValueError("it is infinite; expected a shape of a finite size")
+                    references.append(reference)
+            except ValueError as error:
+                raise self.scene.error(str(error), "groups", name, k) from None
+        if references:
+            self.trees.append((references, False))
+            trees.insert(0, np.array([len(self.trees) - 1]))
+            maps.insert(0, identity()[None])
+        return np.concatenate(trees), np.concatenate(maps)
+
+
+def _type_of(shape: Shape) -> str:
+    return str(getattr(shape, "type", "shape"))
+
+
+def _map_of(instance: Instance) -> Affine:
+    outer = affine(instance.transform)
+    invert(outer)  # refuses singular maps
+    return outer
+
+
+def _composed(maps: FloatArray, outer: Affine) -> FloatArray:
+    """Each of the maps (k, 3, 4), followed by `outer`."""
+    result = np.empty_like(maps)
+    result[:, :, :3] = outer[:, :3] @ maps[:, :, :3]
+    result[:, :, 3] = maps[:, :, 3] @ outer[:, :3].T + outer[:, 3]
+    return result
+
+
+def _concatenated_bounds(parts: Sequence[Bounds]) -> Bounds:
+    lower, upper = (np.concatenate(side) for side in zip(*parts, strict=True))
+    return lower, upper
+
+
+def _concatenate(parts: Sequence[Any]) -> Any:
+    """One table from several: the rows one after another."""
+    table = type(parts[0])
+    align = getattr(TABLES[_CODES[table]][3], "align", None)
+    if align is not None:
+        parts = align(parts)
+    columns = [
+        None if column[0] is None else np.ascontiguousarray(_joined(column))
+        for column in zip(*parts, strict=True)
+    ]
+    return table(*columns)
+
+
+def _joined(arrays: Sequence[Any]) -> Any:
+    """The arrays one after another; of a single one no copy."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _solid_bounds(steps: Sequence[int], boxes: Sequence[Bounds]) -> tuple[Bounds, int]:
+    """A box (1, 3), (1, 3) that a solid lies in, infinite where it does, and its program's depth.
+
+    The complement of anything may be everywhere; an intersection lies in both boxes.
+    """
+    stack: list[Bounds] = []
+    depth = 0
+    for step in steps:
+        if step >= 0:
+            stack.append(boxes[step])
+        elif step == NOT:
+            stack[-1] = (np.full(3, -np.inf), np.full(3, np.inf))
+        else:
+            b, a = stack.pop(), stack.pop()
+            low, high = (np.minimum, np.maximum) if step == OR else (np.maximum, np.minimum)
+            stack.append((low(a[0], b[0]), high(a[1], b[1])))
+        depth = max(depth, len(stack))
+    lower, upper = stack.pop()
+    # Boxes that do not meet: the solid is empty, and any point will do.
+    return (np.minimum(lower, upper)[None], np.maximum(lower, upper)[None]), depth

@@ -1,0 +1,244 @@
+"""Hierarchies over what a scene's rays are led to, and the tables in the order of their leaves."""
+
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.accel import bvh
+from reference_rt.accel.bvh import Bvh
+from reference_rt.accel.leaf import INSTANCE, SOLID
+from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.shapes import TABLES, TRIANGLE, Packets
+from reference_rt.shapes.instances import Instances
+from reference_rt.shapes.placement import bounds as placed_bounds
+
+BVH_FROM = 40
+"""Primitives from which a hierarchy pays: random rays among random shapes were as fast either way
+at 45 spheres, 80 boxes and 90 rectangles tested side by side, and at 4 triangles, which are tested
+one by one and so count for ONE_BY_ONE each (a core with AVX-512)."""
+ONE_BY_ONE = 10
+
+
+class Reference(NamedTuple):
+    """Primitives or solids of one kind, by their rows (n,)."""
+
+    kind: int
+    rows: IntArray
+
+
+class Copies(NamedTuple):
+    """What an instance stands for: its index in the scene, trees (k,) and maps (k, 3, 4)."""
+
+    owner: int
+    trees: IntArray
+    maps: FloatArray
+
+
+class Trees:
+    """Collects hierarchies into the arrays of one `Bvh`.
+
+    method: see `bvh.build`, or "auto";  tables: by field of `Shapes`;  bounds: boxes of each kind.
+    """
+
+    def __init__(
+        self,
+        method: bvh.Method | Literal["auto"],
+        tables: dict[str, Any],
+        bounds: dict[int, Bounds],
+    ) -> None:
+        self.method, self.tables, self.bounds = method, tables, bounds
+        self._wide: list[bvh.Wide] = []
+        self._boxes: list[FloatArray] = []
+        self._kinds: list[IntArray] = []
+        self._rows: list[IntArray] = []
+        self._unbounded = -1
+        self._instances: Instances | None = None
+        self._new_rows: dict[int, IntArray] = {}
+        self._scene: int | None = None
+
+    def add(self, references: Sequence[Reference], whole: bool = False) -> int:
+        """A hierarchy over these; its number.  With `whole` each is referenced once only."""
+        kinds, rows = _joined(references)
+        lower, upper = self._bounds_of(kinds, rows)
+        method: bvh.Method = "sah" if self.method == "auto" else self.method
+        if whole and method == "spatial":
+            method = "sah"
+        nodes, order = bvh.build(lower, upper, method, self._corners(kinds, rows))
+        return self._append(nodes, kinds[order], rows[order])
+
+    def finish(
+        self, top: Sequence[Reference], copies: Sequence[Copies], roots: Sequence[int]
+    ) -> None:
+        """The scene's own hierarchy, over shapes and instances; `roots` are the numbers of the
+        trees that `copies` name.  Puts the tables' rows into leaf order."""
+        if copies:
+            self._instances = self._place(copies, roots)
+            count = len(self._instances.owner)
+            top = [*top, Reference(INSTANCE, np.arange(count))]
+        kinds, rows = _joined(top)
+        if len(kinds) > 0 and not (self.method == "auto" and self._is_few(kinds)):
+            lower, upper = self._bounds_of(kinds, rows)
+            finite = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
+            del lower, upper  # `add` asks again: of a million triangles two copies count
+            kinds_of = kinds[finite], kinds[~finite]
+            rows_of = rows[finite], rows[~finite]
+            if finite.any():
+                self._scene = self.add(
+                    [
+                        Reference(int(k), rows_of[0][kinds_of[0] == k])
+                        for k in _distinct(kinds_of[0])
+                    ]
+                )
+            if not finite.all():
+                everywhere = np.repeat([-np.inf, np.inf], 3)[None]
+                leaf = bvh.Nodes(everywhere, np.zeros(1, np.int64), np.array([(~finite).sum()]))
+                self._unbounded = self._append(leaf, kinds_of[1], rows_of[1])
+                if self._scene is None:
+                    self._scene, self._unbounded = self._unbounded, -1
+        self._order_rows()
+
+    def hierarchy(self) -> Bvh | None:
+        """All hierarchies, the scene's first; None where a few shapes are better tested in turn."""
+        if self._scene is None:
+            return None
+        order = [self._scene, *(k for k in range(len(self._wide)) if k != self._scene)]
+        triangles = self.tables["triangles"]
+        joined = bvh.joined(
+            [self._wide[k] for k in order],
+            [self._kinds[k] for k in order],
+            [self._rows[k] for k in order],
+            None if triangles is None else triangles.vertices,
+        )
+        return joined._replace(unbounded=-1 if self._unbounded < 0 else self.start(self._unbounded))
+
+    def start(self, tree: int) -> int:
+        """The first node of a tree among all nodes."""
+        if tree == self._scene:
+            return 0
+        before = sum(len(self._wide[k].codes) for k in range(tree) if k != self._scene)
+        return before + (0 if self._scene is None else len(self._wide[self._scene].codes))
+
+    def packets(self) -> Packets:
+        """The tables side by side, where nothing else leads to their rows."""
+        modules = {field: module for _, field, _, module in TABLES}
+        few = self._scene is None
+        return Packets(
+            *(
+                modules[field].pack_all(self.tables[field])
+                if few and self.tables[field] is not None
+                else None
+                for field in Packets._fields
+            )
+        )
+
+    def instances(self) -> Instances | None:
+        if self._instances is None:
+            return None
+        starts = np.array([self.start(k) for k in range(len(self._wide))])
+        return self._instances._replace(root=starts[self._instances.root])
+
+    def new_row(self, kind: int, row: int) -> int:
+        """Where a row of a table has gone."""
+        return int(self._new_rows[kind][row])
+
+    # ---- how ------------------------------------------------------------------------------------
+
+    def _append(self, nodes: bvh.Nodes, kinds: IntArray, rows: IntArray) -> int:
+        self._wide.append(bvh.widened(nodes, kinds == TRIANGLE))
+        self._boxes.append(nodes.boxes[0].copy())
+        self._kinds.append(kinds)
+        self._rows.append(rows)
+        return len(self._wide) - 1
+
+    def _is_few(self, kinds: IntArray) -> bool:
+        if self._wide or np.any(kinds >= SOLID):
+            return False
+        side_by_side = [code for code, field, _, _ in TABLES if field in Packets._fields]
+        work = np.where(np.isin(kinds, side_by_side), 1, ONE_BY_ONE)
+        return bool(work.sum() < BVH_FROM)
+
+    def _bounds_of(self, kinds: IntArray, rows: IntArray) -> Bounds:
+        present = _distinct(kinds)
+        if len(present) == 1:
+            low, high = self.bounds[present[0]]
+            return low[rows], high[rows]
+        lower, upper = np.empty((2, len(kinds), 3))
+        for kind in present:
+            mine = kinds == kind
+            lower[mine], upper[mine] = (side[rows[mine]] for side in self.bounds[kind])
+        return lower, upper
+
+    def _corners(self, kinds: IntArray, rows: IntArray) -> FloatArray | None:
+        """The vertices (n, 9) of triangles, which spatial splits clip; NaN for other kinds."""
+        if self.method != "spatial":
+            return None
+        corners = np.full((len(kinds), 9), np.nan)
+        mine = kinds == TRIANGLE
+        if mine.any():
+            corners[mine] = self.tables["triangles"].vertices[rows[mine]]
+        return corners
+
+    def _place(self, copies: Sequence[Copies], roots: Sequence[int]) -> Instances:
+        """The table of instances, whose `root` is the number of the tree; and their bounds."""
+        maps = np.concatenate([c.maps for c in copies])
+        trees = np.array(roots)[np.concatenate([c.trees for c in copies])]
+        counts = [len(c.trees) for c in copies]
+        edges = maps[:, :, :3].transpose(0, 2, 1).reshape(-1, 9)
+        inverse = np.linalg.inv(maps[:, :, :3]).reshape(-1, 9)
+        table = Instances(
+            center=np.ascontiguousarray(maps[:, :, 3]),
+            to_local=np.ascontiguousarray(inverse),
+            edges=np.ascontiguousarray(edges),
+            root=trees,
+            owner=np.repeat([c.owner for c in copies], counts),
+            copy=np.concatenate([np.arange(n) for n in counts]),
+        )
+        boxes = np.array(self._boxes)[trees]
+        self.bounds[INSTANCE] = placed_bounds(table.center, edges, boxes[:, :3], boxes[:, 3:])
+        return table
+
+    def _order_rows(self) -> None:
+        """Tables in the order in which leaves name their rows: neighbours lie side by side in
+        memory."""
+        kinds = np.concatenate([np.zeros(0, np.int64), *self._kinds])
+        rows = np.concatenate([np.zeros(0, np.int64), *self._rows])
+        for code, field, table_type, module in TABLES:
+            table = self.tables[field]
+            if table is None:
+                continue
+            ragged = getattr(module, "RAGGED", ())
+            order = _first_named(rows[kinds == code], len(table.owner))
+            new_row = np.empty_like(order)
+            new_row[order] = np.arange(len(order))
+            self._new_rows[code] = new_row
+            self.tables[field] = table_type(
+                *(
+                    a if a is None or name in ragged else np.ascontiguousarray(a[order])
+                    for name, a in table._asdict().items()
+                )
+            )
+            for tree_kinds, tree_rows in zip(self._kinds, self._rows, strict=True):
+                mine = tree_kinds == code
+                tree_rows[mine] = new_row[tree_rows[mine]]
+
+
+def _distinct(kinds: IntArray) -> list[int]:
+    """The codes among kinds (n,), which are small numbers: np.unique takes 0.2 s for a million."""
+    return np.flatnonzero(np.bincount(kinds)).tolist()
+
+
+def _first_named(rows: IntArray, count: int) -> IntArray:
+    """All of 0 to count - 1 once: those of rows (m,) in the order of their first mention, then the
+    rest."""
+    first = np.full(count, len(rows))
+    # Backwards, so that of several mentions the first is what stays.
+    first[rows[::-1]] = np.arange(len(rows))[::-1]
+    return np.argsort(first, kind="stable")
+
+
+def _joined(references: Sequence[Reference]) -> tuple[IntArray, IntArray]:
+    """Kinds and rows (n,)."""
+    none = np.zeros(0, np.int64)
+    kinds = [np.full(len(r.rows), r.kind) for r in references]
+    return np.concatenate([none, *kinds]), np.concatenate([none, *(r.rows for r in references)])

@@ -1,0 +1,133 @@
+"""The materials of a scene as tables."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from reference_rt.materials import Materials
+from reference_rt.materials.bsdfs.diffuse import Diffuse
+from reference_rt.materials.bsdfs.phong import Phong
+from reference_rt.materials.bsdfs.tables import BLACK, CLEAR, TABLES, Leaves
+from reference_rt.materials.emissive import Emissive
+from reference_rt.materials.material import Material
+from reference_rt.materials.nested.flattened import LayerTables
+from reference_rt.materials.nested.paths import Way, needs_tangents, transmits, ways
+from reference_rt.materials.nested.wrappers import Wrapper
+from reference_rt.materials.textured import asks_textures, textured_table
+from reference_rt.scene.model import SceneModel
+from reference_rt.textures import Palette
+from reference_rt.textures.parameter import join
+
+DEFAULT = "\0"
+"""The name, which no scene can use, of what shapes without a material are made of."""
+
+
+def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Materials:
+    """The materials of a scene in its order, then the default one, if that is used (`default`) or
+    there is no other.
+
+    An emissive material scatters as its base does.  Raises SceneError.
+    """
+    materials: dict[str, Material] = {**scene.materials}
+    if default or not materials:
+        materials[DEFAULT] = Diffuse()
+    leaves, layers = _Leaves(materials, palette), LayerTables(palette)
+    kinds, rows, traits, shown = [], [], [], []
+    oriented = False
+    for name in materials:
+        try:
+            shown.append(palette.colours(_shown(name, materials), np.inf))
+            scattering = _scattering(name, materials)
+            if scattering is None or (name == DEFAULT and not default):
+                found = []
+            else:
+                found = ways(scattering, materials)
+            if scene.integrator.type == "path":
+                _check_energy(found, materials, palette)
+            numbers = [leaves.add(way.leaf) for way in found]
+            layers.add(list(zip(found, numbers, strict=True)))
+        except ValueError as error:
+            raise scene.error(str(error), "materials", name) from None
+        kind, row = numbers[0] if len(numbers) == 1 else (BLACK, -1)
+        kinds.append(kind)
+        rows.append(row)
+        traits.append(_traits(found, materials))
+        oriented = oriented or any(needs_tangents(way, materials) for way in found)
+    smooth, chooses, behind = np.ascontiguousarray(np.array(traits, np.int64).T)
+    asks = np.array([asks_textures(name, materials) for name in materials], np.int64)
+    is_one_table = len(leaves.parts) == 1 and set(kinds) == leaves.parts.keys()
+    return Materials(
+        kind=None if is_one_table else np.array(kinds),
+        row=None if is_one_table and rows == list(range(len(rows))) else np.array(rows),
+        smooth=None if smooth.all() else smooth,
+        chooses=chooses if chooses.any() else None,
+        behind=behind if behind.any() else None,
+        shown=join(shown),
+        oriented=np.zeros(1, np.int64) if oriented else None,
+        asks=asks if asks.any() and not asks.all() else None,
+        textured=textured_table(materials, palette),
+        layers=layers.tables(),
+        leaves=leaves.tables(),
+    )
+
+
+def _check_energy(found: list[Way], materials: Mapping[str, Material], palette: Palette) -> None:
+    """Raises ValueError for the text-book's local shading where it is no law that paths can follow:
+    it may return more light than arrives."""
+    for way in found:
+        leaf = materials[way.leaf] if way.leaf is not None else None
+        if isinstance(leaf, Phong) and leaf.energy_bound(palette) > 1.0:
+            raise ValueError(
+                f"creates energy: up to {leaf.energy_bound(palette):.4g} of the light comes back; "
+                "expected at most 1 for path tracing, or the integrator 'whitted'"
+            )
+
+
+def _scattering(name: str, materials: Mapping[str, Material]) -> str | None:
+    """The name of the material that scatters: of an emissive one its base, if it has any."""
+    material = materials[name]
+    return material.base if isinstance(material, Emissive) else name
+
+
+def _shown(name: str, materials: Mapping[str, Material]) -> tuple[float, float, float] | str:
+    """The colour of a material, of a wrapper that of the first that it wraps."""
+    material = materials[name]
+    while isinstance(material, Wrapper):
+        material = materials[getattr(material, material.bases[0])]
+    return material.colour
+
+
+def _traits(found: list[Way], materials: Mapping[str, Material]) -> tuple[bool, bool, bool]:
+    """`Materials.smooth`, `chooses` and `behind`."""
+    leaves = [materials[way.leaf] for way in found if way.leaf is not None]
+    return (
+        any(leaf.smooth for leaf in leaves),
+        len(found) > 1 or any(leaf.chooses for leaf in leaves),
+        any(transmits(way, materials) or way.turns for way in found),
+    )
+
+
+class _Leaves:
+    """Collects the rows of leaves, each once."""
+
+    def __init__(self, materials: Mapping[str, Material], palette: Palette) -> None:
+        self.materials, self.palette = materials, palette
+        self.parts: dict[int, list[Any]] = {}
+        self.known: dict[str, tuple[int, int]] = {}
+
+    def add(self, name: str | None) -> tuple[int, int]:
+        """(kind, row) of a leaf, without a name of what is not there.  Raises ValueError."""
+        if name is None:
+            return CLEAR, -1
+        if name not in self.known:
+            material = self.materials[name]
+            code = next(c for c, _, cls, _, _ in TABLES if isinstance(material, cls))
+            rows = self.parts.setdefault(code, [])
+            rows.append(material.tabulate(self.palette))
+            self.known[name] = code, len(rows) - 1
+        return self.known[name]
+
+    def tables(self) -> Leaves:
+        found = {code: join(rows) for code, rows in self.parts.items()}
+        return Leaves(**{field: found.get(code) for code, field, _, _, _ in TABLES})

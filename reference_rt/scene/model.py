@@ -1,0 +1,273 @@
+"""`SceneModel`: the description of a scene: its fields, its checks, YAML and JSON in and out."""
+
+import hashlib
+import json
+import warnings
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from reference_rt.cameras import AnyCamera
+from reference_rt.cameras.film import Film
+from reference_rt.cameras.perspective import Perspective
+from reference_rt.core.model import Description
+from reference_rt.core.numpy_fields import AS_DIGEST
+from reference_rt.integrators import AnyIntegrator
+from reference_rt.integrators import Path as PathTracing
+from reference_rt.lights import AnyLight, Constant, EnvironmentMap
+from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
+from reference_rt.materials.nested.paths import ways
+from reference_rt.sampling import AnySampler, Grid, Sobol
+from reference_rt.scene import yaml_text
+from reference_rt.scene.yaml_lines import line_of
+from reference_rt.shapes import Shape
+from reference_rt.shapes.csg import AnyShape, Solid
+from reference_rt.shapes.instances import Instance
+from reference_rt.textures import AnyTexture, texture_names
+from reference_rt.util.errors import SceneError, SceneWarning, printable
+from reference_rt.util.files import read_text
+
+MOST_NESTED = 100
+"""Set operations in each other: pydantic writes 255 levels of lists and keys at most, of which each
+takes two."""
+
+
+class SceneModel(Description):
+    """Everything that determines a picture.  Right-handed world; linear sRGB; scene units."""
+
+    description: str = ""
+    """A line for people."""
+    camera: AnyCamera = Perspective()
+    film: Film = Film()
+    sampler: AnySampler | None = None
+    """Where samples lie; none: Sobol' points for path tracing, pixel centres otherwise."""
+    integrator: AnyIntegrator = PathTracing()
+    textures: dict[str, AnyTexture] = Field(default_factory=dict)
+    """Textures by name, which parameters of materials take."""
+    materials: dict[str, AnyMaterial] = Field(default_factory=dict)
+    """Materials by name."""
+    shapes: tuple[AnyShape, ...] = Field(default=(), strict=False)
+    groups: dict[str, Annotated[tuple[AnyShape, ...], Field(strict=False, min_length=1)]] = Field(
+        default_factory=dict
+    )
+    """Shapes by name, stored once, which shapes of type `instance` draw."""
+    hierarchy: Literal["auto", "sah", "median", "spatial", "none"] = "auto"
+    """How rays are led to shapes: by surface area heuristic, median split, spatial splits, or each
+    shape in turn; auto: the first, where the shapes are not few.  Pictures are the same."""
+    lights: tuple[AnyLight, ...] = Field(default=(), strict=False)
+    """Lights that are not shapes; a shape with an emissive material is a light too."""
+
+    _folder: Path = PrivateAttr(default_factory=Path)
+    _source: "tuple[str, str] | None" = PrivateAttr(default=None)
+    _warned: set[str] = PrivateAttr(default_factory=set)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for i, shape in enumerate(self.shapes):
+            self._check_shape(shape, "shapes", i)
+        for name, shapes in self.groups.items():
+            for k, shape in enumerate(shapes):
+                self._check_shape(shape, "groups", name, k)
+        for name, material in self.materials.items():
+            self._check_parts(name, material)
+        for name, material in self.materials.items():
+            if isinstance(material, Wrapper):
+                try:
+                    ways(name, self.materials)
+                except ValueError as error:
+                    raise SceneError(str(error), ("materials", name)) from None
+        if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
+            raise SceneError("more than one environment; expected at most one", ("lights",))
+        if isinstance(self.sampler, Grid) and not self.integrator.deterministic:
+            raise SceneError(
+                f"'{self.integrator.type}' needs random numbers, which 'grid' does not have; "
+                "expected 'sobol' or 'independent'",
+                ("sampler", "type"),
+            )
+        return self
+
+    def _check_parts(self, name: str, material: Material) -> None:
+        """Whether the textures and materials that a material names are there and fit."""
+        for field, texture in texture_names(material).items():
+            if texture not in self.textures:
+                known = ", ".join(f"'{t}'" for t in self.textures) or "none"
+                raise SceneError(
+                    f"there is no texture '{texture}'; expected one of: {known}",
+                    ("materials", name, field),
+                )
+        bases: tuple[str, ...] = ()
+        if isinstance(material, Emissive):
+            bases = ("base",)
+        elif isinstance(material, Wrapper):
+            bases = material.bases
+        for field in bases:
+            base = getattr(material, field)
+            self._check_material(base, "materials", name, field)
+            if base is not None and isinstance(self.materials[base], Emissive):
+                raise SceneError(
+                    f"'{base}' is emissive itself; expected what it scatters like",
+                    ("materials", name, field),
+                )
+
+    def _check_shape(self, shape: Shape, *path: str | int) -> None:
+        self._check_material(shape.material, *path, "material")
+        if isinstance(shape, Solid):
+            if path.count("of") >= MOST_NESTED:
+                raise SceneError(
+                    f"set operations in each other, deeper than {MOST_NESTED}; expected fewer: one "
+                    "may have any number of operands",
+                    path,
+                )
+            for k, operand in enumerate(shape.of):
+                self._check_shape(operand, *path, "of", k)
+        if isinstance(shape, Instance):
+            if shape.group not in self.groups:
+                known = ", ".join(f"'{g}'" for g in self.groups) or "none"
+                raise SceneError(
+                    f"there is no group '{shape.group}'; expected one of: {known}", (*path, "group")
+                )
+            if shape.material is not None:
+                raise SceneError(
+                    "an instance has the materials of its group; expected none here",
+                    (*path, "material"),
+                )
+
+    def _check_material(self, name: str | None, *path: str | int) -> None:
+        if name is not None and name not in self.materials:
+            known = ", ".join(f"'{m}'" for m in self.materials) or "none"
+            raise SceneError(f"there is no material '{name}'; expected one of: {known}", path)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal descriptions; where they were read from does not count."""
+        return isinstance(other, SceneModel) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> str:
+        """As `to_json`, with a digest in place of each array."""
+        return self.model_dump_json(exclude_none=True, indent=1, context=AS_DIGEST)
+
+    # ---- where it comes from --------------------------------------------------------------------
+
+    @property
+    def folder(self) -> Path:
+        """What file names in the scene are relative to."""
+        return self._folder
+
+    @property
+    def name(self) -> str:
+        """The scene file's name without its suffix; escapes in place of what does not print."""
+        return printable(Path(self._source[0]).stem) if self._source else "scene"
+
+    @property
+    def is_from_file(self) -> bool:
+        """Whether the scene was read from a file or from text."""
+        return self._source is not None
+
+    def error(self, message: str, *path: str | int) -> SceneError:
+        """An error about the part at `path`, with file and line where the scene has them."""
+        if self._source is None:
+            return SceneError(message, path)
+        name, text = self._source
+        return SceneError(message, path, name, line_of(text, path))
+
+    def warn(self, message: str, *path: str | int) -> None:
+        """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`.
+
+        Once: a second table of the scene, or one of a `changed` scene, has nothing new to say.
+        """
+        text = str(self.error(message, *path))
+        if text not in self._warned:
+            self._warned.add(text)
+            warnings.warn(SceneWarning(text), stacklevel=3)
+
+    @property
+    def resolved_sampler(self) -> AnySampler:
+        """The sampler, or what stands in for none."""
+        if self.sampler is not None:
+            return self.sampler
+        return Grid() if self.integrator.deterministic else Sobol()
+
+    def digest(self) -> str:
+        """SHA-256 of the description: what pictures name as their source."""
+        return hashlib.sha256(self._key().encode()).hexdigest()
+
+    # ---- in -------------------------------------------------------------------------------------
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a .yaml, .yml or .json file.  Raises SceneError (file, line, keys, what and why)."""
+        path = Path(path)
+        if path.suffix.lower() not in (".yaml", ".yml", ".json"):
+            raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))
+        try:
+            text = read_text(path)
+        except OSError as error:
+            raise SceneError(
+                f"cannot be read: {error.strerror}; expected a scene file", file=str(path)
+            ) from None
+        except UnicodeDecodeError:
+            raise SceneError("is not text; expected UTF-8", file=str(path)) from None
+        return cls.parse(text, str(path), path.parent)
+
+    @classmethod
+    def parse(cls, text: str, name: str = "<scene>", folder: Path | None = None) -> Self:
+        """A scene from YAML or JSON text; `name` stands in errors, `folder` holds its files."""
+        try:
+            data = _load_data(text)
+        except yaml_text.MalformedError as error:
+            raise SceneError(f"malformed: {error}", file=name, line=error.line) from None
+        except RecursionError:
+            raise SceneError("malformed: nested too deeply", file=name) from None
+        if not isinstance(data, dict):
+            raise SceneError("expected keys such as camera, shapes, lights", file=name, line=1)
+        try:
+            scene = cls._checked(data)
+        except SceneError as error:
+            line = line_of(text, error.path)
+            raise SceneError(error.message, error.path, name, line) from None
+        scene._folder = Path() if folder is None else folder
+        scene._source = (name, text)
+        return scene
+
+    def changed(self, **parts: Any) -> Self:
+        """The same scene with other parts (film=..., sampler=...), checked again."""
+        fields = {name: getattr(self, name) for name in self.model_fields_set} | parts
+        scene = type(self)(**fields)
+        scene._folder, scene._source = self._folder, self._source
+        scene._warned = self._warned
+        return scene
+
+    # ---- out ------------------------------------------------------------------------------------
+
+    def to_json(self) -> str:
+        """The scene as JSON text, which `parse` takes."""
+        return self.model_dump_json(exclude_defaults=False, exclude_none=True, indent=1)
+
+    def to_yaml(self) -> str:
+        """The scene as YAML text, which `parse` takes."""
+        return yaml_text.dump(json.loads(self.to_json()))
+
+
+def _load_data(text: str) -> Any:
+    """Data from JSON or YAML 1.2.  Data only: no tags make objects."""
+    if text.lstrip().startswith("{"):
+        # What is wrong, and in which line, YAML's reader says for both. It lacks some of JSON:
+        # pairs of surrogates, and control characters.
+        with suppress(ValueError):
+            return json.loads(text, object_pairs_hook=_distinct)
+    return yaml_text.load(text)
+
+
+def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError("the same key twice")
+    return dict(pairs)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of scene files."""
+    return SceneModel.model_json_schema(by_alias=True) | {"title": "Scene"}

@@ -1,0 +1,197 @@
+"""A few shapes, without a hierarchy: the nearest of all of them."""
+
+from typing import Any, NamedTuple
+
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import Crossing, Hit, Ray, miss, no_hit
+from reference_rt.core.ray_block import Hits, Rays, ray_of
+from reference_rt.core.vec3 import row, triple
+from reference_rt.jit.kernel import kernel, local_floats, local_integers
+from reference_rt.jit.simd import LANES
+from reference_rt.shapes import box
+from reference_rt.shapes.box import Boxes
+from reference_rt.shapes.curved import sphere
+from reference_rt.shapes.curved.sphere import Spheres
+from reference_rt.shapes.dispatch import intersect_row
+from reference_rt.shapes.flat import rectangle
+from reference_rt.shapes.flat.rectangle import Rectangles
+from reference_rt.shapes.meshes.triangle import Triangles
+from reference_rt.shapes.meshes.watertight import shear_of
+from reference_rt.shapes.ray_simd import begin, end
+from reference_rt.shapes.shape import nearest_lane
+from reference_rt.shapes.tables import (
+    BOX,
+    DISK,
+    PLANE,
+    POLYGON,
+    QUADRIC,
+    RECTANGLE,
+    SPHERE,
+    TORUS,
+    TRIANGLE,
+    Shapes,
+    of_table,
+)
+
+
+class Packets(NamedTuple):
+    """Shapes as `nearest_in_packets` takes them, where no hierarchy leads to them; else None."""
+
+    spheres: FloatArray | None
+    rectangles: FloatArray | None
+    boxes: FloatArray | None
+
+
+_lane_distance = of_table("lane_distance", miss)
+
+
+@kernel
+def _not_found(table: Any, i: int, ray: Ray, t: float) -> Crossing:
+    return miss()
+
+
+_found = of_table("found", _not_found)
+
+
+@kernel
+def _nearest_in_packets(
+    kind: int, table: Any, packets: FloatArray | None, ray: Ray, closest: Hit
+) -> Hit:
+    """The nearest of `closest` and all shapes of a table, LANES of them side by side."""
+    if table is None:
+        return closest
+    if packets is None:
+        return closest
+    distances = local_floats(LANES)
+    best, t = -1, closest.t
+    for k in range(len(packets)):
+        for lane in range(LANES):
+            distances[lane] = _lane_distance(table, packets, k, lane, ray)
+        best, t = nearest_lane(distances, k, best, t)
+    if best < 0:
+        return closest
+    found: Crossing = _found(table, best, ray, t)
+    return Hit(found.t, kind, best, found.u, found.v, -1)
+
+
+@kernel
+def _nearest_in_table(kind: int, table: Any, ray: Any, closest: Hit) -> Hit:
+    """The nearest of `closest` and all primitives of a table, one after another."""
+    if table is None:
+        return closest
+    for i in range(len(table.owner)):
+        found: Crossing = intersect_row(table, i, ray)
+        if found.t < closest.t:
+            closest = Hit(found.t, kind, i, found.u, found.v, -1)
+    return closest
+
+
+@kernel
+def nearest(shapes: Shapes, packets: Packets, ray: Ray) -> Hit:
+    """The nearest primitive of all; of several at the same t, the first in the order of the codes
+    and then of the scene."""
+    closest = Hit(ray.t_max, -1, -1, 0.0, 0.0, -1)
+    closest = _nearest_in_packets(SPHERE, shapes.spheres, packets.spheres, ray, closest)
+    closest = _nearest_in_packets(RECTANGLE, shapes.rectangles, packets.rectangles, ray, closest)
+    closest = _nearest_in_packets(BOX, shapes.boxes, packets.boxes, ray, closest)
+    return _nearest_of_others(shapes, ray, closest)
+
+
+@kernel
+def _nearest_of_others(shapes: Shapes, ray: Ray, closest: Hit) -> Hit:
+    """The nearest of `closest` and what has no packets."""
+    closest = _nearest_triangle(shapes.triangles, ray, closest)
+    closest = _nearest_in_table(DISK, shapes.disks, ray, closest)
+    closest = _nearest_in_table(PLANE, shapes.planes, ray, closest)
+    closest = _nearest_in_table(POLYGON, shapes.polygons, ray, closest)
+    closest = _nearest_in_table(QUADRIC, shapes.quadrics, ray, closest)
+    return _nearest_in_table(TORUS, shapes.tori, ray, closest)
+
+
+@kernel
+def _has_others(shapes: Shapes) -> bool:
+    """Whether there is what has no packets: a constant."""
+    flat = shapes.disks is not None or shapes.planes is not None or shapes.polygons is not None
+    curved = shapes.quadrics is not None or shapes.tori is not None
+    return shapes.triangles is not None or flat or curved
+
+
+@kernel
+def _nearest_triangle(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hit:
+    if triangles is None:
+        return closest
+    return _nearest_in_table(TRIANGLE, triangles, shear_of(ray), closest)
+
+
+_KIND = 2**40
+"""The code of a primitive that a ray among several has found is kind * _KIND + row."""
+
+
+@kernel
+def nearest_of_rays(shapes: Shapes, rays: Rays, hits: Hits, n: int, any_hit: bool) -> None:
+    """What `nearest_of_ray` makes the hits of the first n of `rays` of; where `any_hit`, only
+    whether there is any, by the sign of its code."""
+    t, codes = local_floats(LANES), local_integers(LANES)
+    for at in range(0, n, LANES):
+        begin(rays.numbers, at, t, codes)
+        _nearer_spheres(shapes.spheres, rays, at, t, codes)
+        _nearer_rectangles(shapes.rectangles, rays, at, t, codes)
+        _nearer_boxes(shapes.boxes, rays, at, t, codes)
+        end(t, codes, at, hits.numbers, hits.codes)
+    if any_hit and _has_others(shapes):
+        for j in range(n):
+            if hits.codes[j] < 0:
+                ray = ray_of(rays, j)
+                hits.codes[j] = _nearest_of_others(shapes, ray, no_hit(ray)).kind
+
+
+@kernel
+def nearest_of_ray(shapes: Shapes, ray: Ray, hits: Hits, j: int) -> Hit:
+    """`nearest` for ray number j of those that `nearest_of_rays` was asked for."""
+    closest = _hit_of_code(shapes, ray, hits.codes[j], hits.numbers[j])
+    return _nearest_of_others(shapes, ray, closest)
+
+
+@kernel
+def _hit_of_code(shapes: Shapes, ray: Ray, code: int, t: float) -> Hit:
+    if code < 0:
+        return no_hit(ray)
+    kind, i = code // _KIND, code % _KIND
+    if shapes.rectangles is None and shapes.boxes is None:
+        kind = SPHERE  # a constant, so that choices vanish
+    found = Crossing(t, 0.0, 0.0)
+    if kind == RECTANGLE:
+        found = _found(shapes.rectangles, i, ray, t)
+    elif kind == BOX:
+        found = _found(shapes.boxes, i, ray, t)
+    return Hit(found.t, kind, i, found.u, found.v, -1)
+
+
+@kernel
+def _nearer_spheres(
+    spheres: Spheres | None, rays: Rays, at: int, t: FloatArray, codes: IntArray
+) -> None:
+    if spheres is not None:
+        for i in range(len(spheres.owner)):
+            shape = (row(spheres.center, i), spheres.radius[i])
+            sphere.nearer(rays.numbers, at, shape, SPHERE * _KIND + i, t, codes)
+
+
+@kernel
+def _nearer_rectangles(
+    table: Rectangles | None, rays: Rays, at: int, t: FloatArray, codes: IntArray
+) -> None:
+    if table is not None:
+        for i in range(len(table.owner)):
+            place = (row(table.center, i), row(table.normal, i))
+            shape = (*place, row(table.x_of, i), row(table.y_of, i))
+            rectangle.nearer(rays.numbers, at, shape, RECTANGLE * _KIND + i, t, codes)
+
+
+@kernel
+def _nearer_boxes(boxes: Boxes | None, rays: Rays, at: int, t: FloatArray, codes: IntArray) -> None:
+    if boxes is not None:
+        for i in range(len(boxes.owner)):
+            of = boxes.to_local
+            shape = (row(boxes.center, i), triple(of, i, 0), triple(of, i, 1), triple(of, i, 2))
+            box.nearer(rays.numbers, at, shape, BOX * _KIND + i, t, codes)

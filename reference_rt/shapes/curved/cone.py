@@ -1,0 +1,38 @@
+"""Cone, or frustum of a cone: around the z axis, closed or open."""
+
+from fractions import Fraction
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from reference_rt.core.model import Positive
+from reference_rt.shapes.curved.quadric import tabulate
+from reference_rt.shapes.curved.quadrics import Quadrics
+from reference_rt.shapes.shape import Place, Shape
+
+
+class Cone(Shape):
+    """x² + y² <= r(z)² from z = 0, where r is `radius`, to z = `height`, where it is `top_radius`
+    (0: the apex), linear between, where its transform takes it; normals point outwards, at the apex
+    along the axis.
+
+    Texture coordinates: around from +x and up from z = 0, each from 0 to 1; on a cap x and y over
+    the square around the wider one.  Faces: 0 the side, 3 the bottom, 6 the top.
+    """
+
+    type: Literal["cone"] = "cone"
+    radius: Positive = 1.0
+    height: Positive = 1.0
+    top_radius: Annotated[float, Field(ge=0)] = 0.0
+    capped: bool = True
+    """Whether this is a solid, closed by disks; else it is the side alone, seen from both sides."""
+
+    def tabulate(self, place: Place) -> Quadrics:
+        r, top = Fraction(self.radius), Fraction(self.top_radius)
+        slope = (top - r) / Fraction(self.height)
+        zero, one = Fraction(0), Fraction(1)
+        form = (one, one, -slope * slope, zero, zero, zero, zero, zero, -2 * r * slope, -r * r)
+        reach = max(self.radius, self.top_radius)
+        lower, upper = (-reach, -reach, 0.0), (reach, reach, self.height)
+        clipped = (False, False, True)
+        return tabulate(place, self.map_in(place), form, lower, upper, clipped, self.capped)

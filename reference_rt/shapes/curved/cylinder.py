@@ -1,0 +1,41 @@
+"""Cylinder: around the z axis, closed or open."""
+
+from fractions import Fraction
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from reference_rt.core.model import Positive
+from reference_rt.shapes.curved.quadric import tabulate
+from reference_rt.shapes.curved.quadrics import Quadrics
+from reference_rt.shapes.shape import Place, Shape
+
+
+class Cylinder(Shape):
+    """x² + y² <= radius² from `z_min` to `z_max`, where its transform takes it; normals point
+    outwards.
+
+    Texture coordinates: around from +x and up from `z_min`, each from 0 to 1; on a cap x and y over
+    the square around it.  Faces: 0 the side, 3 the bottom, 6 the top.
+    """
+
+    type: Literal["cylinder"] = "cylinder"
+    radius: Positive = 1.0
+    z_min: float = 0.0
+    z_max: float = 1.0
+    capped: bool = True
+    """Whether this is a solid, closed by two disks; else it is the side alone, seen from both
+    sides."""
+
+    @model_validator(mode="after")
+    def _has_a_height(self) -> Self:
+        if not self.z_min < self.z_max:
+            raise ValueError("expected 'z_min' below 'z_max'")
+        return self
+
+    def tabulate(self, place: Place) -> Quadrics:
+        r = self.radius
+        form = (*map(Fraction, (1, 1, 0, 0, 0, 0, 0, 0, 0)), -(Fraction(r) ** 2))
+        lower, upper = (-r, -r, self.z_min), (r, r, self.z_max)
+        clipped = (False, False, True)
+        return tabulate(place, self.map_in(place), form, lower, upper, clipped, self.capped)

@@ -1,0 +1,121 @@
+"""Quadric: a surface of second degree, clipped to a box; how rows of the table are made.
+
+Cylinders, cones and ellipsoids are rows of it too.  A row's own coordinates are those of
+`quadratic_form.fit`.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from reference_rt.core.model import Vector
+from reference_rt.core.transform import Affine
+from reference_rt.shapes.curved.quadratic_form import (
+    Coefficients,
+    Form,
+    Point,
+    definite_sign,
+    fit,
+    seen_from,
+)
+from reference_rt.shapes.curved.quadrics import Quadrics
+from reference_rt.shapes.placement import columns
+from reference_rt.shapes.shape import Place, Shape
+
+
+class Quadric(Shape):
+    """The surface f = 0 inside a box, f(x, y, z) = A x² + B y² + C z² + D xy + E yz + F xz + G x +
+    H y + I z + J; its normal is the gradient of f, so that its front is where f > 0.
+
+    Planes (A to F zero) and pairs of planes are quadrics like any other; but along one plane of a
+    pair f vanishes, so that where a ray there meets the other is hard to tell.  An f that does not
+    change its sign (a constant; a sum of squares, which vanishes at a point or on a line at most; a
+    square, which a plane touches) bounds nothing: an error, but capped, where it means the whole
+    box if f <= 0 everywhere, and else nothing.
+    """
+
+    type: Literal["quadric"] = "quadric"
+    coefficients: Coefficients
+    """[A, B, C, D, E, F, G, H, I, J]."""
+    lower: Vector
+    """The corner of the clip box with the smallest coordinates, in the shape's own."""
+    upper: Vector
+    """The opposite corner."""
+    capped: bool = False
+    """Whether this is the solid f <= 0 in the box, closed by the box's faces; else it is the
+    surface alone."""
+
+    @model_validator(mode="after")
+    def _has_a_box(self) -> Self:
+        if not all(a < b for a, b in zip(self.lower, self.upper, strict=True)):
+            raise ValueError("expected each coordinate of 'lower' to be below that of 'upper'")
+        return self
+
+    def tabulate(self, place: Place) -> "Quadrics":
+        form = tuple(Fraction(x) for x in self.coefficients)
+        sign = definite_sign(form)
+        if sign != 0:
+            if not self.capped:
+                raise ValueError(
+                    "f does not change its sign, so that there is no surface; expected "
+                    "coefficients for which f takes both"
+                )
+            form = (*[Fraction(0)] * 9, Fraction(sign))
+        clipped = (True, True, True)
+        m = self.map_in(place)
+        return tabulate(place, m, form, self.lower, self.upper, clipped, self.capped)
+
+
+_LARGEST = 1e140
+"""Of the entries of a map and of its inverse: squares of ten times these are finite."""
+
+
+def tabulate(
+    place: Place,
+    m: Affine,
+    form: Form,
+    lower: Point,
+    upper: Point,
+    clipped: Sequence[bool],
+    capped: bool,
+) -> Quadrics:
+    """One row; `m` maps the coordinates of the form and the box to the place's.
+
+    The box must contain the whole surface along the axes that it does not clip.
+    """
+    try:
+        fitted = fit(form, lower, upper)
+    except OverflowError:
+        raise ValueError("its size overflows; expected finite numbers") from None
+    # Exactly: an origin far away and a map that brings it back do not cancel.
+    offset = [
+        float(
+            sum((Fraction(a) * Fraction(o) for a, o in zip(r[:3], fitted.origin, strict=True)), r3)
+        )
+        for r, r3 in zip(m, map(Fraction, m[:, 3]), strict=True)
+    ]
+    table = Quadrics(
+        **columns(np.column_stack([m[:, :3] * fitted.unit, offset]), place),
+        coefficients=np.array([fitted.form]),
+        lower=np.array([fitted.lower]),
+        upper=np.array([fitted.upper]),
+        clipped=np.array([clipped], np.int64),
+        capped=np.array([capped], np.int64),
+    )
+    if max(np.abs(table.edges).max(), np.abs(table.to_local).max()) > _LARGEST:
+        raise ValueError(
+            f"its size overflows; expected a scale from {1 / _LARGEST:.0e} to {_LARGEST:.0e}"
+        )
+    return table
+
+
+def ellipsoid(place: Place, m: Affine, middle: Vector, radius: float) -> Quadrics:
+    """The sphere around `middle`, where m takes it."""
+    unit_sphere = tuple(Fraction(k) for k in (1, 1, 1, 0, 0, 0, 0, 0, 0))
+    form = seen_from((*unit_sphere, -(Fraction(radius) ** 2)), [-Fraction(x) for x in middle])
+    lower = [Fraction(x) - Fraction(radius) for x in middle]
+    upper = [Fraction(x) + Fraction(radius) for x in middle]
+    return tabulate(place, m, form, lower, upper, (False, False, False), True)

@@ -1,0 +1,251 @@
+"""The table of all quadrics, and its kernels."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, at, miss
+from reference_rt.core.vec3 import (
+    Vec3,
+    component,
+    cross,
+    dot,
+    length,
+    max_abs,
+    normalize,
+    row,
+    triple,
+)
+from reference_rt.jit.kernel import kernel
+from reference_rt.shapes import placement
+from reference_rt.shapes.box import face_normal, on_face
+from reference_rt.shapes.curved.quadratic import gradient, noise, value
+from reference_rt.shapes.curved.quadric_line import in_world, line_of, solid_along
+from reference_rt.shapes.placement import (
+    local_point,
+    local_vector,
+    world_covector,
+    world_surface,
+    world_vector,
+)
+from reference_rt.shapes.shape import Spans, Tangents, any_tangents, one_span
+
+
+class Quadrics(NamedTuple):
+    """n quadrics: center (n, 3), rows of the inverse map (n, 9), columns of the map (n, 9), f's
+    coefficients (n, 10), the box's corners lower and upper (n, 3), for each axis 1 where the box
+    clips and 0 where f itself ends within it (n, 3), capped (n,): 1 for solids; owner, the shape's
+    index in the scene; material, light: rows of those tables; face (n,)."""
+
+    center: FloatArray
+    to_local: FloatArray
+    edges: FloatArray
+    coefficients: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    clipped: IntArray
+    capped: IntArray
+    owner: IntArray
+    material: IntArray
+    light: IntArray
+    face: IntArray
+
+
+def bounds(quadrics: Quadrics) -> Bounds:
+    """Boxes along the axes (n, 3), (n, 3) around the clip boxes, rounded outwards."""
+    return placement.bounds(quadrics.center, quadrics.edges, quadrics.lower, quadrics.upper)
+
+
+def is_solid(quadrics: Quadrics) -> bool:
+    return bool(np.all(quadrics.capped != 0))
+
+
+@kernel
+def spans(quadrics: Quadrics, i: int, ray: Ray) -> Spans:
+    """Where the line runs in the solid: f <= 0 within the box.  An end's u is 0 on f's surface, and
+    1 + the box's face (axis, + 3 on the positive side) on a cap."""
+    line = line_of(quadrics, i, ray)
+    s = solid_along(line)
+    return Spans(
+        in_world(line, s.t0),
+        s.u0,
+        in_world(line, s.t1),
+        s.u1,
+        in_world(line, s.t2),
+        s.u2,
+        in_world(line, s.t3),
+        s.u3,
+    )
+
+
+@kernel
+def intersect(quadrics: Quadrics, i: int, ray: Ray) -> Crossing:
+    """Where the ray meets quadric i, and as u which surface of it: see `spans`.
+
+    A surface that is not capped includes its rim.  A line that lies in it does not meet it.
+    """
+    if quadrics.capped[i] != 0:
+        s = spans(quadrics, i, ray)
+        if s.t0 > 0.0:
+            return Crossing(s.t0, s.u0, 0.0)
+        if s.t1 > 0.0:
+            return Crossing(s.t1, s.u1, 0.0)
+        if s.t2 > 0.0:
+            return Crossing(s.t2, s.u2, 0.0)
+        return Crossing(s.t3 if s.t3 > 0.0 else math.inf, s.u3, 0.0)
+    line = line_of(quadrics, i, ray)
+    t0, t1 = in_world(line, line.t0), in_world(line, line.t1)
+    if t0 > 0.0 and line.t_in <= line.t0 and line.t0 <= line.t_out:
+        return Crossing(t0, 0.0, 0.0)
+    if t1 > 0.0 and line.t_in <= line.t1 and line.t1 <= line.t_out:
+        return Crossing(t1, 0.0, 0.0)
+    return miss()
+
+
+@kernel
+def crossings(quadrics: Quadrics, i: int, ray: Ray) -> Spans:
+    """All crossings of the line and quadric i in order, of a surface that is not capped too."""
+    if quadrics.capped[i] != 0:
+        return spans(quadrics, i, ray)
+    line = line_of(quadrics, i, ray)
+    first = in_world(line, line.t0) if line.t_in <= line.t0 <= line.t_out else math.inf
+    second = in_world(line, line.t1) if line.t_in <= line.t1 <= line.t_out else math.inf
+    return one_span(min(first, second), 0.0, max(first, second), 0.0)
+
+
+# ---- where it was met ---------------------------------------------------------------------------
+
+
+@kernel
+def _on_surface(quadrics: Quadrics, i: int, q: Vec3) -> Vec3:
+    """q moved onto f = 0 along the world's normal, by Newton's steps while they lead closer.
+
+    Each squares the distance, in radii of curvature: four are for a point that is off by a
+    hundredth, of a ray from 1e13 sizes away.
+    """
+    k = quadrics.coefficients[i]
+    for _ in range(4):
+        f = value(k, q)
+        normal = world_covector(quadrics, i, gradient(k, q))
+        steepness = dot(normal, normal)
+        if f == 0.0 or steepness == 0.0:
+            break
+        moved = q - local_vector(quadrics, i, normal) * (f / steepness)
+        if not abs(value(k, moved)) < abs(f):
+            break
+        q = moved
+    return q
+
+
+@kernel
+def _normal(quadrics: Quadrics, i: int, q: Vec3) -> Vec3:
+    """The unit gradient; where that vanishes, as at an apex, the z axis off the box's middle."""
+    g = gradient(quadrics.coefficients[i], q)
+    size = max_abs(g)
+    if size == 0.0:
+        middle = 0.5 * (quadrics.lower[i, 2] + quadrics.upper[i, 2])
+        return Vec3(0.0, 0.0, 1.0 if q.z >= middle else -1.0)
+    return normalize(g * (1.0 / size))
+
+
+@kernel
+def surface(quadrics: Quadrics, ray: Ray, hit: Hit) -> SurfacePoint:
+    i, code = hit.row, int(hit.u)
+    material, light = quadrics.material[i], quadrics.light[i]
+    q = local_point(quadrics, i, at(ray, hit.t))
+    if code > 0:
+        axis, sign = (code - 1) % 3, 1.0 if code > 3 else -1.0
+        plane = quadrics.upper[i, axis] if code > 3 else quadrics.lower[i, axis]
+        n = face_normal(axis, sign)
+        q = on_face(q, axis, plane)
+        return world_surface(quadrics, i, q, n, 0.0, material, light)
+    q = _on_surface(quadrics, i, q)
+    n, error = _normal(quadrics, i, q), _error(quadrics, i, q)
+    return world_surface(quadrics, i, q, n, error, material, light)
+
+
+@kernel
+def _error(quadrics: Quadrics, i: int, q: Vec3) -> float:
+    """How far q must move along the normal for f's computed sign there to be right: what f is at q,
+    its noise here, and that of the next ray's origin, with one to spare for rounding.
+
+    Next to a point where the gradient vanishes, f grows as the square of the distance from it, and
+    this is the distance within which the noise hides it.
+    """
+    k = quadrics.coefficients[i]
+    uncertain = abs(value(k, q)) + 3.0 * noise(k, q)
+    if uncertain == 0.0:
+        return 0.0
+    bend = abs(k[0]) + abs(k[1]) + abs(k[2]) + abs(k[3]) + abs(k[4]) + abs(k[5])
+    return uncertain / max(length(gradient(k, q)), math.sqrt(uncertain * bend))
+
+
+@kernel
+def _in_box(quadrics: Quadrics, i: int, q: Vec3) -> Vec3:
+    """q in coordinates where the box is the cube [-1, 1]³."""
+    lower, upper = row(quadrics.lower, i), row(quadrics.upper, i)
+    return Vec3(
+        ((q.x - lower.x) - (upper.x - q.x)) / (upper.x - lower.x),
+        ((q.y - lower.y) - (upper.y - q.y)) / (upper.y - lower.y),
+        ((q.z - lower.z) - (upper.z - q.z)) / (upper.z - lower.z),
+    )
+
+
+@kernel
+def uv(quadrics: Quadrics, ray: Ray, hit: Hit) -> tuple[float, float]:
+    """In coordinates where the box is the cube [-1, 1]³: (phi / 2 pi around z from +x, z from 0 to
+    1); of an ellipsoid as a sphere's; of a cap as a box's face: the two other coordinates in the
+    order x, y, z, from 0 to 1."""
+    i, code = hit.row, int(hit.u)
+    x, y, z = _in_box(quadrics, i, local_point(quadrics, i, at(ray, hit.t)))
+    if code > 0:
+        axis = (code - 1) % 3
+        a, b = y if axis == 0 else x, y if axis == 2 else z
+        return 0.5 * (a + 1.0), 0.5 * (b + 1.0)
+    phi = math.atan2(y, x)
+    if phi < 0.0:
+        phi += 2.0 * math.pi
+    if quadrics.clipped[i, 2] == 0:
+        return phi / (2.0 * math.pi), math.atan2(math.sqrt(x * x + y * y), z) / math.pi
+    return phi / (2.0 * math.pi), 0.5 * (z + 1.0)
+
+
+@kernel
+def tangents(quadrics: Quadrics, ray: Ray, hit: Hit) -> Tangents:
+    """Any where u and v are no coordinates of the surface: on the z axis, and where v is level."""
+    i, code = hit.row, int(hit.u)
+    size = row(quadrics.upper, i) - row(quadrics.lower, i)
+    q = local_point(quadrics, i, at(ray, hit.t))
+    if code > 0:
+        axis = (code - 1) % 3
+        a, b = 1 if axis == 0 else 0, 1 if axis == 2 else 2
+        return Tangents(
+            triple(quadrics.edges, i, a) * component(size, a),
+            triple(quadrics.edges, i, b) * component(size, b),
+        )
+    q = _on_surface(quadrics, i, q)
+    x, y, z = _in_box(quadrics, i, q)
+    rho2 = x * x + y * y
+    # The gradients of u, v and f, the former times numbers: dp/du is what only u grows along.
+    du, u_size = Vec3(-y, x, 0.0), 2.0 * math.pi * rho2
+    dv, v_size = Vec3(0.0, 0.0, 1.0), 2.0
+    if quadrics.clipped[i, 2] == 0:
+        dv, v_size = Vec3(x * z, y * z, -rho2), math.pi * math.sqrt(rho2) * (rho2 + z * z)
+    df = gradient(quadrics.coefficients[i], q) * size
+    along_u, along_v = cross(dv, df), cross(df, du)
+    volume = dot(du, along_u)
+    if volume != 0.0:
+        half = size * (0.5 / volume)
+        dpdu = world_vector(quadrics, i, along_u * half) * u_size
+        dpdv = world_vector(quadrics, i, along_v * half) * v_size
+        if max(max_abs(dpdu), max_abs(dpdv)) < math.inf:
+            return Tangents(dpdu, dpdv)
+    return any_tangents(normalize(world_covector(quadrics, i, _normal(quadrics, i, q))))
+
+
+@kernel
+def face_of(quadrics: Quadrics, hit: Hit) -> int:
+    """0 for f's surface, else 1 + the face of the clip box: axis, + 3 on the positive side."""
+    return int(hit.u)

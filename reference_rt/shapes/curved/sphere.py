@@ -1,0 +1,243 @@
+"""Sphere: |p - c| = r."""
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.core import transform
+from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.model import Positive, Vector
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, length, normalize, row, to_world
+from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd import larger, select, smaller, square_root, with_sign
+from reference_rt.sampling.warp import on_circle
+from reference_rt.shapes.curved.quadric import ellipsoid
+from reference_rt.shapes.curved.quadrics import Quadrics
+from reference_rt.shapes.placement import local_vector, owners, world_covector
+from reference_rt.shapes.ray_simd import nearer_by
+from reference_rt.shapes.rounding import along_from
+from reference_rt.shapes.shape import (
+    LightPoint,
+    Place,
+    Shape,
+    Spans,
+    Tangents,
+    any_tangents,
+    lane_vector,
+    no_light_point,
+    no_spans,
+    one_span,
+    outward,
+    pack,
+)
+
+
+class Sphere(Shape):
+    """A sphere; its outward normal is the front.  A transform may make it an ellipsoid."""
+
+    type: Literal["sphere"] = "sphere"
+    center: Vector = (0.0, 0.0, 0.0)
+    radius: Positive = 1.0
+
+    def tabulate(self, place: Place) -> "Spheres | Quadrics":
+        m = self.map_in(place)
+        if m is transform.IDENTITY:
+            return Spheres(
+                center=np.array([self.center]),
+                radius=np.array([self.radius]),
+                to_local=np.eye(3).reshape(1, 9),
+                **owners(place),
+            )
+        size = np.abs(m[:, :3]).max()  # kept apart: squares of extreme scales overflow
+        linear = m[:, :3] / size
+        factor = math.sqrt(float(np.trace(linear.T @ linear)) / 3.0)
+        # A similarity has A^T A = s² 1; each entry of the product rounds at most 8 times.
+        if np.max(np.abs(linear.T @ linear - factor**2 * np.eye(3))) > 8e-16 * 4 * factor**2:
+            return ellipsoid(place, m, self.center, self.radius)
+        return Spheres(
+            center=transform.apply_points(m, np.array([self.center])),
+            radius=np.array([self.radius * factor * size]),
+            to_local=np.asarray(np.linalg.inv(linear / factor), np.float64).reshape(1, 9),
+            **owners(place),
+        )
+
+
+class Spheres(NamedTuple):
+    """n spheres: center (n, 3), radius (n,), world-to-local rotation (n, 9) for uv; owner, the
+    shape's index in the scene; material, light: rows of those tables; face (n,)."""
+
+    center: FloatArray
+    radius: FloatArray
+    to_local: FloatArray
+    owner: IntArray
+    material: IntArray
+    light: IntArray
+    face: IntArray
+
+
+def bounds(spheres: Spheres) -> Bounds:
+    """Boxes (n, 3), (n, 3) that contain the spheres, rounded outwards."""
+    r = spheres.radius[:, None]
+    return outward(spheres.center - r, spheres.center + r)
+
+
+def areas(spheres: Spheres) -> FloatArray:
+    return 4.0 * math.pi * np.square(spheres.radius)
+
+
+def pack_all(spheres: Spheres) -> FloatArray:
+    """What `distance` takes, as packets."""
+    return pack(spheres.center, spheres.radius)
+
+
+@kernel
+def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
+    """(whether the line meets the sphere, where it enters, where it leaves), t of any sign.
+
+    The quadratic in a form without cancellation for far or small spheres (Haines et al. 2019, "Ray
+    Tracing Gems", ch. 7): the discriminant from the closest approach, the second root from c / q.
+    There the closest approach is off by u D for an origin D away; here it is found without that
+    (`along_from`), and what its t was off by along d is taken out again: D is of no account.
+    """
+    f = ray.o - center
+    a = dot(ray.d, ray.d)
+    b = -dot(f, ray.d)
+    per_a = 1.0 / a
+    approach = along_from(ray.o, ray.d, center, b * per_a)
+    past = dot(approach, ray.d)
+    discriminant = r * r - dot(approach, approach) + past * past * per_a
+    q = b + with_sign(square_root(a * larger(discriminant, 0.0)), b)
+    t0 = (dot(f, f) - r * r) / q
+    t1 = q / a
+    return discriminant >= 0.0, smaller(t0, t1), larger(t0, t1)
+
+
+@kernel
+def distance(ray: Ray, center: Vec3, r: float) -> float:
+    """The smallest t > 0 at which a ray meets a sphere, inf where it does not."""
+    meets, near, far = roots(ray, center, r)
+    t = select(near > 0.0, near, far)
+    nearest: float = select(meets & (t > 0.0), t, math.inf)
+    return nearest
+
+
+nearer = nearer_by(distance)
+
+
+@kernel
+def spans(spheres: Spheres, i: int, ray: Ray) -> Spans:
+    meets, near, far = roots(ray, row(spheres.center, i), spheres.radius[i])
+    return one_span(near, 0.0, far, 0.0) if meets else no_spans()
+
+
+@kernel
+def found(spheres: Spheres, i: int, ray: Ray, t: float) -> Crossing:
+    """The crossing of sphere i at t: nothing else is needed."""
+    return Crossing(t, 0.0, 0.0)
+
+
+@kernel
+def intersect(spheres: Spheres, i: int, ray: Ray) -> Crossing:
+    """Where the ray meets sphere i."""
+    return Crossing(distance(ray, row(spheres.center, i), spheres.radius[i]), 0.0, 0.0)
+
+
+@kernel
+def lane_distance(spheres: Spheres, packets: FloatArray, k: int, lane: int, ray: Ray) -> float:
+    """`distance` for one lane of packet k of `pack_all`."""
+    return distance(ray, lane_vector(packets, k, 0, lane), packets[k, 3, lane])
+
+
+@kernel
+def surface(spheres: Spheres, ray: Ray, hit: Hit) -> SurfacePoint:
+    """The point, put back on the sphere: that leaves the rounding of c + r n alone."""
+    i = hit.row
+    center = row(spheres.center, i)
+    r = spheres.radius[i]
+    n = normalize(at(ray, hit.t) - center)
+    p = center + n * r
+    error = surface_error(p, center, 2.0 * r)
+    return SurfacePoint(p, n, n, error, spheres.material[i], spheres.light[i])
+
+
+@kernel
+def uv(spheres: Spheres, ray: Ray, hit: Hit) -> tuple[float, float]:
+    """(phi / 2 pi from local +x, theta / pi from local +z), each in [0, 1]."""
+    n = normalize(at(ray, hit.t) - row(spheres.center, hit.row))
+    x, y, z = local_vector(spheres, hit.row, n)
+    phi = math.atan2(y, x)
+    if phi < 0.0:
+        phi += 2.0 * math.pi
+    return phi / (2.0 * math.pi), math.atan2(math.sqrt(x * x + y * y), z) / math.pi
+
+
+@kernel
+def tangents(spheres: Spheres, ray: Ray, hit: Hit) -> Tangents:
+    """Eastwards and southwards; any at a pole."""
+    i = hit.row
+    n = normalize(at(ray, hit.t) - row(spheres.center, i))
+    x, y, z = local_vector(spheres, i, n)
+    rho = math.sqrt(x * x + y * y)
+    if rho == 0.0:
+        return any_tangents(n)
+    # The inverse of a rotation is its transpose.
+    east = world_covector(spheres, i, Vec3(-y, x, 0.0))
+    south = world_covector(spheres, i, Vec3(x * z / rho, y * z / rho, -rho))
+    r = spheres.radius[i]
+    return Tangents(east * (2.0 * math.pi * r), south * (math.pi * r))
+
+
+@kernel
+def is_outside(p: Vec3, center: Vec3, r: float) -> bool:
+    """Whether `p` is off the sphere by more than its own error bound: a point of the sphere itself
+    sees none of it, whatever side its rounding put it on."""
+    return length(center - p) - r > surface_error(p, center, 2.0 * r)
+
+
+@kernel
+def cone_of_sight(distance2: float, r: float) -> float:
+    """1 - cos(theta_max) of the cone in which a sphere is seen, without cancellation."""
+    sin2 = r * r / distance2
+    return sin2 / (1.0 + math.sqrt(1.0 - sin2))
+
+
+@kernel
+def sample(spheres: Spheres, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
+    """A point of the sphere seen from `p` outside, uniform in the cone of sight.
+
+    pdf per solid angle: 1 / (2 pi (1 - cos theta_max)) (Shirley, Wang & Zimmerman 1996).
+    """
+    center = row(spheres.center, i)
+    r = spheres.radius[i]
+    to_center = center - p
+    distance2 = dot(to_center, to_center)
+    if not is_outside(p, center, r):
+        return no_light_point()
+    one_minus_cos_max = cone_of_sight(distance2, r)
+    one_minus_cos = u0 * one_minus_cos_max
+    cos_theta = 1.0 - one_minus_cos
+    sin2 = one_minus_cos * (1.0 + cos_theta)
+    sin_theta = math.sqrt(sin2)
+    cos_phi, sin_phi = on_circle(u1)
+    frame = frame_from_normal(to_center * (1.0 / math.sqrt(distance2)))
+    wi = to_world(frame, Vec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta))
+    # The nearer root of the quadratic; at the rim rounding may leave it a hair below zero.
+    half_chord2 = max(0.0, r * r - distance2 * sin2)
+    along = math.sqrt(distance2) * cos_theta - math.sqrt(half_chord2)
+    n = normalize(p + wi * along - center)
+    q = center + n * r
+    density = 0.5 / (math.pi * one_minus_cos_max)
+    return LightPoint(q, n, surface_error(q, center, 2.0 * r), density, 0.0, 0.0)
+
+
+@kernel
+def pdf(spheres: Spheres, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
+    """The density of `sample` per solid angle, for directions from `p` that meet the sphere."""
+    to_center = row(spheres.center, i) - p
+    distance2 = dot(to_center, to_center)
+    r = spheres.radius[i]
+    if not is_outside(p, row(spheres.center, i), r):
+        return 0.0
+    return 0.5 / (math.pi * cone_of_sight(distance2, r))

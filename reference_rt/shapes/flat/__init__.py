@@ -1,0 +1,1 @@
+"""Planes and pieces of planes: disks, rectangles, polygons."""

@@ -1,0 +1,121 @@
+"""Flat shapes: a plane with coordinates x, y of its own, p = center + x x_edge + y y_edge.
+
+Their tables have center, unit normal, the covectors x_of and y_of, and the edges, all (n, 3).  The
+covectors lie in the plane, x = x_of · (p - center): how far rounding leaves a point off the plane
+does not change its coordinates, whatever else the shape's map does to space.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import Crossing, Ray, SurfacePoint, miss, surface_error
+from reference_rt.core.transform import FLAT, Affine
+from reference_rt.core.vec3 import Vec3, dot, max_abs, row
+from reference_rt.jit.kernel import kernel
+from reference_rt.shapes.placement import owners
+from reference_rt.shapes.shape import Place
+
+Integers = npt.NDArray[np.object_]
+
+
+def integers(a: FloatArray) -> tuple[Integers, int]:
+    """`a` exactly, as Python's integers over a common power of two: (numerators, denominator)."""
+    ratios = [x.as_integer_ratio() for x in a.ravel().tolist()]
+    denominator = max(d for _, d in ratios)
+    numerators = np.array([n * (denominator // d) for n, d in ratios], dtype=object)
+    return numerators.reshape(a.shape), denominator
+
+
+def columns(
+    center: FloatArray, x_edge: FloatArray, y_edge: FloatArray, place: Place
+) -> dict[str, Any]:
+    """The columns that every flat table has, one row; the normal is that of x_edge x y_edge.
+
+    Integers make them right but for their own rounding: a thin shape's normal is as exact as any,
+    and squares of extreme scales do not overflow.  Raises ValueError.
+    """
+    edges = np.array([x_edge, y_edge])
+    if not np.isfinite(edges).all():
+        raise ValueError("its coordinates overflow; expected finite numbers")
+    (x, y), one = integers(edges)
+    n = np.cross(x, y)
+    n2 = int(n @ n)
+    if n2 == 0:
+        raise ValueError(FLAT)
+    unit = (n / np.abs(n).max()).astype(float)
+    try:
+        # The basis dual to x, y in the plane; all here is in units of 1 / one.
+        x_of = (np.cross(y, n) * one / n2).astype(float)
+        y_of = (np.cross(n, x) * one / n2).astype(float)
+    except OverflowError:
+        raise ValueError("it is too small; expected a size that has a reciprocal") from None
+    return {
+        "center": center.copy()[None],
+        "normal": (unit / math.hypot(*unit))[None],
+        "x_of": x_of[None],
+        "y_of": y_of[None],
+        "x_edge": x_edge.copy()[None],
+        "y_edge": y_edge.copy()[None],
+        **owners(place),
+    }
+
+
+def facing_z(m: Affine, place: Place) -> dict[str, Any]:
+    """`columns` for the plane z = 0 with normal +z under the map m: a map that mirrors space leaves
+    the normal on the side that +z goes to."""
+    made = columns(m[:, 3], m[:, 0], m[:, 1], place)
+    (x, y, z), _ = integers(m[:, :3].T)
+    if np.cross(x, y) @ z < 0:
+        made["normal"] = -made["normal"]
+    return made
+
+
+@kernel
+def signed_distance(table: Any, i: int, p: Vec3) -> float:
+    """The distance of `p` from plane i: positive on the normal's side."""
+    return dot(p - row(table.center, i), row(table.normal, i))
+
+
+@kernel
+def coordinates(table: Any, i: int, ray: Ray, t: float) -> tuple[float, float]:
+    """x, y of the ray's point at t, each off by at most 6 u (|o - center| + t |d|) |covector|."""
+    q = (ray.o - row(table.center, i)) + ray.d * t
+    return dot(q, row(table.x_of, i)), dot(q, row(table.y_of, i))
+
+
+@kernel
+def meet(table: Any, i: int, ray: Ray) -> Crossing:
+    """Where the ray meets plane i, on either side; its u, v are x and y.
+
+    A parallel ray, in the plane or not, has t = ±inf or NaN: it misses.  The two products with the
+    normal round 6 u |o - center| and 5 u |d|, so with r = |o - center| + t |d| and the angle of
+    incidence, t |d| is off by at most 7 u r / cos, x by 13 u r |x_of| / cos and y likewise: who
+    asks them decides right beyond that.
+    """
+    t = -signed_distance(table, i, ray.o) / dot(ray.d, row(table.normal, i))
+    if (t > 0.0) & (t < math.inf):
+        x, y = coordinates(table, i, ray, t)
+        return Crossing(t, x, y)
+    return miss()
+
+
+@kernel
+def surface_at(table: Any, i: int, x: float, y: float) -> SurfacePoint:
+    """The point at x, y: in the plane by construction, but for rounding.
+
+    Two sums and two products, of numbers no larger than |center| and `reach`, and the normal's
+    own rounding across `reach` are 2 |center| + 5 reach of u a component; seeing the next origin
+    from the plane is |p| + 4 reach: within what `surface_error` bounds, however large x and y.
+    `reach` is the shape's own size at least: at x = y = 0 of a shape at the origin nothing rounds,
+    but the bound must still take a ray off the surface.
+    """
+    x_edge, y_edge = row(table.x_edge, i), row(table.y_edge, i)
+    center, n = row(table.center, i), row(table.normal, i)
+    p = center + x_edge * x + y_edge * y
+    reach = max_abs(x_edge) * max(1.0, abs(x)) + max_abs(y_edge) * max(1.0, abs(y))
+    error = surface_error(p, center, reach)
+    return SurfacePoint(p, n, n, error, table.material[i], table.light[i])

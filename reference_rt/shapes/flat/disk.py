@@ -1,0 +1,130 @@
+"""Disk: the unit disk in the plane z = 0, normal +z, under an affine map: any ellipse."""
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.ray import (
+    UNIT_ROUNDOFF,
+    Crossing,
+    Hit,
+    Ray,
+    SurfacePoint,
+    miss,
+    surface_error,
+)
+from reference_rt.core.vec3 import Vec3, max_abs, row
+from reference_rt.jit.kernel import kernel
+from reference_rt.sampling.warp import concentric_disk
+from reference_rt.shapes.flat import base
+from reference_rt.shapes.shape import (
+    LightPoint,
+    Place,
+    Shape,
+    Tangents,
+    any_tangents,
+    lift,
+    outward,
+    solid_angle_pdf,
+)
+
+
+class Disk(Shape):
+    """The unit disk at z = 0 with normal +z, where its transform takes it."""
+
+    type: Literal["disk"] = "disk"
+
+    def tabulate(self, place: Place) -> "Disks":
+        disks = Disks(**base.facing_z(self.map_in(place), place))
+        if not 0.0 < areas(disks)[0] < math.inf:
+            raise ValueError("the disk's area is not a float64; expected an ordinary size")
+        return disks
+
+
+class Disks(NamedTuple):
+    """n ellipses: see `flat` for center, normal, x_of, y_of and for x_edge, y_edge, which are
+    conjugate radii; owner, the shape's index in the scene; material, light: rows of those tables;
+    face (n,)."""
+
+    center: FloatArray
+    normal: FloatArray
+    x_of: FloatArray
+    y_of: FloatArray
+    x_edge: FloatArray
+    y_edge: FloatArray
+    owner: IntArray
+    material: IntArray
+    light: IntArray
+    face: IntArray
+
+
+def bounds(disks: Disks) -> Bounds:
+    """Boxes (n, 3), (n, 3) that contain the disks, rounded outwards.
+
+    cos(phi) a + sin(phi) b reaches sqrt(a² + b²) along each axis.
+    """
+    reach = np.hypot(disks.x_edge, disks.y_edge) * (1.0 + 8.0 * UNIT_ROUNDOFF)
+    return outward(disks.center - reach, disks.center + reach)
+
+
+def areas(disks: Disks) -> FloatArray:
+    cross = np.cross(disks.x_edge, disks.y_edge)
+    return np.asarray(math.pi * np.linalg.norm(cross, axis=1))
+
+
+@kernel
+def intersect(disks: Disks, i: int, ray: Ray) -> Crossing:
+    """Where the ray meets disk i; u, v are the local x, y."""
+    found = base.meet(disks, i, ray)
+    if found.u * found.u + found.v * found.v <= 1.0:
+        return found
+    return miss()
+
+
+@kernel
+def surface(disks: Disks, ray: Ray, hit: Hit) -> SurfacePoint:
+    return base.surface_at(disks, hit.row, hit.u, hit.v)
+
+
+@kernel
+def uv(disks: Disks, ray: Ray, hit: Hit) -> tuple[float, float]:
+    """(r, phi / 2 pi) of the local x, y; each in [0, 1]."""
+    turns = math.atan2(hit.v, hit.u) / (2.0 * math.pi)
+    if turns < 0.0:
+        turns += 1.0
+    return math.sqrt(hit.u * hit.u + hit.v * hit.v), turns
+
+
+@kernel
+def tangents(disks: Disks, ray: Ray, hit: Hit) -> Tangents:
+    """Of polar coordinates; any in the middle."""
+    i, x, y = hit.row, hit.u, hit.v
+    r = math.sqrt(x * x + y * y)
+    if r == 0.0:
+        return any_tangents(row(disks.normal, i))
+    a, b = row(disks.x_edge, i), row(disks.y_edge, i)
+    return Tangents(a * (x / r) + b * (y / r), (b * x - a * y) * (2.0 * math.pi))
+
+
+@kernel
+def lift_of(disks: Disks, i: int, p: Vec3) -> float:
+    """See `shape.lift`; its error by the whole size holds for every point of the disk."""
+    a, b, center = row(disks.x_edge, i), row(disks.y_edge, i), row(disks.center, i)
+    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
+    return lift(p - center, reach, surface_error(p, center, max_abs(a) + max_abs(b)))
+
+
+@kernel
+def sample(disks: Disks, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
+    """A point uniform over the area, as a light for `p`."""
+    x, y = concentric_disk(u0, u1)
+    q = base.surface_at(disks, i, x, y)
+    return LightPoint(q.p, q.n, q.error, pdf(disks, i, area, p, q), x, y)
+
+
+@kernel
+def pdf(disks: Disks, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
+    """The density of `sample` per solid angle, at the point `q` of the disk."""
+    return solid_angle_pdf(p, q.p, q.n, area, lift_of(disks, i, p))

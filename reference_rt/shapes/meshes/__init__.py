@@ -1,0 +1,1 @@
+"""Triangle meshes: from files or arrays, their topology, and the intersection with a triangle."""

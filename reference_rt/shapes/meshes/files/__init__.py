@@ -1,0 +1,69 @@
+"""Mesh files: `read_mesh` reads one and checks it; one module per format.
+
+Readers of our own where trimesh would change what a file says without a word: it takes cut .stl
+and .off files for whole or empty ones, gives a vertex of an .obj one normal for all of its faces
+and leaves out faces that do not exist, refuses binary .ply files of mixed polygons, and fills what
+a .gltf file only promises with zeros, however much that is.  It reads every other format.
+
+A file is read as data and nothing else: it runs nothing, and nothing that it names is opened, but
+the buffers of a .gltf file beside it.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from reference_rt.shapes.meshes.files import gltf, obj, off, other, ply, stl
+from reference_rt.shapes.meshes.files.data import MeshData, RawMesh, checked
+from reference_rt.util.files import read_input
+
+__all__ = ["MeshData", "read_mesh"]
+
+Reader = Callable[[bytes, Path], RawMesh]
+"""From a file's content and its folder."""
+
+_READERS: dict[str, Reader] = {
+    ".obj": lambda content, folder: obj.read(content),
+    ".ply": lambda content, folder: ply.read(content),
+    ".stl": lambda content, folder: stl.read(content),
+    ".off": lambda content, folder: off.read(content),
+    ".glb": gltf.read_glb,
+    ".gltf": gltf.read_gltf,
+}
+
+
+def read_mesh(path: Path) -> MeshData:
+    """Read and check a mesh.  Raises ValueError with one line that names the file."""
+    suffix = path.suffix.lower()
+    reader = _READERS.get(suffix)
+    content = _content(path)
+    if reader is None and (reader := other.reader(suffix)) is None:
+        known = ", ".join([*_READERS, *other.suffixes()])
+        raise ValueError(f"mesh {path}: '{suffix}' is not supported; expected one of {known}")
+    with np.errstate(all="ignore"):  # what overflows, and what is NaN, is found by the checks
+        raw = _parsed(path, reader, content)
+        try:
+            return checked(raw)
+        except ValueError as error:
+            raise ValueError(f"mesh {path}{error}") from None
+
+
+def _parsed(path: Path, reader: Reader, content: bytes) -> RawMesh:
+    try:
+        return reader(content, path.parent)
+    except MemoryError:
+        raise ValueError(f"mesh {path}: it does not fit into memory") from None
+    except Exception as error:
+        # Whatever parsing stumbles over, deep inside libraries, too, means a malformed file.
+        detail = (str(error).splitlines() or [""])[0][:200]
+        if not isinstance(error, ValueError):
+            detail = f"{type(error).__name__} {detail}"
+        raise ValueError(f"mesh {path} is malformed: {detail}") from None
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return read_input(path)
+    except OSError as error:
+        raise ValueError(f"cannot read mesh {path}: {error.strerror}; expected a file") from None

@@ -1,0 +1,129 @@
+"""What every mesh file is read into, and the checks that all of them share."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.diagnosis import FieldError
+
+
+@dataclass(frozen=True, eq=False)
+class MeshData:
+    """A checked mesh.  What the file does not give for every vertex is None.
+
+    Triangles are numbered in the order of the file, those of a polygon one after the other; those
+    without area are among them.  A vertex that differs in normal, uv or colour from
+    face to face is several vertices.  Polygons are fans about their first corner: exact for convex
+    ones; a concave one's fan may cover area outside of it.
+    """
+
+    vertices: FloatArray
+    """(n, 3), finite."""
+    faces: IntArray
+    """(m, 3) indices of vertices, m > 0, counter-clockwise seen from the front."""
+    normals: FloatArray | None = None
+    """(n, 3) unit vectors."""
+    uv: FloatArray | None = None
+    """(n, 2), finite; (0, 0) is the lower left corner of a picture, (1, 1) the upper right."""
+    colours: FloatArray | None = None
+    """(n, 3) linear sRGB, finite, not negative."""
+    ignored: tuple[str, ...] = ()
+    """Names of what the file has besides, as the format calls it."""
+
+
+class RawMesh(NamedTuple):
+    """`MeshData` as a reader finds it, before the checks: normals of any length."""
+
+    vertices: npt.NDArray[Any]
+    faces: npt.NDArray[Any]
+    normals: npt.NDArray[Any] | None = None
+    uv: npt.NDArray[Any] | None = None
+    colours: npt.NDArray[Any] | None = None
+    ignored: tuple[str, ...] = ()
+
+
+def checked(mesh: RawMesh) -> MeshData:
+    """Raises FieldError, whose text is the rest of a line that begins with the file's name."""
+    if len(mesh.vertices) == 0 or len(mesh.faces) == 0:
+        field = "faces" if len(mesh.vertices) else "vertices"
+        raise FieldError(field, " is empty; expected vertices and faces")
+    vertices = np.ascontiguousarray(mesh.vertices, np.float64)
+    faces = np.ascontiguousarray(mesh.faces, np.int64)
+    for name in ("normals", "uv", "colours"):
+        values = getattr(mesh, name)
+        if values is not None and len(values) != len(vertices):
+            raise FieldError(
+                name, f": {len(values)} {name} and {len(vertices)} vertices; expected one for each"
+            )
+    _expect_finite("vertices", vertices, "vertex {} is not finite; expected three finite numbers")
+    outside = (faces < 0) | (faces >= len(vertices))
+    if outside.any():
+        bad = int(np.flatnonzero(outside.any(axis=1))[0])
+        raise FieldError(
+            "faces",
+            f": face {bad} has index {faces[bad][outside[bad]][0]}, out of range; "
+            f"expected 0 to {len(vertices) - 1}",
+        )
+    uv = colours = None
+    if mesh.uv is not None:
+        uv = np.ascontiguousarray(mesh.uv, np.float64)
+        _expect_finite("uv", uv, "the uv of vertex {} is not finite; expected two finite numbers")
+    if mesh.colours is not None:
+        colours = np.ascontiguousarray(mesh.colours, np.float64)
+        _expect_finite(
+            "colours",
+            np.where(colours < 0.0, np.nan, colours),
+            "the colour of vertex {} is negative or not finite; expected numbers of at least 0",
+        )
+    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours, mesh.ignored)
+
+
+def _expect_finite(field: str, rows: FloatArray, message: str) -> None:
+    finite = np.isfinite(rows).all(axis=1)
+    if not finite.all():
+        raise FieldError(field, ": " + message.format(int(np.argmin(finite))))
+
+
+def _unit(normals: npt.NDArray[Any] | None) -> FloatArray | None:
+    if normals is None:
+        return None
+    n = np.asarray(normals, np.float64)
+    largest = np.abs(n).max(axis=1)
+    bad = ~((largest > 0.0) & np.isfinite(largest))
+    if bad.any():
+        raise FieldError(
+            "normals",
+            f": a vertex normal is zero or not finite, of vertex {int(np.argmax(bad))}; "
+            "expected a direction",
+        )
+    n = n / largest[:, None]  # squares of extreme lengths overflow
+    return np.ascontiguousarray(n / np.linalg.norm(n, axis=1, keepdims=True))
+
+
+def fans(corners: npt.NDArray[Any], counts: IntArray) -> npt.NDArray[Any]:
+    """Triangles (m, 3) of polygons: a fan about the first corner of each.
+
+    `corners`: the indices of all polygons, one after the other; `counts`: how many each has.
+    """
+    if len(counts) and counts.min() < 3:
+        bad = int(np.argmin(counts >= 3))
+        raise ValueError(f"face {bad} has {counts[bad]} corners; expected at least three")
+    if len(corners) == 3 * len(counts):
+        return corners.reshape(-1, 3)
+    first = np.repeat(np.cumsum(counts) - counts, counts - 2)
+    second = first + 1 + ramps(counts - 2)
+    return np.stack([corners[first], corners[second], corners[second + 1]], axis=1)
+
+
+def ramps(counts: IntArray) -> IntArray:
+    """0 1 2 ... up to each count, one after the other."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def linear(encoded: FloatArray) -> FloatArray:
+    """Linear values of sRGB-encoded ones, 0 to 1 (IEC 61966-2-1)."""
+    high = np.power((np.maximum(encoded, 0.04045) + 0.055) / 1.055, 2.4)
+    return np.where(encoded <= 0.04045, encoded / 12.92, high)

@@ -1,0 +1,241 @@
+"""glTF 2.0 (ISO/IEC 12113), .gltf and .glb: the triangles of its scene, as one mesh.
+
+Read are POSITION, NORMAL, TEXCOORD_0 and COLOR_0 (linear, as the format has it), at rest: without
+animations, skins and morphing.  Points, lines, materials, images and all else are ignored, and
+named.  A buffer may be a file, in the mesh's folder or below it.
+"""
+
+import base64
+import json
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+import numpy.typing as npt
+
+from reference_rt.core import transform
+from reference_rt.shapes.meshes.files.data import RawMesh, fans
+from reference_rt.shapes.meshes.files.join import joined
+from reference_rt.util.files import read_input
+
+_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6  # points and lines are 0 to 3
+_READ = ("POSITION", "NORMAL", "TEXCOORD_0", "COLOR_0")
+_JSON, _BIN = 0x4E4F534A, 0x004E4942
+
+# What may be required although it is not known here: it does not change the shape.
+_HARMLESS = (
+    "KHR_materials_",
+    "KHR_texture_",
+    "KHR_lights_",
+    "EXT_texture_",
+    "KHR_mesh_quantization",
+)
+
+Rows = npt.NDArray[Any]
+
+
+def read_gltf(content: bytes, folder: Path) -> RawMesh:
+    return _joined(_File(content, None, folder))
+
+
+def read_glb(content: bytes, folder: Path) -> RawMesh:
+    if len(content) < 12 or content[:4] != b"glTF":
+        raise ValueError("it does not begin with 'glTF' and a header")
+    version, length = struct.unpack_from("<II", content, 4)
+    if version != 2 or length != len(content):
+        raise ValueError(
+            f"its header says version {version}, {length} bytes; expected 2, {len(content)}"
+        )
+    chunks: dict[int, bytes] = {}
+    position = 12
+    while position < length:
+        if position + 8 > length:
+            raise ValueError("it ends within the header of a chunk")
+        size, kind = struct.unpack_from("<II", content, position)
+        position += 8 + size
+        if position > length:
+            raise ValueError("it ends within a chunk")
+        chunks.setdefault(kind, content[position - size : position])
+    if _JSON not in chunks:
+        raise ValueError("it has no JSON chunk")
+    return _joined(_File(chunks[_JSON], chunks.get(_BIN), folder))
+
+
+def _joined(file: "_File") -> RawMesh:
+    found = joined(file.parts())
+    return found._replace(ignored=(*found.ignored, *file.ignored()))
+
+
+class _File:
+    """The JSON of a file, its binary chunk if it has one, and its folder."""
+
+    def __init__(self, text: bytes, binary: bytes | None, folder: Path) -> None:
+        self.root, self.binary, self.folder = json.loads(text), binary, folder
+        self.buffers: dict[int, bytes] = {}
+        self.files: dict[Path, bytes] = {}
+        self.has_lines = False
+        if not isinstance(self.root, dict):
+            raise ValueError("its JSON is no object")
+        for name in self.root.get("extensionsRequired", []):
+            if not str(name).startswith(_HARMLESS):
+                raise ValueError(f"it requires the extension {str(name)[:60]!r}, which is unknown")
+
+    def item(self, kind: str, index: Any) -> dict[str, Any]:
+        items = self.root.get(kind)
+        if not (isinstance(items, list) and type(index) is int and 0 <= index < len(items)):
+            raise ValueError(f"it has no {kind}[{str(index)[:20]}]")
+        found = items[index]
+        if not isinstance(found, dict):
+            raise ValueError(f"{kind}[{index}] is no object")
+        return found
+
+    def parts(self) -> Iterator[tuple[RawMesh, transform.Affine]]:
+        """The primitives of all nodes of the scene, with the nodes' maps to the world."""
+        scene = self.item("scenes", self.root.get("scene", 0))
+        waiting = [(node, transform.identity()) for node in reversed(scene.get("nodes", []))]
+        seen = set()
+        while waiting:
+            index, to_world = waiting.pop()
+            node = self.item("nodes", index)
+            if index in seen:
+                raise ValueError(f"nodes[{index}] has two parents; expected a tree")
+            seen.add(index)
+            m = transform.compose(_local(node), to_world)
+            waiting += [(child, m) for child in reversed(node.get("children", []))]
+            if "mesh" in node:
+                for primitive in self.item("meshes", node["mesh"])["primitives"]:
+                    if primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN):
+                        yield self.primitive(primitive), m
+                    else:
+                        self.has_lines = True
+
+    def ignored(self) -> tuple[str, ...]:
+        """What the file has besides its parts, as far as it changes what is seen."""
+        names = [key for key in ("materials", "animations", "skins") if self.root.get(key)]
+        return (*names, *(["points or lines"] if self.has_lines else []))
+
+    def primitive(self, primitive: dict[str, Any]) -> RawMesh:
+        attributes = primitive["attributes"]
+        points = self.accessor(attributes.get("POSITION"), (3,))
+        normals, uv, colours = (
+            self.accessor(attributes[name], widths, fraction) if name in attributes else None
+            for name, widths, fraction in (
+                ("NORMAL", (3,), False),
+                ("TEXCOORD_0", (2,), True),
+                ("COLOR_0", (3, 4), True),
+            )
+        )
+        if any(a is not None and len(a) != len(points) for a in (normals, uv, colours)):
+            raise ValueError("the attributes of a primitive have different lengths")
+        if uv is not None:
+            uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1].astype(np.float64)])  # from the top
+        corners = np.arange(len(points))
+        if "indices" in primitive:
+            corners = self.accessor(primitive["indices"], (1,))[:, 0].astype(np.int64)
+        faces = _faces(corners, primitive.get("mode", _TRIANGLES))
+        ignored = [name for name in attributes if name not in _READ]
+        if primitive.get("targets"):
+            ignored.append("targets")
+        if colours is not None and colours.shape[1] == 4 and np.any(colours[:, 3] < 1.0):
+            ignored.append("alpha of COLOR_0")
+        rgb = None if colours is None else colours[:, :3]
+        return RawMesh(points, faces, normals, uv, rgb, tuple(map(str, ignored)))
+
+    def accessor(self, index: Any, widths: tuple[int, ...], fraction: bool = False) -> Rows:
+        """Rows (count, one of `widths`); fraction: integers are those of [0, 1] or [-1, 1]."""
+        accessor = self.item("accessors", index)
+        if "sparse" in accessor or "bufferView" not in accessor:
+            raise ValueError(
+                f"accessors[{index}] is sparse or without data, which is not supported"
+            )
+        view = self.item("bufferViews", accessor["bufferView"])
+        data = self.buffer(view.get("buffer"))
+        width = _WIDTHS.get(str(accessor.get("type")))
+        component = _COMPONENTS.get(accessor.get("componentType", 0))
+        if width not in widths or component is None:
+            raise ValueError(f"accessors[{index}] has the wrong type")
+        dtype = np.dtype(component)
+        row = width * dtype.itemsize
+        count, stride = _natural(accessor, "count"), _natural(view, "byteStride", row)
+        begin, within = _natural(view, "byteOffset", 0), _natural(accessor, "byteOffset", 0)
+        size = _natural(view, "byteLength")
+        if begin + size > len(data):
+            raise ValueError(f"the view of accessors[{index}] reaches beyond its buffer")
+        if count < 1 or stride < row or within + (count - 1) * stride + row > size:
+            raise ValueError(f"accessors[{index}] reaches beyond its view, or is empty")
+        rows = np.ndarray((count, width), dtype, data, begin + within, (stride, dtype.itemsize))
+        if dtype.kind != "f" and (fraction or accessor.get("normalized", False)):
+            return np.maximum(rows / np.iinfo(dtype).max, -1.0)
+        return rows
+
+    def buffer(self, index: Any) -> bytes:
+        entry = self.item("buffers", index)
+        if index not in self.buffers:
+            self.buffers[index] = self.load(entry.get("uri"), index)
+        if _natural(entry, "byteLength") > len(self.buffers[index]):
+            raise ValueError(f"buffers[{index}] has only {len(self.buffers[index])} bytes")
+        return self.buffers[index]
+
+    def load(self, uri: Any, index: int) -> bytes:
+        if uri is None and index == 0 and self.binary is not None:
+            return self.binary
+        if not isinstance(uri, str):
+            raise ValueError(f"buffers[{index}] has no data")
+        head, _, payload = uri.partition(",")
+        if head.startswith("data:") and head.endswith(";base64"):
+            return base64.b64decode(payload, validate=True)
+        try:
+            path = (self.folder / unquote(uri)).resolve()
+            if not path.is_relative_to(self.folder.resolve()):
+                raise ValueError(f"buffers[{index}] is {uri[:60]!r}; expected a file in its folder")
+            if path not in self.files:  # many buffers may be the same file
+                self.files[path] = read_input(path)
+            return self.files[path]
+        except OSError as error:
+            raise ValueError(
+                f"buffers[{index}], {uri[:60]!r}: {error.strerror}; expected a file in its folder"
+            ) from None
+
+
+def _natural(values: dict[str, Any], key: str, default: int | None = None) -> int:
+    value = values.get(key, default)
+    if type(value) is not int or value < 0:
+        raise ValueError(f"'{key}' is {str(value)[:20]}; expected an integer of at least 0")
+    return value
+
+
+def _faces(corners: npt.NDArray[np.int64], mode: int) -> npt.NDArray[Any]:
+    if len(corners) < 3 or (mode == _TRIANGLES and len(corners) % 3 != 0):
+        raise ValueError(f"a primitive of {len(corners)} corners; expected whole triangles")
+    if mode == _TRIANGLES:
+        return corners.reshape(-1, 3)
+    if mode == _FAN:
+        return fans(corners, np.array([len(corners)]))
+    i = np.arange(len(corners) - 2)
+    odd = i % 2  # every other triangle of a strip is turned
+    return np.stack([corners[i], corners[i + 1 + odd], corners[i + 2 - odd]], axis=1)
+
+
+def _local(node: dict[str, Any]) -> transform.Affine:
+    """A node's map to its parent: a matrix, by columns; or scaled, turned, moved."""
+
+    def vector(key: str, default: list[float]) -> npt.NDArray[np.float64]:
+        found = np.array(node.get(key, default), np.float64)
+        if found.shape != (len(default),) or not np.all(np.isfinite(found)):
+            raise ValueError(f"a node's '{key}' is not {len(default)} finite numbers")
+        return found
+
+    if "matrix" in node:
+        return vector("matrix", [0.0] * 16).reshape(4, 4).T[:3]
+    x, y, z, w = q = vector("rotation", [0.0, 0.0, 0.0, 1.0])
+    norm2 = float(q @ q)
+    if norm2 == 0.0:
+        raise ValueError("a node's 'rotation' is zero; expected a unit quaternion")
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turn = np.eye(3) + 2.0 / norm2 * (w * cross + cross @ cross)
+    return np.column_stack([turn * vector("scale", [1.0] * 3), vector("translation", [0.0] * 3)])

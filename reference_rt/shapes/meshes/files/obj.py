@@ -1,0 +1,176 @@
+"""Wavefront .obj (Advanced Visualizer manual, appendix B1): polygons of v, vt and vn.
+
+Vertex colours, `v x y z r g b`, are no part of the format but widely written, from 0 to 1 and as
+displayed (by Blender, MeshLab and three.js): they are taken as sRGB-encoded.  All groups and
+objects are one mesh.  Materials, lines, points, curves and all else are ignored, and named.
+"""
+
+import math
+from array import array
+from collections.abc import Iterable, Iterator
+from itertools import chain
+
+import numpy as np
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.shapes.meshes.files.data import RawMesh, fans, linear
+
+Triple = tuple[int, int, int]
+
+_WIDTHS = {b"v": 3, b"vt": 2, b"vn": 3}
+
+_NAMES_ONLY = (b"", b"g", b"o")
+"""Without a meaning for the surface: blank lines, names of groups and objects."""
+
+
+class _Corners(dict[bytes, int]):
+    """The number of the vertex that a corner means, by its text: "v", "v/vt", "v//vn", "v/vt/vn".
+
+    `rows`: the numbers of the v, vt and vn lines so far; `triples`: indices into these, from 0 and
+    -1 for none, of each vertex in the order of their numbers.
+    """
+
+    def __init__(self) -> None:
+        self.rows = {kind: array("d") for kind in _WIDTHS}
+        self.triples: dict[Triple, int] = {}
+
+    def __missing__(self, text: bytes) -> int:
+        v, *others = text.split(b"/")
+        if len(others) > 2:
+            raise ValueError(f"{_shown(text)} is no corner; expected v, v/vt, v//vn or v/vt/vn")
+        vt, vn = (*others, b"", b"")[:2]
+        triple = (
+            self._index(v, b"v"),
+            self._index(vt, b"vt") if vt else -1,
+            self._index(vn, b"vn") if vn else -1,
+        )
+        number = self.triples.setdefault(triple, len(self.triples))
+        if b"-" not in text:  # what a negative index means depends on where it stands
+            self[text] = number
+        return number
+
+    def _index(self, text: bytes, kind: bytes) -> int:
+        count = len(self.rows[kind]) // _WIDTHS[kind]
+        try:
+            index = int(text)
+        except ValueError:
+            raise ValueError(f"{_shown(text)} is not an index; expected an integer") from None
+        if index == 0 or abs(index) > count:
+            raise ValueError(f"index {index} of {count} '{kind.decode()}' lines is out of range")
+        return index - 1 if index > 0 else count + index
+
+
+def read(content: bytes) -> RawMesh:
+    """Vertices are numbered in the order of their first use; unused ones are left out.
+
+    An index counts the lines before it.  Normals, uv and colours that not all have are ignored.
+    """
+    vertex_of = _Corners()
+    rows = vertex_of.rows
+    colours, corners, counts = array("d"), array("q"), array("q")
+    others: dict[str, None] = {}  # a set in the order of the file
+    for line, text in _logical_lines(content):
+        words = (text.partition(b"#")[0] if b"#" in text else text).split()
+        kind = words[0] if words else b""
+        try:
+            if kind == b"f":
+                corners.extend([vertex_of[w] for w in words[1:]])
+                counts.append(len(words) - 1)
+                if len(words) < 4:
+                    raise ValueError("a face has fewer than three corners")
+            elif kind == b"v":
+                rows[b"v"].extend(_three(words))
+                if len(words) > 5:
+                    colours.extend(_colour(words))
+                elif len(words) == 5 and words[4] != b"1" and float(words[4]) != 1.0:
+                    others["w of v"] = None
+            elif kind == b"vn":
+                rows[b"vn"].extend(_three(words))
+            elif kind == b"vt":
+                rows[b"vt"].extend(_uv(words))
+                if len(words) == 4 and float(words[3]) != 0.0:
+                    others["w of vt"] = None
+            elif kind == b"s":
+                if words[1:] not in ([b"off"], [b"0"]):
+                    others["s (smoothing groups)"] = None
+            elif kind not in _NAMES_ONLY:
+                others[_keyword(kind)] = None
+        except ValueError as error:
+            raise ValueError(f"line {line}: {error}") from None
+
+    triples = np.fromiter(chain.from_iterable(vertex_of.triples), np.int64)
+    v, vt, vn = triples.reshape(-1, 3).T
+    positions, uv, normals = (_table(rows[kind], width) for kind, width in _WIDTHS.items())
+    rgb = _table(colours, 3)
+    if len(normals) and np.all(vn >= 0):
+        others.pop("s (smoothing groups)", None)  # the normals say the same
+    for name, table, complete in (
+        ("vn of some corners", normals, np.all(vn >= 0)),
+        ("vt of some corners", uv, np.all(vt >= 0)),
+        ("colours of some v", rgb, len(rgb) == len(positions)),
+    ):
+        if len(table) and not complete:
+            others[name] = None
+    return RawMesh(
+        positions[v],
+        fans(np.frombuffer(corners, np.int64), np.frombuffer(counts, np.int64)),
+        normals[vn] if np.all(vn >= 0) else None,
+        uv[vt] if np.all(vt >= 0) else None,
+        linear(rgb[v]) if len(rgb) == len(positions) else None,
+        tuple(others),
+    )
+
+
+def _keyword(kind: bytes) -> str:
+    what = {b"mtllib": "materials", b"usemtl": "materials", b"l": "lines", b"p": "points"}
+    name = kind.decode("ascii", "replace")
+    return f"{name} ({what[kind]})" if kind in what else name
+
+
+def _logical_lines(content: bytes) -> Iterable[tuple[int, bytes]]:
+    """The lines and their numbers; a backslash at its end continues a line on the next."""
+    lines = enumerate(content.splitlines(), start=1)
+    return _continued(lines) if b"\\" in content else lines
+
+
+def _continued(lines: Iterable[tuple[int, bytes]]) -> Iterator[tuple[int, bytes]]:
+    begun, first = list[bytes](), 0
+    for number, line in lines:
+        text = line.partition(b"#")[0].rstrip()  # a comment does not go on
+        first = first or number
+        goes_on = text.endswith(b"\\")
+        begun.append(text[:-1] if goes_on else text)
+        if not goes_on:
+            yield first, b" ".join(begun)
+            begun, first = [], 0
+    if begun:
+        yield first, b" ".join(begun)
+
+
+def _three(words: list[bytes]) -> list[float]:
+    numbers = [float(w) for w in words[1:4]]
+    if not (len(numbers) == 3 and all(map(math.isfinite, numbers))):
+        raise ValueError(f"'{words[0].decode()}' needs three finite numbers")
+    return numbers
+
+
+def _uv(words: list[bytes]) -> list[float]:
+    numbers = [float(w) for w in words[1:3]]
+    if not (numbers and all(map(math.isfinite, numbers))):
+        raise ValueError("'vt' needs one to three finite numbers")
+    return numbers if len(numbers) == 2 else [numbers[0], 0.0]
+
+
+def _colour(words: list[bytes]) -> list[float]:
+    numbers = [float(w) for w in words[4:]]
+    if not (len(numbers) == 3 and all(0.0 <= x <= 1.0 for x in numbers)):
+        raise ValueError("'v' has a colour that is not three numbers from 0 to 1")
+    return numbers
+
+
+def _shown(word: bytes) -> str:
+    return repr(word[:20].decode("ascii", "replace"))
+
+
+def _table(numbers: "array[float]", width: int) -> FloatArray:
+    return np.frombuffer(numbers, np.float64).reshape(-1, width)

@@ -1,0 +1,61 @@
+"""Formats that trimesh reads, where what it needs for them is installed (.3mf: lxml, networkx).
+
+Positions and triangles, in the scene that the file describes; no normals, uv or colours (these two
+are named as ignored).
+"""
+
+import io
+import warnings
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from reference_rt.core import transform
+from reference_rt.shapes.meshes.files.data import RawMesh
+from reference_rt.shapes.meshes.files.join import joined
+
+# Read here, or without surfaces.
+_LEFT_OUT = {"obj", "ply", "stl", "stl_ascii", "off", "gltf", "glb", "xyz"}
+
+UNPACKED = 2**28
+"""Bytes that an archive may unpack to: as text, some millions of triangles."""
+
+
+def suffixes() -> list[str]:
+    from trimesh.exchange import load  # costs 0.3 s to import, and few scenes need it
+
+    return sorted(f".{kind}" for kind in load.mesh_formats() - _LEFT_OUT)
+
+
+def reader(suffix: str) -> Callable[[bytes, Path], RawMesh] | None:
+    """What reads files with this suffix, if anything does."""
+    if suffix not in suffixes():
+        return None
+    return lambda content, folder: joined(_parts(content, suffix[1:]))
+
+
+def _parts(content: bytes, kind: str) -> Iterator[tuple[RawMesh, transform.Affine]]:
+    import trimesh
+
+    file = io.BytesIO(content)
+    if zipfile.is_zipfile(file):
+        size = sum(entry.file_size for entry in zipfile.ZipFile(file).infolist())
+        if size > UNPACKED:
+            raise ValueError(f"it unpacks to {size} bytes; expected at most {UNPACKED}")
+    file.seek(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        # The resolver finds no other file, whichever the content asks for.
+        scene = trimesh.load(file, file_type=kind, resolver={}, force="scene", process=False)
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if hasattr(geometry, "faces"):
+            vertices = np.asarray(geometry.vertices, np.float64)
+            faces = np.asarray(geometry.faces, np.int64)
+            visual = getattr(geometry.visual, "kind", None)
+            ignored = () if visual is None else (f"{visual} colours or textures",)
+            raw = RawMesh(vertices, faces, ignored=ignored)
+            yield raw, np.asarray(matrix, np.float64)[:3]

@@ -1,0 +1,187 @@
+"""Polygon files, .ply (Turk 1994): ascii, binary of both byte orders, any mixture of polygons.
+
+Read are the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u texture_v) and a
+colour, and the element `face` with its list vertex_indices or vertex_index; all else is ignored,
+and named.  A colour is red green blue, or r g b; or diffuse_red and so on; or as Mitsuba writes it,
+color_0 color_1 color_2, and in the other forms that it reads, color_r and vertex_color_x among
+them.  Of several it is the first in this order.  Colours of integers are sRGB-encoded, 255 or 65535
+being 1: as displayed, which is what scanners and modellers write.  Colours of floats are linear: as
+computed.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.shapes.meshes.files.data import RawMesh, fans, linear
+from reference_rt.shapes.meshes.files.ply_body import (
+    Array,
+    Element,
+    Property,
+    columns,
+    lists,
+    numbers,
+)
+
+# Both sets of names that are in use.
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+_UV = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
+_WORDS, _LETTERS = ("red", "green", "blue"), ("r", "g", "b")
+_RGB = (
+    _WORDS,
+    _LETTERS,
+    *(
+        tuple(prefix + last for last in lasts)
+        for prefix in ("diffuse_", "color_", "colour_", "vertex_color_", "vertex_colour_")
+        for lasts in (_WORDS, _LETTERS, ("0", "1", "2"), ("1", "2", "3"), ("x", "y", "z"))
+    ),
+)
+_NORMAL = ("nx", "ny", "nz")
+_INDICES = ("vertex_indices", "vertex_index")
+
+
+class Header(NamedTuple):
+    """`order`: a numpy byte order, "=" for ascii; `size` in bytes."""
+
+    elements: list[Element]
+    order: str
+    size: int
+
+
+def read(content: bytes) -> RawMesh:
+    """Numbers of ascii files are read as float64, whatever float type the header names."""
+    header = _header(content)
+    ascii_ = header.order == "="
+    body = memoryview(content)[header.size :]
+    if ascii_:
+        body = memoryview(numbers(bytes(body)).tobytes())
+    mesh, position = RawMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64)), 0
+    ignored: list[str] = []
+    for element in header.elements:
+        if element.name == "vertex":
+            table, position = columns(body, position, element)
+            points = _together(table, _first(table, (("x", "y", "z"),)))
+            if points is None:
+                raise ValueError("its element 'vertex' lacks x, y or z; expected these")
+            normal, uv, rgb = (_first(table, sets) for sets in ((_NORMAL,), _UV, _RGB))
+            ignored += [
+                f"vertex {name}"
+                for name in table
+                if name not in ("x", "y", "z", *normal, *uv, *rgb)
+            ]
+            mesh = RawMesh(
+                points,
+                mesh.faces,
+                _together(table, normal),
+                _together(table, uv),
+                _colours(table, rgb, element),
+            )
+        elif element.name == "face" and element.rows > 0:
+            corners, counts, position = lists(body, position, element, _indices(element))
+            if not np.all(np.isfinite(corners) & (corners == np.trunc(corners))):
+                raise ValueError("it has an index that is no integer")
+            mesh = mesh._replace(faces=fans(corners.astype(np.int64), counts))
+            used = _indices(element).name
+            ignored += [f"face {p.name}" for p in element.properties if p.name != used]
+        else:
+            _, _, position = lists(body, position, element, None)
+            if element.rows > 0:
+                ignored.append(f"element {element.name}")
+    if position != len(body):
+        left = (len(body) - position) // (8 if ascii_ else 1)
+        what = "numbers" if ascii_ else "bytes"
+        raise ValueError(f"{left} {what} are left after all that its header promises")
+    return mesh._replace(ignored=tuple(ignored))
+
+
+def _first(table: dict[str, Array], sets: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """The first of several sets of names that is there as a whole; () for none."""
+    return next((names for names in sets if all(n in table for n in names)), ())
+
+
+def _together(table: dict[str, Array], names: tuple[str, ...]) -> FloatArray | None:
+    if not names:
+        return None
+    return np.stack([table[n].astype(np.float64) for n in names], axis=1)
+
+
+def _colours(
+    table: dict[str, Array], names: tuple[str, ...], element: Element
+) -> FloatArray | None:
+    colours = _together(table, names)
+    if colours is None:
+        return None
+    types = {p.declared for p in element.properties if p.name in names}
+    if types <= {"f4", "f8"}:
+        return colours
+    if types not in ({"u1"}, {"u2"}):
+        raise ValueError("its colours have an odd type; expected uchar, ushort, float or double")
+    white = 255.0 if types == {"u1"} else 65535.0
+    if not np.all((colours >= 0.0) & (colours <= white)):
+        raise ValueError(f"it has a colour that is not from 0 to {white:.0f}")
+    return linear(colours / white)
+
+
+def _indices(element: Element) -> Property:
+    for p in element.properties:
+        if p.name in _INDICES and p.length is not None:
+            if p.declared[0] == "f":
+                raise ValueError(f"its '{p.name}' are floats; expected integers")
+            return p
+    raise ValueError("its element 'face' has no list 'vertex_indices'; expected one")
+
+
+def _header(content: bytes) -> Header:
+    first = (content[:100].splitlines(keepends=True) or [b""])[0]
+    newline = first[3:].lstrip(b" \t")
+    if not first.startswith(b"ply") or newline not in (b"\n", b"\r\n", b"\r"):
+        raise ValueError("Not a ply file! Expected 'ply' as its first line")
+    last = newline + b"end_header" + newline
+    end = content.find(last)
+    if end < 0:
+        raise ValueError("its header has no line 'end_header'")
+    order, elements = "", list[Element]()
+    for number, line in enumerate(content[:end].split(newline), start=1):
+        try:
+            match line.decode("latin-1").split():
+                case ["format", name, "1.0"] if name in _ORDERS and not elements:
+                    order = _ORDERS[name]
+                case ["element", name, count] if order and count.isdecimal():
+                    elements.append(Element(name, int(count), []))
+                case ["property", *words] if elements:
+                    elements[-1].properties.append(_property(words, order))
+                case ["ply" | "comment" | "obj_info", *_] | []:
+                    pass
+                case words:
+                    expected = "'format', then elements with their count, each with its properties"
+                    raise ValueError(f"{' '.join(words)[:40]!r}; expected {expected}")
+        except ValueError as error:
+            raise ValueError(f"line {number}: {error}") from None
+    if not order:
+        raise ValueError("its header has no line 'format'")
+    for names in ([e.name for e in elements], *([p.name for p in e.properties] for e in elements)):
+        if len(names) != len(set(names)):
+            raise ValueError("its header has a name twice; expected different ones")
+    return Header(elements, order, end + len(last))
+
+
+def _property(words: list[str], order: str) -> Property:
+    def stored(name: str) -> np.dtype[Any]:
+        # The numbers of an ascii body become float64, whatever they are declared to be.
+        return np.dtype(np.float64 if order == "=" else order + _TYPES[name])
+
+    match words:
+        case [kind, name] if kind in _TYPES:
+            return Property(name, _TYPES[kind], stored(kind), None)
+        case ["list", count, kind, name] if kind in _TYPES and _TYPES.get(count, "f")[0] != "f":
+            return Property(name, _TYPES[kind], stored(kind), stored(count))
+    expected = "'TYPE NAME' or 'list INTEGER_TYPE TYPE NAME'"
+    raise ValueError(f"property {' '.join(words)[:40]!r}; expected {expected}")

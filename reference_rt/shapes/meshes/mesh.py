@@ -1,0 +1,149 @@
+"""Mesh: triangles from a file, or from arrays."""
+
+from pathlib import Path
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.diagnosis import FieldError
+from reference_rt.core.numpy_fields import AS_DIGEST, Floats2, Floats3, Integers3
+from reference_rt.core.transform import IDENTITY, Affine
+from reference_rt.shapes.meshes import triangle
+from reference_rt.shapes.meshes.files import MeshData, read_mesh
+from reference_rt.shapes.meshes.files.data import RawMesh, checked
+from reference_rt.shapes.meshes.vertex_normals import smooth_normals
+from reference_rt.shapes.shape import Place, Shape
+
+_MOST_NAMED = 12
+"""Of what a file has besides, a warning names so many."""
+
+_LONGEST = 60
+"""Characters of a name, which a damaged file may make any."""
+
+
+class Mesh(Shape):
+    """The triangles of a file, or of arrays, with vertex normals, texture coordinates and colours.
+
+    Geometric normals follow the winding in the file: under a transform that mirrors space the front
+    stays the front, and what is closed does not turn inside out.
+    """
+
+    array_fields: ClassVar[frozenset[str]] = frozenset(
+        ("vertices", "faces", "normals", "uv", "colours")
+    )
+
+    type: Literal["mesh"] = "mesh"
+    file: str | None = None
+    """An .obj or .ply file, or another that `shapes.mesh_files` reads; a relative name counts from
+    the scene file's folder.  Without one: `vertices` and `faces`."""
+    vertices: Floats3 | None = None
+    """Positions (n, 3)."""
+    faces: Integers3 | None = None
+    """Triangles (m, 3): indices of vertices from 0, counter-clockwise seen from the front."""
+    normals: Floats3 | None = None
+    """Vertex normals (n, 3) of any length but 0."""
+    uv: Floats2 | None = None
+    """Texture coordinates (n, 2); (0, 0) is the lower left corner of a picture."""
+    colours: Floats3 | None = None
+    """Vertex colours (n, 3), linear sRGB of at least 0."""
+    face_normals: bool = False
+    """Shade with each triangle's own normal, whatever the file has."""
+    smooth: bool = False
+    """Make vertex normals where the file has none: those of the faces around a vertex, weighted by
+    angle, in the mesh's own coordinates.  Vertices of the same position and uv are one."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        given = [name for name in sorted(self.array_fields) if getattr(self, name) is not None]
+        if self.file is not None and given:
+            raise FieldError(given[0], "beside a file; expected one of the two")
+        if self.file is None and (self.vertices is None or self.faces is None):
+            raise ValueError("expected a file, or vertices and faces")
+        if self.smooth and self.face_normals:
+            raise FieldError("smooth", "beside face_normals; expected one of the two at most")
+        if self.file is None:
+            try:
+                self.data(Path())
+            except FieldError as error:
+                raise FieldError(error.field, str(error).lstrip(": ")) from None
+        return self
+
+    def __eq__(self, other: object) -> bool:
+        """Equal descriptions, arrays by what they hold."""
+        return type(other) is type(self) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> str:
+        return self.model_dump_json(context=AS_DIGEST)
+
+    def data(self, folder: Path) -> MeshData:
+        """What the file holds, or the arrays.  Raises ValueError."""
+        if self.file is not None:
+            return read_mesh(folder / self.file)
+        assert self.vertices is not None
+        assert self.faces is not None
+        return checked(RawMesh(self.vertices, self.faces, self.normals, self.uv, self.colours))
+
+    def tabulate(self, place: Place) -> triangle.Triangles:
+        m = self.map_in(place)
+        data = self.data(place.folder)
+        name = "the mesh" if self.file is None else f"mesh {place.folder / self.file}"
+        if data.ignored:
+            place.warn(place.owner, f"{name}: {_told(data.ignored)}")
+        vertices = transform.apply_points(m, data.vertices)[data.faces].reshape(-1, 9)
+        # Without area there is no normal, but rounding alone makes rays hit: left out.
+        n = triangle.geometric_normals(vertices)
+        has_area = np.einsum("ij,ij->i", n, n) > 0.0
+        if not has_area.any():
+            raise ValueError(f"{name}: no triangle has any area; expected one that has")
+        faces, numbers = data.faces, None
+        if not has_area.all():
+            numbers = np.flatnonzero(has_area)
+            vertices, faces = vertices[has_area], faces[has_area]
+            place.warn(
+                place.owner,
+                f"{name}: {len(has_area) - len(numbers):,} of {len(has_area):,} triangles have no "
+                "area, or one that float64 cannot hold, and are left out (the others keep their "
+                "numbers); expected triangles with an area",
+            )
+        triangles = triangle.soup(
+            np.ascontiguousarray(vertices),
+            place,
+            normals=self._normals(data, faces, m),
+            uvs=_at_corners(data.uv, faces),
+            colours=_at_corners(data.colours, faces),
+            face=numbers,
+        )
+        return triangle.facing(m, triangles)
+
+    def makes_normals(self, data: MeshData) -> bool:
+        """Whether the mesh has vertex normals that its data have not."""
+        return self.smooth and data.normals is None
+
+    def _normals(self, data: MeshData, faces: IntArray, m: Affine) -> FloatArray | None:
+        """Unit normals (m, 9) at the corners of faces where the map takes them."""
+        if self.makes_normals(data):
+            made = smooth_normals(data.vertices, faces, data.uv).reshape(-1, 3)
+            return (made if m is IDENTITY else transform.apply_normals(m, made)).reshape(-1, 9)
+        if data.normals is None or self.face_normals:
+            return None
+        return _at_corners(transform.apply_normals(m, data.normals), faces)
+
+
+def _told(ignored: tuple[str, ...]) -> str:
+    names = [name[:_LONGEST] for name in ignored[:_MOST_NAMED]]
+    more = [f"{len(ignored) - len(names)} more"] if len(ignored) > len(names) else []
+    return (
+        f"ignored: {', '.join(names + more)}; expected positions, faces, and of the vertices "
+        "normals, texture coordinates and colours"
+    )
+
+
+def _at_corners(values: FloatArray | None, faces: IntArray) -> FloatArray | None:
+    """(m, 3 k) values at the corners of faces (m, 3), from those of vertices (n, k)."""
+    return None if values is None else values[faces].reshape(len(faces), -1)

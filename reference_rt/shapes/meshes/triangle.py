@@ -1,0 +1,352 @@
+"""Triangle: three vertices, watertight along shared edges."""
+
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from reference_rt.core import transform
+from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.model import Vector
+from reference_rt.core.ray import (
+    UNIT_ROUNDOFF,
+    Crossing,
+    Hit,
+    Ray,
+    SurfacePoint,
+    miss,
+    surface_error,
+)
+from reference_rt.core.vec3 import Vec3, cross, dot, max_abs, normalize, triple
+from reference_rt.jit.kernel import kernel
+from reference_rt.shapes.meshes.watertight import Projection, Shear, exactly, project, project_lane
+from reference_rt.shapes.shape import (
+    LightPoint,
+    Place,
+    Shape,
+    Tangents,
+    any_tangents,
+    lift,
+    solid_angle_pdf,
+)
+
+
+class Triangle(Shape):
+    """A triangle; its normal is (v1 - v0) x (v2 - v0), before the transform: under one that mirrors
+    space its front stays its front."""
+
+    type: Literal["triangle"] = "triangle"
+    v0: Vector
+    v1: Vector
+    v2: Vector
+
+    def tabulate(self, place: Place) -> "Triangles":
+        m = self.map_in(place)
+        vertices = transform.apply_points(m, np.array([self.v0, self.v1, self.v2]))
+        triangles = facing(m, soup(vertices.reshape(1, 9), place))
+        if areas(triangles)[0] == 0.0:
+            raise ValueError("the triangle has no area; expected three points not on a line")
+        return triangles
+
+
+class Triangles(NamedTuple):
+    """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), texture coordinates (n, 6)
+    and linear sRGB colours (n, 9; -1 for none) of the vertices, each None where no triangle has
+    any; owners (n,); face, the number within its shape, of a mesh that in its file."""
+
+    vertices: FloatArray
+    normals: FloatArray | None
+    uvs: FloatArray | None
+    colours: FloatArray | None
+    owner: IntArray
+    material: IntArray
+    light: IntArray
+    face: IntArray
+
+
+def soup(
+    vertices: FloatArray,
+    place: Place,
+    normals: FloatArray | None = None,
+    uvs: FloatArray | None = None,
+    colours: FloatArray | None = None,
+    face: IntArray | None = None,
+) -> Triangles:
+    """Triangles of one shape: see `Triangles`; without numbers, `face` counts them."""
+    n = len(vertices)
+    return Triangles(
+        vertices=vertices,
+        normals=normals,
+        uvs=uvs,
+        colours=colours,
+        owner=np.full(n, place.owner),
+        material=np.full(n, place.material),
+        light=np.full(n, -1),
+        face=np.arange(n) if face is None else face,
+    )
+
+
+def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
+    """The triangles, whose vertices the map m has taken where they are, with their fronts where it
+    takes those: a mirror turns the corners' order round, and they are turned back."""
+    if not transform.mirrors(m):
+        return triangles
+    uvs = _barycentrics(triangles) if triangles.uvs is None else triangles.uvs
+    return triangles._replace(
+        vertices=_exchanged(triangles.vertices),
+        normals=None if triangles.normals is None else _exchanged(triangles.normals),
+        uvs=_exchanged(uvs),
+        colours=None if triangles.colours is None else _exchanged(triangles.colours),
+    )
+
+
+def _exchanged(corners: FloatArray) -> FloatArray:
+    """(n, 3 k): the second corner and the third in each other's place."""
+    return np.ascontiguousarray(
+        corners.reshape(len(corners), 3, -1)[:, [0, 2, 1]].reshape(corners.shape)
+    )
+
+
+def _barycentrics(triangles: Triangles) -> FloatArray:
+    """The coordinates of triangles that have none of their own (n, 6)."""
+    return np.repeat([[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]], len(triangles.face), axis=0)
+
+
+def align(parts: Sequence[Triangles]) -> list[Triangles]:
+    """Tables with the same columns: what one has, the others get."""
+    parts = list(parts)
+    if any(part.normals is not None for part in parts):
+        parts = [
+            part._replace(normals=_flat_normals(part)) if part.normals is None else part
+            for part in parts
+        ]
+    if any(part.uvs is not None for part in parts):
+        parts = [
+            part._replace(uvs=_barycentrics(part)) if part.uvs is None else part for part in parts
+        ]
+    if any(part.colours is not None for part in parts):
+        parts = [
+            part._replace(colours=np.full((len(part.face), 9), -1.0))
+            if part.colours is None
+            else part
+            for part in parts
+        ]
+    return parts
+
+
+def _flat_normals(triangles: Triangles) -> FloatArray:
+    """Each triangle's own normal at its vertices."""
+    n = geometric_normals(triangles.vertices)
+    with np.errstate(invalid="ignore"):
+        n = np.nan_to_num(n / np.linalg.norm(n, axis=1, keepdims=True))
+    return np.tile(n, 3)
+
+
+def geometric_normals(vertices: FloatArray) -> FloatArray:
+    """Normals (n, 3) of twice the area's length, of vertices (n, 9)."""
+    v = vertices.reshape(-1, 3, 3)
+    return np.asarray(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]))
+
+
+def areas(triangles: Triangles) -> FloatArray:
+    return np.asarray(0.5 * np.linalg.norm(geometric_normals(triangles.vertices), axis=1))
+
+
+def bounds(triangles: Triangles) -> Bounds:
+    """Boxes (n, 3), (n, 3): minima and maxima of vertices are exact."""
+    a, b, c = triangles.vertices.reshape(-1, 3, 3).transpose(1, 0, 2)
+    # Two at a time: along an axis of three NumPy takes ten times as long.
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
+@kernel
+def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
+    """Where the ray meets triangle i; u, v are the barycentrics of v1 and v2."""
+    return _crossing(project(triangles.vertices, i, shear), shear)
+
+
+@kernel
+def intersect_lane(
+    corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
+) -> Crossing:
+    """The same of a triangle of a leaf, see `watertight.see`."""
+    return _crossing(project_lane(corners, first, size, lane, shear, seen), shear)
+
+
+@kernel
+def _crossing(seen: Projection, shear: Shear) -> Crossing:
+    found = on_line(seen, shear)
+    return found if found.t > 0.0 else miss()
+
+
+@kernel
+def on_line(seen: Projection, shear: Shear) -> Crossing:
+    """Where the ray's line crosses a triangle, at t of any sign."""
+    if seen.side == 0:
+        return miss()
+    inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
+    u, v = seen.e1 * inverse, seen.e2 * inverse
+    # Edge functions times depths would overflow from sizes of 1e102 on, barycentrics do not.
+    t = (seen.e0 * inverse * seen.a_z + u * seen.b_z + v * seen.c_z) * shear.s_z
+    return Crossing(t, u, v)
+
+
+@kernel
+def enters(triangles: Triangles, i: int, shear: Shear) -> int:
+    """+1 where the ray comes to the front of triangle i, -1 where it comes from behind."""
+    return project(triangles.vertices, i, shear).side
+
+
+@kernel
+def interpolate(array: FloatArray, i: int, u: float, v: float) -> Vec3:
+    """(1 - u - v) a0 + u a1 + v a2 of the three vectors in row i."""
+    return triple(array, i, 0) * (1.0 - u - v) + triple(array, i, 1) * u + triple(array, i, 2) * v
+
+
+@kernel
+def normal(triangles: Triangles, i: int) -> Vec3:
+    """Perpendicular to the edges, on slivers too.
+
+    Products of edges a and b round by u |a| |b|, and so n's direction by some 6 u over the sine of
+    their angle: below 1/4 they are made exact.  A ray along a sliver that leaves it by what `leave`
+    takes would else come back to it.
+    """
+    v0 = triple(triangles.vertices, i, 0)
+    a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
+    n = cross(a, b)
+    if dot(n, n) < 0.0625 * (dot(a, a) * dot(b, b)):
+        x, _ = exactly(a.y, a.z, b.y, b.z)
+        y, _ = exactly(a.z, a.x, b.z, b.x)
+        z, _ = exactly(a.x, a.y, b.x, b.y)
+        n = Vec3(x, y, z)
+    return normalize(n)
+
+
+@kernel
+def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
+    """However thin the triangle is.
+
+    A ray that begins next to it projects its vertices to within 7 u of their distances, at most the
+    longest edge, and names the point of the triangle that it meets to within `CANCELLED` u + 4 u of
+    that: twice the edge in `surface_error`, which has p's own rounding besides.
+    """
+    v = triangles.vertices
+    v0, v1, v2 = triple(v, i, 0), triple(v, i, 1), triple(v, i, 2)
+    longest = max(max_abs(v1 - v0), max(max_abs(v2 - v0), max_abs(v2 - v1)))
+    return surface_error(p, v0, 2.0 * longest)
+
+
+@kernel
+def lift_of(triangles: Triangles, i: int, p: Vec3) -> float:
+    """See `shape.lift`."""
+    v = triangles.vertices
+    a, b, c = triple(v, i, 0), triple(v, i, 1), triple(v, i, 2)
+    lower = Vec3(min(a.x, b.x, c.x), min(a.y, b.y, c.y), min(a.z, b.z, c.z))
+    upper = Vec3(max(a.x, b.x, c.x), max(a.y, b.y, c.y), max(a.z, b.z, c.z))
+    middle = lower * 0.5 + upper * 0.5
+    return lift(p - middle, upper * 0.5 - lower * 0.5, error_at(triangles, i, p))
+
+
+@kernel
+def shading_normal(normals: FloatArray | None, i: int, u: float, v: float, n: Vec3) -> Vec3:
+    """The interpolated vertex normal made unit; `n` where there is none."""
+    if normals is None:
+        return n
+    ns = interpolate(normals, i, u, v)
+    if dot(ns, ns) == 0.0:
+        return n
+    return normalize(ns)
+
+
+@kernel
+def surface(triangles: Triangles, ray: Ray, hit: Hit) -> SurfacePoint:
+    i = hit.row
+    p = interpolate(triangles.vertices, i, hit.u, hit.v)
+    n = normal(triangles, i)
+    ns = shading_normal(triangles.normals, i, hit.u, hit.v, n)
+    return SurfacePoint(
+        p, n, ns, error_at(triangles, i, p), triangles.material[i], triangles.light[i]
+    )
+
+
+@kernel
+def sample(triangles: Triangles, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
+    """A point uniform over the area, as a light for `p` (Turk 1990: the square root warp)."""
+    root = math.sqrt(u0)
+    u, v = root * (1.0 - u1), root * u1
+    q = interpolate(triangles.vertices, i, u, v)
+    n = normal(triangles, i)
+    density = solid_angle_pdf(p, q, n, area, lift_of(triangles, i, p))
+    return LightPoint(q, n, error_at(triangles, i, q), density, u, v)
+
+
+@kernel
+def pdf(triangles: Triangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
+    """The density of `sample` per solid angle, at the point `q` of the triangle."""
+    return solid_angle_pdf(p, q.p, q.n, area, lift_of(triangles, i, p))
+
+
+@kernel
+def uv(triangles: Triangles, ray: Ray, hit: Hit) -> tuple[float, float]:
+    """The interpolated texture coordinates; without any, the barycentrics of v1 and v2."""
+    return _interpolated_uv(triangles.uvs, hit)
+
+
+@kernel
+def _interpolated_uv(uvs: FloatArray | None, hit: Hit) -> tuple[float, float]:
+    if uvs is None:
+        return hit.u, hit.v
+    w = uvs[hit.row]
+    a = 1.0 - hit.u - hit.v
+    return a * w[0] + hit.u * w[2] + hit.v * w[4], a * w[1] + hit.u * w[3] + hit.v * w[5]
+
+
+@kernel
+def tangents(triangles: Triangles, ray: Ray, hit: Hit) -> Tangents:
+    """Those of texture coordinates without area are any."""
+    i = hit.row
+    v0 = triple(triangles.vertices, i, 0)
+    a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
+    return _tangents_of_uv(triangles.uvs, i, a, b, normal(triangles, i))
+
+
+@kernel
+def _tangents_of_uv(uvs: FloatArray | None, i: int, a: Vec3, b: Vec3, n: Vec3) -> Tangents:
+    """From the edges a = v1 - v0 and b = v2 - v0: a = du_a dp/du + dv_a dp/dv, and b likewise."""
+    if uvs is None:
+        return Tangents(a, b)
+    w = uvs[i]
+    du_a, dv_a, du_b, dv_b = w[2] - w[0], w[3] - w[1], w[4] - w[0], w[5] - w[1]
+    x, y = du_a * dv_b, dv_a * du_b
+    # Differences and products round x and y by 3 u each, and their difference by another.
+    if abs(x - y) <= 4.0 * UNIT_ROUNDOFF * (abs(x) + abs(y)):
+        return any_tangents(n)
+    inverse = 1.0 / (x - y)
+    dpdu, dpdv = (a * dv_b - b * dv_a) * inverse, (b * du_a - a * du_b) * inverse
+    if max(max_abs(dpdu), max_abs(dpdv)) < math.inf:
+        return Tangents(dpdu, dpdv)
+    return any_tangents(n)
+
+
+@kernel
+def colour(triangles: Triangles | None, hit: Hit, without: Vec3) -> Vec3:
+    """The interpolated colour of the vertices; `without` any, that."""
+    if triangles is None:
+        return without
+    return _interpolated_colour(triangles.colours, hit, without)
+
+
+@kernel
+def _interpolated_colour(colours: FloatArray | None, hit: Hit, without: Vec3) -> Vec3:
+    if colours is None:
+        return without
+    if colours[hit.row, 0] < 0.0:
+        return without
+    return interpolate(colours, hit.row, hit.u, hit.v)
+
+
+@kernel
+def face_of(triangles: Triangles, hit: Hit) -> int:
+    """The number of the triangle in its mesh."""
+    return int(triangles.face[hit.row])

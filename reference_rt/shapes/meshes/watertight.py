@@ -1,0 +1,226 @@
+"""A triangle as a ray sees it: edge functions that decide every ray, those through edges too."""
+
+from typing import Any, NamedTuple
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import component
+from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd import LANES, select
+from reference_rt.jit.simd_kernels import lane_kernel
+from reference_rt.shapes.rounding import product_error
+
+
+class Shear(NamedTuple):
+    """A ray turned so that its direction is the unit z axis: the axes permuted to x y z, and the
+    shear that remains (Woop, Benthin & Wald 2013, JCGT 2(1))."""
+
+    x: int
+    y: int
+    z: int
+    o_x: float
+    o_y: float
+    o_z: float
+    s_x: float
+    s_y: float
+    s_z: float
+
+
+@kernel
+def shear_of(ray: Ray) -> Shear:
+    """Once per ray: the largest axis of d becomes z; x and y swap to keep the winding."""
+    z = 2
+    if abs(ray.d.x) >= abs(ray.d.y) and abs(ray.d.x) >= abs(ray.d.z):
+        z = 0
+    elif abs(ray.d.y) >= abs(ray.d.z):
+        z = 1
+    x, y = (z + 1) % 3, (z + 2) % 3
+    d_z = component(ray.d, z)
+    if d_z < 0.0:
+        x, y = y, x
+    return Shear(
+        x,
+        y,
+        z,
+        component(ray.o, x),
+        component(ray.o, y),
+        component(ray.o, z),
+        component(ray.d, x) / d_z,
+        component(ray.d, y) / d_z,
+        1.0 / d_z,
+    )
+
+
+CANCELLED = 16.0
+"""How many times larger than a triangle's area the products may be that it is the sum of.
+
+They round by u each, and so barycentrics by CANCELLED u: the point that they name is off by that
+share of the triangle as the ray sees it.  Where more is cancelled, on slivers and grazing rays, it
+would be off by up to the whole of it."""
+
+
+class Projection(NamedTuple):
+    """A triangle as a ray sees it: its edge functions, whose sum is twice its area, and the depths
+    of its vertices; side, 0 where the ray passes by, else 1 at the front and -1 from behind."""
+
+    side: int
+    e0: float
+    e1: float
+    e2: float
+    a_z: float
+    b_z: float
+    c_z: float
+
+
+@kernel
+def project(vertices: FloatArray, i: int, shear: Shear) -> Projection:
+    """The triangle in row i of `vertices` (n, 9), seen along a ray."""
+    return _project(vertices.reshape(-1), 9 * i, 1, shear)
+
+
+@kernel
+def project_lane(
+    corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
+) -> Projection:
+    """A triangle of a leaf, of which `see` has left what it can, seen along a ray."""
+    if seen[_DOUBT + lane] == 0.0:
+        e0 = seen[lane]
+        side = 1 if e0 > 0.0 else -1
+        e1, e2 = seen[LANES + lane], seen[2 * LANES + lane]
+        depths = seen[3 * LANES + lane], seen[4 * LANES + lane], seen[5 * LANES + lane]
+        return Projection(side, e0, e1, e2, depths[0], depths[1], depths[2])
+    return _project(corners, 9 * first + lane, size, shear)
+
+
+@kernel
+def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection:
+    """The triangle whose nine coordinates are v[start], v[start + stride], ... (Woop, Benthin &
+    Wald 2013).
+
+    Each vertex is projected by arithmetic of its own, and two neighbours' edge functions differ in
+    sign alone.  Products round monotonically: a difference that is not 0 has the right sign.  Where
+    it is 0, `exactly` decides: of the triangles around an edge or a vertex that a ray passes
+    through, it passes through exactly those that it would pass through a hair beside it.
+    """
+    x, y, z = start + stride * shear.x, start + stride * shear.y, start + stride * shear.z
+    a_z = v[z] - shear.o_z
+    b_z = v[z + 3 * stride] - shear.o_z
+    c_z = v[z + 6 * stride] - shear.o_z
+    a_x = v[x] - shear.o_x - shear.s_x * a_z
+    b_x = v[x + 3 * stride] - shear.o_x - shear.s_x * b_z
+    c_x = v[x + 6 * stride] - shear.o_x - shear.s_x * c_z
+    a_y = v[y] - shear.o_y - shear.s_y * a_z
+    b_y = v[y + 3 * stride] - shear.o_y - shear.s_y * b_z
+    c_y = v[y + 6 * stride] - shear.o_y - shear.s_y * c_z
+    left0, right0 = c_x * b_y, c_y * b_x
+    left1, right1 = a_x * c_y, a_y * c_x
+    left2, right2 = b_x * a_y, b_y * a_x
+    e0, e1, e2 = left0 - right0, left1 - right1, left2 - right2
+    side = 0
+    if e0 > 0.0 and e1 > 0.0 and e2 > 0.0:
+        side = 1
+    elif e0 < 0.0 and e1 < 0.0 and e2 < 0.0:
+        side = -1
+    if side != 0:
+        size = abs(left0) + abs(right0) + abs(left1) + abs(right1) + abs(left2) + abs(right2)
+        if size > CANCELLED * abs(e0 + e1 + e2):
+            e0, _ = exactly(c_x, c_y, b_x, b_y)
+            e1, _ = exactly(a_x, a_y, c_x, c_y)
+            e2, _ = exactly(b_x, b_y, a_x, a_y)
+    elif e0 == 0.0 or e1 == 0.0 or e2 == 0.0:
+        e0, s0 = exactly(c_x, c_y, b_x, b_y)
+        e1, s1 = exactly(a_x, a_y, c_x, c_y)
+        e2, s2 = exactly(b_x, b_y, a_x, a_y)
+        side = s0 if s0 == s1 and s1 == s2 else 0
+    return Projection(side, e0, e1, e2, a_z, b_z, c_z)
+
+
+_DOUBT = 6 * LANES
+SEEN_FLOATS = 7 * LANES
+
+
+@lane_kernel
+def _see(
+    corners: Any,
+    start: Any,
+    size: Any,
+    x: Any,
+    y: Any,
+    z: Any,
+    o_x: Any,
+    o_y: Any,
+    o_z: Any,
+    s_x: Any,
+    s_y: Any,
+    seen: Any,
+) -> Any:
+    """`_project` of the triangles of a leaf, by the same operations, and where it takes more than
+    these; those whose edge functions do not differ in sign."""
+    x, y, z = start + x * size, start + y * size, start + z * size
+    a_z = corners.load(z) - o_z
+    b_z = corners.load(z + 3 * size) - o_z
+    c_z = corners.load(z + 6 * size) - o_z
+    a_x = corners.load(x) - o_x - s_x * a_z
+    b_x = corners.load(x + 3 * size) - o_x - s_x * b_z
+    c_x = corners.load(x + 6 * size) - o_x - s_x * c_z
+    a_y = corners.load(y) - o_y - s_y * a_z
+    b_y = corners.load(y + 3 * size) - o_y - s_y * b_z
+    c_y = corners.load(y + 6 * size) - o_y - s_y * c_z
+    left0, right0 = c_x * b_y, c_y * b_x
+    left1, right1 = a_x * c_y, a_y * c_x
+    left2, right2 = b_x * a_y, b_y * a_x
+    e0, e1, e2 = left0 - right0, left1 - right1, left2 - right2
+    for k, number in enumerate((e0, e1, e2, a_z, b_z, c_z)):
+        seen.store(k * LANES, number)
+    products = abs(left0) + abs(right0) + abs(left1) + abs(right1) + abs(left2) + abs(right2)
+    in_front = (e0 > 0.0) & (e1 > 0.0) & (e2 > 0.0)
+    behind = (e0 < 0.0) & (e1 < 0.0) & (e2 < 0.0)
+    cancelled = products > abs(e0 + e1 + e2) * CANCELLED
+    seen.store(_DOUBT, select((in_front | behind) & ~cancelled, 0.0, 1.0))
+    below = (e0 < 0.0) | (e1 < 0.0) | (e2 < 0.0)
+    above = (e0 > 0.0) | (e1 > 0.0) | (e2 > 0.0)
+    return ~(below & above)
+
+
+@kernel
+def see(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArray) -> int:
+    """The triangles of a leaf, as bits, that `project_lane` may find met: all that are, and some on
+    whose edges the ray passes;  seen (SEEN_FLOATS,): what it need not do again.
+
+    The vertices of references first .. first + size, LANES at most, lie in `corners` from 9 first
+    on: the first coordinate of each, the second of each, and so on.  What follows the last one's
+    takes up the lanes that are left.
+    """
+    met = _see(
+        corners,
+        9 * first,
+        size,
+        shear.x,
+        shear.y,
+        shear.z,
+        shear.o_x,
+        shear.o_y,
+        shear.o_z,
+        shear.s_x,
+        shear.s_y,
+        seen,
+    )
+    return met & ((1 << size) - 1)
+
+
+@kernel
+def exactly(p_x: float, p_y: float, q_x: float, q_y: float) -> tuple[float, int]:
+    """The edge function p_x q_y - p_y q_x to within one rounding, and its sign, which is right.
+
+    On the edge it is that beside the edge, as if the ray were moved by (h, h²) for an h above 0 and
+    below everything else: 0 only for an edge without length.
+    """
+    left, right = p_x * q_y, p_y * q_x
+    e = left - right + (product_error(p_x, q_y, left) - product_error(p_y, q_x, right))
+    along_x, along_y = p_y - q_y, q_x - p_x
+    for decides in (e, along_x, along_y):
+        if decides > 0.0:
+            return e, 1
+        if decides < 0.0:
+            return e, -1
+    return 0.0, 0

@@ -1,0 +1,147 @@
+"""Rays side by side: the plain kernels of shapes' distances, made into vector code.
+
+The kernel `distance` of such a shape is a text for LANES rays at once too: see `lanes`.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import BLOCK, Ray
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.simd import I64, LANES, REALS, Lanes, in_all_lanes
+
+_WORDS = ir.VectorType(I64, LANES)
+_FIRST = I64(0)
+
+
+class _Writer:
+    """What the intrinsics below share."""
+
+    def __init__(self, context: Any, builder: ir.IRBuilder) -> None:
+        self.context, self.builder = context, builder
+
+    def _place(self, array_type: Any, array: ir.Value, of: ir.Type, at: ir.Value) -> ir.Value:
+        """Where item `at` of an array begins, as a pointer to `of`."""
+        data = self.context.make_array(array_type)(self.context, self.builder, array).data
+        return self.builder.bitcast(self.builder.gep(data, [at]), of.as_pointer())
+
+    def load(self, array_type: Any, array: ir.Value, of: ir.Type, at: ir.Value = _FIRST) -> Any:
+        return self.builder.load(self._place(array_type, array, of, at), align=8)
+
+    def store(
+        self, array_type: Any, array: ir.Value, value: ir.Value, at: ir.Value = _FIRST
+    ) -> None:
+        self.builder.store(value, self._place(array_type, array, value.type, at), align=8)
+
+    def lanes(self, value: ir.Value, *at: int) -> Lanes:
+        """A number of a tuple, the same in all lanes."""
+        number = self.builder.extract_value(value, at)
+        return Lanes(self.builder, in_all_lanes(self.builder, number))
+
+    def vector(self, value: ir.Value, k: int) -> Vec3:
+        """Vector k of a tuple, the same in all lanes."""
+        components: list[Any] = [self.lanes(value, k, axis) for axis in range(3)]
+        return Vec3(*components)
+
+    def column(self, array_type: Any, rays: ir.Value, column: int, at: ir.Value) -> Lanes:
+        """A number of each of LANES rays."""
+        place = self.builder.add(at, I64(column * BLOCK))
+        return Lanes(self.builder, self.load(array_type, rays, REALS, place))
+
+
+def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
+    """The kernel nearer(rays, at, shape, code, t, codes) of a `distance(ray, *shape)`.
+
+    For each of LANES rays of `rays` (`streams.Rays.numbers`) from number `at` on: where the shape
+    is nearer than t (LANES,), its distance there, and `code` into codes (LANES,).
+    """
+    if numba.config.DISABLE_JIT:
+        return nearer_plainly(distance)
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def nearer(
+        typing_context: Any, rays: Any, at: Any, shape: Any, code: Any, t: Any, codes: Any
+    ) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            writer = _Writer(context, builder)
+            rays_value, at_value, shape_value, code_value, t_value, codes_value = values
+            numbers: list[Any] = [writer.column(rays, rays_value, k, at_value) for k in range(6)]
+            arguments = [
+                writer.vector(shape_value, k)
+                if isinstance(part, types.BaseTuple)
+                else writer.lanes(shape_value, k)
+                for k, part in enumerate(shape)
+            ]
+            ray = Ray(Vec3(*numbers[:3]), Vec3(*numbers[3:]), math.inf)
+            found = distance(ray, *arguments).value
+            best = writer.load(t, t_value, REALS)
+            which = writer.load(codes, codes_value, _WORDS)
+            is_nearer = builder.fcmp_ordered("<", found, best)
+            own = in_all_lanes(builder, code_value, _WORDS)
+            writer.store(t, t_value, builder.select(is_nearer, found, best))
+            writer.store(codes, codes_value, builder.select(is_nearer, own, which))
+            return context.get_dummy_value()
+
+        number = types.int64
+        return types.void(rays, number, shape, number, t, codes), generate
+
+    made: Callable[..., None] = nearer
+    return made
+
+
+def nearer_plainly(distance: Callable[..., Any]) -> Callable[..., None]:
+    """What `nearer_by` returns, as plain Python."""
+
+    def nearer(
+        rays: FloatArray, at: int, shape: Any, code: int, t: FloatArray, codes: IntArray
+    ) -> None:
+        for lane in range(LANES):
+            x = [rays[k * BLOCK + at + lane] for k in range(6)]
+            found = distance(Ray(Vec3(*x[:3]), Vec3(*x[3:]), math.inf), *shape)
+            if found < t[lane]:
+                t[lane], codes[lane] = found, code
+
+    return nearer
+
+
+def _begin(rays: FloatArray, at: int, t: FloatArray, codes: IntArray) -> None:
+    """Nothing found by LANES rays from number `at` on: t their ends, codes -1."""
+    t[:], codes[:] = rays[6 * BLOCK + at : 6 * BLOCK + at + LANES], -1
+
+
+def _end(t: FloatArray, codes: IntArray, at: int, to: FloatArray, to_codes: IntArray) -> None:
+    """What LANES rays have found, to where those from `at` on are kept."""
+    to[at : at + LANES], to_codes[at : at + LANES] = t, codes
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _begin_lanes(typing_context: Any, rays: Any, at: Any, t: Any, codes: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        writer = _Writer(context, builder)
+        writer.store(t, values[2], writer.column(rays, values[0], 6, values[1]).value)
+        writer.store(codes, values[3], ir.Constant(_WORDS, [-1] * LANES))
+        return context.get_dummy_value()
+
+    return types.void(rays, types.int64, t, codes), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _end_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_codes: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        writer = _Writer(context, builder)
+        writer.store(to, values[3], writer.load(t, values[0], REALS), values[2])
+        writer.store(to_codes, values[4], writer.load(codes, values[1], _WORDS), values[2])
+        return context.get_dummy_value()
+
+    return types.void(t, codes, types.int64, to, to_codes), generate
+
+
+begin: Callable[..., None] = _begin if numba.config.DISABLE_JIT else _begin_lanes
+end: Callable[..., None] = _end if numba.config.DISABLE_JIT else _end_lanes

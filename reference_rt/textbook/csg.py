@@ -1,0 +1,175 @@
+"""Solids by lists of intervals, and by inside tests of all crossings (row T12).
+
+Both begin with the crossings of each operand and the ray's line, which are the renderer's own.
+From there, the intervals know of an operand only where the line goes in and out; the inside tests
+only whether a point is in it, which `inside` finds from the operand's description.  The form that
+renders is neither: `csg.evaluate` passes the crossings one after another, and those that rounding
+cannot tell apart at once.
+"""
+
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from reference_rt.core.arrays import IntArray
+from reference_rt.core.transform import apply_points
+from reference_rt.jit.kernel import entry_kernel, kernel
+from reference_rt.textbook.inside import INSIDE, BoolArray, in_closed_mesh
+from reference_rt.textbook.method import FloatArray, Method
+from reference_rt.textbook.operands import (
+    INTERSECTION,
+    UNION,
+    Combination,
+    CsgParameters,
+    Operand,
+    Tree,
+    boundaries,
+    leaves,
+    prepare,
+    trimmed,
+    type_of,
+)
+
+# ---- intervals ----------------------------------------------------------------------------------
+
+
+@kernel
+def holds(operation: int, in_a: bool, in_b: bool) -> bool:
+    """Whether a point is in the combination of a and b."""
+    if operation == UNION:
+        return in_a or in_b
+    if operation == INTERSECTION:
+        return in_a and in_b
+    return in_a and not in_b
+
+
+@entry_kernel
+def _combine(operation: int, a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """Boundaries (n, j) and (n, k) merged into (n, j + k): both are passed in order, those at the
+    same t at once, and the ones where the answer changes are kept."""
+    for r in range(len(out)):
+        i, j, n = 0, 0, 0
+        in_a, in_b, inside = False, False, False
+        while True:
+            t = math.inf
+            if i < a.shape[1]:
+                t = a[r, i]
+            if j < b.shape[1]:
+                t = min(t, b[r, j])
+            if t == math.inf:
+                break
+            while i < a.shape[1] and a[r, i] == t:
+                in_a = not in_a
+                i += 1
+            while j < b.shape[1] and b[r, j] == t:
+                in_b = not in_b
+                j += 1
+            if holds(operation, in_a, in_b) != inside:
+                inside = not inside
+                out[r, n] = t
+                n += 1
+
+
+def interval_list(tree: Tree, o: FloatArray, d: FloatArray) -> FloatArray:
+    """The boundaries of a whole tree: see `boundaries`."""
+    if isinstance(tree, Operand):
+        return boundaries(tree, o, d)
+
+    def combined(a: FloatArray, b: FloatArray) -> FloatArray:
+        out = np.full((len(o), a.shape[1] + b.shape[1]), math.inf)
+        _combine(tree.operation, a, b, out)
+        return trimmed(out)
+
+    return functools.reduce(combined, (interval_list(part, o, d) for part in tree.of))
+
+
+def intervals(tree: Tree, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    """Each operand's intervals inside, combined pairwise up the tree; the first end beyond 0.
+
+    Cost: of k crossings in all, one compare each at every level of the tree above them.
+    Fails: where faces coincide.  Crossings that should be one differ by their roundings, and what
+    is between them stays as a film, or a gap, that thin: of a turned box without one side of it,
+    measured, up to half of the rays through what is gone meet a film.  A ray that leaves a surface
+    may meet it at once.
+    """
+    ends = interval_list(tree, o, d)
+    np.min(np.where(ends > 0.0, ends, math.inf), axis=1, initial=math.inf, out=t)
+
+
+# ---- inside tests -------------------------------------------------------------------------------
+
+
+def contains(tree: Tree, p: FloatArray) -> BoolArray:
+    """Whether points (n, 3) are inside."""
+    if isinstance(tree, Combination):
+        first, *others = (contains(part, p) for part in tree.of)
+        if tree.operation == INTERSECTION:
+            return np.asarray(np.logical_and.reduce([first, *others]))
+        if tree.operation == UNION:
+            return np.asarray(np.logical_or.reduce([first, *others]))
+        return np.asarray(first & ~np.logical_or.reduce([np.zeros_like(first), *others]))
+    if tree.shapes.triangles is not None:
+        return in_closed_mesh(tree.shapes.triangles.vertices, p)
+    if type_of(tree.shape) not in INSIDE:
+        raise ValueError(
+            f"no inside test for a {type_of(tree.shape)}; expected one of "
+            f"{', '.join(INSIDE)} or a closed mesh"
+        )
+    return INSIDE[type_of(tree.shape)](tree.shape, apply_points(tree.to_own, p))
+
+
+def inside_tests(tree: Tree, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    """All crossings of all operands, in order: one is on the surface of the solid where a point
+    just before it is inside and one just after it is not, or the other way round.
+
+    Such points are the middles between one crossing and the next.
+    Cost: for each of k crossings up to the one that shows, the inside tests of all operands.
+    Fails: as `intervals` does, though less: the inside tests round otherwise than the crossings and
+    often find no point in a film.  Of the same box, one ray in ten meets one.
+    """
+    every = np.concatenate([boundaries(operand, o, d) for operand in leaves(tree)], axis=1)
+    ahead = np.sort(np.where(every > 0.0, every, math.inf), axis=1)
+    again = np.pad(ahead[:, 1:] == ahead[:, :-1], ((0, 0), (1, 0)))
+    ahead = trimmed(np.where(again, math.inf, ahead))
+    ahead = np.pad(ahead, ((0, 0), (0, 1)), constant_values=math.inf)
+    t[:] = math.inf
+    searching = np.flatnonzero(ahead[:, 0] < math.inf)
+    before = _contains_at(tree, o, d, searching, 0.5 * ahead[searching, 0])
+    for k in range(ahead.shape[1] - 1):
+        here, following = ahead[searching, k], ahead[searching, k + 1]
+        # After the last crossing, any point will do.
+        end = np.where(following < math.inf, following, 2.0 * here)
+        after = _contains_at(tree, o, d, searching, here + 0.5 * (end - here))
+        shows = before != after
+        t[searching[shows]] = here[shows]
+        on = ~shows & (following < math.inf)
+        searching, before = searching[on], after[on]
+
+
+def _contains_at(
+    tree: Tree, o: FloatArray, d: FloatArray, rays: IntArray, t: FloatArray
+) -> BoolArray:
+    """`contains` for the points of these rays at t."""
+    return contains(tree, o[rays] + t[:, None] * d[rays])
+
+
+def _method(name: str, summary: str, source: str, run: Callable[..., None]) -> Method:
+    return Method(f"csg.{name}", "T12", summary, source, CsgParameters, prepare, run)
+
+
+METHODS = (
+    _method(
+        "intervals",
+        "lists of intervals, combined pairwise along the tree",
+        "Roth 1982, Computer Graphics and Image Processing 18(2)",
+        intervals,
+    ),
+    _method(
+        "inside_tests",
+        "all crossings; those where points before and after differ",
+        "Tilove 1980, IEEE Transactions on Computers 29(10)",
+        inside_tests,
+    ),
+)

@@ -1,0 +1,268 @@
+"""Triangle v0 v1 v2, hit from both sides, edges included: five methods (row T7).
+
+All but the first two steps of `two_step` and `watertight` solve
+
+    u (v1 - v0) + v (v2 - v0) - t d = o - v0
+
+for t and the barycentrics u, v.  The costs are of a hit, compares apart.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy.typing as npt
+
+from reference_rt.core.ray import Ray, at
+from reference_rt.core.vec3 import Vec3, component, cross, dot
+from reference_rt.jit.kernel import entry_kernel, kernel
+from reference_rt.textbook.method import FloatArray, Method, ray_of, vector
+
+
+class TriangleParameters(NamedTuple):
+    """Three vertices (3,) in world coordinates."""
+
+    v0: npt.ArrayLike
+    v1: npt.ArrayLike
+    v2: npt.ArrayLike
+
+
+Prepared = tuple[Vec3, Vec3, Vec3]
+
+
+def prepare(triangle: TriangleParameters) -> Prepared:
+    """The three vertices, checked."""
+    return vector(triangle.v0, "v0"), vector(triangle.v1, "v1"), vector(triangle.v2, "v2")
+
+
+@kernel
+def two_step(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
+    """First the plane, t = n·(v0 - o) / n·d, then the point: on the inner side of all edges?
+
+    With n = (v1 - v0) x (v2 - v0), `p` is inside where n·((b - a) x (p - a)) >= 0 for every edge.
+    Cost: 52 +, 42 *, 1 /.
+    Fails: at edges.  Two neighbours see two points p, each rounded off its plane: of rays aimed at
+    the shared edges of a solid, measured, one in five slips between them.
+    """
+    n = cross(v1 - v0, v2 - v0)
+    slope = dot(n, ray.d)
+    if slope == 0.0:
+        return math.inf
+    t = dot(n, v0 - ray.o) / slope
+    if not t > 0.0:
+        return math.inf
+    p = at(ray, t)
+    if dot(n, cross(v1 - v0, p - v0)) < 0.0:
+        return math.inf
+    if dot(n, cross(v2 - v1, p - v1)) < 0.0:
+        return math.inf
+    if dot(n, cross(v0 - v2, p - v2)) < 0.0:
+        return math.inf
+    return t
+
+
+@kernel
+def determinant(a: Vec3, b: Vec3, c: Vec3) -> float:
+    """Of the matrix with these columns: a·(b x c)."""
+    return dot(a, cross(b, c))
+
+
+@kernel
+def cramer(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
+    """Cramer's rule, with its four determinants written out: u = |s e2 -d| / |e1 e2 -d|, ...
+
+    Cost: 30 +, 36 *, 3 /.
+    Fails: with slivers and grazing rays, as each determinant rounds by u |e1| |e2| |s|, whatever
+    is left of it: on triangles 1e-6 high, measured, t is off by 4e5 u in the median.  At edges,
+    since 1 - u - v is not what the neighbour computes: one ray in 20 aimed there slips through.
+    """
+    e1, e2, s, back = v1 - v0, v2 - v0, ray.o - v0, -ray.d
+    whole = determinant(e1, e2, back)
+    if whole == 0.0:
+        return math.inf
+    u = determinant(s, e2, back) / whole
+    v = determinant(e1, s, back) / whole
+    t = determinant(e1, e2, s) / whole
+    return t if u >= 0.0 and v >= 0.0 and u + v <= 1.0 and t > 0.0 else math.inf
+
+
+@kernel
+def lu(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
+    """LU factors of the 3x3 matrix, rows exchanged so that each pivot is its column's largest.
+
+    Rows are x, y, z; columns u, v, t.  P A = L U; then L y = P s forwards, U (u, v, t) = y back.
+    Cost: 21 +, 11 *, 6 /.
+    Fails: at edges, where one ray in 25 slips through.  Not with slivers: elimination solves
+    exactly for a matrix whose entries differ by a few roundings, and t, unlike u and v, does not
+    depend on how thin the triangle is.  On those 1e-6 high t is off by 1 u in the median.
+    """
+    e1, e2, s = v1 - v0, v2 - v0, ray.o - v0
+    row0, b0 = Vec3(e1.x, e2.x, -ray.d.x), s.x
+    row1, b1 = Vec3(e1.y, e2.y, -ray.d.y), s.y
+    row2, b2 = Vec3(e1.z, e2.z, -ray.d.z), s.z
+    if abs(row1.x) > abs(row0.x):
+        row0, b0, row1, b1 = row1, b1, row0, b0
+    if abs(row2.x) > abs(row0.x):
+        row0, b0, row2, b2 = row2, b2, row0, b0
+    if row0.x == 0.0:
+        return math.inf
+    l10, l20 = row1.x / row0.x, row2.x / row0.x
+    u11, u12 = row1.y - l10 * row0.y, row1.z - l10 * row0.z
+    u21, u22 = row2.y - l20 * row0.y, row2.z - l20 * row0.z
+    if abs(u21) > abs(u11):
+        u11, u12, l10, b1, u21, u22, l20, b2 = u21, u22, l20, b2, u11, u12, l10, b1
+    if u11 == 0.0:
+        return math.inf
+    l21 = u21 / u11
+    u22 = u22 - l21 * u12
+    if u22 == 0.0:
+        return math.inf
+    y1 = b1 - l10 * b0
+    y2 = b2 - l20 * b0 - l21 * y1
+    t = y2 / u22
+    v = (y1 - u12 * t) / u11
+    u = (b0 - row0.y * v - row0.z * t) / row0.x
+    return t if u >= 0.0 and v >= 0.0 and u + v <= 1.0 and t > 0.0 else math.inf
+
+
+@kernel
+def moller_trumbore(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
+    """Cramer's rule with two cross products for all four determinants, and rejection on the way.
+
+    d x e2 and s x e1 are shared; the published tolerance of the determinant is left out.
+    Cost: 24 +, 27 *, 1 /; a miss by u needs 16 +, 13 *, 1 /.
+    Fails: as `cramer` does.
+    """
+    e1, e2 = v1 - v0, v2 - v0
+    h = cross(ray.d, e2)
+    whole = dot(e1, h)
+    if whole == 0.0:
+        return math.inf
+    inverse = 1.0 / whole
+    s = ray.o - v0
+    u = dot(s, h) * inverse
+    if u < 0.0 or u > 1.0:
+        return math.inf
+    q = cross(s, e1)
+    v = dot(ray.d, q) * inverse
+    if v < 0.0 or u + v > 1.0:
+        return math.inf
+    t = dot(e2, q) * inverse
+    return t if t > 0.0 else math.inf
+
+
+@kernel
+def watertight(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
+    """Shear space so that the ray is the z axis; the signs of three 2-D edge functions decide.
+
+    The largest axis of d becomes z.  Each vertex is projected by arithmetic of its own, and an edge
+    function of the reversed edge is its exact negative: neighbours cannot both reject a ray
+    through their edge.  The form that renders, but for edge functions that round to 0: those the
+    renderer works out exactly, and what is on the edge it gives to one neighbour alone, as if the
+    ray were moved by less than any number (`shapes.watertight.project`).
+    Cost: 22 +, 16 *, 4 /.
+    Fails: never at edges, but a ray whose edge function rounds to 0 hits both neighbours; with
+    slivers, where t is off by 3e3 u in the median, and with grazing rays, as all do.  (In float32
+    it was published with zero edge functions computed again in float64.)
+    """
+    z = 2
+    if abs(ray.d.x) >= abs(ray.d.y) and abs(ray.d.x) >= abs(ray.d.z):
+        z = 0
+    elif abs(ray.d.y) >= abs(ray.d.z):
+        z = 1
+    x, y = (z + 1) % 3, (z + 2) % 3
+    d_z = component(ray.d, z)
+    s_x, s_y, s_z = component(ray.d, x) / d_z, component(ray.d, y) / d_z, 1.0 / d_z
+    a, b, c = v0 - ray.o, v1 - ray.o, v2 - ray.o
+    a_z, b_z, c_z = component(a, z), component(b, z), component(c, z)
+    a_x, a_y = component(a, x) - s_x * a_z, component(a, y) - s_y * a_z
+    b_x, b_y = component(b, x) - s_x * b_z, component(b, y) - s_y * b_z
+    c_x, c_y = component(c, x) - s_x * c_z, component(c, y) - s_y * c_z
+    e0 = c_x * b_y - c_y * b_x
+    e1 = a_x * c_y - a_y * c_x
+    e2 = b_x * a_y - b_y * a_x
+    if (e0 < 0.0 or e1 < 0.0 or e2 < 0.0) and (e0 > 0.0 or e1 > 0.0 or e2 > 0.0):
+        return math.inf
+    whole = e0 + e1 + e2
+    if whole == 0.0:
+        return math.inf
+    t = s_z * (e0 * a_z + e1 * b_z + e2 * c_z) / whole
+    return t if t > 0.0 else math.inf
+
+
+@entry_kernel
+def _two_step(triangle: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    for i in range(len(o)):
+        t[i] = two_step(ray_of(o, d, i), *triangle)
+
+
+@entry_kernel
+def _cramer(triangle: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    for i in range(len(o)):
+        t[i] = cramer(ray_of(o, d, i), *triangle)
+
+
+@entry_kernel
+def _lu(triangle: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    for i in range(len(o)):
+        t[i] = lu(ray_of(o, d, i), *triangle)
+
+
+@entry_kernel
+def _moller_trumbore(triangle: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    for i in range(len(o)):
+        t[i] = moller_trumbore(ray_of(o, d, i), *triangle)
+
+
+@entry_kernel
+def _watertight(triangle: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    for i in range(len(o)):
+        t[i] = watertight(ray_of(o, d, i), *triangle)
+
+
+METHODS = (
+    Method(
+        "triangle.two_step",
+        "T7",
+        "the plane, then three inside tests",
+        "Haines 1989, in Glassner (ed.), An Introduction to Ray Tracing, ch. 2",
+        TriangleParameters,
+        prepare,
+        _two_step,
+    ),
+    Method(
+        "triangle.cramer",
+        "T7",
+        "barycentrics by Cramer's rule",
+        "Shirley & Marschner 2009, Fundamentals of Computer Graphics, 4.4.2",
+        TriangleParameters,
+        prepare,
+        _cramer,
+    ),
+    Method(
+        "triangle.lu",
+        "T7",
+        "barycentrics by LU with partial pivoting",
+        "Golub & Van Loan 2013, Matrix Computations, 3.4",
+        TriangleParameters,
+        prepare,
+        _lu,
+    ),
+    Method(
+        "triangle.moller_trumbore",
+        "T7",
+        "Cramer's rule with shared cross products",
+        "Möller & Trumbore 1997, Journal of Graphics Tools 2(1)",
+        TriangleParameters,
+        prepare,
+        _moller_trumbore,
+    ),
+    Method(
+        "triangle.watertight",
+        "T7",
+        "sheared space and edge functions: no gap between neighbours",
+        "Woop, Benthin & Wald 2013, JCGT 2(1)",
+        TriangleParameters,
+        prepare,
+        _watertight,
+    ),
+)

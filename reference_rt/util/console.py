@@ -1,0 +1,86 @@
+"""Progress for people: a bar on a terminal, a line per step without one; standard error only."""
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from reference_rt.util.errors import printable
+
+_WORDS = {
+    "compile": "compiling kernels (once for each kind of scene; kept for later)",
+    "render": "rendering",
+}
+_PATIENCE = 0.4
+"""Seconds before compiling is mentioned: kernels from the cache load faster than that."""
+
+
+class Bar:
+    """A bar on a terminal, nothing without one: what every display of progress begins with.
+
+    columns: what stands behind the bar.
+    """
+
+    def __init__(self, *columns: ProgressColumn, console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True, highlight=False)
+        self._bar = Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            *columns,
+            console=self._console,
+            transient=True,
+        )
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._console.is_terminal:
+            self._bar.stop()
+
+    def line(self, text: str) -> None:
+        """One line that stays."""
+        self._console.print(printable(text), markup=False, soft_wrap=True)
+
+
+class ProgressLine(Bar):
+    """A `render.Progress`: call it with what is being done and the fraction that is done."""
+
+    def __init__(self) -> None:
+        percentage = TextColumn("{task.percentage:>3.0f}%")
+        super().__init__(percentage, TimeElapsedColumn(), TimeRemainingColumn())
+        self._tasks: dict[str, TaskID] = {}
+        self._started: dict[str, float] = {}
+
+    def __call__(self, what: str, fraction: float) -> None:
+        words = _WORDS.get(what, what)
+        if what not in self._tasks:
+            # A bar without a total pulses: nobody knows how far a compiler is.
+            total = None if what == "compile" else 1.0
+            self._tasks[what] = self._bar.add_task(words, total=total)
+            self._started[what] = time.perf_counter()
+            return
+        task = self._tasks[what]
+        self._bar.update(task, completed=fraction)
+        if fraction >= 1.0:
+            self._bar.update(task, visible=False)
+            seconds = time.perf_counter() - self._started[what]
+            if not self._console.is_terminal and seconds > _PATIENCE:
+                self.line(f"{words}: {seconds:.1f} s")

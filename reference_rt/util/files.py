@@ -1,0 +1,128 @@
+"""Reading files that are files, and writing them whole or not at all."""
+
+import errno
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from reference_rt.util.errors import ImageError
+
+MOST_BYTES = 1 << 32
+"""Of a file that is read whole: no mesh that fits into a machine's memory has more."""
+
+MOST_TEXT = 1 << 28
+"""Bytes of a scene, a suite or a record: two million spheres in YAML.  Each byte of such a scene
+takes about eight bytes of memory once it is read: 2 GiB."""
+
+_KINDS = (
+    (stat.S_ISFIFO, "is a pipe"),
+    (stat.S_ISSOCK, "is a socket"),
+    (stat.S_ISCHR, "is a device"),
+    (stat.S_ISBLK, "is a device"),
+)
+
+
+def open_input(path: Path) -> BinaryIO:
+    """Open a regular file for reading.  Raises OSError, its `strerror` saying what is wrong.
+
+    Reading anything else could wait or go on for ever: a pipe that nobody writes to, /dev/zero.
+    """
+    flags = os.O_RDONLY
+    for name in ("O_BINARY", "O_CLOEXEC", "O_NOCTTY", "O_NONBLOCK"):  # not every system has all
+        flags |= getattr(os, name, 0)
+    try:
+        number = os.open(path, flags)  # does not wait for a pipe's writer
+    except ValueError as error:  # a name with a null byte
+        raise OSError(errno.EINVAL, str(error), str(path)) from None
+    try:
+        mode = os.fstat(number).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(mode):
+            kind = next((kind for is_one, kind in _KINDS if is_one(mode)), "is something else")
+            raise OSError(errno.EINVAL, f"{kind}, not a regular file", str(path))
+        return os.fdopen(number, "rb")
+    except BaseException:
+        os.close(number)
+        raise
+
+
+def read_input(path: Path, most: int = MOST_BYTES) -> bytes:
+    """All bytes of a regular file.  Raises OSError, also for one of more than `most` bytes."""
+    with open_input(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        content = file.read(size + 1) if size <= most else b""
+        # A file that somebody writes to grows, and those below /proc have the size 0.
+        while size <= most and (more := file.read(1 << 20)):
+            content += more
+            size = len(content)
+    if size > most:
+        raise OSError(errno.EFBIG, f"has more than {most} bytes", str(path))
+    return content
+
+
+def read_text(path: Path) -> str:
+    """The text of a regular file.  Raises OSError, UnicodeDecodeError where it is not UTF-8."""
+    return read_input(path, MOST_TEXT).decode("utf-8")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path` to write to; it becomes `path` when the block ends well.
+
+    A reader sees the old file or the whole new one; an error, Ctrl-C or a full disk leaves the old
+    one and no rubbish.  Makes parent folders.  Raises ImageError where the file cannot be written.
+    """
+    # The same folder, since a rename is atomic within one file system only; the same suffix, since
+    # writers choose the format by it.
+    temporary = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        raise ImageError(
+            f"{path}: cannot be written: {error.strerror or error}; expected a writable place"
+        ) from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def check_writable(*paths: Path) -> None:
+    """Raise ImageError where one of these files could not be written.
+
+    Every command calls this for all files that it will write, before its work begins: nobody should
+    wait for results that cannot be stored.  Leaves nothing behind, no folder either.
+    """
+    for path in paths:
+        _check_writable(path)
+
+
+def _check_writable(path: Path) -> None:
+    probe = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
+    made: list[Path] = []
+    try:
+        if path.is_dir():
+            raise ImageError(f"{path}: is a folder; expected the name of a file")
+        if (file := next((p for p in path.parents if p.is_file()), None)) is not None:
+            raise ImageError(f"{path}: cannot be written: {file} is a file; expected a folder")
+        made = [parent for parent in path.parents if not parent.exists()]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+    except OSError as error:
+        raise ImageError(
+            f"{path}: cannot be written: {error.strerror}; expected a writable place"
+        ) from None
+    finally:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
+        for parent in made:  # the deepest first; one that somebody else fills stays
+            with suppress(OSError):
+                parent.rmdir()

@@ -1,0 +1,188 @@
+"""Every file that a command writes is checked before its work begins: nobody waits for minutes for
+results that cannot be stored.
+
+The commands and their options are those of the program itself: a command that is added fails these
+tests until its outputs are listed here.
+"""
+
+import inspect
+import subprocess
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import pytest
+from suite_runs import run_in, scenes
+from typer.testing import CliRunner
+
+import comparisons.commands.register
+import comparisons.experiments.convergence.contestants
+import comparisons.mitsuba.backend
+import reference_rt.rendering.render
+import reference_rt.scene.build
+from reference_rt.cli.main import app
+
+SCENE = str(Path(__file__).parents[3] / "scenes" / "spheres_whitted.yaml")
+
+if not any(command.name == "compare" for command in app.registered_commands):
+    comparisons.commands.register.register(app)
+
+COMMANDS = {c.name or c.callback.__name__: c.callback for c in app.registered_commands}
+
+ARGUMENTS = {
+    "render": [SCENE],
+    "compare": [SCENE],
+    "suite": ["smoke", "--scenes", str(Path(SCENE).parent)],
+    "gate": ["no.exr", "--scene", SCENE],
+    "accept": ["no.exr", "--name", "room", "--reason", "right"],
+    "report": ["run"],
+    "selftest": ["--scenes", str(Path(SCENE).parent)],
+    "converge": [SCENE],
+    "methods": [],
+    "bench": ["--scenes", str(Path(SCENE).parent)],
+    "stability": [],
+    "explain": [SCENE],
+    "schema": [],
+}
+"""What each command needs besides its outputs."""
+
+INPUTS = {"scene", "scenes", "candidates", "reference", "variance", "folder", "mesh", "unused"}
+"""Parameters that name what is read."""
+
+FILES = {
+    ("render", "output"): ["x.exr"],
+    ("compare", "out"): ["results.json", "report.html", "cases/x"],
+    ("suite", "out"): ["results.json", "report.html", "cases/x"],
+    ("suite", "junit"): [""],
+    ("gate", "out"): ["results.json", "report.html"],
+    ("gate", "junit"): [""],
+    ("gate", "baselines"): [],  # which it reads
+    ("accept", "baselines"): ["room/x"],
+    ("report", "out"): [""],
+    ("selftest", "out"): ["selftest.json", "selftest.md"],
+    ("converge", "out"): ["results.json", "results.csv", "report.html", "rungs/x"],
+    ("methods", "out"): ["results.json", "results.csv", "methods.html"],
+    ("bench", "out"): ["results.json", "bench.md", "rows/x"],
+    ("bench", "markdown"): [""],
+    ("stability", "out"): [
+        "results.json", "results.csv", "stability.html", "settings/x", "pictures/x"
+    ],
+    ("stability", "markdown"): [""],
+}  # fmt: skip
+"""What is written below the path that an option names; "": the path itself."""
+
+
+def _paths(callback: Any) -> set[str]:
+    """The parameters of a command that are paths."""
+    hints = get_type_hints(callback, include_extras=True)
+    found = set()
+    for name in inspect.signature(callback).parameters:
+        hint = hints[name]
+        kind = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+        if kind is Path or Path in get_args(kind):
+            found.add(name)
+    return found
+
+
+def test_every_option_that_is_a_path_is_an_input_or_a_listed_output():
+    assert set(COMMANDS) == set(ARGUMENTS)
+    outputs = {(name, option) for name, c in COMMANDS.items() for option in _paths(c) - INPUTS}
+    assert outputs == set(FILES)
+
+
+class WorkBegan(BaseException):
+    """Not an Exception, which commands would tell of as their own."""
+
+
+@pytest.fixture
+def idle(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Whatever takes long raises, and the working folder is the test's own."""
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise WorkBegan
+
+    for module, name in (
+        (reference_rt.scene.build, "build_tables"),
+        (reference_rt.rendering.render, "build_tables"),
+        (comparisons.mitsuba.backend, "mitsuba"),
+        (subprocess, "Popen"),
+        (subprocess, "run"),
+    ):
+        monkeypatch.setattr(module, name, refuse)
+    for name in ("CI", "GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+
+
+CASES = [
+    (command, option, file, how)
+    for (command, option), files in FILES.items()
+    for file in files
+    for how in ("a file on the way", "a folder in its place", "no folder can be made")
+    # Into a folder for records any name may be written.
+    if (file.rpartition("/")[2], how) != ("x", "a folder in its place")
+]
+
+
+@pytest.mark.parametrize(("command", "option", "file", "how"), CASES)
+@pytest.mark.usefixtures("fake_runners", "idle")
+def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
+    command, option, file, how, tmp_path
+):
+    out = tmp_path / "out"
+    named = out / file if command == "render" else out
+    target = out / file if file else out
+    if how == "a file on the way":
+        blocker = target.parent if file else (tmp_path / "file")
+        named = blocker / "x" if not file else named
+        blocker.parent.mkdir(parents=True, exist_ok=True)
+        blocker.write_text("a file")
+    elif how == "a folder in its place":
+        target.mkdir(parents=True)
+    else:
+        named = Path("/proc/none") / named.relative_to(tmp_path)
+    (tmp_path / "run" / "cases").mkdir(parents=True)  # for `report`
+    before = set(tmp_path.rglob("*"))
+    result = CliRunner().invoke(
+        app, [command, *ARGUMENTS[command], f"--{option}", str(named)], catch_exceptions=False
+    )
+    told = result.stderr.splitlines()
+    assert [line for line in told if line.startswith("error: ")] == told, result.output
+    assert len(told) == 1
+    # A file in which a table is to be put must be there: to name another is wrong usage.
+    assert result.exit_code == (2 if "cannot be read" in told[0] else 3), result.output
+    assert option == "markdown" or result.exit_code == 3
+    assert str(named) in told[0]
+    assert set(tmp_path.rglob("*")) == before  # no file, and no folder
+
+
+@pytest.mark.parametrize("command", ["suite", "gate"])
+@pytest.mark.usefixtures("fake_runners", "idle")
+def test_so_is_the_summary_of_github(command, tmp_path, monkeypatch):
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path))
+    result = CliRunner().invoke(app, [command, *ARGUMENTS[command]], catch_exceptions=False)
+    assert (result.exit_code, result.stderr) == (
+        3, f"error: {tmp_path}: is a folder; expected the name of a file\n",
+    )  # fmt: skip
+
+
+@pytest.mark.usefixtures("idle")
+def test_a_baseline_is_not_written_over_a_file(tmp_path):
+    (tmp_path / "baselines").mkdir()
+    (tmp_path / "baselines" / "room").write_text("mine")
+    result = CliRunner().invoke(app, ["accept", *ARGUMENTS["accept"]])
+    assert result.exit_code == 3
+    assert "is a file; expected the folder of a baseline" in result.stderr
+    assert (tmp_path / "baselines" / "room").read_text() == "mine"
+
+
+@pytest.mark.usefixtures("fake_runners")
+def test_the_page_of_a_former_run_does_not_outlive_it(tmp_path):
+    """A run that is killed leaves no page that says what an earlier run found."""
+    folder, out = scenes(tmp_path / "scenes", "a"), tmp_path / "out"
+    run_in(out, folder)
+    assert (out / "report.html").exists()
+    scenes(folder, "unavailable")
+    with pytest.raises(Exception, match="no reference here"):
+        run_in(out, folder)
+    assert not (out / "report.html").exists()

@@ -1,0 +1,240 @@
+"""Causes: each that is planted on a picture is named, and none where only noise differs."""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from comparisons.compare.causes import likeliest, of_rungs
+from comparisons.results.case import FloatArray, Images, Tier
+from reference_rt.rendering.image import srgb
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+from reference_rt.textures.image_file import linear
+
+SCENES = Path(__file__).parents[3] / "scenes"
+
+ERROR = {"cornell_box": 0.015, "textured_room": 0.03, "spheres_whitted": 0.0}
+"""Relative noise of the pictures: of 64 samples per pixel in the first, 16 in the second."""
+
+
+@cache
+def picture(name: str) -> FloatArray:
+    """Rendered: with many samples, as a truth to which noise is added, so that it is known."""
+    scene = Scene.load(SCENES / f"{name}.yaml")
+    height = 72 if name == "spheres_whitted" else 96
+    scene = scene.changed(film=scene.film.model_copy(update={"width": 96, "height": height}))
+    if not scene.integrator.deterministic:
+        sampler = scene.resolved_sampler.model_copy(update={"spp": 64})
+        scene = scene.changed(sampler=sampler)
+    return render(scene).colour
+
+
+def pair(name: str, change: Callable[[FloatArray], FloatArray], seed: int = 0) -> Images:
+    """A changed picture and the right one, as means of 16 noisy ones of either."""
+    clean, error = picture(name), ERROR[name]
+    if error == 0.0:
+        return Images(change(clean), clean)
+    rng = np.random.default_rng(seed)
+    deviation = error * np.maximum(clean, 0.1 * clean.mean())
+    candidate, reference = (clean + deviation * rng.normal(size=clean.shape) for _ in range(2))
+    return Images(change(candidate), reference, np.sqrt(2.0) * deviation)
+
+
+def shifted(x: float, y: float, order: int = 1) -> Callable[[FloatArray], FloatArray]:
+    return lambda p: ndimage.shift(p, (y, x, 0.0), order=order, mode="nearest")
+
+
+def blurred(sigma: float) -> Callable[[FloatArray], FloatArray]:
+    return lambda p: ndimage.gaussian_filter(p, (sigma, sigma, 0.0), mode="nearest")
+
+
+def part(
+    rows: slice | int, columns: slice | int, gain: float
+) -> Callable[[FloatArray], FloatArray]:
+    def change(p: FloatArray) -> FloatArray:
+        p = p.copy()
+        p[rows, columns] *= gain
+        return p
+
+    return change
+
+
+ALL = slice(None)
+
+PLANTED = {
+    "constant gain of 1.02": lambda p: 1.02 * p,
+    "constant gain of 0.5": lambda p: 0.5 * p,
+    "gain of red of 1.02": lambda p: p * [1.02, 1.0, 1.0],
+    "gain of blue of 0.98": lambda p: p * [1.0, 1.0, 0.98],
+    "another gain of each channel": lambda p: p * [1.03, 1.0, 0.97],
+    "swapped channels: red and blue": lambda p: p[..., ::-1],
+    "gamma of 0.95": lambda p: np.maximum(p, 0.0) ** (1.0 / 1.05),
+    "sRGB-encoded values taken for linear ones": srgb,
+    "linear values taken for sRGB-encoded ones": lambda p: linear(np.clip(p, 0.0, 1.0)),
+    "constant offset of +0.01": lambda p: p + 0.01,
+    "half-pixel shift in x": shifted(0.5, 0.0),
+    "half-pixel shift in y": shifted(0.0, -0.5, order=3),
+    "shift by one pixel in x": shifted(-1.0, 0.0),
+    "shift by 0.28": shifted(0.2, 0.2),
+    "mirrored left to right": lambda p: p[:, ::-1],
+    "upside down": lambda p: p[::-1],
+    "rotated by 180 degrees": lambda p: p[::-1, ::-1],
+    "blurred by 1": blurred(1.0),
+    "sharpened": lambda p: p + 0.8 * (p - blurred(0.7)(p)),
+    "highlights clamped to 0.5": lambda p: np.minimum(p, 0.5),
+    "one bad tile": part(slice(40, 56), slice(40, 56), 0.8),
+    "one bad row": part(30, ALL, 0.3),
+    "one bad column": part(ALL, 50, 0.3),
+    "a few wrong pixels": part(slice(40, 48, 4), slice(20, 28, 4), 50.0),
+}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "cornell_box",
+        "spheres_whitted",
+        pytest.param("textured_room", marks=pytest.mark.slow),
+    ],
+)
+@pytest.mark.parametrize("cause", PLANTED)
+def test_planted(name: str, cause: str) -> None:
+    found = likeliest(pair(name, PLANTED[cause]))
+    assert found is not None
+    *words, last = cause.split()
+    *found_words, found_last = found.name.replace(" pixels", "").split()
+    try:
+        amount = float(last.removesuffix("pixels"))
+    except ValueError:
+        assert found.name == cause
+    else:
+        assert found_words == [word for word in words if word != "pixels"], found
+        assert float(found_last) == pytest.approx(amount, rel=0.05)
+    assert found.explained > 0.6
+    assert found.evidence
+
+
+@pytest.mark.parametrize(
+    ("factor", "told"), [(np.pi, "pi times"), (0.5, "half"), (2.0, "twice"), (1 / np.pi, "1/pi")]
+)
+def test_remarkable_factors(factor: float, told: str) -> None:
+    found = likeliest(pair("cornell_box", lambda p: factor * p))
+    assert found is not None
+    assert told in found.evidence
+
+
+def test_transposed() -> None:
+    found = likeliest(pair("cornell_box", lambda p: p.transpose(1, 0, 2)))
+    assert found is not None
+    assert found.name == "rows and columns exchanged"
+
+
+def test_rounded() -> None:
+    found = likeliest(
+        pair("spheres_whitted", lambda p: linear(np.round(255.0 * srgb(np.clip(p, 0, 1))) / 255.0))
+    )
+    assert found is not None
+    assert found.name == "rounded to 8 bits (sRGB)"
+
+
+@pytest.mark.parametrize(
+    ("amount", "name"),
+    [(-1.0, "lost light: lamp"), (1.0, "light counted twice: lamp"), (0.4, "light of another")],
+)
+def test_lights(amount: float, name: str) -> None:
+    """Two lights: what each gives is known."""
+    x = np.linspace(0.0, 1.0, 96)[None, :, None]
+    lamp, sky = picture("cornell_box") * x, picture("cornell_box") * (1.0 - x) + 0.05
+    noise = np.random.default_rng(5).normal(size=(2, *lamp.shape))
+    images = Images(
+        (1.0 + amount) * lamp + sky + 0.003 * noise[0],
+        lamp + sky + 0.003 * noise[1],
+        np.full(lamp.shape, 0.003 * np.sqrt(2.0)),
+    )
+    found = likeliest(images, {"lamp": lamp, "sky": sky})
+    assert found is not None
+    assert found.name.startswith(name)
+    assert "lamp" in found.evidence
+    without = likeliest(images)
+    assert without is None or "light" not in without.name.replace("highlights", "")
+
+
+@pytest.mark.parametrize("pairs", [20, pytest.param(100, marks=pytest.mark.slow)])
+def test_noise_alone_has_no_cause(pairs: int) -> None:
+    """Also not skewed noise whose strength is known from few replicates only."""
+    for seed in range(pairs):
+        for name in ("cornell_box", "textured_room"):
+            assert likeliest(pair(name, lambda p: p, seed)) is None
+    rng = np.random.default_rng(6)
+    clean = picture("cornell_box")
+    for count in (2, 4, 16):
+        for _ in range(pairs // 5):
+            sides = [
+                clean * rng.gamma(1.0, 1.0, size=(count, *clean.shape[:2], 1)) for _ in range(2)
+            ]
+            error = np.sqrt(sum(x.var(axis=0, ddof=1) / count for x in sides))
+            images = Images(*(x.mean(axis=0) for x in sides), error)
+            assert likeliest(images) is None
+
+
+def test_what_is_no_single_cause_has_no_name() -> None:
+    rng = np.random.default_rng(7)
+    pattern = ndimage.gaussian_filter(rng.normal(size=(96, 96, 3)), (4.0, 4.0, 0.0))
+    pattern *= 0.1 / pattern.std()
+    found = likeliest(pair("cornell_box", lambda p: p * (1.0 + pattern)))
+    assert found is None
+
+
+def test_pictures_that_cannot_be_compared() -> None:
+    clean = picture("cornell_box")
+    broken = clean.copy()
+    broken[0, 0, 0] = np.nan
+    assert likeliest(Images(broken, clean)) is None
+    assert likeliest(Images(clean[:10], clean)) is None
+    assert likeliest(Images(clean, clean)) is None
+    tiny = np.ones((1, 2, 3))
+    found = likeliest(Images(1.5 * tiny, tiny))
+    assert found is None  # of one colour it may be a gain as well as an offset
+
+
+def geometry(mismatches: int, **kinds: int) -> Tier:
+    numbers = {"mismatches": mismatches, "mismatches_by_kind": kinds}
+    return Tier("geometry", "differ", "some rays differ", numbers)
+
+
+@pytest.mark.parametrize(
+    ("tier", "name"),
+    [
+        (geometry(50, hit=0, t=0, normal=50, shading_normal=50), "wrong normal"),
+        (geometry(50, hit=0, t=0, normal=0, shading_normal=50), "wrong shading normal"),
+        (geometry(50, hit=0, t=0, uv=49), "wrong texture coordinates"),
+        (geometry(50, hit=2, t=49, normal=50, uv=50), "moved or resized surface"),
+        (geometry(50, hit=49, t=1), "missing or additional surface"),
+        (geometry(50, hit=20, t=10, uv=20), None),
+        (Tier("film", "differ", "the filters differ by 0.1"), "wrong filter or filter width"),
+        (
+            Tier("direct", "differ", "", {"ratio_median": 1.7, "ratio_spread": 0.5,
+                                          "ratio_times_cosine_spread": 0.001}),
+            "missing cosine",
+        ),
+        (
+            Tier("direct", "differ", "", {"ratio_median": 3.14159, "ratio_spread": 1e-4}),
+            "direct light times 3.142",
+        ),
+        (Tier("direct", "differ", "", {}), None),
+        (Tier("whitted", "differ", ""), None),
+    ],
+)  # fmt: skip
+def test_of_rungs(tier: Tier, name: str | None) -> None:
+    found = of_rungs([Tier("input", "agree", ""), tier, Tier("images", "differ", "")])
+    assert (found.name if found else None) == name
+
+
+def test_no_broken_rung_has_no_cause() -> None:
+    assert of_rungs([Tier("geometry", "agree", "", {})]) is None
+    camera = Tier("geometry", "differ", "the camera: 5 of 9 rays differ", {})
+    assert of_rungs([camera]) is None

@@ -1,0 +1,117 @@
+"""`reference-rt compare` as a whole: exit codes, results.json, the page, planted faults."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import comparisons.commands.register
+import comparisons.compare.compare
+import comparisons.mitsuba.translate
+from comparisons.compare.budget import Budget
+from comparisons.mitsuba.translate import UntranslatableError
+from comparisons.results.case import Case
+from comparisons.results.verdict import exit_code
+from reference_rt.cli.main import app
+from reference_rt.rendering.scene import Scene
+
+SCENES = Path(__file__).parents[3] / "scenes"
+
+if not any(command.name == "compare" for command in app.registered_commands):
+    comparisons.commands.register.register(app)
+
+
+def compare(out: Path, *arguments: str) -> tuple[Result, Any]:
+    result = CliRunner().invoke(app, ["compare", *arguments, "--out", str(out)])
+    path = out / "results.json"
+    return result, json.loads(path.read_text()) if path.exists() else None
+
+
+def compared_here(budget: Budget) -> Case:
+    """What the worker of `compare` finds, in this process, where tests can plant faults."""
+    scene = Scene.load(SCENES / "spheres_whitted.yaml")
+    return comparisons.compare.compare.compare_scene(
+        comparisons.compare.compare.Subject(scene), budget, lambda _: None
+    )
+
+
+def test_scenes_agree(tmp_path: Path) -> None:
+    scenes = [str(SCENES / f"{name}.yaml") for name in ("spheres_whitted", "polygons_fill_rules")]
+    result, found = compare(tmp_path, *scenes, "--size", "48x32")
+    assert result.exit_code == 0, result.output
+    assert found["schema"] == 2
+    assert [case["verdict"] for case in found["cases"]] == ["agree", "agree"]
+    case = found["cases"][0]
+    assert set(case) >= {"scene", "verdict", "reason", "tiers", "metrics", "seconds"}
+    assert list(case["tiers"]) == ["input", "geometry", "direct", "whitted", "statistics", "images"]
+    assert set(case["metrics"]) >= {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias"}
+    geometry = case["tiers"]["geometry"]
+    assert (geometry["decided_ours"], geometry["undecided"]) == (0, 0)
+    assert case["seconds"]["candidate"]["render"] > 0.0
+    assert case["seconds"]["reference"]["render"] > 0.0
+    assert "spheres_whitted" in (tmp_path / "report.html").read_text()
+
+
+def test_path_tracing_is_compared_by_replicates(tmp_path: Path) -> None:
+    scene = str(SCENES / "cornell_box.yaml")
+    result, found = compare(tmp_path, scene, "--size", "32x32", "--spp", "16", "--replicates", "4")
+    statistics = found["cases"][0]["tiers"]["statistics"]
+    # 4 x 16 samples of 32 x 32 pixels are too few to tell half a percent: it must say so.
+    assert found["cases"][0]["verdict"] == "inconclusive"
+    assert statistics["status"] == "inconclusive"
+    assert "smallest bias of the image mean seen with 99 % power" in statistics["reason"]
+    assert result.exit_code == 1
+
+
+def test_wrong_light_differs_at_its_rung(monkeypatch: pytest.MonkeyPatch) -> None:
+    translate = comparisons.mitsuba.translate.translate_light
+
+    def brighter(light: Any, around: Any) -> dict[str, Any]:
+        emitter = translate(light, around)
+        assert emitter is not None
+        if emitter["type"] == "point":
+            emitter["intensity"]["value"] = [1.01 * x for x in emitter["intensity"]["value"]]
+        return emitter
+
+    monkeypatch.setattr(comparisons.mitsuba.translate, "translate_light", brighter)
+    case = compared_here(Budget(size=(48, 32)))
+    assert case.verdict == "differ"
+    assert case.reason.startswith("direct:")
+    status = {tier.name: tier.status for tier in case.tiers}
+    assert status["geometry"] == "agree"
+    assert status["whitted"] == "not-applicable"
+    assert exit_code([case]) == 1
+
+
+def test_type_without_translation_is_not_comparable(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(light: Any, around: Any) -> dict[str, Any]:
+        raise UntranslatableError(light, "light")
+
+    monkeypatch.setattr(comparisons.mitsuba.translate, "translate_light", refuse)
+    case = compared_here(Budget())
+    assert case.verdict == "not-comparable"
+    assert "light Point" in case.reason
+    assert exit_code([case]) == 1
+
+
+def test_without_mitsuba_exit_code_4(tmp_path: Path) -> None:
+    code = (
+        "import sys; sys.modules['mitsuba'] = None; import importlib.metadata as m;"
+        "version = m.version;"
+        "m.version = lambda n: version('no-such-package' if n == 'mitsuba' else n);"
+        "from reference_rt.cli.main import main; main()"
+    )
+    scene = str(SCENES / "spheres_whitted.yaml")
+    run = subprocess.run(
+        [sys.executable, "-c", code, "compare", scene, "--out", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 4, run.stderr
+    assert "pip install" in run.stderr
+    assert "Traceback" not in run.stderr

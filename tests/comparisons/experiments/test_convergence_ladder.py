@@ -1,0 +1,85 @@
+"""The ladder: contestants take turns, and what is done is not done again."""
+
+import numpy as np
+import pytest
+from convergence_fakes import EXACT, Fake, climbs
+
+from comparisons.experiments.convergence import ladder
+from comparisons.experiments.convergence.contestants import Shot
+from comparisons.experiments.convergence.ladder import Climb, climb
+from comparisons.experiments.convergence.store import Store
+
+
+def test_contestants_take_turns_and_numbers_are_used_once():
+    asked = []
+
+    class Told(Fake):
+        def __call__(self, spp: int, replicate: int) -> Shot:
+            asked.append((self, spp))
+            return super().__call__(spp, replicate)
+
+    a, b = Told(), Told()
+    climb(climbs(a=a, b=b), EXACT, 8, Store(None, ""))
+    assert asked[:6] == [(a, 4), (b, 4), (a, 8), (b, 8), (a, 16), (b, 16)]
+    assert len(asked) == 2 * 3 * 8
+    numbers = [replicate for _, replicate in a.asked]
+    assert len(set(numbers)) == len(numbers)
+
+
+def test_what_is_done_is_not_done_again(tmp_path):
+    first = climbs(a=Fake())
+    climb(first, EXACT, 8, Store(tmp_path / "s", "key"))
+    again, fake = climbs(a=Fake()), Fake()
+    again["a"].renderer = lambda: fake
+    climb(again, EXACT, 8, Store(tmp_path / "s", "key"))
+    assert fake.asked == []
+    for one, other in zip(first["a"].rungs, again["a"].rungs, strict=True):
+        np.testing.assert_array_equal(one.seconds, other.seconds)
+        # Pictures are stored as float32.
+        np.testing.assert_allclose(one.relmse, other.relmse, rtol=1e-5)
+    for store in (Store(tmp_path / "s", "other key"), Store(tmp_path / "s", "key", fresh=True)):
+        assert store.rung("a", 4) is None
+
+
+def test_an_interruption_loses_no_picture(tmp_path):
+    """Stopped in the third sweep: the second run does the rest, with the same result."""
+    broken = climbs(a=Fake(breaks_after=7))
+    with pytest.raises(KeyboardInterrupt):
+        climb(broken, EXACT, 8, Store(tmp_path / "s", "key"))
+    rest = Fake()
+    resumed = climbs(a=rest)
+    climb(resumed, EXACT, 8, Store(tmp_path / "s", "key"))
+    assert len(rest.asked) == 3 * 8 - 7
+    whole = climbs(a=Fake())
+    climb(whole, EXACT, 8, Store(None, ""))
+    for one, other in zip(whole["a"].rungs, resumed["a"].rungs, strict=True):
+        np.testing.assert_allclose(one.relmse, other.relmse, rtol=1e-4)
+        np.testing.assert_allclose(one.variance, other.variance, rtol=1e-4, atol=1e-7)
+
+
+def test_a_damaged_record_is_done_again(tmp_path):
+    store = Store(tmp_path / "s", "key")
+    climb(climbs(a=Fake()), EXACT, 8, store)
+    path = tmp_path / "s" / "a-8.npz"
+    path.write_bytes(path.read_bytes()[:100])
+    fake = Fake()
+    climb(climbs(a=fake), EXACT, 8, store)
+    assert {spp for spp, _ in fake.asked} == {8}
+
+
+def test_slower_than_promised_climbs_less():
+    fake = Fake(speed=1.0)
+    one = Climb(lambda: fake, (4, 8, 16, 32), 100.0)
+    climb({"a": one}, EXACT, 8, Store(None, ""))
+    # 8 pictures of 4 and 8 samples take 96 s; those of 16, another 128 s.
+    assert [rung.asked for rung in one.rungs] == [4, 8]
+    assert "rungs from 16 samples a pixel" in one.stopped
+
+
+def test_long_runs_are_stored_on_the_way(tmp_path, monkeypatch):
+    monkeypatch.setattr(ladder, "STORED_EVERY", -1.0)
+    kept = []
+    store = Store(tmp_path / "s", "key")
+    monkeypatch.setattr(store, "keep", lambda name, rung: kept.append(rung.replicates))
+    climb(climbs(a=Fake()), EXACT, 4, store)
+    assert kept == [1] * 3 + [2] * 3 + [3] * 3 + [4] * 3

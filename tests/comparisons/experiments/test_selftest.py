@@ -1,0 +1,92 @@
+"""The self-test: that its faults are what they say, and that what it counts is what it found."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import reference_rt
+from comparisons.experiments.selftest import FAULTS, PictureFault, SceneFault, SourceFault
+from comparisons.experiments.selftest.finding import Finding, finding
+from comparisons.experiments.selftest.run import Outcome, markdown
+from comparisons.experiments.selftest.sensitivity import StaleFaultError, patched_text
+from comparisons.experiments.selftest.specificity import Alarms
+from comparisons.results.case import Case, Tier
+from reference_rt.rendering.scene import Scene
+
+SCENES = Path(__file__).parents[3] / "scenes"
+
+
+def of(kind: type) -> list:
+    return [pytest.param(f, id=f.name) for f in FAULTS if isinstance(f, kind)]
+
+
+def test_there_are_enough_faults_of_each_kind() -> None:
+    assert len(FAULTS) >= 40
+    assert len({fault.name for fault in FAULTS}) == len(FAULTS)
+    assert all((SCENES / f"{fault.scene}.yaml").is_file() for fault in FAULTS)
+
+
+@pytest.mark.parametrize("fault", of(SourceFault))
+def test_source_fault_fits_the_source_and_is_still_python(fault: SourceFault) -> None:
+    text = patched_text(fault)
+    assert text != (Path(reference_rt.__file__).parent / fault.file).read_text(encoding="utf-8")
+    compile(text, fault.file, "exec")
+
+
+def test_source_fault_whose_text_is_gone_is_told() -> None:
+    with pytest.raises(StaleFaultError, match=r"ray.py holds the text that it replaces 0 times"):
+        patched_text(SourceFault("gone", "cornell_box", "ray.py", "no such text", ""))
+
+
+@pytest.mark.parametrize("fault", of(SceneFault))
+def test_scene_fault_makes_another_valid_scene(fault: SceneFault) -> None:
+    scene = Scene.load(SCENES / f"{fault.scene}.yaml")
+    faulty = fault.change(scene)
+    assert faulty.digest() != scene.digest()
+    Scene.parse(faulty.to_json(), folder=scene.folder)
+
+
+@pytest.mark.parametrize("fault", of(PictureFault))
+def test_picture_fault_changes_pictures_and_leaves_the_right_ones(fault: PictureFault) -> None:
+    pictures = np.random.default_rng(0).gamma(2.0, 0.4, (4, 48, 48, 3))
+    kept = pictures.copy()
+    changed = fault.change(pictures)
+    assert changed.shape == pictures.shape
+    assert not np.array_equal(changed, pictures)
+    assert np.array_equal(pictures, kept)
+
+
+def test_finding_names_the_first_rung_that_broke() -> None:
+    tiers = (
+        Tier("geometry", "agree", ""),
+        Tier("direct", "differ", "told", {"rays": 1000, "unexplained": 12}),
+        Tier("images", "differ", "later"),
+    )
+    case = Case("scene", "differ", "direct: told", tiers, None, {})
+    found = finding(SceneFault("f", "scene", lambda scene: scene), "smoke", case)
+    assert (found.caught, found.rung, found.strength) == (True, "direct", "12 of 1,000 values")
+    assert found.kind == "scene"
+
+
+def test_too_much_noise_is_not_a_catch() -> None:
+    tiers = (Tier("statistics", "inconclusive", "too noisy"),)
+    case = Case("scene", "inconclusive", "statistics: too noisy", tiers, None, {})
+    assert not finding(PictureFault("f", "scene", np.zeros_like), "smoke", case).caught
+
+
+def outcome(missed_by_standard: bool = False, alarms: int = 0) -> Outcome:
+    def one(suite: str, number: int, caught: bool) -> Finding:
+        return Finding(f"f{number}", "scene", "s", suite, "differ", caught, "direct", "much", "")
+
+    findings = [one("standard", k, not (missed_by_standard and k == 3)) for k in range(20)]
+    findings += [one("smoke", k, k >= 2) for k in range(20)]
+    return Outcome(findings, [], [Alarms("s", 1000, 16, alarms, {}, 0.003)])
+
+
+def test_what_holds() -> None:
+    assert outcome().holds
+    assert outcome(alarms=1).holds
+    assert not outcome(alarms=2).holds
+    assert not outcome(missed_by_standard=True).holds
+    assert "**missed**" in markdown(outcome())

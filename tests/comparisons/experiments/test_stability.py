@@ -1,0 +1,201 @@
+"""Runs of families with known outcomes: what is told, kept, and done again."""
+
+import csv
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+import stability_fakes
+import typer
+from builders import HELPERS
+from typer.testing import CliRunner
+
+from comparisons.commands import register
+from comparisons.experiments.stability.harness import families, run, table
+from comparisons.experiments.stability.harness.family import OURS, Outcome, Series, generator
+from comparisons.experiments.stability.harness.result import Found
+from comparisons.experiments.stability.harness.summary import summarise
+
+
+@pytest.fixture
+def fakes(monkeypatch):
+    monkeypatch.setattr(families, "MODULES", dict(families.MODULES))
+    monkeypatch.setattr(run, "WORKER", ("stability_fakes",))
+    before = os.environ.get("PYTHONPATH", "")
+    monkeypatch.setenv("PYTHONPATH", f"{HELPERS}{os.pathsep}{before}".rstrip(os.pathsep))
+    modules = set(sys.modules)
+    stability_fakes.install()
+    yield
+    for name in set(sys.modules) - modules:
+        if name.startswith("comparisons.experiments.stability.T"):
+            del sys.modules[name]
+
+
+def stability(out, *options):
+    """The command's exit code and what it printed."""
+    app = typer.Typer()
+    register.register(app)
+    found = CliRunner().invoke(app, ["stability", "-o", str(out), "--jobs", "1", *options])
+    return found.exit_code, found.output
+
+
+def test_limits_and_ratios(fakes, tmp_path):
+    code, told = stability(tmp_path, "--family", "T1", "--full")
+    assert code == 0, told
+    results = json.loads((tmp_path / "results.json").read_text())
+    (one,) = results["families"]
+    assert (one["id"], one["limit_ours"], one["limit_mitsuba"]) == ("T1", 1e9, 1e4)
+    assert one["ours"]["failures"] == 4 * 200  # beyond what must hold
+    far, alone = one["series"]
+    assert far["further"] == pytest.approx(1e5)
+    assert far["settings"][3]["outcomes"]["ours"]["worst"] == 1e3
+    assert far["settings"][3]["outcomes"]["mitsuba"]["worst"] == 2.0**29 * 1e3
+    assert alone["limit_ours"] is None
+    assert one["cases"] == 14 * 2000
+    rows = list(csv.DictReader((tmp_path / "results.csv").read_text().splitlines()))
+    assert len(rows) == 14 * 3
+    page = (tmp_path / "stability.html").read_text()
+    assert "growing &lt;errors&gt;" in page
+    assert "&lt;grey&gt;" in page
+    assert page.count("data:image/png") == 2  # Mitsuba's first failure, and ours there
+
+
+def test_what_was_found_is_kept_and_the_same_again(fakes, tmp_path):
+    stability(tmp_path, "--family", "T1")
+    first = json.loads((tmp_path / "results.json").read_text())
+    _, told = stability(tmp_path, "--family", "T1")
+    assert told.count("measured before") == 4
+    assert json.loads((tmp_path / "results.json").read_text())["families"] == first["families"]
+    # The command of a setting draws what the whole run drew.
+    setting = first["families"][0]["series"][0]["settings"][1]
+    words = setting["again"].split()[2:]
+    assert stability(tmp_path / "again", *words)[0] == 0
+    again = json.loads((tmp_path / "again" / "results.json").read_text())
+    alone = again["families"][0]["series"][0]["settings"]
+    assert [one["outcomes"] for one in alone] == [setting["outcomes"]]
+    _, told = stability(tmp_path, "--family", "T1", "--seed", "2")
+    assert "measured before" not in told
+
+
+def test_failures_of_ours_fail_and_are_told(fakes, tmp_path):
+    code, told = stability(tmp_path, "--family", "T3")
+    assert code == 1
+    assert "again: reference-rt stability --family T3 --series near --at 1000000000.0" in told
+    assert (0.1).hex() in told
+    assert "--at 100000000.0" not in told
+
+
+def test_a_setting_that_kills_its_process(fakes, tmp_path):
+    code, told = stability(tmp_path, "--family", "T2")
+    assert code == 1
+    assert "SIGABRT" in told
+    assert "ValueError: of no use" in told
+    (one,) = json.loads((tmp_path / "results.json").read_text())["families"]
+    assert not one["holds"]
+    first, died, raised = one["series"][0]["settings"]
+    assert first["outcomes"]["ours"]["worst"] == "inf"
+    assert "SIGABRT" in died["broken"]
+    assert raised["outcomes"] == {}
+    # It is tried again next time; what was found is not.
+    _, told = stability(tmp_path, "--family", "T2")
+    assert told.count("measured before") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--family", "T9"), "expected one of T1"),
+        (("--series", "far"), "expected one --family"),
+        (("--family", "T1", "--series", "near"), "expected one of far, alone"),
+        (("--family", "T1", "--at", "3"), "expected a --series"),
+    ],
+)
+def test_usage(fakes, tmp_path, options, said):
+    code, told = stability(tmp_path, *options)
+    assert code == 2
+    assert said in told
+
+
+def test_an_end_of_the_run_keeps_what_was_found(fakes, tmp_path):
+    """SIGTERM in the midst: the first setting is kept, and no process stays behind."""
+    script = (
+        "import stability_fakes, signal, sys; stability_fakes.install();"
+        "from comparisons.experiments.stability import run; run.WORKER = ('stability_fakes',);"
+        "signal.signal(signal.SIGTERM, lambda *_: sys.exit(3));"
+        "from reference_rt.cli.main import main; main()"
+    )
+    command = [sys.executable, "-c", script, "stability", "-o", str(tmp_path), "--family", "T4"]
+    process = subprocess.Popen([*command, "--no-mitsuba"], stderr=subprocess.DEVNULL)
+    kept = tmp_path / "settings" / "T4" / "slow" / "0.25.json"
+    deadline = time.monotonic() + 60.0
+    while not kept.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert kept.exists()
+    process.terminate()
+    assert process.wait(20.0) == 3
+    code, told = stability(
+        tmp_path, "--family", "T4", "--no-mitsuba", "--series", "slow", "--at", "0.25"
+    )
+    assert code == 0
+    assert "measured before" in told
+
+
+def test_outcomes_add_up_and_refuse_nonsense():
+    both = Outcome(3, 1, 2.0, 1, ({"a": 1},)) + Outcome(4, 0, None, 2)
+    assert both == Outcome(7, 1, 2.0, 3, ({"a": 1},))
+    with pytest.raises(ValueError, match="NaN"):
+        Outcome(1, 0, math.nan)
+    with pytest.raises(ValueError, match="2 failures of 1"):
+        Outcome(1, 2)
+
+
+def test_series_refuse_an_end_without_a_law():
+    with pytest.raises(ValueError, match="law"):
+        Series("s", "x", "", (1.0, 2.0), (1.0,), {}, lambda *_: {}, holds_to=1.0)
+    with pytest.raises(ValueError, match="increase"):
+        Series("s", "x", "", (2.0, 1.0), (), {}, lambda *_: {})
+
+
+def test_settings_are_drawn_apart():
+    draws = [generator(1, "F1", "far", x).random() for x in (1.0, 10.0)]
+    draws += [generator(2, "F1", "far", 1.0).random(), generator(1, "F1", "rim", 1.0).random()]
+    assert len(set(draws)) == 4
+
+
+def test_a_lead_that_is_too_small_must_be_explained():
+    """Ours twice as far as Mitsuba is less than 29 bits allow."""
+    found = [
+        Found("T", "far", x, {OURS: Outcome(1, int(x > 4)), "mitsuba": Outcome(1, int(x > 2))}, 0.0)
+        for x in (1.0, 2.0, 4.0, 8.0)
+    ]
+    for explained in ("", "since it is so"):
+        series = Series(
+            "far", "x", "", (1.0, 2.0, 4.0, 8.0), (), {}, lambda *_: {},
+            holds_to=4.0, law="four", explained=explained,
+        )  # fmt: skip
+        (one,) = summarise(families_of("T", series), found)
+        assert one.further == 2.0
+        assert one.holds
+        assert one.unexplained == (not explained)
+        assert table.where(one, OURS) == "holds to float64's end, 4"
+        assert table.where(one, "mitsuba") == "fails from 4 on"
+
+
+def families_of(name, *series):
+    from comparisons.experiments.stability.harness.family import Family
+
+    return Family(name, "", "", series)
+
+
+def test_found_is_read_with_its_key_alone(tmp_path):
+    found = Found("T", "far", 0.1, {OURS: Outcome(2, 1, math.inf, 0, ({"t": "inf"},))}, 1.5)
+    found.write(tmp_path / "x.json", "key")
+    assert Found.read(tmp_path / "x.json", "key") == found
+    assert Found.read(tmp_path / "x.json", "other") is None
+    assert Found.read(tmp_path / "y.json", "key") is None
+    (tmp_path / "x.json").write_text("{")
+    assert Found.read(tmp_path / "x.json", "key") is None

@@ -1,0 +1,67 @@
+"""All families say what they measure, and why Mitsuba's float32 holds as far as it does."""
+
+import importlib
+
+import pytest
+
+from comparisons.experiments.stability.harness.families import MODULES, family
+from comparisons.experiments.stability.harness.family import MITSUBA, OURS
+from comparisons.experiments.stability.harness.run import Choice, mitsuba_is_there, run
+from comparisons.experiments.stability.harness.summary import FURTHER, SeriesSummary, summarise
+
+NAMES = tuple(MODULES)
+
+
+def test_families_come_in_order():
+    assert [family(name).id for name in NAMES] == [f"F{k}" for k in range(1, 15)]
+    assert all(module.startswith(f"f{k:02d}_") for k, module in enumerate(MODULES.values(), 1))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_family_says_what_it_measures(name):
+    """Its module's docstring: the law, its ranges and how many cases."""
+    said = importlib.import_module(
+        f"comparisons.experiments.stability.{MODULES[name]}"
+    ).__doc__.lower()
+    one = family(name)
+    assert said.startswith(one.id.lower())
+    assert one.law
+    assert one.anchors
+    for words in (("law",), ("range", " to "), ("count", "case", "samples", "rays", "pairs")):
+        assert any(word in said for word in words), words
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_series_is_whole(name):
+    for series in family(name).series:
+        assert set(series.quick) <= set(series.values), series.name
+        assert series.settings("quick") == series.quick
+        assert series.settings("full") == series.values
+        assert set(series.cases) == {"quick", "full"}, series.name
+        assert 0 < series.cases["quick"] <= series.cases["full"], series.name
+        assert series.about.endswith("."), series.name
+        assert all(min(series.values) <= x <= series.holds_to for x in series.quick), series.name
+
+
+def unexplained(one: SeriesSummary) -> bool:
+    """More than `SeriesSummary.unexplained`: also where Mitsuba does not fail at all."""
+    if not one.mitsuba_took_part or one.series.explained:
+        return False
+    return one.further is None or one.further < FURTHER
+
+
+@pytest.mark.slow
+def test_no_series_is_unexplained(tmp_path):
+    """The quick run of all: ours holds, and where Mitsuba does as well, the series says why."""
+    if why := mitsuba_is_there():
+        pytest.skip(why)
+    found = run(Choice(NAMES, "quick", 1), tmp_path, 2, lambda *_: None).found
+    for name in NAMES:
+        for one in summarise(family(name), found):
+            place = f"{name} {one.series.name}"
+            assert one.holds, (place, one.broken, one.failed)
+            assert not unexplained(one), place
+            outcomes = [o for f in one.found for who, o in f.outcomes.items() if who == MITSUBA]
+            if any(o.worst is not None for o in outcomes):
+                assert one.series.unit, place
+            assert all(OURS in f.outcomes for f in one.found), place

@@ -1,0 +1,162 @@
+"""F2 and F13: the families hold for ours, and see what is planted."""
+
+import math
+
+import numpy as np
+import pytest
+
+from comparisons.experiments.stability.contact import family as contact
+from comparisons.experiments.stability.contact.light import fresnel, lit, shadow_scene
+from comparisons.experiments.stability.contact.stacks import bound, plates
+from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw
+from comparisons.experiments.stability.leaving import family as leaving
+from comparisons.experiments.stability.leaving.judge import Judge, Tally
+from comparisons.experiments.stability.leaving.shapes import KINDS, Extent, aim, place
+from comparisons.experiments.stability.leaving.tracer import depart, subjects
+from comparisons.geometry.exact import first_hit
+
+PLAIN = Extent.of(1.0, 2.0, 1.0, False)
+
+
+def draw_of(folder, cases=300, seed=5):
+    return Draw(np.random.default_rng(seed), cases, False, folder)
+
+
+@pytest.mark.parametrize("name", ["sphere", "triangle", "torus", "anisotropy", "everything"])
+def test_ours_leaves_every_shape_at_its_most_extreme(name, tmp_path):
+    series = leaving.FAMILY.by_name[name]
+    x = max(x for x in series.quick if x <= series.holds_to)
+    found = series.measure(draw_of(tmp_path), x)[OURS]
+    assert found.cases > 0
+    assert found.failures == 0, found.examples
+    assert found.worst <= 1.0
+
+
+def test_the_text_books_epsilon_fails_far_away_and_on_small_shapes(tmp_path):
+    for name, x in (("sphere", 1e10), ("small", 1e8)):
+        found = leaving.FAMILY.by_name[name].measure(draw_of(tmp_path, 3000), x)
+        assert found[leaving.FIXED].failures > 0
+        assert found[leaving.FIXED].examples
+
+
+def planted(kind, fault, tmp_path):
+    """What is reported when ours is changed by `fault`: departures to departures."""
+    draw = draw_of(tmp_path)
+    placed = place(kind, PLAIN, draw)
+    (subject,) = subjects(kind, [placed])
+    rays, ways = aim(placed, 200, False, draw.rng), leaving.ways(draw.rng, 200)
+    tally = Tally()
+    found = fault(depart(subject, rays, ways), ways.outer)
+    Judge(placed, subject, sample=4)(tally, rays, ways.outer, found, True)
+    return tally
+
+
+def test_departures_are_right_as_they_are(tmp_path):
+    for kind in ("sphere", "rectangle", "torus", "box"):
+        assert planted(kind, lambda found, _: found, tmp_path).failures == 0
+
+
+def test_a_surface_that_is_met_again_is_seen(tmp_path):
+    def again(found, outer):
+        k = np.flatnonzero(outer)[:3]
+        found.again[k] = 1e-12
+        return found
+
+    for kind in ("sphere", "rectangle"):
+        assert planted(kind, again, tmp_path).why == {"met again": 3}
+
+
+def test_a_far_wall_that_is_lost_is_seen(tmp_path):
+    def lost(found, outer):
+        found.again[np.flatnonzero(~outer)[:3]] = np.inf
+        return found
+
+    for kind in ("sphere", "box", "torus"):
+        assert planted(kind, lost, tmp_path).why == {"lost": 3}
+
+
+def test_an_offset_that_is_too_large_is_seen(tmp_path):
+    def far(found, _):
+        found.start[:3] += found.n[:3] * 1e-6
+        return found
+
+    assert planted("sphere", far, tmp_path).why == {"begins too far off": 3}
+
+
+def test_a_shape_that_is_not_met_is_seen(tmp_path):
+    def missed(found, _):
+        found.t[:3] = np.inf
+        return found
+
+    assert planted("sphere", missed, tmp_path).why == {"the shape is not met": 3}
+
+
+def test_a_start_on_the_wrong_side_is_seen_by_exact_arithmetic(tmp_path):
+    """The tracer itself says nothing is wrong: the sample is asked about."""
+
+    def beneath(found, outer):
+        found.start[:] = np.where(outer[:, None], 2.0 * found.p - found.start, found.start)
+        return found
+
+    assert planted("sphere", beneath, tmp_path).why.get("met again", 0) > 0
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"mesh", "solid", "instance"}))
+def test_aimed_rays_meet_the_shape(kind, tmp_path):
+    """By exact arithmetic; what they are aimed at is inside."""
+    draw = draw_of(tmp_path)
+    placed = place(kind, PLAIN, draw)
+    (subject,) = subjects(kind, [placed])
+    rays = aim(placed, 50, False, draw.rng)
+    row = {
+        name: column if name == "outline" else column[[subject.row]]
+        for name, column in subject.table._asdict().items()
+        if column is not None
+    }
+    assert np.isfinite(first_hit(subject.field, row, rays.o, rays.d).t).all()
+
+
+# ---- F13 ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["plates", "shells", "plates, far away", "shadow", "glass"])
+def test_ours_keeps_gaps_apart_up_to_the_law(name, tmp_path):
+    series = contact.FAMILY.by_name[name]
+    found = series.measure(draw_of(tmp_path, 80), max(series.quick))[OURS]
+    assert found.cases > 0
+    assert found.failures == 0, found.examples
+
+
+def test_gaps_below_the_law_are_lost_at_last(tmp_path):
+    """Plates a thousand scales away, closer than floats there are: the family is not blind."""
+    far = contact.FAMILY.by_name["plates, far away"]
+    assert far.holds_to * 4.0 * bound(contact.FAR) < 1.0
+    assert far.measure(draw_of(tmp_path, 80), 1e15)[OURS].failures > 0
+
+
+def test_mitsuba_skips_gaps_of_its_epsilon(tmp_path):
+    pytest.importorskip("mitsuba")
+    draw = draw_of(tmp_path, 40)._replace(mitsuba=True)
+    series = contact.FAMILY.by_name["plates"]
+    assert series.measure(draw, 1e1)[MITSUBA].failures == 0
+    found = series.measure(draw, 1e5)[MITSUBA]
+    assert found.failures == found.cases > 0
+
+
+def test_light_comes_in_under_the_cube_by_one_gap():
+    gap = 1e-3
+    at = np.array([[1.0 - 0.5 * gap, 0.0, 0.0], [1.0 - 2.0 * gap, 0.0, 0.0]])
+    up = np.tile([0.0, 0.0, 1.0], (2, 1))
+    sun = np.tile([math.sqrt(0.5), 0.0, math.sqrt(0.5)], (2, 1))
+    assert lit(OURS, shadow_scene(gap), at - up, up, sun)[:, 0].tolist() == [1.0, 0.0]
+
+
+def test_fresnel_head_on():
+    assert fresnel(np.array([1.0]))[0] == pytest.approx(1.0 - 0.2**2, rel=1e-15)
+
+
+def test_plates_are_as_far_apart_as_asked():
+    stack = plates(np.random.default_rng(1), 4, 1e-3)
+    centers = np.array([np.array(s.transform[0].matrix)[:, 3] for s in stack.scene.shapes])
+    apart = np.linalg.norm(np.diff(centers, axis=0), axis=1)
+    assert apart == pytest.approx(np.full(7, 1e-3), rel=1e-12)

@@ -1,0 +1,158 @@
+"""Driving a renderer: each way to fail has its message, and none leaves a picture behind."""
+
+import os
+import shlex
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from comparisons.gate.driver import Command, drive
+from comparisons.gate.errors import RendererError
+from reference_rt.util.errors import ImageError, UsageError
+
+RENDERER = """\
+import os, signal, subprocess, sys, time
+from pathlib import Path
+import numpy as np
+how, output, seed = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
+picture = np.random.default_rng(seed).random((4, 6, 3))
+print("how", how, flush=True)
+if how == "fails":
+    print("one\\nthe sky\\x1b[2J is\\n\\nfalling", file=sys.stderr)
+    sys.exit(7)
+if how == "crashes":
+    os.kill(os.getpid(), signal.SIGSEGV)
+if how == "hangs":
+    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    Path(sys.argv[4]).write_text(str(child.pid))
+    time.sleep(60)
+if how == "beside":
+    np.save(output.with_name("mine.npy"), picture)
+if how == "here":
+    np.save("mine.npy", picture)
+if how == "folder":
+    output.mkdir()
+if how == "empty":
+    output.touch()
+if how == "rubbish":
+    output.write_text("rubbish")
+if how == "well":
+    with output.open("wb") as file:
+        np.save(file, picture)
+"""
+
+
+@pytest.fixture
+def renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The start of its command line; the working folder is the test's own."""
+    script = tmp_path / "my renderer.py"  # a space, which a shell would break
+    script.write_text(RENDERER)
+    monkeypatch.chdir(tmp_path)
+    return f"{shlex.quote(sys.executable)} {shlex.quote(str(script))}"
+
+
+def command(renderer: str, how: str, seconds: float = 30.0) -> Command:
+    return Command(f"{renderer} {how} {{output}} {{seed}}", suffix=".npy", seconds=seconds)
+
+
+def test_each_seed_has_its_picture(renderer: str, tmp_path: Path) -> None:
+    keep = tmp_path / "kept"
+    keep.mkdir()
+    (keep / "candidate-09.npy").write_text("of an earlier run")
+    said: list[str] = []
+    pictures = drive(command(renderer, "well"), range(5, 8), keep, said.append)
+    for seed, picture in zip(range(5, 8), pictures, strict=True):
+        expected = np.random.default_rng(seed).random((4, 6, 3))
+        np.testing.assert_array_equal(picture.radiance, expected)
+        assert Path(picture.name).is_file()
+    names = [f"candidate-0{k}.npy" for k in range(3)]
+    assert sorted(path.name for path in keep.iterdir()) == names
+    assert said == [f"candidate {k + 1} of 3, seed {5 + k}" for k in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        (
+            "fails",
+            r"failed with seed 1: exit code 7, expected 0; it said: .*"
+            r"one \| the sky\?\[2J is \| falling$",
+        ),
+        ("crashes", "crashed with seed 1: SIGSEGV; it said"),
+        ("nothing", "ended well with seed 1, but wrote nothing; expected candidate-00.npy"),
+        ("beside", "another place with seed 1: mine.npy in the same folder; expected candidate-00"),
+        ("here", "another place with seed 1: mine.npy in the working folder; expected candidate"),
+        ("folder", "another place with seed 1: candidate-00.npy in the same folder"),
+    ],
+)
+def test_failures(renderer: str, tmp_path: Path, how: str, message: str) -> None:
+    with pytest.raises(RendererError, match=message) as caught:
+        drive(command(renderer, how), range(1, 3), tmp_path / "kept")
+    assert caught.value.exit_code == 4
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.glob("kept/*"))
+
+
+@pytest.mark.parametrize(
+    ("how", "message"), [("empty", "is empty"), ("rubbish", "is not an image")]
+)
+def test_what_is_written_must_be_a_picture(
+    renderer: str, tmp_path: Path, how: str, message: str
+) -> None:
+    with pytest.raises(ImageError, match=message):
+        drive(command(renderer, how), range(1, 2), tmp_path / "kept")
+
+
+def test_what_hangs_is_killed_with_its_children(renderer: str, tmp_path: Path) -> None:
+    note = tmp_path / "child.pid"
+    hanging = Command(f"{renderer} hangs {{output}} {{seed}} {note}", seconds=3.0)
+    with pytest.raises(RendererError, match=r"hung with seed 3: not done after 3 s, and was kill"):
+        drive(hanging, range(3, 4), tmp_path / "kept")
+    child = int(note.read_text())
+    for _ in range(100):  # an orphan's end is noted by init, when it comes to it
+        if not _runs(child):
+            break
+        time.sleep(0.05)
+    assert not _runs(child)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (ProcessLookupError, FileNotFoundError):
+        return False
+    return state != "Z"
+
+
+def test_placeholders(tmp_path: Path) -> None:
+    full = Command("a '{scene} x' -o{output} --seed={seed} {spp} {other", Path("a b.yaml"), 16)
+    assert full.arguments(Path("/o/p.exr"), 3) == [
+        "a",
+        "a b.yaml x",
+        "-o/o/p.exr",
+        "--seed=3",
+        "16",
+        "{other",
+    ]
+    for template, message in (
+        ("render {output} {sed}", "there is no {sed}; expected some of {scene}, {output}, {seed}"),
+        ("render {scene}", "has no {output}; expected it where the picture is named"),
+        ("render {output} {scene}", "has {scene}, but there is no --scene"),
+        ("render {output} {spp}", "has {spp}, but there is no --spp"),
+        ("render '{output}", "no closing quotation; expected closed quotes"),
+        ("", "is empty; expected a program"),
+    ):
+        with pytest.raises(UsageError, match=f"--command: {message}"):
+            drive(Command(template), range(1), tmp_path)
+
+
+def test_a_shell_is_not_there(renderer: str, tmp_path: Path) -> None:
+    template = f"{renderer} well {{output}} {{seed}} ; touch {tmp_path / 'touched'} $(touch b)"
+    drive(Command(template, suffix=".npy"), range(1), tmp_path / "kept")
+    assert not (tmp_path / "touched").exists()
+    with pytest.raises(RendererError, match="no-such-program: cannot be started: No such file"):
+        drive(Command("no-such-program {output}"), range(1), tmp_path / "kept")

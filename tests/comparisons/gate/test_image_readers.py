@@ -1,0 +1,353 @@
+"""One set of image readers: every kind of file, in every place that takes one."""
+
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from picture_writers import exr, hdr, npy, pfm, png, rgbe
+from PIL import Image
+
+import reference_rt as rt
+from comparisons.gate.pictures_in import read_candidate
+from reference_rt.scene.build import build_tables
+from reference_rt.textures.image_file import linear
+from reference_rt.util.errors import ImageError
+
+HEIGHT, WIDTH = 6, 11
+RNG = np.random.default_rng(7)
+FLOATS = np.float64(RNG.uniform(0.0, 4.0, (HEIGHT, WIDTH, 4)).astype(np.float32))
+FLOATS[..., 3] = 1.0
+HALVES = FLOATS.astype(np.float16).astype(np.float64)
+FLOATS[1, 2:9] = FLOATS[1, 2]  # something to run over
+RGBE = rgbe(FLOATS[..., :3])
+
+
+def radiance_of(codes):
+    """By Ward's formula, with the middle of each interval but of the first, which is black."""
+    mantissa = np.where(codes[..., :3] > 0, codes[..., :3] + 0.5, 0.0)
+    return mantissa * 2.0 ** (codes[..., 3:].astype(np.float64) - 136.0)
+
+
+def codes(bits, channels):
+    return np.random.default_rng(bits + channels).integers(0, 1 << bits, (HEIGHT, WIDTH, channels))
+
+
+def decoded(values, bits):
+    """(colours, opacity or None) that a PNG of these codes shows."""
+    scaled = values / float((1 << bits) - 1)
+    has_opacity = scaled.shape[2] in (2, 4)
+    colours = scaled[..., :-1] if has_opacity else scaled
+    colours = np.broadcast_to(colours, (HEIGHT, WIDTH, 3))
+    return linear(np.ascontiguousarray(colours)), scaled[..., -1] if has_opacity else None
+
+
+def half_exr(path):
+    planes = {c: HALVES[..., k].astype(np.float16) for k, c in enumerate("RGB")}
+    with OpenEXR.File({"compression": OpenEXR.PIZ_COMPRESSION}, planes) as file:
+        file.write(str(path))
+
+
+def tiled_exr(path):
+    planes = {c: FLOATS[..., k].astype(np.float32) for k, c in enumerate("RGB")}
+    header = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
+    with OpenEXR.File(header, planes) as file:
+        file.write(str(path))
+
+
+def floats(make):
+    return lambda path: path.write_bytes(make())
+
+
+GREY = np.repeat(FLOATS[..., :1], 3, axis=-1)
+COLOUR = FLOATS[..., :3]
+FLIPS = {"-Y {} +X {}": (1, 1), "+Y {} +X {}": (-1, 1), "-Y {} -X {}": (1, -1)}
+FLIPS |= {"+Y {} -X {}": (-1, -1)}
+
+KINDS = {
+    "float.exr": (lambda path: exr(path, COLOUR), COLOUR, None),
+    "half.exr": (half_exr, HALVES[..., :3], None),
+    "tiled.exr": (tiled_exr, COLOUR, None),
+    "grey.exr": (lambda path: exr(path, COLOUR, "Y"), GREY, None),
+    "opacity.exr": (lambda path: exr(path, FLOATS, "RGBA"), COLOUR, FLOATS[..., 0]),
+    "little.pfm": (floats(lambda: pfm(COLOUR, "-1.0")), COLOUR, None),
+    "big.pfm": (floats(lambda: pfm(COLOUR, "1.0", ">f4")), COLOUR, None),
+    "grey little.pfm": (floats(lambda: pfm(FLOATS[..., :1], "-1")), GREY, None),
+    "grey big.pfm": (floats(lambda: pfm(FLOATS[..., :1], "1", ">f4")), GREY, None),
+    "float16.npy": (floats(lambda: npy(HALVES[..., :3].astype("<f2"))), HALVES[..., :3], None),
+    "float32.npy": (floats(lambda: npy(COLOUR.astype(">f4"))), COLOUR, None),
+    "float64.npy": (floats(lambda: npy(COLOUR)), COLOUR, None),
+    "columns.npy": (floats(lambda: npy(np.asfortranarray(COLOUR))), COLOUR, None),
+    "opacity.npy": (floats(lambda: npy(FLOATS)), COLOUR, FLOATS[..., 3]),
+}
+for _axes, (_rows, _columns) in FLIPS.items():
+    for _runs in (True, False):
+        KINDS[f"{_axes.replace(' {}', '')}, {'runs' if _runs else 'flat'}.hdr"] = (
+            floats(lambda axes=_axes, runs=_runs: hdr(RGBE, runs, axes)),
+            radiance_of(RGBE)[::_rows, ::_columns],
+            None,
+        )
+for _bits in (8, 16):
+    for _channels in (1, 2, 3, 4):
+        _values = codes(_bits, _channels)
+        KINDS[f"{_bits} bits, {_channels}.png"] = (
+            lambda path, values=_values, bits=_bits: png(path, values, bits),
+            *decoded(_values, _bits),
+        )
+
+AS_TEXTURES = {
+    "quality.jpg": {"format": "JPEG"},
+    "picture.webp": {"format": "WEBP", "lossless": True},
+    "picture.bmp": {"format": "BMP"},
+    "picture.tif": {"format": "TIFF"},
+}
+"""Which scenes take besides, and the gate refuses."""
+
+
+def bitmap_of(path):
+    scene = rt.Scene(textures={"t": rt.Bitmap(file=str(path))})
+    bitmaps = build_tables(scene).textures.bitmaps
+    assert bitmaps.texels.flags.c_contiguous
+    return bitmaps.texels.reshape(bitmaps.height[0], bitmaps.width[0], 3)
+
+
+def environment_of(path):
+    scene = rt.Scene(lights=(rt.EnvironmentMap(file=str(path)),))
+    return build_tables(scene).lights.environment.texels
+
+
+def what_is_said(consumer, path):
+    """The error; None if there is none."""
+    try:
+        consumer(path)
+    except (rt.SceneError, ImageError) as error:
+        return str(error)
+    return None
+
+
+def gate_of(path):
+    return read_candidate(path).radiance
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_in_every_place(tmp_path, name):
+    """To the bit."""
+    write, colours, opacity = KINDS[name]
+    write(tmp_path / name)
+    for consumer in (bitmap_of, environment_of):
+        np.testing.assert_array_equal(consumer(tmp_path / name), colours, consumer.__name__)
+    found = read_candidate(tmp_path / name)
+    # Of codes, a colour counts as much as it is opaque; floats are premultiplied.
+    covered = opacity is not None and name.endswith(".png")
+    expected = colours * opacity[..., None] if covered else colours
+    np.testing.assert_array_equal(found.radiance, expected)
+    if opacity is None:
+        assert found.opacity is None
+    else:
+        np.testing.assert_array_equal(found.opacity, opacity)
+
+
+@pytest.mark.parametrize("name", AS_TEXTURES)
+def test_other_kinds_in_scenes(tmp_path, name):
+    picture = Image.fromarray(codes(8, 3).astype(np.uint8))
+    picture.save(tmp_path / name, **AS_TEXTURES[name])
+    with Image.open(tmp_path / name) as image:
+        expected = linear(np.asarray(image) / 255.0)
+    for consumer in (bitmap_of, environment_of):
+        np.testing.assert_array_equal(consumer(tmp_path / name), expected)
+    with pytest.raises(ImageError, match=r"is not an image that can be read; expected EXR, PNG"):
+        gate_of(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_name_of_a_file_does_not_tell_its_kind(tmp_path, name):
+    write, colours, _ = KINDS[name]
+    write(tmp_path / name)
+    other = (tmp_path / name).rename(tmp_path / "picture.dat")
+    np.testing.assert_array_equal(bitmap_of(other), colours)
+
+
+@pytest.mark.parametrize("name", [*KINDS, *AS_TEXTURES])
+def test_damaged_files_in_every_place(tmp_path, name, capfd):
+    """Truncated anywhere, or with bytes of others: one line of ours, or a picture; nothing printed
+    by the libraries, and no other error."""
+    path = tmp_path / name
+    if name in KINDS:
+        KINDS[name][0](path)
+    else:
+        Image.fromarray(codes(8, 3).astype(np.uint8)).save(path, **AS_TEXTURES[name])
+    whole = path.read_bytes()
+    rng = np.random.default_rng(11)
+    cuts = {0, 1, 3, 7, 12, 20, 60, len(whole) // 3, len(whole) // 2, len(whole) - 1}
+    damaged = [whole[:cut] for cut in sorted(cuts)]
+    for _ in range(12):
+        changed = bytearray(whole)
+        for at in rng.integers(0, min(len(whole), 400), 3):
+            changed[at] = rng.integers(0, 256)
+        damaged.append(bytes(changed))
+    for k, content in enumerate(damaged):
+        path.write_bytes(content)
+        for consumer in (bitmap_of, environment_of, gate_of):
+            said = what_is_said(consumer, path)
+            if said is None:
+                # A picture cut short is none, but for what follows its last pixel.
+                assert k >= len(cuts) or len(content) > 0.75 * len(whole), (consumer, k)
+            else:
+                assert "\n" not in said
+                assert str(path) in said
+    assert capfd.readouterr() == ("", "")
+
+
+def test_signalling_nans_are_not_finite(tmp_path):
+    """They raise floating point exceptions where they are converted."""
+    values = np.full((4, 4, 3), 0x7FA00000, "<u4").view("<f4")
+    (tmp_path / "a.pfm").write_bytes(b"PF\n4 4\n-1\n" + values.tobytes())
+    (tmp_path / "a.npy").write_bytes(npy(values))
+    for name in ("a.pfm", "a.npy"):
+        with pytest.raises(rt.SceneError, match="is not finite; expected finite ones"):
+            bitmap_of(tmp_path / name)
+        assert np.isnan(gate_of(tmp_path / name)).all()
+
+
+def test_many_bitmaps_are_one_array(tmp_path):
+    """Each in its place, without copies of the others."""
+    names = ("float.exr", "8 bits, 3.png", "little.pfm", "8 bits, 3.png")
+    for name in names:
+        KINDS[name][0](tmp_path / name)
+    textures = {f"t{k}": rt.Bitmap(file=name) for k, name in enumerate(names)}
+    (tmp_path / "scene.json").write_text(rt.Scene(textures=textures).to_json())
+    bitmaps = build_tables(rt.Scene.load(tmp_path / "scene.json")).textures.bitmaps
+    expected = np.concatenate([KINDS[name][1].reshape(-1, 3) for name in names])
+    np.testing.assert_array_equal(bitmaps.texels, expected)
+    assert bitmaps.first.tolist() == [k * HEIGHT * WIDTH for k in range(4)]
+
+
+# ---- memory -------------------------------------------------------------------------------------
+
+SIZE = (1600, 2500)
+
+CHILD = """
+import sys
+from pathlib import Path
+import numpy as np
+import reference_rt as rt
+from reference_rt.scene.build import _texture_tables
+from reference_rt.lights.emitters.environment_map import tabulate
+import reference_rt.core.image_files, OpenEXR
+from PIL import Image
+
+def peak():
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM"))
+
+Image.init()
+tabulate(np.ones((4, 8, 3)), np.eye(3))  # what it compiles is not what is measured
+before = peak()
+if sys.argv[1] == "bitmap":
+    files = sys.argv[2:]
+    scene = rt.Scene(textures={f"t{k}": rt.Bitmap(file=f) for k, f in enumerate(files)})
+    tables = _texture_tables(scene)
+else:
+    tables = rt.EnvironmentMap(file=sys.argv[2]).tabulate(Path())
+print(peak() - before)
+"""
+
+LARGE = {
+    "a.png": lambda path: Image.fromarray(large_codes(3)).save(path, compress_level=1),
+    "deep.png": lambda path: png(path, large_codes(3).astype(np.int64) * 257, 16),
+    "a.jpg": lambda path: Image.fromarray(large_codes(3)).save(path),
+    "a.exr": lambda path: exr(path, large_floats()),
+    "a.pfm": lambda path: path.write_bytes(pfm(large_floats(), "-1")),
+    "a.npy": lambda path: path.write_bytes(npy(large_floats().astype(np.float64))),
+    "a.hdr": lambda path: path.write_bytes(hdr(rgbe(large_floats()), runs=False)),
+}
+
+
+QUICK = ("deep.png", "a.exr")
+"""Those that come nearest to the bound, or would be beyond it if they were read as a whole."""
+
+
+def large_codes(channels):
+    values = np.arange(SIZE[0] * SIZE[1] * channels) % 251
+    return values.reshape(*SIZE, channels).astype(np.uint8)
+
+
+def large_floats():
+    return large_codes(3).astype(np.float32) + 0.5
+
+
+def peak_of(place, *files):
+    """Bytes a pixel that a process took at most."""
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, place, *map(str, files)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+    )
+    return int(done.stdout) / (SIZE[0] * SIZE[1] * len(files))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for the most memory so far")
+@pytest.mark.parametrize(
+    "name",
+    [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in LARGE],
+)
+def test_memory_of_a_texture(tmp_path, name):
+    """At most 32 bytes a pixel, of which 24 stay."""
+    LARGE[name](tmp_path / name)
+    assert peak_of("bitmap", tmp_path / name) <= 32.0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for the most memory so far")
+def test_memory_of_several_textures_and_of_an_environment(tmp_path):
+    """The same for two textures.  An environment map stores 32 bytes a pixel, 8 for its sums: two
+    more for what is freed between them but not given back."""
+    LARGE["a.png"](tmp_path / "a.png")
+    assert peak_of("bitmap", tmp_path / "a.png", tmp_path / "a.png") <= 32.0
+    assert peak_of("environment", tmp_path / "a.png") <= 34.0
+
+
+@pytest.mark.parametrize("consumer", [bitmap_of, environment_of, gate_of])
+def test_what_would_not_fit_into_memory_is_refused_by_its_header(tmp_path, consumer):
+    """Before anything is decoded: the files have no pixels."""
+    whole = io.BytesIO()
+    Image.new("RGB", (8, 8)).save(whole, "PNG")
+    huge = (1 << 19).to_bytes(4, "big")
+    picture = bytearray(whole.getvalue())
+    picture[16:24] = huge + huge
+    import zlib
+
+    picture[29:33] = zlib.crc32(bytes(picture[12:29])).to_bytes(4, "big")
+    (tmp_path / "a.png").write_bytes(picture)
+    said = "declares 524288 x 524288" if consumer is gate_of else "which take 8192.0 GiB of memory"
+    with pytest.raises((rt.SceneError, ImageError), match=said):
+        consumer(tmp_path / "a.png")
+
+
+def test_many_textures_that_would_not_fit_together(tmp_path, monkeypatch):
+    from reference_rt.util import memory
+
+    KINDS["float.exr"][0](tmp_path / "a.exr")
+    pixels = HEIGHT * WIDTH
+    monkeypatch.setattr(memory, "machine_memory", lambda: 3 * 32 * pixels)
+    textures = {f"t{k}": rt.Bitmap(file=str(tmp_path / "a.exr")) for k in range(3)}
+    build_tables(rt.Scene(textures=textures))
+    textures["t3"] = rt.Bitmap(file=str(tmp_path / "a.exr"))
+    with pytest.raises(rt.SceneError, match=f"has 4 bitmaps of {4 * pixels} pixels in all"):
+        build_tables(rt.Scene(textures=textures))
+
+
+def test_pillows_own_limit_is_not_ours():
+    """It is of the process, and stays what it was."""
+    before = Image.MAX_IMAGE_PIXELS
+    assert before is not None
+    from reference_rt.core.image_files import open_image
+
+    with pytest.raises(OSError, match="No such file"):
+        open_image(Path("missing.png"))
+    assert before == Image.MAX_IMAGE_PIXELS

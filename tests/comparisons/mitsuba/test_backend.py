@@ -1,0 +1,125 @@
+"""Which Mitsuba runs is found out in child processes, and told."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from comparisons.mitsuba import backend
+from reference_rt.util.errors import ReferenceUnavailableError
+
+
+@pytest.fixture(autouse=True)
+def _own_memory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("REFERENCE_RT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.delenv(backend.FORCE, raising=False)
+    monkeypatch.delenv(backend.LIBRARY, raising=False)
+
+
+@pytest.fixture
+def bogus(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> str:
+    """A library that is none."""
+    path = tmp_path / "libLLVM.so.99.1"
+    path.write_text("not a library")
+    monkeypatch.setenv(backend.LIBRARY, str(path))
+    return str(path)
+
+
+def test_a_library_that_fails_leaves_scalar_and_says_how_to_get_llvm(bogus: str) -> None:
+    chosen = backend.choose()
+    assert chosen.variant == "scalar_rgb"
+    assert chosen.llvm_path is None
+    assert chosen.version
+    assert bogus in chosen.reason
+    assert "reference-rt[compare]" in chosen.reason
+    assert "libllvm19" in chosen.reason
+    assert "\n" not in chosen.reason
+
+
+def test_what_was_proven_is_remembered_until_the_file_changes(
+    bogus: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proofs = []
+
+    def count(variant: str, path: str | None) -> str | None:
+        proofs.append((variant, path))
+        return None
+
+    monkeypatch.setattr(backend, "prove", count)
+    assert backend.choose().variant == "llvm_ad_rgb"
+    assert backend.choose().llvm_path == bogus
+    assert proofs == [("llvm_ad_rgb", bogus)]
+    Path(bogus).write_text("another file of another size")
+    stat = Path(bogus).stat()
+    os.utime(bogus, ns=(stat.st_atime_ns, stat.st_mtime_ns + 10**9))
+    backend.choose()
+    assert len(proofs) == 2
+
+
+def test_a_broken_memory_is_none(bogus: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cut anywhere, or of other types than were written: proven again, and whole afterwards."""
+    file = backend._memory_file()
+    monkeypatch.setattr(backend, "prove", lambda variant, path: None)
+    backend.choose()
+    whole = file.read_bytes()
+    others = (
+        b"[]",
+        b"null",
+        b"\xff\xfe",
+        whole.replace(b"null", b"5"),
+        whole.replace(b"null", b"{}"),
+    )
+    for damaged in (*(whole[:k] for k in range(0, len(whole), 7)), *others):
+        file.write_bytes(damaged)
+        assert backend.choose().llvm_path == bogus
+        assert file.read_bytes() == whole
+
+
+def test_an_abort_of_the_child_is_told_and_not_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(backend, "_PROOF", "import os; os.abort()")
+    assert backend.prove("llvm_ad_rgb", None) == "ends the process by signal 6"
+
+
+def test_a_child_that_hangs_is_ended_and_not_remembered(
+    bogus: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(backend, "_PROOF", "import time; time.sleep(60)")
+    monkeypatch.setattr(backend, "_PROOF_SECONDS", 0.2)
+    assert "did not answer" in backend.choose().reason
+    assert not backend._memory_file().exists()
+
+
+def test_a_wrong_picture_is_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(backend, "_PROOF", "import sys; sys.exit(3)")
+    assert backend.prove("llvm_ad_rgb", None) == "renders a wrong picture"
+
+
+def test_the_proof_renders_in_the_simplest_variant() -> None:
+    assert backend.prove("scalar_rgb", None) is None
+
+
+def test_forced_variants(monkeypatch: pytest.MonkeyPatch, bogus: str) -> None:
+    monkeypatch.setenv(backend.FORCE, "scalar_rgb")
+    assert backend.choose().variant == "scalar_rgb"
+    assert backend.FORCE in backend.choose().reason
+    monkeypatch.setenv(backend.FORCE, "llvm_ad_rgb")
+    with pytest.raises(ReferenceUnavailableError, match=r"libLLVM.so.99.1"):
+        backend.choose()
+    monkeypatch.setenv(backend.FORCE, "no_such_variant")
+    with pytest.raises(ReferenceUnavailableError, match="no_such_variant"):
+        backend.choose()
+
+
+def test_without_mitsuba_the_error_says_how_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(ReferenceUnavailableError, match=r"reference-rt\[compare\]") as caught:
+        backend.choose()
+    assert caught.value.exit_code == 4
+
+
+def test_importing_the_comparisons_does_not_import_mitsuba() -> None:
+    modules = "comparisons.mitsuba.backend, comparisons.mitsuba.translate, comparisons.rungs"
+    code = f"import sys, {modules}; sys.exit('mitsuba' in sys.modules or 'drjit' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,209 @@
+"""Material by material: what our kernels scatter is what their twins in Mitsuba do."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.mitsuba import accuracy
+from comparisons.mitsuba.accuracy import both_sides, clearcoat_error, directions, table_error
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
+from comparisons.mitsuba.plugins.exact_coat import smooth_reflectance
+from comparisons.mitsuba.translate.materials import translate_material
+from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.rungs.rays import arbiter
+from reference_rt.core.arrays import FloatArray
+from reference_rt.materials import (
+    Diffuse,
+    Material,
+    Phong,
+    Plastic,
+    Principled,
+    RoughConductor,
+    RoughDielectric,
+    RoughPlastic,
+)
+
+PAIRS = 60
+
+GOLD: dict[str, Any] = {
+    "eta": (0.2, 0.9, 1.1),
+    "k": (3.0, 2.0, 2.5),
+    "reflectance": (0.9, 0.8, 0.7),
+}
+COLOURS: dict[str, Any] = {"reflectance": (0.9, 0.5, 0.1), "specular": (0.9, 1.0, 0.8)}
+PHONG: dict[str, Any] = {"diffuse": (0.2, 0.1, 0.05), "specular": (0.3, 1.2, 0.1)}
+
+MATERIALS: tuple[Material, ...] = (
+    Diffuse(reflectance=(0.3, 0.5, 1.0)),
+    *(
+        RoughConductor(**GOLD, alpha=alpha, distribution=distribution)
+        for alpha in ((0.02, 0.02), (0.3, 0.3), (0.1, 0.6), (1.3, 1.3))
+        for distribution in ("ggx", "beckmann")
+    ),
+    *(
+        RoughDielectric(
+            interior_ior=inside,
+            exterior_ior=outside,
+            alpha=(alpha, alpha),
+            distribution=distribution,
+            reflectance=(0.9, 0.8, 1.0),
+            transmittance=(1.0, 0.5, 0.7),
+        )
+        for inside, outside, alpha in ((1.5, 1.0, 0.1), (1.1, 1.4, 0.5))
+        for distribution in ("ggx", "beckmann")
+    ),
+    *(
+        Plastic(**COLOURS, interior_ior=index, nonlinear=nonlinear)
+        for index in (1.2, 1.5, 2.4)
+        for nonlinear in (False, True)
+    ),
+    RoughPlastic(**COLOURS, alpha=0.15),
+    RoughPlastic(**COLOURS, alpha=0.4, distribution="beckmann", nonlinear=True),
+    Principled(base_colour=(0.8, 0.5, 0.2)),
+    Principled(base_colour=(0.8, 0.5, 0.2), metallic=1.0, roughness=0.3, anisotropic=0.7),
+    Principled(base_colour=(0.8, 0.5, 0.2), metallic=0.4, roughness=0.6, spec_tint=0.7),
+    Principled(base_colour=(0.8, 0.5, 0.2), sheen=0.8, sheen_tint=0.5, flatness=0.6, specular=0.2),
+    Principled(base_colour=(0.8, 0.5, 0.2), clearcoat=0.9, clearcoat_gloss=0.7, eta=1.4),
+    Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=0.7, roughness=0.4, metallic=0.1),
+    Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=1.0, roughness=0.2, eta=1.6),
+    Phong(**PHONG, exponent=40.0),
+    Phong(**PHONG, exponent=7.5, half_vector=True),
+)
+
+
+def pairs(material: Material) -> tuple[FloatArray, FloatArray]:
+    """Half of them anywhere, half near the mirrored one; behind, too, where light passes."""
+    wo, wi = directions(PAIRS, seed=4, both=material.transmits)
+    rng = np.random.default_rng(5)
+    near = wo * [-1.0, -1.0, 1.0] + 0.1 * rng.normal(size=wo.shape)
+    wi[::2] = near[::2]
+    wi /= np.linalg.norm(wi, axis=1, keepdims=True)
+    return wo, wi.astype(np.float32).astype(np.float64)
+
+
+def float32_bound(material: Material, wo: FloatArray, wi: FloatArray, ours: FloatArray) -> Any:
+    """(n,): the products' roundings, and how far those of the directions move our value."""
+    found = 128.0 * UNIT_ROUNDOFF * np.abs(ours).max(axis=1)
+    for move in arbiter.directions(6):
+        step = ROUNDINGS * UNIT_ROUNDOFF * move
+        moved = both_sides(material, wo + step, wi - step, theirs=False)[0]
+        found += np.abs(moved - ours).max(axis=1)
+    if isinstance(material, Principled) and material.clearcoat != 0.0:
+        found += clearcoat_error(material) * np.abs(ours).max(axis=1)
+    # Mitsuba's microfacets end where fewer than 1e-20 face a direction.
+    return found + 1e-18
+
+
+@pytest.mark.parametrize("material", MATERIALS, ids=lambda m: m.type)
+def test_the_same_is_scattered(material: Material) -> None:
+    wo, wi = pairs(material)
+    ours, theirs = both_sides(material, wo, wi)
+    bound = float32_bound(material, wo, wi, ours)
+    if isinstance(material, RoughPlastic):
+        white = {"reflectance": (1.0, 1.0, 1.0), "specular": (0.0, 0.0, 0.0)}
+        bound += 1.5 * table_error(material.model_copy(update=white)) * ours.max(axis=1)
+    assert (ours.max(axis=1) > 0.0).sum() > PAIRS // 4
+    assert (np.abs(ours - theirs).max(axis=1) <= bound).all()
+
+
+@pytest.mark.parametrize(
+    ("material", "wrong"),
+    [
+        (RoughConductor(**GOLD, alpha=(0.1, 0.3)), {"alpha": (0.3, 0.1)}),
+        (RoughConductor(**GOLD, alpha=(0.3, 0.3)), {"alpha": (0.3001, 0.3001)}),
+        (RoughConductor(**GOLD), {"k": (3.0, 2.0, 2.501)}),
+        (RoughDielectric(alpha=(0.3, 0.3)), {"interior_ior": 1.501}),
+        (Plastic(**COLOURS), {"nonlinear": True}),
+        (Plastic(**COLOURS), {"interior_ior": 1.501}),
+        (Principled(sheen=0.5), {"sheen": 0.501}),
+        (Principled(clearcoat=0.5), {"clearcoat_gloss": 0.01}),
+        (Phong(**PHONG), {"exponent": 32.01}),
+    ],
+    ids=lambda x: x.type if isinstance(x, Material) else "",
+)
+def test_a_slightly_different_material_is_told_apart(
+    material: Material, wrong: dict[str, Any]
+) -> None:
+    wo, wi = pairs(material)
+    ours, _ = both_sides(material, wo, wi)
+    _, theirs = both_sides(material.model_copy(update=wrong), wo, wi)
+    bound = float32_bound(material, wo, wi, ours)
+    assert (np.abs(ours - theirs).max(axis=1) > bound).any()
+
+
+def test_tables_of_rough_plastic_are_off_by_little() -> None:
+    """The bound that comparisons allow for is far from what they call wrong."""
+    worst = max(
+        table_error(
+            RoughPlastic(
+                reflectance=(1.0, 1.0, 1.0), specular=(0.0, 0.0, 0.0), alpha=a, interior_ior=n
+            )
+        )
+        for a, n in ((0.05, 2.0), (0.2, 1.5), (0.6, 1.3))
+    )
+    assert 0.0 < accuracy.MARGIN * worst < 0.5 * accuracy.MOST
+
+
+def test_how_far_mitsubas_masking_is_off() -> None:
+    a = np.linspace(0.01, 4.0, 2000)
+    off = np.abs(approximate_g1(a) / exact_g1(a) - 1.0).max()
+    assert off == pytest.approx(0.0031, abs=0.0003)
+
+
+@pytest.mark.parametrize(("eta", "off"), [(1.3, 1e-3), (1.5, 1e-3), (2.0, 7e-3)])
+def test_how_far_mitsubas_fit_of_the_coat_is_off(eta: float, off: float) -> None:
+    """And that the integral in its place is one: against half a million midpoints."""
+    mi = mitsuba()
+    n = 500_000
+    cos = (np.arange(n) + 0.5) / n
+    sin_t2 = (1.0 - cos * cos) * eta * eta
+    cos_t = np.sqrt(np.maximum(1.0 - sin_t2, 0.0))
+    s = (eta * cos - cos_t) / (eta * cos + cos_t)
+    p = (cos - eta * cos_t) / (cos + eta * cos_t)
+    f = np.where(sin_t2 < 1.0, 0.5 * (s * s + p * p), 1.0)
+    exact = float((2.0 * f * cos).mean())
+    # Near the critical angle f has a root's slope: a step's share of it is missed at most.
+    assert smooth_reflectance(eta) == pytest.approx(exact, abs=1e-6)
+    fit = float(np.array(mi.fresnel_diffuse_reflectance(1.0 / eta)).item())
+    assert 0.0 < abs(fit / exact - 1.0) < off
+
+
+SAMPLED: tuple[Material, ...] = (
+    RoughConductor(**GOLD, alpha=(0.4, 0.4), distribution="beckmann"),
+    RoughDielectric(alpha=(0.4, 0.4), distribution="beckmann"),
+    Plastic(**COLOURS),
+    RoughPlastic(**COLOURS, alpha=0.3),
+    RoughPlastic(**COLOURS, alpha=0.3, distribution="beckmann"),
+    Phong(**PHONG, exponent=20.0, mirror=(0.1, 0.2, 0.3)),
+    Phong(**PHONG, exponent=20.0, half_vector=True),
+)
+
+
+@pytest.mark.parametrize("material", SAMPLED, ids=lambda m: m.type)
+def test_twins_draw_what_they_say(material: Material) -> None:
+    """The mean of the weights of those that are written here is the integral of what they give."""
+    import drjit as dr
+
+    mi = mitsuba()
+    if mi.variant().startswith("scalar"):
+        pytest.skip("a million samples, one at a time")
+    bsdf = mi.load_dict(translate_material(material, Surroundings({}, {}, Path())))
+    n = 1_000_000
+    sampler = mi.load_dict({"type": "independent", "sample_count": 1})
+    sampler.seed(7, n)
+    si = dr.zeros(mi.SurfaceInteraction3f, n)
+    si.t, si.wi = 1.0, dr.normalize(mi.Vector3f(0.5, 0.2, 0.8))
+    drawn, weight = bsdf.sample(mi.BSDFContext(), si, sampler.next_1d(), sampler.next_2d())
+    perfect = np.array(mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta))
+    weights = np.array(weight).T * ~perfect[:, None]
+    d = mi.warp.square_to_uniform_sphere(sampler.next_2d())
+    values = np.array(bsdf.eval(mi.BSDFContext(), si, d)).T * 4.0 * np.pi
+    error = np.sqrt((weights.var(axis=0) + values.var(axis=0)) / n)
+    assert (np.abs(weights.mean(axis=0) - values.mean(axis=0)) < 5.0 * error).all()
+    pdf, told = np.array(bsdf.pdf(mi.BSDFContext(), si, drawn.wo)), np.array(drawn.pdf)
+    counts = weights.max(axis=1) > 0.0
+    np.testing.assert_allclose(pdf[counts], told[counts], rtol=2e-3, atol=1e-6)

@@ -1,0 +1,107 @@
+"""Textures and environment maps against their twins."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.scene import for_rays
+from comparisons.mitsuba.translate.lights import translate_light
+from comparisons.mitsuba.translate.textures import Surroundings, translate_texture
+from reference_rt.core.vec3 import Vec3, luminance
+from reference_rt.lights import EnvironmentMap
+from reference_rt.lights.emitters import environment_map
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+from reference_rt.textures import At, Bitmap, Checker, Texture, VertexColours
+from reference_rt.textures.lookup import lookup, lookup_gradient
+from reference_rt.textures.texture import UvMap
+
+TURNED = UvMap(scale=(1.3, 0.7), rotate=25.0, offset=(0.1, -0.2))
+
+TEXTURES: tuple[Texture, ...] = (
+    Checker(first=(0.1, 0.2, 0.3), second=(0.9, 0.7, 0.4), uv=TURNED),
+    Checker(first=(1.0, 2.0, 3.0), second=(9.0, 7.0, 4.0), uv=TURNED),
+    *(
+        Bitmap(file="colours.png", filter=filter_type, wrap=wrap, uv=TURNED)
+        for filter_type in ("bilinear", "nearest")
+        for wrap in ("repeat", "clamp", "mirror")
+    ),
+    Bitmap(file="colours.png", encoding="raw"),
+)
+
+
+def interaction(u: Any, v: Any) -> Any:
+    import drjit as dr
+
+    mi = mitsuba()
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.t, si.uv = 1.0, mi.Point2f(u, v)
+    return si
+
+
+@pytest.mark.parametrize("texture", TEXTURES)
+def test_textures(texture: Texture, image_folder: Path) -> None:
+    scene = Scene(textures={"t": texture})
+    scene._folder = image_folder
+    textures = build_tables(scene).textures
+    around = Surroundings.of(scene)
+    rng = np.random.default_rng(1)
+    u, v = rng.uniform(-2.0, 2.0, (2, 500)).astype(np.float32).astype(np.float64)
+    at = [
+        At(textures, a, b, Vec3(-1.0, -1.0, -1.0))
+        for a, b in zip(u.tolist(), v.tolist(), strict=True)
+    ]
+    ours = np.array([tuple(lookup(0, a)) for a in at])
+    load_dict = mitsuba().load_dict
+    colours = load_dict(translate_texture(texture, "t", around, False))
+    numbers = load_dict(translate_texture(texture, "t", around, True))
+    theirs = for_rays(lambda a, b: (colours.eval(interaction(a, b)),), u, v)[0]
+    one = for_rays(lambda a, b: (numbers.eval_1(interaction(a, b)),), u, v)[0]
+    # uv round by 2^-23 each; from one texel to the next is a step of 1 at most, over 1/24.  An
+    # edge may lie in between: none does for this seed.
+    bound = 24.0 * 8.0 * 2.0**-23 * max(1.0, float(ours.max()))
+    np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=bound)
+    grey = np.array([luminance(Vec3(*c)) for c in ours])
+    np.testing.assert_allclose(one, grey, rtol=0.0, atol=bound)
+    if isinstance(texture, Bitmap) and texture.filter == "bilinear" and texture.uv == UvMap():
+        gradient = for_rays(lambda a, b: (numbers.eval_1_grad(interaction(a, b)),), u, v)[0]
+        slopes = np.array([lookup_gradient(0, a) for a in at])
+        np.testing.assert_allclose(gradient, slopes, rtol=0.0, atol=24.0 * bound)
+
+
+def test_vertex_colours_where_there_are_none() -> None:
+    texture = VertexColours(without=(0.1, 0.2, 0.3))
+    around = Surroundings({}, {"t": texture}, Path())
+    assert translate_texture(texture, "t", around, False)["value"] == [0.1, 0.2, 0.3]
+
+
+@pytest.mark.parametrize(
+    "turn", ["[]", "[{rotate: {axis: [0.3, 1, 0.1], degrees: 37}}]", "[{scale: [-1, 1, 1]}]"]
+)
+def test_environment_maps(turn: str, image_folder: Path) -> None:
+    scene = Scene.parse(
+        f"lights: [{{type: environment_map, file: sky.png, scale: 2.5, transform: {turn}}}]",
+        folder=image_folder,
+    )
+    light = scene.lights[0]
+    assert isinstance(light, EnvironmentMap)
+    table = light.tabulate(image_folder)
+    rng = np.random.default_rng(2)
+    d = rng.normal(size=(500, 3))
+    d = (d / np.linalg.norm(d, axis=1)[:, None]).astype(np.float32).astype(np.float64)
+    ours = np.array([tuple(environment_map.radiance(table, Vec3(*row))) for row in d.tolist()])
+    emitter = mitsuba().load_dict(translate_light(light, Surroundings.of(scene)))
+
+    def radiance(towards: Any) -> tuple[Any, ...]:
+        si = interaction(0.0, 0.0)
+        si.wi = -towards
+        return (emitter.eval(si),)
+
+    theirs = for_rays(radiance, d)[0]
+    # A direction's 4 roundings, over a texel of 2 pi / 32, near the poles over its sine.
+    sine = np.hypot(d[:, 0], d[:, 2])
+    bound = 32.0 * 8.0 * 2.0**-24 * table.texels.max() / np.maximum(sine, 0.05)
+    assert (np.abs(theirs - ours).max(axis=1) < bound).all()

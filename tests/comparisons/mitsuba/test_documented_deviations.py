@@ -1,0 +1,174 @@
+"""How far Mitsuba's materials are from the exact law, where a twin stands in for them: what README
+and the notes of a case say is what is measured here, with Mitsuba's own materials."""
+
+import itertools
+import re
+from pathlib import Path
+
+import drjit as dr
+import numpy as np
+import pytest
+
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.notes import notes_of
+from comparisons.mitsuba.plastic_error import COSINES, base_error
+from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
+from comparisons.mitsuba.translate.materials import translate_material
+from comparisons.mitsuba.translate.textures import Surroundings
+from reference_rt.materials import Blend, Diffuse, Mirror, Plastic, RoughPlastic
+from reference_rt.rendering.scene import Scene
+
+README = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
+
+
+def directions(cosines, azimuth=0.0):
+    """Unit vectors (3, n) with these cosines."""
+    sine = np.sqrt(1.0 - cosines**2)
+    return mitsuba().Vector3f(
+        *(mitsuba().Float(x) for x in (np.cos(azimuth) * sine, np.sin(azimuth) * sine, cosines))
+    )
+
+
+def base_of(material, native, wi, wo):
+    """Values (n,) of the base of a plastic, as Mitsuba has it or as its twin does."""
+    mi = mitsuba()
+    scene = Scene(materials={"m": material})
+    around = Surroundings.of(scene, native=native)
+    bsdf = mi.load_dict(translate_material(material, around))
+    context = mi.BSDFContext()
+    context.component = 1
+    si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
+    si.wi = directions(wi)
+    return np.array(bsdf.eval(context, si, directions(wo, 2.0)))[0]
+
+
+COATS = [
+    Plastic(reflectance=1.0),
+    Plastic(reflectance=0.3, interior_ior=2.4),
+    Plastic(reflectance=1.0, interior_ior=1.3, exterior_ior=1.6),
+    RoughPlastic(reflectance=0.5, alpha=0.01, interior_ior=1.52),
+    RoughPlastic(reflectance=1.0, alpha=0.1, nonlinear=True, distribution="beckmann"),
+    RoughPlastic(reflectance=0.5, alpha=0.5, interior_ior=1.9, exterior_ior=1.2),
+]
+
+
+@pytest.mark.parametrize("material", COATS)
+def test_the_note_of_a_coat_is_what_mitsuba_does(material):
+    """Native material over twin, in the directions that the note is about."""
+    pairs = np.array(list(itertools.combinations_with_replacement(COSINES, 2)))
+    with np.errstate(invalid="ignore"):
+        native, exact = (base_of(material, n, *pairs.T) for n in (True, False))
+        ratio = (native / exact)[exact > 0.0] - 1.0
+    (note,) = (n for n in notes_of(Scene(materials={"m": material})) if "Mitsuba's" in n)
+    found = re.search(r"base ([\d.]+)(?: to ([\d.]+))? % (darker|brighter)", note)
+    assert found is not None, note
+    low, high, word = float(found[1]), float(found[2] or found[1]), found[3]
+    sign = -1.0 if word == "darker" else 1.0
+    # Half a unit of the last digit, and float32's rounding of a few operations.
+    off = sorted(100.0 * sign * ratio)
+    assert (off[0], off[-1]) == pytest.approx((low, high), abs=0.006)
+    assert f"index of {material.interior_ior / material.exterior_ior:.4g}" in note
+
+
+def test_a_darker_nonlinear_base_errs_less():
+    """As the note is of a white one."""
+    wi = wo = np.array([1.0])
+    off = []
+    for rho in (0.2, 0.6, 1.0):
+        material = RoughPlastic(reflectance=rho, nonlinear=True, alpha=0.05)
+        native, exact = (base_of(material, n, wi, wo) for n in (True, False))
+        off.append(abs(float((native / exact)[0]) - 1.0))
+    assert off[0] < off[1] < off[2]
+    assert off[2] == pytest.approx(-base_error(1.5, "ggx", 0.05)[1], abs=1e-3)
+
+
+def documented():
+    """(index, alpha, GGX, Beckmann): what README's table says, in percent."""
+    table = README.partition("<!-- rough-plastic -->")[2].partition("<!-- end -->")[0]
+    head, _, *rows = (line.split("|")[1:-1] for line in table.strip().splitlines())
+    alphas = [float(re.findall(r"[\d.]+$", cell.strip())[0]) for cell in head[1:]]
+    for name, *cells in rows:
+        index = float(name.removeprefix(" index"))
+        for alpha, cell in zip(alphas, cells, strict=True):
+            yield (index, alpha, *(float(x) for x in re.findall(r"[\d.]+", cell)))
+
+
+QUICK = {(1.5, 0.01), (1.9, 0.1), (1.3, 0.5)}
+
+
+@pytest.mark.parametrize(
+    ("index", "alpha", "ggx", "beckmann"),
+    [
+        pytest.param(*row, marks=() if row[:2] in QUICK else pytest.mark.slow)
+        for row in documented()
+    ],
+)
+def test_documented_coats(index, alpha, ggx, beckmann, monkeypatch):
+    monkeypatch.setattr("comparisons.mitsuba.plastic_error.COSINES", (1.0,))
+    for distribution, told in (("ggx", ggx), ("beckmann", beckmann)):
+        low, high = base_error(index, distribution, alpha)
+        assert low == high
+        assert -100.0 * low == pytest.approx(told, abs=0.051)  # one digit after the point
+
+
+def test_documented_smooth_coats():
+    off = [abs(base_error(float(index))[0]) for index in np.linspace(1.02, 2.0, 25)]
+    assert max(off) < 0.00135
+    assert base_error(2.4)[0] == pytest.approx(0.028, abs=5e-4)
+
+
+def test_documented_masking():
+    a = np.geomspace(1e-4, 20.0, 20_001)
+    off = approximate_g1(a) / exact_g1(a)
+    assert 0.0030 < np.abs(off - 1.0).max() < 0.00315
+    assert 0.0062 < max(off.max() ** 2 - 1.0, 1.0 - off.min() ** 2) < 0.00635
+
+
+OTHERS = {
+    "black": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},
+    "grey": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.5] * 3}},
+    "metal": {
+        "type": "roughconductor", "alpha": 0.1, "distribution": "ggx",
+        "specular_reflectance": {"type": "rgb", "value": [0.4] * 3},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("other", OTHERS)
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_documented_blends(share, other):
+    """Mitsuba's own blend: what a mirror with this share has of its light."""
+    mi = mitsuba()
+    bsdf = mi.load_dict(
+        {
+            "type": "blendbsdf", "weight": share,
+            "bsdf_0": OTHERS[other], "bsdf_1": {"type": "conductor"},
+        }
+    )  # fmt: skip
+    rng, n = np.random.default_rng(3), 64
+    for cosine in (0.3, 1.0):
+        si = dr.zeros(mi.SurfaceInteraction3f, n)
+        si.wi = directions(np.full(n, cosine))
+        numbers = [mi.Float(rng.uniform(size=n)) for _ in range(3)]
+        drawn, weight = bsdf.sample(mi.BSDFContext(), si, numbers[0], mi.Point2f(*numbers[1:]))
+        mirrored = np.array(mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta))
+        assert mirrored.any()
+        one = dr.zeros(mi.SurfaceInteraction3f, 1)
+        one.wi, wo = directions(np.array([cosine])), directions(np.array([cosine]), np.pi)
+        alone = mi.load_dict(OTHERS[other])
+        f = float(np.array(alone.eval(mi.BSDFContext(), one, wo))[0, 0])
+        p = float(np.array(alone.pdf(mi.BSDFContext(), one, wo))[0])
+        law = (share + (1.0 - share) * f) / (share + (1.0 - share) * p)
+        # float32: some roundings, of a density that is steep where the material is glossy.
+        np.testing.assert_allclose(np.array(weight)[0][mirrored], law, rtol=1e-3)
+        if (share, other, cosine) == (0.5, "grey", 1.0):
+            whole = 0.5 * law + 0.25
+            assert whole / 0.75 - 1.0 == pytest.approx(-0.08, abs=0.005)
+
+
+def test_notes_of_blends_have_the_law():
+    materials = {
+        "m": Mirror(), "d": Diffuse(), "b": Blend(first="m", second="d", weight=0.5),
+    }  # fmt: skip
+    (note,) = notes_of(Scene(materials=materials))
+    assert "(w + (1 - w) f) / (w + (1 - w) p)" in note

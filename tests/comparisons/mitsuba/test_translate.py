@@ -1,0 +1,250 @@
+"""Every public type, translated, is what it is in ours: conventions are compared by rays."""
+
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.counterpart import trace
+from comparisons.mitsuba.scene import render
+from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
+from comparisons.rungs import geometry
+from comparisons.rungs.rays.camera import compare_camera
+from reference_rt.cameras import Orthographic, Perspective
+from reference_rt.cameras.camera import Camera
+from reference_rt.cameras.film import AnyFilter, BoxFilter, Film, GaussianFilter, TentFilter
+from reference_rt.core.model import Description
+from reference_rt.integrators import Path as PathTracing
+from reference_rt.integrators import RayCast, Whitted
+from reference_rt.lights import Constant, Point
+from reference_rt.materials import Emissive, Mirror
+from reference_rt.materials.material import Material
+from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid, Independent, Sobol
+from reference_rt.scene.build import build_tables
+from reference_rt.shapes import Mesh, Sphere
+from reference_rt.shapes.shape import Shape
+from reference_rt.util.errors import SceneError
+
+ALL_SHAPES = """
+camera: {type: perspective, eye: [0.4, 1, 6], target: [0, 0, 0], fov: 50}
+film: {width: 40, height: 30}
+shapes:
+  - {type: sphere, center: [-2, 1, 0.3], radius: 0.5,
+     transform: [{rotate: {axis: [1, 2, 3], degrees: 50}}]}
+  - {type: sphere, center: [0, 1, 0], radius: 0.3,
+     transform: [{matrix: [[-2, 0, 0, 0], [0, 2, 0, -0.8], [0, 0, 2, 0]]}]}
+  - {type: rectangle,
+     transform: [{rotate: {axis: [1, 0.2, 0], degrees: -60}}, {translate: [2, 1, 0]}]}
+  - {type: rectangle, transform: [{matrix: [[0.9, 0.4, 0, -2], [0, 0.7, 0, -1], [0, 0.2, -1, 0]]}]}
+  - {type: box,
+     transform: [{scale: [0.3, 0.5, 0.2]}, {rotate: {axis: [1, 1, 0], degrees: 40}},
+       {translate: [0, -1, 0]}]}
+  - {type: box, transform: [{matrix: [[0.3, 0.1, 0, 1.5], [0, -0.4, 0.1, -1.2], [0, 0, 0.3, 1]]}]}
+  - {type: triangle, v0: [1, 0, 2], v1: [2, 0.3, 2], v2: [1.2, 1, 1.5]}
+  - {type: triangle, v0: [-1, 0, 2], v1: [-1.8, 0.3, 2], v2: [-1.2, 1, 1.5],
+     transform: [{scale: [-1, 1, 1]}, {translate: [-2.4, 0, 0]}]}
+  - {type: mesh, file: roof.obj, transform: [{scale: [1, -1, 1]}, {translate: [0, 0.9, 1.5]}]}
+  - {type: mesh, file: roof.obj, face_normals: true, transform: [{translate: [0, -2.2, 1]}]}
+  - {type: mesh, file: bare.obj, transform: [{translate: [1, -0.7, 2]}]}
+"""
+
+ROOF = """
+v -0.7 0 0
+v 0.7 0 0
+v 0.7 0.5 -0.4
+v -0.7 0.5 -0.4
+vn 0 -0.5 1
+vn 0.3 0 1
+vn 0 0.6 1
+vn -0.2 0.1 1
+f 1//1 2//2 3//3
+f 1//1 3//3 4//4
+"""
+
+BARE = """
+v -0.4 -0.2 0
+v 0.4 -0.2 0
+v 0 0.3 0.2
+v 0 0 -0.5
+f 1 2 3
+f 1 4 2
+f 2 4 3
+f 3 4 1
+"""
+
+
+@pytest.fixture(scope="module")
+def all_shapes(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    folder = tmp_path_factory.mktemp("meshes")
+    (folder / "roof.obj").write_text(ROOF)
+    (folder / "bare.obj").write_text(BARE)
+    return Scene.parse(ALL_SHAPES, folder=folder)
+
+
+def test_every_shape_is_where_ours_is(all_shapes: Scene) -> None:
+    twin = load(all_shapes)
+    tier = geometry(all_shapes, build_tables(all_shapes), twin, pixels=4_000)
+    assert tier.status == "agree", tier.reason
+    # The outcome says something about a shape only where rays met it.
+    rng = np.random.default_rng(1)
+    o = rng.uniform(-4.0, 4.0, (20_000, 3))
+    d = rng.uniform(-2.0, 2.0, (20_000, 3)) - o
+    seen = np.unique(trace(twin, o, d).shape)
+    assert seen.tolist() == list(range(-1, len(all_shapes.shapes)))
+
+
+def test_shapes_keep_their_index_beyond_ten() -> None:
+    balls = tuple(Sphere(center=(3.0 * i, 0.0, 0.0)) for i in range(12))
+    o = np.array([[3.0 * i, 0.0, 5.0] for i in range(12)])
+    hits = trace(load(Scene(shapes=balls)), o, np.tile([0.0, 0.0, -1.0], (12, 1)))
+    assert hits.shape.tolist() == list(range(12))
+    np.testing.assert_allclose(hits.t, 4.0, rtol=1e-6)
+    np.testing.assert_allclose(hits.n, np.tile([0.0, 0.0, 1.0], (12, 1)), atol=1e-6)
+
+
+def test_a_miss_has_no_shape() -> None:
+    hits = trace(load(Scene(shapes=(Sphere(),))), np.array([[5.0, 0, 5]]), np.array([[0.0, 0, -1]]))
+    assert (hits.t[0], hits.shape[0], hits.primitive[0]) == (np.inf, -1, -1)
+    assert not hits.p.any()
+
+
+TILTED = Perspective(eye=(3.0, 2.0, -5.0), target=(0.3, 0.2, 0.1), up=(0.1, 1.0, 0.2), fov=70.0)
+
+CAMERAS: tuple[Perspective | Orthographic, ...] = (
+    *(TILTED.model_copy(update={"fov_axis": axis}) for axis in ("x", "y", "smaller", "larger")),
+    Perspective(eye=(0.0, 0.0, 0.0), target=(0.0, -1.0, 0.0), up=(1.0, 0.0, 0.0), fov=150.0),
+    Perspective(eye=(-40.0, 3.0, 9.0), fov=0.5),
+    Orthographic(eye=(3.0, 2.0, -5.0), target=(0.3, 0.2, 0.1), up=(0.1, 1.0, 0.2), width=7.0),
+    Orthographic(eye=(0.0, 9.0, 0.0), up=(0.0, 0.0, -1.0), width=0.01),
+)
+
+
+@pytest.mark.parametrize("size", [(31, 17), (16, 29)])
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_cameras_send_the_same_rays(
+    camera: Perspective | Orthographic, size: tuple[int, int]
+) -> None:
+    scene = Scene(camera=camera, film=Film(width=size[0], height=size[1]), shapes=(Sphere(),))
+    found = compare_camera(scene, load(scene), 10_000)
+    assert found.problem == ""
+    assert found.numbers["max_camera_direction_error_over_bound"] <= 1.0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"fov": 70.01}, {"fov_axis": "y"}, {"up": (0.1001, 1.0, 0.2)}, {"eye": (3.0, 2.0, -5.0001)}],
+)
+def test_another_camera_is_told_apart(change: dict[str, object]) -> None:
+    scene = Scene(camera=TILTED, film=Film(width=31, height=17), shapes=(Sphere(),))
+    other = scene.changed(camera=TILTED.model_copy(update=change))
+    assert "the camera" in compare_camera(scene, load(other), 10_000).problem
+
+
+def test_film_samplers_and_integrators() -> None:
+    def parts(**changes: object) -> tuple[dict[str, object], dict[str, object]]:
+        translated = to_mitsuba(Scene(shapes=(Sphere(),)).changed(**changes))
+        return translated["sensor"], translated.get("integrator", {})
+
+    sensor, integrator = parts(sampler=Sobol(spp=3), integrator=PathTracing(rr_depth=9))
+    assert sensor["sampler"] == {"type": "independent", "sample_count": 3}
+    assert integrator == {"type": "path", "max_depth": -1, "rr_depth": 9}
+    sensor, integrator = parts(sampler=Independent(spp=5), integrator=PathTracing(max_depth=4))
+    assert sensor["sampler"] == {"type": "independent", "sample_count": 5}
+    assert integrator["max_depth"] == 4
+    sensor, integrator = parts(sampler=Grid(spp=9), integrator=Whitted(max_depth=2))
+    assert sensor["sampler"] == {"type": "stratified", "jitter": False, "sample_count": 9}
+    assert (integrator["type"], integrator["max_depth"]) == ("whitted", 2)
+    assert parts(integrator=RayCast())[1] == {}
+
+
+@pytest.mark.parametrize("film_filter", [BoxFilter(), TentFilter(radius=1.5), GaussianFilter()])
+def test_filters_load_and_wide_ones_sample_beyond_the_border(film_filter: AnyFilter) -> None:
+    film = Film(width=8, height=4, filter=film_filter)
+    scene = Scene(film=film, shapes=(Sphere(),), lights=(Constant(radiance=(2.0, 2.0, 2.0)),))
+    mi_film = load(scene).sensors()[0].film()
+    assert mi_film.sample_border() == (film_filter != BoxFilter())
+    picture = render(load(scene).mi_scene, 1, 4).pictures
+    assert picture.shape == (1, 4, 8, 3)
+
+
+def test_replicates_differ_by_seed_alone() -> None:
+    scene = Scene(
+        film=Film(width=8, height=8), shapes=(Sphere(),), lights=(Constant(radiance=(1.0,) * 3),)
+    )
+    mi_scene = load(scene).mi_scene
+    first, again = render(mi_scene, 2, 2, seed=5), render(mi_scene, 2, 2, seed=5)
+    np.testing.assert_array_equal(first.pictures, again.pictures)
+    assert np.any(first.pictures[0] != first.pictures[1])
+    assert first.pictures.dtype == np.float64
+    assert (first.seconds > 0.0).all()
+
+
+def test_emitters() -> None:
+    scene = Scene(
+        materials={
+            "lamp": Emissive(radiance=(1.0, 2.0, 3.0), base="m"),
+            "dark": Emissive(radiance=(4.0, 5.0, 6.0)),
+            "m": Mirror(reflectance=(0.1, 0.2, 0.3)),
+        },
+        shapes=(Sphere(material="lamp"), Sphere(material="dark", center=(5.0, 0.0, 0.0))),
+        lights=(Point(position=(1.0, 2.0, 3.0), intensity=(7.0, 8.0, 9.0)),),
+    )
+    translated = to_mitsuba(scene)
+    assert translated["shape_0"]["emitter"]["radiance"]["value"] == [1.0, 2.0, 3.0]
+    assert translated["shape_0"]["bsdf"]["specular_reflectance"]["value"] == [0.1, 0.2, 0.3]
+    assert translated["shape_1"]["bsdf"]["reflectance"]["value"] == [0.0, 0.0, 0.0]
+    assert translated["light_0"]["intensity"]["value"] == [7.0, 8.0, 9.0]
+    assert {e.id() for e in load(scene).mi_scene.emitters()} >= {"light_0"}
+
+
+class Teapot(Shape):
+    type: str = "teapot"
+
+
+class Velvet(Material):
+    type: str = "velvet"
+
+
+class Fisheye(Camera):
+    type: str = "fisheye"
+
+
+class Sun(Description):
+    deterministic: ClassVar[bool] = True
+    type: str = "sun"
+
+
+class Lanczos(Description):
+    type: str = "lanczos"
+
+
+@pytest.mark.parametrize(
+    ("part", "changes"),
+    [
+        (Teapot(), {"shapes": (Teapot(),)}),
+        (Velvet(), {"materials": {"v": Velvet()}, "shapes": (Sphere(material="v"),)}),
+        (Fisheye(), {"camera": Fisheye()}),
+        (Sun(), {"lights": (Sun(),)}),
+        (Lanczos(), {"film": Film().model_copy(update={"filter": Lanczos()})}),
+        (Sun(), {"integrator": Sun()}),
+        (Sun(), {"sampler": Sun()}),
+    ],
+)
+def test_a_type_without_translation_is_named(part: Description, changes: dict[str, object]) -> None:
+    scene = Scene.model_construct(**(dict(Scene()) | changes))
+    scene._folder, scene._source = Path(), None
+    with pytest.raises(UntranslatableError, match=type(part).__name__) as caught:
+        to_mitsuba(scene)
+    assert caught.value.exit_code == 4
+
+
+def test_a_missing_mesh_is_an_error_of_the_scene() -> None:
+    with pytest.raises(SceneError, match=r"shapes\[0\].*nowhere.obj"):
+        to_mitsuba(Scene(shapes=(Mesh(file="nowhere.obj"),)))
+
+
+def test_the_plugin_is_registered() -> None:
+    assert mitsuba().load_dict({"type": "whitted", "max_depth": 3}).max_depth == 3

@@ -1,0 +1,79 @@
+"""Which rung names the verdict, and what a run's exit code says."""
+
+import pytest
+
+from comparisons.results.case import Case, Metrics, Tier
+from comparisons.results.verdict import decide, exit_code
+
+METRICS = Metrics(1.0, 0.0, 60.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0)
+
+
+def tiers(**statuses):
+    return [Tier(name, status, f"{name} says {status}") for name, status in statuses.items()]
+
+
+@pytest.mark.parametrize(
+    ("statuses", "verdict", "rung"),
+    [
+        ({"statistics": "differ", "geometry": "differ", "direct": "agree"}, "differ", "geometry"),
+        ({"geometry": "agree", "direct": "differ", "whitted": "differ"}, "differ", "direct"),
+        ({"geometry": "differ", "statistics": "invalid"}, "invalid", "statistics"),
+        ({"geometry": "inconclusive", "statistics": "differ"}, "differ", "statistics"),
+        ({"geometry": "reference-limited", "statistics": "differ"}, "differ", "statistics"),
+        ({"geometry": "not-comparable", "direct": "inconclusive"}, "inconclusive", "direct"),
+        ({"geometry": "agree", "direct": "not-comparable"}, "not-comparable", "direct"),
+        (
+            {"geometry": "reference-limited", "direct": "inconclusive"},
+            "inconclusive",
+            "direct",
+        ),
+        ({"geometry": "reference-limited", "direct": "agree"}, "reference-limited", "geometry"),
+    ],
+)
+def test_gravest_status_then_first_rung(statuses, verdict, rung):
+    assert decide(tiers(**statuses), METRICS) == (verdict, f"{rung}: {rung} says {verdict}")
+
+
+def test_agreement_needs_a_rung_that_agreed():
+    ladder = tiers(geometry="agree", whitted="not-applicable", statistics="agree")
+    assert decide(ladder, None) == ("agree", "geometry, statistics: statistics says agree")
+    assert decide(tiers(geometry="not-applicable"), METRICS)[0] == "not-comparable"
+    assert decide([], METRICS)[0] == "not-comparable"
+
+
+def test_pixels_not_finite_go_before_everything():
+    nan = float("nan")
+    metrics = Metrics(nan, nan, nan, nan, nan, (nan, nan, nan), 3)
+    verdict, reason = decide(tiers(geometry="differ", statistics="agree"), metrics)
+    assert (verdict, reason) == ("invalid", "images: 3 pixels not finite")
+    assert decide(tiers(direct="invalid"), metrics)[1] == "direct: direct says invalid"
+
+
+def test_a_rung_of_unknown_name_is_refused():
+    with pytest.raises(ValueError, match="sheen"):
+        decide([Tier("sheen", "differ", "")], METRICS)
+
+
+def case(verdict, **statuses):
+    return Case("scene", verdict, "", tuple(tiers(**statuses)), METRICS, {})
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "code"),
+    [
+        (["agree", "reference-limited"], 0),
+        (["agree", "differ"], 1),
+        (["agree", "inconclusive"], 1),
+        (["agree", "not-comparable"], 1),
+        (["agree", "invalid"], 1),
+        ([], 4),
+    ],
+)
+def test_exit_code(verdicts, code):
+    assert exit_code([case(verdict, geometry="agree") for verdict in verdicts]) == code
+
+
+def test_exit_code_of_a_case_that_could_not_run():
+    ran = [case("agree", direct="agree"), case("differ", direct="differ")]
+    assert exit_code(ran) == 1
+    assert exit_code([*ran, case("invalid", run="invalid")]) == 4

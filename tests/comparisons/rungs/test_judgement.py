@@ -1,0 +1,126 @@
+"""Whose fault a mismatch is: faults planted in ours, and in Mitsuba's scene, are told apart."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from comparisons.geometry.exact.referee import Referee
+from comparisons.mitsuba.counterpart import trace
+from comparisons.mitsuba.translate import load
+from comparisons.rungs import geometry
+from comparisons.rungs.rays.adversarial_rays import aimed_rays
+from comparisons.rungs.rays.bounds import ShapeSizes
+from comparisons.rungs.rays.judgement import MOST_JUDGED, judged
+from comparisons.rungs.rays.rays import Rays, mixed_rays
+from reference_rt.rendering import query
+from reference_rt.rendering.query import Intersections
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+
+TEXT = """
+camera: {type: perspective, eye: [1, 2, 7], target: [0, 0, 0], fov: 40}
+film: {width: 40, height: 30}
+integrator: {type: ray_cast}
+groups:
+  pair: [{type: sphere, radius: 0.4}, {type: box, transform: [{scale: 0.3}, {translate: [0, 1, 0]}]}]
+shapes:
+  - {type: rectangle, transform: [{scale: 3}, {translate: [0, 0, -1]}]}
+  - {type: instance, group: pair, transform: [{scale: [1, -1.4, 1]}, {translate: [1.5, 0, 0]}]}
+  - {type: difference, of: [{type: box}, {type: sphere, radius: 1.2}], transform: [{translate: [-1, 0, 0]}]}
+  - {type: triangle, v0: [-2, 1.5, 0], v1: [2, 1.5, 0], v2: [0, 2.5, 0.5]}
+"""  # noqa: E501
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return Scene.parse(TEXT)
+
+
+def test_ours_and_exact_arithmetic_agree(scene: Scene) -> None:
+    """Every random ray, and every ray that is aimed at an edge."""
+    sizes = ShapeSizes(scene)
+    tables = build_tables(scene)
+    for rays in (mixed_rays(scene, tables, sizes, 200, 1), aimed_rays(tables, sizes, 300, 1)):
+        ours = query.intersect(tables, rays.o, rays.d)
+        truths = Referee(sizes).decide(rays.o, rays.d)
+        right = [truth.agrees(ours, k, 1e-9) for k, truth in enumerate(truths)]
+        assert all(right)
+        assert np.count_nonzero(ours.shape >= 0) > 100
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("radius: 1.2", "radius: 1.201"),
+        ("radius: 0.4", "radius: 0.401"),
+        ("-1.4", "-1.401"),
+        ("v1: [2, 1.5, 0]", "v1: [2, 1.501, 0]"),
+    ],
+)
+def test_a_fault_of_ours_is_ours(scene: Scene, right: str, wrong: str) -> None:
+    assert TEXT.count(right) == 1
+    faulty = Scene.parse(TEXT.replace(right, wrong))
+    # Our tables are of another scene than is asked for.
+    tier = geometry(scene, build_tables(faulty), load(scene), pixels=300)
+    assert tier.status == "differ"
+    assert tier.numbers["decided_ours"] > 0
+    # But for rays at edges that Mitsuba does get wrong.
+    assert tier.numbers["decided_mitsuba"] < 0.2 * tier.numbers["decided_ours"]
+    assert "by our fault" in tier.reason
+    # And the other way round it is Mitsuba's: too many rays for its rounding.
+    tier = geometry(scene, build_tables(scene), load(faulty), pixels=300)
+    assert tier.status == "differ"
+    assert tier.numbers["decided_ours"] == 0
+    assert tier.numbers["decided_mitsuba"] > 0
+    assert tier.numbers["mitsuba_wrong"]
+
+
+def test_answers_that_are_made_up_are_seen_through(scene: Scene) -> None:
+    sizes = ShapeSizes(scene)
+    tables = build_tables(scene)
+    referee = Referee(sizes)
+    rays = mixed_rays(scene, tables, sizes, 40, 2)
+    theirs = trace(load(scene), rays.o, rays.d)
+    hit = np.flatnonzero(theirs.shape >= 0)[:30]
+
+    def verdict(ours: Intersections, numbers: Any = hit) -> Any:
+        return judged(referee, rays, ours, theirs, numbers)
+
+    ours = query.intersect(tables, rays.o, rays.d)
+    assert len(verdict(ours).undecided) == len(hit)  # both are right
+    for name, value in (("shape", 0), ("part", 7), ("instance", 3), ("primitive", 9)):
+        column = getattr(ours, name).copy()
+        column[hit] = np.where(column[hit] == value, value + 1, value)
+        assert len(verdict(dataclasses.replace(ours, **{name: column})).ours) == len(hit)
+    assert len(verdict(dataclasses.replace(ours, t=ours.t * (1.0 + 1e-5))).ours) == len(hit)
+    missed = dataclasses.replace(ours, shape=np.full_like(ours.shape, -1))
+    assert len(verdict(missed).ours) == len(hit)
+    many = np.repeat(hit, MOST_JUDGED)
+    assert len(verdict(ours, many).undecided) == len(many)
+
+
+def test_aimed_rays_are_at_edges(scene: Scene) -> None:
+    """Moved by the largest offset that they are given, most find something else."""
+    sizes = ShapeSizes(scene)
+    tables = build_tables(scene)
+    rays = aimed_rays(tables, sizes, 2000, 3)
+    assert len(rays.o) == 2000
+    np.testing.assert_array_equal(rays.o, rays.o.astype(np.float32))
+    changes = np.zeros(2000, bool)
+    before = query.intersect(tables, rays.o, rays.d)
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        d = rays.d + 0.02 * rng.normal(size=(2000, 3))
+        after = query.intersect(tables, rays.o, d)
+        for name in ("shape", "instance", "part", "primitive"):
+            changes |= getattr(after, name) != getattr(before, name)
+    # The corners that are aimed at may be hidden behind something else.
+    assert changes.mean() > 0.7
+    plain = mixed_rays(scene, tables, sizes, 700, 3)
+    unaimed = Rays(plain.o[:2000], plain.d[:2000])
+    before = query.intersect(tables, unaimed.o, unaimed.d)
+    d = unaimed.d + 0.02 * rng.normal(size=(2000, 3))
+    after = query.intersect(tables, unaimed.o, d)
+    assert (before.shape != after.shape).mean() < 0.2

@@ -1,0 +1,124 @@
+"""Suites whose processes fail, hang or are interrupted."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from suite_runs import processes, run_in, scenes
+
+from comparisons.compare.budget import Budget
+from comparisons.results.record import read_case, read_record
+from comparisons.results.verdict import exit_code
+from comparisons.runs.processes import pool
+from comparisons.suites import run
+from comparisons.suites.archive import read_archive
+from comparisons.suites.worker import Request
+from reference_rt.util.errors import ReferenceUnavailableError
+
+pytestmark = pytest.mark.usefixtures("fake_runners")
+
+
+def test_what_fails_is_told_and_the_others_go_on(tmp_path):
+    names = ("a", "crash", "exit", "print", "raise", "scene_error", "z")
+    folder, out = scenes(tmp_path / "scenes", *names), tmp_path / "out"
+    found = run_in(out, folder)
+    assert [case.scene for case in found.cases] == list(names)
+    reasons = {case.scene: case.reason for case in found.cases if case.verdict == "invalid"}
+    assert set(reasons) == {"crash", "exit", "raise", "scene_error"}
+    assert reasons["crash"].startswith("run: the process died by signal 11 (SIGSEGV)")
+    assert "Segmentation fault" in (out / "cases" / "crash" / run.LOG).read_text()
+    assert reasons["exit"].startswith("run: the process ended with code 7 in the midst of the case")
+    assert "it said: the last word" in reasons["exit"]
+    assert reasons["raise"].startswith("run: KeyError: 'no such\\nthing'")
+    assert "Traceback" in (out / "cases" / "raise" / run.LOG).read_text()
+    assert reasons["scene_error"] == "scene: x.yaml:3: is not what it must be"
+    assert exit_code(found.cases) == 4  # some could not run
+    for case in found.cases:
+        rung = "scene" if case.scene == "scene_error" else "run"
+        assert case.tiers[0].name == (rung if case.scene in reasons else "geometry")
+    # What could not be run is run again; the rest is not.
+    again = run_in(out, folder)
+    pids = processes_of(found, "agree")
+    assert pids == processes_of(again, "agree")
+    assert read_record(out / "cases" / "crash").key == ""
+
+
+def processes_of(found, verdict):
+    return [c.tiers[0].numbers["process"] for c in found.cases if c.verdict == verdict]
+
+
+def test_a_process_that_hangs_is_ended(tmp_path):
+    folder = scenes(tmp_path / "scenes", "a", "hang", "z")
+    found = run_in(tmp_path / "out", folder, "about: x\ncase_seconds: 5\n", jobs=2)
+    assert [case.verdict for case in found.cases] == ["agree", "invalid", "agree"]
+    assert found.cases[1].reason.startswith("run: took longer than 5 s")
+
+
+def test_processes_are_shared_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(pool, "MOST_CASES", 2)
+    names = [f"slow{k}" for k in range(2)] + [f"z{k}" for k in range(3)]
+    folder = scenes(tmp_path / "scenes", *names)
+    found = run_in(tmp_path / "out", folder, jobs=2, threads=3)
+    pids = list(processes(found).values())
+    assert pids[0] != pids[1]
+    assert max(pids.count(pid) for pid in pids) == 2
+    assert {case.tiers[0].numbers["threads"] for case in found.cases} == {3}
+
+
+def test_where_no_case_can_run_nothing_is_said_of_any(tmp_path):
+    folder = scenes(tmp_path / "scenes", "a", "unavailable")
+    with pytest.raises(ReferenceUnavailableError, match="no reference here"):
+        run_in(tmp_path / "out", folder)
+    request = Request(name="a", scene=folder / "a.yaml", budget=Budget(), folder=tmp_path)
+    worker = ("comparisons.suites.worker", "--runner", "no_such_module:f")
+    with pytest.raises(ReferenceUnavailableError, match="no_such_module"):
+        list(pool.run([request], 1, 60.0, lambda *_: None, worker))
+
+
+INTERRUPTED = """
+import signal
+import sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are deaf to it
+from pathlib import Path
+from comparisons.mitsuba.backend import Backend
+from comparisons.suites import run, suite
+run.backend = lambda: Backend("llvm_ad_rgb", "0", "", None)
+run.provenance = lambda **more: {"mitsuba": "none", **more}
+source = suite.Source(suite.Suite(about="x"), "test", "test.yaml", "test.yaml", "")
+planned = suite.plan(source, Path(sys.argv[1]))
+run.run_suite(source, planned, run.Options(Path(sys.argv[2]), runner="suite_runners:by_name"))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_keeps_what_is_done(tmp_path, number):
+    folder, out = scenes(tmp_path / "scenes", "a", "hang"), tmp_path / "out"
+    command = [sys.executable, "-c", INTERRUPTED, str(folder), str(out)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        deadline = time.monotonic() + 60.0
+        while not (out / "cases" / "a" / "case.json").exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        time.sleep(0.5)  # until the next case has begun
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        workers = children.read_text().split() if children.exists() else []
+        process.send_signal(number)
+        process.communicate(timeout=120.0)
+    finally:
+        process.kill()
+    assert process.returncode != 0
+    assert read_case(out / "cases" / "a").verdict == "agree"
+    assert not (out / "cases" / "hang").exists()
+    assert [case["scene"] for case in json.loads((out / "results.json").read_text())["cases"]] == [
+        "a"
+    ]
+    for worker in workers:
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(worker), 0)
+    assert [case.scene for case in read_archive(out).cases] == ["a"]

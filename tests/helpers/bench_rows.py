@@ -1,0 +1,17 @@
+"""Rows of a benchmark with made-up times, for its tests."""
+
+from comparisons.experiments.bench import table
+from comparisons.experiments.bench.machine import machine
+from comparisons.experiments.bench.row import Row, against
+
+FIELDS = {"name", "ours", "peer", "peer_name", "ratio", "goal", "spread", "unit", "better", "met"}
+
+
+def made_up(name: str = "one", ratio: float = 0.5, goal: float = 0.8) -> Row:
+    """A row whose measured times have exactly this ratio."""
+    return against(name, f"the row {name}", [ratio] * 7, ("another", [1.0] * 7), goal)
+
+
+def a_table(rows: list[Row]) -> str:
+    """The table of these rows."""
+    return table.markdown(rows, machine(), {"cold": "no time"})

@@ -1,0 +1,91 @@
+"""Cases for the page, and what a browser shows of it: for its tests."""
+
+import numpy as np
+
+from comparisons.results.case import Case, Metrics, Tier
+from comparisons.statistics.metrics import encode
+
+SIZE = 12, 8
+
+
+def case(images, scene="box", verdict="differ", reason="why", **more):
+    metrics = Metrics(0.9, 0.1, 30.0, 0.5, 0.25, (0.0, 0.0, -0.01), 0)
+    tiers = (Tier("geometry", "agree", "holds", {"rays": 7}),)
+    return Case(scene, verdict, reason, tiers, metrics, {"ours": {"load": 1.0}}, images, **more)
+
+
+def grey(value, size=SIZE):
+    return np.full((size[1], size[0], 3), value)
+
+
+def pixel(page, kind, x, y, number=1):
+    """The colour on a canvas, once the case is drawn."""
+    page.wait_for_selector(f"#case-{number}[data-drawn]", state="attached")
+    return tuple(
+        page.evaluate(
+            """([selector, x, y]) => [...document.querySelector(selector)
+                .getContext("2d").getImageData(x, y, 1, 1).data].slice(0, 3)""",
+            [f"#case-{number} .{kind} canvas", x, y],
+        )
+    )
+
+
+def drawn(page, **look):
+    """Wait until the first case is drawn so."""
+    page.wait_for_function(
+        """(look) => {
+            const drawn = document.querySelector("#case-1").dataset.drawn;
+            return drawn && Object.entries(look).every(([k, v]) => JSON.parse(drawn)[k] === v);
+        }""",
+        arg=look,
+    )
+
+
+def read(page, row, number=1):
+    """The numbers at the cursor, as text."""
+    return page.locator(f"#case-{number} [data-row={row}] td").all_text_contents()
+
+
+def shown(page):
+    """Kinds of the pictures of the first case that show."""
+    figures = page.locator("#case-1 figure")
+    return [
+        figures.nth(i).get_attribute("data-kind")
+        for i in range(figures.count())
+        if figures.nth(i).is_visible()
+    ]
+
+
+def display(radiance, white=1.0):
+    """The sRGB value that a radiance has on the page."""
+    return round(255 * float(encode(np.array(radiance), white)))
+
+
+def point(page, x, y, kind="candidate", size=SIZE, number=1):
+    """Put the mouse on a pixel of an unzoomed picture."""
+    pixel(page, kind, 0, 0, number)
+    frame = page.locator(f"#case-{number} .{kind} .frame")
+    frame.scroll_into_view_if_needed()
+    box = frame.bounding_box()
+    step = box["width"] / size[0], box["height"] / size[1]
+    page.mouse.move(box["x"] + (x + 0.5) * step[0], box["y"] + (y + 0.5) * step[1])
+
+
+def visible_part(page, kind="candidate"):
+    """Left, top, width and height of what shows of a picture, in its pixels."""
+    frame = page.locator(f".{kind} .frame").bounding_box()
+    canvas = page.locator(f".{kind} canvas").bounding_box()
+    scale = SIZE[0] / canvas["width"], SIZE[1] / canvas["height"]
+    return (
+        (frame["x"] - canvas["x"]) * scale[0],
+        (frame["y"] - canvas["y"]) * scale[1],
+        frame["width"] * scale[0],
+        frame["height"] * scale[1],
+    )
+
+
+def centre(page, x, y):
+    box = page.locator("#case-1 .candidate .frame").bounding_box()
+    return box["x"] + (x + 0.5) * box["width"] / SIZE[0], box["y"] + (y + 0.5) * box[
+        "height"
+    ] / SIZE[1]

@@ -1,0 +1,107 @@
+"""The layout: folders on floors, no import from a lower floor to a higher one, no import circle."""
+
+import ast
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+FLOORS = {
+    "reference_rt": (
+        *("util", "jit", "core", "sampling", "textures", "shapes", "cameras", "accel"),
+        *("materials", "lights", "integrators", "scene", "rendering", "textbook", "cli"),
+    ),
+    "comparisons": (
+        *("results", "geometry", "statistics", "mitsuba", "runs", "rungs", "report", "compare"),
+        *("gate", "suites", "experiments", "commands"),
+    ),
+}
+"""The folders of each package from the lowest to the highest: a file may import files of its own
+folder and of folders before it."""
+
+LOOSE = {
+    "reference_rt": {"__init__.py", "query.py", "transform.py", "methods.py"},
+    "comparisons": {"__init__.py"},
+}
+"""Files beside the folders: the package's public face, which imports from any folder."""
+
+LONGEST = 320
+"""Lines of a file: about as much as can be kept in mind at once."""
+
+SOURCES = {
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+    for package in FLOORS
+    for path in sorted((ROOT / package).rglob("*.py"))
+}
+FILES = [*SOURCES.values(), *sorted((ROOT / "tests").rglob("*.py"))]
+
+
+def imports_of(module: str) -> set[str]:
+    """The modules of the project that a module imports, anywhere in it: inside functions and under
+    TYPE_CHECKING too."""
+    found = set()
+    for node in ast.walk(ast.parse(SOURCES[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                found.add(inner if inner in SOURCES else str(node.module))
+    return (found & SOURCES.keys()) - {module}
+
+
+IMPORTS = {module: imports_of(module) for module in SOURCES}
+
+
+def floor(module: str) -> int | None:
+    """The number of its folder from below; none for the package's own files."""
+    package, _, rest = module.partition(".")
+    folder = rest.partition(".")[0]
+    return FLOORS[package].index(folder) if folder in FLOORS[package] else None
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_every_folder_has_its_floor(package):
+    folders = {path.parent.name for path in (ROOT / package).glob("*/__init__.py")}
+    assert folders == set(FLOORS[package])
+    assert {path.name for path in (ROOT / package).glob("*.py")} == LOOSE[package]
+
+
+def test_no_import_circle():
+    try:
+        TopologicalSorter(IMPORTS).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_imports_go_down():
+    upwards = [
+        f"{module} imports {other}"
+        for module, others in IMPORTS.items()
+        for other in sorted(others)
+        if module.partition(".")[0] == other.partition(".")[0]
+        and (here := floor(module)) is not None
+        and ((there := floor(other)) is None or there > here)
+    ]
+    assert upwards == []
+
+
+def test_the_check_sees_imports_inside_functions_and_for_types():
+    text = "def f():\n    from a.b import c\nif TYPE_CHECKING:\n    import d.e\n"
+    nodes = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Import | ast.ImportFrom)]
+    assert len(nodes) == 2
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_files_are_short_and_say_what_they_hold(path):
+    text = path.read_text(encoding="utf-8")
+    assert text.count("\n") <= LONGEST
+    assert ast.get_docstring(ast.parse(text))
+
+
+def test_tests_mirror_the_packages():
+    folders = {p.parent.relative_to(ROOT / "tests") for p in (ROOT / "tests").rglob("test_*.py")}
+    mirrored = {Path(package, folder) for package, names in FLOORS.items() for folder in names}
+    assert folders <= mirrored | {Path("project")}

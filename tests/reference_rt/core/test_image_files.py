@@ -1,0 +1,212 @@
+"""Images for textures: what is read of every kind of file, and what is said of every fault."""
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import reference_rt as rt
+from reference_rt.core.exr import write_exr
+from reference_rt.rendering.image import srgb
+from reference_rt.scene.build import build_tables
+from reference_rt.textures.bitmap import lookup
+from reference_rt.textures.image_file import linear, read_image
+
+IMAGE = np.random.default_rng(14).integers(0, 256, (5, 7, 3), dtype=np.uint8)
+
+
+def png(width, height, depth, colour_type, rows):
+    """The bytes of a .png."""
+
+    def chunk(kind, data):
+        body = kind + data
+        return struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))
+
+    header = struct.pack(">IIBBBBB", width, height, depth, colour_type, 0, 0, 0)
+    data = zlib.compress(b"".join(b"\0" + row for row in rows))
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data)
+            + chunk(b"IEND", b""))  # fmt: skip
+
+
+def test_srgb_curve_is_undone():
+    codes = np.arange(256) / 255.0
+    assert linear(np.array([0.0, 1.0])).tolist() == [0.0, 1.0]
+    # The standard's two curves are inverse to its 8 digits; where they join, to 1e-7.
+    assert np.allclose(srgb(linear(codes)), codes, rtol=0, atol=2e-8)
+    assert linear(np.array(0.5)) == pytest.approx(((0.5 + 0.055) / 1.055) ** 2.4, rel=1e-15)
+    assert linear(np.array(0.04)) == 0.04 / 12.92
+
+
+def test_encodings(tmp_path):
+    grey = np.full((2, 2, 3), 128, np.uint8)
+    Image.fromarray(grey).save(tmp_path / "a.png")
+    write_exr(tmp_path / "a.exr", {c: np.full((2, 2), 0.5) for c in "RGB"}, {})
+    decoded = float(linear(np.array(128 / 255)))
+    for name, encoding, expected in (
+        ("a.png", "auto", decoded),
+        ("a.png", "srgb", decoded),
+        ("a.png", "raw", 128 / 255),
+        ("a.exr", "auto", 0.5),
+        ("a.exr", "raw", 0.5),
+        ("a.exr", "srgb", float(linear(np.array(0.5)))),
+    ):
+        values = read_image(tmp_path / name, encoding)
+        assert values.shape == (2, 2, 3)
+        assert values.dtype == np.float64
+        assert (values == expected).all(), (name, encoding)
+
+
+def test_modes_of_images(tmp_path):
+    """Grey, with opacity, of a palette, of one bit: what they show, without the opacity."""
+    rgb = Image.fromarray(IMAGE)
+    rgba = rgb.copy()
+    rgba.putalpha(Image.fromarray(IMAGE[..., 0]))
+    grey = Image.fromarray(IMAGE[..., 1])
+    two = Image.fromarray(np.where(IMAGE[..., 1] > 127, 255, 0).astype(np.uint8)).convert("1")
+    palette = Image.new("P", (2, 1))
+    palette.putpalette([255, 0, 0, 0, 255, 0])
+    palette.putpixel((1, 0), 1)
+    expected = {
+        "rgba": (rgba, IMAGE / 255),
+        "grey": (grey, np.repeat(IMAGE[..., 1:2] / 255, 3, axis=-1)),
+        "two": (two, np.repeat(IMAGE[..., 1:2] > 127, 3, axis=-1).astype(float)),
+        "palette": (palette, np.array([[[1.0, 0, 0], [0, 1, 0]]])),
+    }
+    for name, (image, values) in expected.items():
+        options = {"transparency": b"\x00\xff"} if name == "palette" else {}
+        image.save(tmp_path / f"{name}.png", **options)
+        assert np.array_equal(read_image(tmp_path / f"{name}.png", "raw"), values), name
+
+
+def test_sixteen_bits(tmp_path):
+    """All bits of grey and of colours, of which Pillow by itself would drop half."""
+    values = np.array([[0, 1, 256, 65535]], ">u2")
+    (tmp_path / "grey.png").write_bytes(png(4, 1, 16, 0, [values.tobytes()]))
+    read = read_image(tmp_path / "grey.png", "raw")
+    assert np.array_equal(read[0, :, 1], values[0] / 65535.0)
+    for colour_type, channels in ((2, 3), (4, 2), (6, 4)):
+        rows = [np.full((2, channels), 257, ">u2").tobytes()]
+        (tmp_path / "colour.png").write_bytes(png(2, 1, 16, colour_type, rows))
+        assert (read_image(tmp_path / "colour.png", "raw") == 257 / 65535).all()
+
+
+def test_exr_channels(tmp_path):
+    rng = np.random.default_rng(19)
+    rgb = rng.uniform(0, 1e4, (3, 4, 6)).astype(np.float32)
+    write_exr(tmp_path / "a.exr", dict(zip("RGB", rgb, strict=True)) | {"A": rgb[0]}, {})
+    assert np.array_equal(read_image(tmp_path / "a.exr", "auto"), np.moveaxis(rgb, 0, -1))
+    write_exr(tmp_path / "y.exr", {"Y": rgb[1]}, {})
+    assert np.array_equal(read_image(tmp_path / "y.exr", "auto"), rgb[1][..., None].repeat(3, -1))
+    write_exr(tmp_path / "layer.exr", {"beauty.R": rgb[1]}, {})
+    with pytest.raises(ValueError, match=r"has channels beauty.R; expected R, G, B, or Y"):
+        read_image(tmp_path / "layer.exr", "auto")
+
+
+def faults(folder):
+    """(file, what is said of it) for every fault."""
+    exr = {c: np.full((3, 4), 0.5) for c in "RGB"}
+    write_exr(folder / "good.exr", exr, {})
+    Image.fromarray(IMAGE).save(folder / "good.png")
+    Image.fromarray(IMAGE).save(folder / "good.jpg")
+    for name, part in (("good.exr", 0.9), ("good.png", 0.6), ("good.jpg", 0.6)):
+        data = (folder / name).read_bytes()
+        (folder / name.replace("good", "cut")).write_bytes(data[: int(part * len(data))])
+    for name in ("text.png", "text.exr"):
+        (folder / name).write_text("No image.\n")
+    for name in ("empty.png", "empty.exr"):
+        (folder / name).write_bytes(b"")
+    (folder / "zero.png").write_bytes(png(0, 1, 8, 2, [b""]))
+    for name, value in (("nan", np.nan), ("inf", np.inf), ("negative", -0.25)):
+        bad = {c: plane.copy() for c, plane in exr.items()}
+        bad["G"][1, 2] = value
+        write_exr(folder / f"{name}.exr", bad, {})
+    (folder / "folder.png").mkdir()
+    return [
+        ("missing.png", "No such file"),
+        ("missing.exr", "No such file"),
+        ("cut.png", "cannot be read"),
+        ("cut.jpg", "cannot be read"),
+        ("cut.exr", "cannot be read as EXR"),
+        ("text.png", "is not an image that can be read"),
+        ("text.exr", "is not an image that can be read"),
+        ("empty.png", "is empty; expected an image"),
+        ("empty.exr", "is empty; expected an image"),
+        ("zero.png", "image"),
+        ("nan.exr", "the pixel at column 2, row 1 is not finite; expected finite ones"),
+        ("inf.exr", "the pixel at column 2, row 1 is not finite; expected finite ones"),
+        ("negative.exr", "the pixel at column 2, row 1 is negative; expected"),
+        ("folder.png", "cannot be read"),
+    ]
+
+
+def test_files_of_every_fault(tmp_path, refused):
+    """One line with the file, exit code 3, nothing written."""
+    made = faults(tmp_path)
+    scene = tmp_path / "scene.yaml"
+    for name, said in made:
+        with pytest.raises(ValueError, match=said) as caught:
+            read_image(tmp_path / name, "auto")
+        assert "\n" not in str(caught.value)
+        assert name in str(caught.value)
+    for name, said in made:
+        scene.write_text(
+            f"textures:\n  wood:\n    {{type: bitmap, file: {name}}}\n"
+            "materials: {m: {type: diffuse, reflectance: wood}}\n"
+            "shapes: [{type: sphere, material: m}]\n"
+        )
+        line = refused(3, "render", str(scene), "-o", str(tmp_path / "out.exr"))
+        assert "textures.wood" in line
+        assert said in line
+        assert name in line
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("materials: {m: {type: diffuse, reflectance: wood}}", "no texture 'wood'; expected one"),
+        ("textures: {t: {type: marble}}", "unknown type 'marble'"),
+        ("textures: {t: {type: bitmap}}", "textures.t.file"),
+        ("textures: {t: {type: bitmap, file: a.png, wrap: fold}}", "textures.t.wrap"),
+        ("textures: {t: {type: bitmap, file: a.png, filter: cubic}}", "textures.t.filter"),
+        ("textures: {t: {type: bitmap, file: a.png, encoding: half}}", "textures.t.encoding"),
+        ("textures: {t: {type: checker, first: -1}}", "numbers of at least 0"),
+        ("textures: {t: {type: checker, uv: {scale: [1, 2, 3]}}}", "textures.t.uv.scale"),
+        ("textures: {t: {type: checker, uv: {scale: [true, 1]}}}", "textures.t.uv.scale"),
+        ("textures: {t: {type: checker, uv: {rotate: .nan}}}", "textures.t.uv.rotate"),
+        ("textures: {t: {type: checker, uv: {scale: 1" + "0" * 400 + "}}}", "textures.t.uv.scale"),
+        ("materials: {m: {type: mask, base: m, opacity: 1" + "0" * 400 + "}}", "from 0 to 1"),
+        ("materials: {m: {type: mask, base: m, opacity: [1, 1]}}", "or the name of a texture"),
+    ],
+    ids=lambda text: text[:60],
+)
+def test_wrong_scenes(tmp_path, refused, text, said):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(text + "\n")
+    line = refused(3, "render", str(scene), "-o", str(tmp_path / "out.exr"))
+    assert said in line
+    assert str(scene) in line
+
+
+def test_a_texture_that_would_create_energy(tmp_path, refused):
+    """A reflectance is at most 1; a radiance may be more."""
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(
+        "textures: {bright: {type: checker, first: 1.5}}\n"
+        "materials: {m: {type: diffuse, reflectance: bright}}\n"
+        "shapes: [{type: sphere, material: m}]\n"
+    )
+    line = refused(3, "render", str(scene), "-o", str(tmp_path / "out.exr"))
+    assert "the texture 'bright' has values up to 1.5; expected at most 1" in line
+
+
+def test_bitmaps_are_read_beside_the_scene(tmp_path):
+    """A file name is relative to the scene's folder."""
+    (tmp_path / "deep").mkdir()
+    Image.fromarray(IMAGE).save(tmp_path / "deep" / "image.png")
+    (tmp_path / "scene.yaml").write_text(
+        "textures: {t: {type: bitmap, file: deep/image.png, encoding: raw, filter: nearest}}\n"
+    )
+    textures = build_tables(rt.Scene.load(tmp_path / "scene.yaml")).textures
+    assert np.array_equal(lookup(textures.bitmaps, 0, 0.01, 0.99), IMAGE[0, 0] / 255)

@@ -1,0 +1,209 @@
+"""Furnaces: where everything shines equally, every radiance is known."""
+
+import math
+
+import numpy as np
+import pytest
+from worlds import FLOOR, MATERIALS, assert_mean, at, estimate, facing, world
+
+import reference_rt as rt
+from reference_rt.core.exr import write_exr
+
+SAMPLING = ("both", "lights", "bsdf")
+
+# The front of each wall of the cube [-1, 1]³ points at the middle.
+WALLS = tuple(
+    rt.Rectangle(material="wall", transform=(*at(0, 0, -1), *facing(axis, degrees)))
+    for axis, degrees in (
+        ((1, 0, 0), 0), ((1, 0, 0), 90), ((1, 0, 0), 180),
+        ((1, 0, 0), 270), ((0, 1, 0), 90), ((0, 1, 0), 270),
+    )
+)  # fmt: skip
+INSIDE = rt.Orthographic(eye=(0.1, 0.2, 0.3), target=(-1, -0.9, -0.8), width=1e-12)
+
+
+def closed(albedo, **parts):
+    """Walls that emit 1 and reflect `albedo`, seen from within."""
+    materials = {
+        "scattering": rt.Diffuse(reflectance=albedo),
+        "wall": rt.Emissive(radiance=(1, 1, 1), base="scattering"),
+    }
+    return world(*WALLS, materials=materials, camera=INSIDE, **parts)
+
+
+# With roulette the paths are some 1 / (1 - a) long, without as long as they are let: where a^k has
+# fallen below the standard error, or the rest is in the formula.
+ALBEDOS = (0.0, 0.5, 0.9, 0.99, pytest.param(0.999, marks=pytest.mark.slow))
+
+
+@pytest.mark.parametrize(
+    ("albedo", "spp"),
+    [
+        (0.0, 64),
+        (0.5, 64),
+        (0.9, 64),
+        (0.99, 16),
+        pytest.param(0.99, 64, marks=pytest.mark.slow),
+        pytest.param(0.999, 16, marks=pytest.mark.slow),
+        pytest.param(0.999, 64, marks=pytest.mark.slow),
+    ],
+)
+def test_closed_furnace_with_roulette(albedo, spp):
+    scene = closed(albedo, integrator=rt.Path(rr_depth=5), spp=spp)
+    assert_mean(scene, 1 / (1 - albedo), power=1e-2 if spp == 16 else 5e-3)
+
+
+def test_roulette_from_the_first_bounce():
+    albedo = np.array([0.95, 0.5, 0.9])
+    scene = closed(tuple(albedo), integrator=rt.Path(rr_depth=1), spp=64)
+    assert_mean(scene, 1 / (1 - albedo), power=5e-3)
+
+
+@pytest.mark.parametrize("sampling", SAMPLING)
+@pytest.mark.parametrize("albedo", [0.5, pytest.param(0.9, marks=pytest.mark.slow)])
+def test_closed_furnace_by_each_way_of_sampling(albedo, sampling):
+    scene = closed(albedo, integrator=rt.Path(rr_depth=5, sampling=sampling), spp=256)
+    assert_mean(scene, 1 / (1 - albedo), power=7e-3)
+
+
+@pytest.mark.parametrize("albedo", ALBEDOS)
+def test_closed_furnace_without_roulette(albedo):
+    """The finite sum over max_depth emissions, of which nothing is left out: 7000 for the whitest
+    leave a thousandth of the infinite sum."""
+    depth = {0.0: 10, 0.5: 60, 0.9: 300, 0.99: 700, 0.999: 7000}[albedo]
+    scene = closed(albedo, integrator=rt.Path(max_depth=depth, rr_depth=4096), pixels=64, spp=16)
+    assert_mean(scene, (1 - albedo**depth) / (1 - albedo), power=5e-3)
+
+
+@pytest.mark.parametrize("depth", range(7))
+def test_max_depth_counts_edges(depth):
+    """By scattered rays alone every path brings the same, and `max_depth` is the number of
+    terms: no noise."""
+    albedo = np.array([0.2, 0.5, 0.9])
+    for rr_depth in (4096, depth + 1):
+        path = rt.Path(max_depth=depth, rr_depth=rr_depth, sampling="bsdf")
+        scene = closed(tuple(albedo), integrator=path, pixels=4, spp=4)
+        expected = (1 - albedo**depth) / (1 - albedo)
+        assert np.allclose(rt.render(scene).colour, expected, rtol=1e-14, atol=0)
+    assert_mean(
+        closed(tuple(albedo), integrator=rt.Path(max_depth=depth), spp=64), expected, power=5e-3
+    )
+
+
+# ---- lossless bodies in a sky of one radiance ----------------------------------------------------
+
+SKY = np.array([1.0, 2.0, 3.0])
+
+
+@pytest.fixture(scope="module")
+def sky(tmp_path_factory):
+    """An environment of the radiance SKY, as a map: see `worlds.DARK`."""
+    path = tmp_path_factory.mktemp("sky") / "sky.exr"
+    write_exr(path, {name: np.full((3, 4), x) for name, x in zip("RGB", SKY, strict=True)}, {})
+    return rt.EnvironmentMap(file=str(path))
+
+
+# A mirror's back is black, and what passes a mask around solid glass is not refracted: only mirrors
+# with two sides and thin glass may be mixed without loss.
+LOSSLESS = {
+    "mirror": rt.Mirror(),
+    "conductor": rt.Conductor(eta=(1e-9,) * 3, k=(1.0, 2.0, 3.0)),
+    "glass": rt.Dielectric(),
+    "bubble": rt.Dielectric(interior_ior=1.0, exterior_ior=1.5),
+    "diamond": rt.Dielectric(interior_ior=2.42),
+    "thin glass": rt.ThinDielectric(),
+    "mirror on both sides": rt.TwoSided(base="silver"),
+    "masked mirror": rt.Mask(base="mirrors", opacity=0.3),
+    "chequered mask": rt.Mask(base="mirrors", opacity="white and black"),
+    "masked thin glass": rt.Mask(base="thin glass", opacity=0.5),
+    "half silvered": rt.Blend(first="mirrors", second="thin glass", weight=0.25),
+    "all of them": rt.Blend(first="mirrors", second="masked", weight="white and black"),
+    "nothing": rt.Mask(base="silver", opacity=0.0),
+}
+
+
+def body(material, environment, seed=4, spp=64, **path):
+    """A ball in the sky, from edge to edge."""
+    return world(
+        rt.Sphere(material="body"),
+        materials={
+            **MATERIALS,
+            "mirrors": rt.TwoSided(base="silver"),
+            "masked": rt.Mask(base="thin glass", opacity=0.5),
+            "body": material,
+        },
+        environment=environment,
+        camera=rt.Orthographic(eye=(0, 0, 3), width=2.1),
+        film=rt.Film(width=32, height=32),
+        sampler=rt.Sobol(spp=spp, seed=seed),
+        integrator=rt.Path(**path),
+    )
+
+
+@pytest.mark.parametrize("name", LOSSLESS)
+def test_lossless_bodies_vanish(name, sky):
+    """Without roulette path by path; a conductor with eta = 1e-9 absorbs 4 eta / (eta² + k² + 1) of
+    what it mirrors at most (the Fresnel equations at normal incidence, k >= 1)."""
+    scene = body(LOSSLESS[name], sky, rr_depth=4096, max_depth=10**5)
+    # A few roundings at each of some ten surfaces.
+    loss = 4e-9 if name == "conductor" else 1e-12
+    assert np.allclose(rt.render(scene).colour, SKY, rtol=loss, atol=0)
+
+
+@pytest.mark.parametrize("name", LOSSLESS)
+def test_roulette_leaves_them_invisible(name, sky):
+    scene = body(LOSSLESS[name], sky, rr_depth=1)
+    expected = SKY * (1 - 4e-9 if name == "conductor" else 1.0)
+    mean, error = estimate(scene)
+    assert (np.abs(mean - expected) <= 4 * error + 5e-9 * expected).all()
+    assert (error <= 5e-3 * expected).all()
+
+
+# Without the diffuse part of `principled`, which by its law (Burley 2012) is brighter than white at
+# grazing angles.
+ROUGH = {
+    "rough conductor": rt.RoughConductor(eta=(1e-9,) * 3, k=(1.0, 2.0, 3.0), alpha=0.3),
+    "brushed": rt.RoughConductor(eta=(1e-9,) * 3, k=(1.0, 2.0, 3.0), alpha=(0.05, 0.5)),
+    "beckmann": rt.RoughConductor(
+        eta=(1e-9,) * 3, k=(1.0, 2.0, 3.0), alpha=0.5, distribution="beckmann"
+    ),
+    "frosted glass": rt.RoughDielectric(alpha=0.3),
+    "rough glass": rt.RoughDielectric(alpha=0.8, distribution="beckmann"),
+    "plastic": rt.Plastic(reflectance=(1, 1, 1)),
+    "saturated plastic": rt.Plastic(reflectance=(1, 1, 1), nonlinear=True),
+    "rough plastic": rt.RoughPlastic(reflectance=(1, 1, 1), alpha=0.2),
+    "principled metal": rt.Principled(base_colour=(1, 1, 1), roughness=0.2, metallic=1.0),
+    "principled glass": rt.Principled(
+        base_colour=(1, 1, 1), roughness=0.3, spec_trans=1.0, eta=1.5
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ROUGH)
+@pytest.mark.parametrize("roulette", [1, 4096])
+def test_rough_bodies_never_shine(name, roulette, sky):
+    """Single scattering loses what the facets shadow, and gains nothing: no 4 x 4 pixels brighter
+    than the sky beyond their noise over eight seeds (6 standard errors for 64 squares), and most
+    of the light comes back."""
+    pictures = [
+        rt.render(body(ROUGH[name], sky, seed=s, spp=16, rr_depth=roulette, max_depth=200)).colour
+        for s in range(8)
+    ]
+    squares = np.array(pictures).reshape(8, 8, 4, 8, 4, 3).mean(axis=(2, 4)) / SKY
+    mean, error = squares.mean(axis=0), squares.std(axis=0, ddof=1) / math.sqrt(8)
+    assert (mean <= 1 + 1e-12 + 6 * error).all()
+    of_picture = squares.mean(axis=(1, 2))
+    most = 1 + 1e-12 + 4 * of_picture.std(axis=0, ddof=1) / math.sqrt(8)
+    assert (of_picture.mean(axis=0) <= most).all()
+    assert (of_picture.mean(axis=0) >= 0.65).all()
+
+
+def test_a_floor_that_reflects_everything(sky):
+    """An albedo of 1 under the whole hemisphere."""
+    floor = FLOOR.model_copy(update={"material": "white"})
+    for sampling in SAMPLING:
+        path = rt.Path(max_depth=2, sampling=sampling)
+        scene = world(
+            floor, materials={"white": rt.Diffuse(reflectance=1)}, environment=sky, integrator=path
+        )
+        assert_mean(scene, SKY, power=2e-3)

@@ -1,0 +1,84 @@
+"""NUMBA_DISABLE_JIT=1 runs the same text as plain Python, to the same last bit."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import HELPERS, SCENES, every_law, every_light, every_shape
+
+import reference_rt as rt
+
+SMALL = rt.Film(width=6, height=4)
+
+_RENDER = """
+import sys, numpy as np
+sys.path.insert(0, sys.argv[1])
+import test_plain_python as here
+from pathlib import Path
+np.savez(sys.argv[3], **here.pictures(Path(sys.argv[2]), sys.argv[4] == "True"))
+"""
+
+
+def scenes(folder, more):
+    """Every shape, material, texture, light, integrator and sampler, and two of the usual scenes,
+    which lack most of them; `more`: also shapes by paths, and materials and lights by Whitted."""
+    shapes = rt.Scene.load(every_shape(folder))
+    laws = rt.Scene.load(every_law(folder))
+    lights = rt.Scene.load(every_light(folder))
+    whitted = {"integrator": rt.Whitted(), "sampler": rt.Grid(spp=4)}
+    box = rt.Scene.load(SCENES / "cornell_box.yaml")
+    spheres = rt.Scene.load(SCENES / "spheres_whitted.yaml")
+    others = {
+        "shapes": shapes,
+        "laws, whitted": laws.changed(**whitted),
+        "lights, whitted": lights.changed(**whitted),
+    }
+    return (others if more else {}) | {
+        "shapes, ray cast": shapes.changed(integrator=rt.RayCast(), sampler=None),
+        "laws": laws,
+        "lights": lights,
+        "lights, direct": lights.changed(integrator=rt.Direct(light_samples=2, bsdf_samples=2)),
+        "cornell box": box.changed(film=SMALL, sampler=rt.Sobol(spp=2)),
+        "spheres": spheres.changed(film=SMALL, sampler=rt.Grid(spp=1)),
+    }
+
+
+def pictures(folder, more):
+    """Every layer of every scene."""
+    return {
+        f"{name}: {layer}": pixels
+        for name, scene in scenes(folder, more).items()
+        for layer, pixels in rt.render(scene, threads=1).layers.items()
+    }
+
+
+@pytest.fixture(scope="module", params=[False, pytest.param(True, marks=pytest.mark.slow)])
+def both(tmp_path_factory, request):
+    folder = tmp_path_factory.mktemp("plain")
+    file = folder / "plain.npz"
+    arguments = [str(Path(__file__).parent), str(folder), str(file), str(request.param)]
+    plain = subprocess.Popen(  # the while, this process compiles
+        [sys.executable, "-W", "error", "-c", _RENDER, *arguments],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(HELPERS)},
+    )
+    try:
+        compiled = pictures(tmp_path_factory.mktemp("compiled"), request.param)
+    finally:
+        code = plain.wait()
+    assert code == 0
+    return compiled, dict(np.load(file))
+
+
+def test_same_bits(both):
+    compiled, plain = both
+    assert set(compiled) == set(plain)
+    different = [name for name in compiled if not np.array_equal(compiled[name], plain[name])]
+    assert different == []
+
+
+def test_the_pictures_show_something(both):
+    for name, pixels in both[0].items():
+        assert len(np.unique(pixels)) > 3, name

@@ -1,0 +1,286 @@
+"""Direct light against closed forms, and furnaces, in which every radiance is known."""
+
+import math
+
+import numpy as np
+import pytest
+
+import reference_rt as rt
+from reference_rt.core import transform
+
+SMALL = transform.Scale(scale=(1e-3, 1e-3, 1e-3))
+ELSEWHERE = (
+    rt.Sphere(center=(0, -50, 0), radius=1e-3),
+    rt.Box(transform=(SMALL, transform.Translate(translate=(0, -60, 0)))),
+    rt.Triangle(v0=(0, -70, 0), v1=(1e-3, -70, 0), v2=(0, -70, 1e-3)),
+    rt.Rectangle(material="off", transform=(SMALL, transform.Translate(translate=(0, -80, 0)))),
+)
+"""One of each shape, and a lamp, out of sight: every scene here has the same tables, and those that
+are rendered in the same way share kernels."""
+
+MATERIALS = {
+    "lamp": rt.Emissive(radiance=(3.0, 2.0, 1.0)),
+    "off": rt.Emissive(radiance=(0, 0, 0)),
+    "floor": rt.Diffuse(reflectance=(0.8, 0.5, 0.2)),
+    "glass": rt.Dielectric(),
+}
+FLOOR = rt.Rectangle(
+    material="floor",
+    transform=(
+        transform.Scale(scale=(30.0, 30.0, 30.0)),
+        transform.Rotate(rotate=transform.Turn(axis=(1, 0, 0), degrees=-90)),
+    ),
+)
+# Looks down at the origin from just above it: every pixel sees the same point.
+CAMERA = rt.Orthographic(eye=(0, 1e-3, 0), target=(0, 0, 0), up=(0, 0, -1), width=1e-9)
+
+
+def estimate(scene):
+    """(mean, standard error) over the pixels, which are independent estimates of one number."""
+    pixels = rt.render(scene).colour.reshape(-1, 3)
+    return pixels.mean(axis=0), pixels.std(axis=0, ddof=1) / math.sqrt(len(pixels))
+
+
+def assert_estimates(scene, expected):
+    """Within 4 standard errors (1 in 16,000 by chance; the seed is fixed), and rounding."""
+    mean, error = estimate(scene)
+    assert (np.abs(mean - expected) <= 4 * error + 1e-12 * np.abs(expected)).all(), (mean, expected)
+
+
+def scene_of(*shapes, lights=(), sky=0.0, materials=None, **parts):
+    """Shapes under lights and a sky of one radiance."""
+    given = {
+        "camera": CAMERA,
+        "film": rt.Film(width=32, height=32),
+        "sampler": rt.Sobol(spp=64, seed=4),
+        "integrator": rt.Path(max_depth=2),
+    } | parts
+    dark = rt.Point(position=(0, -55, 0), intensity=0)
+    return rt.Scene(
+        materials=MATERIALS | (materials or {}),
+        shapes=(*shapes, *ELSEWHERE),
+        lights=(*lights, dark, rt.Constant(radiance=sky)),
+        **given,
+    )
+
+
+WHITTED = {"integrator": rt.Whitted(), "sampler": rt.Grid()}
+
+
+def lit(lamp, **parts):
+    return scene_of(FLOOR, lamp, **parts)
+
+
+def polygon_irradiance(corners, n):
+    """Lambert's formula for a polygon of radiance 1 above the horizon of the origin."""
+    total = np.zeros(3)
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        cross = np.cross(a, b)
+        angle = math.atan2(np.linalg.norm(cross), a @ b)
+        total += angle * cross / np.linalg.norm(cross)
+    return abs(total @ n) / 2
+
+
+RHO = np.array([0.8, 0.5, 0.2])
+RADIANCE = np.array([3.0, 2.0, 1.0])
+UP = np.array([0.0, 1.0, 0.0])
+
+
+def test_triangle_light():
+    corners = np.array([[1.0, 2.0, -0.5], [1.5, 1.0, 1.5], [-1.0, 1.5, 1.0]])
+    v = [tuple(c) for c in corners]
+    if np.cross(corners[1] - corners[0], corners[2] - corners[0]) @ corners[0] > 0:
+        v = v[::-1]  # facing the origin
+    lamp = rt.Triangle(v0=v[0], v1=v[1], v2=v[2], material="lamp")
+    expected = RHO / math.pi * RADIANCE * polygon_irradiance(corners, UP)
+    assert_estimates(lit(lamp), expected)
+
+
+STEPS = (
+    transform.Scale(scale=(1.2, 0.6, 0.3)),
+    transform.Rotate(rotate=transform.Turn(axis=(1, 0, 0), degrees=70)),
+    transform.Rotate(rotate=transform.Turn(axis=(0, 1, 0), degrees=25)),
+    transform.Translate(translate=(0.6, 2.0, -0.5)),
+)
+
+
+def test_rectangle_light():
+    m = transform.affine(STEPS)
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+    corners = transform.apply_points(m, square)
+    assert np.cross(corners[1] - corners[0], corners[2] - corners[0]) @ corners[0] < 0
+    lamp = rt.Rectangle(transform=STEPS, material="lamp")
+    expected = RHO / math.pi * RADIANCE * polygon_irradiance(corners, UP)
+    assert_estimates(lit(lamp), expected)
+    away = (transform.Scale(scale=(1, 1, -1)), *STEPS)  # shines with its front alone
+    assert not estimate(lit(rt.Rectangle(transform=away, material="lamp")))[0].any()
+
+
+def test_box_light():
+    """The faces that the origin sees, each by Lambert's formula."""
+    m = transform.affine(STEPS)
+    expected = 0.0
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            square = np.zeros((4, 3))
+            square[:, axis] = side
+            square[:, (axis + 1) % 3], square[:, (axis + 2) % 3] = [-1, 1, 1, -1], [-1, -1, 1, 1]
+            corners = transform.apply_points(m, square)
+            outward = corners.mean(axis=0) - m[:, 3]
+            normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+            normal *= np.sign(normal @ outward)
+            if normal @ corners[0] < 0:
+                expected += polygon_irradiance(corners, UP)
+    lamp = rt.Box(transform=STEPS, material="lamp")
+    assert_estimates(lit(lamp), RHO / math.pi * RADIANCE * expected)
+
+
+@pytest.mark.parametrize(
+    ("center", "radius"), [((0.5, 2.0, -1.0), 0.8), ((300.0, 400.0, 0.0), 1.0)]
+)
+def test_sphere_light(center, radius):
+    """pi (r / d)² cos, wholly above the horizon."""
+    d = np.linalg.norm(center)
+    irradiance = math.pi * (radius / d) ** 2 * (center[1] / d)
+    lamp = rt.Sphere(center=center, radius=radius, material="lamp")
+    assert_estimates(lit(lamp), RHO / math.pi * RADIANCE * irradiance)
+
+
+@pytest.mark.parametrize("position", [(0, 2, 0), (3, 4, 0), (1e3, 1e3, 1e3)])
+@pytest.mark.parametrize("parts", [{}, WHITTED], ids=["path", "whitted"])
+def test_point_light_by_the_inverse_square(position, parts):
+    film = rt.Film(width=2, height=2)
+
+    def picture(position):
+        light = rt.Point(position=position, intensity=(7, 8, 9))
+        return rt.render(scene_of(FLOOR, lights=(light,), film=film, **parts)).colour
+
+    r2 = float(np.dot(position, position))
+    expected = RHO / math.pi * [7, 8, 9] * (position[1] / math.sqrt(r2)) / r2
+    # No noise; the view is 1e-9 wide around the origin and the light some units away.
+    assert np.allclose(picture(position), expected, rtol=1e-8)
+    assert not picture((0.0, -2.0, 0.0)).any()
+
+
+def test_something_in_the_way():
+    """A wall between a point light and the floor."""
+    wall = rt.Sphere(center=(0, 1, 0), radius=0.1)
+    light = rt.Point(position=(0, 2, 0), intensity=(1, 1, 1))
+    assert rt.render(scene_of(FLOOR, lights=(light,), **WHITTED)).colour.all()
+    assert not rt.render(scene_of(FLOOR, wall, lights=(light,), **WHITTED)).colour.any()
+
+
+def test_whitteds_area_light_is_its_middle():
+    """One point of radiance times area: L A cos cos' / r² (the area is 4 times 1.2 times 0.6)."""
+    m = transform.affine(STEPS)
+    w = m[:, 3]
+    r2 = w @ w
+    normal = np.cross(m[:, 0], m[:, 1])  # of half the edges: a quarter of the area long
+    expected = RHO / math.pi * RADIANCE * 4 * (-normal @ w) * w[1] / r2**2
+    lamp = rt.Rectangle(transform=STEPS, material="lamp")
+    # The view is 1e-9 wide.
+    assert np.allclose(rt.render(lit(lamp, **WHITTED)).colour, expected, rtol=1e-8)
+
+
+def test_whitteds_environment_is_seen_and_lights_nothing():
+    camera, film = rt.Orthographic(eye=(0, 0, 3), width=3.0), rt.Film(width=9, height=9)
+    scene = scene_of(rt.Sphere(), sky=(1.0, 2.0, 3.0), camera=camera, film=film, **WHITTED)
+    colour = rt.render(scene).colour
+    assert np.unique(colour.reshape(-1, 3), axis=0).tolist() == [[0, 0, 0], [1, 2, 3]]
+
+
+# ---- furnaces -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("integrator", "share"),
+    [
+        (rt.Path(max_depth=2), 0.125),
+        (rt.Path(max_depth=2, sampling="bsdf"), 0.125),
+        (rt.Path(max_depth=2, sampling="lights"), 0.99),
+        (rt.Direct(), 0.125),
+        (rt.Direct(bsdf_samples=0), 0.99),
+    ],
+    ids=["both", "bsdf", "lights", "direct", "direct lights"],
+)
+def test_a_lamp_under_a_sky(integrator, share):
+    """The sky is picked seldom where scattered rays find it too, and gives as much as ever."""
+    m = transform.affine(STEPS)
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+    seen = polygon_irradiance(transform.apply_points(m, square), UP)
+    sky = np.array([2.0, 0.5, 1.0])
+    lamp = rt.Rectangle(transform=STEPS, material="lamp")
+    scene = lit(lamp, sky=tuple(sky), integrator=integrator)
+    chances = scene.tables.lights.choice.probability
+    assert chances[-1] == share if share < 0.5 else chances[-1] > share
+    assert chances.sum() == pytest.approx(1.0, abs=1e-15)
+    assert_estimates(scene, RHO / math.pi * (RADIANCE * seen + sky * (math.pi - seen)))
+
+
+def test_a_sky_without_other_lights_keeps_its_share():
+    """Also beside lamps without power; what other lights have goes by their power."""
+    sky, point = rt.Constant(radiance=1), rt.Point(position=(0, 5, 0), intensity=1)
+    dark = point.model_copy(update={"intensity": (0.0, 0.0, 0.0)})
+    twice = point.model_copy(update={"intensity": (2.0, 2.0, 2.0)})
+    for lights, expected in (
+        ((sky,), [1]),
+        ((dark, sky), [0, 1]),
+        ((point, dark, twice, sky), [7 / 24, 0, 14 / 24, 1 / 8]),
+    ):
+        scene = rt.Scene(shapes=(rt.Sphere(center=(0, -50, 0)),), lights=lights)
+        chances = scene.tables.lights.choice.probability
+        np.testing.assert_allclose(chances, expected, rtol=1e-15)
+
+
+def test_open_furnace():
+    """A convex body in a constant environment: reflectance times radiance, wherever it is seen."""
+    camera = rt.Orthographic(eye=(0, 0, 5), width=0.5)
+    scene = scene_of(rt.Sphere(material="floor"), sky=(1.0, 2.0, 3.0), camera=camera)
+    assert_estimates(scene, RHO * [1, 2, 3])
+
+
+@pytest.mark.parametrize("rr_depth", [1, 5, 40])
+def test_closed_furnace(rr_depth):
+    """Walls that emit 1 and reflect a see 1 / (1 - a), whatever roulette does."""
+    walls = []
+    for axis, degrees in (((1, 0, 0), 0), ((1, 0, 0), 90), ((1, 0, 0), 180), ((1, 0, 0), 270),
+                          ((0, 1, 0), 90), ((0, 1, 0), 270)):  # fmt: skip
+        back = transform.Translate(translate=(0, 0, -1))  # then its normal points at the middle
+        turn = transform.Rotate(rotate=transform.Turn(axis=axis, degrees=degrees))
+        walls.append(rt.Rectangle(material="lamp", transform=(back, turn)))
+    scene = scene_of(
+        *walls,
+        camera=rt.Orthographic(eye=(0.1, 0.2, 0.3), target=(-1, -1, -1), width=0.5),
+        film=rt.Film(width=24, height=24),
+        sampler=rt.Sobol(spp=64, seed=5),
+        integrator=rt.Path(rr_depth=rr_depth),
+        materials={
+            "lamp": rt.Emissive(radiance=(1, 1, 1), base="white"),
+            "white": rt.Diffuse(reflectance=(0.0, 0.5, 0.8)),
+        },
+    )
+    assert_estimates(scene, 1 / (1 - np.array([0.0, 0.5, 0.8])))
+
+
+@pytest.mark.parametrize("n", [1.5, 0.75])
+def test_glass_in_a_furnace_vanishes(n):
+    """A clear ball in a constant environment looks like the environment; path by path."""
+    scene = scene_of(
+        rt.Sphere(material="glass"),
+        sky=(1.0, 2.0, 3.0),
+        camera=rt.Orthographic(eye=(0, 0, 3), width=2.5),
+        film=rt.Film(width=24, height=24),
+        sampler=rt.Sobol(spp=16),
+        integrator=rt.Path(rr_depth=4096),
+        materials={"glass": rt.Dielectric(interior_ior=n)},
+    )
+    # 1/eta² on the way in, eta² on the way out, and a few roundings each time.
+    assert np.allclose(rt.render(scene).colour, [1.0, 2.0, 3.0], rtol=1e-12)
+
+
+def test_unlimited_paths_without_any_light_are_black():
+    scene = rt.Scene(
+        film=rt.Film(width=2, height=2), shapes=(rt.Sphere(),), camera=rt.Perspective(eye=(0, 0, 5))
+    )
+    with pytest.warns(rt.SceneWarning, match="no lights"):
+        assert not rt.render(scene).colour.any()

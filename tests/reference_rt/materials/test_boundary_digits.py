@@ -1,0 +1,156 @@
+"""Boundaries keep their digits: at matched indices, at grazing angles, from either side."""
+
+import math
+
+import numpy as np
+import pytest
+from builders import U
+from flint import arb, ctx
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reference_rt.core.vec3 import Vec3, dot
+from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, evaluate, sample
+from reference_rt.materials.microfacet.fresnel import MOST_INDEX, fresnel, relative_index
+from reference_rt.materials.microfacet.ggx_and_smith import bend, half_vector, refract
+from reference_rt.sampling.warp import uniform_sphere
+from reference_rt.shapes.flat.spherical_rectangle import solid_angle_of
+from reference_rt.textures import NO_TEXTURES, At
+
+AT = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
+
+offsets = st.floats(-12.0, -0.2).map(lambda e: 10.0**e)
+signs = st.sampled_from([-1.0, 1.0])
+indices = st.one_of(
+    st.floats(0.25, 4.0).filter(lambda n: abs(n - 1.0) > 0.01),
+    st.builds(lambda off, sign: 1.0 + sign * off, offsets, signs),
+)
+cosines = st.builds(lambda e, sign: sign * 10.0**e, st.floats(-12.0, 0.0), signs)
+heights = st.floats(-12.0, 0.0).map(lambda e: 10.0**e)
+angles = st.floats(0.0, 6.28)
+
+
+def towards(cosine, phi):
+    sine = math.sqrt((1 - cosine) * (1 + cosine))
+    return Vec3(sine * math.cos(phi), sine * math.sin(phi), cosine)
+
+
+@given(cosines, indices)
+def test_reflectance_and_transmittance_to_the_last_digits(cosine, n):
+    """Of the very floats, by the definitions in 60 digits; for indices above 1 from outside, and
+    below 1 from inside, where nothing is totally reflected."""
+    if (cosine > 0.0) != (n > 1.0):
+        cosine = -cosine
+    ctx.dps = 60
+    eta = arb(n) if cosine > 0.0 else 1 / arb(n)
+    c = abs(arb(cosine))
+    t = (1 - (1 - c * c) / (eta * eta)).sqrt()
+    s, p = (c - eta * t) / (c + eta * t), (eta * c - t) / (eta * c + t)
+    r = (s * s + p * p) / 2
+    found = fresnel(cosine, n)
+    assert abs(float((arb(found.reflectance) - r) / r)) <= 64 * U
+    assert abs(float((arb(found.transmittance) - (1 - r)) / (1 - r))) <= 64 * U
+    assert abs(float((arb(found.gap) - (c / eta - t)) / (c / eta - t))) <= 16 * U
+    assert abs(float((arb(found.cos_t) - t) / t)) <= 8 * U
+
+
+@given(cosines, indices)
+def test_nothing_is_lost_and_nothing_gained(cosine, n):
+    found = fresnel(cosine, n)
+    assert 0.0 <= found.reflectance <= 1.0
+    assert found.reflectance + found.transmittance == pytest.approx(1.0, abs=64 * U)
+
+
+@pytest.mark.parametrize("n", [1e-300, 1e-80, 1.0, 1e80, 1e300])
+@pytest.mark.parametrize("cosine", [-1.0, -1e-200, 0.0, 1e-200, 1.0])
+def test_no_index_breaks_it(n, cosine):
+    clipped = relative_index(n, 1.0)
+    assert 1.0 / MOST_INDEX <= clipped <= MOST_INDEX
+    assert all(math.isfinite(x) for x in fresnel(cosine, clipped))
+
+
+@given(heights, angles, heights, angles, indices)
+def test_bending_is_the_same_from_either_side(up, phi, down, psi, n):
+    """The same bits; of the spread, which counts solid angle, n² more from inside."""
+    a, b = towards(up, phi), -towards(down, psi)
+    there = bend(a, b, n, True)
+    back = bend(-b, -a, n, False)  # upside down, so that wo is above
+    assert there.refraction == back.refraction
+    assert (there.h == back.h) or (there.h == -back.h)
+    assert back.spread == pytest.approx(there.spread * n * n, rel=4 * U)
+
+
+@given(heights, angles, heights, angles)
+def test_half_vectors_are_symmetric(a_up, phi, b_up, psi):
+    a, b = towards(a_up, phi), towards(b_up, psi)
+    assert half_vector(a, b) == half_vector(b, a)
+    half = half_vector(a, b)
+    # The products' roundings, and those of unit vectors, seen against the length of their sum.
+    assert half.cosine == pytest.approx(dot(a, half.h), abs=8 * U / half.cosine)
+
+
+@given(heights, angles, indices, signs)
+def test_refracted_directions_are_unit_and_obey_snell(up, phi, n, side):
+    wo = towards(up, phi)
+    found = fresnel(math.copysign(up, side), n)
+    if found.transmittance == 0.0:
+        return
+    wi = refract(wo, Vec3(0.0, 0.0, 1.0), found)
+    assert dot(wi, wi) == pytest.approx(1.0, abs=8 * U)
+    assert wi.x * found.eta == pytest.approx(-wo.x, abs=64 * U)
+    assert wi.y * found.eta == pytest.approx(-wo.y, abs=64 * U)
+
+
+@pytest.mark.parametrize("index", [1.0 + 1e-8, 1.0 - 1e-8, 1.0 + 1e-5])
+@pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
+def test_glass_that_hardly_bends(index, distribution):
+    """Directions pass as good as straight, with a weight that only the masking takes from; and
+    samples are found again by `evaluate`."""
+    material = RoughDielectric.model_validate(
+        {
+            "type": "rough_dielectric",
+            "interior_ior": index,
+            "alpha": 0.2,
+            "distribution": distribution,
+        }
+    )
+    table = material.tabulate(NO_TEXTURES)
+    rng = np.random.default_rng(70)
+    for u_lobe, u0, u1 in rng.uniform(0.0, 1.0, (200, 3)).tolist():
+        for side in (1.0, -1.0):
+            wo = towards(0.7, 0.3)
+            wo = Vec3(wo.x, wo.y, side * wo.z)
+            found = sample(table, 0, AT, wo, u_lobe, u0, u1)
+            assert found.pdf > 0.0
+            assert dot(found.wi, -wo) > 1.0 - 1e-7
+            assert 0.9 < found.weight.x <= 1.0 + abs(index - 1.0) * 4.0
+            value = evaluate(table, 0, AT, wo, found.wi).x
+            # A direction tells the half vector's slope to u / |n - 1|, D to 14 / alpha of it.
+            off = 4 * 14.0 / 0.2 * U / abs(index - 1.0)
+            assert value == pytest.approx(found.weight.x * found.pdf, rel=32 * U + off)
+
+
+def test_solid_angles_of_rectangles():
+    """Against differences of angles at the corners in 300 bits; an eighth of all directions for a
+    corner of a cube."""
+    assert 6 * solid_angle_of(1.0, -1.0, 1.0, -1.0, 1.0) == pytest.approx(4 * math.pi, rel=4 * U)
+    rng = np.random.default_rng(71)
+    ctx.prec = 300
+    for _ in range(300):
+        h = float(10.0 ** rng.uniform(-20, 10))
+        x0, y0 = rng.uniform(1.0, 3.0, 2).tolist()
+        x1, y1 = x0 + float(10.0 ** rng.uniform(-6, 0)), y0 + float(10.0 ** rng.uniform(-6, 0))
+        exact = arb(0)
+        for x, y, sign in ((x1, y1, 1), (x0, y1, -1), (x1, y0, -1), (x0, y0, 1)):
+            x, y, z = arb(x), arb(y), arb(h)
+            exact += sign * (x * y / (z * (x * x + y * y + z * z).sqrt())).atan()
+        assert solid_angle_of(h, x0, x1, y0, y1) == pytest.approx(float(exact), rel=32 * U)
+
+
+@pytest.mark.parametrize("u0", [0.0, 2.0**-53, 1e-12, 0.3, 1.0 - 2.0**-53])
+def test_directions_near_the_poles_are_unit(u0):
+    x, y, z = uniform_sphere(u0, 0.2)
+    assert math.hypot(x, y) == pytest.approx(
+        2.0 * math.sqrt(u0 * (1.0 - u0)), rel=8 * U, abs=1e-300
+    )
+    assert x * x + y * y + z * z == pytest.approx(1.0, abs=8 * U)

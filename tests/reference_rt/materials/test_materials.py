@@ -1,0 +1,206 @@
+"""Materials: closed forms of Fresnel and Snell, energy, one-sidedness."""
+
+import math
+
+import numpy as np
+import pytest
+from builders import U
+from hypothesis import given
+from hypothesis import strategies as st
+
+import reference_rt as rt
+from reference_rt.core.vec3 import Vec3, dot, length
+from reference_rt.materials import any_smooth
+from reference_rt.materials.bsdfs import dielectric, diffuse, mirror
+from reference_rt.materials.bsdfs.tables import BLACK, DIFFUSE, TABLES, Leaves, only
+from reference_rt.materials.material import sample_branch
+from reference_rt.materials.microfacet.fresnel import fresnel
+from reference_rt.textures import NO_TEXTURES, At
+
+AT = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
+INDICES = (1.0003, 1.33, 1.5, 2.4)
+
+etas = st.floats(0.25, 4.0).filter(lambda eta: abs(eta - 1) > 1e-3)
+cosines = st.floats(1e-3, 1.0)
+azimuths = st.floats(0.0, 2 * math.pi)
+
+
+def towards(cosine, phi):
+    sine = math.sqrt((1 - cosine) * (1 + cosine))
+    return Vec3(sine * math.cos(phi), sine * math.sin(phi), cosine)
+
+
+@pytest.mark.parametrize("n", INDICES)
+def test_fresnel_at_normal_incidence(n):
+    expected = ((n - 1) / (n + 1)) ** 2
+    for cosine in (1.0, -1.0):
+        assert fresnel(cosine, n).reflectance == pytest.approx(expected, rel=32 * U)
+
+
+@pytest.mark.parametrize("n", INDICES)
+def test_fresnel_at_brewsters_angle(n):
+    """tan = n: nothing of the parallel polarisation; half of ((n² - 1) / (n² + 1))² remains."""
+    found = fresnel(1 / math.sqrt(1 + n * n), n)
+    expected = 0.5 * ((n * n - 1) / (n * n + 1)) ** 2
+    # The parallel amplitude is zero to a few u, and squared; the other as above.
+    assert found.reflectance == pytest.approx(expected, rel=32 * U / (n - 1))
+    # At this angle the mirrored and the refracted ray are at right angles: cos_t is the sine.
+    assert found.cos_t == pytest.approx(n / math.sqrt(1 + n * n), rel=8 * U)
+
+
+@pytest.mark.parametrize("n", INDICES)
+def test_total_reflection_beyond_the_critical_angle(n):
+    critical = math.sqrt(1 - 1 / n**2)  # its cosine
+    for beyond in (0.999999 * critical, 0.5 * critical, 1e-9):
+        assert fresnel(-beyond, n).reflectance == 1.0
+        assert fresnel(-beyond, n).cos_t == 0.0
+    assert fresnel(-1.000001 * critical, n).reflectance < 1.0
+
+
+def test_everything_is_reflected_at_grazing_incidence():
+    for n in INDICES:
+        assert fresnel(1e-12, n).reflectance == pytest.approx(1.0, abs=1e-9)  # 4 cos / sqrt(n²-1)
+
+
+@given(cosines, etas)
+def test_fresnel_is_reciprocal(cosine, eta):
+    """The same fraction, there and back along the same path."""
+    there = fresnel(cosine, eta)
+    if there.reflectance < 1.0:
+        back = fresnel(-there.cos_t, eta)
+        # Each cosine is the root of a difference, whose rounding (up to 1 + eta² or 1 + 1/eta²
+        # times u) it stretches by one over itself; the reflectance's slope is a few.
+        tolerance = 64 * U * (1 + eta**2) * (1 + eta**-2) / (cosine * there.cos_t)
+        assert back.reflectance == pytest.approx(there.reflectance, abs=tolerance)
+        assert back.eta == pytest.approx(1 / there.eta)
+
+
+@given(cosines, azimuths, etas, st.sampled_from([1.0, -1.0]))
+def test_dielectric_branches(cosine, phi, eta, side):
+    table = rt.Dielectric(interior_ior=eta).tabulate(NO_TEXTURES)
+    wo = towards(cosine, phi)
+    wo = Vec3(wo.x, wo.y, side * wo.z)
+    found = dielectric.branches(table, 0, AT, wo)
+    ratio = eta if side > 0 else 1 / eta
+    # Energy: radiance is compressed by eta² where it enters.
+    total = found.reflectance.x + found.transmittance.x * ratio**2
+    assert total == pytest.approx(1.0, rel=8 * U)
+    assert found.reflected == (-wo.x, -wo.y, wo.z)
+    assert found.share == found.reflectance.x
+    if found.share < 1.0:
+        # Snell: the tangential part shrinks by the ratio; a unit vector on the other side.
+        wi = found.refracted
+        assert (wi.x, wi.y) == pytest.approx((-wo.x / ratio, -wo.y / ratio), rel=4 * U)
+        assert wi.z * wo.z < 0
+        assert length(wi) == pytest.approx(1.0, rel=16 * U)
+
+
+@given(cosines, azimuths, etas, st.floats(0, 1, exclude_max=True))
+def test_a_sampled_branch_weighs_what_it_must(cosine, phi, eta, u):
+    """weight times probability is the branch's factor, whichever is drawn."""
+    found = dielectric.branches(
+        rt.Dielectric(interior_ior=eta).tabulate(NO_TEXTURES), 0, AT, towards(cosine, phi)
+    )
+    drawn = sample_branch(found, u)
+    reflected = u < found.share
+    assert drawn.is_delta
+    assert drawn.wi == (found.reflected if reflected else found.refracted)
+    factor = found.reflectance if reflected else found.transmittance
+    assert drawn.weight.x * drawn.pdf == pytest.approx(factor.x, rel=4 * U)
+    assert drawn.eta == (1.0 if reflected else found.eta)
+
+
+def test_mirror_is_one_sided():
+    table = rt.Mirror(reflectance=(0.2, 0.4, 0.6)).tabulate(NO_TEXTURES)
+    front = mirror.branches(table, 0, AT, Vec3(0.6, 0.0, 0.8))
+    assert front.reflected == (-0.6, 0.0, 0.8)
+    assert front.reflectance == (0.2, 0.4, 0.6)
+    assert sample_branch(front, 0.999).wi == front.reflected
+    back = mirror.branches(table, 0, AT, Vec3(0.6, 0.0, -0.8))
+    assert sample_branch(back, 0.5).pdf == 0.0
+
+
+@given(cosines, st.floats(1e-9, 1 - 1e-9), st.floats(0, 1, exclude_max=True))
+def test_diffuse_sample_evaluate_and_pdf_agree(cosine, u0, u1):
+    table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate(NO_TEXTURES)
+    wo = towards(cosine, 0.3)
+    drawn = diffuse.sample(table, 0, AT, wo, 0.5, u0, u1)
+    value = diffuse.evaluate(table, 0, AT, wo, drawn.wi)
+    assert drawn.pdf == diffuse.pdf(table, 0, AT, wo, drawn.wi)
+    assert not drawn.is_delta
+    for k in range(3):
+        assert value[k] == pytest.approx(drawn.weight[k] * drawn.pdf, rel=4 * U)
+    assert dot(drawn.wi, drawn.wi) == pytest.approx(1.0, rel=8 * U)
+
+
+@given(cosines, cosines)
+def test_diffuse_is_one_sided_and_reciprocal(a, b):
+    table = rt.Diffuse().tabulate(NO_TEXTURES)
+    wo, wi = towards(a, 0.3), towards(b, 2.0)
+    below = Vec3(wi.x, wi.y, -wi.z)
+    assert diffuse.evaluate(table, 0, AT, wo, below) == (0.0, 0.0, 0.0)
+    assert diffuse.evaluate(table, 0, AT, below, wo) == (0.0, 0.0, 0.0)
+    assert diffuse.pdf(table, 0, AT, wo, below) == diffuse.pdf(table, 0, AT, below, wo) == 0.0
+    assert diffuse.sample(table, 0, AT, below, 0.5, 0.5, 0.5).pdf == 0.0
+    there, back = diffuse.evaluate(table, 0, AT, wo, wi).x, diffuse.evaluate(table, 0, AT, wi, wo).x
+    assert there / wi.z == pytest.approx(back / wo.z, rel=4 * U)
+
+
+def test_diffuse_reflects_its_reflectance():
+    """The integral of f cos over the hemisphere, by the midpoint rule in cos and phi."""
+    table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate(NO_TEXTURES)
+    ticks = (np.arange(64) + 0.5) / 64
+    values = [diffuse.evaluate(table, 0, AT, Vec3(0, 0, 1), towards(c, 0.0)) for c in ticks]
+    # Linear in the cosine: the midpoint rule is exact.
+    assert 2 * math.pi * np.mean(values, axis=0) == pytest.approx((0.1, 0.5, 0.9), rel=1e-14)
+
+
+def tables_of(**materials):
+    shapes = tuple(rt.Sphere(material=name) for name in materials)
+    return rt.build_tables(rt.Scene(materials=materials, shapes=shapes)).materials
+
+
+def test_what_all_materials_share_is_said_by_absence():
+    """So that nothing is asked where there is nothing to choose."""
+    diffuse, mirror, lamp = rt.Diffuse(), rt.Mirror(), rt.Emissive(radiance=1.0)
+    alike = tables_of(a=diffuse, b=diffuse)
+    assert alike.kind is alike.smooth is alike.chooses is alike.behind is None
+    assert any_smooth(alike)
+    # A lamp scatters nothing: it is of no table.
+    lit = tables_of(a=diffuse, lamp=lamp)
+    assert lit.kind.tolist() == [DIFFUSE, BLACK]
+    assert lit.smooth.tolist() == [1, 0]
+    assert lit.chooses is lit.behind is None
+    mirrors = tables_of(a=mirror)
+    assert mirrors.kind is None
+    assert mirrors.smooth.tolist() == [0]
+    assert not any_smooth(mirrors)
+    mixed = tables_of(a=diffuse, b=rt.RoughDielectric(), c=rt.TwoSided(base="a"))
+    assert mixed.kind is not None
+    assert mixed.smooth is None
+    assert mixed.chooses.tolist() == [0, 1, 0]
+    assert mixed.behind.tolist() == [0, 1, 1]
+
+
+def test_the_only_table_is_known():
+    for code, field, _, _, _ in TABLES:
+        one = Leaves(**dict.fromkeys(Leaves._fields) | {field: ()})
+        assert only(one) == code
+
+
+def test_who_asks_textures():
+    """Surface coordinates are found for materials that ask a texture, for heights too."""
+    materials = {
+        "grey": rt.Diffuse(),
+        "chequered": rt.Diffuse(reflectance="squares"),
+        "dented": rt.Bump(base="grey", height="squares"),
+        "both": rt.TwoSided(base="grey", back="chequered"),
+        "lamp": rt.Emissive(radiance=1, base="chequered"),
+        "plain lamp": rt.Emissive(radiance=1),
+    }
+    body = rt.Sphere(material="grey")
+    scene = rt.Scene(textures={"squares": rt.Checker()}, materials=materials, shapes=(body,))
+    assert scene.tables.materials.asks.tolist() == [0, 1, 1, 1, 1, 0]
+    asking = {"chequered": materials["chequered"], "lamp": materials["lamp"]}
+    body = rt.Sphere(material="chequered")
+    assert scene.changed(materials=asking, shapes=(body,)).tables.materials.asks is None

@@ -1,0 +1,288 @@
+"""Cylinders, cones and frustums: against rational arithmetic, and what is special about them."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from quadric_checks import (
+    ULP,
+    all_spans,
+    anywhere,
+    check_against_exact,
+    check_leaving,
+    guides_at,
+    probe,
+    put,
+    rays_at,
+    rotation,
+    table_of,
+)
+from quadric_exact import exactly, meetings
+
+import reference_rt as rt
+from reference_rt.core import transform
+from reference_rt.shapes.curved import quadrics
+
+KINDS = {
+    "cylinder": [rt.Cylinder(), rt.Cylinder(radius=0.3, z_min=-2.0, z_max=0.7)],
+    "tube": [rt.Cylinder(capped=False), rt.Cylinder(radius=3, z_min=-2, z_max=0.7, capped=False)],
+    "cone": [rt.Cone(), rt.Cone(radius=0.7, height=2.1), rt.Cone(radius=3, height=0.1)],
+    "open cone": [rt.Cone(capped=False), rt.Cone(radius=0.7, height=2.1, capped=False)],
+    "frustum": [
+        rt.Cone(top_radius=0.3),
+        rt.Cone(radius=0.5, top_radius=1.3, height=0.7),
+        rt.Cone(top_radius=0.9999),
+        rt.Cone(top_radius=1.0),
+    ],
+    "open frustum": [rt.Cone(top_radius=0.3, capped=False)],
+}
+BY_NAME = pytest.mark.parametrize("name", KINDS)
+CLOSED = ("cylinder", "cone", "frustum")
+
+
+def seeded(name, *more):
+    return np.random.default_rng([list(KINDS).index(name), *more])
+
+
+def hits_of(name, distance, n):
+    rng = seeded(name, 1)
+    hits = 0
+    for shape in KINDS[name]:
+        placed = anywhere(rng, shape, 0.3)
+        hits += check_against_exact(placed, *rays_at(rng, exactly(placed), n, distance))
+    assert hits > n * len(KINDS[name]) / 3
+
+
+@BY_NAME
+@pytest.mark.parametrize("distance", [(-2.0, 1.0), (3.0, 7.0)])
+def test_hits(name, distance):
+    hits_of(name, distance, 150)
+
+
+@pytest.mark.slow
+@BY_NAME
+@pytest.mark.parametrize("distance", [(-2.0, 1.0), (1.0, 4.0), (3.0, 7.0)])
+def test_hits_of_many(name, distance):
+    hits_of(name, distance, 2000)
+
+
+def leave_of(name, spread, n):
+    rng = seeded(name, 2)
+    hits = 0
+    for shape in KINDS[name]:
+        placed = anywhere(rng, shape, spread)
+        o, d = rays_at(rng, exactly(placed), n)
+        hits += check_leaving(placed, o, d, guides_at(rng, n))
+    assert hits > n * len(KINDS[name]) / 3
+
+
+@BY_NAME
+@pytest.mark.parametrize("spread", [0.3, 3.0])
+def test_leaving(name, spread):
+    leave_of(name, spread, 300)
+
+
+@pytest.mark.slow
+@BY_NAME
+@pytest.mark.parametrize("spread", [0.3, 3.0])
+def test_leaving_of_many(name, spread):
+    leave_of(name, spread, 5000)
+
+
+@pytest.mark.parametrize("name", CLOSED)
+@pytest.mark.parametrize("spread", [0.3, 3.0])
+def test_what_is_convex_is_not_met_again(name, spread):
+    rng = seeded(name, 3)
+    for shape in KINDS[name]:
+        placed = anywhere(rng, shape, spread)
+        guides = guides_at(rng, 10_000)
+        guides[:, 2] = np.abs(guides[:, 2])
+        found = probe(placed, *rays_at(rng, exactly(placed), 10_000), guides)
+        # Along the surface, w's rounding decides which side it leaves on.
+        outwards = found.hits[found.side[found.hits] > 0]
+        assert len(outwards) > 2000
+        assert np.isinf(found.next_t[outwards]).all()
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_spans(name):
+    rng = seeded(name, 4)
+    for shape in KINDS[name]:
+        placed = anywhere(rng, shape, 0.3)
+        o, d = rays_at(rng, exactly(placed), 100, (-1.0, 1.0))
+        t, face = all_spans(placed, o, d)
+        for i in range(100):
+            true = meetings(exactly(placed), o[i], d[i])
+            assert len(true) in (0, 2)
+            assert [m.face for m in true] == [
+                f for f, x in zip(face[i], t[i], strict=True) if x < math.inf
+            ]
+            assert np.allclose(t[i][: len(true)], [float(m.t) for m in true], rtol=1e-9)
+
+
+@BY_NAME
+def test_bounds_are_tight(name):
+    for shape in KINDS[name]:
+        exact = exactly(shape)
+        lower, upper = quadrics.bounds(table_of(shape))
+        assert np.allclose(lower[0], [float(x) for x in exact.lower], rtol=1e-14, atol=1e-14)
+        assert np.allclose(upper[0], [float(x) for x in exact.upper], rtol=1e-14, atol=1e-14)
+        rng = seeded(name, 5)
+        placed = anywhere(rng, shape, 1.0)
+        found = probe(placed, *rays_at(rng, exactly(placed), 2000))
+        lower, upper = quadrics.bounds(table_of(placed))
+        assert (found.p[found.hits] >= lower).all()
+        assert (found.p[found.hits] <= upper).all()
+
+
+def test_coordinates_and_faces():
+    cylinder = rt.Cylinder(radius=2, z_min=-1, z_max=3)
+    phi = np.linspace(0.01, 0.99, 50) * 2.0 * math.pi
+    z = np.linspace(-0.9, 2.9, 50)
+    away = np.column_stack([np.cos(phi), np.sin(phi), np.zeros(50)])
+    side = probe(cylinder, 5.0 * away + [[0, 0, 1]] * z[:, None], -away)
+    assert np.allclose(side.t, 3.0)
+    assert np.allclose(side.u, phi / (2.0 * math.pi))
+    assert np.allclose(side.v, (z + 1.0) / 4.0)
+    assert np.allclose(side.n, away)
+    assert set(side.face) == {0}
+    ends = probe(cylinder, [[1, -0.5, 9], [1, -0.5, -9]], [[0, 0, -1], [0, 0, 1]])
+    assert ends.face.tolist() == [6, 3]
+    assert np.array_equal(ends.n, [[0, 0, 1], [0, 0, -1]])
+    assert np.allclose([ends.u, ends.v], [[0.75, 0.75], [0.375, 0.375]])
+    cone = probe(rt.Cone(radius=2, height=4), 5.0 * away + [[0, 0, 3]], -away)
+    assert np.allclose(cone.t, 4.5)
+    assert np.allclose(cone.u, phi / (2.0 * math.pi))
+    assert np.allclose(cone.v, 0.75)
+    assert np.allclose(cone.n, (2.0 * away + [0, 0, 1]) / math.sqrt(5.0))
+
+
+def test_an_open_one_is_seen_from_both_sides():
+    inside = [[0.1, 0.2, 0.5]]
+    for shape in (rt.Cylinder(capped=False), rt.Cone(capped=False), rt.Cone(top_radius=2)):
+        shape = shape.model_copy(update={"capped": False})
+        found = probe(shape, inside * 2, [[1, 0, 0], [-1, 0, 0]])
+        assert (found.t > 0).all()
+        assert np.isfinite(found.t).all()
+        assert (found.n[0] @ [1, 0, 0] > 0, found.n[1] @ [-1, 0, 0] > 0) == (True, True)
+        # Straight through the ends.
+        assert np.isinf(probe(shape, [[0.1, 0.2, 9]], [[0, 0, 1]]).t).all()
+    through = probe(rt.Cylinder(capped=False), [[0.1, 0.2, 9]], [[0, 0, -1]])
+    assert np.isinf(through.t).all()
+
+
+def test_a_frustum_of_equal_radii_is_a_cylinder():
+    rng = np.random.default_rng(6)
+    one, two = rt.Cone(radius=0.7, top_radius=0.7, height=2), rt.Cylinder(radius=0.7, z_max=2)
+    o, d = rays_at(rng, exactly(two), 2000)
+    a, b = probe(one, o, d), probe(two, o, d)
+    assert np.array_equal(a.t, b.t)
+    assert np.array_equal(a.face, b.face)
+
+
+# ---- the apex -----------------------------------------------------------------------------------
+
+
+def apex_of(shape):
+    exact = exactly(shape)
+    return exact.m[:, :3] @ [0.0, 0.0, shape.height] + exact.m[:, 3]
+
+
+@pytest.mark.parametrize("capped", [False, True])
+def test_the_apex(capped):
+    """Met from all around, within rounding and exactly: a point, a unit normal, no other nappe."""
+    rng = np.random.default_rng(7)
+    upright = rt.Cone(capped=capped)
+    for shape in (upright, put(upright, rotation(rng) @ np.diag([1, 2, 0.5]), (1.0, -2.0, 3.0))):
+        apex, exact = apex_of(shape), exactly(shape)
+        v = rng.normal(size=(3000, 3))
+        near = apex + v * 10.0 ** -rng.uniform(1, 17, (3000, 1))
+        near[:500] = apex
+        o = near + rng.normal(size=(3000, 3)) * 3.0
+        found = probe(shape, o, near - o, guides_at(rng, 3000))
+        i = found.hits
+        assert len(i) > 300
+        assert np.allclose(np.linalg.norm(found.n[i], axis=1), 1.0, rtol=1e-14)
+        assert np.isfinite(found.error[i]).all()
+        assert (found.error[i] < 1e-12).all()
+        up = np.linalg.solve(exact.m[:, :3], (found.p[i] - apex).T).T[:, 2]
+        assert (up <= 64 * ULP).all()
+
+
+def test_the_apex_exactly():
+    apex = [0.0, 0.0, 1.0]
+    for shape in (rt.Cone(), rt.Cone(capped=False)):
+        for d in ([1, 0, 0], [0, -1, 0], [0.25, 0.5, 0], [0, 0, -1], [0.125, 0, -1]):
+            d = np.array(d, float)
+            found = probe(shape, [apex - 2.0 * d], [d])
+            assert found.t[0] == 2.0
+            assert np.array_equal(found.p[0], apex)
+            assert np.array_equal(found.n[0], [0.0, 0.0, 1.0])
+            assert found.face[0] in (0, 6)
+        # Above it there is the nappe that is cut off.
+        for height in (2.0**-52, 2.0**-30, 0.5):
+            o = np.array([[-2.0, 0.0, 1.0 + height]])
+            assert np.isinf(probe(shape, o, [[1.0, 0.0, 0.0]]).t[0])
+            below = probe(shape, [[-2.0, 0.0, 1.0 - height / 2]], [[1.0, 0.0, 0.0]])
+            assert below.t[0] == 2.0 - height / 2
+            assert below.face[0] == 0
+
+
+def test_leaving_the_apex():
+    """Upwards nothing is met again, however flat."""
+    rng = np.random.default_rng(8)
+    guides = guides_at(rng, 1000)
+    guides[:, 2] = np.abs(guides[:, 2])
+    for shape in (rt.Cone(), rt.Cone(radius=0.3), rt.Cone(radius=5.0)):
+        for offset in ((0.0, 0.0, 0.0), (1.0, 2.0, 3.0)):
+            placed = put(shape, np.eye(3), offset)
+            o = np.tile(np.add(apex_of(placed), [0.0, 0.0, 4.0]), (1000, 1))
+            found = probe(placed, o, np.tile([0.0, 0.0, -1.0], (1000, 1)), guides)
+            assert (found.t == 4.0).all()
+            assert np.isinf(found.next_t).all()
+
+
+# ---- what there is to describe ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("shape", "fields", "message"),
+    [
+        (rt.Cylinder, {"radius": 0}, "greater than 0"),
+        (rt.Cylinder, {"z_min": 1.0}, "expected 'z_min' below 'z_max'"),
+        (rt.Cylinder, {"z_max": math.inf}, "finite"),
+        (rt.Cone, {"radius": 0}, "greater than 0"),
+        (rt.Cone, {"height": -1}, "greater than 0"),
+        (rt.Cone, {"top_radius": -1}, "greater than or equal to 0"),
+    ],
+)
+def test_refused(shape, fields, message):
+    with pytest.raises(rt.SceneError, match=re.escape(message)):
+        shape(**fields)
+
+
+def test_solids():
+    """A cylinder cut by boxes is a shorter cylinder; a cone without its tip is a frustum."""
+    rng = np.random.default_rng(9)
+    o, d = rays_at(rng, exactly(rt.Cylinder(z_min=-1)), 2000)
+    low = put(rt.Box(), np.diag([4.0, 4.0, 0.5]))
+    high = put(rt.Box(), np.diag([4.0, 4.0, 1.0]), (0.0, 0.0, 1.5))
+    pairs = (
+        (rt.Cylinder(z_min=-3, z_max=5) & low, rt.Cylinder(z_min=-0.5, z_max=0.5)),
+        (rt.Cone(height=1.0) - high, rt.Cone(height=0.5, top_radius=0.5)),
+    )
+    # Elsewhere one of each: all scenes have the same kinds, and share kernels.
+    away = (transform.Translate(translate=(0.0, 0.0, 1e6)),)
+    others = (
+        rt.Cylinder(transform=away),
+        rt.Cone(transform=away),
+        rt.Box(transform=away) - rt.Box(),
+    )
+    for made, expected in pairs:
+        one, two = (rt.Scene(shapes=(s, *others)).intersect(o, d) for s in (made, expected))
+        hit = np.isfinite(two.t)
+        assert hit.sum() > 300
+        assert np.array_equal(hit, np.isfinite(one.t))
+        assert np.allclose(one.t[hit], two.t[hit], rtol=1e-12)
+        assert np.allclose(one.n[hit], two.n[hit], atol=1e-12)

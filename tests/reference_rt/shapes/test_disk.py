@@ -1,0 +1,270 @@
+"""Disks: rational arithmetic, closed forms, light."""
+
+import itertools
+import math
+from fractions import Fraction as Q
+
+import numpy as np
+import pytest
+from builders import U, shapes_in_order
+from drivers import probe
+from flat_checks import (
+    ExactHits,
+    exact_normal,
+    leave_and_return,
+    mirrors,
+    plane_points,
+    random_map,
+    rays_at,
+)
+
+import reference_rt as rt
+from reference_rt.core import transform
+from reference_rt.core.vec3 import Vec3
+from reference_rt.rendering import query
+from reference_rt.shapes import DISK
+from reference_rt.shapes.flat import disk
+from reference_rt.shapes.shape import Place
+
+CHI2_199 = 308.60
+"""The quantile 1 - 1e-6 of chi-square with 199 degrees of freedom: scipy.stats.chi2.ppf."""
+
+
+def disks_and_rays(rng, n, stretch, offset, distance):
+    """n disks, a ray at the plane of each: points at up to 1.4 radii, every third at the rim."""
+    shapes = [rt.Disk(transform=(random_map(rng, stretch, offset),)) for _ in range(n)]
+    tables, rows = shapes_in_order(shapes)
+    r, phi = 1.4 * np.sqrt(rng.uniform(0, 1, n)), rng.uniform(0, 2 * math.pi, n)
+    r[::3] = 1 + rng.choice([-1, 1], len(r[::3])) * 10.0 ** rng.uniform(-16, -3, len(r[::3]))
+    points = plane_points(tables.disks, rows, r * np.cos(phi), r * np.sin(phi))
+    return shapes, tables, rows, *rays_at(rng, points, distance)
+
+
+@pytest.mark.parametrize(
+    ("stretch", "offset", "distance"), [(0.0, 3.0, 5.0), (3.0, 3.0, 5.0), (1.0, 1e4, 1e6)]
+)
+def test_against_rational_arithmetic(stretch, offset, distance):
+    """Hit or miss, t, uv and normal; sheared, mirrored, scaled by 1e-3 to 1e3, and from afar."""
+    rng = np.random.default_rng(1)
+    n = 400
+    shapes, tables, rows, o, d = disks_and_rays(
+        rng, n, stretch, offset, distance * rng.uniform(0.1, 2, n)
+    )
+    table = tables.disks
+    found, right = probe(tables, DISK, rows, o, d), ExactHits(table, rows, o, d)
+    hits = misses = 0
+    for i in range(n):
+        t, x, y = right.t[i], right.x[i], right.y[i]
+        inside = float(1 - x * x - y * y)
+        band = 2 * (abs(float(x)) * right.x_error[i] + abs(float(y)) * right.y_error[i]) + 4 * U
+        if abs(inside) < band:
+            continue
+        assert np.isfinite(found.t[i]) == (inside > 0)
+        hits, misses = hits + (inside > 0), misses + (inside < 0)
+        if inside < 0:
+            continue
+        assert abs(float(Q(found.t[i]) - t)) <= right.t_error[i]
+        normal, side = exact_normal(table, rows[i])
+        assert side == (-1 if mirrors(shapes[i]) else 1)
+        assert np.abs(found.n[i] - side * normal).max() <= 4 * U
+        r = math.hypot(x, y)
+        assert abs(found.u[i] - r) <= right.x_error[i] + right.y_error[i] + 4 * U
+        turn = math.atan2(y, x) / (2 * math.pi) - found.v[i]
+        off = abs(turn - round(turn)) * 2 * math.pi * r
+        assert off <= right.x_error[i] + right.y_error[i] + 16 * U
+        assert 0 <= found.v[i] <= 1
+    assert hits > n // 4
+    assert misses > n // 8
+
+
+def test_distances_are_within_16_ulp_of_size():
+    """Met at 0.1 and more, at an ordinary scale."""
+    rng = np.random.default_rng(2)
+    _, tables, rows, o, d = disks_and_rays(rng, 600, 0.5, 3.0, rng.uniform(0.1, 10, 600))
+    table = tables.disks
+    found, right = probe(tables, DISK, rows, o, d), ExactHits(table, rows, o, d)
+    speed = np.linalg.norm(d, axis=1)
+    cosine = np.abs(np.sum(d * table.normal[rows], axis=1)) / speed
+    size = np.linalg.norm(np.hstack([table.x_edge, table.y_edge])[rows], axis=1)
+    worst = max(
+        abs(float(Q(found.t[i]) - right.t[i])) * speed[i] / (found.t[i] * speed[i] + size[i])
+        for i in np.flatnonzero(np.isfinite(found.t) & (cosine > 0.1))
+    )
+    assert worst <= 16 * 2 * U
+
+
+def test_on_a_lattice():
+    """The rim belongs to the disk; rays in the plane miss; either zero."""
+    origins = np.array(list(itertools.product((-2, -1, 0, 1, 2), repeat=3)), float)
+    directions = [w for w in itertools.product((-1.0, 0.0, -0.0, 1.0), repeat=3) if any(w)]
+    o = np.repeat(origins, len(directions), axis=0)
+    d = np.tile(directions, (len(origins), 1))
+    tables, _ = shapes_in_order([rt.Disk()])
+    found = probe(tables, DISK, np.zeros(len(o)), o, d)
+    for i in range(len(o)):
+        t = math.inf
+        if d[i, 2] != 0 and -o[i, 2] / d[i, 2] > 0:
+            x, y, _ = o[i] - d[i] * (o[i, 2] / d[i, 2])
+            t = -o[i, 2] / d[i, 2] if x * x + y * y <= 1 else t
+        assert found.t[i] == t, (o[i], d[i])
+
+
+def test_uv_along_the_axes():
+    """(r, phi / 2 pi), phi from local +x towards +y."""
+    scene = rt.Scene(shapes=(rt.Disk(),))
+    o = [[0.5, 0, 1], [0, 0.5, 1], [-0.25, 0, 1], [0, -1, 1], [0, 0, 1]]
+    hits = scene.intersect(o, [[0, 0, -1]] * 5)
+    assert hits.uv.tolist() == [[0.5, 0], [0.5, 0.25], [0.25, 0.5], [1, 0.75], [0, 0]]
+
+
+def test_rays_that_leave_never_return():
+    rng = np.random.default_rng(3)
+    left = 0
+    for stretch, offset in ((0.0, 0.0), (3.0, 1.0), (3.0, 1e6), (1.0, 1e12)):
+        tables, rows = shapes_in_order(
+            [rt.Disk(transform=(random_map(rng, stretch, offset),)) for _ in range(50)]
+        )
+        table, rows = tables.disks, np.tile(rows, 400)
+        x, y = rng.uniform(-0.7, 0.7, (2, len(rows)))
+        size = np.linalg.norm(table.x_edge[rows], axis=1)
+        hits, again = leave_and_return(
+            tables, DISK, rows, plane_points(table, rows, x, y), size, rng
+        )
+        left += hits
+        assert np.isinf(again).all()
+    assert left > 60_000
+
+
+def test_bounds_touch_the_rim():
+    rng = np.random.default_rng(4)
+    for _ in range(30):
+        table = rt.Disk(transform=(random_map(rng, 2.0, 3.0),)).tabulate(Place())
+        phi = np.linspace(0, 2 * math.pi, 100_001)
+        points = plane_points(table, np.zeros(len(phi), int), np.cos(phi), np.sin(phi))
+        (lower,), (upper,) = disk.bounds(table)
+        size = np.abs(points).max() + np.abs(table.center).max()
+        # Rounding of the points themselves; the rim between two of them, (1e-4)² / 16 of it.
+        assert (points >= lower - 4 * U * size).all()
+        assert (points <= upper + 4 * U * size).all()
+        assert (points.min(axis=0) - lower).max() <= 1e-9 * size
+        assert (upper - points.max(axis=0)).max() <= 1e-9 * size
+
+
+# ---- as a light ---------------------------------------------------------------------------------
+
+
+def lamp(*steps):
+    """A disk that shines on a floor of reflectance 0.5 at z = 0."""
+    return rt.Scene(
+        materials={"lamp": rt.Emissive(radiance=(2, 2, 2))},
+        shapes=(
+            rt.Disk(material="lamp", transform=steps),
+            rt.Rectangle(transform=(transform.Scale(scale=(9, 9, 9)),)),
+        ),
+    )
+
+
+def samples(scene, u):
+    """(points, pdf, contributions) of the light at the floor's middle."""
+    o, d = [[0.0, 0.0, 0.01]], [[0.0, 0.0, -1.0]]
+    found = [query.direct_light(scene.tables, o, d, 0, tuple(k)) for k in u]
+    return (
+        np.concatenate([getattr(f, k) for f in found]) for k in ("target", "pdf", "contribution")
+    )
+
+
+FACING_DOWN = transform.Rotate(rotate=transform.Turn(axis=(1, 0, 0), degrees=180))
+
+
+def test_points_are_uniform():
+    """Over 10 x 20 cells of equal area of the local disk, under a map with shear."""
+    step = random_map(np.random.default_rng(5), 0.5, 3.0)
+    table = rt.Disk(transform=(step,)).tabulate(Place())
+    u = np.random.default_rng(6).uniform(0, 1, (20_000, 2))
+    far = Vec3(1e3, 0.0, 0.0)
+    p = np.array([disk.sample(table, 0, 1.0, far, *k).p for k in u.tolist()]) - table.center[0]
+    x, y = p @ table.x_of[0], p @ table.y_of[0]
+    r2, turns = x * x + y * y, np.arctan2(y, x) / (2 * math.pi) % 1
+    assert r2.max() <= 1 + 64 * U * 10
+    counts, _, _ = np.histogram2d(r2, turns, bins=(10, 20), range=[[0, 1 + 1e-12], [0, 1]])
+    assert np.sum((counts - 100) ** 2) / 100 < CHI2_199
+
+
+def midpoints(n):
+    ticks = (np.arange(n) + 0.5) / n
+    return itertools.product(ticks, ticks)
+
+
+def test_light_of_a_disk_overhead():
+    """R at height h: irradiance pi L R² / (R² + h²), solid angle 2 pi (1 - h / √(h² + R²))."""
+    h, r = 2.0, 1.5
+    scene = lamp(
+        transform.Scale(scale=(r, r, 1)), FACING_DOWN, transform.Translate(translate=(0, 0, h))
+    )
+    _, pdf, light = samples(scene, midpoints(30))
+    solid_angle = 2 * math.pi * (1 - h / math.hypot(h, r))
+    # The midpoint rule of second order in cells of 1/30.
+    assert np.mean(1 / pdf) == pytest.approx(solid_angle, rel=1e-3)
+    irradiance = math.pi * 2 * r * r / (r * r + h * h)
+    assert np.mean(light[:, 0] / pdf) == pytest.approx(0.5 / math.pi * irradiance, rel=1e-3)
+
+
+def test_light_of_an_ellipse():
+    """Sheared, tilted and off to the side: 1 / pdf against cos / distance² summed over the disk."""
+    tilt = transform.Rotate(rotate=transform.Turn(axis=(1, 0, 0), degrees=205))
+    shear = transform.Matrix(
+        matrix=((1.0, 0.7, 0.0, 0.0), (0.0, 0.6, 0.2, 0.0), (0.0, 0.0, 1.0, 0.0))
+    )
+    scene = lamp(shear, tilt, transform.Translate(translate=(0.5, -0.4, 2)))
+    _, pdf, _ = samples(scene, midpoints(30))
+    m = transform.affine(scene.shapes[0].transform)
+    r2, phi = np.meshgrid((np.arange(400) + 0.5) / 400, 2 * math.pi * np.arange(400) / 400)
+    local = np.sqrt(r2)[..., None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+    q = local @ m[:, :2].T + m[:, 3]
+    cross = np.cross(m[:, 0], m[:, 1])  # of the area's length
+    distance2 = np.sum(q * q, axis=-1)
+    solid_angle = math.pi * np.mean(-(q @ cross) / distance2**1.5)
+    assert (pdf > 0).all()
+    assert np.mean(1 / pdf) == pytest.approx(solid_angle, rel=2e-3)
+
+
+def test_the_back_does_not_shine():
+    scene = lamp(transform.Translate(translate=(0, 0, 2)))
+    _, pdf, light = samples(scene, midpoints(3))
+    assert not pdf.any()
+    assert not light.any()
+
+
+def test_the_pdf_is_that_of_the_samples():
+    """What a path that meets the light by chance weighs itself against."""
+    step = random_map(np.random.default_rng(7), 0.3, 0.0)
+    scene = lamp(step, transform.Translate(translate=(0, 0, 5)))
+    areas = scene.tables.lights.areas
+    m = transform.affine(scene.shapes[0].transform)
+    area = math.pi * np.linalg.norm(np.cross(m[:, 0], m[:, 1]))
+    assert areas.area[areas.kind == DISK][0] == pytest.approx(area, rel=8 * U)
+
+
+# ---- what is refused ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("factors", "message"),
+    [
+        (
+            (1, 0, 1),
+            "the transform is singular: it flattens space; expected one that can be undone",
+        ),
+        ((1e200, 1e200, 1), "the disk's area is not a float64; expected an ordinary size"),
+        ((1e-200, 1e-200, 1), "the disk's area is not a float64; expected an ordinary size"),
+    ],
+)
+def test_bad_maps(factors, message):
+    scene = rt.Scene(shapes=(rt.Disk(transform=(transform.Scale(scale=factors),)),))
+    with pytest.raises(rt.SceneError, match=message):
+        rt.build_tables(scene)
+
+
+def test_not_a_solid():
+    with pytest.raises(rt.SceneError, match="it encloses no space; expected a solid"):
+        rt.build_tables(rt.Scene(shapes=(rt.Sphere() - rt.Disk(),)))

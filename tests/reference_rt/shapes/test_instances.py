@@ -1,0 +1,135 @@
+"""Instances: stored once, drawn many times, as if each copy stood there by itself."""
+
+import numpy as np
+import pytest
+from builders import icosphere, placed, unit_vectors, write_obj
+from drivers import leave_scene
+
+import reference_rt as rt
+from reference_rt.core import transform
+
+N = 20_000
+
+
+def moved(*offset):
+    return (transform.Translate(translate=offset),)
+
+
+def rays(rng, reach):
+    o = rng.uniform(-2 * reach, 2 * reach, (N, 3))
+    return o, rng.uniform(-reach, reach, (N, 3)) - o
+
+
+def members(folder):
+    file = write_obj(folder / "ball.obj", *icosphere(1))
+    turned = placed(np.random.default_rng(3), 0.5, 1.0)
+    return (
+        rt.Mesh(file=str(file), transform=moved(0.0, 0.0, 1.5)),
+        rt.Box(transform=turned),
+        rt.Rectangle(transform=moved(0.0, 1.5, 0.0)),
+        rt.Triangle(v0=(0, 0, 0), v1=(2, 0, 1), v2=(0, 2, 1)),
+    )
+
+
+def test_as_if_each_stood_there(tmp_path):
+    """Copies under unequal scales and mirrors, against the same shapes with composed maps."""
+    rng = np.random.default_rng(4)
+    shapes = members(tmp_path)
+    places = [
+        (*placed(rng, 0.7, 4.0), transform.Scale(scale=(1.0, float(sign), 1.0)))
+        for sign in (1, -1, 1, -1, 1)
+    ]
+    drawn = rt.Scene(
+        groups={"g": shapes}, shapes=tuple(rt.Instance(group="g", transform=p) for p in places)
+    )
+    baked = rt.Scene(
+        shapes=tuple(
+            s.model_copy(update={"transform": (*s.transform, *p)}) for p in places for s in shapes
+        )
+    )
+    o, d = rays(rng, 4.0)
+    one, two = drawn.intersect(o, d), baked.intersect(o, d)
+    same = np.isfinite(one.t) == np.isfinite(two.t)
+    assert (~same).sum() <= 1  # an edge
+    hit = same & np.isfinite(one.t)
+    assert hit.sum() > N // 10
+    assert np.array_equal(one.shape[hit] * len(shapes) + one.part[hit], two.shape[hit])
+    assert np.array_equal(one.primitive[hit], two.primitive[hit])
+    assert (one.instance[hit] == 0).all()
+    assert (two.instance == -1).all()
+    # Maps of condition below 16: some hundred roundings of numbers up to 20.
+    limit = 16 * 100 * 20 * 2.0**-53
+    np.testing.assert_allclose(one.p[hit], two.p[hit], rtol=0, atol=limit)
+    cosine = np.sum(one.n[hit] * two.n[hit], axis=1)
+    np.testing.assert_allclose(cosine, 1.0, atol=1e-12)
+    np.testing.assert_allclose(one.uv[hit], two.uv[hit], atol=1e-9)
+
+
+def test_groups_of_groups():
+    """Three levels of ten: a thousand copies, numbered, where they belong."""
+    ten = {
+        "ball": (rt.Sphere(radius=0.3),),
+        "row": tuple(rt.Instance(group="ball", transform=moved(float(i), 0, 0)) for i in range(10)),
+        "sheet": tuple(
+            rt.Instance(group="row", transform=moved(0, float(i), 0)) for i in range(10)
+        ),
+        "cube": tuple(
+            rt.Instance(group="sheet", transform=moved(0, 0, float(i))) for i in range(10)
+        ),
+    }
+    scene = rt.Scene(groups=ten, shapes=(rt.Instance(group="cube"),))
+    assert len(scene.tables.geometry.instances.root) == 1000
+    at = np.array([(x, y, z) for z in range(10) for y in range(10) for x in range(10)], float)
+    o = at + np.array([0.5, 0.0, 0.0])
+    hits = scene.intersect(o, np.tile([-1.0, 0.0, 0.0], (1000, 1)))
+    np.testing.assert_allclose(hits.t, 0.2, rtol=1e-14)
+    assert hits.instance.tolist() == list(range(1000))
+    assert (hits.shape == 0).all()
+    assert len(scene.tables.geometry.shapes.spheres.radius) == 1
+
+
+def test_no_copy_hits_itself_when_left(tmp_path):
+    """Unequal scales up to 1 : 1e6, far from the origin."""
+    rng = np.random.default_rng(6)
+    for scale in ((1.0, 1.0, 1.0), (1e3, 1.0, 1e-3), (1e-8, 1e-8, 1e-8)):
+        steps = (transform.Scale(scale=scale), *placed(rng, 1.0, 100.0))
+        scene = rt.Scene(
+            camera=rt.Perspective(),
+            groups={"g": (rt.Box(), rt.Sphere(radius=0.5, center=(0, 0, 3.0)))},
+            shapes=(rt.Instance(group="g", transform=steps),),
+        )
+        m = transform.affine(steps)
+        inner = rng.uniform(-1.0, 1.0, (N, 3)) + [0.0, 0.0, 3.0] * rng.integers(0, 2, (N, 1))
+        target = transform.apply_points(m, inner)
+        o = target + 10.0 * np.abs(m[:, :3]).max() * unit_vectors(rng, N)
+        again, hit = leave_scene(scene, o, target - o, unit_vectors(rng, N))
+        assert hit.sum() > N // 20
+        # Convex shapes: a ray that leaves outwards meets at most the other one, which is as far as
+        # the two are apart.
+        assert (again[hit] > 1e-3 * min(scale)).all()
+
+
+def test_refusals():
+    def message(**parts):
+        with pytest.raises(rt.SceneError) as caught:
+            rt.build_tables(rt.Scene(**parts))
+        return str(caught.value)
+
+    ball = (rt.Sphere(),)
+    assert message(shapes=(rt.Instance(group="x"),), groups={"g": ball}) == (
+        "shapes[0].group: there is no group 'x'; expected one of: 'g'"
+    )
+    loop = {"a": (rt.Instance(group="b"),), "b": (rt.Instance(group="a"),)}
+    assert "contains itself: a -> b -> a" in message(shapes=(rt.Instance(group="a"),), groups=loop)
+    flat = (transform.Scale(scale=(1.0, 0.0, 1.0)),)
+    assert "flattens space" in message(
+        shapes=(rt.Instance(group="g", transform=flat),), groups={"g": ball}
+    )
+    many = {"g0": ball} | {
+        f"g{k}": tuple(rt.Instance(group=f"g{k - 1}") for _ in range(10)) for k in range(1, 8)
+    }
+    assert "over 1,000,000 copies" in message(shapes=(rt.Instance(group="g7"),), groups=many)
+    lamp = {"lamp": rt.Emissive(radiance=(1, 1, 1))}
+    assert "materials of its group" in message(
+        shapes=(rt.Instance(group="g", material="lamp"),), groups={"g": ball}, materials=lamp
+    )

@@ -1,0 +1,224 @@
+"""Planes: rational arithmetic, parallel rays, far away; the half space below as a solid."""
+
+import itertools
+import math
+from fractions import Fraction as Q
+
+import numpy as np
+import pytest
+from builders import U, shapes_in_order, unit_vectors
+from drivers import probe
+from flat_checks import (
+    ExactHits,
+    exact,
+    exact_normal,
+    leave_and_return,
+    mirrors,
+    plane_points,
+    random_map,
+    rays_at,
+)
+
+import reference_rt as rt
+from reference_rt.core import transform
+from reference_rt.core.vec3 import Vec3
+from reference_rt.shapes import PLANE
+from reference_rt.shapes.flat import base, plane
+
+
+def random_planes(rng, n, stretch, offset):
+    shapes = [rt.Plane(transform=(random_map(rng, stretch, offset),)) for _ in range(n)]
+    return shapes, *shapes_in_order(shapes)
+
+
+@pytest.mark.parametrize(("stretch", "offset", "reach"), [(0, 3, 3), (3, 3, 1), (1, 3, 1e6)])
+def test_against_rational_arithmetic(stretch, offset, reach):
+    """t, normal and uv; sheared, mirrored, scaled by 1e-3 to 1e3; met far from the origin, from
+    above, below and pointing away."""
+    rng = np.random.default_rng(1)
+    n = 400
+    shapes, tables, rows = random_planes(rng, n, stretch, offset)
+    table = tables.planes
+    x, y = reach * rng.uniform(-1, 1, (2, n))
+    points = plane_points(table, rows, x, y)
+    o, d = rays_at(rng, points, reach * rng.uniform(0.1, 3, n))
+    d *= rng.choice([-1, 1, 1], (n, 1))
+    found, right = probe(tables, PLANE, rows, o, d), ExactHits(table, rows, o, d)
+    for i in range(n):
+        t = right.t[i]
+        assert np.isfinite(found.t[i]) == (t > 0)
+        if t < 0:
+            continue
+        assert abs(float(Q(found.t[i]) - t)) <= right.t_error[i]
+        assert abs(float(Q(found.u[i]) - right.x[i])) <= right.x_error[i]
+        assert abs(float(Q(found.v[i]) - right.y[i])) <= right.y_error[i]
+        normal, side = exact_normal(table, rows[i])
+        assert side == (-1 if mirrors(shapes[i]) else 1)
+        assert np.abs(found.n[i] - side * normal).max() <= 4 * U
+        # The point lies in the plane of x_edge and y_edge, to within its error.
+        off = [p - c for p, c in zip(exact(found.p[i]), exact(table.center[rows[i]]), strict=True)]
+        assert abs(sum(float(a) * b for a, b in zip(off, normal, strict=True))) <= found.error[i]
+    assert 0.5 * n < np.isfinite(found.t).sum() < 0.8 * n
+
+
+def test_distances_are_within_16_ulp_of_size():
+    """Met at a cosine of 0.1 and more, at an ordinary scale."""
+    rng = np.random.default_rng(2)
+    _, tables, rows = random_planes(rng, 600, 0.5, 3.0)
+    table = tables.planes
+    x, y = rng.uniform(-1, 1, (2, 600))
+    o, d = rays_at(rng, plane_points(table, rows, x, y), rng.uniform(0.1, 10, 600))
+    found, right = probe(tables, PLANE, rows, o, d), ExactHits(table, rows, o, d)
+    speed = np.linalg.norm(d, axis=1)
+    cosine = np.abs(np.sum(d * table.normal[rows], axis=1)) / speed
+    size = np.linalg.norm(np.hstack([table.x_edge, table.y_edge])[rows], axis=1)
+    worst = max(
+        abs(float(Q(found.t[i]) - right.t[i])) * speed[i] / (found.t[i] * speed[i] + size[i])
+        for i in np.flatnonzero(np.isfinite(found.t) & (cosine > 0.1))
+    )
+    assert worst <= 16 * 2 * U
+
+
+def test_on_a_lattice():
+    """Both faces are hit; parallel rays miss, in the plane too, for either zero."""
+    origins = np.array(list(itertools.product((-2, -1, 0, 1, 2), repeat=3)), float)
+    directions = [w for w in itertools.product((-1.0, 0.0, -0.0, 1.0), repeat=3) if any(w)]
+    o = np.repeat(origins, len(directions), axis=0)
+    d = np.tile(directions, (len(origins), 1))
+    tables, _ = shapes_in_order([rt.Plane()])
+    found = probe(tables, PLANE, np.zeros(len(o)), o, d)
+    for i in range(len(o)):
+        t = -o[i, 2] / d[i, 2] if d[i, 2] != 0 else math.inf
+        t = t if t > 0 else math.inf
+        assert found.t[i] == t, (o[i], d[i])
+        if t < math.inf:
+            assert found.p[i].tolist() == (o[i] + t * d[i]).tolist()
+            assert [found.u[i], found.v[i]] == found.p[i, :2].tolist()
+
+
+def test_signed_distance():
+    """Above is positive, in scene units whatever the scale of the map."""
+    step = transform.Scale(scale=(2, 3, 50))
+    lift = transform.Translate(translate=(7, 7, 4))
+    planes = rt.build_tables(rt.Scene(shapes=(rt.Plane(transform=(step, lift)),)))
+    table = planes.geometry.shapes.planes
+    assert base.signed_distance(table, 0, Vec3(100.0, 9.0, 6.5)) == 2.5
+    assert base.signed_distance(table, 0, Vec3(100.0, 9.0, 3.0)) == -1.0
+
+
+def test_rays_that_leave_never_return():
+    """Met as far away as 1e12 times the size of what happens there."""
+    rng = np.random.default_rng(3)
+    left = 0
+    for stretch, offset, reach in ((0, 0, 1), (3, 1, 1), (3, 1e6, 1e3), (1, 1, 1e12)):
+        _, tables, rows = random_planes(rng, 50, stretch, offset)
+        rows = np.tile(rows, 400)
+        x, y = reach * rng.uniform(-1, 1, (2, len(rows)))
+        points = plane_points(tables.planes, rows, x, y)
+        hits, again = leave_and_return(tables, PLANE, rows, points, np.ones(len(rows)), rng)
+        left += hits
+        assert np.isinf(again).all()
+    assert left > 60_000
+
+
+def test_the_point_is_off_by_no_more_than_its_error_at_the_horizon():
+    """A plane met 1e15 away at 1e-15 radians."""
+    tables, _ = shapes_in_order([rt.Plane(transform=(random_map(np.random.default_rng(4)),))])
+    n = tables.planes.normal[0]
+    along = np.cross(n, [0.3, 0.5, -0.8])
+    found = probe(tables, PLANE, [0], [tables.planes.center[0] + n], [along - 1e-15 * n])
+    assert found.t[0] > 1e14
+    assert abs(n @ (found.p[0] - tables.planes.center[0])) <= found.error[0]
+    assert found.error[0] <= 1e-14 * np.abs(found.p[0]).max()
+
+
+# ---- among other shapes -------------------------------------------------------------------------
+
+
+def test_outside_of_the_hierarchy():
+    """Among many spheres, with any hierarchy: the same hits as with none."""
+    rng = np.random.default_rng(5)
+    spheres = [rt.Sphere(center=tuple(c), radius=0.3) for c in rng.uniform(-3, 3, (60, 3))]
+    planes = [rt.Plane(transform=(random_map(rng),)) for _ in range(2)]
+    o, d = rng.uniform(-4, 4, (500, 3)), unit_vectors(rng, 500)
+    found = [
+        rt.Scene(shapes=(*planes, *spheres), hierarchy=h).intersect(o, d)
+        for h in ("none", "sah", "median")
+    ]
+    for other in found[1:]:
+        assert np.array_equal(found[0].t, other.t)
+        assert np.array_equal(found[0].shape, other.shape)
+    assert set(found[0].shape) >= {0, 1}
+    assert (found[0].shape >= 2).sum() > 50
+
+
+def test_not_in_a_group():
+    scene = rt.Scene(groups={"ground": (rt.Plane(),)}, shapes=(rt.Instance(group="ground"),))
+    with pytest.raises(rt.SceneError, match=r"groups\.ground\[0\]: it is infinite; expected"):
+        rt.build_tables(scene)
+
+
+# ---- as a solid ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("o", "d", "expected"),
+    [
+        ((0, 0, 2), (0, 0, -2), (1, math.inf)),
+        ((0, 0, 2), (0, 0, 1), (-math.inf, -2)),
+        ((0, 0, -3), (1, 0, 1), (-math.inf, 3)),
+        ((0, 0, -3), (1, 1, 0), (-math.inf, math.inf)),
+        ((0, 0, 3), (1, 1, 0), (math.inf, math.inf)),
+        ((0, 0, 0), (1, 1, -0.0), (math.inf, math.inf)),
+    ],
+)
+def test_spans(o, d, expected):
+    """The line's part below, over all t; none in the plane."""
+    tables, _ = shapes_in_order([rt.Plane()])
+    ray = rt.ray.Ray(Vec3(*map(float, o)), Vec3(*map(float, d)), math.inf)
+    spans = plane.spans(tables.planes, 0, ray)
+    assert (spans.t0, spans.t1) == expected
+    assert spans.t2 == math.inf
+
+
+def test_half_a_ball():
+    """A unit ball below a tilted plane through its middle, against its two surfaces in turn."""
+    rng = np.random.default_rng(6)
+    tilt = (transform.Rotate(rotate=transform.Turn(axis=(1, 2, 0), degrees=50)),)
+    n = transform.affine(tilt)[:, 2]
+    half, rest = (
+        rt.Scene(shapes=(s,))
+        for s in (rt.Sphere() & rt.Plane(transform=tilt), rt.Sphere() - rt.Plane(transform=tilt))
+    )
+    o, d = rng.uniform(-2, 2, (3000, 3)), unit_vectors(rng, 3000)
+    d[::2] = (unit_vectors(rng, 3000) - o)[::2]
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    for scene, side in ((half, 1), (rest, -1)):
+        hits = scene.intersect(o, d)
+        b, c = np.sum(o * d, axis=1), np.sum(o * o, axis=1) - 1
+        with np.errstate(invalid="ignore"):
+            root = np.sqrt(b * b - c)
+        candidates = np.stack([-b - root, -b + root, -(o @ n) / (d @ n)])
+        p = o + d * candidates[..., None]
+        on_ball = side * (p @ n) < 0
+        in_ball = np.sum(p * p, axis=-1) < 1
+        shown = np.concatenate([on_ball[:2], in_ball[2:]]) & (candidates > 0)
+        t = np.where(shown, candidates, np.inf).min(axis=0)
+        assert np.array_equal(np.isfinite(hits.t), np.isfinite(t))
+        met = np.isfinite(t)
+        assert np.allclose(hits.t[met], t[met], rtol=1e-10)
+        cut = met & (np.argmin(np.where(shown, candidates, np.inf), axis=0) == 2)
+        assert np.allclose(hits.n[cut], side * n, rtol=0, atol=4 * U)
+        assert cut.sum() > 100
+        assert (met & ~cut).sum() > 300
+
+
+def test_a_solid_without_end():
+    """What is below, less a ball: seen from above, from within and from the ball's hollow."""
+    scene = rt.Scene(shapes=(rt.Plane() - rt.Sphere(),))
+    o = [[3, 0, 2], [0, 0, 2], [3, 0, -2], [0, 0, -0.5], [3, 0, -5]]
+    d = [[0, 0, -1], [0, 0, -1], [0, 0, 1], [1, 0, 0], [0, 0, -1]]
+    hits = scene.intersect(o, d)
+    assert hits.t.tolist() == pytest.approx([2, 3, 2, math.sqrt(0.75), math.inf], rel=4 * U)
+    assert hits.part.tolist() == [0, 1, 0, 1, -1]
+    assert hits.n[1].tolist() == [0, 0, 1]

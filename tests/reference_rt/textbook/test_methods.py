@@ -1,0 +1,138 @@
+"""All methods by name: what there is, what is refused, that they agree, also as plain Python."""
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import HELPERS, U, unit_vectors
+from method_checks import CUBE, DIRECTIONS, EXAMPLES, L_SHAPE, TRIANGLE, UNIT_SPHERE, mixed_lengths
+
+import reference_rt as rt
+from reference_rt import textbook
+from reference_rt.textbook.method import rays
+
+
+def test_names():
+    assert {f: len(textbook.names(f)) for f in EXAMPLES} == {
+        "sphere": 3,
+        "box": 3,
+        "triangle": 5,
+        "polygon": 3,
+        "csg": 2,
+        "hierarchy": 4,
+    }
+    assert set(textbook.names()) == set(textbook.METHODS)
+    assert {m.row for m in textbook.METHODS.values()} == {"T5", "T7", "T8", "T9", "T12", "T18"}
+    for name, method in textbook.METHODS.items():
+        assert method.name == name
+        assert method.summary
+        assert method.source
+
+
+@pytest.mark.parametrize(
+    ("expected", "call"),
+    [
+        (r"unknown method 'sphere\.x'; expected one of sphere\.algebraic, ", ("sphere.x", CUBE)),
+        (r"box\.slabs_ieee takes BoxParameters, got Sphere", ("box.slabs_ieee", UNIT_SPHERE)),
+        (r"radius: .* above 0, got -1", ("sphere.robust", UNIT_SPHERE._replace(radius=-1))),
+        (r"center: expected three", ("sphere.robust", UNIT_SPHERE._replace(center=(0, 0)))),
+        (r"v1: expected three finite", ("triangle.lu", TRIANGLE._replace(v1=(0, 0, math.nan)))),
+        (r"expected lower <= upper", ("box.six_planes", CUBE._replace(upper=(1, -2, 1)))),
+        (r"at least one ring", ("polygon.winding", L_SHAPE._replace(rings=[]))),
+        (r"three vertices in each", ("polygon.winding", L_SHAPE._replace(rings=[np.eye(3)[:2]]))),
+        (r"ring: expected points", ("polygon.winding", L_SHAPE._replace(rings=[np.eye(4)]))),
+        (r"no area", ("polygon.winding", L_SHAPE._replace(rings=[np.ones((4, 3))]))),
+        (
+            r"a rectangle encloses no space",
+            ("csg.intervals", textbook.CsgParameters(rt.Rectangle())),
+        ),
+        (r"takes CsgParameters, got Sphere", ("csg.intervals", UNIT_SPHERE)),
+        (r"takes SceneParameters, got Box", ("hierarchy.sah", CUBE)),
+        (r"0\.577 off", ("polygon.winding", L_SHAPE._replace(rings=[[*np.eye(3), (0, 0, 0)]]))),
+    ],
+)
+def test_refusals(expected, call):
+    with pytest.raises(ValueError, match=expected):
+        textbook.intersect(*call, [[0, 0, 0]], [[0, 0, 1]])
+
+
+def test_refused_families_and_rays():
+    with pytest.raises(ValueError, match="unknown family 'cube'; expected one of sphere, tri"):
+        textbook.names("cube")
+    for bad in ([0, 0, 1], [[0, 0, 0]], [[0, math.inf, 1]], [[0, 0, 1], [0, 0, 1]]):
+        with pytest.raises(ValueError, match=r"expected (two \(n, 3\) arrays|finite)"):
+            textbook.intersect("sphere.robust", UNIT_SPHERE, [[0, 0, 0]], bad)
+
+
+@pytest.mark.parametrize("family", EXAMPLES)
+def test_all_methods_of_a_family_agree(family):
+    """On many rays that are not grazing, from about 5 away.
+
+    The bounds below come to at most 320 u t each: flat shapes 8 u 32 12 / (16 0.3 t |d|) with
+    t |d| > 2, the sphere 8 u 36 / (0.43 t |d|) with t |d| > 3 and rays within 0.9 of the centre.
+    """
+    n = 20_000
+    rng = np.random.default_rng(12)
+    o = unit_vectors(rng, n) * 5
+    target = rng.uniform(-1.5, 1.5, (n, 3))
+    if family == "sphere":
+        target = 0.9 * unit_vectors(rng, n) * rng.uniform(0, 1, (n, 1))
+    elif family in ("triangle", "polygon"):
+        o[:, 2] = np.copysign(np.maximum(np.abs(o[:, 2]), 4), o[:, 2])
+        target = rng.uniform((-1, -1, 0), (5, 5, 0), (n, 3))
+    d = mixed_lengths(rng, target - o)
+    first_t, *others = (
+        textbook.intersect(name, EXAMPLES[family], o, d) for name in textbook.names(family)
+    )
+    hit = np.isfinite(first_t)
+    assert hit.sum() > 0.2 * n
+    for t in others:
+        assert np.array_equal(np.isfinite(t), hit)
+        assert np.max(np.abs(t[hit] / first_t[hit] - 1)) <= 640 * U
+
+
+_PLAIN = """
+import sys, numpy as np
+sys.path.insert(0, sys.argv[1])
+import test_methods as here
+np.savez(sys.argv[2], **here.answers())
+"""
+
+
+def answers():
+    """t of every method for the same rays, many of them along the axes or on edges."""
+    rng = np.random.default_rng(11)
+    o = np.concatenate(
+        [rng.uniform(-4, 4, (200, 3)), rng.integers(-4, 5, (len(DIRECTIONS) * 4, 3))]
+    )
+    d = np.concatenate([rng.uniform(-0.5, 0.5, (200, 3)) - o[:200], DIRECTIONS * 4])
+    return {
+        name: textbook.intersect(name, EXAMPLES[name.partition(".")[0]], o, d)
+        for name in textbook.names()
+    }
+
+
+def test_plain_python_gives_the_same_bits(tmp_path):
+    file = tmp_path / "plain.npz"
+    subprocess.run(
+        [sys.executable, "-W", "error", "-c", _PLAIN, str(Path(__file__).parent), str(file)],
+        check=True,
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(HELPERS)},
+    )
+    plain, compiled = dict(np.load(file)), answers()
+    assert set(plain) == set(compiled)
+    for name, t in compiled.items():
+        assert t.tobytes() == plain[name].tobytes(), name
+        assert 10 < np.isfinite(t).sum() < len(t), name
+
+
+def test_inputs_are_not_changed():
+    o, d = np.zeros((2, 3)), np.ones((2, 3))
+    copies = rays(o, d)
+    assert not any(np.shares_memory(x, y) for x, y in zip((o, d), copies, strict=True))
+    t = textbook.intersect("sphere.robust", UNIT_SPHERE, np.asfortranarray(o), d.astype(np.float32))
+    assert np.allclose(t, 1 / math.sqrt(3), rtol=4 * U)
