@@ -1,6 +1,6 @@
 """`python -m reference_rt.cli`."""
 
-from reference_rt.cli import main
+from reference_rt.cli.main import main
 
 if __name__ == "__main__":
     main()
