@@ -1,4 +1,4 @@
-"""Pinhole: the real one, a box with a film behind a hole."""
+"""Pinhole camera: the physical one, a box with a film behind a hole."""
 
 from typing import Literal, Self
 
