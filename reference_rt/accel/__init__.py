@@ -25,7 +25,7 @@ Who calls what, and which way it takes:
 
     query.crossings, t_min > 0      next_crossing -------------------> no BVH:    brute force
                                                                        else:      single ray
-    query.solid_crossings           csg.evaluate.surface_along         one solid, no traversal
+    query.solid_crossings           csg.evaluate.surface_along         only one solid, no search
 
 Who decides:
 
@@ -47,10 +47,10 @@ goes on at the root of the group's BVH: only single-ray traversal does that.  Wh
 Why all ways find the same bits:
 
 1. They test a primitive by the same IEEE operations in the same order.  Scalar and SIMD code are
-   generated from one function (`jit/simd.py`) or tested to agree (triangles: tests/.../test_simd).
+   generated from one function (`jit/simd.py`) or tested to agree (triangles: `test_simd`).
 2. No traversal misses a hit: boxes only cull, and rounding only enlarges them (`view_of`, float32
-   planes rounded outwards, FAR_SLACK).  A box is skipped only where it begins beyond the closest
-   hit so far, never at the same t.
+   planes rounded outwards, FAR_SLACK).  A box that the ray meets is skipped only where it begins
+   beyond the closest hit so far, never at the same t.
 3. Of the hits found the choice does not depend on their order: the smallest t, and at equal t the
    first by `crossing_order.precedes`, a total order (instance, kind, shape, face).  Finding a
    primitive twice, in two leaves, changes nothing.  Brute force visits primitives in that order

@@ -1,5 +1,5 @@
-"""`Geometry`, all that a ray can hit: closest-hit and any-hit queries for one ray, and what is
-known of a hit (surface point, ids, texture coordinates, tangents)."""
+"""`Geometry`, all that a ray can hit: closest-hit and any-hit queries for one ray; the surface
+point, ids, texture coordinates and tangents of a hit."""
 
 from typing import NamedTuple
 

@@ -66,8 +66,8 @@ def _span(o: Any, d: Any, first: Any, boxes: Any, span: Any) -> Any:
     """Componentwise bounds of BUNDLE origins and directions, from float `first` of their arrays on.
 
     Into span (SPAN_FLOATS,): the smallest numbers of o and d, then the largest, each as 3 LANES
-    numbers that are x, y, z in turn and still to be reduced; then the upper planes of the root's
-    boxes, relative to the tree's centre.  Returns the mask of lanes whose numbers are all finite.
+    numbers that are x, y, z in turn and still to be reduced; then how far each child of the root
+    reaches beyond the tree's centre.  Returns the mask of lanes whose numbers are all finite.
     """
     is_finite = boxes.load(0) <= float("inf")
     for place, vectors in ((0, o), (_TURNS, d)):

@@ -41,8 +41,8 @@ def closest_of_packet(
     d (n, 3).
 
     Returns INCOHERENT: nothing is done (they are not coherent, or the scene has no BVH or has
-    instances);  MISSED: no ray hits anything;  FOUND: the rays and their hits are the first ones of
-    `rays` and `hits`.
+    instances);  MISSED: no ray hits anything;  FOUND: the rays and their hits, some of them misses,
+    are the first ones of `rays` and `hits`.
     """
     if not may_be_coherent(row(d, begin), row(d, begin + BUNDLE - 1)):
         return INCOHERENT
