@@ -22,7 +22,7 @@ class Camera(Description):
     up: Direction = (0.0, 1.0, 0.0)
 
     @model_validator(mode="after")
-    def _stands_somewhere(self) -> Self:
+    def _check_orientation(self) -> Self:
         transform.look_at(self.eye, self.target, self.up)
         return self
 

@@ -30,7 +30,7 @@ class ThinLens(CentralCamera):
     through `target`."""
 
     @model_validator(mode="after")
-    def _focuses(self) -> Self:
+    def _check_focus(self) -> Self:
         if not self.aperture_radius / self.focus <= STEEPEST:
             raise ValueError(
                 "the lens is too wide for its focus; expected a larger 'focus_distance' or a "

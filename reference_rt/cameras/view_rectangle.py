@@ -20,7 +20,7 @@ class Rectangle(NamedTuple):
     t: float
 
 
-class Sheet(NamedTuple):
+class PlacedRectangle(NamedTuple):
     """A rectangle in space as three vectors: from the eye to its top left corner, along its top
     edge, and along its left edge."""
 
@@ -98,11 +98,11 @@ def at_distance_1(rectangle: Rectangle, distance: float) -> Rectangle:
     return near
 
 
-def place(rectangle: Rectangle, basis: FloatArray, distance: float) -> Sheet:
+def place(rectangle: Rectangle, basis: FloatArray, distance: float) -> PlacedRectangle:
     """The rectangle across the view direction at `distance` before the eye."""
     u, v, w = basis
     l, r, b, t = rectangle
-    return Sheet(vec3(l * u + t * v - distance * w), vec3((r - l) * u), vec3((b - t) * v))
+    return PlacedRectangle(vec3(l * u + t * v - distance * w), vec3((r - l) * u), vec3((b - t) * v))
 
 
 def vec3(array: FloatArray) -> Vec3:

@@ -91,7 +91,7 @@ def _silent() -> Iterator[None]:
     """Suppresses standard output and error, to which the library writes from C++ and from Python:
     the caller reports a damaged file in one line."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    kept = os.dup(1), os.dup(2)
+    saved = os.dup(1), os.dup(2)
     try:
         with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
             for number in (1, 2):
@@ -100,7 +100,7 @@ def _silent() -> Iterator[None]:
     finally:
         if sys.platform != "win32":
             ctypes.CDLL(None).fflush(None)  # flush C's buffers
-        for number, own in zip((1, 2), kept, strict=True):
-            os.dup2(own, number)
-        for number in (nowhere, *kept):
+        for number, original in zip((1, 2), saved, strict=True):
+            os.dup2(original, number)
+        for number in (nowhere, *saved):
             os.close(number)

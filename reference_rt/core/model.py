@@ -38,9 +38,10 @@ class Description(BaseModel):
     """Names of the fields that take arrays without conversion to lists."""
 
     def __init__(self, /, **fields: Any) -> None:
-        kept = type(self).array_fields
+        as_arrays = type(self).array_fields
         self._checked(
-            {name: v if name in kept else _plain(v) for name, v in fields.items()}, instance=self
+            {name: v if name in as_arrays else _plain(v) for name, v in fields.items()},
+            instance=self,
         )
 
     # Without this, pydantic would call `__init__` for every part of a scene file.  Files contain
