@@ -1,4 +1,4 @@
-"""What arrays of rays hit, block after block."""
+"""Closest hits and occlusion for arrays of rays: packets where rays are coherent, else blocks."""
 
 import math
 from typing import NamedTuple
@@ -9,7 +9,7 @@ import numpy.typing as npt
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
 from reference_rt.accel.geometry import Geometry, closest_hit
 from reference_rt.accel.packet.packet import BUNDLE
-from reference_rt.accel.packet.traversal import ALONE, FOUND, closest_together
+from reference_rt.accel.packet.traversal import FOUND, INCOHERENT, closest_of_packet
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import BLOCK, Hit, Ray
 from reference_rt.core.ray_block import (
@@ -27,8 +27,8 @@ from reference_rt.jit.kernel import kernel, local_floats, local_integers
 
 
 class Primitives(NamedTuple):
-    """What n rays hit, as `Hit`, each with the t of its `scaled` ray: t (n,); codes (n, 3): kind,
-    row and instance, kind -1 for a miss; uv (n, 2)."""
+    """The hits of n rays as arrays.  t (n,), of the `scaled` ray; codes (n, 3): `Hit.kind`, row and
+    instance, kind -1 for a miss; uv (n, 2): `Hit.u` and v."""
 
     t: FloatArray
     codes: IntArray
@@ -36,14 +36,15 @@ class Primitives(NamedTuple):
 
 
 MOST_ADDED = BLOCK + BUNDLE
-"""Rays that one call of `trace_bundle` may add to what is found."""
+"""The most hits that one call of `trace_bundle` adds to its output."""
 
 
 class Work(NamedTuple):
-    """Buffers of `trace_bundle`.  bundle, hits: of rays that are traced together;  rays, numbers
-    (BLOCK,): rays that wait to be traced as a block, and their numbers."""
+    """Scratch buffers of `trace_bundle`.  packet, hits: the rays of a packet and their hits (hits
+    also of a block);  rays, numbers (BLOCK,): incoherent rays that wait until they fill a block,
+    and their indices."""
 
-    bundle: Rays
+    packet: Rays
     hits: Hits
     rays: Rays
     numbers: IntArray
@@ -61,34 +62,35 @@ def trace_bundle(
     numbers: IntArray,
     filled: int,
 ) -> tuple[int, int]:
-    """Trace BUNDLE rays from origins o (n, 3) into directions d (n, 3), from number `begin` on:
-    together where they are alike, else let them wait until there is a block of them.
+    """Closest hits of the BUNDLE rays begin, begin + 1, ... with origins o (n, 3) and directions
+    d (n, 3): as a packet where they are coherent, else queued until there is a block of them.
 
-    What rays meet is added to `found` and their numbers to `numbers`, of which `filled` are used,
-    in any order; with the last of the n rays all are there.  (waiting, filled) afterwards.
+    waiting: rays in the queue;  filled: hits in `found`, whose rays' indices are in `numbers`.
+    Returns both as they are afterwards.  Hits come in any order; the call for the last of the n
+    rays empties the queue.
     """
     end = min(begin + BUNDLE, len(o))
-    outcome = ALONE
+    outcome = INCOHERENT
     if end == begin + BUNDLE:
-        outcome = closest_together(geometry, o, d, begin, work.bundle, work.hits)
+        outcome = closest_of_packet(geometry, o, d, begin, work.packet, work.hits)
     for i in range(begin, end):
         hit = Hit(math.inf, -1, -1, 0.0, 0.0, -1)
         if outcome == FOUND:
-            hit = hit_of(geometry, ray_of(work.bundle, i - begin), work.hits, i - begin)
-        elif outcome == ALONE:
+            hit = hit_of(geometry, ray_of(work.packet, i - begin), work.hits, i - begin)
+        elif outcome == INCOHERENT:
             ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
             if valid:
                 put_ray(work.rays, waiting, ray)
                 work.numbers[waiting] = i
                 waiting += 1
                 continue
-        _put(found, filled, hit)
+        _put_hit(found, filled, hit)
         numbers[filled] = i
         filled += 1
     if waiting > BLOCK - BUNDLE or end == len(o):
         closest_hits(geometry, work.rays, work.hits, waiting)
         for j in range(waiting):
-            _put(found, filled, hit_of(geometry, ray_of(work.rays, j), work.hits, j))
+            _put_hit(found, filled, hit_of(geometry, ray_of(work.rays, j), work.hits, j))
             numbers[filled] = work.numbers[j]
             filled += 1
         waiting = 0
@@ -97,17 +99,17 @@ def trace_bundle(
 
 @kernel
 def closest_one_by_one(geometry: Geometry, o: FloatArray, d: FloatArray, found: Primitives) -> None:
-    """What rays meet first, ray after ray: the same bits, slower, from far less code."""
+    """Closest hits by `closest_hit`: the same bits, slower, but much faster to compile."""
     for i in range(len(o)):
         ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
         hit = Hit(math.inf, -1, -1, 0.0, 0.0, -1)
         if valid:
             hit = closest_hit(geometry, ray)
-        _put(found, i, hit)
+        _put_hit(found, i, hit)
 
 
 @kernel
-def _put(found: Primitives, i: int, hit: Hit) -> None:
+def _put_hit(found: Primitives, i: int, hit: Hit) -> None:
     found.t[i], found.uv[i, 0], found.uv[i, 1] = hit.t, hit.u, hit.v
     found.codes[i, 0], found.codes[i, 1], found.codes[i, 2] = hit.kind, hit.row, hit.instance
 
@@ -116,7 +118,7 @@ def _put(found: Primitives, i: int, hit: Hit) -> None:
 def occluded_rays(
     geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
 ) -> None:
-    """Whether anything lies on rays up to t_max (n,), into out (n,)."""
+    """Whether each ray hits anything at 0 < t < t_max (n,), written to out (n,)."""
     rays = Rays(local_floats(RAY_FLOATS))
     hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
     numbers = local_integers(BLOCK)

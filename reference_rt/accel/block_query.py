@@ -1,4 +1,5 @@
-"""What the rays of a block hit: side by side, on their ways together, or one after another."""
+"""Closest-hit and any-hit queries for a block of rays: by SIMD brute force, stream traversal or
+single-ray traversal."""
 
 import numba
 import numpy as np
@@ -17,7 +18,7 @@ from reference_rt.core.ray_block import (
     put_hit,
     ray_of,
 )
-from reference_rt.core.ray_block import hit_of as kept_hit
+from reference_rt.core.ray_block import hit_of as hit_in_block
 from reference_rt.jit.function_pointer import Address, call_at
 from reference_rt.jit.kernel import kernel, signature_of
 from reference_rt.jit.parallel_compile import Call
@@ -25,11 +26,11 @@ from reference_rt.shapes.instances import Instances
 
 
 def tracer_of(geometry: Geometry) -> Call | None:
-    """The kernel that is to stand at `geometry.tracer`; None for none, where it is inlined or there
-    is no hierarchy.
+    """The stream traversal and its signature, to be compiled separately and called through
+    `geometry.tracer`; None where there is no BVH, where there are instances, or without a compiler.
 
-    A few shapes were compiled by themselves too: nothing was won that the noise would show, and
-    spheres were 1 to 2 % slower (measured).
+    Compiling brute force separately too gained nothing measurable, and spheres were 1 to 2 %
+    slower (measured).
     """
     bvh, shapes, solids = geometry.bvh, geometry.shapes, geometry.solids
     if numba.config.DISABLE_JIT or bvh is None or geometry.instances is not None:
@@ -41,13 +42,14 @@ def tracer_of(geometry: Geometry) -> Call | None:
 
 @kernel
 def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
-    """`closest_hit` of the first n rays: what `hit_of` tells."""
+    """`closest_hit` of the first n rays; read the hits with `hit_of`."""
     _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, False)
 
 
 @kernel
 def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
-    """`occluded` of the first n rays: of the hits, only whether there is any is meant."""
+    """`occluded` of the first n rays: hits.codes[j] >= 0 for those that are; the rest of the hits
+    means nothing."""
     _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, True)
 
 
@@ -67,7 +69,7 @@ def _trace(
         any_shape.nearest_of_rays(shapes, rays, hits, n, any_hit)
         return
     if instances is not None:
-        # Rays have directions and origins of their own in each, which change on their ways.
+        # An instance changes the ray's origin and direction, which streams compute only once.
         for j in range(n):
             if any_hit:
                 hits.codes[j] = 0 if occluded(geometry, ray_of(rays, j)) else -1
@@ -85,7 +87,7 @@ def _trace(
 
 @kernel
 def hit_of(geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
-    """What ray number j has found."""
+    """The hit of ray j after `closest_hits`."""
     return _hit_of(geometry.bvh, geometry, ray, hits, j)
 
 
@@ -93,4 +95,4 @@ def hit_of(geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
 def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
     if bvh is None:
         return any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
-    return kept_hit(hits, j)
+    return hit_in_block(hits, j)

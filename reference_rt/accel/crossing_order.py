@@ -1,4 +1,4 @@
-"""The order of crossings along a ray: by t, and at one t in the order of the scene."""
+"""The order of crossings along a ray: by t, and at equal t a fixed order of the primitives."""
 
 import math
 from typing import NamedTuple
@@ -9,10 +9,10 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.shapes import Shapes
 
 
-class Crossed(NamedTuple):
-    """One of all crossings of a ray.  owner, face: of the primitive that was hit;  number: which of
-    those with the same primitive, or with the same solid, it is, from 0 on.  A `hit` of kind -1
-    stands for every crossing at its t: what comes after it has a larger t."""
+class OrderedCrossing(NamedTuple):
+    """A crossing with the keys that order it.  owner, face: index of the shape and of its face;
+    number: counts the ray's crossings with the same primitive, or with the same solid, from 0.  A
+    `hit` of kind -1 comes after all crossings at its t."""
 
     hit: Hit
     owner: int
@@ -20,27 +20,27 @@ class Crossed(NamedTuple):
     number: int
 
 
-FROM_THE_START = Crossed(Hit(-math.inf, -1, -1, 0.0, 0.0, -1), -1, -1, -1)
-"""Every crossing comes after this."""
+FROM_THE_START = OrderedCrossing(Hit(-math.inf, -1, -1, 0.0, 0.0, -1), -1, -1, -1)
+"""Comes before every crossing."""
 
 
 @kernel
-def nothing_at(t: float) -> Crossed:
-    """No crossing: what stands before a search beyond t, or is found by one up to t in vain."""
-    return Crossed(Hit(t, -1, -1, 0.0, 0.0, -1), -1, -1, -1)
+def nothing_at(t: float) -> OrderedCrossing:
+    """No crossing: begins a search beyond t, or is the result of one up to t that found none."""
+    return OrderedCrossing(Hit(t, -1, -1, 0.0, 0.0, -1), -1, -1, -1)
 
 
 @kernel
-def crossed(shapes: Shapes, hit: Hit, number: int) -> Crossed:
-    """A crossing, number `number` of its primitive or solid."""
+def ordered_crossing(shapes: Shapes, hit: Hit, number: int) -> OrderedCrossing:
+    """The crossing at `hit`, with number `number` of its primitive or solid."""
     owner = any_shape.owner(shapes, hit.kind, hit.row)
-    return Crossed(hit, owner, any_shape.face(shapes, hit), number)
+    return OrderedCrossing(hit, owner, any_shape.face(shapes, hit), number)
 
 
 @kernel
 def precedes(shapes: Shapes, hit: Hit, other: Hit) -> bool:
-    """Which of two hits at the same t counts: by kind, then in the order of the scene, so that no
-    order of traversal can change a picture."""
+    """Whether `hit` wins over another one at the same t: by instance, kind, shape and face, so that
+    the order of traversal cannot change a picture."""
     if hit.instance != other.instance:
         return hit.instance < other.instance
     if hit.kind != other.kind:
@@ -55,11 +55,11 @@ def precedes(shapes: Shapes, hit: Hit, other: Hit) -> bool:
 
 
 @kernel
-def comes_after(one: Crossed, other: Crossed) -> bool:
-    """Whether a crossing comes after another, at one t in the order of `precedes`.
+def comes_after(one: OrderedCrossing, other: OrderedCrossing) -> bool:
+    """Whether a crossing comes after another: by t, then as in `precedes`, then by number.
 
-    A total order: what is neither before nor after a crossing is that crossing itself, met a second
-    time because a hierarchy leads to its primitive twice.
+    A total order: a crossing that comes neither before nor after another is the same one, found
+    again because its primitive is in several leaves.
     """
     a, b = one.hit, other.hit
     if a.t != b.t or b.kind < 0:

@@ -1,4 +1,5 @@
-"""What a ray can hit: the closest-hit and the any-hit query over all shapes of a scene."""
+"""`Geometry`, all that a ray can hit: closest-hit and any-hit queries for one ray; the surface
+point, ids, texture coordinates and tangents of a hit."""
 
 from typing import NamedTuple
 
@@ -13,8 +14,15 @@ from reference_rt.accel.bvh import (
     row_of,
     size_of,
 )
-from reference_rt.accel.leaf import INSTANCE, nearer_primitive, nearest_of_packet
-from reference_rt.accel.single_ray import any_child, can_be_nearer, enter, nearest_child, view_of
+from reference_rt.accel.leaf import INSTANCE, nearer_primitive, nearest_of_triangle_leaf
+from reference_rt.accel.single_ray import (
+    SlabRay,
+    any_child,
+    can_be_nearer,
+    enter,
+    nearest_child,
+    view_of,
+)
 from reference_rt.core.ray import Hit, Ray, SurfacePoint, no_hit
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.function_pointer import Address
@@ -25,17 +33,18 @@ from reference_rt.shapes.csg.anchor import out_of_solid, ray_near
 from reference_rt.shapes.csg.tables import Parts, Solids
 from reference_rt.shapes.instances import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.shapes.meshes import triangle
-from reference_rt.shapes.meshes.watertight import SEEN_FLOATS, shear_of
+from reference_rt.shapes.meshes.watertight import SEEN_FLOATS, Shear, shear_of
 from reference_rt.shapes.shape import Tangents
 
 STACK = 2 * WIDE_STACK + LANES + 1
-"""A hierarchy of instances, one of a group, the instances of a leaf, and what is infinite."""
+"""Entries of the traversal stack: for the scene's BVH, for one group's, for the instances of a leaf
+and for `Bvh.unbounded`."""
 
 
 class Geometry(NamedTuple):
-    """All shapes, and the hierarchy over them where they are many enough to need one.
-
-    tracer: where `wavefront.trace_block` stands, compiled for these; None where it is inlined.
+    """The tables of all shapes.  bvh: None where brute force is faster;  solids, instances, parts:
+    None where there are none;  tracer: address of `stream.traversal.trace_block` compiled for these
+    tables, None where it is inlined.
     """
 
     shapes: Shapes
@@ -55,16 +64,34 @@ def closest_hit(geometry: Geometry, ray: Ray) -> Hit:
 
 @kernel
 def occluded(geometry: Geometry, ray: Ray) -> bool:
-    """Whether anything lies in (0, t_max): a hierarchy is left at the first thing found."""
+    """Whether anything is hit at t in (0, t_max); the traversal ends at the first hit."""
     return _trace(geometry.bvh, geometry, ray, True).kind >= 0
 
 
 @kernel
 def _trace(bvh: Bvh | None, geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
     if bvh is None:
-        # For a few shapes, asking after each whether the ray is done costs more than the rest.
+        # For a few shapes an early exit of any-hit rays would cost more than it saves.
         return any_shape.nearest(geometry.shapes, geometry.packets, ray)
     return _traverse(bvh, geometry.shapes, geometry.solids, geometry.instances, ray, any_hit)
+
+
+class LocalRay(NamedTuple):
+    """A ray in the space of one BVH, with what the tests of boxes and of triangles need of it."""
+
+    ray: Ray
+    slab_ray: SlabRay
+    shear: Shear
+
+
+@kernel
+def local_ray(bvh: Bvh, instances: Instances | None, instance: int, ray: Ray) -> LocalRay:
+    """The ray in the space of an instance's group; in world space for instance -1."""
+    local, root = ray_in(instances, instance, ray), 0
+    if instances is not None:
+        if instance >= 0:
+            root = instances.root[instance]
+    return LocalRay(local, view_of(bvh, root, local), shear_of(local))
 
 
 @kernel
@@ -76,20 +103,21 @@ def _traverse(
     ray: Ray,
     any_hit: bool,
 ) -> Hit:
-    """The nearest child first; the others wait on a stack with the distances of their boxes, and
-    with the instance in whose coordinates they stand."""
+    """Depth first, the nearest child first.  The stack holds the other children (`stack`), the t at
+    which the ray enters their boxes (`waiting`) and the instance in whose space they are
+    (`space`)."""
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
     distances, seen = local_floats(LANES), local_floats(SEEN_FLOATS)
     closest = no_hit(ray)
-    local, instance = ray, -1
-    view, shear = view_of(bvh, 0, local), shear_of(local)
+    instance = -1
+    local = local_ray(bvh, instances, instance, ray)
     node, top = 0, 0
     if bvh.unbounded >= 0:
         stack[0], waiting[0], space[0] = bvh.unbounded, 0.0, -1
         top = 1
     while True:
         while node >= 0:
-            met = enter(bvh, node, view, closest.t, distances)
+            met = enter(bvh, node, local.slab_ray, closest.t, distances)
             bottom = top
             if met == 0:
                 node = NOTHING
@@ -101,8 +129,8 @@ def _traverse(
                 for k in range(bottom, top):
                     space[k] = instance
         if is_packet(node):
-            closest = nearest_of_packet(
-                bvh.corners, bvh, shapes, node, shear, seen, instance, closest
+            closest = nearest_of_triangle_leaf(
+                bvh.corners, bvh, shapes, node, local.shear, seen, instance, closest
             )
         else:
             first = first_of(node)
@@ -114,9 +142,9 @@ def _traverse(
                         top += 1
                         continue
                 closest = nearer_primitive(
-                    bvh, shapes, solids, kind, row, local, shear, instance, closest
+                    bvh, shapes, solids, kind, row, local.ray, local.shear, instance, closest
                 )
-        # Asked once a leaf: asked for each primitive it costs a quarter of the speed.
+        # Tested once per leaf: a test after each primitive costs a quarter of the speed.
         if any_hit and closest.kind >= 0:
             return closest
         while True:
@@ -129,24 +157,23 @@ def _traverse(
         if instances is not None:
             if space[top] != instance:
                 instance = space[top]
-                local = ray_in(instances, instance, ray)
-                shear = shear_of(local)
-                view = view_of(bvh, 0 if instance < 0 else instances.root[instance], local)
+                local = local_ray(bvh, instances, instance, ray)
 
 
 @kernel
 def surface(geometry: Geometry, ray: Ray, hit: Hit) -> SurfacePoint:
-    """The surface at a hit (which must be one: `hit.kind >= 0`)."""
-    local, seen, solid = _as_primitive(geometry, ray, hit)
+    """The surface point, in world space, of a hit with `hit.kind >= 0`."""
+    local, seen, solid = _in_primitive_space(geometry, ray, hit)
     point = any_shape.surface(geometry.shapes, local, seen)
-    point = _turned(geometry.parts, geometry.shapes, hit, point)
+    point = _flipped(geometry.parts, geometry.shapes, hit, point)
     point = out_of_solid(geometry.solids, solid, point)
     return out_of(geometry.instances, hit.instance, point)
 
 
 @kernel
-def _as_primitive(geometry: Geometry, ray: Ray, hit: Hit) -> tuple[Ray, Hit, int]:
-    """The ray and the hit as the primitive's table has it, and its solid, -1 for none."""
+def _in_primitive_space(geometry: Geometry, ray: Ray, hit: Hit) -> tuple[Ray, Hit, int]:
+    """(ray, hit, solid): the ray and the hit in the space of the primitive's table, that is of its
+    instance and relative to the anchor of its solid; solid is -1 for none."""
     local = ray_in(geometry.instances, hit.instance, ray)
     solid = _solid_of(geometry.parts, geometry.shapes, hit)
     local, begin = ray_near(geometry.solids, solid, local)
@@ -161,8 +188,8 @@ def _solid_of(parts: Parts | None, shapes: Shapes, hit: Hit) -> int:
 
 
 @kernel
-def _turned(parts: Parts | None, shapes: Shapes, hit: Hit, point: SurfacePoint) -> SurfacePoint:
-    """The point of an operand with the normals of the solid."""
+def _flipped(parts: Parts | None, shapes: Shapes, hit: Hit, point: SurfacePoint) -> SurfacePoint:
+    """The point, with normals flipped where the operand's outside is the inside of its solid."""
     if parts is None:
         return point
     if parts.turned[any_shape.owner(shapes, hit.kind, hit.row)] == 0:
@@ -170,12 +197,12 @@ def _turned(parts: Parts | None, shapes: Shapes, hit: Hit, point: SurfacePoint) 
     return SurfacePoint(point.p, -point.n, -point.ns, point.error, point.material, point.light)
 
 
-class Owner(NamedTuple):
-    """Whose surface it is.
+class HitIds(NamedTuple):
+    """Which shape, instance, part and face a hit belongs to.
 
     shape: index in the scene;  instance: number of the copy, -1 outside groups;  part: number of
     the operand in its solid, or of the shape in its group, else 0;  face: number of the triangle in
-    its mesh, or of the face that was hit;  u, v: the surface coordinates.
+    its mesh, or of the shape's face;  u, v: the surface coordinates.
     """
 
     shape: int
@@ -187,20 +214,20 @@ class Owner(NamedTuple):
 
 
 @kernel
-def owner(geometry: Geometry, ray: Ray, hit: Hit) -> Owner:
-    """Whose a hit is: for pictures and queries, which path tracing does not need."""
-    local, seen, _ = _as_primitive(geometry, ray, hit)
+def owner(geometry: Geometry, ray: Ray, hit: Hit) -> HitIds:
+    """The ids and surface coordinates of a hit, for layers and queries; path tracing needs none."""
+    local, seen, _ = _in_primitive_space(geometry, ray, hit)
     number = any_shape.owner(geometry.shapes, hit.kind, hit.row)
-    shape, part = _whole(geometry.parts, number)
+    shape, part = _shape_and_part(geometry.parts, number)
     shape, copy = _in_scene(geometry.instances, hit.instance, shape)
     face = any_shape.face(geometry.shapes, hit)
     u, v = any_shape.uv(geometry.shapes, local, seen)
-    return Owner(shape, copy, part, face, u, v)
+    return HitIds(shape, copy, part, face, u, v)
 
 
 class Coordinates(NamedTuple):
-    """What textures are asked with: the surface coordinates, and the interpolated colour of a
-    mesh's vertices, negative where there is none."""
+    """The inputs of texture lookups: the surface coordinates, and the interpolated vertex colour of
+    a mesh, negative where there is none."""
 
     u: float
     v: float
@@ -209,24 +236,24 @@ class Coordinates(NamedTuple):
 
 @kernel
 def coordinates(geometry: Geometry, ray: Ray, hit: Hit) -> Coordinates:
-    """Where on its surface a hit lies."""
-    local, seen, _ = _as_primitive(geometry, ray, hit)
+    """The surface coordinates and the vertex colour of a hit."""
+    local, seen, _ = _in_primitive_space(geometry, ray, hit)
     u, v = any_shape.uv(geometry.shapes, local, seen)
     return Coordinates(u, v, colour(geometry.shapes, hit, Vec3(-1.0, -1.0, -1.0)))
 
 
 @kernel
 def tangents(geometry: Geometry, ray: Ray, hit: Hit) -> Tangents:
-    """dp/du and dp/dv at a hit, u and v being those of `coordinates`.  Where an operand's outside
-    is the inside of its solid they are the same: only normals turn over."""
-    local, seen, _ = _as_primitive(geometry, ray, hit)
+    """dp/du and dp/dv at a hit, with u and v as in `coordinates`.  A solid flips the normals of
+    some operands, but never their tangents."""
+    local, seen, _ = _in_primitive_space(geometry, ray, hit)
     found = any_shape.tangents(geometry.shapes, local, seen)
     return tangents_out_of(geometry.instances, hit.instance, found)
 
 
 @kernel
-def _whole(parts: Parts | None, number: int) -> tuple[int, int]:
-    """(shape, part) of a primitive's owner."""
+def _shape_and_part(parts: Parts | None, number: int) -> tuple[int, int]:
+    """(shape, part) of the owner number in a primitive's table."""
     if parts is None:
         return number, 0
     return int(parts.shape[number]), int(parts.part[number])
@@ -234,7 +261,8 @@ def _whole(parts: Parts | None, number: int) -> tuple[int, int]:
 
 @kernel
 def _in_scene(instances: Instances | None, i: int, shape: int) -> tuple[int, int]:
-    """(shape, copy) in the scene."""
+    """(shape, copy) of a hit in instance i: the instance's index in the scene, and its number among
+    the copies that the instance stands for."""
     if instances is None:
         return shape, -1
     if i < 0:
@@ -244,7 +272,7 @@ def _in_scene(instances: Instances | None, i: int, shape: int) -> tuple[int, int
 
 @kernel
 def colour(shapes: Shapes, hit: Hit, without: Vec3) -> Vec3:
-    """The colour that a mesh brings for its vertices, interpolated; `without` one, that."""
+    """The interpolated vertex colour of a mesh; `without` for hits that have none."""
     if hit.kind == TRIANGLE:
         return triangle.colour(shapes.triangles, hit, without)
     return without

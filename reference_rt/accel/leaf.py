@@ -1,4 +1,4 @@
-"""What a ray finds in a leaf of a hierarchy."""
+"""Rays against the contents of a BVH leaf: primitives, SIMD triangles, solids."""
 
 from reference_rt import shapes as any_shape
 from reference_rt.accel.bvh import Bvh, first_of, is_packet, kind_of, row_of, size_of
@@ -15,8 +15,8 @@ from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.watertight import Shear, see
 
 SOLID, INSTANCE = 100, 101
-"""Codes of references that are not rows of a shape's table, but of `Solids` or `Instances`.  Rays
-hit the primitives in these: no `Hit` has such a kind."""
+"""Kinds of references to rows of `Solids` and `Instances` rather than of a shape's table.  Rays hit
+the primitives in these: no `Hit` has such a kind."""
 
 
 @kernel
@@ -31,11 +31,11 @@ def nearest_of_leaf(
     seen: FloatArray,
     hits: Hits,
 ) -> Hit:
-    """The nearer of hit j, which it becomes, and what ray j of a block meets in a leaf without
-    instances."""
+    """The closest of hit j and all hits of ray j of a block in a leaf without instances; it becomes
+    hit j.  seen (SEEN_FLOATS,) is scratch."""
     closest = hit_of(hits, j)
     if is_packet(leaf):
-        closest = nearest_of_packet(bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest)
+        closest = nearest_of_triangle_leaf(bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest)
     else:
         ray, first = ray_of(rays, j), first_of(leaf)
         for k in range(first, first + size_of(leaf)):
@@ -57,7 +57,7 @@ def nearer_primitive(
     instance: int,
     closest: Hit,
 ) -> Hit:
-    """The nearer of `closest` and what a reference of a leaf stands for."""
+    """The nearer of `closest` and the ray's hit with one reference, a primitive or a solid."""
     if solids is not None:
         if kind == SOLID:
             hit = evaluate.intersect(solids, shapes, bvh, row, ray, closest.t)
@@ -68,7 +68,7 @@ def nearer_primitive(
 
 
 @kernel
-def nearest_of_packet(
+def nearest_of_triangle_leaf(
     corners: FloatArray | None,
     bvh: Bvh,
     shapes: Shapes,
@@ -78,7 +78,8 @@ def nearest_of_packet(
     instance: int,
     closest: Hit,
 ) -> Hit:
-    """The nearest of `closest` and the triangles of a leaf;  seen (SEEN_FLOATS,) is scratch."""
+    """The closest of `closest` and the hits with a leaf of triangles, tested LANES at once.  seen
+    (SEEN_FLOATS,) is scratch."""
     if corners is None:
         return closest
     first, size = first_of(node), size_of(node)
@@ -96,12 +97,12 @@ def nearest_of_packet(
 def _nearer(
     shapes: Shapes, found: Crossing, kind: int, row: int, instance: int, closest: Hit
 ) -> Hit:
-    """The nearer of what was found and the closest so far."""
+    """The nearer of a crossing with one primitive and the closest hit so far."""
     if found.t <= closest.t:
         hit = Hit(found.t, kind, row, found.u, found.v, instance)
         if found.t < closest.t:
             return hit
-        # t_max itself, which a ray that has met nothing yet starts with, lies beyond the ray's end.
+        # Without a hit so far, closest.t is t_max, which is no longer on the ray.
         if closest.kind >= 0 and precedes(shapes, hit, closest):
             return hit
     return closest

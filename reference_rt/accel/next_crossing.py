@@ -1,45 +1,50 @@
-"""One crossing of a ray with the scene's surfaces after another, where rendering asks for the
-nearest alone."""
+"""All crossings of a ray with the scene's surfaces, one call each, for queries; rendering needs
+only the closest hit."""
 
 import math
 
 from reference_rt.accel.bvh import NOTHING, Bvh, first_of, kind_of, row_of, size_of
-from reference_rt.accel.crossing_order import Crossed, comes_after, crossed, nothing_at
+from reference_rt.accel.crossing_order import (
+    OrderedCrossing,
+    comes_after,
+    nothing_at,
+    ordered_crossing,
+)
 from reference_rt.accel.csg import evaluate
-from reference_rt.accel.geometry import STACK, Geometry
+from reference_rt.accel.geometry import STACK, Geometry, local_ray
 from reference_rt.accel.leaf import INSTANCE, SOLID
-from reference_rt.accel.single_ray import can_be_nearer, enter, nearest_child, view_of
+from reference_rt.accel.single_ray import can_be_nearer, enter, nearest_child
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import LANES
 from reference_rt.shapes import TABLES, Shapes
 from reference_rt.shapes.crossings import MOST, along, number_of
 from reference_rt.shapes.csg.tables import Solids
-from reference_rt.shapes.instances import Instances, ray_in
+from reference_rt.shapes.instances import Instances
 from reference_rt.shapes.meshes.watertight import Shear, shear_of
 
 KINDS = len(TABLES)
 
 
 @kernel
-def next_crossing(geometry: Geometry, ray: Ray, after: Crossed) -> Crossed:
-    """The first crossing in (0, t_max) that comes after another; `kind` is -1 for none.
+def next_crossing(geometry: Geometry, ray: Ray, after: OrderedCrossing) -> OrderedCrossing:
+    """The first crossing in (0, t_max) that comes after `after`; `kind` is -1 for none.
 
-    Each call walks from the ray's start, so that no memory limits how many there are, and the t of
-    each is the t that `closest_hit` would have found.
+    Each call traverses the BVH from the ray's origin.  So no buffer limits the number of crossings,
+    and each has the t that `closest_hit` would have found.
     """
     return _next(geometry.bvh, geometry, ray, after)
 
 
 @kernel
-def _next(bvh: Bvh | None, geometry: Geometry, ray: Ray, after: Crossed) -> Crossed:
+def _next(bvh: Bvh | None, geometry: Geometry, ray: Ray, after: OrderedCrossing) -> OrderedCrossing:
     if bvh is None:
-        return _among_few(geometry.shapes, ray, after)
+        return _brute_force(geometry.shapes, ray, after)
     return _traverse(bvh, geometry.shapes, geometry.solids, geometry.instances, ray, after)
 
 
 @kernel
-def _among_few(shapes: Shapes, ray: Ray, after: Crossed) -> Crossed:
+def _brute_force(shapes: Shapes, ray: Ray, after: OrderedCrossing) -> OrderedCrossing:
     best, shear = nothing_at(ray.t_max), shear_of(ray)
     for kind in range(KINDS):
         for i in range(number_of(shapes, kind)):
@@ -55,10 +60,10 @@ def _of_primitive(
     ray: Ray,
     shear: Shear,
     instance: int,
-    after: Crossed,
-    best: Crossed,
-) -> Crossed:
-    """The first of `best` and the crossings of a primitive that come after `after`."""
+    after: OrderedCrossing,
+    best: OrderedCrossing,
+) -> OrderedCrossing:
+    """The earliest of `best` and of the primitive's crossings that come after `after`."""
     spans, v = along(shapes, kind, i, ray, shear)
     for number in range(MOST):
         t, u = spans.t0, spans.u0
@@ -69,19 +74,21 @@ def _of_primitive(
         elif number == 3:
             t, u = spans.t3, spans.u3
         if 0.0 < t < math.inf:
-            one = crossed(shapes, Hit(t, kind, i, u, v, instance), number)
+            one = ordered_crossing(shapes, Hit(t, kind, i, u, v, instance), number)
             best = _first(one, after, best)
     return best
 
 
 @kernel
-def _first(found: Crossed, after: Crossed, best: Crossed) -> Crossed:
-    """The first of `best` and of what was found, if that comes after `after`."""
+def _first(
+    found: OrderedCrossing, after: OrderedCrossing, best: OrderedCrossing
+) -> OrderedCrossing:
+    """The earlier of `best` and of `found`, if that comes after `after`."""
     if not found.hit.t <= best.hit.t or not comes_after(found, after):
         return best
     if found.hit.t < best.hit.t:
         return found
-    # t_max itself, which the search starts with, lies beyond the ray's end.
+    # Without a crossing so far, best.hit.t is t_max, which is no longer on the ray.
     if best.hit.kind >= 0 and comes_after(best, found):
         return found
     return best
@@ -94,21 +101,21 @@ def _traverse(
     solids: Solids | None,
     instances: Instances | None,
     ray: Ray,
-    after: Crossed,
-) -> Crossed:
-    """As `geometry.closest_hit` goes through a hierarchy."""
+    after: OrderedCrossing,
+) -> OrderedCrossing:
+    """As `geometry._traverse`."""
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
     distances = local_floats(LANES)
     best = nothing_at(ray.t_max)
-    local, instance = ray, -1
-    view, shear = view_of(bvh, 0, local), shear_of(local)
+    instance = -1
+    local = local_ray(bvh, instances, instance, ray)
     node, top = 0, 0
     if bvh.unbounded >= 0:
         stack[0], waiting[0], space[0] = bvh.unbounded, 0.0, -1
         top = 1
     while True:
         while node >= 0:
-            met = enter(bvh, node, view, best.hit.t, distances)
+            met = enter(bvh, node, local.slab_ray, best.hit.t, distances)
             bottom = top
             if met == 0:
                 node = NOTHING
@@ -125,7 +132,7 @@ def _traverse(
                     top += 1
                     continue
             best = _of_reference(
-                bvh, shapes, solids, kind, row, local, shear, instance, after, best
+                bvh, shapes, solids, kind, row, local.ray, local.shear, instance, after, best
             )
         while True:
             if top == 0:
@@ -137,9 +144,7 @@ def _traverse(
         if instances is not None:
             if space[top] != instance:
                 instance = space[top]
-                local = ray_in(instances, instance, ray)
-                shear = shear_of(local)
-                view = view_of(bvh, 0 if instance < 0 else instances.root[instance], local)
+                local = local_ray(bvh, instances, instance, ray)
 
 
 @kernel
@@ -152,10 +157,11 @@ def _of_reference(
     ray: Ray,
     shear: Shear,
     instance: int,
-    after: Crossed,
-    best: Crossed,
-) -> Crossed:
-    """The first of `best` and what a reference of a leaf stands for, a primitive or a solid."""
+    after: OrderedCrossing,
+    best: OrderedCrossing,
+) -> OrderedCrossing:
+    """The earliest of `best` and of the crossings with one reference, a primitive or a solid, that
+    come after `after`."""
     if solids is not None:
         if kind == SOLID:
             none, no_parts = local_floats(0), local_integers(0)

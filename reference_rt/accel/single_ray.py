@@ -1,4 +1,5 @@
-"""Rays against the boxes of a hierarchy: slabs that rounding cannot make too small."""
+"""Steps of single-ray traversal: the conservative slab test of a node's boxes (rounding can only
+enlarge a box) and the order in which children are visited."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,12 +13,12 @@ from reference_rt.jit.simd import LANES, larger, smaller
 from reference_rt.jit.simd_kernels import lane_kernel, lowest, prefetch
 
 
-class View(NamedTuple):
-    """A ray as boxes see it.
+class SlabRay(NamedTuple):
+    """A ray prepared for slab tests.
 
-    near, far: its origin relative to the tree's centre, moved so that every box's near planes come
-    nearer and the far ones go further by the rounding of what is inside;  inverse: 1 / d;  x, y, z:
-    which of a node's six rows of planes are near.
+    near, far: its origin relative to the tree's centre, displaced by the error bound of hits, so
+    that near planes come nearer and far planes go further;  inverse: 1 / d;  x, y, z: which of a
+    node's six rows of planes is the near one of each axis.
     """
 
     near: Vec3
@@ -29,8 +30,8 @@ class View(NamedTuple):
 
 
 @kernel
-def view_of(bvh: Bvh, root: int, ray: Ray) -> View:
-    """Once per ray and hierarchy."""
+def view_of(bvh: Bvh, root: int, ray: Ray) -> SlabRay:
+    """Prepares a ray for the tree whose root is node `root`: once per ray and tree."""
     inverse = Vec3(reciprocal(ray.d.x), reciprocal(ray.d.y), reciprocal(ray.d.z))
     frame = bvh.frames
     center = Vec3(frame[root, CENTER], frame[root, CENTER + 1], frame[root, CENTER + 2])
@@ -46,7 +47,7 @@ def view_of(bvh: Bvh, root: int, ray: Ray) -> View:
         math.copysign(error, inverse.y),
         math.copysign(error, inverse.z),
     )
-    return View(
+    return SlabRay(
         Vec3(o.x + x, o.y + y, o.z + z),
         Vec3(o.x - x, o.y - y, o.z - z),
         inverse,
@@ -56,17 +57,17 @@ def view_of(bvh: Bvh, root: int, ray: Ray) -> View:
     )
 
 
-def between(boxes: Any, node: Any, view: Any, t_max: Any) -> Any:
-    """A text for lanes: where a ray enters the boxes of a node's children, which of them it enters
-    before t_max;  view: of x, y and z each the row of the near planes, and near, far and inverse of
-    `View`.
+def slab_test(boxes: Any, node: Any, slab_ray: Any, t_max: Any) -> Any:
+    """The slab test of all children of a node, a generic kernel (see `jit.simd`).  Returns the t at
+    which the ray enters each box, and the mask of the boxes that it enters before t_max.
 
-    The rows of the near planes are chosen by the sign of d: the 0 * inf of a ray in a plane can
-    only be NaN, which `larger` and `smaller` pass over: such a plane does not limit the ray.
+    slab_ray: for x, y and z each the row of the near planes, and near, far and inverse of
+    `SlabRay`.  The sign of d chooses the near row, so that the 0 * inf of a ray in a plane of a box
+    can only be NaN, which `larger` and `smaller` ignore: such a plane does not limit the ray.
     """
     first = node * NODE_SINGLES
     t_in, t_out = 0.0, t_max
-    for axis, (row, near, far, inverse) in enumerate(view):
+    for axis, (row, near, far, inverse) in enumerate(slab_ray):
         near_plane = boxes.load(first + row * LANES)
         far_plane = boxes.load(first + (3 + 2 * axis - row) * LANES)
         t_in = larger(t_in, (near_plane - near) * inverse)
@@ -93,35 +94,37 @@ def _entered(
     t_max: Any,
     distances: Any,
 ) -> Any:
-    """The children whose boxes a ray enters before t_max, and where it enters them."""
-    view = (
+    """The mask of the children whose boxes a ray enters before t_max; into distances the t at which
+    it does."""
+    slab_ray = (
         (x, near_x, far_x, inverse_x),
         (y, near_y, far_y, inverse_y),
         (z, near_z, far_z, inverse_z),
     )
-    t_in, met = between(boxes, node, view, t_max)
+    t_in, met = slab_test(boxes, node, slab_ray, t_max)
     distances.store(0, t_in)
     return met
 
 
 @kernel
-def enter(bvh: Bvh, node: int, view: View, t_max: float, distances: FloatArray) -> int:
-    """The children of a node that a ray meets, as bits; into distances (LANES,) how far away."""
+def enter(bvh: Bvh, node: int, slab_ray: SlabRay, t_max: float, distances: FloatArray) -> int:
+    """The children of a node whose boxes a ray enters before t_max, as bits; into distances
+    (LANES,) the t at which it does."""
     return _entered(
         bvh.boxes,
         node,
-        view.x,
-        view.y,
-        view.z,
-        view.near.x,
-        view.near.y,
-        view.near.z,
-        view.far.x,
-        view.far.y,
-        view.far.z,
-        view.inverse.x,
-        view.inverse.y,
-        view.inverse.z,
+        slab_ray.x,
+        slab_ray.y,
+        slab_ray.z,
+        slab_ray.near.x,
+        slab_ray.near.y,
+        slab_ray.near.z,
+        slab_ray.far.x,
+        slab_ray.far.y,
+        slab_ray.far.z,
+        slab_ray.inverse.x,
+        slab_ray.inverse.y,
+        slab_ray.inverse.z,
         t_max,
         distances,
     )
@@ -137,8 +140,8 @@ def nearest_child(
     waiting: FloatArray,
     top: int,
 ) -> tuple[int, int]:
-    """The nearest of the children that are met (one at least), and the new top of the stack, on
-    which the others wait with their distances, the nearer the higher."""
+    """(child, top): the nearest of the children entered, at least one; the others are pushed with
+    their distances, sorted, the nearer the higher."""
     lane = lowest(met)
     nearest, t_nearest = child_of(bvh, node, lane), distances[lane]
     met &= met - 1
@@ -150,19 +153,28 @@ def nearest_child(
         if t < t_nearest:
             code, nearest = nearest, code
             t, t_nearest = t_nearest, t
-        k = top
-        while k > bottom and waiting[k - 1] < t:
-            stack[k], waiting[k] = stack[k - 1], waiting[k - 1]
-            k -= 1
-        stack[k], waiting[k] = code, t
-        top += 1
+        top = push_sorted(stack, waiting, bottom, top, code, t)
         _prefetch(bvh, code)
     return nearest, top
 
 
 @kernel
+def push_sorted(
+    stack: IntArray, waiting: FloatArray, bottom: int, top: int, code: int, t: float
+) -> int:
+    """Inserts a child into the entries from `bottom` up to `top`, of which the nearest is on top;
+    the new top."""
+    k = top
+    while k > bottom and waiting[k - 1] < t:
+        stack[k], waiting[k] = stack[k - 1], waiting[k - 1]
+        k -= 1
+    stack[k], waiting[k] = code, t
+    return top + 1
+
+
+@kernel
 def any_child(bvh: Bvh, node: int, met: int, stack: IntArray, top: int) -> tuple[int, int]:
-    """One of the children that are met (one at least); the others wait on the stack."""
+    """(child, top): one of the children entered, at least one; the others are pushed."""
     lane = lowest(met)
     chosen = child_of(bvh, node, lane)
     met &= met - 1
@@ -177,7 +189,7 @@ def any_child(bvh: Bvh, node: int, met: int, stack: IntArray, top: int) -> tuple
 
 @kernel
 def _prefetch(bvh: Bvh, code: int) -> None:
-    """Have a node that waits fetched: on the bunny 6 % faster for random rays (measured)."""
+    """Prefetches a node on the stack: random rays at the bunny are 6 % faster (measured)."""
     if code >= 0:
         for line in range(3):
             prefetch(bvh.boxes, code * NODE_SINGLES + 16 * line)
@@ -185,5 +197,5 @@ def _prefetch(bvh: Bvh, code: int) -> None:
 
 @kernel
 def can_be_nearer(t_in: float, t_max: float) -> bool:
-    """Whether a box entered at t_in can hold something at t_max or before."""
+    """Whether a box that the ray enters at t_in can hold a hit at t <= t_max."""
     return t_in <= t_max * FAR_SLACK

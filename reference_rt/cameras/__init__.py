@@ -1,7 +1,13 @@
-"""All cameras: one file each; here, the choice among them.
+"""Cameras, one module each, and the film: picture size, layers and reconstruction filters.
 
-To add a camera: its file with description, NamedTuple and kernel; `AnyCamera` and the registrations
-below; a translator function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
+A camera's module has a `Camera` description, in scene units and degrees, with
+`setup(width, height)` for a picture of that many pixels, which returns a NamedTuple (a *view*); the
+kernel camera_ray(view, x, y, lens) -> `Ray` with a unit direction and no end, for the film point
+(x, y), each in [0, 1] across the picture from its top left corner; and, for a camera with a lens,
+lens_sample(view, sampler), which draws the lens point.
+
+To add a camera: its module; `AnyCamera` and the registrations below; a translator function in
+`comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
 """
 
 from typing import Annotated
@@ -19,8 +25,8 @@ from reference_rt.jit.kernel import ByClass
 AnyCamera = Annotated[Perspective | Orthographic | Pinhole | ThinLens, Field(discriminator="type")]
 
 VIEWS = (PerspectiveView, OrthographicView, ThinLensView)
-"""What kernels see of cameras.  A pinhole's rays are those of a perspective view, whose class it
-shares."""
+"""The classes that `setup` returns.  `Pinhole` has no own one: its rays are those of a
+`PerspectiveView`."""
 
 _ray = ByClass("camera_ray")
 _ray.register(PerspectiveView, perspective.camera_ray)
@@ -28,15 +34,16 @@ _ray.register(OrthographicView, orthographic.camera_ray)
 _ray.register(ThinLensView, thin_lens.camera_ray)
 camera_ray = _ray.function
 """camera_ray(view, x, y, lens) -> the ray of the film point (x, y), x to the right and y down, each
-from 0 to 1 across the picture, through the point of the lens that `lens`, a pair in [0, 1), stands
-for: LENS_CENTRE is its middle."""
+from 0 to 1 across the picture, through the lens point for `lens`, a pair in [0, 1); LENS_CENTRE
+gives the centre of the lens."""
 
 _lens = ByClass("lens_sample")
 _lens.register(PerspectiveView, no_lens)
 _lens.register(OrthographicView, no_lens)
 _lens.register(ThinLensView, thin_lens.lens_sample)
 lens_sample = _lens.function
-"""lens_sample(view, sampler) -> the `lens` for a sample's ray.  Draws for a camera with a lens."""
+"""lens_sample(view, sampler) -> `lens` for a sample's ray: drawn for a camera with a lens, else
+LENS_CENTRE."""
 
 __all__ = [
     "LENS_CENTRE",

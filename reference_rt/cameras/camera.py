@@ -1,4 +1,4 @@
-"""What all cameras share: where they stand, and that most have no lens."""
+"""What all cameras share: position and orientation; and `no_lens`, for most of them."""
 
 from typing import Any, Self
 
@@ -11,32 +11,32 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.sampling import Sample
 
 LENS_CENTRE = (0.5, 0.5)
-"""The lens sample that meets the middle of any lens."""
+"""The lens sample of the centre of any lens."""
 
 
 class Camera(Description):
-    """An eye at `eye` that looks at `target`; `up` is up in the picture."""
+    """A camera at `eye` that looks at `target`; `up` is up in the picture."""
 
     eye: Vector = (0.0, 0.0, 1.0)
     target: Vector = (0.0, 0.0, 0.0)
     up: Direction = (0.0, 1.0, 0.0)
 
     @model_validator(mode="after")
-    def _stands_somewhere(self) -> Self:
+    def _check_orientation(self) -> Self:
         transform.look_at(self.eye, self.target, self.up)
         return self
 
     @property
     def basis(self) -> FloatArray:
-        """(3, 3): the text-book's u, v, w as rows: right, up, and back from where it looks."""
+        """(3, 3), orthonormal: the textbook's u, v, w as rows: right, up and backward."""
         return transform.look_at(self.eye, self.target, self.up)[:, :3].T
 
     def setup(self, width: int, height: int) -> Any:
-        """The camera as its kernel needs it, for a picture of width x height pixels."""
+        """The NamedTuple that `camera_ray` takes, for a picture of width x height pixels."""
         raise NotImplementedError
 
 
 @kernel
 def no_lens(view: Any, sampler: Sample) -> tuple[float, float]:
-    """For cameras whose rays all pass one point, or none: nothing is drawn."""
+    """The `lens_sample` of cameras without a lens: draws nothing."""
     return LENS_CENTRE

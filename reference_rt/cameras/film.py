@@ -1,4 +1,4 @@
-"""Film: the picture's size, its reconstruction filter and the layers beside its colour."""
+"""Film: the picture's size, its reconstruction filter and the layers (AOVs) beside its colour."""
 
 from typing import Annotated, Any, Literal
 
@@ -34,14 +34,14 @@ class Film(Description):
     height: Annotated[int, Field(ge=1, lt=2**31)] = 256
     filter: AnyFilter = BoxFilter()
     layers: Annotated[tuple[LayerName, ...], BeforeValidator(_each_once)] = ()
-    """What is written beside the colour.
+    """Which layers (AOVs) are written beside the colour.
 
-    Of what the eye's rays hit first, holes of a mask too, as the filter weighs them and with 0 for
-    misses: albedo, the material's own colour, and normal, the shading normal without bump and
-    normal maps.  Of the ray through the centres of pixel and lens: depth, the distance from the
-    eye, inf for a miss, and id, the shape's index, -1 for a miss.  variance: that of the pixel's
-    mean, from the spread of its samples; for `sobol` and `grid`, whose samples lie more evenly than
-    chance would have them, an upper estimate.  Ray casting writes its own layers instead.
+    Means over camera rays of the first hit, weighted by the filter, 0 for misses, masked holes
+    counting as hits: albedo, the material's own colour, and normal, the shading normal without bump
+    and normal maps.  For the ray through the centres of pixel and lens: depth, the distance from
+    the eye, inf for a miss, and id, the shape's index, -1 for a miss.  variance: of the pixel's
+    mean, estimated from its samples; for `sobol` and `grid`, whose samples are stratified, an upper
+    estimate.  Ray casting writes its own layers instead.
     """
 
 

@@ -1,10 +1,10 @@
-"""Reconstruction filters, as densities to draw film points from.
+"""Reconstruction filters by filter importance sampling: densities from which film points are drawn.
 
 A pixel is the integral of radiance times the filter around its centre.  Each pixel draws its own
-points from the filter (filter importance sampling, Ernst et al. 2006): pixels share no samples, so
-that any tiling and any number of threads give the same bits.  Where a filter is negative, points
-are drawn from its absolute value and weigh negatively; the mean stays exact, since samples are not
-divided by the sum of their weights.
+points from the filter (Ernst et al. 2006): pixels share no samples, so that any tiling and any
+number of threads give the same bits.  Where a filter is negative, points are drawn from its
+absolute value and have negative weights; the mean is unbiased, since samples are not divided by the
+sum of their weights.  Lengths are in pixels.
 
 To add a filter: its description; for a tabulated one the NamedTuple of its profile, a kernel and
 its registration; `AnyFilter`; a translator function in `comparisons.mitsuba.translate`; a scene.
@@ -24,10 +24,10 @@ from reference_rt.sampling.distribution import cell_of
 
 
 class Filter(Description):
-    """The product of the same function of x and of y, each of integral 1."""
+    """A separable filter: the product of one function of x and of y, whose integral is 1."""
 
     def setup(self) -> Any:
-        """What `film_offset` draws from."""
+        """The NamedTuple that `film_offset` takes."""
         raise NotImplementedError
 
     def value(self, x: float) -> float:
@@ -37,7 +37,7 @@ class Filter(Description):
 
 
 class BoxFilter(Filter):
-    """The pixel's own square, evenly."""
+    """Constant over the pixel's square."""
 
     type: Literal["box"] = "box"
 
@@ -142,8 +142,8 @@ class WindowedSinc(NamedTuple):
 
 
 class Tabulated(NamedTuple):
-    """The filter is profile / integral; edges and cumulative (cells + 1,) are a distribution that
-    is linear between them and close to that of its absolute value."""
+    """A tabulated filter.  It is profile / integral;  edges, cumulative (cells + 1,): a piecewise
+    linear CDF close to that of its absolute value, from which points are drawn."""
 
     profile: Gaussian | Cubics | WindowedSinc
     integral: float
@@ -155,10 +155,10 @@ class Tabulated(NamedTuple):
 def _tabulated(
     profile: Gaussian | Cubics | WindowedSinc, radius: float, cells: int = 256
 ) -> Tabulated:
-    """The table of an even profile that ends at `radius`; where it has a kink, there is an edge.
+    """The table of an even profile that ends at `radius` and whose kinks are at edges of cells.
 
-    Four Gauss points in cells of a 64th of a pixel, or of a 32nd of a Gaussian's s, integrate what
-    is smooth inside them to less than rounding.
+    Cells are 1/64 pixel, or 1/32 of a Gaussian's s, wide; four Gauss points integrate a function
+    that is smooth inside a cell to below rounding.
     """
     edges = np.linspace(-radius, radius, cells + 1)
     nodes, weights = np.polynomial.legendre.leggauss(4)
@@ -226,7 +226,7 @@ def _tent_offset(tent: TentSetup, u: float) -> tuple[float, float]:
 
 @kernel
 def _tabulated_offset(table: Tabulated, u: float) -> tuple[float, float]:
-    """Linear inside a cell of the table; the weight is the filter over that cell's density."""
+    """Uniform inside a cell of the table; the weight is the filter over the cell's density."""
     edges, cumulative = table.edges, table.cumulative
     cell = cell_of(cumulative, u)
     low, high = cumulative[cell], cumulative[cell + 1]

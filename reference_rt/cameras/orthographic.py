@@ -1,4 +1,4 @@
-"""Orthographic: parallel rays that start on the view rectangle."""
+"""Orthographic camera: parallel rays that start on the view rectangle."""
 
 import math
 from typing import Literal, NamedTuple, Self
@@ -53,5 +53,5 @@ class OrthographicView(NamedTuple):
 
 @kernel
 def camera_ray(view: OrthographicView, x: float, y: float, lens: tuple[float, float]) -> Ray:
-    """From (x, y) of the rectangle, forward (T2: u_s = l + (r - l)(i + 1/2) / n_x)."""
+    """The ray from (x, y) of the rectangle, forward (T2: u_s = l + (r - l)(i + 1/2) / n_x)."""
     return Ray(view.corner + view.right * x + view.down * y, view.forward, math.inf)

@@ -1,4 +1,4 @@
-"""Perspective: all rays start at the eye and pass a view rectangle in front of it."""
+"""Perspective camera: all rays start at the eye and pass a view rectangle in front of it."""
 
 import math
 from typing import Literal, NamedTuple
@@ -21,8 +21,8 @@ class Perspective(CentralCamera):
 
 
 class PerspectiveView(NamedTuple):
-    """Where rays start; the direction of that through the picture's top left corner; how it changes
-    across the picture and down."""
+    """eye: the origin of all rays;  corner: the direction, of any length, to the picture's top left
+    corner;  right, down: its change across the picture, and down."""
 
     eye: Vec3
     corner: Vec3

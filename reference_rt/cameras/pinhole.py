@@ -1,4 +1,4 @@
-"""Pinhole: the real one, a box with a film behind a hole."""
+"""Pinhole camera: the physical one, a box with a film behind a hole."""
 
 from typing import Literal, Self
 
@@ -29,7 +29,7 @@ class Pinhole(Camera):
     """From the hole back to the film, in scene units."""
 
     @model_validator(mode="after")
-    def _sees_an_angle(self) -> Self:
+    def _check_angle(self) -> Self:
         at_distance_1(by_width(self.film_width, 1, 1), self.film_distance)
         return self
 

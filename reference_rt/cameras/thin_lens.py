@@ -1,4 +1,4 @@
-"""Thin lens: perspective through a round lens, sharp in one plane."""
+"""Thin-lens camera: perspective through a round lens, in focus in one plane."""
 
 import math
 from typing import Literal, NamedTuple, Self
@@ -16,7 +16,7 @@ from reference_rt.sampling.warp import concentric_disk
 
 class ThinLens(CentralCamera):
     """An ideal lens around the eye, across the view direction (Cook et al. 1984): all rays of one
-    film point meet again in the plane in focus.
+    film point meet again in the plane of focus.
 
     The lens is sampled.  Where no random numbers are drawn - by ray casting, and on a `grid` -
     every ray passes its centre: the picture of `perspective`, sharp everywhere.
@@ -26,11 +26,11 @@ class ThinLens(CentralCamera):
     aperture_radius: Positive
     """Radius of the lens in scene units."""
     focus_distance: Positive | None = None
-    """From the lens to the plane in focus, along the axis of view; none: the plane through
-    `target`."""
+    """From the lens to the plane of focus, along the axis of view, in scene units; none: the plane
+    through `target`."""
 
     @model_validator(mode="after")
-    def _focuses(self) -> Self:
+    def _check_focus(self) -> Self:
         if not self.aperture_radius / self.focus <= STEEPEST:
             raise ValueError(
                 "the lens is too wide for its focus; expected a larger 'focus_distance' or a "
@@ -40,7 +40,7 @@ class ThinLens(CentralCamera):
 
     @property
     def focus(self) -> float:
-        """The focus distance, or what stands in for none."""
+        """The focus distance, or its default."""
         return self.focus_distance or math.dist(self.eye, self.target)
 
     def setup(self, width: int, height: int) -> "ThinLensView":
@@ -56,8 +56,8 @@ class ThinLens(CentralCamera):
 
 
 class ThinLensView(NamedTuple):
-    """eye, corner, right, down: as of `PerspectiveView`, at distance 1;  u, v: the unit axes of the
-    lens;  radius: its radius;  slope: that over the focus distance."""
+    """eye, corner, right, down: as in `PerspectiveView`, at distance 1;  u, v: unit axes of the
+    lens;  radius: its radius;  slope: radius / focus distance."""
 
     eye: Vec3
     corner: Vec3
@@ -77,10 +77,11 @@ def lens_sample(view: ThinLensView, sampler: Sample) -> tuple[float, float]:
 
 @kernel
 def camera_ray(view: ThinLensView, x: float, y: float, lens: tuple[float, float]) -> Ray:
-    """From a point q of the lens to where the ray through its centre meets the plane in focus.
+    """The ray from a lens point q to the point where the ray through the lens's centre meets the
+    plane of focus.
 
-    With s as long along the axis as 1, that is e + f s, and the direction f s - q, here over f:
-    s - q / f has no sum with the eye, and no overflow however far the focus.
+    With s of length 1 along the axis, that point is e + f s and the direction f s - q.  Divided by
+    f, s - q / f, it needs no sum with the eye, and does not overflow however far the focus is.
     """
     a, b = concentric_disk(lens[0], lens[1])
     q = view.u * a + view.v * b

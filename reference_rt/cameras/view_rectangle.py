@@ -1,4 +1,4 @@
-"""The text-book's view rectangle: by its edges, by its width, or by an angle of view."""
+"""The view rectangle [l, r, b, t], given by its edges, by its width, or by an angle of view."""
 
 import math
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -20,8 +20,9 @@ class Rectangle(NamedTuple):
     t: float
 
 
-class Sheet(NamedTuple):
-    """A rectangle in space: from the eye to its top left corner, its top and its left edge."""
+class PlacedRectangle(NamedTuple):
+    """A rectangle in space as three vectors: from the eye to its top left corner, along its top
+    edge, and along its left edge."""
 
     corner: Vec3
     right: Vec3
@@ -80,14 +81,14 @@ def _centred(half_x: float, half_y: float) -> Rectangle:
 
 
 STEEPEST = 2.0**53
-"""1/u: of a direction that is steeper, the part along the axis is below the rounding of the rest,
-so that the angle of view is 180 degrees.  Its square is far from overflow."""
+"""1/u: in a steeper direction the component along the axis is below the rounding error of the
+others, so that the angle of view is 180 degrees.  Its square is far from overflow."""
 
 
 def at_distance_1(rectangle: Rectangle, distance: float) -> Rectangle:
     """The rectangle at distance 1 that looks the same from the eye.
 
-    Raises ValueError where it is no rectangle, to within float64.
+    Raises ValueError where it degenerates in float64.
     """
     near = Rectangle(*(edge / distance for edge in rectangle))
     if not (near.l < near.r and near.b < near.t):
@@ -97,11 +98,11 @@ def at_distance_1(rectangle: Rectangle, distance: float) -> Rectangle:
     return near
 
 
-def place(rectangle: Rectangle, basis: FloatArray, distance: float) -> Sheet:
+def place(rectangle: Rectangle, basis: FloatArray, distance: float) -> PlacedRectangle:
     """The rectangle across the view direction at `distance` before the eye."""
     u, v, w = basis
     l, r, b, t = rectangle
-    return Sheet(vec3(l * u + t * v - distance * w), vec3((r - l) * u), vec3((b - t) * v))
+    return PlacedRectangle(vec3(l * u + t * v - distance * w), vec3((r - l) * u), vec3((b - t) * v))
 
 
 def vec3(array: FloatArray) -> Vec3:
@@ -136,7 +137,7 @@ class CentralCamera(Camera):
 
     @property
     def angle(self) -> tuple[float, FovAxis]:
-        """fov and fov_axis, or what stands in for none; of no meaning beside `view`."""
+        """fov and fov_axis, or their defaults; meaningless beside `view`."""
         return 45.0 if self.fov is None else self.fov, self.fov_axis or "x"
 
     def rectangle(self, n_x: int, n_y: int) -> Rectangle:

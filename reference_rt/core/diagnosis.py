@@ -1,4 +1,4 @@
-"""What is wrong with a description, and where: pydantic's complaint as one line for people."""
+"""Validation errors for users: pydantic's error as one line, with the keys that lead to it."""
 
 from collections.abc import Iterator
 from typing import Any, get_args
@@ -9,7 +9,7 @@ Keys = tuple[str | int, ...]
 
 
 class FieldError(ValueError):
-    """What is wrong with one field of a description, where only the whole can tell."""
+    """An error in one field that only a validator of the whole description can detect."""
 
     def __init__(self, field: str, message: str) -> None:
         super().__init__(message)
@@ -22,11 +22,12 @@ _PLAIN = {
     "dict_type": "keys with values",
     "tuple_type": "a list",
 }
-"""What pydantic calls by the names of Python's types."""
+"""What is expected, for errors that pydantic words in terms of Python's types."""
 
 
 def first_problem(model: type[BaseModel], error: ValidationError, data: Any) -> tuple[str, Keys]:
-    """One clear line and the keys of the culprit, from the first complaint about `data`."""
+    """(message, keys) of the first error that pydantic reports about `data`: the message is one
+    line, the keys lead to the wrong value."""
     first = error.errors()[0]
     location: Keys = first["loc"]
     keys = _keys_in(data, location)
@@ -58,7 +59,7 @@ def first_problem(model: type[BaseModel], error: ValidationError, data: Any) -> 
 
 
 _MOST_SHOWN = 60
-"""Characters of a wrong value that a message repeats."""
+"""The most characters of a wrong value that a message repeats."""
 
 
 def _shown(value: Any) -> str:
@@ -88,7 +89,7 @@ def _keys_in(data: Any, location: Keys) -> Keys:
 
 
 def _models_at(model: type[BaseModel], location: Keys) -> list[type[BaseModel]]:
-    """The descriptions that may stand at pydantic's location: several where one is to be chosen."""
+    """The description classes possible at pydantic's location: several for a union."""
     models = [model]
     for key in location:
         chosen = [m for m in models if len(models) > 1 and _type_of(m) == key]
@@ -101,7 +102,7 @@ def _models_at(model: type[BaseModel], location: Keys) -> list[type[BaseModel]]:
 
 
 def _descriptions_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """The descriptions that a field's annotation names, however deep."""
+    """All description classes in a field's annotation, at any depth."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for part in get_args(annotation):

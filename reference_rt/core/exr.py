@@ -1,4 +1,4 @@
-"""OpenEXR files: named float32 channels, and text in the header."""
+"""Reading and writing OpenEXR files: named float32 channels, and text in the header."""
 
 import ctypes
 import io
@@ -20,10 +20,10 @@ _MAGIC = b"v/1\x01"
 
 
 def write_exr(path: Path, channels: Mapping[str, FloatArray], header: Mapping[str, str]) -> None:
-    """Channels (height, width) by name as float32, whole or not at all.  Raises ImageError."""
+    """Writes channels (height, width) by name as float32, atomically.  Raises ImageError."""
     import OpenEXR
 
-    with np.errstate(over="ignore"):  # beyond float32 is infinity, which stays visible as such
+    with np.errstate(over="ignore"):  # overflow of float32 becomes infinity
         planes: dict[str, Any] = {
             name: np.ascontiguousarray(plane, np.float32) for name, plane in channels.items()
         }
@@ -31,7 +31,7 @@ def write_exr(path: Path, channels: Mapping[str, FloatArray], header: Mapping[st
     with replacing(path) as temporary:
         try:
             OpenEXR.File(settings | dict(header), planes).write(_name(temporary))
-        except RuntimeError as error:  # what the library raises for any failure to write
+        except RuntimeError as error:  # raised by the library for any failure to write
             raise OSError(None, str(error)) from None
 
 
@@ -50,7 +50,7 @@ def read_exr(path: Path) -> tuple[dict[str, FloatArray], dict[str, Any]]:
 
 
 def read_header(path: Path) -> dict[str, Any]:
-    """The header.  Raises ValueError (what is wrong), OSError."""
+    """The header of an EXR file.  Raises ValueError (what is wrong), OSError."""
     with open_input(path) as start:
         if start.read(4) != _MAGIC:
             raise ValueError("cannot be read as EXR: it does not begin as one")
@@ -59,8 +59,8 @@ def read_header(path: Path) -> dict[str, Any]:
 
 
 def read_planes(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """Channels by name, (height, width) unless they are subsampled, in the file's own type.  Raises
-    ValueError (what is wrong), OSError."""
+    """Channels by name, (height, width) unless they are subsampled, in the file's own data type.
+    Raises ValueError (what is wrong), OSError."""
     open_input(path).close()
     _, planes = _opened(path, separate_channels=True)
     return planes
@@ -74,7 +74,7 @@ def _opened(path: Path, **how: bool) -> tuple[dict[str, Any], dict[str, npt.NDAr
         with _silent(), OpenEXR.File(_name(path), **how) as file:
             planes = {name: channel.pixels for name, channel in file.channels().items()}
             header = dict(file.header())
-    except (RuntimeError, OSError, TypeError, ValueError):  # whose reasons tell people nothing
+    except (RuntimeError, OSError, TypeError, ValueError):  # its messages say nothing to users
         raise ValueError(damaged) from None
     if "separate_channels" in how and not all(hasattr(p, "shape") for p in planes.values()):
         raise ValueError(damaged)  # the library returns channels without pixels
@@ -82,16 +82,16 @@ def _opened(path: Path, **how: bool) -> tuple[dict[str, Any], dict[str, npt.NDAr
 
 
 def _name(path: Path) -> str | bytes:
-    """As the library takes it: names of files need not be UTF-8."""
+    """The file name as the library takes it: names need not be UTF-8."""
     return str(path) if sys.platform == "win32" else os.fsencode(path)
 
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Nothing on standard output and error, which the library writes to from C++ and from Python:
-    a damaged file is told in one line by those who read it."""
+    """Suppresses standard output and error, to which the library writes from C++ and from Python:
+    the caller reports a damaged file in one line."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    kept = os.dup(1), os.dup(2)
+    saved = os.dup(1), os.dup(2)
     try:
         with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
             for number in (1, 2):
@@ -99,8 +99,8 @@ def _silent() -> Iterator[None]:
             yield
     finally:
         if sys.platform != "win32":
-            ctypes.CDLL(None).fflush(None)  # what C still has in its buffers
-        for number, own in zip((1, 2), kept, strict=True):
-            os.dup2(own, number)
-        for number in (nowhere, *kept):
+            ctypes.CDLL(None).fflush(None)  # flush C's buffers
+        for number, original in zip((1, 2), saved, strict=True):
+            os.dup2(original, number)
+        for number in (nowhere, *saved):
             os.close(number)

@@ -1,4 +1,4 @@
-"""What every description in a scene file is made of: the frozen base model and the field types."""
+"""The base of everything in a scene file: the frozen model `Description` and the field types."""
 
 import ast
 import inspect
@@ -27,29 +27,30 @@ from reference_rt.util.errors import SceneError
 class Description(BaseModel):
     """A frozen part of a scene.  Unknown keys, wrong types, NaN and infinity are errors.
 
-    In Python, arrays, NumPy scalars and paths stand for lists, numbers and strings.  Whatever is
-    wrong is a `SceneError`, whose `path` is the way to it from the description that is made.
+    In Python, arrays, NumPy scalars and paths may replace lists, numbers and strings.  Every error
+    is a `SceneError`, whose `path` leads from this description to the wrong value.
     """
 
     model_config: ClassVar[ConfigDict] = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False
     )
     array_fields: ClassVar[frozenset[str]] = frozenset()
-    """The fields that keep arrays as arrays."""
+    """Names of the fields that take arrays without conversion to lists."""
 
     def __init__(self, /, **fields: Any) -> None:
-        kept = type(self).array_fields
+        as_arrays = type(self).array_fields
         self._checked(
-            {name: v if name in kept else _plain(v) for name, v in fields.items()}, instance=self
+            {name: v if name in as_arrays else _plain(v) for name, v in fields.items()},
+            instance=self,
         )
 
-    # Without this, pydantic would call `__init__` for every part of a scene file: files hold plain
-    # data, and scenes of 100,000 shapes must not wait for the conversion.
+    # Without this, pydantic would call `__init__` for every part of a scene file.  Files contain
+    # plain data, which need no conversion: it would be slow for scenes of 100,000 shapes.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @classmethod
     def _checked(cls, data: Any, instance: Self | None = None) -> Self:
-        """A description from plain data.  Raises SceneError with the keys of the culprit."""
+        """A description from plain data.  Raises SceneError with the keys of the wrong value."""
         try:
             found: Self = cls.__pydantic_validator__.validate_python(data, self_instance=instance)
         except ValidationError as error:
@@ -58,7 +59,7 @@ class Description(BaseModel):
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """A description from a dictionary.  Raises SceneError, as making one does."""
+        """A description from a dictionary.  Raises SceneError, as the constructor does."""
         data = _plain(obj)
         try:
             return super().model_validate(data, **options)
@@ -67,7 +68,7 @@ class Description(BaseModel):
 
     @classmethod
     def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
-        """A description from JSON text.  Raises SceneError, as making one does."""
+        """A description from JSON text.  Raises SceneError, as the constructor does."""
         try:
             data = json.loads(json_data)
         except ValueError as error:
@@ -92,10 +93,10 @@ class Description(BaseModel):
     def __get_pydantic_json_schema__(
         cls, core_schema: Any, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """The schema, with the strings below the fields as their descriptions.
+        """The JSON Schema, with the docstrings below the fields as their descriptions.
 
-        `use_attribute_docstrings` would parse all sources whenever they are imported: 0.13 s of
-        every start.
+        Pydantic's `use_attribute_docstrings` would parse all sources at import: 0.13 s of every
+        start.
         """
         schema = handler(core_schema)
         properties = handler.resolve_ref_schema(schema).get("properties", {})
@@ -120,7 +121,7 @@ def _frozen(description: Description, name: str) -> SceneError:
 
 
 def _strings_below(cls: type) -> dict[str, str]:
-    """The string that stands below each annotated name in the body of a class."""
+    """The docstring below each annotated field in the body of a class."""
     (tree,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
     assert isinstance(tree, ast.ClassDef)
     return {

@@ -1,7 +1,7 @@
-"""NumPy in descriptions: arrays given as numbers and lists, and fields that keep arrays.
+"""NumPy in descriptions: conversion of arrays to numbers and lists, and fields that keep arrays.
 
-Scene files hold plain data.  Python code has arrays: NumPy's, and those of every library whose
-objects have the method `__array__`.
+Scene files contain plain data.  Python code may pass arrays: NumPy's, and those of any library
+whose objects have the method `__array__`.
 """
 
 import hashlib
@@ -15,16 +15,16 @@ import numpy.typing as npt
 from pydantic import PlainSerializer, PlainValidator, SerializationInfo, WithJsonSchema
 
 AS_DIGEST = {"arrays": "digest"}
-"""The context of `model_dump_json` in which an array is written as a digest of its content: what
-descriptions are compared by, without a text of millions of numbers."""
+"""The context of `model_dump_json` that writes an array as a digest of its content: descriptions
+are compared without writing millions of numbers."""
 
 
 def plain(value: Any) -> Any:
-    """`value` with Python's own numbers and lists in place of arrays and NumPy scalars, and strings
-    in place of paths; however deep they are in lists, tuples and dictionaries.
+    """`value` with arrays and NumPy scalars replaced by Python's numbers and lists, and paths by
+    strings, at any depth in lists, tuples and dictionaries.
 
-    An array of what is neither numbers, booleans nor strings stays as it is: strict validation
-    refuses it, with its place.
+    Arrays of anything but numbers, booleans and strings stay as they are: strict validation then
+    reports them with their keys.
     """
     convert = _converter(type(value))  # type: ignore[arg-type]
     return value if convert is None else convert(value)
@@ -32,7 +32,7 @@ def plain(value: Any) -> Any:
 
 @cache
 def _converter(kind: type) -> Callable[[Any], Any] | None:
-    """What makes values of a type plain; None for types that are left alone."""
+    """The function that makes values of a type plain; None for types that need no conversion."""
     if kind is list or kind is tuple:
         return lambda value: kind([plain(item) for item in value])
     if kind is dict:
@@ -95,14 +95,14 @@ _AS_LISTS = PlainSerializer(_written, when_used="json")
 Floats2 = Annotated[
     npt.NDArray[np.float64], PlainValidator(_rows(2, False)), _AS_LISTS, _schema(2, "number")
 ]
-"""(n, 2) finite float64: a copy, read-only; lists in scene files."""
+"""(n, 2) finite float64, copied and read-only; lists in scene files."""
 
 Floats3 = Annotated[
     npt.NDArray[np.float64], PlainValidator(_rows(3, False)), _AS_LISTS, _schema(3, "number")
 ]
-"""The same of rows of three."""
+"""(n, 3) finite float64, as `Floats2`."""
 
 Integers3 = Annotated[
     npt.NDArray[np.int64], PlainValidator(_rows(3, True)), _AS_LISTS, _schema(3, "integer")
 ]
-"""(n, 3) int64, likewise."""
+"""(n, 3) int64, as `Floats2`."""

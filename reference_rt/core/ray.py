@@ -1,4 +1,4 @@
-"""Rays and what they find; the one policy for leaving a surface."""
+"""Rays, hits and surface points, and the one policy for leaving a surface without self-hits."""
 
 import math
 from typing import NamedTuple
@@ -11,8 +11,8 @@ UNIT_ROUNDOFF = 2.0**-53
 
 
 BLOCK = 64
-"""Rays that are traced side by side, of as many samples (measured on the Cornell box: 16 take 8 %
-longer, 32 take 3 %; their paths need 35 KiB)."""
+"""The number of rays, and of paths, that are traced as one block (measured on the Cornell box: with
+16 it takes 8 % longer, with 32 3 %; 64 paths need 35 KiB)."""
 
 
 class Ray(NamedTuple):
@@ -24,8 +24,8 @@ class Ray(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """Where a ray meets one primitive: `t`, inf for nowhere; `u`, `v` are what the primitive needs
-    to place the point: see its `intersect`."""
+    """A ray's hit with one primitive.  t: inf for none;  u, v: what the primitive needs to compute
+    the surface point, see its `intersect`."""
 
     t: float
     u: float
@@ -33,10 +33,10 @@ class Crossing(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """The closest intersection so far; for none, `kind` is -1 and `t` the ray's t_max.
+    """The closest hit so far; for none, `kind` is -1 and `t` the ray's t_max.
 
-    `kind` and `row` say which primitive: a code of `reference_rt.shapes` and a row of its table;
-    `instance` the row of the instance that it was met in, -1 for none;  `u`, `v`: see `Crossing`.
+    kind, row: the primitive, as a code of `reference_rt.shapes` and a row of its table;  instance:
+    the row of its instance, -1 for none;  u, v: see `Crossing`.
     """
 
     t: float
@@ -77,12 +77,12 @@ def miss() -> Crossing:
 
 @kernel
 def no_hit(ray: Ray) -> Hit:
-    """Nothing found up to the ray's end."""
+    """No hit up to the ray's t_max."""
     return Hit(ray.t_max, -1, -1, 0.0, 0.0, -1)
 
 
 SURFACE_ROUNDING = 16.0 * 1.7320508075688774 * UNIT_ROUNDOFF
-"""The share of the largest numbers that `surface_error` allows for."""
+"""The relative error bound of `surface_error`: 16 sqrt(3) u."""
 
 
 @kernel
@@ -90,21 +90,22 @@ def surface_error(p: Vec3, anchor: Vec3, size: float) -> float:
     """A bound on |distance to the surface|, for `SurfacePoint.error`.
 
     `anchor` is the point that the shape's table stores and `size` the shape's extent about it.
-    Computing p takes at most 8 roundings of numbers no larger than |anchor| + size; seeing a ray's
-    origin from the shape (o - anchor, products with unit vectors or object-space rows, two sums)
-    takes as many of numbers no larger than |p - anchor| <= size and |p|.  Each is at most u times
-    the number, and a vector's length is at most sqrt(3) times its largest component.
+    Computing p takes at most 8 roundings of numbers no larger than |anchor| + size; transforming a
+    ray's origin to the shape's space (o - anchor, products with unit vectors or object-space rows,
+    two sums) takes as many of numbers no larger than |p - anchor| <= size and |p|.  Each rounding
+    error is at most u times the number, and a vector's length at most sqrt(3) times its largest
+    component.
     """
     return SURFACE_ROUNDING * (max_abs(anchor) + max_abs(p) + size)
 
 
 @kernel
 def leave(point: SurfacePoint, w: Vec3) -> Vec3:
-    """An origin for a ray that leaves `point` towards `w`: off the surface, on w's side.
+    """The origin of a ray that leaves `point` towards `w`: off the surface, on w's side.
 
-    Moves by the point's own error bound along the geometric normal: never by a global epsilon
-    (Wächter & Binder 2019 and PBR 4ed 6.8.6 give the idea).  The bound is many times the spacing
-    of floats at p, so the sum does not round back.
+    The point is displaced along the geometric normal by its own error bound, never by a global
+    epsilon (the idea is Wächter & Binder 2019 and PBR 4ed 6.8.6).  The bound is many times the
+    spacing of floats at p, so that the sum does not round back.
     """
     if dot(w, point.n) < 0.0:
         return point.p - point.n * point.error

@@ -1,4 +1,4 @@
-"""Rays of a block of samples, side by side, and what they find: scratch of a band of pixels."""
+"""SoA buffers for one block of rays and for their hits."""
 
 from typing import NamedTuple
 
@@ -17,15 +17,15 @@ HIT_FLOATS, HIT_INTEGERS = 3 * BLOCK, 3 * BLOCK
 
 
 class Rays(NamedTuple):
-    """Up to BLOCK rays: numbers (RAY_FLOATS,), o.x of all of them, then o.y, o.z, d.x, d.y, d.z and
-    t_max."""
+    """Up to BLOCK rays as SoA: numbers (RAY_FLOATS,), o.x of all rays, then o.y, o.z, d.x, d.y, d.z
+    and t_max."""
 
     numbers: FloatArray
 
 
 class Hits(NamedTuple):
-    """As many hits: numbers (HIT_FLOATS,), t of all of them, then u and v;  codes (HIT_INTEGERS,),
-    kind of all of them, then row and instance."""
+    """Up to BLOCK hits as SoA: numbers (HIT_FLOATS,), t of all hits, then u and v;  codes
+    (HIT_INTEGERS,), kind of all hits, then row and instance."""
 
     numbers: FloatArray
     codes: IntArray
@@ -33,9 +33,9 @@ class Hits(NamedTuple):
 
 @kernel
 def vector_of(numbers: FloatArray, column: int, j: int) -> Vec3:
-    """Number j of the vectors in three columns of BLOCK numbers each.
+    """Vector j of those stored in three columns, from `column` on, of BLOCK numbers each.
 
-    Unsigned, as in `vec3.row` (measured: 2 % of spheres under a sky).
+    The index is unsigned, as in `vec3.row` (measured: 2 % of spheres under a sky).
     """
     at, next_column = np.uint64(column * BLOCK + j), np.uint64(BLOCK)
     return Vec3(numbers[at], numbers[at + next_column], numbers[at + next_column + next_column])
@@ -54,7 +54,7 @@ def add_vector(numbers: FloatArray, column: int, j: int, v: Vec3) -> None:
 
 @kernel
 def ray_of(rays: Rays, j: int) -> Ray:
-    """Ray number j."""
+    """Ray j."""
     numbers = rays.numbers
     return Ray(vector_of(numbers, 0, j), vector_of(numbers, 3, j), numbers[6 * BLOCK + j])
 
@@ -68,7 +68,7 @@ def put_ray(rays: Rays, j: int, ray: Ray) -> None:
 
 @kernel
 def hit_of(hits: Hits, j: int) -> Hit:
-    """Hit number j."""
+    """Hit j."""
     numbers, codes = hits.numbers, hits.codes
     return Hit(
         numbers[j],

@@ -1,4 +1,4 @@
-"""Rays with directions of any length, and of numbers that are none."""
+"""Rays from outside, with directions of any length: scaled to a safe range, invalid ones marked."""
 
 import math
 from typing import NamedTuple
@@ -8,13 +8,13 @@ from reference_rt.core.vec3 import Vec3, is_finite, max_abs
 from reference_rt.jit.kernel import kernel
 
 SHORT = 2.0**-64
-"""Of a direction: its square, and that of the same of an instance 2^400 times as large, are not 0.
-What is neither shorter nor longer than the inverse is left alone."""
+"""Directions whose largest component is between SHORT and 1 / SHORT are not scaled: their squares,
+also in an instance that is 2^400 times as large, do not underflow."""
 
 
 class Scaled(NamedTuple):
-    """A ray whose direction is `unit` times as long as what was asked with: its t times `unit` are
-    those of the question;  valid: whether it is a ray, of finite numbers and d != 0."""
+    """ray: with a direction `unit` times the original one, so that its t times `unit` are those of
+    the original;  valid: whether o and d are finite and d is not 0."""
 
     ray: Ray
     unit: float
@@ -23,8 +23,8 @@ class Scaled(NamedTuple):
 
 @kernel
 def scaled(o: Vec3, d: Vec3, t_max: float) -> Scaled:
-    """By a power of two, which changes no bit of what is computed: squares of directions that are
-    very long or short would leave the range of float64."""
+    """Scales very long and very short directions, whose squares would leave the range of float64,
+    by a power of two, which changes no bit of the results."""
     unit, valid = 1.0, is_finite(o) and is_finite(d) and max_abs(d) > 0.0
     if valid and not SHORT <= max_abs(d) <= 1.0 / SHORT:
         _, exponent = math.frexp(max_abs(d))
@@ -35,5 +35,5 @@ def scaled(o: Vec3, d: Vec3, t_max: float) -> Scaled:
 
 @kernel
 def is_told(t: float, p: Vec3) -> bool:
-    """Whether float64 has numbers for a hit."""
+    """Whether a hit is representable in float64: 0 < t < inf and p finite."""
     return 0.0 < t < math.inf and is_finite(p)

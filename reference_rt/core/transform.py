@@ -19,7 +19,7 @@ Affine = npt.NDArray[np.float64]
 IDENTITY: Affine = np.eye(3, 4)
 
 FLAT = "the transform is singular: it flattens space; expected one that can be undone"
-"""What is said of a map that has no inverse."""
+"""The error message for a map that has no inverse."""
 
 
 def identity() -> Affine:
@@ -35,7 +35,8 @@ def scale(factors: Vector) -> Affine:
 
 
 def rotate(axis: Direction, degrees: float) -> Affine:
-    """Rotation about `axis` through the origin, counter-clockwise seen against it (Rodrigues).
+    """Rotation about `axis` through the origin, counter-clockwise if the axis points at the viewer
+    (Rodrigues' formula).
 
     Quarter turns are exact: their sines and cosines are integers.
     """
@@ -51,7 +52,7 @@ def rotate(axis: Direction, degrees: float) -> Affine:
 
 
 def look_at(eye: Vector, target: Vector, up: Direction) -> Affine:
-    """The map whose columns are right, up, back, eye: the text-book's basis u, v, w at e.
+    """The map whose columns are right, up, back, eye: the textbook's camera basis u, v, w at e.
 
     w = -(target - eye) normalised, u = up x w normalised, v = w x u.  Raises ValueError where
     these are not defined.
@@ -83,8 +84,8 @@ def compose(*maps: Affine) -> Affine:
 def invert(m: Affine) -> Affine:
     """The inverse map.  Raises ValueError where the map flattens space."""
     linear = m[:, :3]
-    # Row scaling removes the units of each axis: what is left of the condition number beyond 1/u
-    # means that the rows are dependent to within float64's own rounding.
+    # Row scaling removes the units of each axis: a condition number above 1/u then means that the
+    # rows are linearly dependent to within float64's rounding.
     norms = np.abs(linear).max(axis=1)
     if not (np.all(np.isfinite(m)) and np.all(norms > 0.0)):
         raise ValueError(FLAT)
@@ -95,14 +96,14 @@ def invert(m: Affine) -> Affine:
 
 
 def mirrors(m: Affine) -> bool:
-    """Whether the map turns right-handed into left-handed."""
+    """Whether the map flips orientation: right-handed becomes left-handed."""
     return bool(np.linalg.slogdet(m[:, :3])[0] < 0.0)  # determinants of extreme scales overflow
 
 
 def apply_points(m: Affine, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """(n, 3) points, mapped: each by the same operations, so that equal points stay equal.
 
-    A product of matrices rounds by where in the array a point stands.
+    The rounding of NumPy's matrix product may depend on a point's place in the array.
     """
     x, y, z = points[:, :1], points[:, 1:2], points[:, 2:]
     return np.asarray(x * m[:, 0] + y * m[:, 1] + z * m[:, 2] + m[:, 3])
@@ -145,7 +146,7 @@ class Scale(Description):
 
 
 class Turn(Description):
-    """An axis and an angle in degrees, counter-clockwise seen against the axis."""
+    """An axis and an angle in degrees, counter-clockwise if the axis points at the viewer."""
 
     axis: Direction
     degrees: float
@@ -219,5 +220,5 @@ Transform = Annotated[tuple[Step, ...], Field(strict=False), BeforeValidator(_st
 
 
 def affine(steps: Transform) -> Affine:
-    """The map that a description's transform stands for."""
+    """The map of a description's transform."""
     return compose(*(step.matrix_of() for step in steps))

@@ -1,4 +1,4 @@
-"""`Vec3`: a point, a direction, a normal or an RGB triple, with the operators of the text-book."""
+"""`Vec3`: a point, a direction, a normal or an RGB triple, with the usual vector operators."""
 
 import math
 import operator
@@ -45,7 +45,8 @@ def _times_scalar(self: Vec3, other: float) -> Vec3:
 
 
 def _compile_operator(symbols: tuple[Callable[..., Any], ...], scalar: Any, vector: Any) -> None:
-    """Let compiled code use `symbols` on Vec3 with the very text that Python runs."""
+    """Overloads the operators `symbols` for Vec3 in compiled code, with the functions that Python
+    runs."""
     for symbol in symbols:
 
         @overload_kernel(symbol)
@@ -72,8 +73,8 @@ def _negative(self: Any) -> Any:
 def row(array: Any, i: int) -> Vec3:
     """Row `i` of an (n, 3) array.
 
-    Unsigned: where numbers may be negative, NumPy's way to count from the end is asked for each
-    time (measured: 4 % of the Cornell box).
+    The index is unsigned: for signed ones each access tests for negative indices, which count from
+    the end (measured: 4 % of the Cornell box).
     """
     k = np.uint64(i)
     return Vec3(array[k, 0], array[k, 1], array[k, 2])
@@ -81,7 +82,7 @@ def row(array: Any, i: int) -> Vec3:
 
 @kernel
 def triple(array: Any, i: int, k: int) -> Vec3:
-    """Vector k of the three in row `i` of an (n, 9) array."""
+    """Vector k, 0 to 2, of the three in row `i` of an (n, 9) array."""
     r = np.uint64(i)
     return Vec3(array[r, 3 * k], array[r, 3 * k + 1], array[r, 3 * k + 2])
 
@@ -135,7 +136,7 @@ def max_component(a: Vec3) -> float:
 
 @kernel
 def luminance(a: Vec3) -> float:
-    """Of a linear sRGB colour (IEC 61966-2-1: its Y)."""
+    """The luminance of a linear sRGB colour (Y of IEC 61966-2-1)."""
     return 0.2126 * a.x + 0.7152 * a.y + 0.0722 * a.z
 
 
@@ -174,11 +175,11 @@ def frame_from_normal(n: Vec3) -> Frame:
 
 @kernel
 def to_world(frame: Frame, v: Vec3) -> Vec3:
-    """`v`, given in the frame's coordinates, in the world's."""
+    """`v` from the frame's coordinates to the world's."""
     return frame.s * v.x + frame.t * v.y + frame.n * v.z
 
 
 @kernel
 def to_local(frame: Frame, v: Vec3) -> Vec3:
-    """`v`, given in the world's coordinates, in the frame's."""
+    """`v` from the world's coordinates to the frame's."""
     return Vec3(dot(v, frame.s), dot(v, frame.t), dot(v, frame.n))

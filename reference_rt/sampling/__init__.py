@@ -1,8 +1,13 @@
-"""Samplers: numbers that are pure functions of (seed, pixel, sample, dimension).
+"""Samplers: numbers in [0, 1) that are pure functions of (seed, pixel, sample, dimension).
 
-No state: any pixel's numbers can be had in any order, so that an image is bit-identical for any
-number of threads.  To add a sampler: its file with description, NamedTuples and kernels; the lines
-below.
+Samplers have no state: numbers can be drawn in any order, and an image is bit-identical for any
+number of threads.  `warp.py` maps numbers to directions and points, `distribution.py` samples
+tabulated densities by inversion.
+
+A sampler's module has a `Description` with `spp` and `setup()`, which returns a NamedTuple for
+kernels; start(setup, pixel, sample) -> a NamedTuple for one sample of one pixel (pixels counted
+along rows, samples from 0); and draw(that, dimension) -> (u0, u1).  To add one: the module; below
+`AnySampler`, `Sample` and the three registrations; a scene and a row in the tests' tuples.
 """
 
 from typing import Annotated, Any, NamedTuple
@@ -23,15 +28,16 @@ from reference_rt.sampling.sobol import Sobol, SobolSample, SobolSetup
 AnySampler = Annotated[Sobol | Independent | Grid, Field(discriminator="type")]
 
 Sample = SobolSample | BlockSample | IndependentSample | GridSample
-"""The numbers of one sample of one pixel."""
+"""The sampler of one sample of one pixel."""
 
-# Dimensions are fixed, so that what one decision draws never shifts another's numbers. A pair
-# takes one number: (u0, u1) of dimension k are stratified in the unit square. Those of a bounce,
-# from PER_BOUNCE times its number on, are so jointly: the first's with the film and the lens.
+# Every decision has a fixed dimension, so that the draws of one never shift the numbers of another.
+# Each dimension gives a pair (u0, u1), stratified in the unit square. The pairs of one bounce, the
+# PER_BOUNCE dimensions from PER_BOUNCE * bounce on, are also stratified jointly; those of the first
+# bounce together with the film and the lens.
 PER_BOUNCE = GROUP
 FILM, LIGHT_AND_LOBE, LIGHT_POINT, BSDF_DIRECTION, LENS = range(PER_BOUNCE)
 ROULETTE = PER_BOUNCE
-"""Whether there is a next bounce: in the place that the film has in the first."""
+"""The dimension of Russian roulette: each later bounce has it where the first one has FILM."""
 
 _start = ByClass("start_sample")
 _start.register(SobolSetup, sobol.start)
@@ -51,14 +57,15 @@ _start_in_block.register(SobolSetup, blocks.start)
 _start_in_block.register(IndependentSetup, _without_blocks)
 _start_in_block.register(GridSetup, _without_blocks)
 start_in_block = _start_in_block.function
-"""start_in_block(setup, pixel, sample, pairs, made) -> a sampler of the same numbers, which draws
-those of several samples of the pixel at once: see `Samplers`."""
+"""start_in_block(setup, pixel, sample, pairs, made) -> a sampler with the same numbers, which
+computes those of several samples of the pixel at once: see `Samplers`."""
 
 
 class Samplers(NamedTuple):
-    """The samplers of some samples: their pixels (n,) and their numbers (n,) in these.
+    """The samplers of n samples: pixels (n,), and the samples' numbers (n,) in their pixels.
 
-    Scratch: pairs (PAIR_FLOATS,), and made (PAIR_INTEGERS,), -1 before the first is drawn.
+    Scratch buffers, a cache of pairs: pairs (PAIR_FLOATS,);  made (PAIR_INTEGERS,), -1 where
+    nothing is cached.
     """
 
     setup: Any
@@ -70,14 +77,15 @@ class Samplers(NamedTuple):
 
 @kernel
 def forget_pairs(samplers: Samplers) -> None:
-    """Before the first sample."""
+    """Empties the cache of pairs: called before the first sample."""
     for k in range(PAIR_INTEGERS):
         samplers.made[k] = -1
 
 
 @kernel
 def sampler_of(samplers: Samplers, k: int) -> Sample:
-    """That of sample k, to be taken one after another: a pixel's are drawn several at once."""
+    """The sampler of sample k.  Fastest in order of k: the numbers of several consecutive samples
+    of a pixel are computed at once."""
     pixel, number = samplers.pixels[k], samplers.numbers[k]
     made: Sample = start_in_block(samplers.setup, pixel, number, samplers.pairs, samplers.made)
     return made

@@ -1,9 +1,9 @@
-"""Sobol' pairs of a block of samples at once: the numbers of `sobol.draw`, made by vector code.
+"""SIMD Sobol' sampler: the pairs of `sobol.draw` for a block of 16 samples of a pixel at once.
 
-The samples of a pixel share the seeds of each pair; each lane takes one of the block.
-`fill_plainly` says what is computed.  The vector code does the same operations on 32 bits, so that
-its results are the same bits, and LLVM makes narrower vectors of it where a processor has no such
-wide ones.  (Measured on the Cornell box: one by one, pairs took a fifth of the time.)
+All samples of a pixel share the seeds of a pair; each lane of a vector computes one sample.
+`fill_plainly` is the scalar version.  The vector code does the same operations on 32-bit integers,
+with the same bits as results; LLVM splits the vectors where the processor's are narrower.
+(Measured on the Cornell box: pairs took a fifth of the time when they were computed singly.)
 """
 
 from collections.abc import Callable
@@ -23,20 +23,20 @@ from reference_rt.sampling.orders import GROUP, OF_DIGITS
 from reference_rt.sampling.sobol import SobolSetup, pair, reverse_bits, seeds_of
 
 TOGETHER = 16
-"""Samples of a block."""
+"""Samples in a block."""
 
 DIMENSIONS = 11 * GROUP
-"""The first dimensions, whose pairs are made in blocks: those of eleven bounces.  11 KiB of
-it are ever used, which leaves most of the fastest cache to the scene."""
+"""The dimensions whose pairs are computed in blocks, those of the first eleven bounces; later ones
+are computed singly.  Their pairs take 11 KiB, which leaves most of the L1 cache to the scene."""
 
 FLOATS, INTEGERS = 2 * TOGETHER * DIMENSIONS, DIMENSIONS
 """The sizes of `BlockSample.pairs` and `BlockSample.made`."""
 
 
 class BlockSample(NamedTuple):
-    """key: a hash of seed and pixel;  sample: its number in the pixel;  block: of pixel and
-    sample, a number that no other block has;  pairs (FLOATS,): for each dimension u0 and u1 of all
-    lanes;  made (INTEGERS,): the block that each dimension's pairs are of, -1 for none."""
+    """key: a hash of seed and pixel;  sample: its number in the pixel;  block: a unique number of
+    its block;  pairs (FLOATS,): a cache, for each dimension u0 and u1 of all lanes;  made
+    (INTEGERS,): the block whose pairs each dimension holds, -1 for none."""
 
     key: np.uint64
     sample: int
@@ -49,14 +49,14 @@ class BlockSample(NamedTuple):
 def start(
     setup: SobolSetup, pixel: int, sample: int, pairs: FloatArray, made: IntArray
 ) -> BlockSample:
-    # Samples are at most 2^31, and there are 16 in a block.
+    # At most 2^31 samples, 16 in each block.
     block = pixel * 2**27 + sample // TOGETHER
     return BlockSample(sobol.start(setup, pixel, 0).key, sample, block, pairs, made)
 
 
 @kernel
 def draw(sampler: BlockSample, dimension: int) -> tuple[float, float]:
-    """As `sobol.draw`."""
+    """The same numbers as `sobol.draw`."""
     sample, pairs = sampler.sample, sampler.pairs
     if dimension >= DIMENSIONS:
         seeds = seeds_of(sampler.key, dimension)
@@ -80,7 +80,7 @@ def fill_plainly(
     pairs: FloatArray,
     at: int,
 ) -> None:
-    """The pairs of TOGETHER samples from `first` on: u0 into pairs[at :], u1 after these."""
+    """Computes the pairs of TOGETHER samples from `first` on: u0 into pairs[at :], then u1."""
     for lane in range(TOGETHER):
         u0, u1 = pair((order, x_seed, y_seed), place, reverse_bits(np.uint64(first + lane)))
         pairs[at + lane], pairs[at + TOGETHER + lane] = u0, u1
@@ -101,7 +101,7 @@ def _reverse(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
 
 
 def _scramble(builder: ir.IRBuilder, x: ir.Value, seed: ir.Value) -> ir.Value:
-    """`sobol.scramble_low_to_high`: 32 bits wrap by themselves."""
+    """`sobol.scramble_low_to_high`; 32-bit integers wrap without masks."""
 
     def stir(x: ir.Value, factor: np.uint64) -> ir.Value:
         return builder.xor(x, builder.mul(x, _all(int(factor))))
@@ -120,8 +120,8 @@ def _pascal(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
 
 
 def _reordered(builder: ir.IRBuilder, x: ir.Value, place: ir.Value, lanes: Any) -> ir.Value:
-    """`sobol.reordered`.  Lanes differ in the lowest digit alone, because each bit of `x` depends
-    on those of the sample's number from there up: the other digits are summed once for all."""
+    """`sobol.reordered`.  Each bit of `x` depends only on the sample number's bits from there up,
+    so that lanes differ in the lowest digit alone: the other digits are summed once for all."""
     number, word = place.type, ir.IntType(32)
     values = ir.Constant(ir.ArrayType(word, OF_DIGITS.size), [int(x) for x in OF_DIGITS.ravel()])
     table = cgutils.global_constant(builder, "sampling_orders", values)

@@ -1,4 +1,4 @@
-"""Tabulated densities, sampled by inversion: running sums, searched by bisection."""
+"""Sampling of tabulated densities by inversion: running sums (unnormalised CDFs) and bisection."""
 
 import math
 
@@ -16,8 +16,8 @@ def running_sums(values: FloatArray) -> FloatArray:
 
 @kernel
 def count_up_to(sums: FloatArray, x: float) -> int:
-    """How many of the ascending sums (n,) are at most x: `np.searchsorted(sums, x, "right")`, of
-    which Numba makes six kernels."""
+    """How many of the ascending sums (n,) are at most x: `np.searchsorted(sums, x, "right")`, for
+    which Numba would compile six functions."""
     low, high = 0, len(sums)
     while low < high:
         middle = (low + high) >> 1
@@ -30,19 +30,19 @@ def count_up_to(sums: FloatArray, x: float) -> int:
 
 @kernel
 def cell_of(sums: FloatArray, x: float) -> int:
-    """The i with sums[i] <= x < sums[i + 1], of running sums (n + 1,): never one of no width."""
+    """The cell i with sums[i] <= x < sums[i + 1] of running sums (n + 1,); never one of width 0."""
     return min(max(count_up_to(sums, x) - 1, 0), len(sums) - 2)
 
 
 @kernel
 def blended(sums: FloatArray, k: int, s: float, i: int) -> float:
-    """Entry i of the running sums between rows k, for s = 0, and k + 1, for s = 1."""
+    """Entry i of the running sums interpolated between rows k (s = 0) and k + 1 (s = 1)."""
     return float(sums[k, i] * (1.0 - s) + sums[k + 1, i] * s)
 
 
 @kernel
 def blended_cell_of(sums: FloatArray, k: int, s: float, x: float) -> int:
-    """As `cell_of`, in `blended` rows of sums (m, n + 1)."""
+    """As `cell_of`, for the `blended` rows of sums (m, n + 1)."""
     low, high = 0, sums.shape[1] - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -55,10 +55,10 @@ def blended_cell_of(sums: FloatArray, k: int, s: float, x: float) -> int:
 
 @kernel
 def linear(u: float, a: float, b: float) -> float:
-    """A number from 0 to 1 with a density that is linear from a >= 0 at 0 to b >= 0 at 1.
+    """A number in [0, 1] with a density that is linear from a >= 0 at 0 to b >= 0 at 1.
 
-    The root of (1 - t) a + t b's integral, (a t + (b - a) t² / 2) = u (a + b) / 2, in the form
-    that does not cancel; both divided by the larger, so that no square overflows.
+    Solves a t + (b - a) t² / 2 = u (a + b) / 2 for t, in the form without cancellation; a and b are
+    divided by the larger one, so that no square overflows.
     """
     most = max(a, b)
     if u <= 0.0 or most == 0.0:

@@ -1,4 +1,4 @@
-"""Grid: n x n fixed points of the pixel, for integrators that draw no random numbers."""
+"""Grid sampler: n x n fixed points in each pixel, for integrators that draw no random numbers."""
 
 import math
 from typing import Annotated, Literal, NamedTuple
@@ -33,7 +33,7 @@ class GridSetup(NamedTuple):
 
 
 class GridSample(NamedTuple):
-    """x, y: the sample's place in its pixel."""
+    """x, y: the sample's position in its pixel, in [0, 1)."""
 
     x: float
     y: float
@@ -47,7 +47,7 @@ def start(setup: GridSetup, pixel: int, sample: int) -> GridSample:
 
 @kernel
 def draw(sampler: GridSample, dimension: int) -> tuple[float, float]:
-    """The place in the pixel for the film (dimension 0), the middle of everything else."""
+    """The position in the pixel for dimension 0 (the film), else (1/2, 1/2)."""
     if dimension == 0:
         return sampler.x, sampler.y
     return 0.5, 0.5

@@ -1,4 +1,4 @@
-"""Integer hashes in uint64 arithmetic, the same in compiled code and in plain Python."""
+"""Integer hashes in uint64 arithmetic, with the same results in compiled code and plain Python."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ _M1, _M2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 
 @kernel
 def mix(x: np.uint64) -> np.uint64:
-    """A bijection of 64 bits in which each input bit moves each output bit (splitmix64's
+    """A bijection of 64 bits in which each input bit affects each output bit (splitmix64's
     finaliser: Stafford 2011, variant 13)."""
     x = (x ^ (x >> _30)) * _M1
     x = (x ^ (x >> _27)) * _M2

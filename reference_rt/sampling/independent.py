@@ -1,4 +1,4 @@
-"""Independent: each number a hash of (seed, pixel, sample, dimension)."""
+"""Independent sampler: each number is a hash of (seed, pixel, sample, dimension)."""
 
 from typing import Annotated, Literal, NamedTuple
 
@@ -41,6 +41,6 @@ def start(setup: IndependentSetup, pixel: int, sample: int) -> IndependentSample
 
 @kernel
 def draw(sampler: IndependentSample, dimension: int) -> tuple[float, float]:
-    """Two numbers of 32 bits, in the middle of their cells: never 0, never 1."""
+    """Two multiples of 2^-32 plus 2^-33, the middles of cells: never 0, never 1."""
     h = mix(sampler.key + np.uint64(dimension + 1) * np.uint64(0x9E3779B97F4A7C15))
     return (float(h >> _32) + 0.5) * 2.0**-32, (float(h & LOW32) + 0.5) * 2.0**-32

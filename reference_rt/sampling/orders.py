@@ -1,26 +1,26 @@
-"""The orders in which the pairs of a group take their points, so that they are stratified jointly.
+"""Permutations of the points of each pair in a group that stratify the pairs jointly.
 
-A pair takes point C n, in binary digits and modulo 2, as number n of its (0, 2)-sequence.  C is
-upper triangular with ones on the diagonal: it rearranges each block of 2^k points in itself, so
-that the pair by itself is as good as before.  With C_a(i, j) = binomial(j, i) a^(j - i) over the
-field of 4 or of 16 elements, numbers in its digits, different a give the parts of a Faure-
-Niederreiter net (Niederreiter 1987), of which the pair's own two matrices, the unit matrix and
-Pascal's triangle, are another two: C_1 after C_a is C_(a + 1).  Ahmed, Skopenkov, Hadwiger & Wonka
-2023, "Analysis and Synthesis of Digital Dyadic Sequences", has such pairs of pairs.
+Sample n of a pair takes point C n of its (0, 2)-sequence, with the matrix C over binary digits
+modulo 2.  C is upper triangular with ones on the diagonal: it permutes each block of 2^k points
+within itself, so that the pair itself is stratified as before.  With C_a(i, j) = binomial(j, i)
+a^(j - i) over the field of 4 or 16 elements, on numbers in its digits, different a give the
+components of a Faure-Niederreiter net (Niederreiter 1987).  The pair's own two matrices, the unit
+matrix and Pascal's triangle, are two more, since C_1 C_a = C_(a + 1).  Ahmed, Skopenkov, Hadwiger &
+Wonka 2023, "Analysis and Synthesis of Digital Dyadic Sequences", has such pairs of pairs.
 """
 
 import numpy as np
 import numpy.typing as npt
 
 GROUP = 5
-"""Pairs of a group: dimensions 5 k to 5 k + 4."""
+"""Pairs in a group: dimensions 5 k to 5 k + 4."""
 
 _MODULUS = {2: 0b111, 4: 0b10011}
 """Irreducible polynomials modulo 2, by degree: x² + x + 1, x⁴ + x + 1."""
 
 
 def product(a: int, b: int, bits: int) -> int:
-    """Of two elements of the field of 2^bits, polynomials written as their coefficients."""
+    """The product of two elements of the field of 2^bits, polynomials with coefficients as bits."""
     total = 0
     for k in range(bits):
         total ^= (b >> k & 1) * a << k
@@ -31,7 +31,7 @@ def product(a: int, b: int, bits: int) -> int:
 
 
 def pascal_columns(a: int, bits: int) -> list[int]:
-    """C_a over the field of 2^bits: 32 columns, each with its first row as the lowest bit."""
+    """C_a over the field of 2^bits as a binary matrix: 32 columns, row 0 in the lowest bit."""
     digits = 32 // bits
     powers = [1]
     while len(powers) < digits:
@@ -48,7 +48,7 @@ def pascal_columns(a: int, bits: int) -> list[int]:
 
 
 def after(first: list[int], then: list[int]) -> list[int]:
-    """The columns of the product `then` times `first`."""
+    """The columns of the matrix product `then` times `first`."""
     columns = []
     for column in first:
         total = 0
@@ -59,16 +59,17 @@ def after(first: list[int], then: list[int]) -> list[int]:
 
 
 def _columns() -> npt.NDArray[np.uint64]:
-    """The first two pairs together are a (0, 4)-sequence in base 4, and so are the next two.  How
-    the halves and the last pair lie to each other is measured: of the orders tried (of both fields,
-    Sobol's further matrices, random ones) one with the least noise in scenes of direct light."""
+    """The first two pairs together are a (0, 4)-sequence in base 4, and so are the next two.  The
+    matrices that relate these halves and the last pair were chosen by experiment: of those tried
+    (from both fields, Sobol's further matrices, random ones) among the ones with the least noise in
+    scenes of direct light."""
     four, sixteen = pascal_columns(2, 2), pascal_columns(2, 4)
     orders = [pascal_columns(0, 2), four, sixteen, after(sixteen, four), pascal_columns(8, 4)]
     return np.array(orders, np.uint64)
 
 
 COLUMNS = _columns()
-"""(GROUP, 32): the columns of each place's matrix, as `pascal_columns`."""
+"""(GROUP, 32): the columns of each pair's matrix, as `pascal_columns`."""
 
 
 def _of_digits() -> npt.NDArray[np.uint64]:
@@ -79,5 +80,5 @@ def _of_digits() -> npt.NDArray[np.uint64]:
 
 
 OF_DIGITS = _of_digits()
-"""(GROUP, 8, 16): of each hexadecimal digit of a number, by its place, lowest first, and its value,
-the sum of the columns: a product with the matrix is the sum of eight of these."""
+"""(GROUP, 8, 16): lookup table of the matrix products, by hexadecimal digit (lowest first) and its
+value: the product of a number with a pair's matrix is the sum (XOR) of eight entries."""

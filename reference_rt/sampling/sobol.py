@@ -1,10 +1,10 @@
-"""Sobol': padded groups of (0, 2)-sequences with hashed Owen scrambling.
+"""Sobol' sampler: padded groups of (0, 2)-sequences with hash-based Owen scrambling.
 
-Each pair of dimensions is the first two of Sobol's sequence, its order and its digits scrambled by
-hashes (Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4)): the first 2^k samples of a
-pixel are stratified in every pair, and every number is uniform.  Groups of pairs and pixels are
-independent; the pairs of a group take their points in different orders, which stratify them
-against each other (`orders.py`).
+Each pair is the first two dimensions of Sobol's sequence, with order and digits scrambled by hashes
+(Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4)): the first 2^k samples of a pixel
+are stratified in every pair, and every number is uniform.  Groups of pairs are independent, and so
+are pixels; the pairs of a group take their points in different orders, which stratify them jointly
+(`orders.py`).
 """
 
 from typing import Annotated, Literal, NamedTuple
@@ -27,7 +27,7 @@ K0, K1, K2 = np.uint64(0x3D20ADEA), np.uint64(0x05526C56), np.uint64(0x53A22864)
 _STEP = np.uint64(0x9E3779B97F4A7C15)
 
 PASCAL_MASKS = (np.uint64(0xFFFF0000), _ODD_8, _ODD_4, _ODD_2, _ODD_1)
-"""The bits that `pascal` moves down by 16, 8, 4, 2 and 1."""
+"""The bits that `pascal` shifts down by 16, 8, 4, 2 and 1."""
 
 
 class Sobol(Description):
@@ -65,8 +65,8 @@ def reverse_bits(x: np.uint64) -> np.uint64:
 
 @kernel
 def scramble_low_to_high(x: np.uint64, seed: np.uint64) -> np.uint64:
-    """A hash of 32 bits in which each bit depends on those below it alone (Laine & Karras 2011,
-    with Vegdahl's constants): Owen scrambling of the bit-reversed number."""
+    """A hash of 32 bits in which each bit depends only on itself and those below it (Laine & Karras
+    2011, with Vegdahl's constants): Owen scrambling of the bit-reversed number."""
     x ^= x * K0 & LOW32
     x = (x + seed) & LOW32
     x = x * ((seed >> _16) | _ODD) & LOW32
@@ -93,20 +93,22 @@ def start(setup: SobolSetup, pixel: int, sample: int) -> SobolSample:
 
 @kernel
 def hash_of(key: np.uint64, dimension: int) -> np.uint64:
-    """Of seed, pixel and dimension."""
+    """The hash of seed, pixel (in key) and dimension."""
     return mix(key + np.uint64(dimension + 1) * _STEP)
 
 
 @kernel
 def seeds_of(key: np.uint64, dimension: int) -> tuple[np.uint64, np.uint64, np.uint64]:
-    """For the order of a pixel's samples, which a group shares, and for the digits of x and y."""
+    """Seeds for the order of a pixel's samples, which a group shares, and for the digits of x and
+    of y."""
     h = hash_of(key, dimension)
     return hash_of(key, dimension - dimension % GROUP) & LOW32, h >> _32, mix(h) & LOW32
 
 
 @kernel
 def reordered(index: np.uint64, place: int) -> np.uint64:
-    """Which point of its sequence the pair at a place of its group takes with number `index`."""
+    """The index of the point that pair number `place` of its group takes for sample `index`: the
+    product with its matrix in `orders`."""
     if place == 0:
         return index
     total = np.uint64(0)
@@ -119,7 +121,7 @@ def reordered(index: np.uint64, place: int) -> np.uint64:
 def pair(
     seeds: tuple[np.uint64, np.uint64, np.uint64], place: int, reversed_index: np.uint64
 ) -> tuple[float, float]:
-    """Two numbers of 32 bits, in the middle of their cells: never 0, never 1."""
+    """Two multiples of 2^-32 plus 2^-33, the middles of cells: never 0, never 1."""
     order, x_seed, y_seed = seeds
     index = reordered(reverse_bits(scramble_low_to_high(reversed_index, order)), place)
     x = reverse_bits(scramble_low_to_high(index, x_seed))

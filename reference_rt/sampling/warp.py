@@ -1,4 +1,4 @@
-"""Maps from the unit square to shapes and directions, each with its density."""
+"""Warps: maps from the unit square to disks and directions, each with its density."""
 
 import math
 
@@ -6,7 +6,7 @@ from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 
 # Coefficients of sin(pi/2 r) / r and cos(pi/2 r) in r²: (-1)^k (pi/2)^(2k+1) / (2k+1)! and
-# (-1)^k (pi/2)^(2k) / (2k)!. For |r| <= 1/2 the first terms left out are below 5e-17.
+# (-1)^k (pi/2)^(2k) / (2k)!. For |r| <= 1/2 the first omitted terms are below 5e-17.
 _SIN = [(-1) ** k * (math.pi / 2) ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(8)]
 _COS = [(-1) ** k * (math.pi / 2) ** (2 * k) / math.factorial(2 * k) for k in range(9)]
 _S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7 = _SIN
@@ -19,15 +19,15 @@ _SQRT_HALF = math.sqrt(0.5)
 def on_circle(turns: float) -> tuple[float, float]:
     """(cos, sin) of 2 pi `turns`, for 0 <= turns < 1, each to within 4 u (measured: 2 u).
 
-    The quarter turns split off exactly, where cos(2 * pi * turns) rounds the angle first; and the
-    Cornell box renders in a tenth less time than with the library's two calls (measured).
+    Quarter turns are split off exactly, whereas cos(2 * pi * turns) would round the angle first;
+    and the Cornell box renders in a tenth less time than with the library's two calls (measured).
     """
     quarters = math.floor(4.0 * turns + 0.5)
     r = 4.0 * turns - quarters
     z = r * r
     z2 = z * z
     z4 = z2 * z2
-    # Estrin's scheme: a third of the waiting of Horner's.
+    # Estrin's scheme: a third of the latency of Horner's.
     s = (_S0 + _S1 * z) + (_S2 + _S3 * z) * z2 + ((_S4 + _S5 * z) + (_S6 + _S7 * z) * z2) * z4
     c = (_C0 + _C1 * z) + (_C2 + _C3 * z) * z2 + ((_C4 + _C5 * z) + (_C6 + _C7 * z) * z2) * z4
     sine, cosine = s * r, c + _C8 * (z4 * z4)
@@ -41,8 +41,8 @@ def on_circle(turns: float) -> tuple[float, float]:
 
 @kernel
 def concentric_disk(u0: float, u1: float) -> tuple[float, float]:
-    """A point of the unit disk, uniformly: squares around the middle become circles (Shirley & Chiu
-    1997, "A Low Distortion Map Between Disk and Square").  The middle, (1/2, 1/2), stays exactly.
+    """A uniform point on the unit disk: concentric squares become circles (Shirley & Chiu 1997, "A
+    Low Distortion Map Between Disk and Square").  (1/2, 1/2) maps to the centre exactly.
     """
     x, y = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
     a, b = abs(x), abs(y)
@@ -73,9 +73,8 @@ def uniform_sphere(u0: float, u1: float) -> Vec3:
 
 @kernel
 def about_normal(u: float) -> float:
-    """The x below which normally distributed numbers of variance 1/2 fall with probability u, for
-    1e-18 <= u < 1, to 2e-7 (Wichura 1988, "The Percentage Points of the Normal Distribution",
-    AS 241's PPND7)."""
+    """The u-quantile of the normal distribution with mean 0 and variance 1/2, for 1e-18 <= u < 1,
+    to 2e-7 (Wichura 1988, "The Percentage Points of the Normal Distribution", AS 241's PPND7)."""
     off = u - 0.5
     if abs(off) <= 0.425:
         r = 0.180625 - off * off

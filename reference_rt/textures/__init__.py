@@ -1,8 +1,13 @@
-"""All textures: one file each; here, their names.
+"""Textures, one module each, and the material parameters that may be textures (`parameter.py`).
 
-To add a texture: its file with description, table and `lookup` kernel; a code in `texture.py`; in
-`lookup.py` a field of `Textures` and a branch; below, `AnyTexture` and a line in `TABLES`; a
-translator function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
+A texture gives a linear sRGB colour, or through its luminance a number, for surface coordinates
+(u, v).  Its module has a `Texture` with `tabulate(folder)`, which returns one row of its table;
+the table, a NamedTuple; `greatest(table)`, the largest value in it, by which parameters check their
+range; and, where it depends on (u, v), `lookup(table, row, u, v)`, after the texture's uv map.
+
+To add a texture: its module; a code in `texture.py`; in `lookup.py` a field of `Textures` and a
+branch; below, `AnyTexture` and a line in `TABLES`; a translator function in
+`comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
 """
 
 from typing import Annotated, Any

@@ -1,4 +1,4 @@
-"""Bitmap: an image laid over the surface, its top row along v = 1."""
+"""Bitmap texture: an image over the unit square of (u, v), its top row along v = 1."""
 
 import math
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ _CLAMP, _MIRROR = 1, 2
 
 
 class Bitmap(Texture):
-    """An image: (0, 0) is its lower left corner, (1, 1) its upper right one."""
+    """An image; (u, v) = (0, 0) is its lower left corner, (1, 1) its upper right one."""
 
     type: Literal["bitmap"] = "bitmap"
     file: str
@@ -31,14 +31,14 @@ class Bitmap(Texture):
     wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
     """What lies beyond (0, 1)."""
     encoding: Literal["auto", "srgb", "raw"] = "auto"
-    """srgb: values are undone to linear ones; raw: taken as they are; auto: srgb for files of
-    integers, raw for those of floats."""
+    """srgb: values are decoded to linear ones; raw: used as they are; auto: srgb for files of
+    integers, raw for files of floats."""
     scale: Positive = 1.0
-    """What linear values are multiplied with: lamps and heights may need more than 1."""
+    """A factor for linear values: lamps and heights may need values above 1."""
 
     def tabulate(self, folder: Path, out: FloatArray | None = None) -> "Bitmaps":
-        """One row.  out: (n, 3), at whose beginning its texels are put, if there is room.  Raises
-        ValueError (what is wrong, what was expected)."""
+        """One row of the table.  out (n, 3): if it is large enough, texels are written to its
+        beginning.  Raises ValueError (what is wrong, what was expected)."""
         texels = read_image(folder / self.file, self.encoding, self.scale, out)
         height, width = texels.shape[:2]
         return Bitmaps(
@@ -52,8 +52,9 @@ class Bitmap(Texture):
 
 
 class Bitmaps(NamedTuple):
-    """n images: texels (all, 3) of all, linear sRGB, rows from the top; of each (n,): the first of
-    its texels, width, height, filter, wrap."""
+    """A table of n images.  texels: (m, 3) of all images, linear sRGB, rows from the top;  for each
+    image (n,): its first texel, width, height, filter (0 bilinear, 1 nearest), wrap (0 repeat,
+    1 clamp, 2 mirror)."""
 
     texels: FloatArray
     first: IntArray
@@ -64,7 +65,7 @@ class Bitmaps(NamedTuple):
 
 
 def room_for(textures: Iterable[Texture], folder: Path) -> FloatArray:
-    """(n, 3), for the texels of all bitmaps among these, one after the other.  Raises ValueError
+    """An uninitialised array (m, 3) for the texels of all bitmaps among these.  Raises ValueError
     where they would not fit into the machine's memory."""
     files = [texture.file for texture in textures if isinstance(texture, Bitmap)]
     pixels = sum(pixels_of(folder / file) for file in files)
@@ -73,10 +74,10 @@ def room_for(textures: Iterable[Texture], folder: Path) -> FloatArray:
 
 
 def join(parts: list[Bitmaps]) -> Bitmaps:
-    """One table from several: texels are counted on.
+    """One table from several; `first` is offset.
 
-    Their texels are not copied where they are already one after the other, in all of one array:
-    every image would be in memory twice.
+    Texels are not copied where they already lie one after another in one whole array, as from
+    `room_for`: otherwise every image would be in memory twice.
     """
     counts = [len(part.texels) for part in parts]
     starts = np.cumsum([0, *counts[:-1]])
@@ -95,12 +96,13 @@ def join(parts: list[Bitmaps]) -> Bitmaps:
 
 
 def greatest(bitmaps: Bitmaps) -> float:
+    """The largest value of any channel."""
     return float(bitmaps.texels.max())
 
 
 @kernel
 def _wrapped(i: int, n: int, wrap: int) -> int:
-    """The texel that stands at i of a row of n that goes on for ever."""
+    """The texel, 0 to n - 1, at position i of a row of n texels that is continued by `wrap`."""
     if wrap == _CLAMP:
         return min(max(i, 0), n - 1)
     if wrap == _MIRROR:
@@ -111,15 +113,15 @@ def _wrapped(i: int, n: int, wrap: int) -> int:
 
 @kernel
 def texel(bitmaps: Bitmaps, i: int, x: int, y: int) -> Vec3:
-    """Column x, row y (from the top) of image i, both beyond its edges too."""
+    """The texel at column x, row y (from the top) of image i; beyond its edges by its `wrap`."""
     width, height, wrap = bitmaps.width[i], bitmaps.height[i], bitmaps.wrap[i]
     k = _wrapped(y, height, wrap) * width + _wrapped(x, width, wrap)
     return row(bitmaps.texels, bitmaps.first[i] + k)
 
 
 class Patch(NamedTuple):
-    """The four texels whose middles are around a point, and how far it is from the left and from
-    the upper ones, from 0 to 1."""
+    """The four texels whose centres surround a point, and its position between them: x from left to
+    right, y from top to bottom, in [0, 1)."""
 
     upper_left: Vec3
     upper_right: Vec3
@@ -131,7 +133,8 @@ class Patch(NamedTuple):
 
 @kernel
 def _patch(bitmaps: Bitmaps, i: int, u: float, v: float) -> Patch:
-    """Texel (x, y) has its middle at u = (x + 1/2) / width, v = 1 - (y + 1/2) / height."""
+    """The patch at (u, v).  The centre of texel (x, y) is at u = (x + 1/2) / width,
+    v = 1 - (y + 1/2) / height."""
     x, y = u * bitmaps.width[i] - 0.5, (1.0 - v) * bitmaps.height[i] - 0.5
     column, line = math.floor(x), math.floor(y)
     return Patch(
@@ -159,8 +162,8 @@ def lookup(bitmaps: Bitmaps, i: int, u: float, v: float) -> Vec3:
 
 @kernel
 def gradient(bitmaps: Bitmaps, i: int, u: float, v: float) -> tuple[float, float]:
-    """The derivatives of the luminance at texture coordinates (u, v) by these: of the bilinear
-    patch there; (0, 0) for the filter `nearest`."""
+    """The partial derivatives of the luminance with respect to u and v at texture coordinates
+    (u, v), of the bilinear patch there; (0, 0) for the filter `nearest`."""
     if bitmaps.filter[i] == _NEAREST:
         return 0.0, 0.0
     patch = _patch(bitmaps, i, u, v)

@@ -1,4 +1,4 @@
-"""Checker: two colours in turn, four squares to each unit square of (u, v)."""
+"""Checker texture: two alternating colours, 2 x 2 squares in each unit square of (u, v)."""
 
 import math
 from pathlib import Path
@@ -33,6 +33,7 @@ class Checkers(NamedTuple):
 
 
 def greatest(checkers: Checkers) -> float:
+    """The largest value of any channel."""
     return float(max(checkers.first.max(), checkers.second.max()))
 
 

@@ -1,4 +1,4 @@
-"""Images from files, as linear sRGB."""
+"""Reading image files as linear sRGB texels."""
 
 from pathlib import Path
 from typing import Literal
@@ -9,7 +9,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.util.memory import check_memory
 
 MOST_BYTES_PER_PIXEL = 32
-"""That reading an image takes: 24 for its colours, and what the file's reader needs besides."""
+"""The most memory per pixel for reading an image: 24 bytes for its texels, 8 for the reader."""
 
 
 def read_image(
@@ -20,10 +20,10 @@ def read_image(
 ) -> FloatArray:
     """(height, width, 3) linear sRGB times `scale`, row 0 on top, finite and at least 0.
 
-    out: (n, 3), at whose beginning the colours are put, if there is room.  Raises ValueError (what
-    is wrong, what was expected).
+    out (n, 3): if it is large enough, the colours are written to its beginning.  Raises ValueError
+    (what is wrong, what was expected).
     """
-    from reference_rt.core.image_files import open_image  # Pillow takes a while
+    from reference_rt.core.image_files import open_image  # importing Pillow is slow
 
     try:
         image = open_image(path)
@@ -49,7 +49,7 @@ def read_image(
 
 
 def pixels_of(path: Path) -> int:
-    """How many pixels a file has by its header; 0 where it cannot be read."""
+    """The number of pixels according to a file's header; 0 where it cannot be read."""
     from reference_rt.core.image_files import open_image
 
     try:
@@ -60,7 +60,8 @@ def pixels_of(path: Path) -> int:
 
 
 def _check_values(values: FloatArray, first: int) -> None:
-    """Raise ValueError for colours (rows, width, 3), from row `first` on, that are no light."""
+    """Raises ValueError for colours (rows, width, 3), from row `first` on, that are negative or not
+    finite."""
     good = np.isfinite(values).all(axis=-1)
     if not good.all():
         y, x = np.argwhere(~good)[0]
@@ -75,7 +76,7 @@ def _check_values(values: FloatArray, first: int) -> None:
 
 
 def linear(encoded: FloatArray) -> FloatArray:
-    """Linear values of sRGB's transfer function (IEC 61966-2-1)."""
+    """Decodes sRGB's transfer function to linear values (IEC 61966-2-1)."""
     low = encoded / 12.92
     high = np.power((np.maximum(encoded, 0.04045) + 0.055) / 1.055, 2.4)
     return np.where(encoded <= 0.04045, low, high)

@@ -1,4 +1,4 @@
-"""Parameters of materials: a colour or a number, or the name of one of the scene's textures."""
+"""Material parameters: a colour or a number, or the name of one of the scene's textures."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
@@ -55,14 +55,14 @@ UnitParameter = Annotated[
     _or_name(_number(0.0, 1.0)),
     _schema({"type": "number", "minimum": 0, "maximum": 1}),
 ]
-"""A number from 0 to 1, or the name of a texture, whose luminance it is."""
+"""A number from 0 to 1, or the name of a texture, of which the luminance is used."""
 
 TextureName = Annotated[str, MayBeTexture()]
 """The name of a texture."""
 
 
 def texture_names(description: Description) -> dict[str, str]:
-    """The textures that a description names, by field."""
+    """The names of the textures that a description's fields refer to, by field."""
     found = {}
     for field, info in type(description).model_fields.items():
         value = getattr(description, field)
@@ -72,25 +72,25 @@ def texture_names(description: Description) -> dict[str, str]:
 
 
 class Colours(NamedTuple):
-    """A parameter of n materials: value (n, 3); texture (n,), -1 for none, None where none of them
-    has any."""
+    """A column of colours for n materials: value (n, 3);  texture (n,): index of the texture that
+    replaces the value, -1 for none; None where no material has a texture."""
 
     value: FloatArray
     texture: IntArray | None
 
 
 class Numbers(NamedTuple):
-    """The same of numbers: value (n,)."""
+    """A column of numbers, as `Colours`: value (n,)."""
 
     value: FloatArray
     texture: IntArray | None
 
 
 class Palette:
-    """The scene's textures by name: makes columns of parameters."""
+    """The scene's textures by name: turns parameters into rows of `Colours` and `Numbers`."""
 
     def __init__(self, numbers: Mapping[str, int], greatest: Sequence[float]) -> None:
-        """numbers: of the textures in their table;  greatest: the largest value of each."""
+        """numbers: each texture's index, by name;  greatest: the largest value of each texture."""
         self.numbers_of, self.greatest = numbers, greatest
 
     def colours(self, value: tuple[float, float, float] | str, most: float = 1.0) -> Colours:
@@ -106,7 +106,7 @@ class Palette:
         return Numbers(np.array([value], dtype=np.float64), np.array([-1]))
 
     def number(self, name: str, most: float) -> int:
-        """The row of the texture `name`."""
+        """The index of the texture `name`.  Raises ValueError if it has values above `most`."""
         k = self.numbers_of[name]
         if self.greatest[k] > most:
             raise ValueError(
@@ -120,9 +120,9 @@ NO_TEXTURES = Palette({}, ())
 
 
 def join(parts: Sequence[Any]) -> Any:
-    """One table from several of a class: the rows one after another, in nested tables too.
+    """Concatenates tables of one class, nested tables too.
 
-    Of parameters that name no texture the column of textures becomes None.
+    Where no parameter of a column has a texture, its `texture` becomes None.
     """
     first = parts[0]
     if not isinstance(first, tuple):
@@ -135,7 +135,7 @@ def join(parts: Sequence[Any]) -> Any:
 
 @kernel
 def colour_at(colours: Colours, i: int, at: At) -> Vec3:
-    """The colour of row i at a place of a surface."""
+    """The colour of row i at a point of a surface."""
     return _colour_at(colours.texture, colours.value, i, at)
 
 
@@ -150,7 +150,7 @@ def _colour_at(texture: IntArray | None, value: FloatArray, i: int, at: At) -> V
 
 @kernel
 def number_at(numbers: Numbers, i: int, at: At) -> float:
-    """The number of row i at a place of a surface: of a texture its luminance."""
+    """The number of row i at a point of a surface: for a texture its luminance."""
     return _number_at(numbers.texture, numbers.value, i, at)
 
 

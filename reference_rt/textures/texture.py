@@ -1,4 +1,4 @@
-"""What all textures share: the codes of their tables, where they are asked, and the uv map."""
+"""What all textures share: the base description, the codes of their tables, and the uv map."""
 
 import math
 from typing import Annotated, Any
@@ -30,22 +30,22 @@ Pair = Annotated[
     Field(strict=False),
     WithJsonSchema({"anyOf": [{"type": "number"}, _NUMBERS]}),
 ]
-"""Two numbers; one stands for both."""
+"""Two numbers, or one for both."""
 
 
 class UvMap(Description):
-    """Surface coordinates to texture coordinates: scaled, then turned, then moved."""
+    """From surface coordinates to texture coordinates: scaled, then rotated, then translated."""
 
     scale: Pair = (1.0, 1.0)
     rotate: float = 0.0
-    """Degrees, counterclockwise in (u, v)."""
+    """Angle in degrees, counterclockwise in (u, v)."""
     offset: Pair = (0.0, 0.0)
 
     def matrix(self) -> FloatArray:
         """(6,): u' = m0 u + m1 v + m2, v' = m3 u + m4 v + m5."""
         degrees = self.rotate % 360.0
         turn = math.radians(degrees)
-        # Whole quarter turns exactly.
+        # Quarter turns are exact.
         c, s = (
             (round(math.cos(turn)), round(math.sin(turn)))
             if degrees % 90.0 == 0.0
@@ -59,11 +59,10 @@ class Texture(Description):
     """A colour, or through its luminance a number, for every point of a surface."""
 
     uv: UvMap = UvMap()
-    """From the surface's coordinates to the texture's."""
+    """The map from the surface's coordinates to the texture's."""
 
     def tabulate(self, folder: Any) -> Any:
-        """This texture as one row of its table.  Raises ValueError (what is wrong, what was
-        expected)."""
+        """One row of the texture's table.  Raises ValueError (what is wrong, what was expected)."""
         raise NotImplementedError
 
 
@@ -72,8 +71,8 @@ _FAR = 2.0**40
 
 @kernel
 def _near(x: float) -> float:
-    """x; 0 for NaN, and for what is so far away that no integer could count texels up to there and
-    its last bits would say little of the place among them."""
+    """x; 0 for NaN and for |x| >= _FAR, where texel indices could overflow and x has few fractional
+    bits left."""
     if not abs(x) < _FAR:
         return 0.0
     return x
@@ -81,7 +80,7 @@ def _near(x: float) -> float:
 
 @kernel
 def map_uv(uv: FloatArray, k: int, u: float, v: float) -> tuple[float, float]:
-    """(u, v) under row k of the maps (n, 6); 0 for coordinates beyond 2^40."""
+    """(u, v) mapped by row k of the maps uv (n, 6); 0 for coordinates beyond 2^40."""
     return (
         _near(uv[k, 0] * u + uv[k, 1] * v + uv[k, 2]),
         _near(uv[k, 3] * u + uv[k, 4] * v + uv[k, 5]),

@@ -1,4 +1,4 @@
-"""Vertex colours: those that a mesh brings for its corners, interpolated."""
+"""Vertex colour texture: the colours of a mesh's vertices, interpolated."""
 
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -11,13 +11,13 @@ from reference_rt.textures.texture import Texture
 
 
 class VertexColours(Texture):
-    """The colours of a mesh's vertices; its `uv` map has no meaning."""
+    """The colours of a mesh's vertices; the `uv` map is ignored."""
 
     type: Literal["vertex_colours"] = "vertex_colours"
     without: Colour = (0.5, 0.5, 0.5)
-    """The colour of what has no vertex colours."""
+    """The colour of shapes without vertex colours."""
     scale: Positive = 1.0
-    """What vertex colours are multiplied with."""
+    """A factor for vertex colours."""
 
     def tabulate(self, folder: Path) -> "VertexColourTable":
         return VertexColourTable(np.array([self.without]), np.array([self.scale]))
@@ -31,5 +31,5 @@ class VertexColourTable(NamedTuple):
 
 
 def greatest(table: VertexColourTable) -> float:
-    """Colours of meshes are at most 1: their readers see to it."""
+    """The largest value of any channel; the readers of meshes ensure that colours are at most 1."""
     return float(max(table.without.max(), table.scale.max()))

@@ -1,2 +1,11 @@
-"""What knows no rendering: errors and exit codes, files, memory, signals, child processes, the
-terminal."""
+"""Utilities that know nothing of rendering, one module each; they import only each other.
+
+- `errors.py`: exceptions that a user can cause, with exit codes; `printable` for names in messages
+- `files.py`: reading regular files within limits, and writing files atomically
+- `memory.py`: the machine's memory, in bytes; refuses what cannot fit
+- `signals.py`: SIGINT, SIGTERM and SIGHUP as exceptions
+- `child_processes.py`: children that end with their parent
+- `console.py`: progress bars, on standard error
+
+A message of an error is one line: what was found, then "; expected ..." what would be right.
+"""

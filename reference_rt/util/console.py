@@ -1,4 +1,4 @@
-"""Progress for people: a bar on a terminal, a line per step without one; standard error only."""
+"""Progress display: a bar on a terminal, else one line per step; on standard error only."""
 
 import time
 from types import TracebackType
@@ -26,9 +26,9 @@ _PATIENCE = 0.4
 
 
 class Bar:
-    """A bar on a terminal, nothing without one: what every display of progress begins with.
+    """A progress bar on a terminal, nothing elsewhere: the base of all progress displays.
 
-    columns: what stands behind the bar.
+    columns: shown to the right of the bar.
     """
 
     def __init__(self, *columns: ProgressColumn, console: Console | None = None) -> None:
@@ -56,12 +56,12 @@ class Bar:
             self._bar.stop()
 
     def line(self, text: str) -> None:
-        """One line that stays."""
+        """Prints a line that remains when the bar disappears."""
         self._console.print(printable(text), markup=False, soft_wrap=True)
 
 
 class ProgressLine(Bar):
-    """A `render.Progress`: call it with what is being done and the fraction that is done."""
+    """A `render.Progress` callback: called with the name of a step and the fraction of it done."""
 
     def __init__(self) -> None:
         percentage = TextColumn("{task.percentage:>3.0f}%")
@@ -72,7 +72,7 @@ class ProgressLine(Bar):
     def __call__(self, what: str, fraction: float) -> None:
         words = _WORDS.get(what, what)
         if what not in self._tasks:
-            # A bar without a total pulses: nobody knows how far a compiler is.
+            # A bar without a total pulses: the compiler does not report how far it is.
             total = None if what == "compile" else 1.0
             self._tasks[what] = self._bar.add_task(words, total=total)
             self._started[what] = time.perf_counter()

@@ -1,14 +1,14 @@
-"""The errors that a person can cause, each with the exit code that the command line gives it."""
+"""The errors that a user can cause, each with its exit code on the command line."""
 
 from collections.abc import Sequence
 
 
 def printable(text: str, kept: str = "") -> str:
-    """The text with Python's escapes in place of characters that do not print, such as newlines,
-    terminal codes and lone surrogates (the bytes of a file name that is not UTF-8); but of `kept`.
+    """The text with characters that do not print (newlines, terminal codes, lone surrogates from
+    file names that are not UTF-8) replaced by Python's escapes; those in `kept` stay.
 
-    Names of files, scenes and materials may hold any.  What shows such a name passes it through
-    here: a terminal would obey it, XML cannot hold it, UTF-8 cannot encode it.
+    Names of files, scenes and materials may contain any characters.  All code that displays or
+    writes them calls this: terminals execute such characters, XML and UTF-8 cannot represent them.
     """
     if text.isprintable():
         return text
@@ -16,11 +16,11 @@ def printable(text: str, kept: str = "") -> str:
 
 
 _MOST_KEYS = 16
-"""Of a way through a scene that a message spells out."""
+"""The most keys of a path into a scene that a message shows; the middle ones are left out."""
 
 
 class ReferenceRtError(Exception):
-    """An error with one clear line for people; `exit_code` is what `reference-rt` returns."""
+    """An error whose message is one line for users; `exit_code` is what `reference-rt` returns."""
 
     exit_code = 5
 
@@ -29,16 +29,16 @@ class ReferenceRtError(Exception):
 
 
 class UsageError(ReferenceRtError):
-    """A command was asked for something that it does not do."""
+    """The command line asks for something that the command does not do."""
 
     exit_code = 2
 
 
 class SceneError(ReferenceRtError):
-    """A scene, or a file that it names, is not what it must be.
+    """A scene, or a file that it names, is invalid.
 
-    `path` is the way through the scene's keys to the culprit, e.g. ``("shapes", 2, "radius")``;
-    `file` and `line` (1-based) are added where the scene was read from a file.
+    `path` are the keys that lead to the error in the scene, e.g. ``("shapes", 2, "radius")``;
+    `file` and `line` (1-based) are set if the scene was read from a file.
     """
 
     exit_code = 3
@@ -65,8 +65,8 @@ class SceneError(ReferenceRtError):
 class SceneWarning(UserWarning):
     """A scene is valid, but probably not what its author meant.
 
-    The text has the form of a `SceneError`: file, line, keys, what was found and what was expected.
-    Python code sees it through the `warnings` module; the command line prints it.
+    The message has the form of a `SceneError`: file, line, keys, what was found, what was expected.
+    Issued through the `warnings` module; the command line prints it.
     """
 
     def __init__(self, message: str = "") -> None:

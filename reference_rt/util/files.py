@@ -1,4 +1,4 @@
-"""Reading files that are files, and writing them whole or not at all."""
+"""Reading regular files within limits, and writing files atomically: whole or not at all."""
 
 import errno
 import os
@@ -12,11 +12,11 @@ from typing import BinaryIO
 from reference_rt.util.errors import ImageError
 
 MOST_BYTES = 1 << 32
-"""Of a file that is read whole: no mesh that fits into a machine's memory has more."""
+"""The most bytes of a file that is read as a whole: no mesh that fits into memory has more."""
 
 MOST_TEXT = 1 << 28
-"""Bytes of a scene, a suite or a record: two million spheres in YAML.  Each byte of such a scene
-takes about eight bytes of memory once it is read: 2 GiB."""
+"""The most bytes of a scene, a suite or a stored result: two million spheres in YAML.  Once read,
+such a scene takes about eight times as much memory: 2 GiB."""
 
 _KINDS = (
     (stat.S_ISFIFO, "is a pipe"),
@@ -27,9 +27,9 @@ _KINDS = (
 
 
 def open_input(path: Path) -> BinaryIO:
-    """Open a regular file for reading.  Raises OSError, its `strerror` saying what is wrong.
+    """Opens a regular file for reading.  Raises OSError, whose `strerror` says what is wrong.
 
-    Reading anything else could wait or go on for ever: a pipe that nobody writes to, /dev/zero.
+    Reading anything else could block or never end: a pipe without a writer, /dev/zero.
     """
     flags = os.O_RDONLY
     for name in ("O_BINARY", "O_CLOEXEC", "O_NOCTTY", "O_NONBLOCK"):  # not every system has all
@@ -52,11 +52,11 @@ def open_input(path: Path) -> BinaryIO:
 
 
 def read_input(path: Path, most: int = MOST_BYTES) -> bytes:
-    """All bytes of a regular file.  Raises OSError, also for one of more than `most` bytes."""
+    """All bytes of a regular file.  Raises OSError, also for more than `most` bytes."""
     with open_input(path) as file:
         size = os.fstat(file.fileno()).st_size
         content = file.read(size + 1) if size <= most else b""
-        # A file that somebody writes to grows, and those below /proc have the size 0.
+        # A file may grow while it is read, and files below /proc report size 0.
         while size <= most and (more := file.read(1 << 20)):
             content += more
             size = len(content)
@@ -66,16 +66,18 @@ def read_input(path: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """The text of a regular file.  Raises OSError, UnicodeDecodeError where it is not UTF-8."""
+    """The text of a regular file.  Raises OSError; UnicodeDecodeError where it is not UTF-8."""
     return read_input(path, MOST_TEXT).decode("utf-8")
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` to write to; it becomes `path` when the block ends well.
+    """Yields a temporary file name beside `path`; the file is renamed to `path` if the block ends
+    without an exception.
 
-    A reader sees the old file or the whole new one; an error, Ctrl-C or a full disk leaves the old
-    one and no rubbish.  Makes parent folders.  Raises ImageError where the file cannot be written.
+    A reader sees the old file or the whole new one.  After an error, Ctrl-C or with a full disk the
+    old file is unchanged and the temporary one is removed.  Creates parent folders.  Raises
+    ImageError where the file cannot be written.
     """
     # The same folder, since a rename is atomic within one file system only; the same suffix, since
     # writers choose the format by it.
@@ -96,10 +98,10 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def check_writable(*paths: Path) -> None:
-    """Raise ImageError where one of these files could not be written.
+    """Raises ImageError if one of these files could not be written.
 
-    Every command calls this for all files that it will write, before its work begins: nobody should
-    wait for results that cannot be stored.  Leaves nothing behind, no folder either.
+    Every command calls this for all its output files before it starts to work, so that no long run
+    ends with results that cannot be stored.  Leaves no files or folders behind.
     """
     for path in paths:
         _check_writable(path)

@@ -1,4 +1,4 @@
-"""How much memory the machine has, so that what cannot fit is refused before it is read."""
+"""The machine's memory: data that cannot fit are refused before they are read."""
 
 import os
 from contextlib import suppress
@@ -6,12 +6,12 @@ from pathlib import Path
 
 
 def machine_memory() -> int | None:
-    """Bytes of memory that this process may have in all: the machine's, or what its container or
-    its shell (`ulimit -v`) leaves of it; None where the system does not say."""
+    """The memory limit of this process in bytes: the smallest of the machine's memory, its
+    container's and its shell's limit (`ulimit -v`); None where the system reports none."""
     found = []
     with suppress(AttributeError, ValueError, OSError):  # Windows has no sysconf
         found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    with suppress(OSError, ValueError):  # of Linux: control groups, where "max" is no number
+    with suppress(OSError, ValueError):  # Linux control groups; "max" (no limit) is no number
         found.append(int(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii")))
     with suppress(ImportError, OSError, ValueError):
         import resource
@@ -23,7 +23,7 @@ def machine_memory() -> int | None:
 
 
 def check_memory(needed: int, what: str) -> None:
-    """Raise ValueError where `needed` bytes, for `what`, are more than the machine has."""
+    """Raises ValueError if `needed` bytes, for `what`, exceed the memory limit."""
     there = machine_memory()
     if there is not None and needed > there:
         raise ValueError(

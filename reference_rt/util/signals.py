@@ -1,4 +1,4 @@
-"""Signals that end the program: as exceptions, so that nothing is left behind."""
+"""Signals that end the program are raised as exceptions, so that cleanup code runs."""
 
 import os
 import signal
@@ -8,17 +8,16 @@ from typing import Any
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGINT, SIGTERM or SIGHUP, so that child processes are ended and no file is left half
+    """Raised on SIGINT, SIGTERM or SIGHUP: child processes are ended, and no file is left half
     written.  Its argument is the signal's number."""
 
 
 _AGAIN = 2.0
-"""Seconds after which a signal is sent again that has not ended the command."""
+"""Seconds after which the signal is sent again if the command has not ended."""
 
 
 def _terminate(number: int, frame: Any) -> None:
-    # An exception is lost where the signal arrives in a callback: of LLVM, which compiles, or of a
-    # fork.
+    # Python drops the exception if the signal arrives in a callback, of LLVM or of a fork.
     again = threading.Timer(_AGAIN, os.kill, (os.getpid(), number))
     again.daemon = True
     again.start()
@@ -26,7 +25,7 @@ def _terminate(number: int, frame: Any) -> None:
 
 
 def exit_code_of(error: KeyboardInterrupt) -> int:
-    """The exit code of an interruption that has been caught; it is not sent again."""
+    """The exit code for a caught interruption; from now on the signal is ignored."""
     if not isinstance(error, Terminated):
         return 130
     number = int(error.args[0])
@@ -35,14 +34,14 @@ def exit_code_of(error: KeyboardInterrupt) -> int:
 
 
 def catch_signals() -> None:
-    """Let the program end by an exception, `Terminated`, on SIGINT, SIGTERM and SIGHUP."""
+    """Makes SIGINT, SIGTERM and SIGHUP raise `Terminated` in the main thread."""
     lost = sys.unraisablehook
 
-    def tell(unraisable: Any) -> None:
+    def report(unraisable: Any) -> None:
         if not isinstance(unraisable.exc_value, Terminated):  # which comes again
             lost(unraisable)
 
-    sys.unraisablehook = tell
+    sys.unraisablehook = report
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)  # Windows has no SIGHUP
         if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):

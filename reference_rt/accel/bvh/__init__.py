@@ -1,7 +1,14 @@
-"""Bounding volume hierarchies over any mix of primitives, from their boxes alone.
+"""Bounding volume hierarchies (BVHs) over any mix of primitives: how they are built and stored.
 
-`build` makes one by any of four methods, each in its file; `statistics` says how good it is.  What
-follows a ray through it is `reference_rt.accel.geometry`, which takes it `widened`.
+Builders see only the primitives' bounding boxes (spatial splits also triangles' vertices).  `build`
+makes a binary BVH, `Nodes` in world space, by one of four methods: `sah.py` with `bins.py` and
+`spatial.py`, `median.py`, or a single leaf.  `widened` (`widening.py`) makes it a BVH of eight
+children a node, `Wide`; `joined` (`wide.py`) puts several into one `Bvh`, the arrays that
+traversals read.  `statistics` measures a BVH.
+
+To add a method: a module with build(boxes (n, 6)) -> (Nodes, references), deterministic, no deeper
+than STACK_SIZE allows, leaves of at most LEAF_SIZE; a name in `Method` and a branch in `build`; the
+method's name in the scene's `hierarchy` and in METHODS of the tests.
 """
 
 from typing import Literal
@@ -67,20 +74,20 @@ def build(
     method: Method = "sah",
     corners: FloatArray | None = None,
 ) -> tuple[Nodes, IntArray]:
-    """A hierarchy over n >= 1 primitives with finite bounds (n, 3), (n, 3).
+    """A binary BVH over n >= 1 primitives with finite bounds lower (n, 3), upper (n, 3).
 
-    Returns the nodes and the references (m,): numbers of primitives, leaf after leaf.
+    Returns the nodes and the references (m,): indices of primitives, leaf after leaf.
 
     - "sah": binned surface area heuristic.  Each primitive is in one leaf.
-    - "median": halved at the median of the sorted centres, along the axis on which they are
-      furthest apart.
-    - "spatial": surface area heuristic that may also cut primitives at a plane, if one is then in
-      several leaves, with a box around its part: n <= m <= 2 n.  `corners` (n, 9) holds triangles'
-      vertices, which are cut exactly, and rows of NaN for what is no triangle: its box is cut.
+    - "median": halved at the median of the sorted centres, along the axis of their largest extent.
+    - "spatial": surface area heuristic with spatial splits: a primitive may be cut at a plane and
+      is then in several leaves, with a box around each part; n <= m <= 2 n.  `corners` (n, 9) holds
+      triangles' vertices, for exact cuts, and rows of NaN for other primitives, whose boxes are
+      cut.
     - "none": one leaf with everything.
     """
     primitives = np.concatenate([lower, upper], axis=1)
-    # Sizes near the largest float: areas and extents that overflow make a worse tree, no wrong one.
+    # With sizes near the largest float, areas and extents overflow: a worse tree, not a wrong one.
     with np.errstate(over="ignore", invalid="ignore"):
         if method == "none":
             box = np.concatenate([lower.min(axis=0), upper.max(axis=0)])

@@ -1,4 +1,5 @@
-"""Median splits: the longest axis of the centres, halved at the median of the sorted centres."""
+"""Median splits: nodes are halved at the median of the sorted centres, along the centres' longest
+axis."""
 
 import numpy as np
 
@@ -16,9 +17,9 @@ def _split_all(
     jobs: IntArray,
     nodes: Nodes,
 ) -> int:
-    """Fill `first` and `size`; returns how many nodes.  Row a of `ordered` (3, n) holds the
-    primitives by their centres along axis a, and stays sorted within each node: its ends give the
-    extent of the node's centres, its middle is their median, and nothing is sorted anew."""
+    """Fills `first` and `size` of the nodes; returns their number.  Row a of `ordered` (3, n) holds
+    the primitives sorted by their centres along axis a, and stays sorted within each node: its ends
+    give the extent of the node's centres, its middle is their median, nothing is sorted again."""
     count, top = 1, push(jobs, 0, 0, 0, len(centers))
     while top > 0:
         top -= 1
@@ -54,8 +55,8 @@ def _split_all(
 
 
 def build(primitives: FloatArray) -> tuple[Nodes, IntArray]:
-    """Nodes and references of primitives with boxes (n, 6), in O(n log n) for any input.  Where
-    centres are equal, the primitive that came first counts as smaller."""
+    """Nodes and references for primitives with boxes (n, 6), in O(n log n) for any input.  Of equal
+    centres that of the primitive with the lower index counts as smaller."""
     n = len(primitives)
     centers = 0.5 * primitives[:, :3] + 0.5 * primitives[:, 3:]
     ordered = np.ascontiguousarray(np.argsort(centers, axis=0, kind="stable").T)

@@ -1,4 +1,4 @@
-"""What every builder makes, how deep it may go, and the boxes that all of them work on.
+"""Binary BVH nodes, the limits that all builders keep, and operations on boxes.
 
 A box is six numbers, lower corner and upper corner; an empty one is +inf and -inf.
 """
@@ -12,24 +12,27 @@ from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.jit.kernel import entry_kernel, kernel
 
 LEAF_SIZE = 4
-"""Most references of a leaf, but for "none": more are always split, fewer where it pays."""
+"""The most references of a leaf, except for the method "none": more are always split, fewer where
+that is cheaper."""
 SAH_DEPTH = 40
-"""Nodes this deep and deeper are halved by count."""
+"""From this depth on, nodes are halved by count instead of by SAH."""
 STACK_SIZE = 72
-"""No input makes a deeper tree.  A node at SAH_DEPTH holds at most 2^32 references, whose scratch
-would fill 224 GiB, and 30 halvings leave LEAF_SIZE of these: no leaf is below depth 70, the root's
-being 0; the median's trees are halved from the root on.  A traversal keeps at most one sibling for
-each level above the node it is at, 70; a builder as many jobs and one for the node itself, 71."""
+"""Entries of every stack over a binary BVH; no input needs more.  A node at SAH_DEPTH has at most
+2^32 references, whose scratch would fill 224 GiB, and 30 halvings leave LEAF_SIZE of these: no leaf
+is below depth 70, the root being at 0; median trees are halved from the root on.  A traversal needs
+at most one sibling for each level above its node, 70; a builder one more, for the node, 71."""
 
 FAR_SLACK = 1.0 + 2.0 * (3.0 * UNIT_ROUNDOFF) / (1.0 - 3.0 * UNIT_ROUNDOFF)
-"""(plane - o) * (1/d) rounds three times: a far distance stretched by twice gamma_3 cannot make a
-ray miss a box that it meets (Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2))."""
+"""A factor for far distances.  (plane - o) * (1/d) rounds three times: a far distance stretched by
+twice gamma_3 cannot make a ray miss a box that it meets (Ize 2013, "Robust BVH Ray Traversal",
+JCGT 2(2))."""
 
 
 class Nodes(NamedTuple):
-    """boxes (n, 6): lower and upper corners;  first (n,): left child, its sibling follows, or the
-    leaf's first reference;  size (n,): references of a leaf, 0 for an inner node.  Node 0 is the
-    root, and children come after their parents."""
+    """A binary BVH in world space.  boxes (n, 6): lower and upper corners;  first (n,): an inner
+    node's left child (the right one follows it), a leaf's first reference;  size (n,): a leaf's
+    number of references, 0 for an inner node.  Node 0 is the root; children follow their
+    parents."""
 
     boxes: FloatArray
     first: IntArray
@@ -52,7 +55,7 @@ def is_empty(box: FloatArray) -> bool:
 
 @kernel
 def assign(into: FloatArray, box: FloatArray) -> None:
-    """Copy `box`."""
+    """Copies `box` into `into`."""
     for k in range(6):
         into[k] = box[k]
 
@@ -91,14 +94,14 @@ def center(box: FloatArray, axis: int) -> float:
 
 @kernel
 def push(jobs: IntArray, top: int, a: int, b: int, c: int) -> int:
-    """Put three numbers on a builder's stack of nodes to make; the new top."""
+    """Pushes three numbers on a builder's stack of nodes still to be made; the new top."""
     jobs[top, 0], jobs[top, 1], jobs[top, 2] = a, b, c
     return top + 1
 
 
 @kernel
 def swap(refs: FloatArray, ids: IntArray, i: int, j: int) -> None:
-    """Exchange references i and j: boxes (m, 6) and primitives' numbers (m,)."""
+    """Exchanges references i and j: boxes (m, 6) and primitives' indices (m,)."""
     for k in range(6):
         refs[i, k], refs[j, k] = refs[j, k], refs[i, k]
     ids[i], ids[j] = ids[j], ids[i]

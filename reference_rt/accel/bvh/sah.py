@@ -1,5 +1,5 @@
-"""The surface area heuristic: top down, always the cheapest of many planes (Wald 2007, "On fast
-construction of SAH-based bounding volume hierarchies", RT'07), with spatial splits or without."""
+"""The SAH builder: top down, each node split at the cheapest of many planes (Wald 2007, "On fast
+construction of SAH-based bounding volume hierarchies", RT'07), with or without spatial splits."""
 
 import numpy as np
 
@@ -31,14 +31,14 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
 
 INNER_COST = 2.0
-"""What an inner node costs, in tests of primitives: it tests two boxes, each in about the time of
-one.  Measured: rays at a bunny and at random triangles are no faster with 1, which makes half as
-many nodes again, or twice as many."""
+"""The cost of an inner node in units of a primitive test: two box tests, each about as expensive as
+one.  Measured: with 1, which makes 1.5 to 2 times as many nodes, rays at a bunny and at random
+triangles are no faster."""
 
 
 @kernel
 def _bound(refs: FloatArray, begin: int, end: int, box: FloatArray, centers: FloatArray) -> None:
-    """The box of references, and that of their centres."""
+    """Computes the bounds of references, and those of their centres."""
     clear(box)
     clear(centers)
     for k in range(begin, end):
@@ -54,7 +54,7 @@ def _bound(refs: FloatArray, begin: int, end: int, box: FloatArray, centers: Flo
 def _partition(
     refs: FloatArray, ids: IntArray, begin: int, end: int, centers: FloatArray, split: Split
 ) -> int:
-    """Put the right child's references first; the index of the first of the left child's."""
+    """Reorders references, the right child's first; the index of the left child's first one."""
     a = split.axis
     low, scale = centers[a], bins_per_unit(centers[a], centers[3 + a])
     i, j = begin, end - 1
@@ -82,11 +82,11 @@ def _split_all(
     nodes: Nodes,
     references: IntArray,
 ) -> tuple[int, int]:
-    """Fill nodes and references; returns how many of each.
+    """Fills nodes and references; returns how many of each.
 
-    refs (m, 6), ids (m,): boxes and numbers of n references, with room for more.  They are a stack:
-    the node in hand has the last ones, its left child's come to lie last and are done first, and a
-    leaf takes its own away.
+    refs (m, 6), ids (m,): boxes and primitives of n references, with room for more.  They are a
+    stack: the current node has the last ones; its left child's are moved to the end and processed
+    first, and a leaf pops its own.
     """
     side, centers = local_floats(6), local_floats(6)
     end, budget = n, len(ids) - n
@@ -105,12 +105,12 @@ def _split_all(
                 if budget > 0 and spatial.is_worth_a_try(
                     refs, begin, end, centers, split, root, parts
                 ):
-                    # Its share of the room that is left, rounded up.
+                    # The node's share of the room that is left, rounded up.
                     spare = (budget * size + end - 1) // end
                     plane = spatial.best_cut(corners, refs, ids, begin, end, spare, box, bins, side)
         area = half_area(box)
         if size <= LEAF_SIZE:
-            # Not the reverse: areas that overflow compare as false.
+            # Not `>=`: with areas that overflow (NaN) the comparison is false, and a leaf is made.
             if not min(split.cost, plane.cost) + INNER_COST * area < size * area:
                 nodes.first[node], nodes.size[node] = used, size
                 for k in range(begin, end):
@@ -136,9 +136,9 @@ def _split_all(
 
 
 def build(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes, IntArray]:
-    """Nodes and references of primitives with boxes (n, 6); with corners (n, 9), see
-    `reference_rt.accel.bvh.build`, they may be cut, into spatial.MOST_REFERENCES n references at
-    most."""
+    """Nodes and references for primitives with boxes (n, 6).  With corners (n, 9), see
+    `reference_rt.accel.bvh.build`, spatial splits may cut them, into at most
+    spatial.MOST_REFERENCES n references."""
     n = len(primitives)
     m = n if corners is None else spatial.MOST_REFERENCES * n
     refs, ids = np.empty((m, 6)), np.arange(m)

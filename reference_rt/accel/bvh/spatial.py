@@ -1,5 +1,5 @@
-"""Spatial splits: cutting primitives at a plane where no sorting can part their boxes (Stich,
-Friedrich & Dietrich 2009, "Spatial splits in bounding volume hierarchies", HPG)."""
+"""Spatial splits: primitives are cut at a plane where sorting them leaves children that overlap
+(Stich, Friedrich & Dietrich 2009, "Spatial splits in bounding volume hierarchies", HPG)."""
 
 from typing import NamedTuple
 
@@ -30,14 +30,14 @@ from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.jit.kernel import kernel
 
 MOST_REFERENCES = 2
-"""References at most, as a multiple of the primitives."""
+"""The most references, as a multiple of the number of primitives."""
 CUT_FROM = 16
-"""Nodes with fewer references are not cut: it gains least there, and would use up the room that
-others need (measured on 200 long strips across a plane: a cost of 41 with this limit, of 64 with 2,
-of 62 without cuts)."""
+"""Nodes with fewer references are not cut: cuts gain least there, and would use up the room for
+references that others need (measured on 200 long strips across a plane: SAH cost 41 with this
+limit, 64 with 2, 62 without cuts)."""
 OVERLAP = 1e-5
-"""Nor are nodes whose children would share less than this part of the root's area: the paper's
-alpha."""
+"""Nodes whose children overlap in less than this fraction of the root's area are not cut either:
+the paper's alpha."""
 
 CUT_ERROR = 16.0 * UNIT_ROUNDOFF
 """A bound on the rounding of p + t (q - p), t = (plane - a) / (b - a) in [0, 1], relative to
@@ -48,7 +48,8 @@ SMALLEST_NORMAL = 2.0**-1022
 
 
 class Parts(NamedTuple):
-    """Scratch: the boxes of one reference's parts and of the whole; those of two nodes to be."""
+    """Scratch boxes: of one reference's two parts and of the whole reference; of the two children
+    so far."""
 
     left: FloatArray
     right: FloatArray
@@ -64,13 +65,13 @@ def new_parts() -> Parts:
 
 @kernel
 def _plane_after(low: float, high: float, b: int) -> float:
-    """Where bin b ends."""
+    """The plane at the end of bin b."""
     return low + (b + 1) * ((high - low) / BINS)
 
 
 @kernel
 def _limit(box: FloatArray, by: FloatArray) -> None:
-    """Leave of `box` what is in `by`, the empty box where nothing is."""
+    """Intersects `box` with `by`; the empty box where they do not meet."""
     for k in range(3):
         box[k] = max(box[k], by[k])
         box[3 + k] = min(box[3 + k], by[3 + k])
@@ -78,7 +79,7 @@ def _limit(box: FloatArray, by: FloatArray) -> None:
         clear(box)
 
 
-# ---- which plane: an estimate, whose rounding decides nothing but speed -------------------------
+# ---- choice of the plane: an estimate, whose rounding affects only speed ------------------------
 
 
 @kernel
@@ -91,7 +92,8 @@ def is_worth_a_try(
     root: FloatArray,
     parts: Parts,
 ) -> bool:
-    """Whether a node has references enough, and the children of its best object split overlap."""
+    """Whether a node has at least CUT_FROM references, and the children of its best object split
+    overlap."""
     if end - begin < CUT_FROM:
         return False
     if split.axis < 0:
@@ -113,7 +115,7 @@ def is_worth_a_try(
 def _mark(
     box: FloatArray, ref: FloatArray, corners: FloatArray, i: int, p: int, q: int, t: float
 ) -> None:
-    """Grow `box` by the point at t from corner p to corner q, moved into the reference's box."""
+    """Grows `box` by the point at t from corner p to corner q, clamped to the reference's box."""
     for k in range(3):
         x = corners[i, p + k] + t * (corners[i, q + k] - corners[i, p + k])
         x = max(ref[k], min(ref[3 + k], x))
@@ -125,8 +127,8 @@ def _mark(
 def _fill_bins(
     corners: FloatArray, i: int, ref: FloatArray, axis: int, low: float, high: float, bins: Bins
 ) -> None:
-    """Add a reference to the bins that it meets: slices of its box, or of a triangle the corners
-    and where its edges cross planes between bins and leave the box."""
+    """Adds a reference to the bins that it overlaps: slices of its box, or for a triangle its
+    corners and the points where its edges cross the planes between bins and leave the box."""
     boxes, scale = bins.boxes[axis], bins_per_unit(low, high)
     first, last = bin_of(ref[axis], low, scale), bin_of(ref[3 + axis], low, scale)
     bins.enter[axis, first] += 1
@@ -171,8 +173,8 @@ def best_cut(
     bins: Bins,
     side: FloatArray,
 ) -> Split:
-    """The cheapest plane between bins of the node's box that makes at most `spare` references
-    more."""
+    """The cheapest plane between bins of the node's box that makes at most `spare` more
+    references."""
     best = no_split()
     for axis in range(3):
         low, high = box[axis], box[3 + axis]
@@ -186,15 +188,15 @@ def best_cut(
     return best
 
 
-# ---- the cut itself: nothing may be lost --------------------------------------------------------
+# ---- the cut itself: its boxes must be conservative ---------------------------------------------
 
 
 @kernel
 def _grow_to_crossing(
     box: FloatArray, corners: FloatArray, i: int, p: int, q: int, t: float
 ) -> None:
-    """Grow `box` by the point at t from corner p to corner q, wherever rounding may have put it;
-    by the whole edge where differences overflow."""
+    """Grows `box` by the point at t from corner p to corner q and its rounding error; by the whole
+    edge where differences overflow."""
     for k in range(3):
         a, b = corners[i, p + k], corners[i, q + k]
         low, high = min(a, b), max(a, b)
@@ -208,9 +210,9 @@ def _grow_to_crossing(
 def cut(
     corners: FloatArray, i: int, box: FloatArray, axis: int, plane: float, parts: Parts
 ) -> None:
-    """parts.left and parts.right: boxes, perhaps empty, of what of primitive i lies in `box` on
-    either side of a plane.  The hull of a triangle's part is that of its corners on that side,
-    which are exact, and of its edges' crossings, which CUT_ERROR bounds."""
+    """Computes parts.left and parts.right: boxes, perhaps empty, of the parts of primitive i inside
+    `box` on either side of a plane.  A triangle's part is the hull of its corners on that side,
+    which are exact, and of its edges' crossings with the plane, whose error CUT_ERROR bounds."""
     left, right = parts.left, parts.right
     clear(left)
     clear(right)
@@ -246,16 +248,18 @@ def cut_all(
     split: Split,
     parts: Parts,
 ) -> tuple[int, int]:
-    """Put the right child's references first, then the left's, some of them in both, cut: (the
-    first of the left's, the new end).  All may come to one side: then none is cut."""
+    """Reorders references, the right child's first, then the left's; those across the plane are cut
+    and are in both.  Returns (index of the left child's first one, new end).  All may come to one
+    side: then none is cut."""
     axis = split.axis
     low, high = box[axis], box[3 + axis]
     scale, plane = bins_per_unit(low, high), _plane_after(low, high, split.bin)
     whole, left_node, right_node = parts.whole, parts.left_node, parts.right_node
     clear(left_node)
     clear(right_node)
-    # In order: right [begin, right), across the plane [right, k), unknown [k, left), left [left,
-    # end).  By bins, not by the plane: as many are across as were counted when it was chosen.
+    # In order: right [begin, right), across the plane [right, k), not yet sorted [k, left), left
+    # [left, end).  Sorted by bins, not by the plane, so that as many are across as were counted
+    # when it was chosen.
     right, left, k = begin, end, begin
     while k < left:
         if bin_of(refs[k, axis], low, scale) > split.bin:
@@ -272,7 +276,7 @@ def cut_all(
             merge(left_node, parts.left)
             merge(right_node, parts.right)
             k += 1
-    # The paper's unsplitting: whole and on one side, where this is cheaper than a part on each.
+    # The paper's reference unsplitting: uncut in one child, where that is cheaper than cut in both.
     n_left, n_right = end - right, left - begin
     while right < left:
         i = ids[right]

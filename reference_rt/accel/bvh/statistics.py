@@ -1,4 +1,4 @@
-"""How good a hierarchy is: its size, its depth, and what a ray costs in it."""
+"""Statistics of a BVH: its size, its depth and its SAH cost."""
 
 from typing import NamedTuple
 
@@ -11,11 +11,11 @@ from reference_rt.jit.simd import LANES
 
 
 class Statistics(NamedTuple):
-    """Counts of a hierarchy.  `depth` is the deepest leaf's, 0 where the root is one.  `sah_cost`
-    is how many box and primitive tests a random line through the root's box expects: it meets a
-    convex box inside with a chance of the ratio of their areas, tests both boxes of an inner node's
-    children and everything in a leaf (Goldsmith & Salmon 1987).  Things that hide others are left
-    out: a bound for lines, not the time of a ray that stops at the first hit."""
+    """Counts of a BVH.  `depth` is the deepest leaf's, 0 where the root is a leaf.  `sah_cost` is
+    the expected number of box and primitive tests of a random line through the root's box: it
+    meets a box inside with the probability area / root's area, and tests both children's boxes of
+    an inner node and all references of a leaf (Goldsmith & Salmon 1987).  Occlusion is ignored: it
+    is a cost of lines, not of rays that stop at the first hit."""
 
     nodes: int
     leaves: int
@@ -27,7 +27,7 @@ class Statistics(NamedTuple):
 
 
 def statistics(nodes: Nodes) -> Statistics:
-    """Counts, depth and cost of the hierarchy whose root is node 0, where others may follow."""
+    """Statistics of the BVH whose root is node 0; others may follow it in the arrays."""
     levels = [np.zeros(1, np.int64)]
     while len(levels[-1]) > 0:
         left = nodes.first[levels[-1][nodes.size[levels[-1]] == 0]]
@@ -43,13 +43,13 @@ def statistics(nodes: Nodes) -> Statistics:
         depth=len(levels) - 2,
         mean_leaf=references / leaves,
         largest_leaf=int(size.max()),
-        sah_cost=float((tests * _chances(nodes.boxes[reached])).sum()),
+        sah_cost=float((tests * _hit_probabilities(nodes.boxes[reached])).sum()),
     )
 
 
 def of_wide(bvh: Bvh) -> Statistics:
-    """The same of the wide hierarchy whose root is node 0, where others may follow: its nodes' and
-    leaves' counts, and for the cost a node's boxes or a leaf of triangles as one test each."""
+    """Statistics of the wide BVH whose root is node 0; others may follow it in the arrays.  In the
+    cost a node's boxes are one test, and so is a leaf of triangles."""
     boxes, codes = [], []
     level = np.zeros(1, np.int64)
     depth = -1
@@ -75,12 +75,13 @@ def of_wide(bvh: Bvh) -> Statistics:
         depth=depth + 1,
         mean_leaf=float(sizes.mean()),
         largest_leaf=int(sizes.max()),
-        sah_cost=float((tests * _chances(np.vstack([root, box]))).sum()),
+        sah_cost=float((tests * _hit_probabilities(np.vstack([root, box]))).sum()),
     )
 
 
-def _chances(boxes: FloatArray) -> FloatArray:
-    """Area of each box over the first's; 1 for all where that has none (all on a line)."""
+def _hit_probabilities(boxes: FloatArray) -> FloatArray:
+    """Each box's area over the first's, the probability that a random line through the first meets
+    it; 1 for all where the first has no area (all on a line)."""
     # In units of the root, and halved first: areas of finite boxes neither over- nor underflow.
     extent = 0.5 * boxes[:, 3:] - 0.5 * boxes[:, :3]
     longest = extent[0].max()

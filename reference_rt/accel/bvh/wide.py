@@ -1,8 +1,8 @@
-"""The hierarchy that rays go through: nodes of up to eight children, made from a binary one.
+"""The BVH that rays traverse: its memory layout, nodes of up to eight children.
 
-A node's eight boxes are met or missed at once (`reference_rt.accel.single_ray`), and so are the
-triangles of a leaf (`shapes.watertight.see`): half as many steps as in the binary tree, and
-measured on the Stanford bunny twice as many rays.  `widening` makes it; this file is what it is.
+A node's eight boxes are tested at once (`reference_rt.accel.single_ray`), and so are the triangles
+of a leaf (`shapes.meshes.watertight.see`): half as many steps as in a binary tree, and twice as
+many rays per second (measured on the Stanford bunny).  `widening` makes it from a binary one.
 """
 
 from collections.abc import Sequence
@@ -20,33 +20,35 @@ Singles = npt.NDArray[np.float32]
 Codes = npt.NDArray[np.int32]
 
 NODE_SINGLES = 64
-"""How many float32 or int32 numbers a node takes, in four cache lines."""
+"""Size of a node in float32 or int32 numbers: four cache lines."""
 CHILDREN = 48
-"""The number of a node with the first child's code; the planes of boxes stand before it."""
+"""Offset in a node of the first child's code; before it are the planes of the boxes."""
 CENTER = 28
-"""The column of `Bvh.frames` with a tree's centre; its size follows."""
+"""The column of `Bvh.frames` with x of a tree's centre; after x, y, z follows the tree's size."""
 MOST_REFERENCES = 2**26
-"""More do not fit into the codes of leaves."""
+"""The most references: leaf codes have no bits for more."""
 WIDE_STACK = (LANES - 1) * (STACK_SIZE + 1)
-"""A node has at least one binary node's depth, and leaves seven siblings at most."""
+"""Stack entries of a traversal: at most seven siblings per level, and no more levels than the
+binary BVH has."""
 
 LEAF_SHARE = LANES
-"""Most references of a leaf."""
+"""The most references of a leaf."""
 
 
 class Bvh(NamedTuple):
-    """One hierarchy or several one after another, as a traversal takes them.
+    """One or several BVHs, one after another, as traversals read them.
 
-    A node is a row of 256 bytes, seen as
+    A node is a row of 256 bytes, with three views:
     boxes (n, 64): float32, lower x of LANES children, lower y, lower z, upper x, y and z, relative
-    to the tree's centre and rounded outwards: boxes only cull, and so half the memory will do;
-    children (64 n,): int32, of each node from CHILDREN on the children's codes;
-    frames (n, 32): float64, of a tree's root from CENTER on the centre and the largest coordinate.
+    to the tree's centre and rounded outwards (boxes only cull, so that half the memory suffices);
+    children (64 n,): int32, in each node from CHILDREN on the children's codes;
+    frames (n, 32): float64, in a tree's root from CENTER on its centre and its size, the largest
+    magnitude of a coordinate.
 
-    The code of a node is its row, that of a leaf `leaf_code`.  references (m, 2): kind and row of
-    what each is, leaf after leaf;  corners (9 m + 8,): of leaves of triangles alone the vertices,
-    see `shapes.watertight.see`, None where there is no such leaf;  unbounded: the node of
-    what has no finite box, -1 for none.
+    The code of a node is its row, that of a leaf is its `leaf_code`.  references (m, 2): kind and
+    row of each reference, leaf after leaf;  corners (9 m + 8,): the vertices of leaves with
+    triangles only, see `shapes.meshes.watertight.see`, None without such leaves;  unbounded: the
+    root of the tree over everything that has no finite box, -1 for none.
     """
 
     boxes: Singles
@@ -58,7 +60,8 @@ class Bvh(NamedTuple):
 
 
 class Wide(NamedTuple):
-    """One hierarchy: boxes (n, 6, LANES) in world coordinates, codes (n, LANES)."""
+    """One wide BVH: boxes (n, 6, LANES) in world space, codes (n, LANES) of the children; lanes
+    without a child hold the empty box and NOTHING."""
 
     boxes: FloatArray
     codes: IntArray
@@ -70,8 +73,8 @@ NOTHING = -1
 
 @kernel
 def leaf_code(first: int, size: int, is_packet: bool) -> int:
-    """The code of a leaf of references first..first + size, at most LEAF_SHARE;  is_packet: they
-    are triangles, whose vertices lie in `Bvh.corners`."""
+    """The code of a leaf of references first..first + size, at most LEAF_SHARE;  is_packet: all are
+    triangles, with vertices in `Bvh.corners`."""
     return -1 - (32 * first + 2 * size + int(is_packet))
 
 
@@ -89,7 +92,7 @@ def size_of(code: int) -> int:
 
 @kernel
 def is_packet(code: int) -> bool:
-    """Whether a leaf's references are triangles, side by side in `Bvh.corners`."""
+    """Whether all of a leaf's references are triangles, stored as SoA in `Bvh.corners`."""
     return (-1 - code) & 1 == 1
 
 
@@ -125,8 +128,9 @@ def joined(
     rows: Sequence[IntArray],
     vertices: FloatArray | None,
 ) -> Bvh:
-    """The trees one after another, with their references' kinds (m,) and rows (m,); vertices (n, 9)
-    of the scene's triangles."""
+    """The `Bvh` of several trees, one after another, given the kinds (m,) and rows (m,) of each
+    one's references, and the vertices (n, 9) of the scene's triangles.  Raises ValueError for more
+    than MOST_REFERENCES."""
     if sum(map(len, rows)) > MOST_REFERENCES:
         raise ValueError(f"over {MOST_REFERENCES:,} primitives; expected fewer")
     frames = _aligned(sum(len(tree.codes) for tree in trees))
@@ -148,19 +152,19 @@ def joined(
         node, reference = here.stop, reference + len(of_tree)
     codes = children[:, CHILDREN : CHILDREN + LANES].astype(np.int64)
     references = np.column_stack([np.concatenate(kinds), np.concatenate(rows)]).astype(np.int32)
-    corners = None if vertices is None else _packets(vertices, codes, references[:, 1])
+    corners = None if vertices is None else _corners_of(vertices, codes, references[:, 1])
     return Bvh(boxes, children.reshape(-1), frames, references, corners, -1)
 
 
 def _aligned(n: int) -> FloatArray:
-    """(n, 32) zeros, each row four whole cache lines."""
+    """(n, 32) zeros, aligned so that each row is four whole cache lines."""
     memory = np.zeros((n + 1) * 32)
     skipped = (-memory.ctypes.data % 64) // 8
     return memory[skipped : skipped + 32 * n].reshape(n, 32)
 
 
 def _below(planes: FloatArray, center: FloatArray) -> Singles:
-    """float32 numbers (n, 3 LANES) that are nowhere above planes (n, 3, LANES) less the centre."""
+    """float32 numbers (n, 3 LANES), none above its plane (n, 3, LANES) minus the centre."""
     with np.errstate(over="ignore"):
         exact = np.nextafter(planes - center[None, :, None], -np.inf)
         rounded = exact.astype(np.float32)
@@ -168,9 +172,9 @@ def _below(planes: FloatArray, center: FloatArray) -> Singles:
     return np.where(rounded > exact, lower, rounded).reshape(len(planes), -1)
 
 
-def _packets(vertices: FloatArray, codes: IntArray, rows: Codes) -> FloatArray | None:
-    """`Bvh.corners` of the leaves among codes, whose references name these rows (m,) of vertices
-    (n, 9)."""
+def _corners_of(vertices: FloatArray, codes: IntArray, rows: Codes) -> FloatArray | None:
+    """`Bvh.corners` for the triangle leaves among codes; rows (m,): each reference's row of
+    vertices (n, 9)."""
     leaves = codes[(codes < NOTHING) & ((-1 - codes) & 1 == 1)]
     if len(leaves) == 0:
         return None

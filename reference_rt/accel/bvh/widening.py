@@ -1,4 +1,4 @@
-"""The wide hierarchy out of the binary one: which of its nodes become nodes.
+"""Collapses a binary BVH into a wide one: chooses which binary nodes become nodes and leaves.
 
 The cheapest of all choices (Wald, Benthin & Boulos 2008, "Getting rid of packets", RT'08), by the
 dynamic program of Ylitie, Karras & Laine 2017, HPG, section 3.1.
@@ -13,16 +13,16 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import entry_kernel, kernel, local_integers
 from reference_rt.jit.simd import LANES
 
-PACKET_COST, PRIMITIVE_COST = 1.0, 0.5
-"""What a leaf of triangles costs, and one primitive of another leaf, in tests of a node's boxes.
-Measured: between 0.5 and 2 the first makes no difference on the bunny."""
+TRIANGLE_LEAF_COST, PRIMITIVE_COST = 1.0, 0.5
+"""The cost of a leaf of triangles, and of each primitive in any other leaf, in units of the test of
+a node's boxes.  Measured: between 0.5 and 2 the first makes no difference on the bunny."""
 
 
 @kernel
 def _leaf_cost(count: int, triangles: int) -> float:
     if count > LEAF_SHARE:
         return np.inf
-    return PACKET_COST if triangles == count else PRIMITIVE_COST * count
+    return TRIANGLE_LEAF_COST if triangles == count else PRIMITIVE_COST * count
 
 
 _INNER, _FEWER = -1, -2
@@ -36,10 +36,11 @@ def _plan(
     cost: FloatArray,
     choice: npt.NDArray[np.int8],
 ) -> None:
-    """The cheapest way to turn each binary node into at most i of a wide node's children.
+    """Computes the cheapest way to turn each binary node into at most i children of a wide node.
 
-    choice (n, LANES + 1): for i = 1 _INNER or 0, a leaf; for more: how many of the i the left
-    child gets, or _FEWER: i - 1 are as good.  count, triangles (n,): references below each node.
+    cost, choice (n, LANES + 1): by node and i.  choice for i = 1: _INNER, or 0 for a leaf; for
+    i > 1: how many of the i go to the left child, or _FEWER: i - 1 are as cheap.  count, triangles
+    (n,): references below each node, and how many of these are triangles.
     """
     n = len(nodes.first)
     for k in range(n):
@@ -78,14 +79,14 @@ def _collapse(
     boxes: FloatArray,
     codes: IntArray,
 ) -> int:
-    """Fill the wide nodes as `_plan` chose; returns how many.  The root must not be a leaf."""
+    """Fills the wide nodes as `_plan` chose; returns their number.  The root must not be a leaf."""
     opening, shares = local_integers(2 * STACK_SIZE), local_integers(2 * STACK_SIZE)
     made, waiting = 1, 1
     jobs[0, 0], jobs[0, 1] = 0, 0
     while waiting > 0:
         waiting -= 1
         node, row = jobs[waiting, 0], jobs[waiting, 1]
-        # The root of a wide node is opened in any case.
+        # The binary node that a wide node is made of is always opened.
         opening[0], shares[0] = node, LANES
         top, lane, whole = 1, 0, True
         while top > 0:
@@ -123,7 +124,8 @@ def _count(
     count: IntArray,
     triangles: IntArray,
 ) -> None:
-    """The first reference below each node, how many there are, and how many triangles."""
+    """Fills start, count, triangles (n,): the first reference below each node, how many there are,
+    and how many of them are triangles."""
     for k in range(len(nodes.first)):
         node = len(nodes.first) - 1 - k
         first, size = nodes.first[node], nodes.size[node]
@@ -138,7 +140,7 @@ def _count(
 
 
 def widened(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
-    """The wide hierarchy of a binary one over m references, of which some are triangles (m,)."""
+    """The wide BVH of a binary one over m references; is_triangle (m,)."""
     if nodes.size[0] > 0:
         return _leaf(nodes, is_triangle)
     n = len(nodes.first)
@@ -162,8 +164,8 @@ def _empty(n: int) -> tuple[FloatArray, IntArray]:
 
 
 def _leaf(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
-    """A tree that is one leaf of any size: as many leaves in one box as it takes, and as many nodes
-    over these."""
+    """The wide BVH of a tree that is one leaf of any size: leaves of LEAF_SHARE references, all in
+    the same box, and as many levels of nodes above them as it takes."""
     begins = np.arange(0, int(nodes.size[0]), LEAF_SHARE)
     ends = np.minimum(begins + LEAF_SHARE, nodes.size[0])
     level = np.array(

@@ -1,9 +1,9 @@
-"""Solids along a ray: the crossings of the operands in order, and a program on who is inside.
+"""CSG along a ray: the operands' crossings in order, and a postfix program that combines them.
 
-The operands' crossings are passed one after another; after each, the postfix program says from the
-operands' states whether the point is inside the solid.  Where that changes is the solid's surface.
-Crossings that rounding cannot tell apart are passed at once: faces that coincide leave no film of
-rounding error between them.
+The operands' crossings are processed in order of t; after each, the postfix program computes from
+the operands' states whether the point is inside the solid.  The solid's surface is where this
+changes.  Crossings that are closer than their rounding errors are processed as one: coincident
+faces leave no film of rounding error between them.
 """
 
 import math
@@ -13,12 +13,12 @@ from reference_rt import shapes as any_shape
 from reference_rt.accel.bvh import Bvh
 from reference_rt.accel.crossing_order import (
     FROM_THE_START,
-    Crossed,
+    OrderedCrossing,
     comes_after,
-    crossed,
     nothing_at,
+    ordered_crossing,
 )
-from reference_rt.accel.csg.mesh_walk import Step, next_crossing, winding
+from reference_rt.accel.csg.mesh_walk import Step, next_mesh_crossing, winding
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray, at, surface_error
 from reference_rt.core.vec3 import dot, length
@@ -28,20 +28,20 @@ from reference_rt.shapes.csg.anchor import ray_near
 from reference_rt.shapes.csg.tables import AND, NOT, OR, Solids
 
 CROSSINGS = 4
-"""Of an operand that is not a mesh: the ends of its `Spans`."""
+"""The most crossings of an operand that is not a mesh: the ends of its `Spans`."""
 
 GRAZING = 2.0**20
-"""Crossings further apart than this many times the rounding of what is met head-on are not asked
-for their angles: they would have to be met at less than 1e-6 radians to be one."""
+"""Crossings further apart than GRAZING times the rounding error of a head-on hit are distinct
+without computing their angles: to be one they would have to be met at less than 1e-6 radians."""
 
 
 class Walk(NamedTuple):
-    """Where the operands of a solid stand along a ray.
+    """The states of a solid's operands during the walk along a ray.
 
     t, u (CROSSINGS k + j): crossing j of operand k, a mesh's next one at j = 0;  v, row, sign (k,):
-    more of a mesh's: its triangle, and +1 where it is entered;  passed (k,): crossings behind;
-    state (k,): 0 outside;  before, met (k,): the state before the crossings that are being passed,
-    and whether one is the operand's.
+    for a mesh also v, the triangle and +1 where the ray enters;  passed (k,): crossings processed;
+    state (k,): 0 outside;  before, met (k,): the state before the crossings that are processed
+    together, and whether one of them is the operand's.
     """
 
     t: FloatArray
@@ -77,17 +77,19 @@ def is_inside(solids: Solids, s: int, state: IntArray, values: IntArray) -> bool
 
 
 @kernel
-def _next_of_mesh(walk: Walk, k: int, step: Step) -> None:
+def _store_mesh_crossing(walk: Walk, k: int, step: Step) -> None:
     walk.t[CROSSINGS * k], walk.u[CROSSINGS * k] = step.t, step.u
     walk.v[k], walk.row[k], walk.sign[k] = step.v, step.row, step.sign
 
 
 @kernel
 def _begin(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, walk: Walk) -> None:
-    """Operand k of a solid, row o of the operands, as the ray's origin finds it."""
+    """The state of operand k of a solid, row o of the operands, at the ray's origin."""
     walk.passed[k] = 0
     if solids.row[o] < 0:
-        _next_of_mesh(walk, k, next_crossing(shapes.triangles, bvh, solids.root[o], ray, 0.0, -1))
+        _store_mesh_crossing(
+            walk, k, next_mesh_crossing(shapes.triangles, bvh, solids.root[o], ray, 0.0, -1)
+        )
         walk.state[k] = winding(shapes.triangles, bvh, solids.root[o], ray)
         return
     spans = any_shape.spans(shapes, solids.kind[o], solids.row[o], ray)
@@ -102,7 +104,7 @@ def _begin(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, w
 
 @kernel
 def _next(solids: Solids, o: int, k: int, walk: Walk) -> Hit:
-    """The crossing that operand k comes to next, as a hit; at inf where there is none."""
+    """The next crossing of operand k as a hit; at inf for none."""
     j = walk.passed[k]
     if j == CROSSINGS:
         return Hit(math.inf, -1, -1, 0.0, 0.0, -1)
@@ -115,12 +117,12 @@ def _next(solids: Solids, o: int, k: int, walk: Walk) -> Hit:
 
 @kernel
 def _pass(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, walk: Walk) -> None:
-    """Operand k goes through its next crossing."""
+    """Advances operand k past its next crossing."""
     if solids.row[o] < 0:
         walk.state[k] += walk.sign[k]
         t, row = walk.t[CROSSINGS * k], walk.row[k]
-        step = next_crossing(shapes.triangles, bvh, solids.root[o], ray, t, row)
-        _next_of_mesh(walk, k, step)
+        step = next_mesh_crossing(shapes.triangles, bvh, solids.root[o], ray, t, row)
+        _store_mesh_crossing(walk, k, step)
     else:
         walk.passed[k] += 1
         walk.state[k] = walk.passed[k] % 2
@@ -128,7 +130,7 @@ def _pass(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, wa
 
 @kernel
 def _nearest(solids: Solids, first: int, count: int, walk: Walk) -> tuple[int, Hit]:
-    """The operand whose next crossing is the first of all, and that; -1 for none."""
+    """(operand, hit): the first of all operands' next crossings; -1 for none."""
     best, closest = -1, Hit(math.inf, -1, -1, 0.0, 0.0, -1)
     for k in range(count):
         hit = _next(solids, first + k, k, walk)
@@ -139,7 +141,7 @@ def _nearest(solids: Solids, first: int, count: int, walk: Walk) -> tuple[int, H
 
 @kernel
 def head_on(ray: Ray, t: float) -> float:
-    """The rounding, in t, of a crossing at t that is met head-on."""
+    """The rounding error, in t, of a crossing at t whose normal is along the ray."""
     return surface_error(ray.o, at(ray, t), 0.0) / length(ray.d)
 
 
@@ -154,8 +156,8 @@ def width(shapes: Shapes, hit: Hit, ray: Ray) -> float:
 
 
 class Front(NamedTuple):
-    """Of the crossings that were passed at once, the last of each operand, which is the one that
-    may show: t, u, v, row (k,)."""
+    """Each operand's last one of the crossings that were processed together, which is the one that
+    may be visible: t, u, v, row (k,)."""
 
     t: FloatArray
     u: FloatArray
@@ -167,12 +169,12 @@ class Front(NamedTuple):
 def begin_all(
     solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, walk: Walk
 ) -> tuple[int, Hit]:
-    """All operands as the ray's origin finds them, and the first crossing of all."""
+    """Sets the state of all operands at the ray's origin; (operand, hit) of the first crossing."""
     first, count = solids.first[s], solids.operands[s]
     at_origin = GRAZING * head_on(ray, 0.0)
     for k in range(count):
         _begin(solids, shapes, bvh, first + k, k, ray, walk)
-        # What is within rounding of the origin is where the ray comes from.
+        # A crossing within rounding of the origin is the surface that the ray leaves.
         hit = _next(solids, first + k, k, walk)
         if hit.t < at_origin and hit.t <= width(shapes, hit, ray):
             _pass(solids, shapes, bvh, first + k, k, ray, walk)
@@ -191,7 +193,8 @@ def pass_together(
     best: int,
     hit: Hit,
 ) -> tuple[int, Hit]:
-    """Passes a crossing and all that rounding cannot tell apart from it; the next one."""
+    """Processes a crossing and all that rounding cannot tell apart from it; (operand, hit) of the
+    next one."""
     first, count = solids.first[s], solids.operands[s]
     for k in range(count):
         walk.before[k], walk.met[k] = walk.state[k], 0
@@ -223,14 +226,14 @@ def surface_along(
     widths: FloatArray,
     part: IntArray,
     instance: int,
-    after: Crossed,
-) -> tuple[int, Crossed]:
-    """(how many points of the surface of solid s lie at t in (0, t_max], the first of them that
-    comes after `after`, as a hit of the operand that it belongs to, at inf for none).
+    after: OrderedCrossing,
+) -> tuple[int, OrderedCrossing]:
+    """Crossings of the ray with the surface of solid s at t in (0, t_max].
 
-    As many of them as there is room for go into t, in order, with their `resolution` and the number
-    of their operand; where there is no room for any, the hit ends the walk.  The ray is that of
-    `instance`, -1 for none.
+    Returns how many there are, and the first that comes after `after`, as a hit of its operand, at
+    inf for none.  Into t, widths and part go t, `resolution` and operand of as many as these have
+    room for, in order; where that is none, the walk ends at the crossing that is returned.  The ray
+    is in the space of `instance`, -1 for none.
     """
     ray, begin = ray_near(solids, s, ray)
     first, count = solids.first[s], solids.operands[s]
@@ -257,11 +260,11 @@ def surface_along(
         was_inside = inside
         inside = is_inside(solids, s, walk.state, values)
         if inside != was_inside:
-            k = which_shows(solids, s, count, walk, values, was_inside)
+            k = visible_operand(solids, s, count, walk, values, was_inside)
             kind, at_k = solids.kind[first + k], begin + front.t[k]
             if closest.hit.kind < 0:
                 hit_k = Hit(at_k, kind, front.row[k], front.u[k], front.v[k], instance)
-                one = crossed(shapes, hit_k, found)
+                one = ordered_crossing(shapes, hit_k, found)
                 if comes_after(one, after):
                     closest = one
             if found < len(t):
@@ -276,14 +279,15 @@ def surface_along(
 
 @kernel
 def resolution(shapes: Shapes, hit: Hit, ray: Ray) -> float:
-    """Crossings whose distance, in t, is more than the sum of theirs are told apart."""
+    """The rounding error of a crossing, in t: two crossings are distinct where they are further
+    apart than the sum of theirs."""
     return min(width(shapes, hit, ray), 0.5 * GRAZING * head_on(ray, hit.t))
 
 
 @kernel
 def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max: float) -> Hit:
-    """The first point of the surface of solid s at t in (0, t_max], as a hit of the operand that it
-    belongs to; at inf for none."""
+    """The ray's first crossing with the surface of solid s at t in (0, t_max], as a hit of its
+    operand; at inf for none."""
     none, no_parts = local_floats(0), local_integers(0)
     _, closest = surface_along(
         solids, shapes, bvh, s, ray, t_max, none, none, no_parts, -1, FROM_THE_START
@@ -292,11 +296,12 @@ def intersect(solids: Solids, shapes: Shapes, bvh: Bvh, s: int, ray: Ray, t_max:
 
 
 @kernel
-def which_shows(
+def visible_operand(
     solids: Solids, s: int, count: int, walk: Walk, values: IntArray, inside: bool
 ) -> int:
-    """The operand whose crossing shows, of those that were passed at once and changed `inside`: the
-    first in the scene's order that changes it alone, or without which nothing would change."""
+    """The operand that is visible, of those whose crossings were processed together and changed
+    `inside`: the first in the scene's order that changes it by itself, or without which it would
+    not change."""
     last = -1
     for k in range(count):
         if walk.met[k] != 0:

@@ -1,4 +1,4 @@
-"""Closed meshes as operands: the crossings of a ray, one after another."""
+"""Closed meshes as CSG operands: a ray's crossings in order, and its origin's winding number."""
 
 import math
 from typing import NamedTuple
@@ -25,18 +25,18 @@ class Step(NamedTuple):
 
 
 @kernel
-def next_crossing(
+def next_mesh_crossing(
     triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray, after: float, row: int
 ) -> Step:
-    """The first crossing of a mesh that comes after (`after`, `row`), ordered by t and then by the
-    triangles' rows, so that none is left out where several have the same t."""
+    """The first crossing of a mesh that comes after (t = `after`, `row`), ordered by t and then by
+    row, so that none is skipped where several have the same t."""
     found, _ = _walk(triangles, bvh, root, ray, after, row, False)
     return found
 
 
 @kernel
 def winding(triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray) -> int:
-    """How many times a closed mesh goes round the origin of a ray: 0 outside, 1 inside."""
+    """The winding number of a closed mesh about the ray's origin: 0 outside, 1 inside."""
     _, total = _walk(triangles, bvh, root, ray, 0.0, -1, True)
     return -total
 
@@ -45,17 +45,17 @@ def winding(triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray) -> int:
 def _walk(
     triangles: Triangles | None, bvh: Bvh, root: int, ray: Ray, after: float, row: int, total: bool
 ) -> tuple[Step, int]:
-    """The next crossing, and with `total` the sum of the signs of all that come."""
+    """(the next crossing, with `total` the sum of the signs of all crossings at t > 0)."""
     found, balance = Step(math.inf, -1, 0.0, 0.0, 0), 0
     if triangles is None:
         return found, balance
     stack, waiting = local_integers(WIDE_STACK), local_floats(WIDE_STACK)
     distances = local_floats(LANES)
-    view, shear = view_of(bvh, root, ray), shear_of(ray)
+    slab_ray, shear = view_of(bvh, root, ray), shear_of(ray)
     node, top = root, 0
     while True:
         while node >= 0:
-            met = enter(bvh, node, view, math.inf if total else found.t, distances)
+            met = enter(bvh, node, slab_ray, math.inf if total else found.t, distances)
             if met == 0:
                 node = NOTHING
             else:

@@ -1,9 +1,10 @@
-"""A bundle of rays against the boxes of a hierarchy, all at once or each by itself."""
+"""Slab tests of a ray packet: all its rays at once against inner nodes, ray by ray against leaves;
+and what each ray needs for the tests in leaves."""
 
 from typing import Any
 
 from reference_rt.accel.bvh import CENTER, FAR_SLACK, NODE_SINGLES, Bvh
-from reference_rt.accel.packet.packet import BUNDLE, Bundle
+from reference_rt.accel.packet.packet import BUNDLE, RayPacket
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import BLOCK
 from reference_rt.core.ray_block import Rays
@@ -13,7 +14,7 @@ from reference_rt.jit.simd import LANES, larger, smaller
 from reference_rt.jit.simd_kernels import lane_kernel
 from reference_rt.shapes.meshes.watertight import Shear
 
-OWN_FLOATS = 12 * BUNDLE
+PER_RAY_FLOATS = 12 * BUNDLE
 
 
 @lane_kernel
@@ -38,10 +39,12 @@ def _entered(
     t_max: Any,
     distances: Any,
 ) -> Any:
-    """The children whose boxes any ray may enter before t_max, and from where on.
+    """The mask of the children whose boxes any ray may enter before t_max; into distances lower
+    bounds of t.
 
-    As in `traversal`, with the smaller and the larger of both products.  The NaN of 0 * inf comes
-    from `most` alone or from both, and stands first where it has to remain: it limits nothing.
+    `single_ray.slab_test` in interval arithmetic: the smaller or the larger of the products with
+    `least` and `most`.  0 * inf = NaN comes from `most` alone or from both; the order of arguments
+    keeps it where it has to stay, so that it limits nothing.
     """
     first = node * NODE_SINGLES
 
@@ -64,34 +67,36 @@ def _entered(
 
 
 @kernel
-def enter_together(bvh: Bvh, node: int, bundle: Bundle, t_max: float, distances: FloatArray) -> int:
-    """The children of a node that rays of a bundle meet, as bits; into distances (LANES,) how far
-    away."""
+def enter_together(
+    bvh: Bvh, node: int, packet: RayPacket, t_max: float, distances: FloatArray
+) -> int:
+    """The children of a node whose boxes rays of a packet may enter, as bits; into distances
+    (LANES,) lower bounds of t."""
     return _entered(
         bvh.boxes,
         node,
-        bundle.x,
-        bundle.y,
-        bundle.z,
-        bundle.near.x,
-        bundle.near.y,
-        bundle.near.z,
-        bundle.far.x,
-        bundle.far.y,
-        bundle.far.z,
-        bundle.least.x,
-        bundle.least.y,
-        bundle.least.z,
-        bundle.most.x,
-        bundle.most.y,
-        bundle.most.z,
+        packet.x,
+        packet.y,
+        packet.z,
+        packet.near.x,
+        packet.near.y,
+        packet.near.z,
+        packet.far.x,
+        packet.far.y,
+        packet.far.z,
+        packet.least.x,
+        packet.least.y,
+        packet.least.z,
+        packet.most.x,
+        packet.most.y,
+        packet.most.z,
         t_max,
         distances,
     )
 
 
 @lane_kernel
-def _each(
+def _prepare_rays(
     rays: Any,
     x: Any,
     y: Any,
@@ -102,39 +107,39 @@ def _each(
     error_x: Any,
     error_y: Any,
     error_z: Any,
-    own: Any,
+    per_ray: Any,
 ) -> Any:
-    """What each ray needs in leaves, into own (OWN_FLOATS,): near, far and inverse for boxes, see
-    `traversal.view_of`, and the shear for triangles by axes x, y, z, see `watertight.shear_of`."""
+    """Fills per_ray (PER_RAY_FLOATS,): near, far and inverse of each ray's `single_ray.SlabRay`,
+    and the shear of `watertight.shear_of` for axes x, y, z."""
     place = ((center_x, error_x), (center_y, error_y), (center_z, error_z))
     for j in range(0, BUNDLE, LANES):
         for k, (center, error) in enumerate(place):
             o, d = rays.load(k * BLOCK + j), rays.load((3 + k) * BLOCK + j)
-            own.store(k * BUNDLE + j, o - center + error)
-            own.store((3 + k) * BUNDLE + j, o - center - error)
-            own.store((6 + k) * BUNDLE + j, 1.0 / (d + 0.0))  # of -0 inf too, as in `_slab`
+            per_ray.store(k * BUNDLE + j, o - center + error)
+            per_ray.store((3 + k) * BUNDLE + j, o - center - error)
+            per_ray.store((6 + k) * BUNDLE + j, 1.0 / (d + 0.0))  # of -0 inf too, as in `_slab`
         d_x, d_y, d_z = (rays.load(axis * BLOCK + (3 * BLOCK + j)) for axis in (x, y, z))
-        own.store(9 * BUNDLE + j, d_x / d_z)
-        own.store(10 * BUNDLE + j, d_y / d_z)
-        own.store(11 * BUNDLE + j, 1.0 / d_z)
+        per_ray.store(9 * BUNDLE + j, d_x / d_z)
+        per_ray.store(10 * BUNDLE + j, d_y / d_z)
+        per_ray.store(11 * BUNDLE + j, 1.0 / d_z)
     return rays.load(0) <= float("inf")
 
 
 @kernel
-def shear_axes(bundle: Bundle) -> tuple[int, int, int]:
-    """The axes x, y, z of all shears, see `watertight.shear_of`."""
-    x, y = (bundle.axis + 1) % 3, (bundle.axis + 2) % 3
-    if component(bundle.least, bundle.axis) < 0.0:
+def shear_axes(packet: RayPacket) -> tuple[int, int, int]:
+    """The axes x, y, z of `watertight.shear_of`, the same for all rays of a packet."""
+    x, y = (packet.axis + 1) % 3, (packet.axis + 2) % 3
+    if component(packet.least, packet.axis) < 0.0:
         x, y = y, x
-    return x, y, bundle.axis
+    return x, y, packet.axis
 
 
 @kernel
-def prepare_each(bvh: Bvh, bundle: Bundle, rays: Rays, own: FloatArray) -> None:
-    """Before the first leaf: most bundles of a picture meet none."""
-    x, y, z = shear_axes(bundle)
+def prepare_rays(bvh: Bvh, packet: RayPacket, rays: Rays, per_ray: FloatArray) -> None:
+    """Called before the first leaf only: most packets of a picture reach none."""
+    x, y, z = shear_axes(packet)
     frame = bvh.frames
-    _each(
+    _prepare_rays(
         rays.numbers,
         x,
         y,
@@ -142,17 +147,17 @@ def prepare_each(bvh: Bvh, bundle: Bundle, rays: Rays, own: FloatArray) -> None:
         frame[0, CENTER],
         frame[0, CENTER + 1],
         frame[0, CENTER + 2],
-        bundle.error.x,
-        bundle.error.y,
-        bundle.error.z,
-        own,
+        packet.error.x,
+        packet.error.y,
+        packet.error.z,
+        per_ray,
     )
 
 
 @kernel
-def shear_in(bundle: Bundle, rays: Rays, j: int, own: FloatArray) -> Shear:
-    """That of ray number j of a bundle."""
-    x, y, z = shear_axes(bundle)
+def shear_in(packet: RayPacket, rays: Rays, j: int, per_ray: FloatArray) -> Shear:
+    """`watertight.shear_of` ray j of a packet."""
+    x, y, z = shear_axes(packet)
     o = rays.numbers
     return Shear(
         x,
@@ -161,15 +166,15 @@ def shear_in(bundle: Bundle, rays: Rays, j: int, own: FloatArray) -> Shear:
         o[x * BLOCK + j],
         o[y * BLOCK + j],
         o[z * BLOCK + j],
-        own[9 * BUNDLE + j],
-        own[10 * BUNDLE + j],
-        own[11 * BUNDLE + j],
+        per_ray[9 * BUNDLE + j],
+        per_ray[10 * BUNDLE + j],
+        per_ray[11 * BUNDLE + j],
     )
 
 
 @lane_kernel
 def _enter_box(
-    own: Any,
+    per_ray: Any,
     j: Any,
     ends: Any,
     near_x: Any,
@@ -179,32 +184,34 @@ def _enter_box(
     far_y: Any,
     far_z: Any,
 ) -> Any:
-    """Which of LANES rays from number j on enter a box before their ends, as in `traversal`."""
-    inverse = [own.load(j + k * BUNDLE) for k in (6, 7, 8)]
-    t_in = larger(0.0, (near_x - own.load(j)) * inverse[0])
-    t_in = larger(t_in, (near_y - own.load(j + BUNDLE)) * inverse[1])
-    t_in = larger(t_in, (near_z - own.load(j + 2 * BUNDLE)) * inverse[2])
-    t_out = smaller(ends.load(j), (far_x - own.load(j + 3 * BUNDLE)) * inverse[0])
-    t_out = smaller(t_out, (far_y - own.load(j + 4 * BUNDLE)) * inverse[1])
-    t_out = smaller(t_out, (far_z - own.load(j + 5 * BUNDLE)) * inverse[2])
+    """The mask of the rays j to j + LANES - 1 that enter a box before their ends: the slab test of
+    `single_ray`, one box for LANES rays."""
+    inverse = [per_ray.load(j + k * BUNDLE) for k in (6, 7, 8)]
+    t_in = larger(0.0, (near_x - per_ray.load(j)) * inverse[0])
+    t_in = larger(t_in, (near_y - per_ray.load(j + BUNDLE)) * inverse[1])
+    t_in = larger(t_in, (near_z - per_ray.load(j + 2 * BUNDLE)) * inverse[2])
+    t_out = smaller(ends.load(j), (far_x - per_ray.load(j + 3 * BUNDLE)) * inverse[0])
+    t_out = smaller(t_out, (far_y - per_ray.load(j + 4 * BUNDLE)) * inverse[1])
+    t_out = smaller(t_out, (far_z - per_ray.load(j + 5 * BUNDLE)) * inverse[2])
     return t_in <= t_out * FAR_SLACK
 
 
 @kernel
 def enter_child(
-    bvh: Bvh, place: int, bundle: Bundle, j: int, own: FloatArray, ends: FloatArray
+    bvh: Bvh, slot: int, packet: RayPacket, j: int, per_ray: FloatArray, ends: FloatArray
 ) -> int:
-    """Which of LANES rays from number j of a bundle on enter a child before ends[j + lane]."""
-    node, lane = place // LANES, place % LANES
+    """The rays j to j + LANES - 1 of a packet that enter the child in a slot (node * LANES + lane)
+    before ends[j + lane], as bits."""
+    node, lane = slot // LANES, slot % LANES
     box = bvh.boxes[node]
     return _enter_box(
-        own,
+        per_ray,
         j,
         ends,
-        float(box[bundle.x * LANES + lane]),
-        float(box[bundle.y * LANES + lane]),
-        float(box[bundle.z * LANES + lane]),
-        float(box[(3 - bundle.x) * LANES + lane]),
-        float(box[(5 - bundle.y) * LANES + lane]),
-        float(box[(7 - bundle.z) * LANES + lane]),
+        float(box[packet.x * LANES + lane]),
+        float(box[packet.y * LANES + lane]),
+        float(box[packet.z * LANES + lane]),
+        float(box[(3 - packet.x) * LANES + lane]),
+        float(box[(5 - packet.y) * LANES + lane]),
+        float(box[(7 - packet.z) * LANES + lane]),
     )

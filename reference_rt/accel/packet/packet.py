@@ -1,9 +1,5 @@
-"""Rays that go through a hierarchy together, because they see the same boxes.
-
-A node is asked once for all rays of a bundle, with intervals in place of their origins and
-inverse directions: a box that any of the rays enters is entered.  In a leaf each ray is asked by
-itself, as if it had come alone, and so finds what it would find alone, to the last bit.
-"""
+"""Ray packets: intervals of the origins and inverse directions of neighbouring rays, and the test
+whether the rays are coherent."""
 
 import math
 from typing import Any, NamedTuple
@@ -18,32 +14,33 @@ from reference_rt.jit.simd import LANES, larger, smaller
 from reference_rt.jit.simd_kernels import lane_kernel
 
 BUNDLE = 16
-"""Rays of a bundle.  Measured on the bunny, camera rays along the rows of 1024 pixels, when all
-numbers were made for each ray: 8 take 38 ns each, 16 take 30, 32 take 31, 64 take 40."""
+"""Rays in a packet.  Measured on the bunny, camera rays along rows of 1024 pixels, at a time when
+every number was computed for each ray: 8 take 38 ns per ray, 16 take 30, 32 take 31, 64 take
+40."""
 
 NARROW = 96.0
-"""How wide a bundle may be where it is in the tree: that share of half the tree, over the root of
-the number of references, and no more than that half.
+"""The largest width of a coherent packet within the tree's box: NARROW / sqrt(references) times
+half the size of the box, and at most that half.
 
-Between what gained and what lost on spheres of triangles seen with 40 degrees.  Time with bundles
-over that without: of 300 triangles 0.78 for 64 pixels a row and 1.31 for 32, of 5,292 0.73 for 128
-and 1.30 for 64, of 69,312 0.80 for 256 and 1.32 for 128, of a million 0.70 for 1024 and 1.12 for
-512."""
+Chosen between gain and loss on spheres of triangles, 40 degrees of view.  Time with packets over
+time without: 300 triangles 0.78 at 64 pixels a row and 1.31 at 32; 5,292 triangles 0.73 at 128 and
+1.30 at 64; 69,312 triangles 0.80 at 256 and 1.32 at 128; a million 0.70 at 1024 and 1.12 at 512."""
 
 _TURNS = 3 * LANES
 SPAN_FLOATS = 4 * _TURNS + LANES
 
 
-class Bundle(NamedTuple):
-    """Rays as boxes see them, see `traversal.View`; of each number what makes boxes nearest or
-    furthest.
+class RayPacket(NamedTuple):
+    """Rays prepared for slab tests, as `single_ray.SlabRay`: bounds of the rays' numbers that make
+    boxes nearest or furthest.
 
-    together: whether they can go together, else the rest means nothing;  near, far: origins
-    relative to the tree's centre;  least, most: 1 / d, by magnitude;  error: how far origins were
-    moved, with the sign of d;  x, y, z: the rows of near planes;  axis: the largest of d.
+    is_coherent: without it the rest means nothing;  near, far: origins relative to the tree's
+    centre;  least, most: 1 / d of the smallest and of the largest magnitude;  error: the
+    displacement of the origins, with the sign of d;  x, y, z: the rows of near planes;  axis: that
+    of the largest component of all d.
     """
 
-    together: bool
+    is_coherent: bool
     near: Vec3
     far: Vec3
     least: Vec3
@@ -56,9 +53,9 @@ class Bundle(NamedTuple):
 
 
 @kernel
-def are_alike(first: Vec3, last: Vec3) -> bool:
-    """Whether directions may be those of a bundle's ends: tells rays that go all ways, most of them
-    at once, for a few per cent of their time.  `bundle_of` decides of the others."""
+def may_be_coherent(first: Vec3, last: Vec3) -> bool:
+    """A quick test of the first and the last direction: rejects most groups of random rays for a
+    few per cent of their time.  `bundle_of` decides on the others."""
     length = 0.25 * max_abs(first)
     off = last - first
     return abs(off.x) <= length and abs(off.y) <= length and abs(off.z) <= length
@@ -66,9 +63,12 @@ def are_alike(first: Vec3, last: Vec3) -> bool:
 
 @lane_kernel
 def _span(o: Any, d: Any, first: Any, boxes: Any, span: Any) -> Any:
-    """Of BUNDLE origins and directions from number `first` of their arrays on the smallest numbers
-    and the largest of eight bundles of x, y and z in turn, and how far a tree's boxes reach from
-    its centre, into span (SPAN_FLOATS,); the lanes whose numbers are finite."""
+    """Componentwise bounds of BUNDLE origins and directions, from float `first` of their arrays on.
+
+    Into span (SPAN_FLOATS,): the smallest numbers of o and d, then the largest, each as 3 LANES
+    numbers that are x, y, z in turn and still to be reduced; then how far each child of the root
+    reaches beyond the tree's centre.  Returns the mask of lanes whose numbers are all finite.
+    """
     is_finite = boxes.load(0) <= float("inf")
     for place, vectors in ((0, o), (_TURNS, d)):
         for begin in range(0, 3 * LANES, LANES):
@@ -86,7 +86,7 @@ def _span(o: Any, d: Any, first: Any, boxes: Any, span: Any) -> Any:
 
 @kernel
 def _lowest(span: FloatArray, place: int) -> Vec3:
-    """The smallest x, y and z of those that `_span` has left."""
+    """The smallest x, y and z of the 3 LANES numbers of `_span` at `place`."""
     low = Vec3(span[place], span[place + 1], span[place + 2])
     for j in range(place + 3, place + _TURNS, 3):
         low = Vec3(min(low.x, span[j]), min(low.y, span[j + 1]), min(low.z, span[j + 2]))
@@ -95,7 +95,7 @@ def _lowest(span: FloatArray, place: int) -> Vec3:
 
 @kernel
 def _highest(span: FloatArray, place: int) -> Vec3:
-    """The largest."""
+    """The largest, as `_lowest`."""
     high = Vec3(span[place], span[place + 1], span[place + 2])
     for j in range(place + 3, place + _TURNS, 3):
         high = Vec3(max(high.x, span[j]), max(high.y, span[j + 1]), max(high.z, span[j + 2]))
@@ -103,15 +103,19 @@ def _highest(span: FloatArray, place: int) -> Vec3:
 
 
 @kernel
-def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArray) -> Bundle:
-    """The BUNDLE rays from number `begin` on; span (SPAN_FLOATS,) is scratch."""
-    together = _span(o, d, 3 * begin, bvh.boxes, span) == (1 << LANES) - 1
+def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArray) -> RayPacket:
+    """The packet of the BUNDLE rays begin, begin + 1, ...; span (SPAN_FLOATS,) is scratch."""
+    is_coherent = _span(o, d, 3 * begin, bvh.boxes, span) == (1 << LANES) - 1
     o_low, d_low = _lowest(span, 0), _lowest(span, _TURNS)
     o_high, d_high = _highest(span, 2 * _TURNS), _highest(span, 3 * _TURNS)
     reach = 0.0
     for lane in range(LANES):
         reach = max(reach, span[4 * _TURNS + lane])
-    steep = Vec3(_least(d_low.x, d_high.x), _least(d_low.y, d_high.y), _least(d_low.z, d_high.z))
+    steep = Vec3(
+        _least_abs(d_low.x, d_high.x),
+        _least_abs(d_low.y, d_high.y),
+        _least_abs(d_low.z, d_high.z),
+    )
     axis = 2
     if steep.x > steep.y and steep.x > steep.z:
         axis = 0
@@ -119,7 +123,7 @@ def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArr
         axis = 1
     frame = bvh.frames
     size = frame[0, CENTER + 3]
-    # As in `view_of`, of a point as far out as any of the origins.
+    # As in `view_of`, for a point as far from 0 as any of the origins.
     far_out = Vec3(
         max(abs(o_low.x), abs(o_high.x)),
         max(abs(o_low.y), abs(o_high.y)),
@@ -129,21 +133,21 @@ def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArr
     center = Vec3(frame[0, CENTER], frame[0, CENTER + 1], frame[0, CENTER + 2])
     o_low, o_high = o_low - center, o_high - center
     length = component(steep, axis)
-    together = together and SHORT <= length <= 1.0 / SHORT
+    is_coherent = is_coherent and SHORT <= length <= 1.0 / SHORT
     slope = (max(max_abs(o_low), max_abs(o_high)) + reach) / length
     widest = reach * min(1.0, NARROW / math.sqrt(len(bvh.references)))
     for k in range(3):
         low, high = component(d_low, k), component(d_high, k)
         width = component(o_high, k) - component(o_low, k) + (high - low) * slope
-        together = together and width <= widest and (low > 0.0 or high < 0.0 or low == high)
-        # Along `axis` no longer than what `scaled` leaves alone.
+        is_coherent = is_coherent and width <= widest and (low > 0.0 or high < 0.0 or low == high)
+        # Along `axis` within the range of lengths that `scaled` does not change.
         longest = max(abs(low), abs(high))
-        together = together and (longest <= 1.0 / SHORT if k == axis else longest < length)
+        is_coherent = is_coherent and (longest <= 1.0 / SHORT if k == axis else longest < length)
     x = _slab(o_low.x, o_high.x, d_low.x, d_high.x, error)
     y = _slab(o_low.y, o_high.y, d_low.y, d_high.y, error)
     z = _slab(o_low.z, o_high.z, d_low.z, d_high.z, error)
-    return Bundle(
-        together,
+    return RayPacket(
+        is_coherent,
         Vec3(x.near, y.near, z.near),
         Vec3(x.far, y.far, z.far),
         Vec3(x.least, y.least, z.least),
@@ -157,7 +161,7 @@ def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArr
 
 
 @kernel
-def _least(low: float, high: float) -> float:
+def _least_abs(low: float, high: float) -> float:
     """The smallest magnitude between two numbers of one sign."""
     return min(abs(low), abs(high))
 
@@ -172,8 +176,8 @@ class _Slab(NamedTuple):
 
 @kernel
 def _slab(o_low: float, o_high: float, d_low: float, d_high: float, error: float) -> _Slab:
-    """A component of `Bundle`.  Rounding is monotonic: what bounds the operands bounds the result.
-    Where all of d is 0 the inverse is inf, whatever the sign of the zeros."""
+    """One axis of `RayPacket`.  Rounding is monotonic: bounds of the operands give bounds of the
+    result.  Where d is 0 for all rays the inverse is inf, whatever the sign of the zeros."""
     if d_low < 0.0:
         return _Slab(o_low - error, o_high + error, 1.0 / d_low, reciprocal(d_high), -error)
     return _Slab(

@@ -1,4 +1,4 @@
-"""The closest hits of neighbouring rays that go through a hierarchy together."""
+"""Packet traversal: the closest hits of PACKET_SIZE coherent rays."""
 
 import math
 
@@ -6,14 +6,20 @@ from reference_rt.accel.bvh import NOTHING, Bvh, child_of
 from reference_rt.accel.geometry import STACK, Geometry
 from reference_rt.accel.leaf import nearest_of_leaf
 from reference_rt.accel.packet.nodes import (
-    OWN_FLOATS,
+    PER_RAY_FLOATS,
     enter_child,
     enter_together,
-    prepare_each,
+    prepare_rays,
     shear_in,
 )
-from reference_rt.accel.packet.packet import BUNDLE, SPAN_FLOATS, Bundle, are_alike, bundle_of
-from reference_rt.accel.single_ray import can_be_nearer
+from reference_rt.accel.packet.packet import (
+    BUNDLE,
+    SPAN_FLOATS,
+    RayPacket,
+    bundle_of,
+    may_be_coherent,
+)
+from reference_rt.accel.single_ray import can_be_nearer, push_sorted
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray, no_hit
 from reference_rt.core.ray_block import Hits, Rays, put_hit, put_ray
@@ -24,26 +30,27 @@ from reference_rt.jit.simd_kernels import lowest
 from reference_rt.shapes.instances import Instances
 from reference_rt.shapes.meshes.watertight import SEEN_FLOATS
 
-ALONE, MISSED, FOUND = -1, 0, 1
+INCOHERENT, MISSED, FOUND = -1, 0, 1
 
 
 @kernel
-def closest_together(
+def closest_of_packet(
     geometry: Geometry, o: FloatArray, d: FloatArray, begin: int, rays: Rays, hits: Hits
 ) -> int:
-    """`closest_hit` of the BUNDLE rays from origins o (n, 3) into directions d (n, 3) from number
-    `begin` on.
+    """`closest_hit` of the BUNDLE rays begin, begin + 1, ... with origins o (n, 3) and directions
+    d (n, 3).
 
-    ALONE: they are not coherent, or have no hierarchy to go through;  MISSED: none met anything;
-    FOUND: `hits` are those of `rays`, of which they are the first.
+    Returns INCOHERENT: nothing is done (they are not coherent, or the scene has no BVH or has
+    instances);  MISSED: no ray hits anything;  FOUND: the rays and their hits, some of them misses,
+    are the first ones of `rays` and `hits`.
     """
-    if not are_alike(row(d, begin), row(d, begin + BUNDLE - 1)):
-        return ALONE
-    return _closest_together(geometry.bvh, geometry.instances, geometry, o, d, begin, rays, hits)
+    if not may_be_coherent(row(d, begin), row(d, begin + BUNDLE - 1)):
+        return INCOHERENT
+    return _closest_of_packet(geometry.bvh, geometry.instances, geometry, o, d, begin, rays, hits)
 
 
 @kernel
-def _closest_together(
+def _closest_of_packet(
     bvh: Bvh | None,
     instances: Instances | None,
     geometry: Geometry,
@@ -54,9 +61,9 @@ def _closest_together(
     hits: Hits,
 ) -> int:
     if bvh is None:
-        return ALONE
-    if instances is not None:  # where rays have directions and origins of their own in each
-        return ALONE
+        return INCOHERENT
+    if instances is not None:  # each of which changes the rays' origins and directions
+        return INCOHERENT
     return _traverse(bvh, geometry, o, d, begin, rays, hits)
 
 
@@ -64,24 +71,24 @@ def _closest_together(
 def _traverse(
     bvh: Bvh, geometry: Geometry, o: FloatArray, d: FloatArray, begin: int, rays: Rays, hits: Hits
 ) -> int:
-    span, own = local_floats(SPAN_FLOATS), local_floats(OWN_FLOATS)
-    bundle = bundle_of(bvh, o, d, begin, span)
-    if not bundle.together:
-        return ALONE
+    span, per_ray = local_floats(SPAN_FLOATS), local_floats(PER_RAY_FLOATS)
+    packet = bundle_of(bvh, o, d, begin, span)
+    if not packet.is_coherent:
+        return INCOHERENT
     stack, waiting = local_integers(STACK), local_floats(STACK)
     distances, seen = local_floats(LANES), local_floats(SEEN_FLOATS)
     outcome, t_max = MISSED, math.inf
-    # Children are called by their places, node * LANES + lane, by which their boxes are found.
-    node, place, top = 0, -1, 0
+    # A child is identified by its slot, node * LANES + lane, which locates its box.
+    node, slot, top = 0, -1, 0
     unbounded = bvh.unbounded
     while True:
         while node >= 0:
-            met = enter_together(bvh, node, bundle, t_max, distances)
+            met = enter_together(bvh, node, packet, t_max, distances)
             if met == 0:
                 node = NOTHING
             else:
-                place, top = _nearest_place(node, met, distances, stack, waiting, top)
-                node = child_of(bvh, place // LANES, place % LANES)
+                slot, top = _nearest_slot(node, met, distances, stack, waiting, top)
+                node = child_of(bvh, slot // LANES, slot % LANES)
         if node != NOTHING:
             if outcome == MISSED:
                 outcome = FOUND
@@ -89,8 +96,8 @@ def _traverse(
                     ray = Ray(row(o, begin + j), row(d, begin + j), math.inf)
                     put_ray(rays, j, ray)
                     put_hit(hits, j, no_hit(ray))
-                prepare_each(bvh, bundle, rays, own)
-            if _nearest_of_leaf(bvh, geometry, node, place, bundle, rays, own, seen, hits):
+                prepare_rays(bvh, packet, rays, per_ray)
+            if _nearest_of_leaf(bvh, geometry, node, slot, packet, rays, per_ray, seen, hits):
                 t_max = 0.0
                 for j in range(BUNDLE):
                     t_max = max(t_max, hits.numbers[j])
@@ -98,8 +105,8 @@ def _traverse(
         while top > 0 and node == NOTHING:
             top -= 1
             if can_be_nearer(waiting[top], t_max):
-                place = stack[top]
-                node = child_of(bvh, place // LANES, place % LANES)
+                slot = stack[top]
+                node = child_of(bvh, slot // LANES, slot % LANES)
         if node == NOTHING:
             if unbounded < 0:
                 return outcome
@@ -111,32 +118,31 @@ def _nearest_of_leaf(
     bvh: Bvh,
     geometry: Geometry,
     leaf: int,
-    place: int,
-    bundle: Bundle,
+    slot: int,
+    packet: RayPacket,
     rays: Rays,
-    own: FloatArray,
+    per_ray: FloatArray,
     seen: FloatArray,
     hits: Hits,
 ) -> bool:
-    """Let each ray of a bundle that enters a leaf, the child at a place, find what is nearer there
-    than its hit so far; whether any did enter."""
+    """Updates the hits of the rays that enter a leaf, the child in `slot`; whether any enters."""
     any_entered = False
     for begin in range(0, BUNDLE, LANES):
-        entered = enter_child(bvh, place, bundle, begin, own, hits.numbers)
+        entered = enter_child(bvh, slot, packet, begin, per_ray, hits.numbers)
         while entered != 0:
             j = begin + lowest(entered)
             entered &= entered - 1
             any_entered = True
-            shear = shear_in(bundle, rays, j, own)
+            shear = shear_in(packet, rays, j, per_ray)
             nearest_of_leaf(bvh, geometry.shapes, geometry.solids, leaf, rays, j, shear, seen, hits)
     return any_entered
 
 
 @kernel
-def _nearest_place(
+def _nearest_slot(
     node: int, met: int, distances: FloatArray, stack: IntArray, waiting: FloatArray, top: int
 ) -> tuple[int, int]:
-    """As `traversal.nearest_child`, with children's places."""
+    """As `single_ray.nearest_child`, with slots in place of codes."""
     lane = lowest(met)
     nearest, t_nearest = node * LANES + lane, distances[lane]
     met &= met - 1
@@ -144,14 +150,9 @@ def _nearest_place(
     while met != 0:
         lane = lowest(met)
         met &= met - 1
-        place, t = node * LANES + lane, distances[lane]
+        slot, t = node * LANES + lane, distances[lane]
         if t < t_nearest:
-            place, nearest = nearest, place
+            slot, nearest = nearest, slot
             t, t_nearest = t_nearest, t
-        k = top
-        while k > bottom and waiting[k - 1] < t:
-            stack[k], waiting[k] = stack[k - 1], waiting[k - 1]
-            k -= 1
-        stack[k], waiting[k] = place, t
-        top += 1
+        top = push_sorted(stack, waiting, bottom, top, slot, t)
     return nearest, top

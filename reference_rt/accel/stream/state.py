@@ -1,4 +1,4 @@
-"""Rays of a block on their ways through a hierarchy: what is known of each, and who is where."""
+"""The state of a ray stream: each ray's constants, its node and stack, and the three queues."""
 
 from typing import Any, NamedTuple
 
@@ -16,31 +16,32 @@ from reference_rt.shapes.meshes.watertight import Shear
 
 Naturals = npt.NDArray[np.uint32]
 
-VIEW_FLOATS = 9 * BLOCK
+SLAB_FLOATS = 9 * BLOCK
 LEVELS = STACK_SIZE
-"""Most nodes of which children wait for one ray."""
+"""Entries of each ray's stack: nodes some of whose children are still to be visited."""
 
 
 @kernel
 def natural(numbers: Naturals, i: int) -> int:
-    """Number i, as other integers."""
+    """Element i, converted to the integers that kernels compute with."""
     number: int = np.int64(numbers[i])  # type: ignore[assignment]
     return number
 
 
-class Wave(NamedTuple):
-    """Rays on their ways, BLOCK of each number.
+class StreamState(NamedTuple):
+    """A stream of up to BLOCK rays, as SoA.
 
-    views (VIEW_FLOATS,): near, far and inverse of `traversal.View`;  axes (6 BLOCK,): its rows x,
-    y, z, and the axes x, y, z of `watertight.Shear`;  node, leaf (BLOCK,): where a ray is, a leaf
-    by -1 less its code;  nodes (LEVELS BLOCK,): of which children wait for it, `level` (BLOCK,) of
-    them;  queues (3 BLOCK,): rays at nodes, at leaves, and on their way back.
+    slab_rays (SLAB_FLOATS,): near, far and inverse of `single_ray.SlabRay`;  axes (6 BLOCK,): its
+    rows x, y, z, and the axes x, y, z of `watertight.Shear`;  node, leaf (BLOCK,): the inner node
+    or the leaf that a ray is at, a leaf as -1 - code;  nodes (LEVELS BLOCK,): each ray's stack of
+    nodes with children still to be visited;  level (BLOCK,): how many these are;  queues
+    (3 BLOCK,): the rays at an inner node, at a leaf, and about to pop their stack.
 
-    Numba asks of each index whether it is negative, but not of natural numbers: 6 % of the time
+    Integers are unsigned: for signed indices Numba tests whether they are negative, 6 % of the time
     (measured, with children's codes in one row).
     """
 
-    views: FloatArray
+    slab_rays: FloatArray
     axes: Naturals
     node: Naturals
     leaf: Naturals
@@ -50,31 +51,31 @@ class Wave(NamedTuple):
 
 
 class Lengths(NamedTuple):
-    """Of the queues."""
+    """The lengths of the three queues."""
 
     nodes: int
     leaves: int
-    back: int
+    pops: int
 
 
 @kernel
-def prepare(bvh: Bvh, wave: Wave, rays: Rays, n: int) -> None:
-    """What of the first n rays does not change on their ways."""
+def prepare(bvh: Bvh, state: StreamState, rays: Rays, n: int) -> None:
+    """Computes what stays the same during the traversal of the first n rays: slab_rays and axes."""
     frame = bvh.frames
     for j in range(0, n, LANES):
-        _look(
+        _prepare_slab_rays(
             rays.numbers,
             j,
             frame[0, CENTER],
             frame[0, CENTER + 1],
             frame[0, CENTER + 2],
             3.0 * frame[0, CENTER + 3],
-            wave.views,
+            state.slab_rays,
         )
     for j in range(n):
         for axis in range(3):
-            is_forward = wave.views[(6 + axis) * BLOCK + j] > 0.0
-            wave.axes[axis * BLOCK + j] = axis + 3 - 3 * is_forward
+            is_forward = state.slab_rays[(6 + axis) * BLOCK + j] > 0.0
+            state.axes[axis * BLOCK + j] = axis + 3 - 3 * is_forward
         # As `watertight.shear_of`, without branches.
         d = ray_of(rays, j).d
         x_is = (abs(d.x) >= abs(d.y)) & (abs(d.x) >= abs(d.z))
@@ -82,16 +83,16 @@ def prepare(bvh: Bvh, wave: Wave, rays: Rays, n: int) -> None:
         first = z + 1 - 3 * (z == 2)
         second = 3 - z - first
         swap = (second - first) * (rays.numbers[(3 + z) * BLOCK + j] < 0.0)
-        wave.axes[3 * BLOCK + j] = first + swap
-        wave.axes[4 * BLOCK + j] = second - swap
-        wave.axes[5 * BLOCK + j] = z
+        state.axes[3 * BLOCK + j] = first + swap
+        state.axes[4 * BLOCK + j] = second - swap
+        state.axes[5 * BLOCK + j] = z
 
 
 @lane_kernel
-def _look(
-    rays: Any, j: Any, center_x: Any, center_y: Any, center_z: Any, extent: Any, views: Any
+def _prepare_slab_rays(
+    rays: Any, j: Any, center_x: Any, center_y: Any, center_z: Any, extent: Any, slab_rays: Any
 ) -> Any:
-    """`traversal.view_of` LANES rays from number j on, but for the rows;  extent: 3 times the
+    """`single_ray.view_of` the rays j to j + LANES - 1, without the rows;  extent: 3 times the
     tree's size."""
     o = [rays.load(j + axis * BLOCK) for axis in range(3)]
     far_out = larger(larger(abs(o[0]), abs(o[1])), abs(o[2]))
@@ -99,27 +100,27 @@ def _look(
     for axis, center in enumerate((center_x, center_y, center_z)):
         inverse = 1.0 / rays.load(j + (3 + axis) * BLOCK)
         moved = with_sign(error, inverse)
-        views.store(j + axis * BLOCK, o[axis] - center + moved)
-        views.store(j + (3 + axis) * BLOCK, o[axis] - center - moved)
-        views.store(j + (6 + axis) * BLOCK, inverse)
+        slab_rays.store(j + axis * BLOCK, o[axis] - center + moved)
+        slab_rays.store(j + (3 + axis) * BLOCK, o[axis] - center - moved)
+        slab_rays.store(j + (6 + axis) * BLOCK, inverse)
     return error >= 0.0
 
 
 @kernel
-def begin_at(wave: Wave, hits: Hits, root: int, n: int, any_hit: bool) -> Lengths:
-    """All rays stand before a root; where `any_hit`, those that have not met anything."""
+def start_at_root(state: StreamState, hits: Hits, root: int, n: int, any_hit: bool) -> Lengths:
+    """Queues all rays at a root; with `any_hit` only those without a hit so far."""
     count = 0
     for j in range(n):
-        wave.node[j], wave.level[j] = root, 0
-        wave.queues[count & (BLOCK - 1)] = j
+        state.node[j], state.level[j] = root, 0
+        state.queues[count & (BLOCK - 1)] = j
         count += not (any_hit and hits.codes[j] >= 0)
     return Lengths(count, 0, 0)
 
 
 @kernel
-def shear_in(wave: Wave, rays: Rays, j: int) -> Shear:
+def shear_in(state: StreamState, rays: Rays, j: int) -> Shear:
     """`watertight.shear_of` ray j."""
-    numbers, axes = rays.numbers, wave.axes
+    numbers, axes = rays.numbers, state.axes
     x, y = natural(axes, 3 * BLOCK + j), natural(axes, 4 * BLOCK + j)
     z = natural(axes, 5 * BLOCK + j)
     d_z = numbers[(3 + z) * BLOCK + j]
@@ -136,36 +137,37 @@ def shear_in(wave: Wave, rays: Rays, j: int) -> Shear:
     )
 
 
-def view_in(views: Any, axes: Any, j: Any) -> Any:
-    """That of ray j, as `between` takes it."""
+def slab_ray_in(slab_rays: Any, axes: Any, j: Any) -> Any:
+    """Ray j as `single_ray.slab_test` takes it."""
     return [
         (
             axes.natural(j + axis * BLOCK),
-            views.everywhere(j + axis * BLOCK),
-            views.everywhere(j + (3 + axis) * BLOCK),
-            views.everywhere(j + (6 + axis) * BLOCK),
+            slab_rays.everywhere(j + axis * BLOCK),
+            slab_rays.everywhere(j + (3 + axis) * BLOCK),
+            slab_rays.everywhere(j + (6 + axis) * BLOCK),
         )
         for axis in range(3)
     ]
 
 
 @kernel
-def queued(
-    bvh: Bvh, wave: Wave, j: int, code: int, met: int, level: int, lengths: Lengths
+def enqueue(
+    bvh: Bvh, state: StreamState, j: int, code: int, met: int, level: int, lengths: Lengths
 ) -> Lengths:
-    """Ray j goes to the child of a code, or, where none was met, back, if children wait for it at
-    any level; else it is done."""
-    node, nodes, leaves, back = max(code, 0), lengths.nodes, lengths.leaves, lengths.back
-    wave.node[j], wave.leaf[j] = node, max(-1 - code, 0)
+    """Moves ray j to the child `code`, an inner node or a leaf; where no child was entered (met is
+    0), to the pop queue if its stack is not empty; else the ray is done."""
+    node, nodes, leaves, pops = max(code, 0), lengths.nodes, lengths.leaves, lengths.pops
+    state.node[j], state.leaf[j] = node, max(-1 - code, 0)
     for line in range(4):
         prefetch(bvh.boxes, node * NODE_SINGLES + 16 * line)
-    # Into all three queues, of which one grows at most; the masks tell that no index is negative.
-    wave.queues[nodes & (BLOCK - 1)] = j
-    wave.queues[BLOCK + (leaves & (BLOCK - 1))] = j
-    wave.queues[2 * BLOCK + (back & (BLOCK - 1))] = j
+    # Written to all three queues, of which at most one grows: no branch.  The masks show Numba that
+    # no index is negative.
+    state.queues[nodes & (BLOCK - 1)] = j
+    state.queues[BLOCK + (leaves & (BLOCK - 1))] = j
+    state.queues[2 * BLOCK + (pops & (BLOCK - 1))] = j
     is_met = met != 0
     return Lengths(
         nodes + (is_met & (code >= 0)),
         leaves + (is_met & (code < 0)),
-        back + ((met == 0) & (level > 0)),
+        pops + ((met == 0) & (level > 0)),
     )

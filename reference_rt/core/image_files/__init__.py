@@ -1,7 +1,13 @@
-"""Image files: `open_image` reads the header of one and tells which kind it is; one module a kind.
+"""Reading image files: `open_image` detects the format and reads the header; one module per format.
 
-Bitmaps, environment maps and the gate read with these.  A kind is told by how a file begins, not by
-its name.
+Bitmap textures, environment maps and the image gate read with these.  The format is detected by a
+file's first bytes, not by its name.  A format's `open_*` function returns an `ImageFile` with size
+and properties; its `strips` yields the pixels, float64, a few rows at a time.  Invalid files raise
+ValueError (what is wrong; what was expected) without the path, which callers add; files that cannot
+be opened raise OSError.
+
+To add a format: a module with a subclass of `ImageFile` and an `open_*` function; its first bytes
+in `_BEGINNINGS`; a test with files of it.
 """
 
 from pathlib import Path
@@ -26,10 +32,10 @@ _BEGINNINGS = (
 
 
 def open_image(path: Path, layer: str = "") -> ImageFile:
-    """The image in a file: its size, and its pixels to come.
+    """The image in a file, of which only the header has been read.
 
-    layer: of an EXR file, the prefix of its channels' names.  Raises ValueError (what is wrong,
-    what was expected) and OSError.
+    layer: the prefix of the channels' names of an EXR file.  Raises ValueError (what is wrong, what
+    was expected) and OSError.
     """
     with open_input(path) as file:
         start = file.read(16)

@@ -1,4 +1,4 @@
-"""OpenEXR images: half or float channels R, G, B, or Y."""
+"""OpenEXR images: half, float or integer channels R, G, B, or Y."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,8 +13,9 @@ from reference_rt.core.image_files.image_file import Curve, ImageFile, Strip, as
 
 @dataclass(frozen=True)
 class ExrFile(ImageFile):
-    """names: of the channels for red, green and blue, and of the one for opacity;  channels: of all
-    in the file;  windows: the corners (x0, y0, x1, y1) of its pixels, and of what is displayed."""
+    """names: the channels for red, green, blue and, where there is one, opacity;  channels: the
+    number of all channels in the file;  windows: corners (x0, y0, x1, y1) of the data window and of
+    the display window."""
 
     names: tuple[str, ...] = ()
     channels: int = 0
@@ -35,8 +36,8 @@ class ExrFile(ImageFile):
             colours = colours if curve is None else curve(colours)
             yield Strip(rows, colours, found[3] if len(found) > 3 else None)
             del found, colours
-            # What has been read is given back: of float32 all planes and the values made of them
-            # would be 36 bytes a pixel.
+            # Frees the rows that have been converted: float32 planes and their float64 values
+            # together would take 36 bytes per pixel.
             for plane in wanted.values():
                 if plane.flags.owndata:
                     plane.resize((rows.start, self.width), refcheck=False)

@@ -1,4 +1,4 @@
-"""Radiance pictures, .hdr and .pic (Ward 1991, "Real pixels"): three mantissas, one exponent."""
+"""Radiance RGBE images, .hdr and .pic (Ward 1991, "Real pixels"): three mantissas, one exponent."""
 
 import math
 import os
@@ -15,7 +15,7 @@ from reference_rt.core.image_files.image_file import Curve, ImageFile, Strip, ch
 from reference_rt.util.files import open_input
 
 _HEADER = 4096
-"""Bytes that a header may take: it is searched for its end, and no further."""
+"""The most bytes of a header: its end is searched for in these alone."""
 
 _SIZE = re.compile(rb"([-+])Y (\d{1,9}) ([-+])X (\d{1,9})\n")
 
@@ -24,10 +24,10 @@ _SIZE = re.compile(rb"([-+])Y (\d{1,9}) ([-+])X (\d{1,9})\n")
 class HdrFile(ImageFile):
     """Values are radiance: EXPOSURE and COLORCORR of the header are undone.
 
-    A mantissa m stands for the middle of its interval, m + 1/2, as in Radiance itself, since its
-    writers round down; 0 stands for 0.  start: of the pixels, in bytes;  exposure: (3,), by what
-    the values were multiplied before they were written;  flips: whether rows go upwards, and
-    whether pixels go leftwards.
+    A mantissa m is decoded as the middle of its interval, m + 1/2, as in Radiance itself, whose
+    writers round down; 0 is 0.  start: byte offset of the pixels;  exposure: (3,), the factors by
+    which the values were multiplied before they were written;  flips: whether rows run upwards, and
+    whether pixels run leftwards.
     """
 
     start: int = 0
@@ -83,7 +83,7 @@ def open_hdr(path: Path) -> ImageFile:
 
 
 def _radiance(rgbe: npt.NDArray[np.uint8]) -> FloatArray:
-    """(rows, width, 3) of mantissas and exponents (rows, width, 4)."""
+    """(rows, width, 3) radiance from mantissas and exponents (rows, width, 4)."""
     mantissa = rgbe[..., :3].astype(np.float64)
     mantissa[mantissa > 0.0] += 0.5
     power = np.ldexp(1.0, rgbe[..., 3:].astype(np.int64) - 136)
@@ -91,7 +91,7 @@ def _radiance(rgbe: npt.NDArray[np.uint8]) -> FloatArray:
 
 
 def _exposure(lines: list[str]) -> tuple[float, ...]:
-    """By what each of three channels was multiplied before it was written."""
+    """The factors by which the three channels were multiplied before they were written."""
     found = np.ones(3)
     kind = ""
     for line in lines:
@@ -114,8 +114,8 @@ def _exposure(lines: list[str]) -> tuple[float, ...]:
 def _runs(
     data: bytes, at: int, width: int, first: int, count: int
 ) -> tuple[npt.NDArray[np.uint8], int]:
-    """(count, width, 4) from scanlines that are run-length encoded channel by channel, and where
-    the next one begins; `first` is the number of the first, for errors."""
+    """Decodes `count` scanlines, run-length encoded channel by channel: (count, width, 4), and the
+    offset of the next one.  `first`: the first one's row number, for errors."""
     out = bytearray()
     mark = b"\x02\x02" + width.to_bytes(2, "big")
     for y in range(first, first + count):

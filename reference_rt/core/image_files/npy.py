@@ -1,4 +1,4 @@
-"""Arrays of floats in NumPy files, .npy."""
+"""NumPy files, .npy, with arrays of floats."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from reference_rt.util.files import open_input
 
 @dataclass(frozen=True)
 class NpyFile(ImageFile):
-    """array: (height, width), or that by 3 or 4 channels, of which the last is opacity; mapped."""
+    """array: memory-mapped, (height, width), or with 3 or 4 channels, the fourth being opacity."""
 
     array: Any = None
 
@@ -23,7 +23,7 @@ class NpyFile(ImageFile):
             for rows in self.row_ranges():
                 found = self.array[rows]
                 if self.array.flags.c_contiguous:
-                    # Read rather than mapped, so that what is done with does not stay in memory.
+                    # Read rather than mapped: rows that are done do not stay in memory.
                     file.seek(self.array.offset + rows.start * self.array.strides[0])
                     found = np.fromfile(file, found.dtype, found.size).reshape(found.shape)
                 opacity = as_float64(found[..., 3]) if self.has_opacity and with_opacity else None
@@ -46,14 +46,14 @@ def open_npy(path: Path) -> ImageFile:
 
 
 def map_npy(path: Path) -> npt.NDArray[Any]:
-    """The array in a file, of floats and any shape; nothing is read of it yet.  Raises ValueError
-    (what is wrong, what was expected), OSError."""
+    """The array of floats, of any shape, in a file, memory-mapped.  Raises ValueError (what is
+    wrong, what was expected), OSError."""
     open_input(path).close()  # not a pipe, which could not be mapped
     try:
         mapped: npt.NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError:
         raise
-    except Exception as error:  # its parser raises what Python's does
+    except Exception as error:  # its parser is Python's, with any of its exceptions
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(f"cannot be read as NPY: {reason}; expected an array of floats") from None
     if mapped.dtype.kind != "f":

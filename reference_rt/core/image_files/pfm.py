@@ -1,4 +1,4 @@
-"""Portable Float Maps, .pfm: float32, grey or in colour, in either order of bytes."""
+"""Portable Float Maps, .pfm: float32, grey or colour, of either byte order."""
 
 import math
 import os
@@ -19,14 +19,14 @@ from reference_rt.core.image_files.image_file import (
 from reference_rt.util.files import open_input
 
 _HEADER = 4096
-"""Bytes that a header may take: it is searched for its end, and no further."""
+"""The most bytes of a header: its end is searched for in these alone."""
 
 _PATTERN = re.compile(rb"P([Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,32})\s")
 
 
 @dataclass(frozen=True)
 class PfmFile(ImageFile):
-    """start: of the pixels, in bytes;  kind: of a number;  channels: 1 or 3."""
+    """start: byte offset of the pixels;  kind: NumPy's type of a number;  channels: 1 or 3."""
 
     start: int = 0
     kind: str = "<f4"
@@ -36,7 +36,7 @@ class PfmFile(ImageFile):
         row = self.width * self.channels
         with open_input(self.path) as file:
             for rows in self.row_ranges():
-                # Written from the bottom up.
+                # The file stores rows from the bottom up.
                 file.seek(self.start + 4 * row * (self.height - rows.stop))
                 values = np.fromfile(file, self.kind, row * (rows.stop - rows.start))
                 shape = (rows.stop - rows.start, self.width, self.channels)
@@ -62,7 +62,7 @@ def open_pfm(path: Path) -> ImageFile:
             f"has the scale {match[4].decode()}, which readers do not agree upon; expected 1 "
             "(big-endian) or -1 (little-endian)"
         )
-    if min(width, height) > 0:  # without pixels is refused for that
+    if min(width, height) > 0:  # `open_image` refuses images without pixels
         check_length(size - match.end(), width * height * channels * 4)
     kind = "<f4" if scale < 0.0 else ">f4"
     return PfmFile(path, width, height, start=match.end(), kind=kind, channels=channels)

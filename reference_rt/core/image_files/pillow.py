@@ -1,4 +1,4 @@
-"""What Pillow reads: PNG, JPEG, TIFF, WebP and many more; the first picture of several."""
+"""Images read by Pillow: PNG, JPEG, TIFF, WebP and many more; of several frames the first."""
 
 import logging
 import struct
@@ -24,8 +24,8 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class PillowFile(ImageFile):
-    """mode: Pillow's, of what it makes of the pixels;  packed: how it takes them for packed in a
-    PNG file;  gamma: in the header of a PNG file that does not call itself sRGB, else None."""
+    """mode: Pillow's mode of the decoded image;  packed: Pillow's raw mode, the layout of pixels in
+    a PNG file;  gamma: from the header of a PNG file that is not marked sRGB, else None."""
 
     mode: str = "RGB"
     packed: str = ""
@@ -52,11 +52,11 @@ class PillowFile(ImageFile):
                 yield Strip(rows, values[codes[..., :3]], opacity)
 
     def _deep_strips(self, values: FloatArray, with_opacity: bool) -> Iterator[Strip]:
-        """Of a PNG file with 16 bits in each of several channels.
+        """The strips of a PNG file with several channels of 16 bits.
 
-        Of these, Pillow unpacks the high byte.  Told to take them for little-endian it unpacks the
-        low byte: two readings together are all 16 bits.  Of grey with opacity it unpacks all four
-        bytes when told that these are four channels.
+        Pillow decodes only the high byte of each.  With the raw mode set to little-endian it
+        decodes the low byte: two passes give all 16 bits.  For grey with opacity the raw mode RGBA
+        makes it decode all four bytes as four channels.
         """
         if self.packed.startswith("LA"):
             image = _decoded(self.path, "RGBA")
@@ -118,11 +118,11 @@ def _opened(path: Path) -> Iterator[Any]:
     """Pillow's image, of which only the header has been read.  Raises ValueError, OSError."""
     from PIL import Image, UnidentifiedImageError
 
-    # What Pillow logs of a damaged file would stand beside the one line of the error.
+    # Without a handler, what Pillow logs about a damaged file would appear beside our error.
     logging.getLogger("PIL").addHandler(_SILENT)
     most = Image.MAX_IMAGE_PIXELS
     try:
-        # Its limit is a constant; ours, of those who open a file, is the machine's memory.
+        # Pillow's limit is a constant; the callers' limit is the machine's memory.
         Image.MAX_IMAGE_PIXELS = None
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of odd metadata
@@ -137,7 +137,7 @@ def _opened(path: Path) -> Iterator[Any]:
         raise ValueError(
             message if "; expected" in message else _unreadable(message, error)
         ) from None
-    except Exception as error:  # decoders raise what they like at rubbish
+    except Exception as error:  # decoders raise anything for invalid data
         raise ValueError(_unreadable(str(error), error)) from None
     finally:
         Image.MAX_IMAGE_PIXELS = most
@@ -149,7 +149,7 @@ def _unreadable(message: str, error: Exception) -> str:
 
 
 def _decoded(path: Path, packed: str | None = None) -> Any:
-    """Pillow's image with its pixels, taken for `packed` in the file.  Raises ValueError,
+    """Pillow's image with its pixels, decoded with the raw mode `packed`.  Raises ValueError,
     OSError."""
     with _opened(path) as image:
         if packed is not None:

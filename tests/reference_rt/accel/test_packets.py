@@ -38,7 +38,7 @@ def _alone(geometry, o, d, t, codes, uv):
 def _go_together(bvh, o, d, together):
     span = local_floats(SPAN_FLOATS)
     for i in range(len(together)):
-        together[i] = bundle_of(bvh, o, d, i * BUNDLE, span).together
+        together[i] = bundle_of(bvh, o, d, i * BUNDLE, span).is_coherent
 
 
 @entry_kernel
@@ -46,7 +46,7 @@ def _entered(bvh, o, d, together, for_all, for_each, distances):
     """The children of each node that a bundle enters, and those that its rays enter."""
     span, own = local_floats(SPAN_FLOATS), local_floats(LANES)
     bundle = bundle_of(bvh, o, d, 0, span)
-    together[0] = bundle.together
+    together[0] = bundle.is_coherent
     for node in range(len(for_all)):
         for_all[node] = enter_together(bvh, node, bundle, math.inf, own)
         for lane in range(LANES):
