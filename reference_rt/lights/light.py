@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from reference_rt.core.ray import Ray, SurfacePoint, ray_from, segment_to
-from reference_rt.core.vec3 import Vec3
+from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import kernel
 
 # Codes of `Lights.kind`.
@@ -32,6 +32,20 @@ class LightSample(NamedTuple):
 def no_light() -> LightSample:
     zero = Vec3(0.0, 0.0, 0.0)
     return LightSample(zero, zero, 0.0, zero, 0.0, False)
+
+
+@kernel
+def from_position(position: Vec3, intensity: Vec3, falloff: float, p: Vec3) -> LightSample:
+    """A light at one point: the fraction `falloff` of its intensity goes towards `p`, where
+    intensity / distance² arrives (the inverse square law)."""
+    w = position - p
+    distance2 = dot(w, w)
+    if distance2 == 0.0:
+        return no_light()  # no direction leads there
+    distance = math.sqrt(distance2)
+    pdf = 1.0 if falloff > 0.0 else 0.0
+    radiance = intensity * (falloff / distance2)
+    return LightSample(w * (1.0 / distance), radiance, pdf, position, distance, True)
 
 
 @kernel

@@ -10,7 +10,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Colour, Description, Vector
 from reference_rt.core.vec3 import Vec3, cross, dot, length, luminance, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.light import LightSample, no_light
+from reference_rt.lights.light import LightSample, from_position
 
 
 class Spot(Description):
@@ -80,17 +80,10 @@ def falloff(spots: Spots, i: int, w: Vec3) -> float:
 
 @kernel
 def sample(spots: Spots, i: int, p: Vec3) -> LightSample:
-    """The one direction; intensity / distance² arrives, as from a point light."""
-    target = row(spots.position, i)
-    w = target - p
-    distance2 = dot(w, w)
-    if distance2 == 0.0:
-        return no_light()  # no direction leads there
-    distance = math.sqrt(distance2)
-    shining = falloff(spots, i, -w)
-    radiance = row(spots.intensity, i) * (shining / distance2)
-    pdf = 1.0 if shining > 0.0 else 0.0
-    return LightSample(w * (1.0 / distance), radiance, pdf, target, distance, True)
+    """The one direction to the light: see `from_position`."""
+    position = row(spots.position, i)
+    shining = falloff(spots, i, -(position - p))
+    return from_position(position, row(spots.intensity, i), shining, p)
 
 
 def power(spots: Spots, scene_radius: float) -> FloatArray:

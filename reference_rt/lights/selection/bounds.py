@@ -16,7 +16,7 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.lights.emitters.point import Points
 from reference_rt.lights.emitters.spot import Spots
 from reference_rt.shapes import DISK, RECTANGLE, TABLES, TRIANGLE, Shapes
-from reference_rt.shapes.meshes.triangle import geometric_normals
+from reference_rt.shapes.meshes.triangle_table import geometric_normals
 
 
 class LightBounds(NamedTuple):

@@ -30,6 +30,7 @@ from reference_rt.materials.material import (
     Branches,
     BsdfSample,
     Material,
+    Scattered,
     no_branches,
     no_sample,
     reflection,
@@ -131,40 +132,26 @@ def _shares(phongs: Phongs, i: int, at: At) -> Shares:
 
 
 @kernel
-def _half(wo: Vec3, wi: Vec3) -> Vec3:
-    """The half vector of two directions above the surface."""
-    return normalize(wo + wi)
+def both(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """f(wo, wi) cos wi, and the density of `sample`, both without the mirrored direction.
 
-
-@kernel
-def evaluate(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi, without the mirror."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    half_vector = phongs.half_vector[i] != 0
-    cosine = _half(wo, wi).z if half_vector else dot(wo, Vec3(-wi.x, -wi.y, wi.z))
-    highlight = power(min(cosine, 1.0), phongs.exponent[i])
-    k_d, k_s = colour_at(phongs.diffuse, i, at), colour_at(phongs.specular, i, at)
-    return k_d * wi.z + k_s * highlight
-
-
-@kernel
-def pdf(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle, without the mirrored direction.
-
-    Around the mirrored direction (p + 1) / (2 pi) (e·r)^p; with half vectors
-    (p + 1) / (2 pi) (h·n)^p dh/dwi, and dh/dwi = 1 / (4 wo·h).
+    The lobe's density is (p + 1) / (2 pi) (e·r)^p around the mirrored direction; with half vectors
+    it is (p + 1) / (2 pi) (h·n)^p dh/dwi, and dh/dwi = 1 / (4 wo·h).
     """
     if wo.z <= 0.0 or wi.z <= 0.0:
-        return 0.0
-    shares = _shares(phongs, i, at)
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
     p = float(phongs.exponent[i])
     if phongs.half_vector[i] != 0:
-        h = _half(wo, wi)
-        lobe = power(min(h.z, 1.0), p) / (4.0 * dot(wo, h))
+        h = normalize(wo + wi)
+        highlight = power(min(h.z, 1.0), p)
+        lobe = highlight / (4.0 * dot(wo, h))
     else:
-        lobe = power(min(dot(wo, Vec3(-wi.x, -wi.y, wi.z)), 1.0), p)
-    return shares.diffuse * (wi.z * INV_PI) + shares.specular * lobe * (p + 1.0) * (0.5 * INV_PI)
+        highlight = power(min(dot(wo, Vec3(-wi.x, -wi.y, wi.z)), 1.0), p)
+        lobe = highlight
+    k_d, k_s = colour_at(phongs.diffuse, i, at), colour_at(phongs.specular, i, at)
+    shares = _shares(phongs, i, at)
+    density = shares.diffuse * (wi.z * INV_PI) + shares.specular * lobe * (p + 1.0) * (0.5 * INV_PI)
+    return Scattered(k_d * wi.z + k_s * highlight, density)
 
 
 @kernel
@@ -199,10 +186,10 @@ def sample(
             wi = to_world(frame_from_normal(mirrored), lobe)
     else:
         wi = cosine_hemisphere(u0, u1)
-    density = pdf(phongs, i, at, wo, wi)
+    value, density = both(phongs, i, at, wo, wi)
     if not density > 0.0:
         return no_sample()
-    weight = evaluate(phongs, i, at, wo, wi) * (1.0 / density)
+    weight = value * (1.0 / density)
     return BsdfSample(wi, weight, density, 1.0, False)
 
 

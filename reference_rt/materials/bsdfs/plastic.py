@@ -17,44 +17,31 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, max_component
 from reference_rt.jit.kernel import kernel
+from reference_rt.materials.bsdfs.coated import Coated, base_albedo
 from reference_rt.materials.material import (
     INV_PI,
     Branches,
     BsdfSample,
-    Material,
+    Scattered,
     no_branches,
     no_sample,
     reflection,
 )
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
 from reference_rt.sampling.warp import cosine_hemisphere
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class Plastic(Material):
+class Plastic(Coated):
     """A diffuse base under a smooth clear coat; its back is black."""
 
-    smooth: ClassVar[bool] = True
     delta: ClassVar[bool] = True
     type: Literal["plastic"] = "plastic"
-    reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
-    """Of the base."""
-    specular: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
-    interior_ior: Positive = 1.5
-    """Index of refraction of the coat."""
-    exterior_ior: Positive = 1.0
-    """Index of refraction around it."""
     nonlinear: bool = False
     """Whether the base colours the light at every bounce, so that colours saturate; otherwise
     `reflectance` is what the base looks like under its coat."""
-
-    @property
-    def colour(self) -> tuple[float, float, float] | str:
-        return self.reflectance
 
     def tabulate(self, palette: Palette) -> "Plastics":
         eta = relative_index(self.interior_ior, self.exterior_ior)
@@ -121,14 +108,7 @@ def _shares(plastics: Plastics, i: int, at: At, wo: Vec3) -> Shares:
     coat = fresnel(wo.z, plastics.eta[i])
     f_o, t_o = coat.reflectance, coat.transmittance
     f_int = plastics.f_int[i]
-    rho = colour_at(plastics.reflectance, i, at)
-    base = rho * (1.0 / (1.0 - f_int))
-    if plastics.nonlinear[i] != 0:
-        base = Vec3(
-            rho.x / (1.0 - rho.x * f_int),
-            rho.y / (1.0 - rho.y * f_int),
-            rho.z / (1.0 - rho.z * f_int),
-        )
+    base = base_albedo(colour_at(plastics.reflectance, i, at), f_int, plastics.nonlinear[i])
     specular = colour_at(plastics.specular, i, at)
     s = f_o * max_component(specular)
     d = t_o * (1.0 - f_int) * max_component(base)
@@ -144,19 +124,13 @@ def _diffuse(plastics: Plastics, i: int, shares: Shares, wi: Vec3) -> Vec3:
 
 
 @kernel
-def evaluate(plastics: Plastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi, without the mirrored light."""
+def both(plastics: Plastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """f(wo, wi) cos wi, and the density of `sample`, both without the mirrored direction."""
     if wo.z <= 0.0 or wi.z <= 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    return _diffuse(plastics, i, _shares(plastics, i, at, wo), wi)
-
-
-@kernel
-def pdf(plastics: Plastics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle, without the mirrored direction."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return 0.0
-    return (1.0 - _shares(plastics, i, at, wo).p) * (wi.z * INV_PI)
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    shares = _shares(plastics, i, at, wo)
+    density = (1.0 - shares.p) * (wi.z * INV_PI)
+    return Scattered(_diffuse(plastics, i, shares, wi), density)
 
 
 @kernel

@@ -242,7 +242,7 @@ def _scattered(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
 
 @kernel
 def both(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`."""
+    """f(wo, wi) |cos wi|, and the density of `sample`."""
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
@@ -251,18 +251,6 @@ def both(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     if side < 0.0 and s.transmitting == 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), density)
     return Scattered(value, density)
-
-
-@kernel
-def evaluate(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi|."""
-    return both(table, i, at, wo, wi).value
-
-
-@kernel
-def pdf(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle."""
-    return both(table, i, at, wo, wi).density
 
 
 @kernel

@@ -14,15 +14,14 @@ inside 1 %, 10 % and 58 %.
 import math
 from typing import ClassVar, Literal, NamedTuple
 
-import numpy as np
 from pydantic import model_validator
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.material import BsdfSample, Material, Scattered, no_sample
-from reference_rt.materials.microfacet.fresnel import Refraction, fresnel, relative_index
+from reference_rt.materials.bsdfs.transparent import Transparent
+from reference_rt.materials.material import BsdfSample, Scattered, no_sample
+from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
 from reference_rt.materials.microfacet.ggx_and_smith import (
     AlphaParameter,
     Distribution,
@@ -40,22 +39,14 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     sample_visible,
     visible_density,
 )
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class RoughDielectric(Material):
+class RoughDielectric(Transparent):
     """A rough boundary of two transparent media; the normal points to the exterior."""
 
     smooth: ClassVar[bool] = True
     type: Literal["rough_dielectric"] = "rough_dielectric"
-    interior_ior: Positive = 1.5
-    """Index of refraction behind the normal."""
-    exterior_ior: Positive = 1.0
-    """Index of refraction on the normal's side."""
-    reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
-    transmittance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the refracted light is multiplied with."""
     distribution: Distribution = "ggx"
     alpha: AlphaParameter = (0.1, 0.1)
 
@@ -70,23 +61,13 @@ class RoughDielectric(Material):
         return self
 
     @property
-    def colour(self) -> tuple[float, float, float] | str:
-        return self.transmittance
-
-    @property
     def oriented(self) -> bool:
         return is_anisotropic(self.alpha)
 
-    @property
-    def transmits(self) -> bool:
-        return True
-
     def tabulate(self, palette: Palette) -> "RoughDielectrics":
         return RoughDielectrics(
-            np.array([relative_index(self.interior_ior, self.exterior_ior)]),
-            palette.colours(self.reflectance),
-            palette.colours(self.transmittance),
-            roughnesses(self.distribution, self.alpha, palette),
+            **self.columns(palette),
+            roughness=roughnesses(self.distribution, self.alpha, palette),
         )
 
 
@@ -140,7 +121,7 @@ def _mirrored_density(m: Microfacets, wo: Vec3, h: Vec3) -> float:
 
 @kernel
 def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`."""
+    """f(wo, wi) |cos wi|, and the density of `sample`."""
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
@@ -161,18 +142,6 @@ def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> S
     value = facet.refracted * (normals * found.spread * shown)
     eta = n if side > 0.0 else 1.0 / n
     return Scattered(value, facet.passing * seen * normals * found.spread * (eta * eta))
-
-
-@kernel
-def evaluate(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi|."""
-    return both(dielectrics, i, at, wo, wi).value
-
-
-@kernel
-def pdf(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle."""
-    return both(dielectrics, i, at, wo, wi).density
 
 
 @kernel

@@ -18,16 +18,16 @@ alpha = 0.05 and 0.3).
 """
 
 import math
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
+from reference_rt.materials.bsdfs.coated import Coated, base_albedo
+from reference_rt.materials.material import INV_PI, BsdfSample, Scattered, no_sample
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import (
     MAX_ALPHA,
@@ -44,7 +44,7 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     sample_visible,
 )
 from reference_rt.sampling.warp import cosine_hemisphere
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.textures import At, Colours, Palette, colour_at
 
 _NODES = 128
 
@@ -54,28 +54,13 @@ _LEAST_MIRRORED = 1e-3
 """What counts as mirrored when lobes are chosen: more than T is off by."""
 
 
-class RoughPlastic(Material):
+class RoughPlastic(Coated):
     """A diffuse base under a rough clear coat; its back is black."""
 
-    smooth: ClassVar[bool] = True
     type: Literal["rough_plastic"] = "rough_plastic"
-    reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
-    """Of the base."""
-    specular: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
-    interior_ior: Positive = 1.5
-    """Index of refraction of the coat."""
-    exterior_ior: Positive = 1.0
-    """Index of refraction around it."""
-    nonlinear: bool = False
-    """Whether the base colours the light at every bounce, so that colours saturate."""
     distribution: Distribution = "ggx"
     alpha: float = Field(default=0.1, gt=0.0, le=MAX_ALPHA)
     """Roughness, the same in all directions; below MIN_ALPHA it counts as that."""
-
-    @property
-    def colour(self) -> tuple[float, float, float] | str:
-        return self.reflectance
 
     def tabulate(self, palette: Palette) -> "RoughPlastics":
         eta = relative_index(self.interior_ior, self.exterior_ior)
@@ -176,14 +161,7 @@ class _Lobes(NamedTuple):
 def _lobes(plastics: RoughPlastics, i: int, at: At, wo: Vec3) -> _Lobes:
     """They are drawn in proportion to the power of their brightest channel."""
     t_o, r_int = _passing(plastics, i, min(1.0, wo.z)), plastics.r_int[i]
-    rho = colour_at(plastics.reflectance, i, at)
-    base = rho * (1.0 / (1.0 - r_int))
-    if plastics.nonlinear[i] != 0:
-        base = Vec3(
-            rho.x / (1.0 - rho.x * r_int),
-            rho.y / (1.0 - rho.y * r_int),
-            rho.z / (1.0 - rho.z * r_int),
-        )
+    base = base_albedo(colour_at(plastics.reflectance, i, at), r_int, plastics.nonlinear[i])
     specular = colour_at(plastics.specular, i, at)
     s = max(1.0 - t_o, _LEAST_MIRRORED) * max_component(specular)
     d = t_o * (1.0 - r_int) * max_component(base)
@@ -206,22 +184,10 @@ def _scattered(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec
 
 @kernel
 def both(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`."""
+    """f(wo, wi) cos wi, and the density of `sample`."""
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
     return _scattered(plastics, i, _lobes(plastics, i, at, wo), wo, wi)
-
-
-@kernel
-def evaluate(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi."""
-    return both(plastics, i, at, wo, wi).value
-
-
-@kernel
-def pdf(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle."""
-    return both(plastics, i, at, wo, wi).density
 
 
 @kernel

@@ -17,7 +17,7 @@ from reference_rt.core.transform import FLAT, Affine
 from reference_rt.core.vec3 import Vec3, dot, max_abs, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.placement import owners
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import Place, lift
 
 Integers = npt.NDArray[np.object_]
 
@@ -74,6 +74,12 @@ def facing_z(m: Affine, place: Place) -> dict[str, Any]:
     return made
 
 
+def check_area(what: str, area: float) -> None:
+    """Raises ValueError for an area that float64 cannot hold."""
+    if not 0.0 < area < math.inf:
+        raise ValueError(f"the {what}'s area is not a float64; expected an ordinary size")
+
+
 @kernel
 def signed_distance(table: Any, i: int, p: Vec3) -> float:
     """The distance of `p` from plane i: positive on the normal's side."""
@@ -119,3 +125,12 @@ def surface_at(table: Any, i: int, x: float, y: float) -> SurfacePoint:
     reach = max_abs(x_edge) * max(1.0, abs(x)) + max_abs(y_edge) * max(1.0, abs(y))
     error = surface_error(p, center, reach)
     return SurfacePoint(p, n, n, error, table.material[i], table.light[i])
+
+
+@kernel
+def lift_of(table: Any, i: int, p: Vec3) -> float:
+    """`shape.lift` for a shape whose |x| and |y| are at most 1: its error bound is the largest that
+    `surface_at` gives."""
+    a, b, center = row(table.x_edge, i), row(table.y_edge, i), row(table.center, i)
+    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
+    return lift(p - center, reach, surface_error(p, center, max_abs(a) + max_abs(b)))

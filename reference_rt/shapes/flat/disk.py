@@ -6,16 +6,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.core.ray import (
-    UNIT_ROUNDOFF,
-    Crossing,
-    Hit,
-    Ray,
-    SurfacePoint,
-    miss,
-    surface_error,
-)
-from reference_rt.core.vec3 import Vec3, max_abs, row
+from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.sampling.warp import concentric_disk
 from reference_rt.shapes.flat import base
@@ -25,7 +17,6 @@ from reference_rt.shapes.shape import (
     Shape,
     Tangents,
     any_tangents,
-    lift,
     outward,
     solid_angle_pdf,
 )
@@ -38,8 +29,7 @@ class Disk(Shape):
 
     def tabulate(self, place: Place) -> "Disks":
         disks = Disks(**base.facing_z(self.map_in(place), place))
-        if not 0.0 < areas(disks)[0] < math.inf:
-            raise ValueError("the disk's area is not a float64; expected an ordinary size")
+        base.check_area("disk", areas(disks)[0])
         return disks
 
 
@@ -109,14 +99,6 @@ def tangents(disks: Disks, ray: Ray, hit: Hit) -> Tangents:
 
 
 @kernel
-def lift_of(disks: Disks, i: int, p: Vec3) -> float:
-    """See `shape.lift`; its error by the whole size holds for every point of the disk."""
-    a, b, center = row(disks.x_edge, i), row(disks.y_edge, i), row(disks.center, i)
-    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
-    return lift(p - center, reach, surface_error(p, center, max_abs(a) + max_abs(b)))
-
-
-@kernel
 def sample(disks: Disks, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
     """A point uniform over the area, as a light for `p`."""
     x, y = concentric_disk(u0, u1)
@@ -127,4 +109,4 @@ def sample(disks: Disks, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
 @kernel
 def pdf(disks: Disks, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, at the point `q` of the disk."""
-    return solid_angle_pdf(p, q.p, q.n, area, lift_of(disks, i, p))
+    return solid_angle_pdf(p, q.p, q.n, area, base.lift_of(disks, i, p))

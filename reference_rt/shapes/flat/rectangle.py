@@ -6,8 +6,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
-from reference_rt.core.vec3 import Vec3, dot, max_abs, row
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import select
 from reference_rt.shapes.flat import base, spherical_rectangle
@@ -19,7 +19,6 @@ from reference_rt.shapes.shape import (
     Shape,
     Tangents,
     lane_vector,
-    lift,
     outward,
     pack,
     solid_angle_pdf,
@@ -51,8 +50,7 @@ class Rectangle(Shape):
     def tabulate(self, place: Place) -> "Rectangles":
         m = self.map_in(place)
         rectangles = Rectangles(**base.facing_z(m, place), lengths=_lengths(m[:, 0], m[:, 1]))
-        if not 0.0 < areas(rectangles)[0] < math.inf:
-            raise ValueError("the rectangle's area is not a float64; expected an ordinary size")
+        base.check_area("rectangle", areas(rectangles)[0])
         return rectangles
 
 
@@ -143,35 +141,8 @@ def lane_distance(
 
 
 @kernel
-def place(rectangles: Rectangles, i: int, x: float, y: float) -> Vec3:
-    """The point at local (x, y): in the plane by construction."""
-    return row(rectangles.center, i) + row(rectangles.x_edge, i) * x + row(rectangles.y_edge, i) * y
-
-
-@kernel
-def error_at(rectangles: Rectangles, i: int, p: Vec3) -> float:
-    """By the whole size, unlike `flat.surface_at`: at the center of a rectangle at the origin that
-    bound is 0, and a light's point has to be off it."""
-    size = max_abs(row(rectangles.x_edge, i)) + max_abs(row(rectangles.y_edge, i))
-    return surface_error(p, row(rectangles.center, i), size)
-
-
-@kernel
-def lift_of(rectangles: Rectangles, i: int, p: Vec3) -> float:
-    """See `shape.lift`."""
-    a, b = row(rectangles.x_edge, i), row(rectangles.y_edge, i)
-    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
-    return lift(p - row(rectangles.center, i), reach, error_at(rectangles, i, p))
-
-
-@kernel
 def surface(rectangles: Rectangles, ray: Ray, hit: Hit) -> SurfacePoint:
-    i = hit.row
-    p = place(rectangles, i, hit.u, hit.v)
-    n = row(rectangles.normal, i)
-    return SurfacePoint(
-        p, n, n, error_at(rectangles, i, p), rectangles.material[i], rectangles.light[i]
-    )
+    return base.surface_at(rectangles, hit.row, hit.u, hit.v)
 
 
 @kernel
@@ -196,7 +167,7 @@ def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
     if dot(w, w) >= _NEAR * _NEAR * half_diagonal2:
         return spherical_rectangle.unseen()
     height_of_p = dot(w, row(rectangles.normal, i))
-    if height_of_p <= lift_of(rectangles, i, p):
+    if height_of_p <= base.lift_of(rectangles, i, p):
         return spherical_rectangle.unseen()  # behind it, or a point of the rectangle itself
     unit = 1.0 / math.sqrt(half_diagonal2)
     h = height_of_p * unit
@@ -220,8 +191,8 @@ def sample(
     x, y = spherical_rectangle.sample(seen, u0, u1)
     x = 2.0 * (x - seen.x0) / (seen.x1 - seen.x0) - 1.0
     y = 2.0 * (y - seen.y0) / (seen.y1 - seen.y0) - 1.0
-    q, n = place(rectangles, i, x, y), row(rectangles.normal, i)
-    return LightPoint(q, n, error_at(rectangles, i, q), 1.0 / seen.solid_angle, x, y)
+    q = base.surface_at(rectangles, i, x, y)
+    return LightPoint(q.p, q.n, q.error, 1.0 / seen.solid_angle, x, y)
 
 
 @kernel
@@ -230,9 +201,9 @@ def sample_by_area(
 ) -> LightPoint:
     """A point uniform over the area, as a light for `p`."""
     x, y = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
-    q, n = place(rectangles, i, x, y), row(rectangles.normal, i)
-    density = solid_angle_pdf(p, q, n, area, lift_of(rectangles, i, p))
-    return LightPoint(q, n, error_at(rectangles, i, q), density, x, y)
+    q = base.surface_at(rectangles, i, x, y)
+    density = solid_angle_pdf(p, q.p, q.n, area, base.lift_of(rectangles, i, p))
+    return LightPoint(q.p, q.n, q.error, density, x, y)
 
 
 @kernel
@@ -246,5 +217,5 @@ def pdf(rectangles: Rectangles, i: int, area: float, p: Vec3, q: SurfacePoint) -
     """The density of `sample` per solid angle, at the point `q` of the rectangle."""
     seen = _see(rectangles, i, p)
     if seen.solid_angle < _LEAST_SOLID_ANGLE:
-        return solid_angle_pdf(p, q.p, q.n, area, lift_of(rectangles, i, p))
+        return solid_angle_pdf(p, q.p, q.n, area, base.lift_of(rectangles, i, p))
     return 1.0 / seen.solid_angle

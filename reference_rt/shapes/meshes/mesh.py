@@ -11,9 +11,14 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.diagnosis import FieldError
 from reference_rt.core.numpy_fields import AS_DIGEST, Floats2, Floats3, Integers3
 from reference_rt.core.transform import IDENTITY, Affine
-from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.files import MeshData, read_mesh
 from reference_rt.shapes.meshes.files.data import RawMesh, checked
+from reference_rt.shapes.meshes.triangle_table import (
+    Triangles,
+    facing,
+    geometric_normals,
+    soup,
+)
 from reference_rt.shapes.meshes.vertex_normals import smooth_normals
 from reference_rt.shapes.shape import Place, Shape
 
@@ -89,7 +94,7 @@ class Mesh(Shape):
         assert self.faces is not None
         return checked(RawMesh(self.vertices, self.faces, self.normals, self.uv, self.colours))
 
-    def tabulate(self, place: Place) -> triangle.Triangles:
+    def tabulate(self, place: Place) -> Triangles:
         m = self.map_in(place)
         data = self.data(place.folder)
         name = "the mesh" if self.file is None else f"mesh {place.folder / self.file}"
@@ -97,7 +102,7 @@ class Mesh(Shape):
             place.warn(place.owner, f"{name}: {_told(data.ignored)}")
         vertices = transform.apply_points(m, data.vertices)[data.faces].reshape(-1, 9)
         # Without area there is no normal, but rounding alone makes rays hit: left out.
-        n = triangle.geometric_normals(vertices)
+        n = geometric_normals(vertices)
         has_area = np.einsum("ij,ij->i", n, n) > 0.0
         if not has_area.any():
             raise ValueError(f"{name}: no triangle has any area; expected one that has")
@@ -111,7 +116,7 @@ class Mesh(Shape):
                 "area, or one that float64 cannot hold, and are left out (the others keep their "
                 "numbers); expected triangles with an area",
             )
-        triangles = triangle.soup(
+        triangles = soup(
             np.ascontiguousarray(vertices),
             place,
             normals=self._normals(data, faces, m),
@@ -119,7 +124,7 @@ class Mesh(Shape):
             colours=_at_corners(data.colours, faces),
             face=numbers,
         )
-        return triangle.facing(m, triangles)
+        return facing(m, triangles)
 
     def makes_normals(self, data: MeshData) -> bool:
         """Whether the mesh has vertex normals that its data have not."""

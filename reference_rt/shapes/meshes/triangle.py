@@ -1,13 +1,12 @@
 """Triangle: three vertices, watertight along shared edges."""
 
 import math
-from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from reference_rt.core import transform
-from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Vector
 from reference_rt.core.ray import (
     UNIT_ROUNDOFF,
@@ -20,6 +19,14 @@ from reference_rt.core.ray import (
 )
 from reference_rt.core.vec3 import Vec3, cross, dot, max_abs, normalize, triple
 from reference_rt.jit.kernel import kernel
+from reference_rt.shapes.meshes.triangle_table import (
+    Triangles,
+    align,
+    areas,
+    bounds,
+    facing,
+    soup,
+)
 from reference_rt.shapes.meshes.watertight import Projection, Shear, exactly, project, project_lane
 from reference_rt.shapes.shape import (
     LightPoint,
@@ -48,116 +55,6 @@ class Triangle(Shape):
         if areas(triangles)[0] == 0.0:
             raise ValueError("the triangle has no area; expected three points not on a line")
         return triangles
-
-
-class Triangles(NamedTuple):
-    """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), texture coordinates (n, 6)
-    and linear sRGB colours (n, 9; -1 for none) of the vertices, each None where no triangle has
-    any; owners (n,); face, the number within its shape, of a mesh that in its file."""
-
-    vertices: FloatArray
-    normals: FloatArray | None
-    uvs: FloatArray | None
-    colours: FloatArray | None
-    owner: IntArray
-    material: IntArray
-    light: IntArray
-    face: IntArray
-
-
-def soup(
-    vertices: FloatArray,
-    place: Place,
-    normals: FloatArray | None = None,
-    uvs: FloatArray | None = None,
-    colours: FloatArray | None = None,
-    face: IntArray | None = None,
-) -> Triangles:
-    """Triangles of one shape: see `Triangles`; without numbers, `face` counts them."""
-    n = len(vertices)
-    return Triangles(
-        vertices=vertices,
-        normals=normals,
-        uvs=uvs,
-        colours=colours,
-        owner=np.full(n, place.owner),
-        material=np.full(n, place.material),
-        light=np.full(n, -1),
-        face=np.arange(n) if face is None else face,
-    )
-
-
-def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
-    """The triangles, whose vertices the map m has taken where they are, with their fronts where it
-    takes those: a mirror turns the corners' order round, and they are turned back."""
-    if not transform.mirrors(m):
-        return triangles
-    uvs = _barycentrics(triangles) if triangles.uvs is None else triangles.uvs
-    return triangles._replace(
-        vertices=_exchanged(triangles.vertices),
-        normals=None if triangles.normals is None else _exchanged(triangles.normals),
-        uvs=_exchanged(uvs),
-        colours=None if triangles.colours is None else _exchanged(triangles.colours),
-    )
-
-
-def _exchanged(corners: FloatArray) -> FloatArray:
-    """(n, 3 k): the second corner and the third in each other's place."""
-    return np.ascontiguousarray(
-        corners.reshape(len(corners), 3, -1)[:, [0, 2, 1]].reshape(corners.shape)
-    )
-
-
-def _barycentrics(triangles: Triangles) -> FloatArray:
-    """The coordinates of triangles that have none of their own (n, 6)."""
-    return np.repeat([[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]], len(triangles.face), axis=0)
-
-
-def align(parts: Sequence[Triangles]) -> list[Triangles]:
-    """Tables with the same columns: what one has, the others get."""
-    parts = list(parts)
-    if any(part.normals is not None for part in parts):
-        parts = [
-            part._replace(normals=_flat_normals(part)) if part.normals is None else part
-            for part in parts
-        ]
-    if any(part.uvs is not None for part in parts):
-        parts = [
-            part._replace(uvs=_barycentrics(part)) if part.uvs is None else part for part in parts
-        ]
-    if any(part.colours is not None for part in parts):
-        parts = [
-            part._replace(colours=np.full((len(part.face), 9), -1.0))
-            if part.colours is None
-            else part
-            for part in parts
-        ]
-    return parts
-
-
-def _flat_normals(triangles: Triangles) -> FloatArray:
-    """Each triangle's own normal at its vertices."""
-    n = geometric_normals(triangles.vertices)
-    with np.errstate(invalid="ignore"):
-        n = np.nan_to_num(n / np.linalg.norm(n, axis=1, keepdims=True))
-    return np.tile(n, 3)
-
-
-def geometric_normals(vertices: FloatArray) -> FloatArray:
-    """Normals (n, 3) of twice the area's length, of vertices (n, 9)."""
-    v = vertices.reshape(-1, 3, 3)
-    return np.asarray(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]))
-
-
-def areas(triangles: Triangles) -> FloatArray:
-    return np.asarray(0.5 * np.linalg.norm(geometric_normals(triangles.vertices), axis=1))
-
-
-def bounds(triangles: Triangles) -> Bounds:
-    """Boxes (n, 3), (n, 3): minima and maxima of vertices are exact."""
-    a, b, c = triangles.vertices.reshape(-1, 3, 3).transpose(1, 0, 2)
-    # Two at a time: along an axis of three NumPy takes ten times as long.
-    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 @kernel
@@ -350,3 +247,28 @@ def _interpolated_colour(colours: FloatArray | None, hit: Hit, without: Vec3) ->
 def face_of(triangles: Triangles, hit: Hit) -> int:
     """The number of the triangle in its mesh."""
     return int(triangles.face[hit.row])
+
+
+__all__ = [
+    "Triangle",
+    "Triangles",
+    "align",
+    "areas",
+    "bounds",
+    "colour",
+    "enters",
+    "error_at",
+    "face_of",
+    "interpolate",
+    "intersect",
+    "intersect_lane",
+    "lift_of",
+    "normal",
+    "on_line",
+    "pdf",
+    "sample",
+    "shading_normal",
+    "surface",
+    "tangents",
+    "uv",
+]
