@@ -1,4 +1,4 @@
-"""What all lights share: the codes of their tables and the sample that their kernels return."""
+"""The codes of the types of lights, and the sample that their kernels return."""
 
 import math
 from typing import NamedTuple
@@ -12,12 +12,12 @@ AREA, POINT, SPOT, DIRECTIONAL, ENVIRONMENT = range(5)
 
 
 class LightSample(NamedTuple):
-    """Light that could arrive at a point, before asking whether something is in the way.
+    """Light that arrives at a point unless it is occluded.
 
-    wi: unit direction towards the light;  radiance: what arrives from there (for a point light its
-    irradiance across wi, intensity / distance²);  pdf: per solid angle, or 1 for a point light; 0
+    wi: unit direction towards the light;  radiance: that from wi, or for a point light the
+    irradiance across wi, intensity / distance²;  pdf: per solid angle, or 1 for a point light; 0
     means that nothing arrives;  target: the point on the light, moved off its surface, or far away;
-    distance: infinite for an environment;  is_delta: whether no other sampling could find it.
+    distance: infinite for an environment;  is_delta: whether no BSDF sample can find the light.
     """
 
     wi: Vec3
@@ -50,7 +50,7 @@ def from_position(position: Vec3, intensity: Vec3, falloff: float, p: Vec3) -> L
 
 @kernel
 def shadow_ray(point: SurfacePoint, light: LightSample) -> Ray:
-    """The part of space between a surface and a light sample."""
+    """The ray that tests visibility: from a surface to a light sample."""
     if light.distance < math.inf:
         return segment_to(point, light.target)
     return ray_from(point, light.wi)

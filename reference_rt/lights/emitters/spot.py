@@ -64,10 +64,10 @@ class Spots(NamedTuple):
 
 @kernel
 def falloff(spots: Spots, i: int, w: Vec3) -> float:
-    """The part of the intensity that goes towards `w` of any length.
+    """The fraction of the intensity that is emitted along `w`, of any length.
 
-    The angle from sine and cosine: from the cosine alone it would lose half of its digits near the
-    axis.
+    The angle is computed from its sine and cosine: from the cosine alone it would lose half of its
+    digits near the axis.
     """
     axis = row(spots.axis, i)
     angle = math.atan2(length(cross(axis, w)), dot(axis, w))
@@ -90,8 +90,8 @@ def power(spots: Spots, scene_radius: float) -> FloatArray:
     """Luminance of the power (n,): 2 pi I times the integral of the falloff f sin from 0 to the
     cutoff c, which with the beam's edge b is 1 - (sin c - sin b) / (c - b).
 
-    Written with the middle m and half the width h of the ring, 1 - cos m sin h / h, for h = 0 too;
-    that as 2 sin²(m/2) + cos m (1 - sin h / h), which is not 0 for the thinnest beam.
+    With the middle m and half the width h of the ring that is 1 - cos m sin h / h, also for h = 0.
+    It is computed as 2 sin²(m/2) + cos m (1 - sin h / h), which is above 0 for the thinnest beam.
     """
     middle = 0.5 * (spots.cutoff + spots.beam)
     half_width = 0.5 * (spots.cutoff - spots.beam)

@@ -31,7 +31,8 @@ class Dielectrics(NamedTuple):
 
 @kernel
 def branches(dielectrics: Dielectrics, i: int, at: At, wo: Vec3) -> Branches:
-    """Reflection F and refraction T / eta²: radiance gathers where light slows down."""
+    """Factor F for the reflection and T / eta² for the refraction: the radiance of refracted light
+    scales with the square of the index."""
     refraction = fresnel(wo.z, dielectrics.eta[i])
     f, passing = refraction.reflectance, refraction.transmittance
     t = passing / (refraction.eta * refraction.eta)

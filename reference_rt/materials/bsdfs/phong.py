@@ -1,11 +1,12 @@
-"""Phong: the text-book's local shading (Phong 1975; Blinn 1977 with the half vector).
+"""Phong: local shading with ambient, diffuse and specular terms (Phong 1975; Blinn 1977 with the
+half vector).
 
     f cos = k_d max(0, l·n) + k_s max(0, e·r)^p      r: the direction of the light l mirrored at n
     f cos = k_d max(0, l·n) + k_s max(0, h·n)^p      h: half way between l and e (`half_vector`)
 
-for lights in front of the surface.  The highlight is not multiplied with the cosine, so that f is
-not reciprocal (f cos is symmetric instead), and nothing keeps the sum of the constants from
-creating energy: see `energy_bound`.
+for lights in front of the surface.  The highlight is not multiplied by the cosine, so that f is not
+reciprocal (f cos is symmetric instead), and constants whose sum is too large create energy: see
+`energy_bound`.
 """
 
 import math
@@ -73,11 +74,12 @@ class Phong(Material):
         )
 
     def energy_bound(self, palette: Palette) -> float:
-        """No direction gets more than this times the power: pi k_d + 2 pi k_s / (p + 1) + k_r in
-        the brightest channel, 8 pi k_s / (p + 1) with the half vector.
+        """An upper bound of the albedo for any wo: pi k_d + 2 pi k_s / (p + 1) + k_r in the
+        brightest channel, with 8 pi k_s / (p + 1) for the half vector.
 
-        The lobe's integral over the sphere, a part of which is below the surface; for half vectors
-        with dwi = 4 (wo·h) dh and wo·h <= 1.  Of textures the greatest value counts.
+        The highlight's term is the lobe's integral over the whole sphere, a part of which is below
+        the surface; for half vectors with dwi = 4 (wo·h) dh and wo·h <= 1.  A texture counts with
+        its greatest value.
         """
         lobe = (8.0 if self.half_vector else 2.0) * math.pi / (self.exponent + 1.0)
         d, s, r = (
@@ -103,14 +105,14 @@ class Phongs(NamedTuple):
 
 @kernel
 def power(x: float, p: float) -> float:
-    """max(0, x)^p for p > 0, relatively right to p |log x| u."""
+    """max(0, x)^p for p > 0, with a relative error of p |log x| u."""
     if x <= 0.0:
         return 0.0
     return math.exp(p * math.log(x))
 
 
 class Shares(NamedTuple):
-    """The probabilities of the lobes, which add to 1, or are 0 where the material is black."""
+    """The probabilities of sampling the lobes, which add to 1; all 0 if the material is black."""
 
     diffuse: float
     specular: float
@@ -119,7 +121,7 @@ class Shares(NamedTuple):
 
 @kernel
 def _shares(phongs: Phongs, i: int, at: At) -> Shares:
-    """In proportion to the bounds of their power, brightest channels."""
+    """In proportion to upper bounds of the lobes' power in the brightest channel."""
     lobe = 8.0 if phongs.half_vector[i] != 0 else 2.0
     d = math.pi * max_component(colour_at(phongs.diffuse, i, at))
     s = lobe * math.pi * max_component(colour_at(phongs.specular, i, at))
@@ -167,8 +169,8 @@ def _cosine_power(p: float, u0: float, u1: float) -> Vec3:
 def sample(
     phongs: Phongs, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """The mirrored direction, one of the highlight's lobe, which fails where it points below the
-    surface, or a cosine-distributed one."""
+    """The mirrored direction, or one of the highlight's lobe, or a cosine-distributed one.
+    Sampling fails where the lobe's direction points below the surface."""
     shares = _shares(phongs, i, at)
     if wo.z <= 0.0 or shares.diffuse + shares.specular + shares.mirror == 0.0:
         return no_sample()

@@ -1,8 +1,8 @@
 """Rough conductor: microfacets of a metal (Cook & Torrance 1982; Walter et al. 2007, eq. 20).
 
-f = F D G / (4 cos wo cos wi), for light that meets one microfacet: what a second one would mirror
-on is lost.  With GGX and F = 1 that is, at normal incidence, 1 % of the light at alpha = 0.1, 12 %
-at 0.3 and log 2 = 69 % at 1.
+f = F D G / (4 cos wo cos wi): single scattering; light that would meet a second microfacet is lost.
+With GGX and F = 1 that is, at normal incidence, 1 % of the light at alpha = 0.1, 12 % at 0.3 and
+log 2 = 69 % at 1.
 """
 
 from typing import ClassVar, Literal, NamedTuple
@@ -61,7 +61,7 @@ class RoughConductors(NamedTuple):
 
 @kernel
 def _mirrored(conductors: RoughConductors, i: int, at: At, cosine: float) -> Vec3:
-    """What a microfacet mirrors of light at this angle."""
+    """The reflectance of a microfacet at this angle of incidence."""
     f = conductor_colour(min(1.0, cosine), row(conductors.eta, i), row(conductors.k, i))
     return f * colour_at(conductors.reflectance, i, at)
 
@@ -81,7 +81,7 @@ def both(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Sca
 def sample(
     conductors: RoughConductors, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """wo mirrored by a microfacet that it sees: the weight is F G1(wi)."""
+    """wo reflected at a visible microfacet: the weight is F G1(wi)."""
     if wo.z <= 0.0:
         return no_sample()
     m = microfacets_at(conductors.roughness, i, at)

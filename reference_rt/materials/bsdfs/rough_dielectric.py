@@ -1,13 +1,13 @@
 """Rough dielectric: microfacets of glass (Walter et al. 2007, eq. 20 and 21).
 
-With eta the index of refraction on wi's side over that on wo's, and radiance as the quantity that
-is carried (hence the 1 / eta², which the eta² of Walter's eq. 17 cancels):
+With eta the index of refraction on wi's side over that on wo's, and for radiance (hence the factor
+1 / eta², which the eta² of Walter's eq. 17 cancels):
 
     reflection, h along wo + wi:      f = F D G / (4 |cos wo cos wi|)
     refraction, h along wo + eta wi:  f = (1 - F) D G |wo·h wi·h| / (|cos wo cos wi| |wo + eta wi|²)
 
-for light that meets one microfacet; what would meet a second one is lost: with GGX, eta = 1.5 and
-normal incidence 0.1 % of the light at alpha = 0.1, 1 % at 0.3 and 11 % at 1 from outside; from
+This is single scattering; light that would meet a second microfacet is lost: with GGX, eta = 1.5
+and normal incidence 0.1 % of the light at alpha = 0.1, 1 % at 0.3 and 11 % at 1 from outside; from
 inside 1 %, 10 % and 58 %.
 """
 
@@ -52,7 +52,8 @@ class RoughDielectric(Transparent):
 
     @model_validator(mode="after")
     def _bends(self) -> "RoughDielectric":
-        # Directions, which are off by u, tell normals to u / |eta - 1|: a thousandth of MIN_ALPHA.
+        # Directions are off by u, and so the half vector is off by u / |eta - 1|: a thousandth of
+        # MIN_ALPHA.
         if abs(self.interior_ior / self.exterior_ior - 1.0) < 1e-9:
             raise ValueError(
                 "interior_ior and exterior_ior are equal: such a boundary bends nothing; "
@@ -82,8 +83,8 @@ class RoughDielectrics(NamedTuple):
 
 
 class _Facet(NamedTuple):
-    """What a microfacet does to light: mirrored and refracted, the factors on radiance without the
-    1 / eta²;  share, passing: the probabilities with which `sample` mirrors and refracts."""
+    """mirrored, refracted: a microfacet's factors on radiance, without the 1 / eta²;
+    share, passing: the probabilities with which `sample` reflects and refracts."""
 
     mirrored: Vec3
     refracted: Vec3
@@ -103,19 +104,19 @@ def _facet(dielectrics: RoughDielectrics, i: int, at: At, refraction: Refraction
 
 @kernel
 def _meet(dielectrics: RoughDielectrics, i: int, side: float, cosine: float) -> Refraction:
-    """What Fresnel says of light at this angle, from the side of wo.z = `side`."""
+    """Fresnel's equations for a microfacet at this cosine, from the side of wo.z = `side`."""
     return fresnel(math.copysign(cosine, side), dielectrics.eta[i])
 
 
 @kernel
 def _upwards(v: Vec3, side: float) -> Vec3:
-    """`v` as seen with wo above: the microfacets are the same from either side."""
+    """`v` mirrored so that wo is above: the microfacets are the same from either side."""
     return Vec3(v.x, v.y, -v.z) if side < 0.0 else v
 
 
 @kernel
 def _mirrored_density(m: Microfacets, wo: Vec3, h: Vec3) -> float:
-    """Of visible normals over 4 wo·h."""
+    """The density of the reflected direction: that of visible normals over 4 wo·h."""
     return 0.25 * g1_over_cos(m, wo) * density(m, h)
 
 
@@ -148,7 +149,7 @@ def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> S
 def sample(
     dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """wo mirrored or refracted by a microfacet that it sees."""
+    """wo reflected or refracted at a visible microfacet."""
     side = wo.z
     if side == 0.0:
         return no_sample()

@@ -1,4 +1,4 @@
-"""Thin dielectric: a pane of glass as one surface, light bouncing between its two faces."""
+"""Thin dielectric: a pane of glass as one surface, with all reflections between its faces."""
 
 from typing import ClassVar, Literal, NamedTuple
 
@@ -38,8 +38,8 @@ class ThinDielectrics(NamedTuple):
 
 @kernel
 def branches(panes: ThinDielectrics, i: int, at: At, wo: Vec3) -> Branches:
-    """With R the reflectance of one face, both together mirror R + T R T + T R R R T + ... =
-    2 R / (1 + R), and the rest, T / (1 + R), goes straight on, as dense as before (PBR 4ed,
+    """With R the reflectance of one face, the two together reflect R + T R T + T R R R T + ... =
+    2 R / (1 + R).  The rest, T / (1 + R), passes undeviated, its radiance unchanged (PBR 4ed,
     9.5.3)."""
     face = fresnel(abs(wo.z), panes.eta[i])
     r = 2.0 * face.reflectance / (1.0 + face.reflectance)

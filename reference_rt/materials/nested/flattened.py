@@ -1,8 +1,8 @@
-"""Layers: materials that are made of others, taken apart.
+"""Flattened materials: lists of BSDF leaves, each with a weight and a frame.
 
-Masks, blends, two-sided materials, bump and normal maps may stand in each other.  Each way from
-such a material down to one that scatters by itself, a leaf, is a layer: a list of steps, which give
-its share and turn its frame.  What the material scatters is the sum of its layers.
+Masks, blends, two-sided materials, bump and normal maps may be nested in each other.  Each path
+from such a material to a leaf (`paths.py`) becomes a layer: the leaf with the steps that compute
+its weight and its frame at a hit.  What the material scatters is the weighted sum of its layers.
 """
 
 from typing import Any, NamedTuple
@@ -24,9 +24,10 @@ from reference_rt.textures.parameter import join
 
 
 class Layers(NamedTuple):
-    """Of each material m: first (m,) and number (m,) of its layers.  Of each layer k: its leaf,
-    kind (k,) and row (k,), and step_first (k,), step_count (k,).  Of each step s: its code (s,),
-    and the row (s,) of its parameters in the tables that follow, None for absent ones."""
+    """For each material m: first (m,) and number (m,) of its layers.  For each layer k: its leaf,
+    kind (k,) and row (k,), and its steps, step_first (k,) and step_count (k,).  For each step s:
+    its code, step (s,), and the row of its parameter, step_row (s,), in one of the tables that
+    follow; a table is None if the scene has no such step."""
 
     first: IntArray
     number: IntArray
@@ -42,9 +43,9 @@ class Layers(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """A layer at a point: the share that it has of the whole;  basis: its frame, in coordinates of
-    the shading frame;  side: 0 where its frame is not tilted by a bump or normal map; else 1, or -1
-    where it is turned to the other side."""
+    """A layer at a point.  weight: that of its leaf;  basis: its frame, in coordinates of the
+    shading frame;  side: 0 if its frame is not tilted by a bump or normal map, else 1, or -1 if it
+    is flipped to the other side."""
 
     weight: float
     basis: Frame
@@ -64,7 +65,7 @@ class LayerTables:
         self.rows: dict[type, list[Any]] = {}
 
     def add(self, layers: list[tuple[Way, tuple[int, int]]]) -> None:
-        """The layers of the next material, each with (kind, row) of its leaf.
+        """Adds the next material: its layers, as paths with the (kind, row) of their leaves.
 
         Raises ValueError.
         """
@@ -76,7 +77,7 @@ class LayerTables:
             self.steps += [(step.code, self._row(step.parameter)) for step in way.steps]
 
     def _row(self, parameter: Any) -> int:
-        """The row of a step's parameter, which is put into its table."""
+        """Puts a step's parameter into its table; returns its row there."""
         if parameter is None:
             return -1
         if isinstance(parameter, Material):
@@ -88,7 +89,7 @@ class LayerTables:
         return len(rows) - 1
 
     def tables(self) -> Layers | None:
-        """None where no material is made of others."""
+        """None if no material is made of others."""
         if not self.steps:
             return None
         counts = np.array(self.step_counts)
@@ -114,12 +115,12 @@ class LayerTables:
 
 
 SIZE = 11
-"""Floats of a layer that is kept: weight, s, t and n of the basis, side."""
+"""Floats of a layer in the scratch buffer: weight, s, t and n of the basis, side."""
 
 
 @kernel
 def most(layers: Layers | None) -> int:
-    """The largest number of layers of a material."""
+    """The largest number of layers of any material."""
     if layers is None:
         return 0
     found = 0
@@ -130,10 +131,10 @@ def most(layers: Layers | None) -> int:
 
 @kernel
 def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
-    """Keeps the layers of the material in `shading.layers`.
+    """Writes the layers of the material at this point to the scratch buffer `shading.layers`.
 
-    They depend on the point and on the viewer, not on where light comes from: found once, they
-    serve every question about the point, and their code is compiled once.
+    They depend on the point and on wo, not on wi: evaluated once per hit they serve all calls of
+    `both`, `sample` and `branches`, and their code is compiled once.
     """
     if layers is None:
         return
@@ -149,7 +150,7 @@ def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
 
 @kernel
 def layer_at(shading: Shading, k: int) -> Layer:
-    """Layer k of the material, as it was prepared."""
+    """Layer k of the material, read from the scratch buffer."""
     kept = shading.layers[SIZE * k : SIZE * (k + 1)]
     basis = Frame(
         Vec3(kept[1], kept[2], kept[3]),
@@ -161,7 +162,7 @@ def layer_at(shading: Shading, k: int) -> Layer:
 
 @kernel
 def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
-    """Layer k of all at a point, seen from `shading.wo`."""
+    """Runs the steps of layer k of the tables, for `shading.wo`."""
     weight, side, tilted = 1.0, 1.0, False
     basis = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
     begin = layers.step_first[k]
@@ -177,7 +178,7 @@ def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
             weight = 0.0 if above else weight
         elif code == TURN:
             if not above:
-                # Mitsuba's mirror: z alone changes sign, so that the basis becomes left-handed.
+                # As in Mitsuba z alone changes sign, so that the basis becomes left-handed.
                 basis = Frame(basis.s, basis.t, -basis.n)
                 side = -side
         else:
@@ -223,8 +224,8 @@ def _mapped(maps: NormalMaps | None, i: int, shading: Shading, tangents: Tangent
 
 @kernel
 def lets(layer: Layer, wi: Vec3) -> bool:
-    """Whether a layer has anything to do with the local `wi`: not where the tilt of its frame puts
-    `wi` to the other side of the surface (Mitsuba's rule)."""
+    """Whether a layer scatters light from the local `wi`: not where wi is on different sides of the
+    surface and of the tilted frame (Mitsuba's rule)."""
     if layer.side == 0.0:
         return True
     return layer.side * wi.z * to_local(layer.basis, wi).z > 0.0
