@@ -34,9 +34,8 @@ class Disk(Shape):
 
 
 class Disks(NamedTuple):
-    """n ellipses: see `flat` for center, normal, x_of, y_of and for x_edge, y_edge, which are
-    conjugate radii; owner, the shape's index in the scene; material, light: rows of those tables;
-    face (n,)."""
+    """n ellipses: the columns of `flat.base`, with x_edge and y_edge as conjugate radii, and of
+    `placement.owners`."""
 
     center: FloatArray
     normal: FloatArray
@@ -89,7 +88,7 @@ def uv(disks: Disks, ray: Ray, hit: Hit) -> tuple[float, float]:
 
 @kernel
 def tangents(disks: Disks, ray: Ray, hit: Hit) -> Tangents:
-    """Of polar coordinates; any in the middle."""
+    """Those of polar coordinates; any in the middle."""
     i, x, y = hit.row, hit.u, hit.v
     r = math.sqrt(x * x + y * y)
     if r == 0.0:

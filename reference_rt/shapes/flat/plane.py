@@ -24,8 +24,7 @@ class Plane(Shape):
 
 
 class Planes(NamedTuple):
-    """n planes: see `flat` for center, normal, x_of, y_of, x_edge, y_edge; owner, the shape's index
-    in the scene; material, light: rows of those tables; face (n,)."""
+    """n planes: the columns of `flat.base` and of `placement.owners`."""
 
     center: FloatArray
     normal: FloatArray
@@ -46,8 +45,8 @@ def bounds(planes: Planes) -> Bounds:
 
 @kernel
 def intersect(planes: Planes, i: int, ray: Ray) -> Crossing:
-    """Where the ray meets plane i, from the front or from behind; a parallel ray does nowhere, one
-    in the plane included."""
+    """Where the ray meets plane i, from the front or from behind; a parallel ray misses, also one
+    in the plane."""
     return base.meet(planes, i, ray)
 
 

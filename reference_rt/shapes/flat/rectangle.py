@@ -25,21 +25,21 @@ from reference_rt.shapes.shape import (
 )
 
 _RIGHT = 2.0**-40
-"""The cosine between edges that counts as none: solid angles are then wrong by as little, and
-turned edges are right to a few u = 2^-53."""
+"""Edges whose cosine is at most this count as perpendicular: the error of solid angles is then as
+small."""
 
 _NEAR = 3.0
-"""Half diagonals within which a light is sampled by solid angle.  Measured at this distance: by
-area, the irradiance has a relative variance per sample of 0.002 seen from the front, of 0.08 to
-0.16 obliquely, which a path's own outweighs and stratified numbers remove; solid angles take
-70 ns more."""
+"""A light nearer than this number of half diagonals is sampled by solid angle.  Measured at this
+distance: sampled by area, the irradiance has a relative variance per sample of 0.002 for a receiver
+in front and of 0.08 to 0.16 obliquely, which is less than that of a path and which stratified
+numbers remove; solid angles take 70 ns more."""
 
 _LEAST_SOLID_ANGLE = 2.0**-26
-"""Places in it are found by differences of angles, which round by a few u = 2^-53: here half of
-their digits are left.  Below, by area."""
+"""A light of a smaller solid angle is sampled by area: points in it are found by differences of
+angles, which round by a few u = 2^-53, so that here half of their digits are left."""
 
 _LEAST_HEIGHT = 2.0**-500
-"""In half diagonals: its square is a float64."""
+"""In half diagonals: the square of this is a float64."""
 
 
 class Rectangle(Shape):
@@ -55,16 +55,15 @@ class Rectangle(Shape):
 
 
 def _lengths(x_edge: FloatArray, y_edge: FloatArray) -> FloatArray:
-    """(1, 2): of the half edges; 0 where they are not perpendicular."""
+    """The lengths (1, 2) of the half edges; 0 if they are not perpendicular."""
     x, y = math.hypot(*x_edge), math.hypot(*y_edge)
     is_right = abs(float((x_edge / x) @ (y_edge / y))) <= _RIGHT
     return np.array([[x, y] if is_right else [0.0, 0.0]])
 
 
 class Rectangles(NamedTuple):
-    """n parallelograms: see `flat` for center, normal, x_of, y_of and for the half edges x_edge and
-    y_edge; lengths (n, 2) of these, 0 where they are not perpendicular; owner, the shape's index in
-    the scene; material, light: rows of those tables; face (n,)."""
+    """n parallelograms: the columns of `flat.base`, with x_edge and y_edge as half edges; lengths
+    (n, 2) of these, 0 where they are not perpendicular; the columns of `placement.owners`."""
 
     center: FloatArray
     normal: FloatArray
@@ -91,13 +90,13 @@ def areas(rectangles: Rectangles) -> FloatArray:
 
 
 def pack_all(rectangles: Rectangles) -> FloatArray:
-    """What `distance` takes, as packets."""
+    """The arguments of `distance`, as packets."""
     return pack(rectangles.center, rectangles.normal, rectangles.x_of, rectangles.y_of)
 
 
 @kernel
 def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> float:
-    """The t > 0 at which a ray meets a rectangle, inf where it does not."""
+    """The t > 0 at which a ray meets a rectangle, inf for a miss."""
     from_center = ray.o - center
     # For a parallel ray this is ±inf or NaN: both fail the comparisons.
     t = -dot(from_center, normal) / dot(ray.d, normal)
@@ -159,8 +158,8 @@ def tangents(rectangles: Rectangles, ray: Ray, hit: Hit) -> Tangents:
 
 @kernel
 def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
-    """Rectangle i from `p` in front of it, in units of half its diagonal; of solid angle 0 where it
-    is to be sampled by area."""
+    """Rectangle i as seen from `p` in front of it, in units of half its diagonal; its solid angle
+    is 0 where it is to be sampled by area."""
     w = p - row(rectangles.center, i)
     width, height = rectangles.lengths[i, 0], rectangles.lengths[i, 1]
     half_diagonal2 = width * width + height * height
@@ -184,7 +183,8 @@ def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
 def sample(
     rectangles: Rectangles, i: int, area: float, p: Vec3, u0: float, u1: float
 ) -> LightPoint:
-    """A point as a light for `p`: near by uniform over the solid angle, else over the area."""
+    """A point as a light for `p`, uniform over the solid angle if `p` is near, else over the
+    area."""
     seen = _see(rectangles, i, p)
     if seen.solid_angle < _LEAST_SOLID_ANGLE:
         return sample_by_area(rectangles, i, area, p, u0, u1)
@@ -208,7 +208,7 @@ def sample_by_area(
 
 @kernel
 def middle(rectangles: Rectangles, i: int, area: float, p: Vec3) -> LightPoint:
-    """Its middle as a light for `p`, of the density that the whole area has there."""
+    """Its middle as a light for `p`, with the density of sampling by area."""
     return sample_by_area(rectangles, i, area, p, 0.5, 0.5)
 
 
