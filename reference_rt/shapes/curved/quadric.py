@@ -1,7 +1,7 @@
 """Quadric: a surface of second degree, clipped to a box; how rows of the table are made.
 
-Cylinders, cones and ellipsoids are rows of it too.  A row's own coordinates are those of
-`quadratic_form.fit`.
+Cylinders, cones and ellipsoids are rows of the same table.  The local coordinates of a row are
+those of `quadratic_form.fit`.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ class Quadric(Shape):
 
 
 _LARGEST = 1e140
-"""Of the entries of a map and of its inverse: squares of ten times these are finite."""
+"""The largest entry of a map and of its inverse: the square of ten times this is finite."""
 
 
 def tabulate(
@@ -82,7 +82,7 @@ def tabulate(
     clipped: Sequence[bool],
     capped: bool,
 ) -> Quadrics:
-    """One row; `m` maps the coordinates of the form and the box to the place's.
+    """One row; `m` maps the coordinates of the form and the box to those of the context.
 
     The box must contain the whole surface along the axes that it does not clip.
     """
@@ -90,7 +90,7 @@ def tabulate(
         fitted = fit(form, lower, upper)
     except OverflowError:
         raise ValueError("its size overflows; expected finite numbers") from None
-    # Exactly: an origin far away and a map that brings it back do not cancel.
+    # In exact arithmetic: an origin far away and a map that brings it back would cancel.
     offset = [
         float(
             sum((Fraction(a) * Fraction(o) for a, o in zip(r[:3], fitted.origin, strict=True)), r3)
@@ -113,7 +113,7 @@ def tabulate(
 
 
 def ellipsoid(place: Place, m: Affine, middle: Vector, radius: float) -> Quadrics:
-    """The sphere around `middle`, where m takes it."""
+    """The image under m of the sphere around `middle`."""
     unit_sphere = tuple(Fraction(k) for k in (1, 1, 1, 0, 0, 0, 0, 0, 0))
     form = seen_from((*unit_sphere, -(Fraction(radius) ** 2)), [-Fraction(x) for x in middle])
     lower = [Fraction(x) - Fraction(radius) for x in middle]

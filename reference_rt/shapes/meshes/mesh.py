@@ -23,10 +23,10 @@ from reference_rt.shapes.meshes.vertex_normals import smooth_normals
 from reference_rt.shapes.shape import Place, Shape
 
 _MOST_NAMED = 12
-"""Of what a file has besides, a warning names so many."""
+"""The number of ignored parts of a file that a warning names."""
 
 _LONGEST = 60
-"""Characters of a name, which a damaged file may make any."""
+"""Characters of a name in a warning: a damaged file may have any names."""
 
 
 class Mesh(Shape):
@@ -77,7 +77,7 @@ class Mesh(Shape):
         return self
 
     def __eq__(self, other: object) -> bool:
-        """Equal descriptions, arrays by what they hold."""
+        """Whether the descriptions are equal; arrays are compared by value."""
         return type(other) is type(self) and self._key() == other._key()
 
     def __hash__(self) -> int:
@@ -87,7 +87,7 @@ class Mesh(Shape):
         return self.model_dump_json(context=AS_DIGEST)
 
     def data(self, folder: Path) -> MeshData:
-        """What the file holds, or the arrays.  Raises ValueError."""
+        """The mesh of the file, or of the arrays.  Raises ValueError."""
         if self.file is not None:
             return read_mesh(folder / self.file)
         assert self.vertices is not None
@@ -101,7 +101,7 @@ class Mesh(Shape):
         if data.ignored:
             place.warn(place.owner, f"{name}: {_told(data.ignored)}")
         vertices = transform.apply_points(m, data.vertices)[data.faces].reshape(-1, 9)
-        # Without area there is no normal, but rounding alone makes rays hit: left out.
+        # Triangles without area have no normal, and rays meet them by rounding alone: left out.
         n = geometric_normals(vertices)
         has_area = np.einsum("ij,ij->i", n, n) > 0.0
         if not has_area.any():
@@ -127,11 +127,11 @@ class Mesh(Shape):
         return facing(m, triangles)
 
     def makes_normals(self, data: MeshData) -> bool:
-        """Whether the mesh has vertex normals that its data have not."""
+        """Whether the mesh has vertex normals that its data do not have."""
         return self.smooth and data.normals is None
 
     def _normals(self, data: MeshData, faces: IntArray, m: Affine) -> FloatArray | None:
-        """Unit normals (m, 9) at the corners of faces where the map takes them."""
+        """Unit normals (m, 9) at the corners of faces, in the world."""
         if self.makes_normals(data):
             made = smooth_normals(data.vertices, faces, data.uv).reshape(-1, 3)
             return (made if m is IDENTITY else transform.apply_normals(m, made)).reshape(-1, 9)

@@ -67,7 +67,7 @@ def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
 def intersect_lane(
     corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
 ) -> Crossing:
-    """The same of a triangle of a leaf, see `watertight.see`."""
+    """`intersect` for a triangle of a BVH leaf, see `watertight.see`."""
     return _crossing(project_lane(corners, first, size, lane, shear, seen), shear)
 
 
@@ -79,19 +79,20 @@ def _crossing(seen: Projection, shear: Shear) -> Crossing:
 
 @kernel
 def on_line(seen: Projection, shear: Shear) -> Crossing:
-    """Where the ray's line crosses a triangle, at t of any sign."""
+    """Where the line of the ray crosses a triangle, at t of any sign."""
     if seen.side == 0:
         return miss()
     inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
     u, v = seen.e1 * inverse, seen.e2 * inverse
-    # Edge functions times depths would overflow from sizes of 1e102 on, barycentrics do not.
+    # From sizes of 1e102 on edge functions times depths would overflow; barycentrics do not.
     t = (seen.e0 * inverse * seen.a_z + u * seen.b_z + v * seen.c_z) * shear.s_z
     return Crossing(t, u, v)
 
 
 @kernel
 def enters(triangles: Triangles, i: int, shear: Shear) -> int:
-    """+1 where the ray comes to the front of triangle i, -1 where it comes from behind."""
+    """+1 if the ray comes to triangle i from the front, -1 if it comes from behind, 0 for a
+    miss."""
     return project(triangles.vertices, i, shear).side
 
 
@@ -106,8 +107,8 @@ def normal(triangles: Triangles, i: int) -> Vec3:
     """Perpendicular to the edges, on slivers too.
 
     Products of edges a and b round by u |a| |b|, and so n's direction by some 6 u over the sine of
-    their angle: below 1/4 they are made exact.  A ray along a sliver that leaves it by what `leave`
-    takes would else come back to it.
+    their angle: for sines below 1/4 the products are made exact.  Otherwise a ray along a sliver
+    that starts off it by `SurfacePoint.error` could meet it again.
     """
     v0 = triple(triangles.vertices, i, 0)
     a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
@@ -122,11 +123,11 @@ def normal(triangles: Triangles, i: int) -> Vec3:
 
 @kernel
 def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
-    """However thin the triangle is.
+    """`SurfacePoint.error`, valid however thin the triangle is.
 
-    A ray that begins next to it projects its vertices to within 7 u of their distances, at most the
-    longest edge, and names the point of the triangle that it meets to within `CANCELLED` u + 4 u of
-    that: twice the edge in `surface_error`, which has p's own rounding besides.
+    A ray that begins next to the triangle projects its vertices to within 7 u of their distances,
+    at most the longest edge, and the error of the point that it meets is `CANCELLED` u + 4 u times
+    that: twice the edge in `surface_error`, which adds the rounding of p itself.
     """
     v = triangles.vertices
     v0, v1, v2 = triple(v, i, 0), triple(v, i, 1), triple(v, i, 2)
@@ -147,7 +148,7 @@ def lift_of(triangles: Triangles, i: int, p: Vec3) -> float:
 
 @kernel
 def shading_normal(normals: FloatArray | None, i: int, u: float, v: float, n: Vec3) -> Vec3:
-    """The interpolated vertex normal made unit; `n` where there is none."""
+    """The interpolated vertex normal, normalised; `n` if there is none."""
     if normals is None:
         return n
     ns = interpolate(normals, i, u, v)
@@ -186,7 +187,7 @@ def pdf(triangles: Triangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> 
 
 @kernel
 def uv(triangles: Triangles, ray: Ray, hit: Hit) -> tuple[float, float]:
-    """The interpolated texture coordinates; without any, the barycentrics of v1 and v2."""
+    """The interpolated texture coordinates; if there are none, the barycentrics of v1 and v2."""
     return _interpolated_uv(triangles.uvs, hit)
 
 
@@ -201,7 +202,7 @@ def _interpolated_uv(uvs: FloatArray | None, hit: Hit) -> tuple[float, float]:
 
 @kernel
 def tangents(triangles: Triangles, ray: Ray, hit: Hit) -> Tangents:
-    """Those of texture coordinates without area are any."""
+    """Any tangents if the triangle has no area in texture coordinates."""
     i = hit.row
     v0 = triple(triangles.vertices, i, 0)
     a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
@@ -216,7 +217,7 @@ def _tangents_of_uv(uvs: FloatArray | None, i: int, a: Vec3, b: Vec3, n: Vec3) -
     w = uvs[i]
     du_a, dv_a, du_b, dv_b = w[2] - w[0], w[3] - w[1], w[4] - w[0], w[5] - w[1]
     x, y = du_a * dv_b, dv_a * du_b
-    # Differences and products round x and y by 3 u each, and their difference by another.
+    # Differences and products round x and y by 3 u each, and their difference rounds by u.
     if abs(x - y) <= 4.0 * UNIT_ROUNDOFF * (abs(x) + abs(y)):
         return any_tangents(n)
     inverse = 1.0 / (x - y)
@@ -228,7 +229,7 @@ def _tangents_of_uv(uvs: FloatArray | None, i: int, a: Vec3, b: Vec3, n: Vec3) -
 
 @kernel
 def colour(triangles: Triangles | None, hit: Hit, without: Vec3) -> Vec3:
-    """The interpolated colour of the vertices; `without` any, that."""
+    """The interpolated colour of the vertices; `without` if there are none."""
     if triangles is None:
         return without
     return _interpolated_colour(triangles.colours, hit, without)

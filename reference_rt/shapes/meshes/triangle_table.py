@@ -12,8 +12,9 @@ from reference_rt.shapes.shape import Place
 
 class Triangles(NamedTuple):
     """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), texture coordinates (n, 6)
-    and linear sRGB colours (n, 9; -1 for none) of the vertices, each None where no triangle has
-    any; owners (n,); face, the number within its shape, of a mesh that in its file."""
+    and linear sRGB colours (n, 9; -1 for none) of the vertices, each None if no triangle has any;
+    the columns of `placement.owners`, with the number in the shape or in the mesh's file as
+    face."""
 
     vertices: FloatArray
     normals: FloatArray | None
@@ -33,7 +34,7 @@ def soup(
     colours: FloatArray | None = None,
     face: IntArray | None = None,
 ) -> Triangles:
-    """Triangles of one shape: see `Triangles`; without numbers, `face` counts them."""
+    """Triangles of one shape: see `Triangles`; `face` defaults to 0, 1, 2, ..."""
     n = len(vertices)
     return Triangles(
         vertices=vertices,
@@ -48,8 +49,8 @@ def soup(
 
 
 def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
-    """The triangles, whose vertices the map m has taken where they are, with their fronts where it
-    takes those: a mirror turns the corners' order round, and they are turned back."""
+    """Keeps the front of triangles whose vertices the map m has transformed: one that flips
+    orientation reverses the order of the corners, which is reversed again here."""
     if not transform.mirrors(m):
         return triangles
     uvs = _barycentrics(triangles) if triangles.uvs is None else triangles.uvs
@@ -62,19 +63,19 @@ def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
 
 
 def _exchanged(corners: FloatArray) -> FloatArray:
-    """(n, 3 k): the second corner and the third in each other's place."""
+    """(n, 3 k) with the second and the third corner exchanged."""
     return np.ascontiguousarray(
         corners.reshape(len(corners), 3, -1)[:, [0, 2, 1]].reshape(corners.shape)
     )
 
 
 def _barycentrics(triangles: Triangles) -> FloatArray:
-    """The coordinates of triangles that have none of their own (n, 6)."""
+    """The texture coordinates (n, 6) of triangles that have none: barycentrics."""
     return np.repeat([[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]], len(triangles.face), axis=0)
 
 
 def align(parts: Sequence[Triangles]) -> list[Triangles]:
-    """Tables with the same columns: what one has, the others get."""
+    """Gives all tables the columns that any of them has, so that they can be concatenated."""
     parts = list(parts)
     if any(part.normals is not None for part in parts):
         parts = [
@@ -104,7 +105,7 @@ def _flat_normals(triangles: Triangles) -> FloatArray:
 
 
 def geometric_normals(vertices: FloatArray) -> FloatArray:
-    """Normals (n, 3) of twice the area's length, of vertices (n, 9)."""
+    """Normals (n, 3), as long as twice the area, of vertices (n, 9)."""
     v = vertices.reshape(-1, 3, 3)
     return np.asarray(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]))
 
@@ -114,7 +115,7 @@ def areas(triangles: Triangles) -> FloatArray:
 
 
 def bounds(triangles: Triangles) -> Bounds:
-    """Boxes (n, 3), (n, 3): minima and maxima of vertices are exact."""
+    """Boxes (n, 3), (n, 3), exact: minima and maxima of vertices."""
     a, b, c = triangles.vertices.reshape(-1, 3, 3).transpose(1, 0, 2)
-    # Two at a time: along an axis of three NumPy takes ten times as long.
+    # In pairs: NumPy's minimum along an axis of length three takes ten times as long.
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
