@@ -20,7 +20,7 @@ hit,
 Shapes whose material is `emissive` are lights too (`emitters/area.py`).
 
 To add a light: a file in `emitters/`; a code in `light.py`; in `dispatch.py` a field of `Lights`
-and one `if` in `_sample_one`; below, a member of `AnyLight` and a line in `TABLES`; a translator in
+and a line in `_by_code`; below, a member of `AnyLight` and a line in `TABLES`; a translator in
 `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.  Step by step:
 docs/extending.md.
 """

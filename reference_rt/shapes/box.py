@@ -33,11 +33,11 @@ class Box(Shape):
 
     type: Literal["box"] = "box"
 
-    def tabulate(self, place: Place) -> "Boxes":
-        m = self.map_in(place)
+    def tabulate(self, context: Place) -> "Boxes":
+        m = self.map_in(context)
         edges = m[:, :3]
         face_areas = 4.0 * np.linalg.norm(np.cross(edges.T[[1, 2, 0]], edges.T[[2, 0, 1]]), axis=1)
-        return Boxes(face_areas=face_areas[None], **columns(m, place))
+        return Boxes(face_areas=face_areas[None], **columns(m, context))
 
 
 class Boxes(NamedTuple):

@@ -18,25 +18,25 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.shape import Place, outward
 
 
-def columns(m: Affine, place: Place) -> dict[str, Any]:
+def columns(m: Affine, context: Place) -> dict[str, Any]:
     """The columns of every table of placed primitives, one row, for the map m of one shape."""
     return {
         "center": m[:, 3].copy()[None],
         "to_local": invert(m)[:, :3].reshape(1, 9).copy(),
         "edges": m[:, :3].T.reshape(1, 9).copy(),
-        **owners(place),
+        **owners(context),
     }
 
 
-def owners(place: Place) -> dict[str, Any]:
+def owners(context: Place) -> dict[str, Any]:
     """The columns of every table of shapes, one row.
 
     owner: the shape id, an index in the scene (in the group);  material, light: rows of those
     tables, light -1 for none;  face: the number of a face within the shape.
     """
     return {
-        "owner": np.array([place.owner]),
-        "material": np.array([place.material]),
+        "owner": np.array([context.owner]),
+        "material": np.array([context.material]),
         "light": np.array([-1]),
         "face": np.array([0]),
     }
@@ -161,18 +161,3 @@ def world_surface(
     normal = covector * (1.0 / covector_length)
     bound = world_error(table, i, p, q, n, covector_length, error)
     return SurfacePoint(p, normal, normal, bound, material, light)
-
-
-__all__ = [
-    "bounds",
-    "columns",
-    "local_point",
-    "local_ray",
-    "local_vector",
-    "owners",
-    "world_covector",
-    "world_error",
-    "world_point",
-    "world_surface",
-    "world_vector",
-]

@@ -16,7 +16,7 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import LANES
 
 
-def _unheard(owner: int, message: str) -> None:
+def _ignore_warning(owner: int, message: str) -> None:
     """Ignores a warning: of a shape that is tabulated once more, after the scene has warned."""
 
 
@@ -32,7 +32,7 @@ class Place(NamedTuple):
     material: int = 0
     folder: Path = Path()
     outer: Affine = IDENTITY
-    warn: Callable[[int, str], None] = _unheard
+    warn: Callable[[int, str], None] = _ignore_warning
 
 
 class Shape(Description):
@@ -44,7 +44,7 @@ class Shape(Description):
     transform: Transform = ()
     """Steps from the shape's own coordinates to the world's, the first one first."""
 
-    def tabulate(self, place: Place) -> Any:
+    def tabulate(self, context: Place) -> Any:
         """This shape as rows of its table.  Raises ValueError (what is wrong, what was
         expected)."""
         raise NotImplementedError
@@ -61,12 +61,12 @@ class Shape(Description):
         """The points of the first solid that are not in the second."""
         return Difference(of=(self, other))
 
-    def map_in(self, place: Place) -> Affine:
+    def map_in(self, context: Place) -> Affine:
         """The map from the shape's own coordinates to those of the context: its transform, then
-        `place.outer`.  Raises ValueError for one that flattens space."""
-        if not self.transform and place.outer is IDENTITY:
+        `context.outer`.  Raises ValueError for one that flattens space."""
+        if not self.transform and context.outer is IDENTITY:
             return IDENTITY  # the fast path: most shapes of a large scene
-        m = compose(affine(self.transform), place.outer)
+        m = compose(affine(self.transform), context.outer)
         invert(m)
         return m
 
@@ -101,7 +101,8 @@ class Difference(Solid):
 
 
 def pack(*columns: FloatArray) -> FloatArray:
-    """The columns (n, k) of a table in SIMD order: packets (ceil(n / LANES), sum of the k, LANES).
+    """The columns (n, k) of a table in SIMD order: packets
+    (ceil(n / VECTOR_WIDTH), sum of the k, VECTOR_WIDTH).
 
     Rows of NaN fill the last packet: every comparison with them fails.
     """

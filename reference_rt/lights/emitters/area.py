@@ -49,7 +49,7 @@ def _from_point(
         return no_light()
     w = q.p - p
     distance = math.sqrt(dot(w, w))
-    at = _place(textures, areas, i, shapes, p, w, q)
+    at = _texture_coordinates(textures, areas, i, shapes, p, w, q)
     return LightSample(
         w * (1.0 / distance),
         colour_at(areas.radiance, i, at),
@@ -61,7 +61,7 @@ def _from_point(
 
 
 @kernel
-def _place(
+def _texture_coordinates(
     textures: Textures | None,
     areas: Areas,
     i: int,

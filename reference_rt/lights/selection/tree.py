@@ -52,14 +52,14 @@ class Angle(NamedTuple):
 
 
 @kernel
-def between(a: Vec3, b: Vec3) -> Angle:
+def angle_between(a: Vec3, b: Vec3) -> Angle:
     """The angle between unit vectors: the sine, from the cross product, keeps its digits for small
     angles, where the cosine has none."""
     return Angle(dot(a, b), length(cross(a, b)))
 
 
 @kernel
-def less(a: Angle, b: Angle) -> Angle:
+def angle_difference(a: Angle, b: Angle) -> Angle:
     """max(0, a - b), of angles from 0 to pi."""
     if a.cos >= b.cos:
         return Angle(1.0, 0.0)
@@ -86,18 +86,18 @@ def importance(tree: LightTree, i: int, p: Vec3, n: Vec3) -> float:
     w = to_center * (1.0 / distance)
     sine = radius / distance
     seen = Angle(math.sqrt(max(0.0, 1.0 - sine * sine)), sine)
-    leaving = less(less(between(axis, -w), spread), seen).cos + SLACK
+    leaving = angle_difference(angle_difference(angle_between(axis, -w), spread), seen).cos + SLACK
     if leaving < cos_reach:
         return 0.0
     arriving = 1.0
     if n.x != 0.0 or n.y != 0.0 or n.z != 0.0:
-        arriving = max(0.0, less(between(n, w), seen).cos + SLACK)
+        arriving = max(0.0, angle_difference(angle_between(n, w), seen).cos + SLACK)
     bound: float = (even + lambertian * max(0.0, leaving)) * arriving / distance2
     return min(bound, _HUGE)
 
 
 @kernel
-def shares(tree: LightTree, i: int, p: Vec3, n: Vec3) -> tuple[float, float]:
+def child_probabilities(tree: LightTree, i: int, p: Vec3, n: Vec3) -> tuple[float, float]:
     """The probabilities of node i and of its sibling i + 1; both 0 if neither reaches `p`."""
     left, right = importance(tree, i, p, n), importance(tree, i + 1, p, n)
     total = left + right
@@ -113,7 +113,7 @@ def pick(tree: LightTree, p: Vec3, n: Vec3, u: float) -> Pick:
     i, probability = 0, 1.0
     while tree.child[i] >= 0:
         i = tree.child[i]
-        left, right = shares(tree, i, p, n)
+        left, right = child_probabilities(tree, i, p, n)
         u = min(u, _BELOW_ONE)
         if u < left:
             u /= left
@@ -136,7 +136,7 @@ def probability(tree: LightTree, p: Vec3, n: Vec3, k: int) -> float:
     i, trail, product = 0, tree.trail[k], 1.0
     while tree.child[i] >= 0:
         i = tree.child[i]
-        left, right = shares(tree, i, p, n)
+        left, right = child_probabilities(tree, i, p, n)
         if trail & 1:
             product *= right
             i += 1

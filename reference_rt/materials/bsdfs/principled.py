@@ -31,7 +31,7 @@ from reference_rt.materials.bsdfs.principled_lobes import (
     coat_normals,
     diffuse,
     facet,
-    meet,
+    fresnel_at,
     sample_coat,
     sheen,
     sheen_colour,
@@ -202,7 +202,7 @@ class _Shares(NamedTuple):
 
 @kernel
 def _shares(s: Surface, wo: Vec3) -> _Shares:
-    refraction = meet(s, wo.z)
+    refraction = fresnel_at(s, wo.z)
     flat = facet(s, refraction)
     main = 0.0
     if s.eta != 1.0 and (s.front or s.transmitting > 0.0):
@@ -226,7 +226,7 @@ def _scattered(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
             return Scattered(value, 0.0)
         return Scattered(value, shares.main / total * f.passing * (normals * (s.eta * s.eta)))
     h, cos_d = half_vector(wo, wi)
-    refraction = meet(s, cos_d)
+    refraction = fresnel_at(s, cos_d)
     f, normals = facet(s, refraction), visible_normals(s.m, wo, h)
     value = f.mirrored * (0.25 * normals * g1(s.m, wi))
     if s.front:
@@ -284,7 +284,7 @@ def sample(
         if not shares.main > 0.0:
             return no_sample()
         h = sample_visible(s.m, wo, u0, u1)
-        refraction = meet(s, max(0.0, dot(wo, h)))
+        refraction = fresnel_at(s, max(0.0, dot(wo, h)))
         f = facet(s, refraction)
         u = (u - shares.cosine - shares.coat) / shares.main
         wi = _main(f, refraction, wo, h, u)

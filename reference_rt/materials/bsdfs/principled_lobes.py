@@ -67,7 +67,7 @@ def schlick_weight(cosine: float) -> float:
 
 
 @kernel
-def meet(s: Surface, cosine: float) -> Refraction:
+def fresnel_at(s: Surface, cosine: float) -> Refraction:
     """Fresnel's equations for a microfacet at this cosine, from wo's side."""
     return fresnel(cosine if s.front else -cosine, s.relative_ior)
 

@@ -103,7 +103,7 @@ def _facet(dielectrics: RoughDielectrics, i: int, at: At, refraction: Refraction
 
 
 @kernel
-def _meet(dielectrics: RoughDielectrics, i: int, side: float, cosine: float) -> Refraction:
+def _fresnel_at(dielectrics: RoughDielectrics, i: int, side: float, cosine: float) -> Refraction:
     """Fresnel's equations for a microfacet at this cosine, from the side of wo.z = `side`."""
     return fresnel(math.copysign(cosine, side), dielectrics.eta[i])
 
@@ -132,7 +132,7 @@ def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> S
     shown = seen * g1(m, wi)
     if wi.z > 0.0:
         half = half_vector(wo, wi)
-        facet = _facet(dielectrics, i, at, _meet(dielectrics, i, side, half.cosine))
+        facet = _facet(dielectrics, i, at, _fresnel_at(dielectrics, i, side, half.cosine))
         normals = density(m, half.h)
         value = facet.mirrored * (0.25 * normals * shown)
         return Scattered(value, facet.share * (0.25 * seen * normals))
@@ -156,7 +156,7 @@ def sample(
     wo = _upwards(wo, side)
     m = microfacets_at(dielectrics.roughness, i, at)
     h = sample_visible(m, wo, u0, u1)
-    refraction = _meet(dielectrics, i, side, max(0.0, dot(wo, h)))
+    refraction = _fresnel_at(dielectrics, i, side, max(0.0, dot(wo, h)))
     facet = _facet(dielectrics, i, at, refraction)
     if u_lobe < facet.share:
         wi = reflect(wo, h)

@@ -1,8 +1,8 @@
 """Flattened materials: lists of BSDF leaves, each with a weight and a frame.
 
 Masks, blends, two-sided materials, bump and normal maps may be nested in each other.  Each path
-from such a material to a leaf (`paths.py`) becomes a layer: the leaf with the steps that compute
-its weight and its frame at a hit.  What the material scatters is the weighted sum of its layers.
+from such a material to a leaf (`paths.py`) becomes a flattened leaf: the leaf with the steps that
+compute its weight and its frame at a hit.  What the material scatters is their weighted sum.
 """
 
 from typing import Any, NamedTuple
@@ -16,7 +16,15 @@ from reference_rt.materials.material import Material
 from reference_rt.materials.nested import bump, normal_map
 from reference_rt.materials.nested.bump import Bumps
 from reference_rt.materials.nested.normal_map import NormalMaps
-from reference_rt.materials.nested.paths import BACK, BUMP, FRONT, REST, TAKE, TURN, Way
+from reference_rt.materials.nested.paths import (
+    BACK_ONLY,
+    BUMP,
+    FACE_VIEWER,
+    FRONT_ONLY,
+    ONE_MINUS_WEIGHT,
+    WEIGHT,
+    Way,
+)
 from reference_rt.materials.shading import Shading
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Numbers, Palette, number_at
@@ -24,10 +32,10 @@ from reference_rt.textures.parameter import join
 
 
 class Layers(NamedTuple):
-    """For each material m: first (m,) and number (m,) of its layers.  For each layer k: its leaf,
-    kind (k,) and row (k,), and its steps, step_first (k,) and step_count (k,).  For each step s:
-    its code, step (s,), and the row of its parameter, step_row (s,), in one of the tables that
-    follow; a table is None if the scene has no such step."""
+    """For each material m: first (m,) and number (m,) of its flattened leaves.  For each of these,
+    k: its table and row, kind (k,) and row (k,), and its steps, step_first (k,) and step_count
+    (k,).  For each step s: its code, step (s,), and the row of its parameter, step_row (s,), in one
+    of the tables that follow; a table is None if the scene has no such step."""
 
     first: IntArray
     number: IntArray
@@ -43,7 +51,7 @@ class Layers(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """A layer at a point.  weight: that of its leaf;  basis: its frame, in coordinates of the
+    """A flattened leaf at a point.  weight: from 0 to 1;  basis: its frame, in coordinates of the
     shading frame;  side: 0 if its frame is not tilted by a bump or normal map, else 1, or -1 if it
     is flipped to the other side."""
 
@@ -53,7 +61,7 @@ class Layer(NamedTuple):
 
 
 class LayerTables:
-    """Collects the layers of a scene's materials."""
+    """Collects the flattened leaves of a scene's materials."""
 
     def __init__(self, palette: Palette) -> None:
         self.palette = palette
@@ -65,7 +73,7 @@ class LayerTables:
         self.rows: dict[type, list[Any]] = {}
 
     def add(self, layers: list[tuple[Way, tuple[int, int]]]) -> None:
-        """Adds the next material: its layers, as paths with the (kind, row) of their leaves.
+        """Adds the next material: its paths, with the (kind, row) of their leaves.
 
         Raises ValueError.
         """
@@ -115,12 +123,12 @@ class LayerTables:
 
 
 SIZE = 11
-"""Floats of a layer in the scratch buffer: weight, s, t and n of the basis, side."""
+"""Floats of a flattened leaf in the scratch buffer: weight, s, t and n of the basis, side."""
 
 
 @kernel
 def most(layers: Layers | None) -> int:
-    """The largest number of layers of any material."""
+    """The largest number of flattened leaves of any material."""
     if layers is None:
         return 0
     found = 0
@@ -131,7 +139,7 @@ def most(layers: Layers | None) -> int:
 
 @kernel
 def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
-    """Writes the layers of the material at this point to the scratch buffer `shading.layers`.
+    """Writes the flattened leaves of the material to the scratch buffer `shading.layers`.
 
     They depend on the point and on wo, not on wi: evaluated once per hit they serve all calls of
     `both`, `sample` and `branches`, and their code is compiled once.
@@ -150,7 +158,7 @@ def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
 
 @kernel
 def layer_at(shading: Shading, k: int) -> Layer:
-    """Layer k of the material, read from the scratch buffer."""
+    """Flattened leaf k of the material, from the scratch buffer."""
     kept = shading.layers[SIZE * k : SIZE * (k + 1)]
     basis = Frame(
         Vec3(kept[1], kept[2], kept[3]),
@@ -162,21 +170,21 @@ def layer_at(shading: Shading, k: int) -> Layer:
 
 @kernel
 def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
-    """Runs the steps of layer k of the tables, for `shading.wo`."""
+    """Runs the steps of flattened leaf k of the scene, for `shading.wo`."""
     weight, side, tilted = 1.0, 1.0, False
     basis = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
     begin = layers.step_first[k]
     for s in range(begin, begin + layers.step_count[k]):
         code, i = layers.step[s], layers.step_row[s]
         above = to_local(basis, shading.wo).z > 0.0
-        if code in (TAKE, REST):
+        if code in (WEIGHT, ONE_MINUS_WEIGHT):
             w = _weight(layers.weights, i, shading)
-            weight *= w if code == TAKE else 1.0 - w
-        elif code == FRONT:
+            weight *= w if code == WEIGHT else 1.0 - w
+        elif code == FRONT_ONLY:
             weight = weight if above else 0.0
-        elif code == BACK:
+        elif code == BACK_ONLY:
             weight = 0.0 if above else weight
-        elif code == TURN:
+        elif code == FACE_VIEWER:
             if not above:
                 # As in Mitsuba z alone changes sign, so that the basis becomes left-handed.
                 basis = Frame(basis.s, basis.t, -basis.n)
@@ -224,20 +232,8 @@ def _mapped(maps: NormalMaps | None, i: int, shading: Shading, tangents: Tangent
 
 @kernel
 def lets(layer: Layer, wi: Vec3) -> bool:
-    """Whether a layer scatters light from the local `wi`: not where wi is on different sides of the
-    surface and of the tilted frame (Mitsuba's rule)."""
+    """Whether a flattened leaf scatters light from the local `wi`: not where wi is on different
+    sides of the surface and of the tilted frame (Mitsuba's rule)."""
     if layer.side == 0.0:
         return True
     return layer.side * wi.z * to_local(layer.basis, wi).z > 0.0
-
-
-__all__ = [
-    "SIZE",
-    "Layer",
-    "LayerTables",
-    "Layers",
-    "layer_at",
-    "lets",
-    "most",
-    "prepare",
-]

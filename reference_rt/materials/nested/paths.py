@@ -12,10 +12,10 @@ from reference_rt.materials.nested.bump import Bump
 from reference_rt.materials.nested.normal_map import NormalMap
 from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided
 
-# Codes of steps.  TAKE, REST: times w, 1 - w, for a number w of `weights`; FRONT, BACK: times 0
-# when seen from the other side; TURN: the frame flipped to the viewer's side; BUMP, NORMAL_MAP: the
-# frame tilted.
-TAKE, REST, FRONT, BACK, TURN, BUMP, NORMAL_MAP = range(7)
+# Codes of steps.  WEIGHT, ONE_MINUS_WEIGHT: times w, 1 - w, for a number w of `weights`;
+# FRONT_ONLY, BACK_ONLY: times 0 when seen from the other side; FACE_VIEWER: the frame flipped to
+# the viewer's side; BUMP, NORMAL_MAP: the frame tilted.
+WEIGHT, ONE_MINUS_WEIGHT, FRONT_ONLY, BACK_ONLY, FACE_VIEWER, BUMP, NORMAL_MAP = range(7)
 
 MOST_LAYERS = 64
 """The most leaves of a material: a blend of blends doubles them at each level."""
@@ -37,7 +37,7 @@ class Way(NamedTuple):
     @property
     def turns(self) -> bool:
         """Whether the leaf may be visible from behind too."""
-        return any(step.code in (TURN, BACK) for step in self.steps)
+        return any(step.code in (FACE_VIEWER, BACK_ONLY) for step in self.steps)
 
 
 def ways(name: str, materials: Mapping[str, Material]) -> list[Way]:
@@ -59,16 +59,21 @@ def _ways(name: str, materials: Mapping[str, Material], above: tuple[str, ...]) 
 
     found = [Way((), name)]
     if isinstance(material, Mask):
-        clear = Way((Step(REST, material.opacity),), None)
-        found = [*below(material.base, Step(TAKE, material.opacity)), clear]
+        clear = Way((Step(ONE_MINUS_WEIGHT, material.opacity),), None)
+        found = [*below(material.base, Step(WEIGHT, material.opacity)), clear]
     elif isinstance(material, Blend):
-        rest, take = Step(REST, material.weight), Step(TAKE, material.weight)
+        rest, take = (
+            Step(ONE_MINUS_WEIGHT, material.weight),
+            Step(WEIGHT, material.weight),
+        )
         found = [*below(material.first, rest), *below(material.second, take)]
     elif isinstance(material, TwoSided):
-        found = below(material.base, Step(TURN if material.back is None else FRONT, None))
+        found = below(
+            material.base, Step(FACE_VIEWER if material.back is None else FRONT_ONLY, None)
+        )
         _check_one_sided(material.base, found, materials)
         if material.back is not None:
-            behind = below(material.back, Step(BACK, None), Step(TURN, None))
+            behind = below(material.back, Step(BACK_ONLY, None), Step(FACE_VIEWER, None))
             _check_one_sided(material.back, behind, materials)
             found += behind
     elif isinstance(material, Bump | NormalMap):

@@ -45,9 +45,9 @@ def anchored(solid: Shape) -> Anchored:
     of coordinates, so that the order of operands does not matter.  Raises ValueError where
     coordinates overflow.
     """
-    standing = list(_standing(solid, ()))
+    operands_with_steps = list(_placed_operands(solid, ()))
     try:
-        maps = [_map_of(shape, steps) for shape, steps in standing]
+        maps = [_map_of(shape, steps) for shape, steps in operands_with_steps]
         anchor = min(maps, key=lambda m: tuple(m[:, 3]))[:, 3].astype(np.float64)
         for m in maps:
             m[:, 3] -= _exact(anchor)
@@ -58,7 +58,7 @@ def anchored(solid: Shape) -> Anchored:
         operands = operands_of(solid, identity(), None)
         return Anchored(np.zeros(3), [(shape, outer) for shape, outer, _, _ in operands])
     seen: list[tuple[Shape, Affine]] = []
-    for (shape, _), m in zip(standing, floats, strict=True):
+    for (shape, _), m in zip(operands_with_steps, floats, strict=True):
         update: dict[str, Any] = {"transform": ()}
         if hasattr(shape, "center"):
             update["center"] = (0.0, 0.0, 0.0)  # in the map
@@ -66,14 +66,14 @@ def anchored(solid: Shape) -> Anchored:
     return Anchored(anchor, seen)
 
 
-def _standing(shape: Shape, outer: Transform) -> Iterator[tuple[Shape, Transform]]:
+def _placed_operands(shape: Shape, outer: Transform) -> Iterator[tuple[Shape, Transform]]:
     """(operand, the steps from its own coordinates to the world's)."""
     steps = (*shape.transform, *outer)
     if not isinstance(shape, Solid):
         yield shape, steps
         return
     for operand in shape.of:
-        yield from _standing(operand, steps)
+        yield from _placed_operands(operand, steps)
 
 
 def _map_of(shape: Shape, steps: Transform) -> Any:

@@ -89,7 +89,7 @@ STEEP = 0.5
 
 
 @kernel
-def _nearer(k: FloatArray, ray: Ray, a: float, slope: float, t: float) -> float:
+def _refined_root(k: FloatArray, ray: Ray, a: float, slope: float, t: float) -> float:
     """The root t, where f grows by 2 `slope`, refined from an origin next to it if f is flat there.
 
     a, b and c round by u times the square of the distance from the origin.  That moves a root as
@@ -137,7 +137,7 @@ def roots(k: FloatArray, ray: Ray) -> Roots:
     # Where f has no quadratic term along the line, one root is ±inf, as IEEE says.
     t0 = q / a if a != 0.0 else q * math.inf
     t1 = c / q if q != 0.0 else t0
-    t0, t1 = _nearer(k, ray, a, -half, t0), _nearer(k, ray, a, half, t1)
+    t0, t1 = _refined_root(k, ray, a, -half, t0), _refined_root(k, ray, a, half, t1)
     return Roots(min(t0, t1), max(t0, t1), a >= 0.0)
 
 

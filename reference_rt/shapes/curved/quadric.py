@@ -54,7 +54,7 @@ class Quadric(Shape):
             raise ValueError("expected each coordinate of 'lower' to be below that of 'upper'")
         return self
 
-    def tabulate(self, place: Place) -> "Quadrics":
+    def tabulate(self, context: Place) -> "Quadrics":
         form = tuple(Fraction(x) for x in self.coefficients)
         sign = definite_sign(form)
         if sign != 0:
@@ -65,8 +65,8 @@ class Quadric(Shape):
                 )
             form = (*[Fraction(0)] * 9, Fraction(sign))
         clipped = (True, True, True)
-        m = self.map_in(place)
-        return tabulate(place, m, form, self.lower, self.upper, clipped, self.capped)
+        m = self.map_in(context)
+        return tabulate(context, m, form, self.lower, self.upper, clipped, self.capped)
 
 
 _LARGEST = 1e140
@@ -74,7 +74,7 @@ _LARGEST = 1e140
 
 
 def tabulate(
-    place: Place,
+    context: Place,
     m: Affine,
     form: Form,
     lower: Point,
@@ -98,7 +98,7 @@ def tabulate(
         for r, r3 in zip(m, map(Fraction, m[:, 3]), strict=True)
     ]
     table = Quadrics(
-        **columns(np.column_stack([m[:, :3] * fitted.unit, offset]), place),
+        **columns(np.column_stack([m[:, :3] * fitted.unit, offset]), context),
         coefficients=np.array([fitted.form]),
         lower=np.array([fitted.lower]),
         upper=np.array([fitted.upper]),
@@ -112,10 +112,10 @@ def tabulate(
     return table
 
 
-def ellipsoid(place: Place, m: Affine, middle: Vector, radius: float) -> Quadrics:
+def ellipsoid(context: Place, m: Affine, middle: Vector, radius: float) -> Quadrics:
     """The image under m of the sphere around `middle`."""
     unit_sphere = tuple(Fraction(k) for k in (1, 1, 1, 0, 0, 0, 0, 0, 0))
     form = seen_from((*unit_sphere, -(Fraction(radius) ** 2)), [-Fraction(x) for x in middle])
     lower = [Fraction(x) - Fraction(radius) for x in middle]
     upper = [Fraction(x) + Fraction(radius) for x in middle]
-    return tabulate(place, m, form, lower, upper, (False, False, False), True)
+    return tabulate(context, m, form, lower, upper, (False, False, False), True)

@@ -14,7 +14,7 @@ from reference_rt.shapes.shape import Spans, no_spans, one_span
 
 
 @kernel
-def _nearby(quadrics: Any, i: int, ray: Ray) -> tuple[Ray, float, float]:
+def _rebased_ray(quadrics: Any, i: int, ray: Ray) -> tuple[Ray, float, float]:
     """(the ray in local coordinates, begin, unit): the world's t is begin + t unit.
 
     The origin of a ray from far away is moved next to the local origin, in the world and without
@@ -38,8 +38,9 @@ def _nearby(quadrics: Any, i: int, ray: Ray) -> tuple[Ray, float, float]:
 class Line(NamedTuple):
     """A line's roots, where it enters and leaves the clip box, and the codes of the caps there.
 
-    All t are those of `_nearby`.  Far away the spacing of the world's t is larger than the distance
-    between a rim and a root: their order is decided before they are rounded to the world's t.
+    All t are those of `_rebased_ray`.  Far away the spacing of the world's t is larger than the
+    distance between a rim and a root: their order is decided before they are rounded to the world's
+    t.
     """
 
     t0: float
@@ -55,7 +56,7 @@ class Line(NamedTuple):
 
 @kernel
 def line_of(quadrics: Any, i: int, ray: Ray) -> Line:
-    near, begin, unit = _nearby(quadrics, i, ray)
+    near, begin, unit = _rebased_ray(quadrics, i, ray)
     r = roots(quadrics.coefficients[i], near)
     s = slabs(quadrics.lower[i], quadrics.upper[i], quadrics.clipped[i], near)
     t_in, t_out = inside(s)

@@ -41,26 +41,26 @@ class Sphere(Shape):
     center: Vector = (0.0, 0.0, 0.0)
     radius: Positive = 1.0
 
-    def tabulate(self, place: Place) -> "Spheres | Quadrics":
-        m = self.map_in(place)
+    def tabulate(self, context: Place) -> "Spheres | Quadrics":
+        m = self.map_in(context)
         if m is transform.IDENTITY:
             return Spheres(
                 center=np.array([self.center]),
                 radius=np.array([self.radius]),
                 to_local=np.eye(3).reshape(1, 9),
-                **owners(place),
+                **owners(context),
             )
         size = np.abs(m[:, :3]).max()  # a factor of its own: squares of extreme scales overflow
         linear = m[:, :3] / size
         factor = math.sqrt(float(np.trace(linear.T @ linear)) / 3.0)
         # A similarity has A^T A = s² 1; each entry of the product rounds at most 8 times.
         if np.max(np.abs(linear.T @ linear - factor**2 * np.eye(3))) > 8e-16 * 4 * factor**2:
-            return ellipsoid(place, m, self.center, self.radius)
+            return ellipsoid(context, m, self.center, self.radius)
         return Spheres(
             center=transform.apply_points(m, np.array([self.center])),
             radius=np.array([self.radius * factor * size]),
             to_local=np.asarray(np.linalg.inv(linear / factor), np.float64).reshape(1, 9),
-            **owners(place),
+            **owners(context),
         )
 
 

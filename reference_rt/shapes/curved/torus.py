@@ -32,7 +32,7 @@ class Torus(Shape):
     minor_radius: Positive = 0.25
     """r, of the tube; less than R."""
 
-    def tabulate(self, place: Place) -> "Tori":
+    def tabulate(self, context: Place) -> "Tori":
         if not self.minor_radius < self.major_radius:
             raise ValueError(
                 f"minor_radius is {self.minor_radius:g}; expected less than major_radius, "
@@ -41,7 +41,7 @@ class Torus(Shape):
         return Tori(
             major=np.array([self.major_radius]),
             minor=np.array([self.minor_radius]),
-            **columns(self.map_in(place), place),
+            **columns(self.map_in(context), context),
         )
 
 

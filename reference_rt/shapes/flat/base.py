@@ -31,7 +31,7 @@ def integers(a: FloatArray) -> tuple[Integers, int]:
 
 
 def columns(
-    center: FloatArray, x_edge: FloatArray, y_edge: FloatArray, place: Place
+    center: FloatArray, x_edge: FloatArray, y_edge: FloatArray, context: Place
 ) -> dict[str, Any]:
     """The columns of every flat table, one row; the normal is that of x_edge x y_edge.
 
@@ -60,14 +60,14 @@ def columns(
         "y_of": y_of[None],
         "x_edge": x_edge.copy()[None],
         "y_edge": y_edge.copy()[None],
-        **owners(place),
+        **owners(context),
     }
 
 
-def facing_z(m: Affine, place: Place) -> dict[str, Any]:
+def facing_z(m: Affine, context: Place) -> dict[str, Any]:
     """`columns` for the plane z = 0 with normal +z under the map m; also for a map that flips
     orientation the normal is on the side that +z is mapped to."""
-    made = columns(m[:, 3], m[:, 0], m[:, 1], place)
+    made = columns(m[:, 3], m[:, 0], m[:, 1], context)
     (x, y, z), _ = integers(m[:, :3].T)
     if np.cross(x, y) @ z < 0:
         made["normal"] = -made["normal"]

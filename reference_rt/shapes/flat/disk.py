@@ -27,8 +27,8 @@ class Disk(Shape):
 
     type: Literal["disk"] = "disk"
 
-    def tabulate(self, place: Place) -> "Disks":
-        disks = Disks(**base.facing_z(self.map_in(place), place))
+    def tabulate(self, context: Place) -> "Disks":
+        disks = Disks(**base.facing_z(self.map_in(context), context))
         base.check_area("disk", areas(disks)[0])
         return disks
 

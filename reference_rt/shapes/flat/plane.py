@@ -19,8 +19,8 @@ class Plane(Shape):
 
     type: Literal["plane"] = "plane"
 
-    def tabulate(self, place: Place) -> "Planes":
-        return Planes(**base.facing_z(self.map_in(place), place))
+    def tabulate(self, context: Place) -> "Planes":
+        return Planes(**base.facing_z(self.map_in(context), context))
 
 
 class Planes(NamedTuple):

@@ -79,8 +79,8 @@ class Polygon(Shape):
     ring in a ring is a hole), or points that the rings go round a number of times that is not 0 (a
     hole is a ring in a ring the other way round)."""
 
-    def tabulate(self, place: Place) -> "Polygons":
-        m = self.map_in(place)
+    def tabulate(self, context: Place) -> "Polygons":
+        m = self.map_in(context)
         points = np.array([p for ring in self.rings for p in ring])
         if np.abs(points).max() > 2.0**1000:
             raise ValueError("its coordinates overflow; expected finite numbers")
@@ -101,7 +101,7 @@ class Polygon(Shape):
         edges = [
             (linear[:, k] - s * linear[:, axis]) * scale for k, s in zip(kept, slopes, strict=True)
         ]
-        made = base.columns(linear[:, axis] * origin + m[:, 3], edges[0], edges[1], place)
+        made = base.columns(linear[:, axis] * origin + m[:, 3], edges[0], edges[1], context)
         if clockwise != transform.mirrors(m):
             made["normal"] = -made["normal"]
         return Polygons(

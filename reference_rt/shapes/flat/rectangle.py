@@ -47,9 +47,9 @@ class Rectangle(Shape):
 
     type: Literal["rectangle"] = "rectangle"
 
-    def tabulate(self, place: Place) -> "Rectangles":
-        m = self.map_in(place)
-        rectangles = Rectangles(**base.facing_z(m, place), lengths=_lengths(m[:, 0], m[:, 1]))
+    def tabulate(self, context: Place) -> "Rectangles":
+        m = self.map_in(context)
+        rectangles = Rectangles(**base.facing_z(m, context), lengths=_lengths(m[:, 0], m[:, 1]))
         base.check_area("rectangle", areas(rectangles)[0])
         return rectangles
 
@@ -157,7 +157,7 @@ def tangents(rectangles: Rectangles, ray: Ray, hit: Hit) -> Tangents:
 
 
 @kernel
-def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
+def _as_seen_from(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
     """Rectangle i as seen from `p` in front of it, in units of half its diagonal; its solid angle
     is 0 where it is to be sampled by area."""
     w = p - row(rectangles.center, i)
@@ -185,7 +185,7 @@ def sample(
 ) -> LightPoint:
     """A point as a light for `p`, uniform over the solid angle if `p` is near, else over the
     area."""
-    seen = _see(rectangles, i, p)
+    seen = _as_seen_from(rectangles, i, p)
     if seen.solid_angle < _LEAST_SOLID_ANGLE:
         return sample_by_area(rectangles, i, area, p, u0, u1)
     x, y = spherical_rectangle.sample(seen, u0, u1)
@@ -215,7 +215,7 @@ def middle(rectangles: Rectangles, i: int, area: float, p: Vec3) -> LightPoint:
 @kernel
 def pdf(rectangles: Rectangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, at the point `q` of the rectangle."""
-    seen = _see(rectangles, i, p)
+    seen = _as_seen_from(rectangles, i, p)
     if seen.solid_angle < _LEAST_SOLID_ANGLE:
         return solid_angle_pdf(p, q.p, q.n, area, base.lift_of(rectangles, i, p))
     return 1.0 / seen.solid_angle

@@ -94,12 +94,12 @@ class Mesh(Shape):
         assert self.faces is not None
         return checked(RawMesh(self.vertices, self.faces, self.normals, self.uv, self.colours))
 
-    def tabulate(self, place: Place) -> Triangles:
-        m = self.map_in(place)
-        data = self.data(place.folder)
-        name = "the mesh" if self.file is None else f"mesh {place.folder / self.file}"
+    def tabulate(self, context: Place) -> Triangles:
+        m = self.map_in(context)
+        data = self.data(context.folder)
+        name = "the mesh" if self.file is None else f"mesh {context.folder / self.file}"
         if data.ignored:
-            place.warn(place.owner, f"{name}: {_told(data.ignored)}")
+            context.warn(context.owner, f"{name}: {_ignored_message(data.ignored)}")
         vertices = transform.apply_points(m, data.vertices)[data.faces].reshape(-1, 9)
         # Triangles without area have no normal, and rays meet them by rounding alone: left out.
         n = geometric_normals(vertices)
@@ -110,15 +110,15 @@ class Mesh(Shape):
         if not has_area.all():
             numbers = np.flatnonzero(has_area)
             vertices, faces = vertices[has_area], faces[has_area]
-            place.warn(
-                place.owner,
+            context.warn(
+                context.owner,
                 f"{name}: {len(has_area) - len(numbers):,} of {len(has_area):,} triangles have no "
                 "area, or one that float64 cannot hold, and are left out (the others keep their "
                 "numbers); expected triangles with an area",
             )
         triangles = soup(
             np.ascontiguousarray(vertices),
-            place,
+            context,
             normals=self._normals(data, faces, m),
             uvs=_at_corners(data.uv, faces),
             colours=_at_corners(data.colours, faces),
@@ -140,7 +140,7 @@ class Mesh(Shape):
         return _at_corners(transform.apply_normals(m, data.normals), faces)
 
 
-def _told(ignored: tuple[str, ...]) -> str:
+def _ignored_message(ignored: tuple[str, ...]) -> str:
     names = [name[:_LONGEST] for name in ignored[:_MOST_NAMED]]
     more = [f"{len(ignored) - len(names)} more"] if len(ignored) > len(names) else []
     return (

@@ -27,7 +27,13 @@ from reference_rt.shapes.meshes.triangle_table import (
     facing,
     soup,
 )
-from reference_rt.shapes.meshes.watertight import Projection, Shear, exactly, project, project_lane
+from reference_rt.shapes.meshes.watertight import (
+    Projection,
+    Shear,
+    exact_edge_function,
+    project,
+    project_lane,
+)
 from reference_rt.shapes.shape import (
     LightPoint,
     Place,
@@ -48,10 +54,10 @@ class Triangle(Shape):
     v1: Vector
     v2: Vector
 
-    def tabulate(self, place: Place) -> "Triangles":
-        m = self.map_in(place)
+    def tabulate(self, context: Place) -> "Triangles":
+        m = self.map_in(context)
         vertices = transform.apply_points(m, np.array([self.v0, self.v1, self.v2]))
-        triangles = facing(m, soup(vertices.reshape(1, 9), place))
+        triangles = facing(m, soup(vertices.reshape(1, 9), context))
         if areas(triangles)[0] == 0.0:
             raise ValueError("the triangle has no area; expected three points not on a line")
         return triangles
@@ -114,9 +120,9 @@ def normal(triangles: Triangles, i: int) -> Vec3:
     a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
     n = cross(a, b)
     if dot(n, n) < 0.0625 * (dot(a, a) * dot(b, b)):
-        x, _ = exactly(a.y, a.z, b.y, b.z)
-        y, _ = exactly(a.z, a.x, b.z, b.x)
-        z, _ = exactly(a.x, a.y, b.x, b.y)
+        x, _ = exact_edge_function(a.y, a.z, b.y, b.z)
+        y, _ = exact_edge_function(a.z, a.x, b.z, b.x)
+        z, _ = exact_edge_function(a.x, a.y, b.x, b.y)
         n = Vec3(x, y, z)
     return normalize(n)
 

@@ -28,7 +28,7 @@ class Triangles(NamedTuple):
 
 def soup(
     vertices: FloatArray,
-    place: Place,
+    context: Place,
     normals: FloatArray | None = None,
     uvs: FloatArray | None = None,
     colours: FloatArray | None = None,
@@ -41,8 +41,8 @@ def soup(
         normals=normals,
         uvs=uvs,
         colours=colours,
-        owner=np.full(n, place.owner),
-        material=np.full(n, place.material),
+        owner=np.full(n, context.owner),
+        material=np.full(n, context.material),
         light=np.full(n, -1),
         face=np.arange(n) if face is None else face,
     )

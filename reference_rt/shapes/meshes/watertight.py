@@ -100,8 +100,8 @@ def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection
 
     The projection of a vertex does not depend on the triangle, and the edge functions of two
     neighbours differ only in sign.  Products round monotonically: a difference that is not 0 has
-    the right sign.  Where it is 0, `exactly` decides: a ray through a shared edge or vertex meets
-    exactly those of the triangles around it that it would meet a hair beside it.
+    the right sign.  Where it is 0, `exact_edge_function` decides: a ray through a shared edge or
+    vertex meets exactly those of the triangles around it that it would meet a hair beside it.
     """
     x, y, z = start + stride * shear.x, start + stride * shear.y, start + stride * shear.z
     a_z = v[z] - shear.o_z
@@ -125,13 +125,13 @@ def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection
     if side != 0:
         size = abs(left0) + abs(right0) + abs(left1) + abs(right1) + abs(left2) + abs(right2)
         if size > CANCELLED * abs(e0 + e1 + e2):
-            e0, _ = exactly(c_x, c_y, b_x, b_y)
-            e1, _ = exactly(a_x, a_y, c_x, c_y)
-            e2, _ = exactly(b_x, b_y, a_x, a_y)
+            e0, _ = exact_edge_function(c_x, c_y, b_x, b_y)
+            e1, _ = exact_edge_function(a_x, a_y, c_x, c_y)
+            e2, _ = exact_edge_function(b_x, b_y, a_x, a_y)
     elif e0 == 0.0 or e1 == 0.0 or e2 == 0.0:
-        e0, s0 = exactly(c_x, c_y, b_x, b_y)
-        e1, s1 = exactly(a_x, a_y, c_x, c_y)
-        e2, s2 = exactly(b_x, b_y, a_x, a_y)
+        e0, s0 = exact_edge_function(c_x, c_y, b_x, b_y)
+        e1, s1 = exact_edge_function(a_x, a_y, c_x, c_y)
+        e2, s2 = exact_edge_function(b_x, b_y, a_x, a_y)
         side = s0 if s0 == s1 and s1 == s2 else 0
     return Projection(side, e0, e1, e2, a_z, b_z, c_z)
 
@@ -189,8 +189,8 @@ def see(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArr
     be called for: all that the ray meets, and some whose edges it passes through;
     seen (SEEN_FLOATS,): where the results are stored for `project_lane`.
 
-    The vertices of references first .. first + size, LANES at most, are in `corners` from 9 first
-    on: the first coordinate of each, the second of each, and so on.  Lanes beyond the last
+    The vertices of references first .. first + size, VECTOR_WIDTH at most, are in `corners` from 9
+    first on: the first coordinate of each, the second of each, and so on.  Lanes beyond the last
     reference read the numbers that follow, and are ignored.
     """
     met = _see(
@@ -211,7 +211,7 @@ def see(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArr
 
 
 @kernel
-def exactly(p_x: float, p_y: float, q_x: float, q_y: float) -> tuple[float, int]:
+def exact_edge_function(p_x: float, p_y: float, q_x: float, q_y: float) -> tuple[float, int]:
     """The edge function p_x q_y - p_y q_x to within one rounding, and its exact sign.
 
     On the edge it is the sign beside the edge, as if the ray were moved by (h, h²) for an
