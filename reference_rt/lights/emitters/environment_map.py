@@ -83,7 +83,7 @@ class EnvironmentMaps(NamedTuple):
 
 
 def tabulate(texels: FloatArray, to_world: FloatArray) -> EnvironmentMaps:
-    """The table of radiance (h, w, 3) turned by an orthogonal (3, 3)."""
+    """The table of an image (h, w, 3) of radiance;  to_world: an orthogonal (3, 3)."""
     height, width = texels.shape[:2]
     row_sums = np.empty((height, width + 1))
     for y, row in enumerate(texels):  # one at a time, since the table itself is what memory holds

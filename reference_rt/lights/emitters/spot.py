@@ -1,4 +1,4 @@
-"""Spot light: a point that shines into a cone, less towards its rim."""
+"""Spot light: a point that emits into a cone, with a falloff towards its rim."""
 
 import math
 from typing import Annotated, Literal, NamedTuple, Self

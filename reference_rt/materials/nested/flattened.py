@@ -149,23 +149,23 @@ def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
     m = shading.point.material
     for k in range(layers.number[m]):
         found = _layer(layers, layers.first[m] + k, shading, at)
-        kept = shading.layers[SIZE * k : SIZE * (k + 1)]
-        kept[0], kept[10] = found.weight, found.side
-        kept[1], kept[2], kept[3] = found.basis.s
-        kept[4], kept[5], kept[6] = found.basis.t
-        kept[7], kept[8], kept[9] = found.basis.n
+        buffer = shading.layers[SIZE * k : SIZE * (k + 1)]
+        buffer[0], buffer[10] = found.weight, found.side
+        buffer[1], buffer[2], buffer[3] = found.basis.s
+        buffer[4], buffer[5], buffer[6] = found.basis.t
+        buffer[7], buffer[8], buffer[9] = found.basis.n
 
 
 @kernel
 def layer_at(shading: Shading, k: int) -> Layer:
     """Flattened leaf k of the material, from the scratch buffer."""
-    kept = shading.layers[SIZE * k : SIZE * (k + 1)]
+    buffer = shading.layers[SIZE * k : SIZE * (k + 1)]
     basis = Frame(
-        Vec3(kept[1], kept[2], kept[3]),
-        Vec3(kept[4], kept[5], kept[6]),
-        Vec3(kept[7], kept[8], kept[9]),
+        Vec3(buffer[1], buffer[2], buffer[3]),
+        Vec3(buffer[4], buffer[5], buffer[6]),
+        Vec3(buffer[7], buffer[8], buffer[9]),
     )
-    return Layer(kept[0], basis, kept[10])
+    return Layer(buffer[0], basis, buffer[10])
 
 
 @kernel
@@ -195,11 +195,13 @@ def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
                 to_local(basis, shading.tangents.dpdu), to_local(basis, shading.tangents.dpdv)
             )
             if code == BUMP:
-                turned = _bumped(layers.bumps, i, at, local)
+                tilted_basis = _bumped(layers.bumps, i, at, local)
             else:
-                turned = _mapped(layers.normal_maps, i, shading, local)
+                tilted_basis = _mapped(layers.normal_maps, i, shading, local)
             basis = Frame(
-                to_world(basis, turned.s), to_world(basis, turned.t), to_world(basis, turned.n)
+                to_world(basis, tilted_basis.s),
+                to_world(basis, tilted_basis.t),
+                to_world(basis, tilted_basis.n),
             )
     return Layer(weight, basis, side if tilted else 0.0)
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.ray import Crossing, Ray, SurfacePoint, miss, surface_error
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
 from reference_rt.core.transform import FLAT, Affine
 from reference_rt.core.vec3 import Vec3, dot, max_abs, row
 from reference_rt.jit.kernel import kernel
@@ -125,6 +125,12 @@ def surface_at(table: Any, i: int, x: float, y: float) -> SurfacePoint:
     reach = max_abs(x_edge) * max(1.0, abs(x)) + max_abs(y_edge) * max(1.0, abs(y))
     error = surface_error(p, center, reach)
     return SurfacePoint(p, n, n, error, table.material[i], table.light[i])
+
+
+@kernel
+def surface(table: Any, ray: Ray, hit: Hit) -> SurfacePoint:
+    """The point at a hit whose u, v are x and y."""
+    return surface_at(table, hit.row, hit.u, hit.v)
 
 
 @kernel

@@ -72,9 +72,7 @@ def intersect(disks: Disks, i: int, ray: Ray) -> Crossing:
     return miss()
 
 
-@kernel
-def surface(disks: Disks, ray: Ray, hit: Hit) -> SurfacePoint:
-    return base.surface_at(disks, hit.row, hit.u, hit.v)
+surface = base.surface
 
 
 @kernel

@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, ValidationError, WithJsonSchema, Wr
 from reference_rt.core import transform
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
 from reference_rt.core.model import Vector
-from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, miss
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.flat import base
@@ -282,9 +282,7 @@ def intersect(polygons: Polygons, i: int, ray: Ray) -> Crossing:
     return miss()
 
 
-@kernel
-def surface(polygons: Polygons, ray: Ray, hit: Hit) -> SurfacePoint:
-    return base.surface_at(polygons, hit.row, hit.u, hit.v)
+surface = base.surface
 
 
 @kernel

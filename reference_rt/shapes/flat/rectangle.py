@@ -139,9 +139,7 @@ def lane_distance(
     )
 
 
-@kernel
-def surface(rectangles: Rectangles, ray: Ray, hit: Hit) -> SurfacePoint:
-    return base.surface_at(rectangles, hit.row, hit.u, hit.v)
+surface = base.surface
 
 
 @kernel
