@@ -95,7 +95,6 @@ __all__ = [
     "Lights",
     "Pick",
     "Point",
-    "Points",
     "Spot",
     "ambient",
     "area_pdf",

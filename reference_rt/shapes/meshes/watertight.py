@@ -185,9 +185,9 @@ def _see(
 
 @kernel
 def see(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArray) -> int:
-    """Projects the triangles of a BVH leaf in SIMD.  Returns as bits those that `project_lane` must
-    be called for: all that the ray meets, and some whose edges it passes through;
-    seen (SEEN_FLOATS,): where the results are stored for `project_lane`.
+    """Projects the triangles of a BVH leaf in SIMD.  Returns, as bits, for which of them
+    `project_lane` must be called: all that the ray meets, and some whose edges it passes through;
+    seen (`SEEN_FLOATS`,): where the results are stored for that.
 
     The vertices of references first .. first + size, VECTOR_WIDTH at most, are in `corners` from 9
     first on: the first coordinate of each, the second of each, and so on.  Lanes beyond the last
