@@ -1,8 +1,28 @@
-"""All lights: one file each; here, their names.  What is asked of them is in `dispatch.py`.
+"""Lights: where light comes from, and which light a shadow ray is sent to.
 
-To add a light: its file with description, table and kernels; a code in `light.py`; in `dispatch.py`
-a field of `Lights` and one `if` in `_sample_one`; below, `AnyLight` and a line in `TABLES`; a
-translator function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
+- `emitters/`: the types of lights, one file each;
+- `selection/`: the light sampler, by power or by a light tree;
+- `dispatch.py`: the kernels that integrators call, for any light of a scene.
+
+Contract: all positions and directions are in the world; units are W sr^-1 m^-2 for radiance, scene
+units for distances; colours are linear sRGB.  Lights that can be sampled are numbered 0, 1, ...
+
+- `pick(lights, p, n, u)` returns a light's number and the probability of picking it;
+- `sample_one(lights, k, shapes, textures, p, u0, u1) -> LightSample` returns a direction from `p`
+to
+  light k and the radiance from there, without testing visibility; its pdf does not include the
+  probability of picking k; pdf = 0 means that nothing arrives;
+- `area_pdf` and `environment_pdf` return the density with which these two find a point that was
+hit,
+  or a direction in which nothing is hit: per solid angle, picking included;
+- `background` returns the radiance of a ray that hits nothing.
+
+Shapes whose material is `emissive` are lights too (`emitters/area.py`).
+
+To add a light: a file in `emitters/`; a code in `light.py`; in `dispatch.py` a field of `Lights`
+and a line in `_by_code`; below, a member of `AnyLight` and a line in `TABLES`; a translator in
+`comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.  Step by step:
+docs/extending.md.
 """
 
 from typing import Annotated, Any
@@ -75,7 +95,6 @@ __all__ = [
     "Lights",
     "Pick",
     "Point",
-    "Points",
     "Spot",
     "ambient",
     "area_pdf",

@@ -1,10 +1,10 @@
-"""What all lights share: the codes of their tables and the sample that their kernels return."""
+"""The codes of the types of lights, and the sample that their kernels return."""
 
 import math
 from typing import NamedTuple
 
 from reference_rt.core.ray import Ray, SurfacePoint, ray_from, segment_to
-from reference_rt.core.vec3 import Vec3
+from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import kernel
 
 # Codes of `Lights.kind`.
@@ -12,12 +12,12 @@ AREA, POINT, SPOT, DIRECTIONAL, ENVIRONMENT = range(5)
 
 
 class LightSample(NamedTuple):
-    """Light that could arrive at a point, before asking whether something is in the way.
+    """Light that arrives at a point unless it is occluded.
 
-    wi: unit direction towards the light;  radiance: what arrives from there (for a point light its
-    irradiance across wi, intensity / distance²);  pdf: per solid angle, or 1 for a point light; 0
+    wi: unit direction towards the light;  radiance: that from wi, or for a point light the
+    irradiance across wi, intensity / distance²;  pdf: per solid angle, or 1 for a point light; 0
     means that nothing arrives;  target: the point on the light, moved off its surface, or far away;
-    distance: infinite for an environment;  is_delta: whether no other sampling could find it.
+    distance: infinite for an environment;  is_delta: whether no BSDF sample can find the light.
     """
 
     wi: Vec3
@@ -35,8 +35,22 @@ def no_light() -> LightSample:
 
 
 @kernel
+def from_position(position: Vec3, intensity: Vec3, falloff: float, p: Vec3) -> LightSample:
+    """A light at one point: the fraction `falloff` of its intensity goes towards `p`, where
+    intensity / distance² arrives (the inverse square law)."""
+    w = position - p
+    distance2 = dot(w, w)
+    if distance2 == 0.0:
+        return no_light()  # no direction leads there
+    distance = math.sqrt(distance2)
+    pdf = 1.0 if falloff > 0.0 else 0.0
+    radiance = intensity * (falloff / distance2)
+    return LightSample(w * (1.0 / distance), radiance, pdf, position, distance, True)
+
+
+@kernel
 def shadow_ray(point: SurfacePoint, light: LightSample) -> Ray:
-    """The part of space between a surface and a light sample."""
+    """The ray that tests visibility: from a surface to a light sample."""
     if light.distance < math.inf:
         return segment_to(point, light.target)
     return ray_from(point, light.wi)

@@ -1,9 +1,24 @@
-"""All materials: one file each; here, their names.  What is asked of them is in `dispatch.py`.
+"""Materials: how the surfaces of a scene scatter light.
 
-To add a material: its file with description, table and kernels; in `leaves.py` a code, a field of
-`Leaves`, a line in `TABLES` and a branch in the dispatchers; below, `AnyMaterial`; a translator
-function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.  One that is made
-of others (`wrappers.py`) needs a step in `nested/flattened.py` instead.
+- `bsdfs/`: the BSDFs, one file each, and the tables that hold them;
+- `nested/`: materials made of others, which are flattened into weighted BSDFs;
+- `microfacet/`: Fresnel's equations and the distributions of microfacets;
+- `dispatch.py`: the kernels that integrators call, for any material of a scene.
+
+Contract: directions are unit vectors in the shading frame (z is the shading normal) and point away
+from the surface, `wo` towards the viewer and `wi` towards the light.  Colours are linear sRGB.
+Call `prepare` once at each hit, before the others.  Then
+
+- `both` returns f(wo, wi) |cos wi| and the density of `sample` at wi, per solid angle (1/sr),
+  without delta lobes; a value of zero means that nothing is scattered from wi to wo;
+- `sample` takes three numbers from [0, 1) and returns a direction with f |cos wi| / pdf; pdf = 0
+  means that sampling failed and the path ends here;
+- `branches` returns the delta lobes, as directions with factors on radiance, black for none.
+
+To add a material: a file in `bsdfs/` or, if it is made of others, in `nested/`, whose docstrings
+say what else is needed; a member of `AnyMaterial` below; a translator in
+`comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.  Step by step:
+docs/extending.md.
 """
 
 from typing import Annotated

@@ -1,6 +1,6 @@
-"""Emissive: a surface that shines, on top of what it scatters.
+"""Emissive: a surface that emits light, besides what it scatters.
 
-The shape that wears it becomes an area light: see `reference_rt.lights.emitters.area`.
+A shape with this material becomes an area light: see `reference_rt.lights.emitters.area`.
 """
 
 from typing import Any, Literal

@@ -1,4 +1,4 @@
-"""The shading frame that follows a surface's coordinates: x along u."""
+"""The shading frame whose x axis follows the texture coordinate u."""
 
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.core.vec3 import Frame, Vec3, cross, dot, frame_from_normal, max_abs, normalize
@@ -6,9 +6,10 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.shape import Tangents
 
 _NOISE = 64.0 * UNIT_ROUNDOFF
-"""What is left of a vector of size 1 that a unit normal is taken off from is rounding if it is
-shorter: some ten roundings of numbers up to 1.  Where it is longer, a second time takes off all but
-the last bits ("twice is enough": Parlett 1980, "The Symmetric Eigenvalue Problem", 6.9)."""
+"""Orthogonalisation takes the part along the unit normal off a vector of size 1.  A remainder
+shorter than this is rounding noise, of some ten roundings of numbers up to 1.  A longer one is
+orthogonal to the last bits when that is done twice ("twice is enough": Parlett 1980, "The Symmetric
+Eigenvalue Problem", 6.9)."""
 
 
 @kernel

@@ -1,8 +1,8 @@
-"""What all materials share: the codes of their tables and the contract of their kernels.
+"""The base of all materials, and the types that their kernels return.
 
 Directions are in the shading frame (z is the shading normal) and point away from the surface: `wo`
-towards where the radiance goes, `wi` towards where it comes from.  A value of zero everywhere means
-"no contribution": black, or a direction that this material never scatters to.
+towards the viewer, `wi` towards the light.  Zero always means "no contribution": black, or a
+direction that this material never scatters to.
 """
 
 import math
@@ -18,26 +18,27 @@ class Material(Description):
     """How a surface scatters light."""
 
     smooth: ClassVar[bool] = False
-    """Whether it scatters to a continuum of directions, so that lights can be sampled."""
+    """Whether it has a lobe of finite density, so that light sampling helps (as Mitsuba's
+    `BSDFFlags::Smooth`)."""
     delta: ClassVar[bool] = False
-    """Whether it has `branches`: a few directions that no light sample could find."""
+    """Whether it has `branches`: delta lobes, whose directions no light sample can find."""
 
     chooses: ClassVar[bool] = True
-    """Whether `sample` uses `u_lobe`."""
+    """Whether `sample` uses its number `u_lobe`, which picks a lobe."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:
-        """What ray casting shows of it: linear sRGB, or the name of a texture."""
+        """The colour that ray casting shows: linear sRGB, or the name of a texture."""
         raise NotImplementedError
 
     @property
     def transmits(self) -> bool:
-        """Whether light passes to the other side."""
+        """Whether it refracts, or lets light pass, to the other side."""
         return False
 
     @property
     def oriented(self) -> bool:
-        """Whether it scatters differently along u and v: then x of the frame is along dp/du."""
+        """Whether it is anisotropic: then x of the shading frame must be along dp/du."""
         return False
 
     def tabulate(self, palette: Palette) -> Any:
@@ -49,9 +50,10 @@ class Material(Description):
 class BsdfSample(NamedTuple):
     """A direction drawn by a material.
 
-    wi: the direction;  weight: f(wo, wi) |cos wi| / pdf;  pdf: per solid angle, 0 for "nothing";
-    eta: index of refraction of wi's side over wo's, 1 unless it went through;  is_delta: whether
-    the direction is one of a few, which no light sample could find (then pdf is a probability).
+    wi: the direction;  weight: f(wo, wi) |cos wi| / pdf;  pdf: per solid angle, 0 means that
+    sampling failed;  eta: index of refraction on wi's side over that on wo's, 1 for a reflection;
+    is_delta: whether wi is of a delta lobe, which no light sample can find: then pdf is a
+    probability.
     """
 
     wi: Vec3
@@ -68,17 +70,17 @@ def no_sample() -> BsdfSample:
 
 
 class Scattered(NamedTuple):
-    """value: f(wo, wi) |cos wi|;  density: that with which `sample` picks wi."""
+    """value: f(wo, wi) |cos wi|;  density: the density of `sample` at wi, per solid angle."""
 
     value: Vec3
     density: float
 
 
 class Branches(NamedTuple):
-    """The mirrored and the refracted direction of a perfectly smooth surface.
+    """The delta lobes of a perfectly smooth surface: the mirrored and the refracted direction.
 
-    Each has the factor on the radiance that arrives from it; a black factor stands for "no such
-    branch".  share, passing: the fractions of power that are mirrored and refracted, which add to
+    Each has the factor on the radiance that arrives from it; a black factor means that there is no
+    such lobe.  share, passing: the fractions of power that are mirrored and refracted, which add to
     1;  eta: index of refraction on the refracted side over that on wo's.
     """
 
@@ -106,14 +108,14 @@ def reflection(wo: Vec3, reflectance: Vec3) -> Branches:
 
 @kernel
 def straight_on(wo: Vec3) -> Branches:
-    """What is not there: everything passes."""
+    """No surface, as where a mask is clear: all light passes straight on."""
     zero, one = Vec3(0.0, 0.0, 0.0), Vec3(1.0, 1.0, 1.0)
     return Branches(zero, zero, -wo, one, 0.0, 1.0, 1.0)
 
 
 @kernel
 def sample_branch(branches: Branches, u: float) -> BsdfSample:
-    """One of the two branches, with the probability of its share of the power."""
+    """One of the two directions, with a probability equal to its fraction of the power."""
     if u < branches.share:
         if is_black(branches.reflectance):
             return no_sample()

@@ -1,4 +1,4 @@
-"""What a material is asked about: a point of a surface, seen from somewhere."""
+"""The arguments of a material's kernels: a point of a surface, seen from a direction."""
 
 from typing import NamedTuple
 
@@ -11,9 +11,9 @@ from reference_rt.textures import At
 
 class Shading(NamedTuple):
     """point: of the surface;  frame: the shading frame, n = `point.ns`;  wo: towards the viewer,
-    local;  at: where textures are asked;  tangents: dp/du and dp/dv, local, which mean something
-    only where a material of the scene is `oriented`;  layers: what `materials.layers` keeps of the
-    material here, empty where no material is made of others."""
+    local;  at: where textures are looked up;  tangents: dp/du and dp/dv, local, only valid if a
+    material of the scene is `oriented`;  layers: the scratch buffer that `prepare` fills with the
+    material's flattened leaves, empty if no material of the scene is nested."""
 
     point: SurfacePoint
     frame: Frame

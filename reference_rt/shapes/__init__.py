@@ -1,4 +1,27 @@
-"""All shapes: one file each.  `tables` says how to add one; `dispatch` chooses among them."""
+"""Shapes: the geometry of a scene, down to rays against single primitives.
+
+- `flat/`, `curved/`, `meshes/`, `box.py`: the primitives, one file each;
+- `csg/`: solids made of primitives; `instances.py`: copies of groups of shapes;
+- `tables.py`: all tables of a scene; `dispatch.py`: the kernels for any primitive;
+- `brute_force.py`: rays against all primitives of small scenes.
+
+A file has a description (a `Shape`), its table (a NamedTuple of arrays, a row for each primitive,
+with the columns of `placement.owners`), `bounds(table)` and kernels.  Contract of the kernels, in
+world coordinates and scene units, for row i of the table or the row of a hit:
+
+- `intersect(table, i, ray) -> Crossing`: the smallest t > 0 at which the ray meets the primitive,
+  inf for a miss; u and v are two numbers that the following kernels need;
+- `surface(table, ray, hit) -> SurfacePoint`: the point, its unit normals and a bound on its error,
+  large enough that a ray that starts at this distance does not meet the same point again;
+- `uv(table, ray, hit)` and `tangents(table, ray, hit)`: texture coordinates, dp/du and dp/dv;
+- `sample(table, i, area, p, u0, u1) -> LightPoint` and `pdf(table, i, area, p, q)` of shapes that
+  can be lights, with `areas(table)`: a density per solid angle at p; 0 means that no light arrives;
+- `spans(table, i, ray) -> Spans` of solids: where the line, at all t, is inside; t = inf for none;
+- `face_of(table, hit)` of shapes with several faces: the number of the face.
+
+To add a shape: its file; what `tables.py` says; a translator in `comparisons.mitsuba.translate`; a
+scene; a row in the tests' tuple.  Step by step: docs/extending.md.
+"""
 
 from reference_rt.core.arrays import IntArray
 from reference_rt.shapes.box import Box

@@ -33,17 +33,16 @@ class Box(Shape):
 
     type: Literal["box"] = "box"
 
-    def tabulate(self, place: Place) -> "Boxes":
-        m = self.map_in(place)
+    def tabulate(self, context: Place) -> "Boxes":
+        m = self.map_in(context)
         edges = m[:, :3]
         face_areas = 4.0 * np.linalg.norm(np.cross(edges.T[[1, 2, 0]], edges.T[[2, 0, 1]]), axis=1)
-        return Boxes(face_areas=face_areas[None], **columns(m, place))
+        return Boxes(face_areas=face_areas[None], **columns(m, context))
 
 
 class Boxes(NamedTuple):
-    """n boxes: center (n, 3), rows of the inverse map (n, 9), half edges x, y, z (n, 9), the areas
-    of the faces across x, y, z (n, 3); owner, the shape's index
-    in the scene; material, light: rows of those tables; face (n,)."""
+    """n boxes: center, to_local and edges, the half edges x, y, z, as in `shapes.placement`; the
+    areas of the faces across x, y, z (n, 3); the columns of `owners`."""
 
     center: FloatArray
     to_local: FloatArray
@@ -66,13 +65,13 @@ def areas(boxes: Boxes) -> FloatArray:
 
 
 def pack_all(boxes: Boxes) -> FloatArray:
-    """What `distance` takes, as packets."""
+    """The arguments of `distance`, as packets."""
     return pack(boxes.center, boxes.to_local)
 
 
 class Slabs(NamedTuple):
-    """Where a ray enters and leaves the space between the planes -1 and 1 of each axis (t), and
-    whether it runs in the axis's positive direction."""
+    """The t at which a ray enters and leaves the slab between the planes -1 and 1 of each axis, and
+    whether it goes in the axis's positive direction."""
 
     x_in: float
     x_out: float
@@ -89,8 +88,8 @@ class Slabs(NamedTuple):
 def slabs(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> Slabs:
     """In the box's coordinates, by reciprocals (Kay & Kajiya 1986).
 
-    A ray along a face meets its plane at ±inf, as IEEE says, or, running in the plane, at 0 * inf:
-    NaN, which `distance` passes over.
+    A ray parallel to a face meets its plane at ±inf, as IEEE says, or, within the plane, at 0 *
+    inf: NaN, which `distance` ignores.
     """
     from_center = ray.o - center
     ox, oy, oz = dot(x_of, from_center), dot(y_of, from_center), dot(z_of, from_center)
@@ -114,8 +113,8 @@ def slabs(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> Slabs:
 
 @kernel
 def inside(s: Slabs) -> tuple[float, float]:
-    """Where a ray enters and leaves all three slabs; enters after it leaves where it misses."""
-    # larger(a, NaN) is a: begun with a number, neither bound can become NaN.
+    """The t at which a ray enters and leaves all three slabs; for a miss the first is larger."""
+    # larger(a, NaN) is a: starting with a number, neither bound can become NaN.
     t_in = larger(larger(larger(-math.inf, s.x_in), s.y_in), s.z_in)
     t_out = smaller(smaller(smaller(math.inf, s.x_out), s.y_out), s.z_out)
     return t_in, t_out
@@ -123,8 +122,8 @@ def inside(s: Slabs) -> tuple[float, float]:
 
 @kernel
 def distance(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> float:
-    """The smallest t > 0 at which a ray meets a box's surface, inf where it does not: from inside,
-    where it leaves."""
+    """The smallest t > 0 at which a ray meets a box's surface, inf for a miss; for a ray from
+    inside that is where it leaves."""
     t_in, t_out = inside(slabs(ray, center, x_of, y_of, z_of))
     t = select(t_in > 0.0, t_in, t_out)
     nearest: float = select((t_in <= t_out) & (t > 0.0), t, math.inf)
@@ -147,7 +146,7 @@ def slabs_of(boxes: Boxes, i: int, ray: Ray) -> Slabs:
 
 @kernel
 def face_entered(s: Slabs, t: float) -> float:
-    """The face through which a ray comes in at t: axis, + 3 on the positive side."""
+    """The face through which a ray enters at t: axis, + 3 on the positive side."""
     if t == s.x_in:
         return 0.0 if s.x_up else 3.0
     if t == s.y_in:
@@ -157,7 +156,7 @@ def face_entered(s: Slabs, t: float) -> float:
 
 @kernel
 def face_left(s: Slabs, t: float) -> float:
-    """The face through which a ray goes out at t."""
+    """The face through which a ray leaves at t."""
     if t == s.x_out:
         return 3.0 if s.x_up else 0.0
     if t == s.y_out:
@@ -230,7 +229,7 @@ def surface(boxes: Boxes, ray: Ray, hit: Hit) -> SurfacePoint:
     if axis >= 3:
         axis, sign = axis - 3, 1.0
     q = on_face(local_point(boxes, i, at(ray, hit.t)), axis, sign)
-    # The slabs' ±1 - o rounds relative to what world_error counts already: no error of their own.
+    # The rounding of ±1 - o in `slabs` is within what world_error allows for: no error is added.
     n = face_normal(axis, sign)
     return world_surface(boxes, i, q, n, 0.0, boxes.material[i], boxes.light[i])
 
@@ -238,7 +237,7 @@ def surface(boxes: Boxes, ray: Ray, hit: Hit) -> SurfacePoint:
 @kernel
 def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
     """A point uniform over the faces, as a light for `p`; u0 picks the face and is used again."""
-    # Half a face's shift: the middle, u0 = 1/2, would else be where two faces of a cube meet.
+    # Shifted by half a face: otherwise u0 = 1/2 would be an edge between two faces of a cube.
     v = u0 * area - 0.5 * boxes.face_areas[i, 0]
     if v < 0.0:
         v += area
@@ -250,7 +249,7 @@ def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
     sign = -1.0
     if v >= 1.0:
         v, sign = v - 1.0, 1.0
-    # The sums above round: v may end a hair above 1.
+    # The sums above round: v may be slightly above 1.
     a, b = 2.0 * min(v, 1.0) - 1.0, 2.0 * u1 - 1.0
     local = Vec3(a, a, b) if axis == 0 else Vec3(a, b, b)
     q = on_face(local, axis, sign)
@@ -264,8 +263,8 @@ def sample(boxes: Boxes, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
 def lift_of(boxes: Boxes, i: int, p: Vec3) -> float:
     """See `shape.lift`.
 
-    Its error holds for every point of the box: of `world_error`, |A| |q| is at most `reach`, and
-    what is seen along the local normal, over the length of that normal in the world, at most the
+    Its error bound holds for every point of the box: in `world_error`, |A| |q| is at most `reach`,
+    and the part along the local normal, over the length of that normal in the world, is at most the
     length of `reach`.
     """
     a, b, c = triple(boxes.edges, i, 0), triple(boxes.edges, i, 1), triple(boxes.edges, i, 2)

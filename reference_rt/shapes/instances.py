@@ -1,4 +1,4 @@
-"""Instances: a group of shapes, stored once and drawn many times, each time under its own map."""
+"""Instances: copies of a group of shapes, which is stored once, each under its own map."""
 
 from typing import Literal, NamedTuple
 
@@ -26,8 +26,8 @@ class Instance(Shape):
 
 class Instances(NamedTuple):
     """n instances: center (n, 3), to_local (n, 9) and edges (n, 9), see `shapes.placement`; root
-    (n,), the node of the hierarchy over the group's shapes; owner (n,), index of the instance in
-    the scene; copy (n,), its number among what that stands for: groups of instances make many."""
+    (n,), the root of the BVH over the group's shapes; owner (n,), the shape id in the scene; copy
+    (n,), the number of the copy, since a group that contains instances has many of one shape id."""
 
     center: FloatArray
     to_local: FloatArray
@@ -39,7 +39,7 @@ class Instances(NamedTuple):
 
 @kernel
 def ray_in(instances: Instances | None, i: int, ray: Ray) -> Ray:
-    """The ray as the group of instance i sees it; as it is for i = -1."""
+    """The ray in the coordinates of the group of instance i; unchanged for i = -1."""
     if instances is None:
         return ray
     if i < 0:
@@ -49,7 +49,7 @@ def ray_in(instances: Instances | None, i: int, ray: Ray) -> Ray:
 
 @kernel
 def out_of(instances: Instances | None, i: int, point: SurfacePoint) -> SurfacePoint:
-    """A point of a group's surface, in the world; as it is for i = -1."""
+    """A point of a group's surface, in the world; unchanged for i = -1."""
     if instances is None:
         return point
     if i < 0:
@@ -70,7 +70,7 @@ def out_of(instances: Instances | None, i: int, point: SurfacePoint) -> SurfaceP
 
 @kernel
 def tangents_out_of(instances: Instances | None, i: int, tangents: Tangents) -> Tangents:
-    """Tangents to a group's surface, in the world; as they are for i = -1."""
+    """Tangents to a group's surface, in the world; unchanged for i = -1."""
     if instances is None:
         return tangents
     if i < 0:

@@ -1,7 +1,9 @@
-"""Primitives that are traced in coordinates of their own: the maps there and back.
+"""Affine placement: primitives that are intersected in local coordinates, and the maps there and
+back.
 
-Such a table has center (n, 3), the rows of the inverse linear map `to_local` (n, 9), and the
-columns of the map itself, `edges` (n, 9): p = center + A q and q = M (p - center), with M = A^-1.
+The table of such a primitive has center (n, 3), the rows of the inverse linear map `to_local` (n,
+9), and the columns of the map itself, `edges` (n, 9): p = center + A q and q = M (p - center), with
+M = A^-1.
 """
 
 from typing import Any
@@ -16,21 +18,25 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.shape import Place, outward
 
 
-def columns(m: Affine, place: Place) -> dict[str, Any]:
-    """The columns that every placed table has, one row, for the map m of one shape."""
+def columns(m: Affine, context: Place) -> dict[str, Any]:
+    """The columns of every table of placed primitives, one row, for the map m of one shape."""
     return {
         "center": m[:, 3].copy()[None],
         "to_local": invert(m)[:, :3].reshape(1, 9).copy(),
         "edges": m[:, :3].T.reshape(1, 9).copy(),
-        **owners(place),
+        **owners(context),
     }
 
 
-def owners(place: Place) -> dict[str, Any]:
-    """The columns that every table has, one row."""
+def owners(context: Place) -> dict[str, Any]:
+    """The columns of every table of shapes, one row.
+
+    owner: the shape id, an index in the scene (in the group);  material, light: rows of those
+    tables, light -1 for none;  face: the number of a face within the shape.
+    """
     return {
-        "owner": np.array([place.owner]),
-        "material": np.array([place.material]),
+        "owner": np.array([context.owner]),
+        "material": np.array([context.material]),
         "light": np.array([-1]),
         "face": np.array([0]),
     }
@@ -42,8 +48,8 @@ def bounds(center: FloatArray, edges: FloatArray, lower: FloatArray, upper: Floa
     middle, half = 0.5 * lower + 0.5 * upper, 0.5 * upper - 0.5 * lower
     p = center + np.einsum("nki,nk->ni", linear, middle)
     reach = np.einsum("nki,nk->ni", np.abs(linear), half)
-    # Two sums of three products, and the halves, round up to sixteen times, on numbers no larger
-    # than these.
+    # Two sums of three products, and the halves: at most sixteen roundings, of numbers no larger
+    # than `size`.
     size = np.abs(center) + np.einsum("nki,nk->ni", np.abs(linear), np.abs(middle)) + reach
     reach += 16.0 * UNIT_ROUNDOFF * size
     return outward(p - reach, p + reach)
@@ -121,10 +127,10 @@ def world_error(
     there, |M^T n| and its own `error`.
 
     In the world, computing p takes at most 8 roundings of numbers no larger than |c| + |A| |q| and
-    |p|.  Seeing a ray's origin from the shape, M (o - c), takes 4, and M is A's inverse to within 8
-    more, on numbers no larger than |M| |A| |q|: these, and the surface's own error, are lengths
-    along the local normal, of which the world sees 1 / |M^T n|.  For a thin shape |M| |A| is what
-    its map's conditioning makes of it.
+    |p|.  Transforming a ray's origin into local coordinates, M (o - c), takes 4, and M is A's
+    inverse to within 8 more, on numbers no larger than |M| |A| |q|: these, and the surface's own
+    error, are lengths along the local normal, which become 1 / |M^T n| times as long in the world.
+    For a thin shape |M| |A| is as large as its map is ill-conditioned.
     """
     reach = _magnitudes(
         triple(table.edges, i, 0), triple(table.edges, i, 1), triple(table.edges, i, 2), q
@@ -148,25 +154,10 @@ def world_error(
 def world_surface(
     table: Any, i: int, q: Vec3, n: Vec3, error: float, material: int, light: int
 ) -> SurfacePoint:
-    """The point q with outward unit normal n and error bound `error`, all local, in the world."""
+    """The world's `SurfacePoint` of the local point q, outward unit normal n and error bound."""
     p = world_point(table, i, q)
     covector = world_covector(table, i, n)
     covector_length = length(covector)
     normal = covector * (1.0 / covector_length)
     bound = world_error(table, i, p, q, n, covector_length, error)
     return SurfacePoint(p, normal, normal, bound, material, light)
-
-
-__all__ = [
-    "bounds",
-    "columns",
-    "local_point",
-    "local_ray",
-    "local_vector",
-    "owners",
-    "world_covector",
-    "world_error",
-    "world_point",
-    "world_surface",
-    "world_vector",
-]

@@ -1,4 +1,4 @@
-"""What rounding takes away, exactly."""
+"""Error-free transformations: the rounding error of a difference and of a product, exactly."""
 
 from typing import Any
 
@@ -26,9 +26,10 @@ def _along(o: Any, d: Any, c: Any, t: Any) -> Any:
 def along_from(o: Vec3, d: Vec3, c: Vec3, t: float) -> Vec3:
     """o + t d - c, as if it were rounded only once or twice, at the end.
 
-    For c near the line and o far away (D) the plain sum is off by u D, which is more than a small
-    shape around c is wide; this by 2 u times the result, and 2 u² D (`rounding` keeps what the
-    difference and the product lose, and where their sum is small it does not round: Sterbenz).
+    For c near the line and o far away (D) the error of the plain sum is u D, more than the size of
+    a small shape around c.  Here it is 2 u times the result, and 2 u² D: the rounding errors of the
+    difference and of the product are added, and where their sum is small it does not round
+    (Sterbenz).
     """
     return Vec3(_along(o.x, d.x, c.x, t), _along(o.y, d.y, c.y, t), _along(o.z, d.z, c.z, t))
 

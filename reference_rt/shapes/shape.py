@@ -1,4 +1,4 @@
-"""What all shapes share: the base description, the codes of their tables, points as lights."""
+"""The base of all shapes: descriptions, SIMD packets, points on lights, tangents, spans."""
 
 import math
 from collections.abc import Callable
@@ -16,23 +16,23 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import LANES
 
 
-def _unheard(owner: int, message: str) -> None:
-    """Warnings of tables that are made for a closer look at a shape: the scene's tell them."""
+def _ignore_warning(owner: int, message: str) -> None:
+    """Ignores a warning: of a shape that is tabulated once more, after the scene has warned."""
 
 
 class Place(NamedTuple):
-    """As what a shape is tabulated.
+    """The context in which a shape is tabulated.
 
-    owner: its index in the scene (in its group);  material: the row of its material;  folder: what
-    file names are relative to;  outer: the map that its own transform is followed by;  warn: takes
-    the owner and what a user should know about the shape.
+    owner: the shape id, its index in the scene (in its group);  material: the row of its material;
+    folder: what file names are relative to;  outer: the map that is applied after its own
+    transform;  warn: takes the owner and a warning for the user.
     """
 
     owner: int = 0
     material: int = 0
     folder: Path = Path()
     outer: Affine = IDENTITY
-    warn: Callable[[int, str], None] = _unheard
+    warn: Callable[[int, str], None] = _ignore_warning
 
 
 class Shape(Description):
@@ -44,7 +44,7 @@ class Shape(Description):
     transform: Transform = ()
     """Steps from the shape's own coordinates to the world's, the first one first."""
 
-    def tabulate(self, place: Place) -> Any:
+    def tabulate(self, context: Place) -> Any:
         """This shape as rows of its table.  Raises ValueError (what is wrong, what was
         expected)."""
         raise NotImplementedError
@@ -61,12 +61,12 @@ class Shape(Description):
         """The points of the first solid that are not in the second."""
         return Difference(of=(self, other))
 
-    def map_in(self, place: Place) -> Affine:
-        """The map from the shape's own coordinates to those of the place.  Raises ValueError for
-        one that flattens space."""
-        if not self.transform and place.outer is IDENTITY:
-            return IDENTITY  # as most shapes of a large scene stand
-        m = compose(affine(self.transform), place.outer)
+    def map_in(self, context: Place) -> Affine:
+        """The map from the shape's own coordinates to those of the context: its transform, then
+        `context.outer`.  Raises ValueError for one that flattens space."""
+        if not self.transform and context.outer is IDENTITY:
+            return IDENTITY  # the fast path: most shapes of a large scene
+        m = compose(affine(self.transform), context.outer)
         invert(m)
         return m
 
@@ -101,7 +101,8 @@ class Difference(Solid):
 
 
 def pack(*columns: FloatArray) -> FloatArray:
-    """Columns (n, k) of a table, side by side, as packets (ceil(n / LANES), all k, LANES).
+    """The columns (n, k) of a table in SIMD order: packets
+    (ceil(n / VECTOR_WIDTH), sum of the k, VECTOR_WIDTH).
 
     Rows of NaN fill the last packet: every comparison with them fails.
     """
@@ -123,7 +124,7 @@ def lane_vector(packets: FloatArray, packet: int, column: int, lane: int) -> Vec
 
 @kernel
 def nearest_lane(d: FloatArray, packet: int, best: int, t: float) -> tuple[int, float]:
-    """(row, distance) of the nearest so far, given the distances of a packet's lanes."""
+    """Updates (row, distance) of the nearest so far with the distances of a packet's lanes."""
     for lane in range(LANES):
         nearer = d[lane] < t
         best = packet * LANES + lane if nearer else best
@@ -132,9 +133,9 @@ def nearest_lane(d: FloatArray, packet: int, best: int, t: float) -> tuple[int, 
 
 
 class LightPoint(NamedTuple):
-    """A point of a shape picked as a light: position, unit normal, the error bound of the position
-    (see `SurfacePoint.error`) and the density per solid angle at the receiver; pdf = 0 means that
-    nothing can arrive from there;  u, v: as in `Crossing`."""
+    """A point sampled on a light: position, unit normal, the error bound of the position (see
+    `SurfacePoint.error`) and the density per solid angle at the receiver; pdf = 0 means that no
+    light arrives from there;  u, v: as in `Crossing`."""
 
     p: Vec3
     n: Vec3
@@ -152,8 +153,8 @@ def no_light_point() -> LightPoint:
 
 @kernel
 def lift(w: Vec3, reach: Vec3, error: float) -> float:
-    """How far rounding may have lifted a point above a flat shape that it lies on: `error`; 0 for a
-    point that is outside the shape's bounding box.
+    """The height above a flat shape to which rounding may have lifted a point of the shape itself:
+    `error`, or 0 for a point outside of the shape's bounding box, which cannot be one.
 
     w: from the middle of that box to the point;  reach: half the box's size;  error: the bound of
     `SurfacePoint.error` there.
@@ -168,13 +169,14 @@ def lift(w: Vec3, reach: Vec3, error: float) -> float:
 
 @kernel
 def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float, lifted: float) -> float:
-    """A uniform density over `area`, at its point `q` with unit normal `n`, per solid angle at `p`:
+    """The density 1 / area, at the point `q` with unit normal `n`, per solid angle at `p`:
     distance² / (cos area) (e.g. Veach 1997, eq. 8.2).
 
-    0 for a receiver behind the surface, and for a point of the flat surface itself, which sees
-    nothing of it, even if rounding has lifted it above the plane: by at most 2 `lifted`, see
-    `lift`.  Half of that bound is p's distance from the plane; q's own distance is at most twice as
-    much, since |q| <= |anchor| + size; the product with n rounds by less than the other half.
+    0 for a receiver behind the surface, and for a point of the flat surface itself, from which none
+    of the surface is visible, even if rounding has lifted it above the plane: by at most 2
+    `lifted`, see `lift`.  Half of that bound is p's distance from the plane; q's own distance is at
+    most twice as much, since |q| <= |anchor| + size; the product with n rounds by less than the
+    other half.
     """
     w = p - q
     height = dot(w, n)
@@ -186,8 +188,8 @@ def solid_angle_pdf(p: Vec3, q: Vec3, n: Vec3, area: float, lifted: float) -> fl
 
 
 class Tangents(NamedTuple):
-    """dp/du and dp/dv: how the point moves with the surface coordinates that a shape's `uv` gives.
-    Not made unit, nor orthogonal."""
+    """dp/du and dp/dv: the derivatives of the point by the coordinates that a shape's `uv` returns,
+    neither unit nor orthogonal."""
 
     dpdu: Vec3
     dpdv: Vec3
@@ -195,15 +197,16 @@ class Tangents(NamedTuple):
 
 @kernel
 def any_tangents(n: Vec3) -> Tangents:
-    """Where u and v are no coordinates, as at a pole: a unit basis of the tangent plane."""
+    """Any tangents, where u and v are no coordinates, as at a pole: a unit basis of the tangent
+    plane."""
     frame = frame_from_normal(n)
     return Tangents(frame.s, frame.t)
 
 
 class Spans(NamedTuple):
-    """Where a line runs inside a solid: from t0 to t1 and from t2 to t3, in order, over all t, also
-    below 0; inf for what there is not.  u0 to u3 are what the primitive needs to place the point,
-    as `Crossing.u`.  A line that comes from inside has t0 = -inf."""
+    """The parts of a line inside a solid: from t0 to t1 and from t2 to t3, in order, over all t,
+    also below 0; inf for parts that do not exist.  u0 to u3: as `Crossing.u` for these points.  A
+    line that comes from inside has t0 = -inf."""
 
     t0: float
     u0: float
@@ -227,5 +230,6 @@ def one_span(t0: float, u0: float, t1: float, u1: float) -> Spans:
 
 
 def outward(lower: FloatArray, upper: FloatArray) -> Bounds:
-    """Bounds moved outwards by one float: their own rounding cannot cut the shape."""
+    """Bounds enlarged by one float on each side, so that their own rounding cannot cut the
+    shape."""
     return np.nextafter(lower, -np.inf), np.nextafter(upper, np.inf)

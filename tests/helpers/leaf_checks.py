@@ -23,20 +23,18 @@ _MODULES = {
     principled.Principleds: principled,
     rough_plastic.RoughPlastics: rough_plastic,
 }
-_evaluate, _pdf, _sample = ByClass("evaluate"), ByClass("pdf"), ByClass("sample")
+_both, _sample = ByClass("both"), ByClass("sample")
 for _table, _module in _MODULES.items():
-    _evaluate.register(_table, _module.evaluate)
-    _pdf.register(_table, _module.pdf)
+    _both.register(_table, _module.both)
     _sample.register(_table, _module.sample)
-_evaluate_one, _pdf_one, _sample_one = _evaluate.function, _pdf.function, _sample.function
+_both_one, _sample_one = _both.function, _sample.function
 
 
 def _evaluate_rows(table, wo, wi, values, densities):
     at = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
     for i in range(len(wo)):
         a, b = Vec3(wo[i, 0], wo[i, 1], wo[i, 2]), Vec3(wi[i, 0], wi[i, 1], wi[i, 2])
-        values[i] = _evaluate_one(table, 0, at, a, b)
-        densities[i] = _pdf_one(table, 0, at, a, b)
+        values[i], densities[i] = _both_one(table, 0, at, a, b)
 
 
 def _sample_rows(table, wo, u, wi, weights, others):

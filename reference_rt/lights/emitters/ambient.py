@@ -1,4 +1,4 @@
-"""Ambient light: the text-book's I_a, the same everywhere and from nowhere."""
+"""Ambient light: I_a of Whitted's integrator, the same everywhere and from no direction."""
 
 from typing import Literal
 

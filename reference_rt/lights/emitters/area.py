@@ -16,8 +16,8 @@ from reference_rt.textures import At, Colours, Textures, colour_at
 
 
 class Areas(NamedTuple):
-    """n emissive primitives: kind and row say which, radiance (n), area (n,), inf for one that only
-    scattered rays find: the choice gives it no probability."""
+    """n emissive primitives: kind (n,) and row (n,) of the tables of shapes, radiance (n), area
+    (n,), inf for one that the light sampler never picks and only scattered rays find."""
 
     kind: IntArray
     row: IntArray
@@ -29,14 +29,14 @@ class Areas(NamedTuple):
 def sample(
     areas: Areas, i: int, shapes: Shapes, textures: Textures | None, p: Vec3, u0: float, u1: float
 ) -> LightSample:
-    """A point of the light's surface; only its front shines."""
+    """A point of the light's surface; only its front emits."""
     q = any_shape.sample(shapes, areas.kind[i], areas.row[i], areas.area[i], p, u0, u1)
     return _from_point(areas, i, shapes, textures, p, q)
 
 
 @kernel
 def middle(areas: Areas, i: int, shapes: Shapes, textures: Textures | None, p: Vec3) -> LightSample:
-    """The one point that stands for all of the light."""
+    """The one point that represents the light where nothing is random."""
     q = any_shape.middle(shapes, areas.kind[i], areas.row[i], areas.area[i], p)
     return _from_point(areas, i, shapes, textures, p, q)
 
@@ -49,7 +49,7 @@ def _from_point(
         return no_light()
     w = q.p - p
     distance = math.sqrt(dot(w, w))
-    at = _place(textures, areas, i, shapes, p, w, q)
+    at = _texture_coordinates(textures, areas, i, shapes, p, w, q)
     return LightSample(
         w * (1.0 / distance),
         colour_at(areas.radiance, i, at),
@@ -61,7 +61,7 @@ def _from_point(
 
 
 @kernel
-def _place(
+def _texture_coordinates(
     textures: Textures | None,
     areas: Areas,
     i: int,
@@ -70,7 +70,7 @@ def _place(
     w: Vec3,
     q: LightPoint,
 ) -> At:
-    """Where textures are asked at a point q of light i."""
+    """The texture coordinates at a point q of light i."""
     none = Vec3(-1.0, -1.0, -1.0)
     if textures is None:
         return At(textures, 0.0, 0.0, none)
@@ -89,8 +89,8 @@ def pdf(areas: Areas, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> float
 def emitted(areas: Areas | None, q: SurfacePoint, at: At, w: Vec3) -> Vec3:
     """The radiance that the surface at `q` emits towards `w`.
 
-    The front is the geometric one: a shading normal does not change where light comes from.
-    Mitsuba asks the shading normal.
+    The geometric normal decides which side is the front: a shading normal does not change where
+    light comes from.  Mitsuba uses the shading normal.
     """
     if areas is None:
         return Vec3(0.0, 0.0, 0.0)

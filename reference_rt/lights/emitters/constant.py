@@ -33,7 +33,7 @@ class Environment(NamedTuple):
 
 @kernel
 def radiance(environment: Environment, d: Vec3) -> Vec3:
-    """What arrives from the direction `d`."""
+    """The radiance from direction `d`."""
     return environment.radiance
 
 

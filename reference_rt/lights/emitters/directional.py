@@ -34,7 +34,7 @@ class Directionals(NamedTuple):
 
 @kernel
 def sample(directionals: Directionals, i: int) -> LightSample:
-    """The one direction; the irradiance arrives undiminished."""
+    """The one direction, with the full irradiance."""
     wi = row(directionals.towards, i)
     return LightSample(wi, row(directionals.irradiance, i), 1.0, wi, math.inf, True)
 

@@ -52,8 +52,8 @@ class EnvironmentMap(Description):
 
 
 def orthogonal(steps: Transform) -> FloatArray:
-    """The (3, 3) rotation or reflection that a transform stands for.  Raises ValueError where it
-    is none: to 1e-6, what numbers written with seven digits can say."""
+    """The (3, 3) rotation or reflection of a transform.  Raises ValueError for any other map, with
+    a tolerance of 1e-6: the accuracy of numbers written with seven digits."""
     m = affine(steps)
     linear_part = m[:, :3]
     if m[:, 3].any() or not np.abs(linear_part.T @ linear_part - np.eye(3)).max() <= 1e-6:
@@ -83,7 +83,7 @@ class EnvironmentMaps(NamedTuple):
 
 
 def tabulate(texels: FloatArray, to_world: FloatArray) -> EnvironmentMaps:
-    """The table of radiance (h, w, 3) turned by an orthogonal (3, 3)."""
+    """The table of an image (h, w, 3) of radiance;  to_world: an orthogonal (3, 3)."""
     height, width = texels.shape[:2]
     row_sums = np.empty((height, width + 1))
     for y, row in enumerate(texels):  # one at a time, since the table itself is what memory holds
@@ -120,7 +120,7 @@ def polar_integral(a: float, b: float, start: float, step: float, width: float) 
 
 @kernel
 def radiance(table: EnvironmentMaps, d: Vec3) -> Vec3:
-    """What arrives from direction d of any length."""
+    """The radiance from direction d, of any length."""
     height, width = table.texels.shape[0], table.texels.shape[1]
     right, up, back = (
         dot(triple(table.to_map, 0, 0), d),
@@ -184,8 +184,8 @@ def sample(table: EnvironmentMaps, u0: float, u1: float) -> LightSample:
 
 @kernel
 def _down_in_cells(table: EnvironmentMaps, y: int, mass: float) -> float:
-    """How far down cell row y, from 0 to 1, the integral over polar angles reaches `mass`: Newton's
-    iteration, kept inside the bounds found so far.
+    """The place t in cell row y, from 0 to 1, at which the integral over polar angles is `mass`: by
+    Newton's iteration, kept inside the bounds found so far.
 
     It ends with a step of 2^-32 of a cell, the spacing of the numbers that samplers draw.
     """

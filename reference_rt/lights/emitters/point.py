@@ -7,9 +7,9 @@ import numpy as np
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Colour, Description, Vector
-from reference_rt.core.vec3 import Vec3, dot, luminance, row
+from reference_rt.core.vec3 import Vec3, luminance, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.light import LightSample, no_light
+from reference_rt.lights.light import LightSample, from_position
 
 
 class Point(Description):
@@ -33,15 +33,8 @@ class Points(NamedTuple):
 
 @kernel
 def sample(points: Points, i: int, p: Vec3) -> LightSample:
-    """The one direction; intensity / distance² arrives (the inverse square law)."""
-    target = row(points.position, i)
-    w = target - p
-    distance2 = dot(w, w)
-    if distance2 == 0.0:
-        return no_light()  # no direction leads there
-    distance = math.sqrt(distance2)
-    radiance = row(points.intensity, i) * (1.0 / distance2)
-    return LightSample(w * (1.0 / distance), radiance, 1.0, target, distance, True)
+    """The one direction to the light: see `from_position`."""
+    return from_position(row(points.position, i), row(points.intensity, i), 1.0, p)
 
 
 def power(points: Points, scene_radius: float) -> FloatArray:

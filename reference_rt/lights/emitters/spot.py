@@ -1,4 +1,4 @@
-"""Spot light: a point that shines into a cone, less towards its rim."""
+"""Spot light: a point that emits into a cone, with a falloff towards its rim."""
 
 import math
 from typing import Annotated, Literal, NamedTuple, Self
@@ -10,7 +10,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Colour, Description, Vector
 from reference_rt.core.vec3 import Vec3, cross, dot, length, luminance, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.light import LightSample, no_light
+from reference_rt.lights.light import LightSample, from_position
 
 
 class Spot(Description):
@@ -64,10 +64,10 @@ class Spots(NamedTuple):
 
 @kernel
 def falloff(spots: Spots, i: int, w: Vec3) -> float:
-    """The part of the intensity that goes towards `w` of any length.
+    """The fraction of the intensity that is emitted along `w`, of any length.
 
-    The angle from sine and cosine: from the cosine alone it would lose half of its digits near the
-    axis.
+    The angle is computed from its sine and cosine: from the cosine alone it would lose half of its
+    digits near the axis.
     """
     axis = row(spots.axis, i)
     angle = math.atan2(length(cross(axis, w)), dot(axis, w))
@@ -80,25 +80,18 @@ def falloff(spots: Spots, i: int, w: Vec3) -> float:
 
 @kernel
 def sample(spots: Spots, i: int, p: Vec3) -> LightSample:
-    """The one direction; intensity / distance² arrives, as from a point light."""
-    target = row(spots.position, i)
-    w = target - p
-    distance2 = dot(w, w)
-    if distance2 == 0.0:
-        return no_light()  # no direction leads there
-    distance = math.sqrt(distance2)
-    shining = falloff(spots, i, -w)
-    radiance = row(spots.intensity, i) * (shining / distance2)
-    pdf = 1.0 if shining > 0.0 else 0.0
-    return LightSample(w * (1.0 / distance), radiance, pdf, target, distance, True)
+    """The one direction to the light: see `from_position`."""
+    position = row(spots.position, i)
+    shining = falloff(spots, i, -(position - p))
+    return from_position(position, row(spots.intensity, i), shining, p)
 
 
 def power(spots: Spots, scene_radius: float) -> FloatArray:
     """Luminance of the power (n,): 2 pi I times the integral of the falloff f sin from 0 to the
     cutoff c, which with the beam's edge b is 1 - (sin c - sin b) / (c - b).
 
-    Written with the middle m and half the width h of the ring, 1 - cos m sin h / h, for h = 0 too;
-    that as 2 sin²(m/2) + cos m (1 - sin h / h), which is not 0 for the thinnest beam.
+    With the middle m and half the width h of the ring that is 1 - cos m sin h / h, also for h = 0.
+    It is computed as 2 sin²(m/2) + cos m (1 - sin h / h), which is above 0 for the thinnest beam.
     """
     middle = 0.5 * (spots.cutoff + spots.beam)
     half_width = 0.5 * (spots.cutoff - spots.beam)

@@ -1,8 +1,8 @@
-"""Where a light, or a group of lights, is, how strongly it shines and to which sides.
+"""Bounds of lights and groups of lights: box, cone of directions, intensity.
 
-A group's lights have their normals within `spread` of the axis, and shine up to `reach` beyond
-their normals (Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree
-Splitting", section 4).
+The normals of a group's lights are within the angle `spread` of the axis, and the lights emit up to
+the angle `reach` from their normals (Conty Estevez & Kulla 2018, "Importance Sampling of Many
+Lights with Adaptive Tree Splitting", section 4).
 """
 
 import math
@@ -16,13 +16,13 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.lights.emitters.point import Points
 from reference_rt.lights.emitters.spot import Spots
 from reference_rt.shapes import DISK, RECTANGLE, TABLES, TRIANGLE, Shapes
-from reference_rt.shapes.meshes.triangle import geometric_normals
+from reference_rt.shapes.meshes.triangle_table import geometric_normals
 
 
 class LightBounds(NamedTuple):
-    """Of n lights: a box, lower and upper (n, 3); unit axis (n, 3); spread and reach (n,), radians;
-    luminance of the radiant intensity (n,) along the normal: of light that falls off with the
-    cosine from it, `lambertian`, and of light that does not, `even`."""
+    """For n lights: a box, lower and upper (n, 3); unit axis (n, 3); spread and reach (n,),
+    radians; the luminance of the radiant intensity (n,) along the normal, `lambertian` for light
+    that falls off with the cosine to it and `even` for light that does not."""
 
     lower: FloatArray
     upper: FloatArray
@@ -35,7 +35,7 @@ class LightBounds(NamedTuple):
 
 def of_areas(shapes: Shapes, kind: IntArray, row: IntArray, intensity: FloatArray) -> LightBounds:
     """Emissive primitives, of kind and row (n,) and with intensity (n,): luminance of radiance
-    times area.  What is not flat shines to all sides."""
+    times area.  A shape that is not flat counts as emitting to all sides."""
     n = len(kind)
     lower, upper, axis = np.zeros((n, 3)), np.zeros((n, 3)), np.tile([0.0, 0.0, 1.0], (n, 1))
     spread = np.full(n, math.pi)
@@ -121,7 +121,7 @@ def store(rows: FloatArray, i: int, b: Bound) -> None:
 
 @kernel
 def nothing() -> Bound:
-    """What any light joins unchanged."""
+    """The neutral element of `union`."""
     inf, zero = math.inf, Vec3(0.0, 0.0, 0.0)
     return Bound(Vec3(inf, inf, inf), Vec3(-inf, -inf, -inf), zero, -1.0, 0.0, 0.0, 0.0)
 
@@ -161,10 +161,10 @@ def union(a: Bound, b: Bound) -> Bound:
 @kernel
 def cost(b: Bound) -> float:
     """The surface area orientation heuristic (Conty Estevez & Kulla 2018, section 4.3), with the
-    square of the diagonal in place of the area, which lights on a line have none of.
+    square of the diagonal in place of the area, which is 0 for lights on a line.
 
-    The measure of directions is the integral over those within spread of the axis, and beyond by
-    reach with a cosine weight.
+    The measure of directions is the integral over those within `spread` of the axis, and over those
+    up to `reach` beyond with a cosine weight.
     """
     if b.spread < 0.0:
         return 0.0

@@ -1,4 +1,4 @@
-"""Which light a path asks: a few by their power, many by a tree."""
+"""Picks one of all lights: by power if there are few, by a light tree if there are many."""
 
 from typing import NamedTuple
 
@@ -14,9 +14,9 @@ FEW = 8
 
 
 class Choice(NamedTuple):
-    """Every light as one list: kind (n,) and row (n,) of its table, the probability (n,) of picking
-    it by power and the running sum (n,) of these, None where there is but one light;  bounded (1,),
-    the probability that one of those of the tree is picked."""
+    """All lights in one list: kind (n,) and row (n,) in the tables, the probability (n,) of picking
+    it by power and the running sum (n,) of these, None if there is only one light;  bounded (1,):
+    the probability of picking from the tree."""
 
     kind: IntArray
     row: IntArray
@@ -27,7 +27,7 @@ class Choice(NamedTuple):
 
 @kernel
 def count(choice: Choice) -> int:
-    """How many lights there are: a constant where there is one."""
+    """The number of lights: a compile-time constant if there is only one."""
     return _count(choice.cumulative)
 
 
@@ -40,7 +40,7 @@ def _count(cumulative: FloatArray | None) -> int:
 
 @kernel
 def pick(choice: Choice, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> Pick:
-    """A light for a surface at `p` with normal `n`; n = 0 for light from all sides."""
+    """A light for a surface at `p` with normal `n`; n = 0 for light from both sides."""
     if tree is None:
         return _by_power(choice.cumulative, choice, u)
     bounded = choice.bounded[0]
@@ -52,7 +52,7 @@ def pick(choice: Choice, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> 
 
 @kernel
 def _by_power(cumulative: FloatArray | None, choice: Choice, u: float) -> Pick:
-    """The light whose stretch of the running sum holds `u`."""
+    """The light whose interval of the running sum contains `u`."""
     if cumulative is None:
         return Pick(0, 1.0)
     k = min(count_up_to(cumulative, u), len(cumulative) - 1)
@@ -61,7 +61,7 @@ def _by_power(cumulative: FloatArray | None, choice: Choice, u: float) -> Pick:
 
 @kernel
 def probability(choice: Choice, tree: LightTree | None, p: Vec3, n: Vec3, k: int) -> float:
-    """The chance that `pick` gives light k."""
+    """The probability that `pick` returns light k."""
     if tree is None:
         return _power_of(choice.cumulative, choice, k)
     if choice.bounded[0] > 0.0 and tree.leaf[k] >= 0:
@@ -71,7 +71,7 @@ def probability(choice: Choice, tree: LightTree | None, p: Vec3, n: Vec3, k: int
 
 @kernel
 def _power_of(cumulative: FloatArray | None, choice: Choice, k: int) -> float:
-    """The chance that `_by_power` gives light k."""
+    """The probability that `_by_power` returns light k."""
     if cumulative is None:
         return 1.0
     return float(choice.probability[k])

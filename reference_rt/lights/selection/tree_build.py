@@ -1,5 +1,5 @@
-"""Building a light tree: top down, by the surface area orientation heuristic in bins (Conty Estevez
-& Kulla 2018, section 4.3)."""
+"""Builds a light tree: top down, by the binned surface area orientation heuristic (Conty Estevez &
+Kulla 2018, section 4.3)."""
 
 import math
 
@@ -23,13 +23,13 @@ from reference_rt.lights.selection.bounds import (
 from reference_rt.lights.selection.tree import SLACK, LightTree
 
 MOST_DEPTH = 28
-"""Nodes this deep are halved by count: 2^32 lights then have leaves at depth 60, whose trails fit
-an integer, and the stack of jobs."""
+"""Nodes at this depth and below are halved by count: with 2^32 lights the leaves are then at depth
+60 at most, so that trails fit into an integer and the jobs into their stack."""
 
 
 def build(bounds: LightBounds, lights: IntArray, count: int) -> LightTree:
-    """The tree over n lights with these bounds, which are numbers `lights` (n,) of the scene's
-    `count`.  Raises ValueError."""
+    """The tree over n lights with these bounds;  lights (n,): their numbers among the scene's
+    `count` lights.  Raises ValueError."""
     n = len(lights)
     strength = bounds.lambertian + bounds.even
     if n == 0 or not np.all((strength > 0.0) & (strength < np.inf)):
@@ -56,7 +56,7 @@ def _tabulate(
     lower, upper = nodes[:, :3], nodes[:, 3:6]
     middle = 0.5 * lower + 0.5 * upper
     radius = np.linalg.norm(0.5 * upper - 0.5 * lower, axis=1) * (1.0 + SLACK)
-    # The middle rounds, and a box's corners may: four roundings of coordinates each.
+    # The middle rounds, and so may a box's corners: four roundings of coordinates each.
     radius += 4.0 * math.sqrt(3.0) * UNIT_ROUNDOFF * np.abs(nodes[:, :6]).max(axis=1)
     spread = np.minimum(nodes[:, 9] + SLACK, math.pi)
     angles = np.column_stack([np.cos(spread), np.sin(spread), np.cos(nodes[:, 10])])
@@ -76,8 +76,8 @@ def _split_all(
     trail: IntArray,
     first: IntArray,
 ) -> None:
-    """Fill the nodes, in the order of `LightTree`: their bounds, children and trails, and which of
-    `order` a leaf has."""
+    """Fills the nodes, in the order of `LightTree`: their bounds, children and trails, and for a
+    leaf its index in `order`."""
     count, top = 1, _push(jobs, 0, 0, 0, len(order), 0)
     while top > 0:
         top -= 1
@@ -102,7 +102,7 @@ def _split_all(
 
 @kernel
 def _push(jobs: IntArray, top: int, node: int, begin: int, end: int, depth: int) -> int:
-    """The new height of the stack of jobs."""
+    """Pushes a job; returns the new height of the stack."""
     job = jobs[top]
     job[0], job[1], job[2], job[3] = node, begin, end, depth
     return top + 1
@@ -112,7 +112,7 @@ def _push(jobs: IntArray, top: int, node: int, begin: int, end: int, depth: int)
 def _cut(
     rows: FloatArray, order: IntArray, begin: int, end: int, bins: FloatArray, costs: FloatArray
 ) -> int:
-    """Sort order[begin:end] into two parts and return where the second begins."""
+    """Partitions order[begin:end] and returns where the second part begins."""
     best, best_low, best_scale = no_split(), 0.0, 0.0
     for axis in range(3):
         low, high = math.inf, -math.inf

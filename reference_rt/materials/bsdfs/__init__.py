@@ -1,1 +1,21 @@
-"""The materials that scatter by a law of their own, one to a file."""
+"""BSDFs, one file each, and `tables.py`, which chooses among them by an integer code.
+
+A file has a description (a `Material`), its table (a NamedTuple of arrays, a row for each material
+of this type), and kernels that take the table, a row i, texture coordinates `at`, and directions as
+in the contract of `materials`:
+
+- `both(table, i, at, wo, wi) -> Scattered`: f(wo, wi) |cos wi| and the density of `sample` per
+  solid angle; needed by a material whose class says `smooth`;
+- `sample(table, i, at, wo, u_lobe, u0, u1) -> BsdfSample`: pdf = 0 means that sampling failed; its
+  weight and pdf agree with `both`; needed like `both`;
+- `branches(table, i, at, wo) -> Branches`: the delta lobes; needed if the class says `delta`;
+- `ambient(table, i, at) -> Vec3`: k_a of Whitted's integrator; optional.
+
+Kernels are IEEE arithmetic in the order written and return the same bits as plain Python; nothing
+that they return is NaN or infinite for unit directions.  A material that does not say that it
+`transmits` is black behind.
+
+To add one: its file; in `tables.py` a code, a field of `Leaves` and a line in `TABLES`.  What
+several files share has a file too: `transparent.py`, `metal.py`, `coated.py`,
+`principled_lobes.py`.
+"""

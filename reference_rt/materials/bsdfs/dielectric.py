@@ -2,45 +2,23 @@
 
 from typing import ClassVar, Literal, NamedTuple
 
-import numpy as np
-
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.material import Branches, Material
-from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.materials.bsdfs.transparent import Transparent
+from reference_rt.materials.material import Branches
+from reference_rt.materials.microfacet.fresnel import fresnel
+from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class Dielectric(Material):
+class Dielectric(Transparent):
     """A smooth boundary of two transparent media; the normal points to the exterior."""
 
     delta: ClassVar[bool] = True
     type: Literal["dielectric"] = "dielectric"
-    interior_ior: Positive = 1.5
-    """Index of refraction behind the normal."""
-    exterior_ior: Positive = 1.0
-    """Index of refraction on the normal's side."""
-    reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
-    transmittance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the refracted light is multiplied with."""
-
-    @property
-    def colour(self) -> tuple[float, float, float] | str:
-        return self.transmittance
-
-    @property
-    def transmits(self) -> bool:
-        return True
 
     def tabulate(self, palette: Palette) -> "Dielectrics":
-        return Dielectrics(
-            np.array([relative_index(self.interior_ior, self.exterior_ior)]),
-            palette.colours(self.reflectance),
-            palette.colours(self.transmittance),
-        )
+        return Dielectrics(**self.columns(palette))
 
 
 class Dielectrics(NamedTuple):
@@ -53,7 +31,8 @@ class Dielectrics(NamedTuple):
 
 @kernel
 def branches(dielectrics: Dielectrics, i: int, at: At, wo: Vec3) -> Branches:
-    """Reflection F and refraction T / eta²: radiance gathers where light slows down."""
+    """Factor F for the reflection and T / eta² for the refraction: the radiance of refracted light
+    scales with the square of the index."""
     refraction = fresnel(wo.z, dielectrics.eta[i])
     f, passing = refraction.reflectance, refraction.transmittance
     t = passing / (refraction.eta * refraction.eta)

@@ -33,24 +33,11 @@ class Diffuses(NamedTuple):
 
 @kernel
 def both(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`, with one question after the sides (measured: 1 % of spheres under a
-    sky)."""
+    """f(wo, wi) cos wi, and the density of `sample`: cos wi / pi."""
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
     density = wi.z * INV_PI
     return Scattered(colour_at(diffuses.reflectance, i, at) * density, density)
-
-
-@kernel
-def evaluate(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi."""
-    return both(diffuses, i, at, wo, wi).value
-
-
-@kernel
-def pdf(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle: cos wi / pi."""
-    return both(diffuses, i, at, wo, wi).density
 
 
 @kernel

@@ -1,11 +1,12 @@
-"""Phong: the text-book's local shading (Phong 1975; Blinn 1977 with the half vector).
+"""Phong: local shading with ambient, diffuse and specular terms (Phong 1975; Blinn 1977 with the
+half vector).
 
     f cos = k_d max(0, l·n) + k_s max(0, e·r)^p      r: the direction of the light l mirrored at n
     f cos = k_d max(0, l·n) + k_s max(0, h·n)^p      h: half way between l and e (`half_vector`)
 
-for lights in front of the surface.  The highlight is not multiplied with the cosine, so that f is
-not reciprocal (f cos is symmetric instead), and nothing keeps the sum of the constants from
-creating energy: see `energy_bound`.
+for lights in front of the surface.  The highlight is not multiplied by the cosine, so that f is not
+reciprocal (f cos is symmetric instead), and constants whose sum is too large create energy: see
+`energy_bound`.
 """
 
 import math
@@ -30,6 +31,7 @@ from reference_rt.materials.material import (
     Branches,
     BsdfSample,
     Material,
+    Scattered,
     no_branches,
     no_sample,
     reflection,
@@ -72,11 +74,12 @@ class Phong(Material):
         )
 
     def energy_bound(self, palette: Palette) -> float:
-        """No direction gets more than this times the power: pi k_d + 2 pi k_s / (p + 1) + k_r in
-        the brightest channel, 8 pi k_s / (p + 1) with the half vector.
+        """An upper bound of the albedo for any wo: pi k_d + 2 pi k_s / (p + 1) + k_r in the
+        brightest channel, with 8 pi k_s / (p + 1) for the half vector.
 
-        The lobe's integral over the sphere, a part of which is below the surface; for half vectors
-        with dwi = 4 (wo·h) dh and wo·h <= 1.  Of textures the greatest value counts.
+        The highlight's term is the lobe's integral over the whole sphere, a part of which is below
+        the surface; for half vectors with dwi = 4 (wo·h) dh and wo·h <= 1.  A texture counts with
+        its greatest value.
         """
         lobe = (8.0 if self.half_vector else 2.0) * math.pi / (self.exponent + 1.0)
         d, s, r = (
@@ -102,14 +105,14 @@ class Phongs(NamedTuple):
 
 @kernel
 def power(x: float, p: float) -> float:
-    """max(0, x)^p for p > 0, relatively right to p |log x| u."""
+    """max(0, x)^p for p > 0, with a relative error of p |log x| u."""
     if x <= 0.0:
         return 0.0
     return math.exp(p * math.log(x))
 
 
 class Shares(NamedTuple):
-    """The probabilities of the lobes, which add to 1, or are 0 where the material is black."""
+    """The probabilities of sampling the lobes, which add to 1; all 0 if the material is black."""
 
     diffuse: float
     specular: float
@@ -118,7 +121,7 @@ class Shares(NamedTuple):
 
 @kernel
 def _shares(phongs: Phongs, i: int, at: At) -> Shares:
-    """In proportion to the bounds of their power, brightest channels."""
+    """In proportion to upper bounds of the lobes' power in the brightest channel."""
     lobe = 8.0 if phongs.half_vector[i] != 0 else 2.0
     d = math.pi * max_component(colour_at(phongs.diffuse, i, at))
     s = lobe * math.pi * max_component(colour_at(phongs.specular, i, at))
@@ -131,40 +134,26 @@ def _shares(phongs: Phongs, i: int, at: At) -> Shares:
 
 
 @kernel
-def _half(wo: Vec3, wi: Vec3) -> Vec3:
-    """The half vector of two directions above the surface."""
-    return normalize(wo + wi)
+def both(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """f(wo, wi) cos wi, and the density of `sample`, both without the mirrored direction.
 
-
-@kernel
-def evaluate(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi, without the mirror."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    half_vector = phongs.half_vector[i] != 0
-    cosine = _half(wo, wi).z if half_vector else dot(wo, Vec3(-wi.x, -wi.y, wi.z))
-    highlight = power(min(cosine, 1.0), phongs.exponent[i])
-    k_d, k_s = colour_at(phongs.diffuse, i, at), colour_at(phongs.specular, i, at)
-    return k_d * wi.z + k_s * highlight
-
-
-@kernel
-def pdf(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle, without the mirrored direction.
-
-    Around the mirrored direction (p + 1) / (2 pi) (e·r)^p; with half vectors
-    (p + 1) / (2 pi) (h·n)^p dh/dwi, and dh/dwi = 1 / (4 wo·h).
+    The lobe's density is (p + 1) / (2 pi) (e·r)^p around the mirrored direction; with half vectors
+    it is (p + 1) / (2 pi) (h·n)^p dh/dwi, and dh/dwi = 1 / (4 wo·h).
     """
     if wo.z <= 0.0 or wi.z <= 0.0:
-        return 0.0
-    shares = _shares(phongs, i, at)
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
     p = float(phongs.exponent[i])
     if phongs.half_vector[i] != 0:
-        h = _half(wo, wi)
-        lobe = power(min(h.z, 1.0), p) / (4.0 * dot(wo, h))
+        h = normalize(wo + wi)
+        highlight = power(min(h.z, 1.0), p)
+        lobe = highlight / (4.0 * dot(wo, h))
     else:
-        lobe = power(min(dot(wo, Vec3(-wi.x, -wi.y, wi.z)), 1.0), p)
-    return shares.diffuse * (wi.z * INV_PI) + shares.specular * lobe * (p + 1.0) * (0.5 * INV_PI)
+        highlight = power(min(dot(wo, Vec3(-wi.x, -wi.y, wi.z)), 1.0), p)
+        lobe = highlight
+    k_d, k_s = colour_at(phongs.diffuse, i, at), colour_at(phongs.specular, i, at)
+    shares = _shares(phongs, i, at)
+    density = shares.diffuse * (wi.z * INV_PI) + shares.specular * lobe * (p + 1.0) * (0.5 * INV_PI)
+    return Scattered(k_d * wi.z + k_s * highlight, density)
 
 
 @kernel
@@ -180,8 +169,8 @@ def _cosine_power(p: float, u0: float, u1: float) -> Vec3:
 def sample(
     phongs: Phongs, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """The mirrored direction, one of the highlight's lobe, which fails where it points below the
-    surface, or a cosine-distributed one."""
+    """The mirrored direction, or one of the highlight's lobe, or a cosine-distributed one.
+    Sampling fails where the lobe's direction points below the surface."""
     shares = _shares(phongs, i, at)
     if wo.z <= 0.0 or shares.diffuse + shares.specular + shares.mirror == 0.0:
         return no_sample()
@@ -199,10 +188,10 @@ def sample(
             wi = to_world(frame_from_normal(mirrored), lobe)
     else:
         wi = cosine_hemisphere(u0, u1)
-    density = pdf(phongs, i, at, wo, wi)
+    value, density = both(phongs, i, at, wo, wi)
     if not density > 0.0:
         return no_sample()
-    weight = evaluate(phongs, i, at, wo, wi) * (1.0 / density)
+    weight = value * (1.0 / density)
     return BsdfSample(wi, weight, density, 1.0, False)
 
 

@@ -1,15 +1,15 @@
-"""Plastic: a smooth clear coat over a diffuse base, light bouncing between the two.
+"""Plastic: a smooth clear coat over a diffuse base, with all reflections between the two.
 
-Light enters, is scattered by the base, and partly thrown back by the coat from within, again and
+Light enters, is scattered by the base, and partly reflected back by the coat from within, again and
 again (Wolff 1994, "Diffuse-Reflectance Model for Smooth Dielectric Surfaces"; Pharr & Humphreys'
 and Mitsuba's form):
 
     f = rho / (1 - c F_int) (1 - F(wi)) (1 - F(wo)) / (eta² pi),   c = rho if `nonlinear`, else 1,
 
-where F_int is the reflectance of the coat from within, of light from all directions alike: an
-exact integral here.  Mitsuba has a fit, which makes its diffuse part brighter: by 0.1 % at
-eta = 1.33, 0.12 % at 1.5, 2.8 % at 2.4 (measured against the integral in 30 digits).  With the
-exact one and c = 1 the base sends back exactly rho (1 - F(wo)) of what reaches it from wo.
+where F_int is the internal diffuse reflectance of the coat: its hemispherical Fresnel reflectance
+from within, an exact integral here.  Mitsuba has a fit, which makes its diffuse part brighter: by
+0.1 % at eta = 1.33, 0.12 % at 1.5, 2.8 % at 2.4 (measured against the integral in 30 digits).  With
+the exact integral and c = 1 the diffuse part of the light from wo is exactly rho (1 - F(wo)).
 """
 
 from typing import ClassVar, Literal, NamedTuple
@@ -17,44 +17,31 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, max_component
 from reference_rt.jit.kernel import kernel
+from reference_rt.materials.bsdfs.coated import Coated, base_albedo
 from reference_rt.materials.material import (
     INV_PI,
     Branches,
     BsdfSample,
-    Material,
+    Scattered,
     no_branches,
     no_sample,
     reflection,
 )
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
 from reference_rt.sampling.warp import cosine_hemisphere
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class Plastic(Material):
+class Plastic(Coated):
     """A diffuse base under a smooth clear coat; its back is black."""
 
-    smooth: ClassVar[bool] = True
     delta: ClassVar[bool] = True
     type: Literal["plastic"] = "plastic"
-    reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
-    """Of the base."""
-    specular: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
-    interior_ior: Positive = 1.5
-    """Index of refraction of the coat."""
-    exterior_ior: Positive = 1.0
-    """Index of refraction around it."""
     nonlinear: bool = False
     """Whether the base colours the light at every bounce, so that colours saturate; otherwise
     `reflectance` is what the base looks like under its coat."""
-
-    @property
-    def colour(self) -> tuple[float, float, float] | str:
-        return self.reflectance
 
     def tabulate(self, palette: Palette) -> "Plastics":
         eta = relative_index(self.interior_ior, self.exterior_ior)
@@ -69,7 +56,7 @@ class Plastic(Material):
 
 class Plastics(NamedTuple):
     """reflectance, specular (n);  eta (n,): index of the coat over that around it;  f_int (n,): its
-    reflectance from within;  nonlinear (n,): 0 or 1."""
+    internal diffuse reflectance;  nonlinear (n,): 0 or 1."""
 
     reflectance: Colours
     specular: Colours
@@ -82,13 +69,13 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)
 
 
 def hemispherical_fresnel(eta: float) -> float:
-    """The fraction of light from all directions alike that a boundary mirrors: the integral of
-    2 F(cos) cos over 0 <= cos <= 1;  eta: index behind it over that in front.
+    """The fraction of uniform diffuse light that a boundary reflects: the integral of 2 F(cos) cos
+    over 0 <= cos <= 1;  eta: index behind it over that in front.
 
     For eta > 1, with q = exp(-2 w), cos = k sinh w and eta cos_t = k cosh w, k² = eta² - 1, make
     Fresnel's amplitudes -q and (m - q) / (1 - m q), m = (eta² - 1) / (eta² + 1), with
     q from (eta - 1) / (eta + 1) to 1: rational, and integrated in log q by Gauss-Legendre to 1e-14
-    for eta up to 100.  For eta < 1 by reciprocity: what passes, 1 - F, passes back, eta² as dense.
+    for eta up to 100.  For eta < 1 by reciprocity: 1 - F_h(eta) = eta² (1 - F_h(1 / eta)).
     """
     if eta == 1.0:
         return 0.0
@@ -105,8 +92,8 @@ def hemispherical_fresnel(eta: float) -> float:
 
 
 class Shares(NamedTuple):
-    """f_o, t_o: Fresnel's reflectance and transmittance towards wo;  base: rho / (1 - c F_int);
-    specular: the colour of the mirrored light;  p: the probability of sampling it."""
+    """f_o, t_o: Fresnel reflectance and transmittance for wo;  base: rho / (1 - c F_int);
+    specular: the colour of the mirrored light;  p: the probability of sampling that."""
 
     f_o: float
     t_o: float
@@ -117,18 +104,11 @@ class Shares(NamedTuple):
 
 @kernel
 def _shares(plastics: Plastics, i: int, at: At, wo: Vec3) -> Shares:
-    """Lobes are drawn in proportion to the power of their brightest channel."""
+    """The probabilities of the lobes are proportional to the power of their brightest channel."""
     coat = fresnel(wo.z, plastics.eta[i])
     f_o, t_o = coat.reflectance, coat.transmittance
     f_int = plastics.f_int[i]
-    rho = colour_at(plastics.reflectance, i, at)
-    base = rho * (1.0 / (1.0 - f_int))
-    if plastics.nonlinear[i] != 0:
-        base = Vec3(
-            rho.x / (1.0 - rho.x * f_int),
-            rho.y / (1.0 - rho.y * f_int),
-            rho.z / (1.0 - rho.z * f_int),
-        )
+    base = base_albedo(colour_at(plastics.reflectance, i, at), f_int, plastics.nonlinear[i])
     specular = colour_at(plastics.specular, i, at)
     s = f_o * max_component(specular)
     d = t_o * (1.0 - f_int) * max_component(base)
@@ -137,26 +117,20 @@ def _shares(plastics: Plastics, i: int, at: At, wo: Vec3) -> Shares:
 
 @kernel
 def _diffuse(plastics: Plastics, i: int, shares: Shares, wi: Vec3) -> Vec3:
-    """f cos wi of what enters the coat."""
+    """f cos wi of the diffuse part: light that enters the coat and leaves it."""
     eta = float(plastics.eta[i])
     t_i = fresnel(wi.z, eta).transmittance
     return shares.base * (t_i * shares.t_o / (eta * eta) * (wi.z * INV_PI))
 
 
 @kernel
-def evaluate(plastics: Plastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi, without the mirrored light."""
+def both(plastics: Plastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """f(wo, wi) cos wi, and the density of `sample`, both without the mirrored direction."""
     if wo.z <= 0.0 or wi.z <= 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    return _diffuse(plastics, i, _shares(plastics, i, at, wo), wi)
-
-
-@kernel
-def pdf(plastics: Plastics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle, without the mirrored direction."""
-    if wo.z <= 0.0 or wi.z <= 0.0:
-        return 0.0
-    return (1.0 - _shares(plastics, i, at, wo).p) * (wi.z * INV_PI)
+        return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    shares = _shares(plastics, i, at, wo)
+    density = (1.0 - shares.p) * (wi.z * INV_PI)
+    return Scattered(_diffuse(plastics, i, shares, wi), density)
 
 
 @kernel

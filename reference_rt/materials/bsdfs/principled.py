@@ -1,16 +1,16 @@
 """Principled: Burley's material for artists, from plaster to metal and glass, in Mitsuba's form.
 
-The lobes and their sources are in `principled_lobes.py`.  Of the front: a diffuse part, a sheen, a
-main lobe of GGX microfacets that mirror and, with `spec_trans`, refract, and a clear coat; of the
-back the main lobe alone, and only with `spec_trans`.  It follows Mitsuba's vectorised variants: in
-its scalar ones a material with spec_trans = 1 has no sheen.
+The lobes and their sources are in `principled_lobes.py`.  The front has a diffuse lobe, a sheen, a
+main lobe of GGX microfacets that reflect and, with `spec_trans`, refract, and a clear coat; the
+back has the main lobe alone, and only with `spec_trans`.  It follows Mitsuba's vectorised variants:
+in its scalar ones a material with spec_trans = 1 has no sheen.
 
-The law is reciprocal: of radiance over the index of refraction squared where it refracts.  But
-lobes are added without taking from one what another mirrors, so that it creates energy.  At grazing
-angles a white base gives back up to 1.6 times the light, a grey one of 0.5 up to 1.2; a white one
-with a sheen, or flatness 1, 1.7; a saturated sheen, whose tint has luminance 1 and so a blue of
-13.9, 3.1 in blue.  A metal or a glass alone (metallic = 1 or spec_trans = 1, no sheen, no coat)
-never gives back more than all: measured on grids of parameters, as the tests do again.
+The BSDF is reciprocal (for refraction: radiance over the index of refraction squared).  It does not
+conserve energy, because the lobes are added without scaling one by what another reflects.  At
+grazing angles the albedo of a white base is up to 1.6, of a grey one of 0.5 up to 1.2; of a white
+one with a sheen, or flatness 1, 1.7; a saturated sheen, whose tint has luminance 1 and so a blue of
+13.9, has 3.1 in blue.  The albedo of a metal or a glass alone (metallic = 1 or spec_trans = 1, no
+sheen, no coat) is never above 1: measured on grids of parameters, which the tests repeat.
 """
 
 import math
@@ -31,7 +31,7 @@ from reference_rt.materials.bsdfs.principled_lobes import (
     coat_normals,
     diffuse,
     facet,
-    meet,
+    fresnel_at,
     sample_coat,
     sheen,
     sheen_colour,
@@ -64,10 +64,11 @@ _MIN_ALPHA = 1e-3
 """Mitsuba's: smaller ones count as this."""
 
 _LEAST_MAIN = 0.05
-"""The main lobe is drawn as if it mirrored this at least: towards grazing angles it mirrors all."""
+"""The least reflectance that the main lobe's probability assumes: at grazing angles it reflects
+all."""
 
 _SHEEN = 0.1
-"""What a white sheen scatters at grazing angles, where it is brightest (measured)."""
+"""The albedo of a white sheen at grazing angles, where it is brightest (measured)."""
 
 
 class Principled(Material):
@@ -159,7 +160,7 @@ class Principleds(NamedTuple):
 
 @kernel
 def _surface(table: Principleds, i: int, at: At, side: float) -> Surface:
-    """Row i at a place, for wo.z = side."""
+    """The parameters of row i at the texture coordinates `at`, for wo.z = side."""
     roughness = number_at(table.roughness, i, at)
     aspect = math.sqrt(1.0 - 0.9 * number_at(table.anisotropic, i, at))
     alpha = roughness * roughness
@@ -187,12 +188,12 @@ def _surface(table: Principleds, i: int, at: At, side: float) -> Surface:
 
 @kernel
 def _upwards(v: Vec3, side: float) -> Vec3:
-    """`v` as seen with wo above: the microfacets are the same from either side."""
+    """`v` mirrored so that wo is above: the microfacets are the same from either side."""
     return Vec3(v.x, v.y, -v.z) if side < 0.0 else v
 
 
 class _Shares(NamedTuple):
-    """Of the lobes, in proportion to their probabilities: the power of the brightest channel."""
+    """The lobes' probabilities times a factor: the power of their brightest channels."""
 
     cosine: float
     coat: float
@@ -201,7 +202,7 @@ class _Shares(NamedTuple):
 
 @kernel
 def _shares(s: Surface, wo: Vec3) -> _Shares:
-    refraction = meet(s, wo.z)
+    refraction = fresnel_at(s, wo.z)
     flat = facet(s, refraction)
     main = 0.0
     if s.eta != 1.0 and (s.front or s.transmitting > 0.0):
@@ -214,7 +215,7 @@ def _shares(s: Surface, wo: Vec3) -> _Shares:
 
 @kernel
 def _scattered(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
-    """With wo above: both at once, which share the most of their work."""
+    """`both` for wo above the surface."""
     total = shares.cosine + shares.coat + shares.main
     if wi.z < 0.0:
         bent = bend(wo, wi, s.relative_ior, s.front)
@@ -225,7 +226,7 @@ def _scattered(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
             return Scattered(value, 0.0)
         return Scattered(value, shares.main / total * f.passing * (normals * (s.eta * s.eta)))
     h, cos_d = half_vector(wo, wi)
-    refraction = meet(s, cos_d)
+    refraction = fresnel_at(s, cos_d)
     f, normals = facet(s, refraction), visible_normals(s.m, wo, h)
     value = f.mirrored * (0.25 * normals * g1(s.m, wi))
     if s.front:
@@ -242,7 +243,7 @@ def _scattered(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
 
 @kernel
 def both(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`."""
+    """f(wo, wi) |cos wi|, and the density of `sample`."""
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
@@ -254,20 +255,8 @@ def both(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
 
 
 @kernel
-def evaluate(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi|."""
-    return both(table, i, at, wo, wi).value
-
-
-@kernel
-def pdf(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle."""
-    return both(table, i, at, wo, wi).density
-
-
-@kernel
 def _main(f: Facet, refraction: Refraction, wo: Vec3, h: Vec3, u: float) -> Vec3:
-    """wo mirrored, or refracted, by a microfacet."""
+    """wo reflected or refracted at a microfacet."""
     if u < f.share:
         return reflect(wo, h)
     return refract(wo, h, refraction)
@@ -278,7 +267,8 @@ def sample(
     table: Principleds, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
     """A direction of one of three lobes: cosine-distributed, of the coat, or of the main lobe's
-    microfacets, which mirror or refract; it fails where it ends on the wrong side."""
+    microfacets, which reflect or refract.  Sampling fails where a direction is on the wrong
+    side."""
     side = wo.z
     if side == 0.0:
         return no_sample()
@@ -294,7 +284,7 @@ def sample(
         if not shares.main > 0.0:
             return no_sample()
         h = sample_visible(s.m, wo, u0, u1)
-        refraction = meet(s, max(0.0, dot(wo, h)))
+        refraction = fresnel_at(s, max(0.0, dot(wo, h)))
         f = facet(s, refraction)
         u = (u - shares.cosine - shares.coat) / shares.main
         wi = _main(f, refraction, wo, h, u)

@@ -1,9 +1,9 @@
-"""The lobes of the principled material: what each adds to f cos, seen with wo above.
+"""The lobes of the principled material: the part that each adds to f cos, for wo above.
 
 Burley 2012, "Physically Based Shading at Disney", and Burley 2015, "Extending the Disney BRDF to a
-BSDF with Integrated Subsurface Scattering", in the form that Mitsuba gives them, whose choices the
-papers leave open: Fresnel's equations for the dielectric part and Schlick's for the coloured ones,
-separable masking, and at eta = 1 no main lobe at all, metals included.
+BSDF with Integrated Subsurface Scattering", in Mitsuba's form where the papers leave a choice:
+Fresnel's equations for the dielectric part and Schlick's for the coloured ones, separable masking,
+and at eta = 1 no main lobe at all, metals included.
 """
 
 import math
@@ -24,7 +24,7 @@ from reference_rt.sampling.warp import on_circle
 
 
 class Surface(NamedTuple):
-    """The parameters at one place, and as wo sees them.
+    """The parameters at one point, and for the side that wo is on.
 
     diffuse, transmitting: the shares (1 - metallic) (1 - spec_trans) and (1 - metallic)
     spec_trans;  coat_alpha: roughness of the clear coat;  eta: index of refraction on the other
@@ -49,9 +49,8 @@ class Surface(NamedTuple):
 
 
 class Facet(NamedTuple):
-    """What a microfacet of the main lobe does to light: mirrored and refracted, the factors on
-    radiance without the 1 / eta²;  share, passing: the probabilities with which `sample` mirrors
-    and refracts."""
+    """mirrored, refracted: the factors on radiance of a microfacet of the main lobe, without the
+    1 / eta²;  share, passing: the probabilities with which `sample` reflects and refracts."""
 
     mirrored: Vec3
     refracted: Vec3
@@ -68,8 +67,8 @@ def schlick_weight(cosine: float) -> float:
 
 
 @kernel
-def meet(s: Surface, cosine: float) -> Refraction:
-    """What Fresnel says of light at this angle, from wo's side."""
+def fresnel_at(s: Surface, cosine: float) -> Refraction:
+    """Fresnel's equations for a microfacet at this cosine, from wo's side."""
     return fresnel(cosine if s.front else -cosine, s.relative_ior)
 
 
@@ -87,8 +86,9 @@ def _tint(base: Vec3) -> Vec3:
 
 @kernel
 def facet(s: Surface, refraction: Refraction) -> Facet:
-    """Outside: a dielectric, one of tinted reflection and a metal, mixed; inside, a dielectric.
-    What passes is tinted by the base colour's root on each way (Burley 2015, section 5)."""
+    """On the outside a mixture of a dielectric, a dielectric of tinted reflection and a metal; on
+    the inside a dielectric.  Refracted light is tinted by the root of the base colour, once on its
+    way in and once on its way out (Burley 2015, section 5)."""
     f, passing, one = refraction.reflectance, refraction.transmittance, Vec3(1.0, 1.0, 1.0)
     if s.eta == 1.0:
         f, passing = 0.0, 1.0
@@ -118,8 +118,8 @@ def visible_normals(m: Microfacets, wo: Vec3, h: Vec3) -> float:
 
 @kernel
 def diffuse(s: Surface, wo: Vec3, wi: Vec3, cos_d: float) -> Vec3:
-    """Burley 2012, section 5.3, with the retro-reflection apart (Burley 2015, eq. 4), and
-    `flatness` of the way to the approximation of scattering under the skin (2012, section 5.3:
+    """Burley 2012, section 5.3, with the retro-reflection as a term of its own (Burley 2015, eq.
+    4), blended by `flatness` with the approximation of subsurface scattering (2012, section 5.3:
     after Hanrahan & Krueger 1993)."""
     f_i, f_o = schlick_weight(wi.z), schlick_weight(wo.z)
     retro = 2.0 * s.roughness * cos_d * cos_d
@@ -134,7 +134,7 @@ def diffuse(s: Surface, wo: Vec3, wi: Vec3, cos_d: float) -> Vec3:
 
 @kernel
 def sheen_colour(s: Surface) -> Vec3:
-    """Of all but the metallic share."""
+    """Of all but the metallic part."""
     white = Vec3(1.0, 1.0, 1.0)
     return _lerp(white, _tint(s.base), s.sheen_tint) * (s.sheen * (1.0 - s.metallic))
 
@@ -147,7 +147,8 @@ def sheen(s: Surface, wi: Vec3, cos_d: float) -> Vec3:
 
 @kernel
 def coat_fresnel(thin: float) -> float:
-    """Schlick's, of a lacquer of index 1.5, with the cosine on the thinner side of the base."""
+    """Schlick's approximation for a lacquer of index 1.5, with the cosine on that side of the base
+    which has the smaller index."""
     return 0.04 + 0.96 * schlick_weight(thin)
 
 

@@ -1,20 +1,17 @@
 """Rough conductor: microfacets of a metal (Cook & Torrance 1982; Walter et al. 2007, eq. 20).
 
-f = F D G / (4 cos wo cos wi), for light that meets one microfacet: what a second one would mirror
-on is lost.  With GGX and F = 1 that is, at normal incidence, 1 % of the light at alpha = 0.1, 12 %
-at 0.3 and log 2 = 69 % at 1.
+f = F D G / (4 cos wo cos wi): single scattering; light that would meet a second microfacet is lost.
+With GGX and F = 1 that is, at normal incidence, 1 % of the light at alpha = 0.1, 12 % at 0.3 and
+log 2 = 69 % at 1.
 """
 
 from typing import ClassVar, Literal, NamedTuple
 
-import numpy as np
-
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Colour
 from reference_rt.core.vec3 import Vec3, dot, reflect, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs.conductor import Index, metal_colour
-from reference_rt.materials.material import BsdfSample, Material, Scattered, no_sample
+from reference_rt.materials.bsdfs.metal import Metal
+from reference_rt.materials.material import BsdfSample, Scattered, no_sample
 from reference_rt.materials.microfacet.fresnel import conductor_colour
 from reference_rt.materials.microfacet.ggx_and_smith import (
     AlphaParameter,
@@ -29,27 +26,17 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     roughnesses,
     sample_visible,
 )
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class RoughConductor(Material):
+class RoughConductor(Metal):
     """A rough metal; its back is black."""
 
     smooth: ClassVar[bool] = True
     chooses: ClassVar[bool] = False
     type: Literal["rough_conductor"] = "rough_conductor"
-    eta: Index
-    """The index of refraction, relative to what is outside."""
-    k: Colour
-    """The extinction coefficient: the imaginary part of the index."""
-    reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
     distribution: Distribution = "ggx"
     alpha: AlphaParameter = (0.1, 0.1)
-
-    @property
-    def colour(self) -> tuple[float, float, float] | str:
-        return metal_colour(self.eta, self.k, self.reflectance)
 
     @property
     def oriented(self) -> bool:
@@ -57,10 +44,8 @@ class RoughConductor(Material):
 
     def tabulate(self, palette: Palette) -> "RoughConductors":
         return RoughConductors(
-            np.array([self.eta]),
-            np.array([self.k]),
-            palette.colours(self.reflectance),
-            roughnesses(self.distribution, self.alpha, palette),
+            **self.columns(palette),
+            roughness=roughnesses(self.distribution, self.alpha, palette),
         )
 
 
@@ -76,14 +61,14 @@ class RoughConductors(NamedTuple):
 
 @kernel
 def _mirrored(conductors: RoughConductors, i: int, at: At, cosine: float) -> Vec3:
-    """What a microfacet mirrors of light at this angle."""
+    """The reflectance of a microfacet at this angle of incidence."""
     f = conductor_colour(min(1.0, cosine), row(conductors.eta, i), row(conductors.k, i))
     return f * colour_at(conductors.reflectance, i, at)
 
 
 @kernel
 def both(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`."""
+    """f(wo, wi) cos wi, and the density of `sample`: that of visible normals over 4 wo·h."""
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
     m = microfacets_at(conductors.roughness, i, at)
@@ -93,22 +78,10 @@ def both(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Sca
 
 
 @kernel
-def evaluate(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi."""
-    return both(conductors, i, at, wo, wi).value
-
-
-@kernel
-def pdf(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle: that of visible normals over 4 wo·h."""
-    return both(conductors, i, at, wo, wi).density
-
-
-@kernel
 def sample(
     conductors: RoughConductors, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """wo mirrored by a microfacet that it sees: the weight is F G1(wi)."""
+    """wo reflected at a visible microfacet: the weight is F G1(wi)."""
     if wo.z <= 0.0:
         return no_sample()
     m = microfacets_at(conductors.roughness, i, at)

@@ -1,28 +1,27 @@
 """Rough dielectric: microfacets of glass (Walter et al. 2007, eq. 20 and 21).
 
-With eta the index of refraction on wi's side over that on wo's, and radiance as the quantity that
-is carried (hence the 1 / eta², which the eta² of Walter's eq. 17 cancels):
+With eta the index of refraction on wi's side over that on wo's, and for radiance (hence the factor
+1 / eta², which the eta² of Walter's eq. 17 cancels):
 
     reflection, h along wo + wi:      f = F D G / (4 |cos wo cos wi|)
     refraction, h along wo + eta wi:  f = (1 - F) D G |wo·h wi·h| / (|cos wo cos wi| |wo + eta wi|²)
 
-for light that meets one microfacet; what would meet a second one is lost: with GGX, eta = 1.5 and
-normal incidence 0.1 % of the light at alpha = 0.1, 1 % at 0.3 and 11 % at 1 from outside; from
+This is single scattering; light that would meet a second microfacet is lost: with GGX, eta = 1.5
+and normal incidence 0.1 % of the light at alpha = 0.1, 1 % at 0.3 and 11 % at 1 from outside; from
 inside 1 %, 10 % and 58 %.
 """
 
 import math
 from typing import ClassVar, Literal, NamedTuple
 
-import numpy as np
 from pydantic import model_validator
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.material import BsdfSample, Material, Scattered, no_sample
-from reference_rt.materials.microfacet.fresnel import Refraction, fresnel, relative_index
+from reference_rt.materials.bsdfs.transparent import Transparent
+from reference_rt.materials.material import BsdfSample, Scattered, no_sample
+from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
 from reference_rt.materials.microfacet.ggx_and_smith import (
     AlphaParameter,
     Distribution,
@@ -40,28 +39,21 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     sample_visible,
     visible_density,
 )
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class RoughDielectric(Material):
+class RoughDielectric(Transparent):
     """A rough boundary of two transparent media; the normal points to the exterior."""
 
     smooth: ClassVar[bool] = True
     type: Literal["rough_dielectric"] = "rough_dielectric"
-    interior_ior: Positive = 1.5
-    """Index of refraction behind the normal."""
-    exterior_ior: Positive = 1.0
-    """Index of refraction on the normal's side."""
-    reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
-    transmittance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the refracted light is multiplied with."""
     distribution: Distribution = "ggx"
     alpha: AlphaParameter = (0.1, 0.1)
 
     @model_validator(mode="after")
     def _bends(self) -> "RoughDielectric":
-        # Directions, which are off by u, tell normals to u / |eta - 1|: a thousandth of MIN_ALPHA.
+        # Directions are off by u, and so the half vector is off by u / |eta - 1|: a thousandth of
+        # MIN_ALPHA.
         if abs(self.interior_ior / self.exterior_ior - 1.0) < 1e-9:
             raise ValueError(
                 "interior_ior and exterior_ior are equal: such a boundary bends nothing; "
@@ -70,23 +62,13 @@ class RoughDielectric(Material):
         return self
 
     @property
-    def colour(self) -> tuple[float, float, float] | str:
-        return self.transmittance
-
-    @property
     def oriented(self) -> bool:
         return is_anisotropic(self.alpha)
 
-    @property
-    def transmits(self) -> bool:
-        return True
-
     def tabulate(self, palette: Palette) -> "RoughDielectrics":
         return RoughDielectrics(
-            np.array([relative_index(self.interior_ior, self.exterior_ior)]),
-            palette.colours(self.reflectance),
-            palette.colours(self.transmittance),
-            roughnesses(self.distribution, self.alpha, palette),
+            **self.columns(palette),
+            roughness=roughnesses(self.distribution, self.alpha, palette),
         )
 
 
@@ -101,8 +83,8 @@ class RoughDielectrics(NamedTuple):
 
 
 class _Facet(NamedTuple):
-    """What a microfacet does to light: mirrored and refracted, the factors on radiance without the
-    1 / eta²;  share, passing: the probabilities with which `sample` mirrors and refracts."""
+    """mirrored, refracted: a microfacet's factors on radiance, without the 1 / eta²;
+    share, passing: the probabilities with which `sample` reflects and refracts."""
 
     mirrored: Vec3
     refracted: Vec3
@@ -121,26 +103,26 @@ def _facet(dielectrics: RoughDielectrics, i: int, at: At, refraction: Refraction
 
 
 @kernel
-def _meet(dielectrics: RoughDielectrics, i: int, side: float, cosine: float) -> Refraction:
-    """What Fresnel says of light at this angle, from the side of wo.z = `side`."""
+def _fresnel_at(dielectrics: RoughDielectrics, i: int, side: float, cosine: float) -> Refraction:
+    """Fresnel's equations for a microfacet at this cosine, from the side of wo.z = `side`."""
     return fresnel(math.copysign(cosine, side), dielectrics.eta[i])
 
 
 @kernel
 def _upwards(v: Vec3, side: float) -> Vec3:
-    """`v` as seen with wo above: the microfacets are the same from either side."""
+    """`v` mirrored so that wo is above: the microfacets are the same from either side."""
     return Vec3(v.x, v.y, -v.z) if side < 0.0 else v
 
 
 @kernel
 def _mirrored_density(m: Microfacets, wo: Vec3, h: Vec3) -> float:
-    """Of visible normals over 4 wo·h."""
+    """The density of the reflected direction: that of visible normals over 4 wo·h."""
     return 0.25 * g1_over_cos(m, wo) * density(m, h)
 
 
 @kernel
 def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`."""
+    """f(wo, wi) |cos wi|, and the density of `sample`."""
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
@@ -150,7 +132,7 @@ def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> S
     shown = seen * g1(m, wi)
     if wi.z > 0.0:
         half = half_vector(wo, wi)
-        facet = _facet(dielectrics, i, at, _meet(dielectrics, i, side, half.cosine))
+        facet = _facet(dielectrics, i, at, _fresnel_at(dielectrics, i, side, half.cosine))
         normals = density(m, half.h)
         value = facet.mirrored * (0.25 * normals * shown)
         return Scattered(value, facet.share * (0.25 * seen * normals))
@@ -164,29 +146,17 @@ def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> S
 
 
 @kernel
-def evaluate(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi|."""
-    return both(dielectrics, i, at, wo, wi).value
-
-
-@kernel
-def pdf(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle."""
-    return both(dielectrics, i, at, wo, wi).density
-
-
-@kernel
 def sample(
     dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """wo mirrored or refracted by a microfacet that it sees."""
+    """wo reflected or refracted at a visible microfacet."""
     side = wo.z
     if side == 0.0:
         return no_sample()
     wo = _upwards(wo, side)
     m = microfacets_at(dielectrics.roughness, i, at)
     h = sample_visible(m, wo, u0, u1)
-    refraction = _meet(dielectrics, i, side, max(0.0, dot(wo, h)))
+    refraction = _fresnel_at(dielectrics, i, side, max(0.0, dot(wo, h)))
     facet = _facet(dielectrics, i, at, refraction)
     if u_lobe < facet.share:
         wi = reflect(wo, h)

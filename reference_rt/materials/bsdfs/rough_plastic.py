@@ -1,33 +1,33 @@
-"""Rough plastic: a rough clear coat over a diffuse base, light bouncing between the two.
+"""Rough plastic: a rough clear coat over a diffuse base, with all reflections between the two.
 
     f = s F D G / (4 cos wo cos wi) + rho / (1 - c R_int) T(wi) T(wo) / (eta² pi),
 
-c = rho if `nonlinear`, else 1: as plastic, with what a boundary of microfacets lets pass, T(w), in
-place of 1 - F(w), and what it mirrors from within, of light from all directions alike, R_int in
-place of F_int (Mitsuba's form, after Walter et al. 2007).  Both are integrals over the visible
-microfacets, G1 of the other direction included, so that light that would meet a second microfacet
-is lost, and the sum of both parts is never above 1: by reciprocity the mean of T / eta² is what
-passes from within, at most 1 - R_int.
+c = rho if `nonlinear`, else 1.  The form is that of plastic, with the transmittance T(w) of the
+rough boundary in place of 1 - F(w) and its internal diffuse reflectance R_int in place of F_int
+(Mitsuba's form, after Walter et al. 2007).  T and R_int are integrals over the visible microfacets
+and include G1 of the other direction: light that would meet a second microfacet is lost.  The
+albedo is never above 1: by reciprocity the mean of T / eta² is the transmittance from within, at
+most 1 - R_int.
 
-T is tabulated at _NODES cosines, evenly in their roots, and interpolated linearly.  For eta from 1
-to 3 and alpha up to 1 T is within 4e-4 and R_int within 4e-4, for others (a coat thinner than what
-is around it, or rougher) within 1e-2: measured against rules of 128 x 128 normals; the tests repeat
-it.  Mitsuba has 64 cosines, evenly, and the mean over them in place of the integral for R_int,
-which makes it 1.5 % too low and, linear, the diffuse part 1 to 2 % darker (measured at eta = 1.5,
-alpha = 0.05 and 0.3).
+T is tabulated at _NODES cosines, evenly spaced in their roots, and interpolated linearly.  For eta
+from 1 to 3 and alpha up to 1 the errors of T and of R_int are at most 4e-4, for others (a coat of
+smaller index than its surroundings, or a rougher one) at most 1e-2: measured against rules of 128 x
+128 normals; the tests repeat it.  Mitsuba has 64 evenly spaced cosines, and the mean over them in
+place of the integral for R_int, which makes it 1.5 % too low and, linear, the diffuse part 1 to 2 %
+darker (measured at eta = 1.5, alpha = 0.05 and 0.3).
 """
 
 import math
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
+from reference_rt.materials.bsdfs.coated import Coated, base_albedo
+from reference_rt.materials.material import INV_PI, BsdfSample, Scattered, no_sample
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import (
     MAX_ALPHA,
@@ -44,38 +44,23 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     sample_visible,
 )
 from reference_rt.sampling.warp import cosine_hemisphere
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.textures import At, Colours, Palette, colour_at
 
 _NODES = 128
 
 _NOWHERE = At(None, 0.0, 0.0, Vec3(0.0, 0.0, 0.0))
 
 _LEAST_MIRRORED = 1e-3
-"""What counts as mirrored when lobes are chosen: more than T is off by."""
+"""The least specular reflectance that lobe probabilities assume: more than the error of T."""
 
 
-class RoughPlastic(Material):
+class RoughPlastic(Coated):
     """A diffuse base under a rough clear coat; its back is black."""
 
-    smooth: ClassVar[bool] = True
     type: Literal["rough_plastic"] = "rough_plastic"
-    reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
-    """Of the base."""
-    specular: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
-    interior_ior: Positive = 1.5
-    """Index of refraction of the coat."""
-    exterior_ior: Positive = 1.0
-    """Index of refraction around it."""
-    nonlinear: bool = False
-    """Whether the base colours the light at every bounce, so that colours saturate."""
     distribution: Distribution = "ggx"
     alpha: float = Field(default=0.1, gt=0.0, le=MAX_ALPHA)
     """Roughness, the same in all directions; below MIN_ALPHA it counts as that."""
-
-    @property
-    def colour(self) -> tuple[float, float, float] | str:
-        return self.reflectance
 
     def tabulate(self, palette: Palette) -> "RoughPlastics":
         eta = relative_index(self.interior_ior, self.exterior_ior)
@@ -115,8 +100,8 @@ def _rule(n: int) -> tuple[FloatArray, FloatArray]:
 def _scatter(
     m: Microfacets, eta: float, cosines: Any, nodes: Any, weights: Any, through: bool, out: Any
 ) -> None:
-    """What microfacets let through, or mirror, of light at each of the cosines: the mean over
-    visible normals, by the product rule in the unit square that `sample_visible` warps."""
+    """The transmittance (`through`) or reflectance of microfacets at each of the cosines: the mean
+    over visible normals, by the product rule in the unit square that `sample_visible` warps."""
     for k in range(len(cosines)):
         wo = Vec3(math.sqrt((1.0 - cosines[k]) * (1.0 + cosines[k])), 0.0, cosines[k])
         total = 0.0
@@ -134,15 +119,14 @@ def _scatter(
 
 
 def transmittances(m: Microfacets, eta: float, cosines: FloatArray, rule: int = 48) -> FloatArray:
-    """T at these cosines from outside, by `rule` x `rule` normals each."""
+    """T at these cosines, for light from outside, by `rule` x `rule` normals each."""
     out = np.empty(len(cosines))
     _scatter(m, eta, cosines, *_rule(rule), True, out)
     return out
 
 
 def internal_reflectance(m: Microfacets, eta: float, rule: int = 48) -> float:
-    """R_int: the integral of 2 R(cos) cos from within, in two parts that meet at the critical
-    angle."""
+    """R_int: the integral of 2 R(cos) cos for light from within, split at the critical angle."""
     critical = math.sqrt(1.0 - 1.0 / (eta * eta)) if eta > 1.0 else 0.5
     nodes, weights = _rule(rule // 2)
     cosines = np.concatenate([critical * nodes, critical + (1.0 - critical) * nodes])
@@ -163,7 +147,7 @@ def _passing(plastics: RoughPlastics, i: int, cosine: float) -> float:
 
 class _Lobes(NamedTuple):
     """t_o: T(wo);  base: rho / (1 - c R_int);  specular: the colour of the mirrored light;
-    p: the probability of sampling it;  m: the microfacets."""
+    p: the probability of sampling that;  m: the microfacets."""
 
     t_o: float
     base: Vec3
@@ -174,16 +158,9 @@ class _Lobes(NamedTuple):
 
 @kernel
 def _lobes(plastics: RoughPlastics, i: int, at: At, wo: Vec3) -> _Lobes:
-    """They are drawn in proportion to the power of their brightest channel."""
+    """The probabilities of the lobes are proportional to the power of their brightest channel."""
     t_o, r_int = _passing(plastics, i, min(1.0, wo.z)), plastics.r_int[i]
-    rho = colour_at(plastics.reflectance, i, at)
-    base = rho * (1.0 / (1.0 - r_int))
-    if plastics.nonlinear[i] != 0:
-        base = Vec3(
-            rho.x / (1.0 - rho.x * r_int),
-            rho.y / (1.0 - rho.y * r_int),
-            rho.z / (1.0 - rho.z * r_int),
-        )
+    base = base_albedo(colour_at(plastics.reflectance, i, at), r_int, plastics.nonlinear[i])
     specular = colour_at(plastics.specular, i, at)
     s = max(1.0 - t_o, _LEAST_MIRRORED) * max_component(specular)
     d = t_o * (1.0 - r_int) * max_component(base)
@@ -193,7 +170,7 @@ def _lobes(plastics: RoughPlastics, i: int, at: At, wo: Vec3) -> _Lobes:
 
 @kernel
 def _scattered(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) -> Scattered:
-    """Above the surface; both at once, which share the most of their work."""
+    """`both` for directions above the surface."""
     eta, half = float(plastics.eta[i]), half_vector(wo, wi)
     f = fresnel(half.cosine, eta).reflectance
     normals = 0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, half.h)
@@ -206,29 +183,17 @@ def _scattered(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec
 
 @kernel
 def both(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`."""
+    """f(wo, wi) cos wi, and the density of `sample`."""
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
     return _scattered(plastics, i, _lobes(plastics, i, at, wo), wo, wi)
 
 
 @kernel
-def evaluate(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) cos wi."""
-    return both(plastics, i, at, wo, wi).value
-
-
-@kernel
-def pdf(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle."""
-    return both(plastics, i, at, wo, wi).density
-
-
-@kernel
 def sample(
     plastics: RoughPlastics, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """wo mirrored by a microfacet that it sees, or a cosine-distributed direction."""
+    """wo reflected at a visible microfacet, or a cosine-distributed direction."""
     if wo.z <= 0.0:
         return no_sample()
     lobes = _lobes(plastics, i, at, wo)

@@ -1,4 +1,4 @@
-"""Beckmann's distribution of slopes: normals as a direction sees them."""
+"""Sampling the visible normals of Beckmann's distribution of slopes."""
 
 import math
 
@@ -16,20 +16,20 @@ _LEAST = 1e-18
 """Smaller numbers count as this."""
 
 _ROUNDED = 2.0**-51
-"""What a sum of two products with erfc and exp is off by, relatively: each is right to 2 u."""
+"""The relative error of a sum of two products with erfc and exp, each of which is right to 2 u."""
 
 _CUBED = 1e-5
-"""A step so small, relative to what bends the curve, that its cube is below 1e-15."""
+"""A step, times the relative curvature there, whose cube is below 1e-15."""
 
 
 @kernel
 def visible_beckmann(w: Vec3, u0: float, u1: float) -> Vec3:
-    """Of roughness 1, not of unit length: the slope towards w by `_slope_seen`, the one across it
-    normally distributed, whoever looks (Heitz & d'Eon 2014, "Importance Sampling Microfacet-Based
-    BSDFs using the Distribution of Visible Normals")."""
+    """A visible normal for roughness 1, not of unit length: the slope towards w is from
+    `_slope_seen`; the slope across it is normally distributed for every w (Heitz & d'Eon 2014,
+    "Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals")."""
     sine = math.sqrt(w.x * w.x + w.y * w.y)
     x = _slope_seen(w.z, sine, u0)
-    # In its lower half, where it is a sum of few cancellations.
+    # By symmetry from the lower half, where fewer digits cancel.
     y = _slope_across(u1) if u1 < 0.5 else -_slope_across(1.0 - u1)
     cos_phi, sin_phi = (w.x / sine, w.y / sine) if sine > 0.0 else (1.0, 0.0)
     return Vec3(sin_phi * y - cos_phi * x, -sin_phi * x - cos_phi * y, 1.0)
@@ -43,18 +43,18 @@ def seen(cosine: float, sine: float, x: float) -> float:
 
 @kernel
 def _slope_across(u: float) -> float:
-    """The slope below which there is the fraction u of all: the root of erfc(-x) = 2 u."""
+    """The quantile u of the slopes: the root of erfc(-x) = 2 u."""
     u = max(u, _LEAST)
     return _refined(1.0, 0.0, FAR, u * (2.0 * SQRT_PI), about_normal(u))
 
 
 @kernel
 def _slope_seen(cosine: float, sine: float, u: float) -> float:
-    """The slope x below which there is the fraction u of those that a direction at this angle sees,
-    of density (cosine - sine x) exp(-x²) up to cosine / sine.
+    """The quantile u of the slopes x that are visible from a direction at this angle: those of
+    density (cosine - sine x) exp(-x²) up to cosine / sine.
 
-    Seen from above it is normally distributed, at grazing angles it is -sqrt(-log u).  In between
-    it lies so near the mean of these, weighted by angle, that two steps are enough (measured).
+    Seen from above it is normally distributed, at grazing angles it is -sqrt(-log u).  Between them
+    the mean of the two, weighted by angle, is so close that two steps are enough (measured).
     """
     u = max(u, _LEAST)
     most = cosine / sine if cosine < FAR * sine else FAR
@@ -66,8 +66,8 @@ def _slope_seen(cosine: float, sine: float, u: float) -> float:
 
 @kernel
 def _refined(cosine: float, sine: float, most: float, goal: float, x: float) -> float:
-    """The root of `seen` = goal below `most`, from near it: by Halley's method, whose error after
-    a step is about the cube of the one before, to the last digits of the goal."""
+    """The root of `seen` = goal below `most`, to the last digits of the goal: by Halley's method
+    from a start x near it.  The error after a step is about the cube of that before."""
     for _ in range(64):
         off = goal - seen(cosine, sine, x)
         height = cosine - sine * x

@@ -1,4 +1,4 @@
-"""Fresnel's equations: how much of the light a smooth boundary mirrors."""
+"""Fresnel's equations: the fractions of light that a smooth boundary reflects and refracts."""
 
 import math
 from typing import NamedTuple
@@ -7,8 +7,8 @@ from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 
 MOST_INDEX = 1e70
-"""Relative indices beyond it, and below one over it, count as that: so that their fourth powers
-are floats."""
+"""Relative indices are clamped to this and to one over it, so that their fourth powers are
+floats."""
 
 
 def relative_index(interior: float, exterior: float) -> float:
@@ -17,11 +17,11 @@ def relative_index(interior: float, exterior: float) -> float:
 
 
 class Refraction(NamedTuple):
-    """What a smooth boundary does to light that comes to it.
+    """Reflection and refraction at a smooth boundary.
 
     reflectance, transmittance: the fractions of power, each to its last digits, (1, 0) for total
     internal reflection;  cos_t: the cosine of the refracted direction;  eta: index on its side over
-    that on wo's;  gap: cos_o / eta - cos_t, without cancellation: the refracted direction is
+    that on wo's side;  gap: cos_o / eta - cos_t, without cancellation: the refracted direction is
     gap n - wo / eta;  thin: the cosine on the side of the smaller index.
     """
 
@@ -43,8 +43,8 @@ def fresnel(cos_o: float, n: float) -> Refraction:
 
         -k / (c + g)²   and   k ((n² + 1) c² - 1) / (n² c + g)²,
 
-    or with (n² + 1) g² - n⁴, which is the same: no digits are lost where indices are nearly equal,
-    nor, where little passes, by 1 - R.
+    or with (n² + 1) g² - n⁴, which is the same.  No digits are lost where the indices are nearly
+    equal, nor by computing a small transmittance as 1 - R.
     """
     k = (n - 1.0) * (n + 1.0)
     cosine = abs(cos_o)
@@ -80,13 +80,13 @@ def conductor_reflectance(cos_o: float, eta: float, k: float) -> float:
     medium outside, for 0 <= cos_o <= 1 (PBR 4ed, 9.3.6, in real arithmetic: Lazányi &
     Szirmay-Kalos 2005, eq. 2-3).
 
-    a² + b² = |(eta + ik)² - sin²|, a the real part of its root.  As the root's square is cos² + e,
-    e = (eta + ik)² - 1, what is not mirrored much is |e|² / |cos + root|⁴, without cancellation.
+    a² + b² = |(eta + ik)² - sin²|, a the real part of its root.  The root's square is cos² + e with
+    e = (eta + ik)² - 1, so that a small reflectance is |e|² / |cos + root|⁴, without cancellation.
     """
     cos2 = cos_o * cos_o
     sin2 = (1.0 - cos_o) * (1.0 + cos_o)
     e = (eta - 1.0) * (eta + 1.0) - k * k
-    # The same, of smaller terms.
+    # Two equal forms: the one of smaller terms.
     p = cos2 + e if cos2 < 0.5 else (eta - k) * (eta + k) - sin2
     q = 2.0 * eta * k
     modulus = math.sqrt(p * p + q * q)
@@ -94,7 +94,7 @@ def conductor_reflectance(cos_o: float, eta: float, k: float) -> float:
     if p < 0.0:
         a2 = 0.5 * q * q / (modulus - p)  # without cancellation
     a = math.sqrt(a2)
-    # Sums of what is not negative, and differences over them.
+    # Sums of numbers that are not negative, and differences, which are divided by them.
     s_high = modulus + cos2 + 2.0 * a * cos_o
     s_low = modulus + cos2 - 2.0 * a * cos_o
     p_high = cos2 * modulus + sin2 * sin2 + 2.0 * a * cos_o * sin2
@@ -111,7 +111,7 @@ def conductor_reflectance(cos_o: float, eta: float, k: float) -> float:
 
 @kernel
 def conductor_colour(cos_o: float, eta: Vec3, k: Vec3) -> Vec3:
-    """The same for three wavelengths."""
+    """`conductor_reflectance` for the three primaries."""
     return Vec3(
         conductor_reflectance(cos_o, eta.x, k.x),
         conductor_reflectance(cos_o, eta.y, k.y),

@@ -1,16 +1,16 @@
-"""Microfacets: a rough boundary as a height field of tiny mirrors, of which only statistics are
-known (Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz 2014,
+"""Microfacets: a rough boundary as a height field of tiny mirrors, described by statistics (Walter
+et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz 2014,
 "Understanding the Masking-Shadowing Function").
 
-Two distributions of slopes, both anisotropic: GGX, which is Trowbridge & Reitz's of 1975, and
-Beckmann's.  `alpha` is the root of twice the mean square slope for Beckmann and a scale of slopes
-for GGX, along x and along y.  Masking and shadowing count as independent, G(wo, wi) = G1(wo)
-G1(wi), as Mitsuba has it: the separable form, not the height-correlated one.  Light that meets a
-second microfacet is lost.  G1 is Smith's, exact for both.  (Mitsuba has a rational approximation of
+There are two distributions of slopes, both anisotropic: GGX, which is Trowbridge & Reitz's of 1975,
+and Beckmann's.  `alpha` is the root of twice the mean square slope for Beckmann and a scale of
+slopes for GGX, along x and along y.  Masking and shadowing are independent, G(wo, wi) = G1(wo)
+G1(wi), as in Mitsuba: the separable form, not the height-correlated one.  Light that meets a second
+microfacet is lost.  G1 is Smith's, exact for both.  (Mitsuba has a rational approximation of
 Beckmann's: up to 0.31 % off.)
 
-Directions are in the shading frame; `v` may be on either side, and the microfacets are those that
-this side sees.  Nothing here is NaN or infinite for unit vectors and MIN_ALPHA <= alpha <=
+Directions are in the shading frame; `v` may be on either side, and the microfacets are those
+visible from this side.  No result is NaN or infinite for unit vectors and MIN_ALPHA <= alpha <=
 MAX_ALPHA.
 """
 
@@ -33,8 +33,8 @@ GGX, BECKMANN = 0, 1
 _KINDS = ("ggx", "beckmann")
 
 MIN_ALPHA = 1e-4
-"""Smaller ones count as this: the lobe, a hundredth of a degree wide, is a mirror's to the eye, and
-half vectors, which are off by a few u, still resolve it to 1e-10."""
+"""Smaller ones are clamped to this: the lobe, a hundredth of a degree wide, looks like a mirror's,
+and half vectors, whose error is a few u, still resolve it to 1e-10."""
 
 MAX_ALPHA = 10.0
 """Slopes of 84 degrees: no surface is rougher; larger ones are refused."""
@@ -101,7 +101,7 @@ def is_anisotropic(alpha: tuple[float, float] | str) -> bool:
 
 
 class Microfacets(NamedTuple):
-    """The distribution at one place: kind, GGX or BECKMANN; roughness along x and along y."""
+    """The distribution at one point: kind, GGX or BECKMANN; roughness along x and along y."""
 
     kind: int
     alpha_x: float
@@ -110,7 +110,7 @@ class Microfacets(NamedTuple):
 
 @kernel
 def microfacets_at(table: Roughnesses, i: int, at: At) -> Microfacets:
-    """Those of row i at a place of a surface."""
+    """The distribution of row i at the texture coordinates `at`."""
     return Microfacets(
         table.kind[i],
         max(MIN_ALPHA, number_at(table.alpha_x, i, at)),
@@ -119,8 +119,8 @@ def microfacets_at(table: Roughnesses, i: int, at: At) -> Microfacets:
 
 
 class Half(NamedTuple):
-    """h: the normal that mirrors wo to wi, 0 for opposite directions;  cosine: wo·h = wi·h, the
-    same bits for both, and not lost where all are grazing."""
+    """h: the half vector, the normal that mirrors wo to wi, 0 for opposite directions;
+    cosine: wo·h = wi·h, the same bits for both, and with all digits at grazing angles."""
 
     h: Vec3
     cosine: float
@@ -128,10 +128,10 @@ class Half(NamedTuple):
 
 @kernel
 def half_vector(wo: Vec3, wi: Vec3) -> Half:
-    """Between unit vectors, whose sum is 2 wo·h long."""
+    """Of two unit vectors, whose sum has the length 2 wo·h."""
     total = wo + wi
     length2 = dot(total, total)
-    if length2 < 1e-280:  # a root of what underflows
+    if length2 < 1e-280:  # the squares underflow
         return Half(Vec3(0.0, 0.0, 0.0), 0.0)
     length = math.sqrt(length2)
     return Half(total * (1.0 / length), min(1.0, 0.5 * length))
@@ -158,11 +158,10 @@ def density(m: Microfacets, h: Vec3) -> float:
 
 @kernel
 def g1_over_cos(m: Microfacets, v: Vec3) -> float:
-    """G1(v) / |v.z|: how many times their own projected area the visible microfacets fill, finite
-    at grazing angles.
+    """G1(v) / |v.z|, finite at grazing angles.
 
     Smith's G1 = 1 / (1 + Lambda) (Heitz 2014, appendix A; Beckmann's with exp and erf), numerator
-    and denominator multiplied by what grows.
+    and denominator multiplied by the factor that diverges at grazing angles.
     """
     z = abs(v.z)
     x, y = m.alpha_x * v.x, m.alpha_y * v.y
@@ -177,14 +176,14 @@ def g1_over_cos(m: Microfacets, v: Vec3) -> float:
 
 @kernel
 def g1(m: Microfacets, v: Vec3) -> float:
-    """The fraction of microfacets facing `v` that others do not hide from it."""
+    """Smith's masking: the fraction of microfacets facing `v` that are visible from there."""
     return min(1.0, abs(v.z) * g1_over_cos(m, v))
 
 
 @kernel
 def visible_density(m: Microfacets, v: Vec3, h: Vec3) -> float:
-    """Of the normals h that `v` sees, per solid angle: G1(v) max(0, v·h) D(h) / |v.z| (Heitz
-    2014), for v on the side of h."""
+    """The density of the normals h visible from `v`, per solid angle: G1(v) max(0, v·h) D(h) /
+    |v.z| (Heitz 2014), for v on the side of h."""
     return g1_over_cos(m, v) * max(0.0, dot(v, h)) * density(m, h)
 
 
@@ -192,8 +191,8 @@ def visible_density(m: Microfacets, v: Vec3, h: Vec3) -> float:
 def sample_visible(m: Microfacets, v: Vec3, u0: float, u1: float) -> Vec3:
     """A normal with `visible_density`, for v.z >= 0.
 
-    Stretched by alpha, the surface has roughness 1 in all directions; slopes shrink back (Heitz
-    2014).
+    The surface is stretched by alpha to roughness 1 in all directions; the normal found there is
+    then transformed back (Heitz 2014).
     """
     w = normalize(Vec3(m.alpha_x * v.x, m.alpha_y * v.y, v.z))
     h = _visible_ggx(w, u0, u1) if m.kind == GGX else visible_beckmann(w, u0, u1)
@@ -202,8 +201,9 @@ def sample_visible(m: Microfacets, v: Vec3, u0: float, u1: float) -> Vec3:
 
 @kernel
 def _visible_ggx(w: Vec3, u0: float, u1: float) -> Vec3:
-    """Of roughness 1, not of unit length: microfacets of a hemisphere mirror w to a spherical cap,
-    uniformly (Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps")."""
+    """A visible normal for roughness 1, not of unit length: the microfacets of a hemisphere mirror
+    w to a spherical cap, uniformly (Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with
+    Spherical Caps")."""
     down = u1 * (1.0 + w.z)  # 1 - z of the point of the cap
     r = math.sqrt(down * (2.0 - down))
     cos_phi, sin_phi = on_circle(u0)
@@ -212,19 +212,19 @@ def _visible_ggx(w: Vec3, u0: float, u1: float) -> Vec3:
 
 @kernel
 def refract(wo: Vec3, h: Vec3, refraction: Refraction) -> Vec3:
-    """wo refracted by a normal, for what `fresnel` says of the two.
+    """wo refracted at a microfacet with normal h; refraction: `fresnel` of the two.
 
-    Rounding leaves its length off by some 10 u times the index; a step of Newton's method for
-    1 / sqrt(x) at 1 puts that right.
+    Rounding changes its length by some 10 u times the index; a step of Newton's method for
+    1 / sqrt(x) at 1 corrects that.
     """
     wi = h * refraction.gap - wo * (1.0 / refraction.eta)
     return wi * (1.5 - 0.5 * dot(wi, wi))
 
 
 class Bend(NamedTuple):
-    """A refraction: its normal, and how much solid angle of wi there is to one of normals, times
-    wo·h / eta²;  0 where no microfacet refracts wo to wi;  refraction: by it, as it is seen from
-    the side of the smaller index, where nothing cancels."""
+    """The microfacet that refracts wo to wi.  h: its normal;  spread: the Jacobian dh / dwi, times
+    wo·h / eta², 0 where no microfacet refracts wo to wi;  refraction: its Fresnel terms, computed
+    from the side of the smaller index, where no digits cancel."""
 
     h: Vec3
     spread: float
@@ -233,11 +233,12 @@ class Bend(NamedTuple):
 
 @kernel
 def bend(wo: Vec3, wi: Vec3, n: float, is_outside: bool) -> Bend:
-    """Walter et al. 2007, eq. 16 and 17; n is the index inside over that outside, where wo is or
-    is not.
+    """Walter et al. 2007, eq. 16 and 17;  n: the index inside over that outside;  is_outside:
+    whether wo is outside.
 
-    From either side by the same operations, so that light goes either way alike: the normal is
-    along outer + n inner, as (outer + inner) + (n - 1) inner, which for n near 1 loses nothing.
+    The operations are the same from either side, which makes the BSDF reciprocal to the last bit.
+    The normal is along outer + n inner, computed as (outer + inner) + (n - 1) inner, which loses no
+    digits for n near 1.
     """
     outer, inner = (wo, wi) if is_outside else (wi, wo)
     scaled = (outer + inner) + inner * (n - 1.0)  # at least |n - 1| long

@@ -1,8 +1,8 @@
-"""Bump: a surface that is shaded as if it were raised by a height, without moving a point.
+"""Bump: shading normals as if the surface were displaced by a height, without moving a point.
 
-Blinn 1978, "Simulation of Wrinkled Surfaces": the point p + h n has the derivatives dp/du + dh/du n
-and dp/dv + dh/dv n, but for terms in h times the curvature, which are left out; their cross product
-is its normal.
+Blinn 1978, "Simulation of Wrinkled Surfaces": the displaced point p + h n has the derivatives
+dp/du + dh/du n and dp/dv + dh/dv n, except for terms in h times the curvature, which are left out;
+their cross product is its normal.
 """
 
 import math
@@ -53,8 +53,8 @@ class Bumps(NamedTuple):
 
 @kernel
 def basis(bumps: Bumps, i: int, at: At, tangents: Tangents) -> Frame:
-    """The tilted frame in coordinates of the shading frame, in which the tangents are too; its s is
-    along dp/du."""
+    """The tilted frame, its s along dp/du; frame and tangents are in coordinates of the shading
+    frame."""
     dhdu, dhdv = lookup_gradient(bumps.texture[i], at)
     scale = bumps.scale[i]
     return frame_along(tilted(scale * dhdu, scale * dhdv, tangents), tangents.dpdu)
@@ -62,11 +62,11 @@ def basis(bumps: Bumps, i: int, at: At, tangents: Tangents) -> Frame:
 
 @kernel
 def tilted(dhdu: float, dhdv: float, tangents: Tangents) -> Vec3:
-    """The unit normal of the raised surface, (0, 0, 1) being that of the surface itself.
+    """The unit normal of the displaced surface; that of the surface itself is (0, 0, 1).
 
-    As Mitsuba has it, the tangents are made orthogonal to the shading normal first, and the result
-    is turned to the side of the geometric normal, here taken to be that one normal to both tangents
-    that is less than 90 degrees from the shading normal.
+    As in Mitsuba, the tangents are first made orthogonal to the shading normal, and the result is
+    flipped to the side of the geometric normal, which here is the normal of both tangents that is
+    less than 90 degrees from the shading normal.
     """
     size_u, size_v = max_abs(tangents.dpdu), max_abs(tangents.dpdv)
     if not (size_u > 0.0 and size_v > 0.0):

@@ -1,8 +1,8 @@
-"""Layers: materials that are made of others, taken apart.
+"""Flattened materials: lists of BSDF leaves, each with a weight and a frame.
 
-Masks, blends, two-sided materials, bump and normal maps may stand in each other.  Each way from
-such a material down to one that scatters by itself, a leaf, is a layer: a list of steps, which give
-its share and turn its frame.  What the material scatters is the sum of its layers.
+Masks, blends, two-sided materials, bump and normal maps may be nested in each other.  Each path
+from such a material to a leaf (`paths.py`) becomes a flattened leaf: the leaf with the steps that
+compute its weight and its frame at a hit.  What the material scatters is their weighted sum.
 """
 
 from typing import Any, NamedTuple
@@ -16,7 +16,15 @@ from reference_rt.materials.material import Material
 from reference_rt.materials.nested import bump, normal_map
 from reference_rt.materials.nested.bump import Bumps
 from reference_rt.materials.nested.normal_map import NormalMaps
-from reference_rt.materials.nested.paths import BACK, BUMP, FRONT, REST, TAKE, TURN, Way
+from reference_rt.materials.nested.paths import (
+    BACK_ONLY,
+    BUMP,
+    FACE_VIEWER,
+    FRONT_ONLY,
+    ONE_MINUS_WEIGHT,
+    WEIGHT,
+    Way,
+)
 from reference_rt.materials.shading import Shading
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Numbers, Palette, number_at
@@ -24,9 +32,10 @@ from reference_rt.textures.parameter import join
 
 
 class Layers(NamedTuple):
-    """Of each material m: first (m,) and number (m,) of its layers.  Of each layer k: its leaf,
-    kind (k,) and row (k,), and step_first (k,), step_count (k,).  Of each step s: its code (s,),
-    and the row (s,) of its parameters in the tables that follow, None for absent ones."""
+    """For each material m: first (m,) and number (m,) of its flattened leaves.  For each of these,
+    k: its table and row, kind (k,) and row (k,), and its steps, step_first (k,) and step_count
+    (k,).  For each step s: its code, step (s,), and the row of its parameter, step_row (s,), in one
+    of the tables that follow; a table is None if the scene has no such step."""
 
     first: IntArray
     number: IntArray
@@ -42,9 +51,9 @@ class Layers(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """A layer at a point: the share that it has of the whole;  basis: its frame, in coordinates of
-    the shading frame;  side: 0 where its frame is not tilted by a bump or normal map; else 1, or -1
-    where it is turned to the other side."""
+    """A flattened leaf at a point.  weight: from 0 to 1;  basis: its frame, in coordinates of the
+    shading frame;  side: 0 if its frame is not tilted by a bump or normal map, else 1, or -1 if it
+    is flipped to the other side."""
 
     weight: float
     basis: Frame
@@ -52,7 +61,7 @@ class Layer(NamedTuple):
 
 
 class LayerTables:
-    """Collects the layers of a scene's materials."""
+    """Collects the flattened leaves of a scene's materials."""
 
     def __init__(self, palette: Palette) -> None:
         self.palette = palette
@@ -64,7 +73,7 @@ class LayerTables:
         self.rows: dict[type, list[Any]] = {}
 
     def add(self, layers: list[tuple[Way, tuple[int, int]]]) -> None:
-        """The layers of the next material, each with (kind, row) of its leaf.
+        """Adds the next material: its paths, with the (kind, row) of their leaves.
 
         Raises ValueError.
         """
@@ -76,7 +85,7 @@ class LayerTables:
             self.steps += [(step.code, self._row(step.parameter)) for step in way.steps]
 
     def _row(self, parameter: Any) -> int:
-        """The row of a step's parameter, which is put into its table."""
+        """Puts a step's parameter into its table; returns its row there."""
         if parameter is None:
             return -1
         if isinstance(parameter, Material):
@@ -88,7 +97,7 @@ class LayerTables:
         return len(rows) - 1
 
     def tables(self) -> Layers | None:
-        """None where no material is made of others."""
+        """None if no material is made of others."""
         if not self.steps:
             return None
         counts = np.array(self.step_counts)
@@ -114,12 +123,12 @@ class LayerTables:
 
 
 SIZE = 11
-"""Floats of a layer that is kept: weight, s, t and n of the basis, side."""
+"""Floats of a flattened leaf in the scratch buffer: weight, s, t and n of the basis, side."""
 
 
 @kernel
 def most(layers: Layers | None) -> int:
-    """The largest number of layers of a material."""
+    """The largest number of flattened leaves of any material."""
     if layers is None:
         return 0
     found = 0
@@ -130,54 +139,54 @@ def most(layers: Layers | None) -> int:
 
 @kernel
 def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
-    """Keeps the layers of the material in `shading.layers`.
+    """Writes the flattened leaves of the material to the scratch buffer `shading.layers`.
 
-    They depend on the point and on the viewer, not on where light comes from: found once, they
-    serve every question about the point, and their code is compiled once.
+    They depend on the point and on wo, not on wi: evaluated once per hit they serve all calls of
+    `both`, `sample` and `branches`, and their code is compiled once.
     """
     if layers is None:
         return
     m = shading.point.material
     for k in range(layers.number[m]):
         found = _layer(layers, layers.first[m] + k, shading, at)
-        kept = shading.layers[SIZE * k : SIZE * (k + 1)]
-        kept[0], kept[10] = found.weight, found.side
-        kept[1], kept[2], kept[3] = found.basis.s
-        kept[4], kept[5], kept[6] = found.basis.t
-        kept[7], kept[8], kept[9] = found.basis.n
+        buffer = shading.layers[SIZE * k : SIZE * (k + 1)]
+        buffer[0], buffer[10] = found.weight, found.side
+        buffer[1], buffer[2], buffer[3] = found.basis.s
+        buffer[4], buffer[5], buffer[6] = found.basis.t
+        buffer[7], buffer[8], buffer[9] = found.basis.n
 
 
 @kernel
 def layer_at(shading: Shading, k: int) -> Layer:
-    """Layer k of the material, as it was prepared."""
-    kept = shading.layers[SIZE * k : SIZE * (k + 1)]
+    """Flattened leaf k of the material, from the scratch buffer."""
+    buffer = shading.layers[SIZE * k : SIZE * (k + 1)]
     basis = Frame(
-        Vec3(kept[1], kept[2], kept[3]),
-        Vec3(kept[4], kept[5], kept[6]),
-        Vec3(kept[7], kept[8], kept[9]),
+        Vec3(buffer[1], buffer[2], buffer[3]),
+        Vec3(buffer[4], buffer[5], buffer[6]),
+        Vec3(buffer[7], buffer[8], buffer[9]),
     )
-    return Layer(kept[0], basis, kept[10])
+    return Layer(buffer[0], basis, buffer[10])
 
 
 @kernel
 def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
-    """Layer k of all at a point, seen from `shading.wo`."""
+    """Runs the steps of flattened leaf k of the scene, for `shading.wo`."""
     weight, side, tilted = 1.0, 1.0, False
     basis = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
     begin = layers.step_first[k]
     for s in range(begin, begin + layers.step_count[k]):
         code, i = layers.step[s], layers.step_row[s]
         above = to_local(basis, shading.wo).z > 0.0
-        if code in (TAKE, REST):
+        if code in (WEIGHT, ONE_MINUS_WEIGHT):
             w = _weight(layers.weights, i, shading)
-            weight *= w if code == TAKE else 1.0 - w
-        elif code == FRONT:
+            weight *= w if code == WEIGHT else 1.0 - w
+        elif code == FRONT_ONLY:
             weight = weight if above else 0.0
-        elif code == BACK:
+        elif code == BACK_ONLY:
             weight = 0.0 if above else weight
-        elif code == TURN:
+        elif code == FACE_VIEWER:
             if not above:
-                # Mitsuba's mirror: z alone changes sign, so that the basis becomes left-handed.
+                # As in Mitsuba z alone changes sign, so that the basis becomes left-handed.
                 basis = Frame(basis.s, basis.t, -basis.n)
                 side = -side
         else:
@@ -186,11 +195,13 @@ def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
                 to_local(basis, shading.tangents.dpdu), to_local(basis, shading.tangents.dpdv)
             )
             if code == BUMP:
-                turned = _bumped(layers.bumps, i, at, local)
+                tilted_basis = _bumped(layers.bumps, i, at, local)
             else:
-                turned = _mapped(layers.normal_maps, i, shading, local)
+                tilted_basis = _mapped(layers.normal_maps, i, shading, local)
             basis = Frame(
-                to_world(basis, turned.s), to_world(basis, turned.t), to_world(basis, turned.n)
+                to_world(basis, tilted_basis.s),
+                to_world(basis, tilted_basis.t),
+                to_world(basis, tilted_basis.n),
             )
     return Layer(weight, basis, side if tilted else 0.0)
 
@@ -223,20 +234,8 @@ def _mapped(maps: NormalMaps | None, i: int, shading: Shading, tangents: Tangent
 
 @kernel
 def lets(layer: Layer, wi: Vec3) -> bool:
-    """Whether a layer has anything to do with the local `wi`: not where the tilt of its frame puts
-    `wi` to the other side of the surface (Mitsuba's rule)."""
+    """Whether a flattened leaf scatters light from the local `wi`: not where wi is on different
+    sides of the surface and of the tilted frame (Mitsuba's rule)."""
     if layer.side == 0.0:
         return True
     return layer.side * wi.z * to_local(layer.basis, wi).z > 0.0
-
-
-__all__ = [
-    "SIZE",
-    "Layer",
-    "LayerTables",
-    "Layers",
-    "layer_at",
-    "lets",
-    "most",
-    "prepare",
-]

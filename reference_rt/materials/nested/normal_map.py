@@ -41,9 +41,9 @@ class NormalMaps(NamedTuple):
 
 @kernel
 def basis(maps: NormalMaps, i: int, at: At, tangents: Tangents) -> Frame:
-    """The tilted frame in coordinates of the shading frame, in which the tangents are too; its s is
-    as far along that of the surface as it can be.  A grey of 1/2, which is no direction, leaves the
-    normal as it is."""
+    """The tilted frame, its s as close to that of the surface as possible; frame and tangents are
+    in coordinates of the shading frame.  A grey of 1/2 is no direction and leaves the normal as it
+    is."""
     surface = frame_along(Vec3(0.0, 0.0, 1.0), tangents.dpdu)
     rgb = lookup(maps.texture[i], at)
     n = Vec3(2.0 * rgb.x - 1.0, 2.0 * rgb.y - 1.0, 2.0 * rgb.z - 1.0)

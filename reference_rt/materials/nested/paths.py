@@ -1,7 +1,7 @@
-"""Ways down: materials that are made of others, as described.
+"""The paths through the material graph, from a material made of others to its BSDF leaves.
 
-A way leads from such a material to one that scatters by itself, a leaf, in steps, each of which
-gives its share or turns its frame; `nested/flattened.py` has the tables and the kernels.
+A path has steps, each of which multiplies the leaf's weight or replaces its frame.  The tables and
+kernels are in `nested/flattened.py`.
 """
 
 from collections.abc import Mapping
@@ -12,35 +12,37 @@ from reference_rt.materials.nested.bump import Bump
 from reference_rt.materials.nested.normal_map import NormalMap
 from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided
 
-# Codes of steps.  TAKE, REST: the share w, 1 - w, of a number of `weights`; FRONT, BACK: nothing
-# when seen from the other side; TURN: the frame turned to the viewer; BUMP, NORMAL_MAP: tilted.
-TAKE, REST, FRONT, BACK, TURN, BUMP, NORMAL_MAP = range(7)
+# Codes of steps.  WEIGHT, ONE_MINUS_WEIGHT: times w, 1 - w, for a number w of `weights`;
+# FRONT_ONLY, BACK_ONLY: times 0 when seen from the other side; FACE_VIEWER: the frame flipped to
+# the viewer's side; BUMP, NORMAL_MAP: the frame tilted.
+WEIGHT, ONE_MINUS_WEIGHT, FRONT_ONLY, BACK_ONLY, FACE_VIEWER, BUMP, NORMAL_MAP = range(7)
 
 MOST_LAYERS = 64
-"""That a material may have: a blend doubles them."""
+"""The most leaves of a material: a blend of blends doubles them at each level."""
 
 
 class Step(NamedTuple):
-    """A step of a way down, as described."""
+    """A step of a path: its code and the parameter as described, None for none."""
 
     code: int
     parameter: Any
 
 
 class Way(NamedTuple):
-    """A layer as described: its steps and the name of its leaf, None for what is not there."""
+    """A path: its steps and the name of its leaf, None for the clear part of a mask."""
 
     steps: tuple[Step, ...]
     leaf: str | None
 
     @property
     def turns(self) -> bool:
-        """Whether it is seen from behind too."""
-        return any(step.code in (TURN, BACK) for step in self.steps)
+        """Whether the leaf may be visible from behind too."""
+        return any(step.code in (FACE_VIEWER, BACK_ONLY) for step in self.steps)
 
 
 def ways(name: str, materials: Mapping[str, Material]) -> list[Way]:
-    """The layers of a material.  Raises ValueError (what is wrong, what was expected)."""
+    """The paths from a material to its leaves.  Raises ValueError (what is wrong, what was
+    expected)."""
     return _ways(name, materials, ())
 
 
@@ -57,16 +59,21 @@ def _ways(name: str, materials: Mapping[str, Material], above: tuple[str, ...]) 
 
     found = [Way((), name)]
     if isinstance(material, Mask):
-        clear = Way((Step(REST, material.opacity),), None)
-        found = [*below(material.base, Step(TAKE, material.opacity)), clear]
+        clear = Way((Step(ONE_MINUS_WEIGHT, material.opacity),), None)
+        found = [*below(material.base, Step(WEIGHT, material.opacity)), clear]
     elif isinstance(material, Blend):
-        rest, take = Step(REST, material.weight), Step(TAKE, material.weight)
+        rest, take = (
+            Step(ONE_MINUS_WEIGHT, material.weight),
+            Step(WEIGHT, material.weight),
+        )
         found = [*below(material.first, rest), *below(material.second, take)]
     elif isinstance(material, TwoSided):
-        found = below(material.base, Step(TURN if material.back is None else FRONT, None))
+        found = below(
+            material.base, Step(FACE_VIEWER if material.back is None else FRONT_ONLY, None)
+        )
         _check_one_sided(material.base, found, materials)
         if material.back is not None:
-            behind = below(material.back, Step(BACK, None), Step(TURN, None))
+            behind = below(material.back, Step(BACK_ONLY, None), Step(FACE_VIEWER, None))
             _check_one_sided(material.back, behind, materials)
             found += behind
     elif isinstance(material, Bump | NormalMap):
@@ -87,11 +94,11 @@ def _check_one_sided(name: str, found: list[Way], materials: Mapping[str, Materi
 
 
 def transmits(way: Way, materials: Mapping[str, Material]) -> bool:
-    """Whether a layer lets light pass."""
+    """Whether the leaf lets light pass."""
     return way.leaf is None or materials[way.leaf].transmits
 
 
 def needs_tangents(way: Way, materials: Mapping[str, Material]) -> bool:
-    """Whether what a layer scatters depends on where u and v point."""
+    """Whether the leaf's scattering depends on the directions of u and v."""
     tilted = any(step.code in (BUMP, NORMAL_MAP) for step in way.steps)
     return tilted or (way.leaf is not None and materials[way.leaf].oriented)

@@ -7,14 +7,14 @@ from reference_rt.textures import Palette, UnitParameter
 
 
 class Wrapper(Material):
-    """A material made of others, which it names; `reference_rt.materials.nested.flattened` takes it
-    apart."""
+    """A material made of others, which it names; `reference_rt.materials.nested.flattened` flattens
+    it."""
 
     bases: ClassVar[tuple[str, ...]] = ("base",)
     """The fields that name materials."""
 
     def tabulate(self, palette: Palette) -> Any:
-        raise TypeError("a wrapper has no row of its own: its layers have")
+        raise TypeError("a wrapper has no row of its own: its leaves have")
 
 
 class Mask(Wrapper):

@@ -1,7 +1,18 @@
 """Constructive solid geometry: union, intersection and difference of solids, nested to any depth.
 
 `sphere & box - cylinder` in Python; in a scene file a tree of `union`, `intersection` and
-`difference`, whose `of` lists the operands.
+`difference`, whose `of` lists the operands.  Operands are primitives with `spans` and closed
+meshes.
+
+- `description.py`: the tree, its operands from left to right, and its postfix program;
+- `tables.py`: operands and programs of all solids of a scene;
+- `anchor.py`: the local origin from which the coordinates of a solid's operands count.
+
+Rays are evaluated in `accel/csg`: the program combines, for each stretch of the ray, whether it is
+inside of each operand.
+
+To add an operation: a description as `Union` in `shapes/shape.py`; a code in `tables.py`; a case in
+`postfix`, and one in `accel/csg/evaluate.py`.
 """
 
 from reference_rt.shapes.csg.anchor import Anchored, anchored

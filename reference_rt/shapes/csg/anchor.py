@@ -1,9 +1,9 @@
-"""Where a solid has its operands' coordinates begin: next to them, so that distance costs nothing.
+"""The anchor of a solid: a local origin for the coordinates of its operands, next to them.
 
-Tabulated in the world, each operand of a solid far from the origin (D) would be rounded by itself,
-by u D: faces that coincide would be parted by that, and what is as thin could not be told from it.
-Here all maps are put together exactly and seen from one anchor: operands round as if the solid
-stood at the origin, and the ray's origin is counted from the anchor once for all of them.
+If the operands of a solid at a distance D from the world's origin were tabulated in the world, each
+would be rounded by itself, by u D.  That would separate faces that coincide, and hide parts as thin
+as that.  Here all maps are composed exactly and moved to one anchor: operands round as if the solid
+stood at the origin, and the anchor is subtracted from a ray's origin once for all of them.
 """
 
 from collections.abc import Iterator
@@ -25,13 +25,14 @@ from reference_rt.shapes.shape import Shape, Solid
 _exact = np.vectorize(Fraction, otypes=[object])
 
 FAR = 16.0
-"""Sizes from the world's origin up to which operands stay in its coordinates, where they round by
-16 times what they must at most, as shapes do that are no operands."""
+"""A solid whose distance from the world's origin is at most this number of its sizes keeps the
+world's coordinates: there operands round at most 16 times more than they must, as other shapes
+do."""
 
 
 class Anchored(NamedTuple):
-    """anchor (3,), 0 for the world's origin;  operands: (shape, the map that its own transform is
-    followed by), seen from there."""
+    """anchor (3,), 0 for the world's origin;  operands: (shape, the map that is applied after its
+    own transform), relative to the anchor."""
 
     anchor: FloatArray
     operands: list[tuple[Shape, Affine]]
@@ -40,12 +41,13 @@ class Anchored(NamedTuple):
 def anchored(solid: Shape) -> Anchored:
     """The operands of a solid, from left to right.
 
-    The anchor is an operand's own origin or, of a sphere, centre: the first by its coordinates, so
-    that the order of operands does not matter.  Raises ValueError where coordinates overflow.
+    The anchor is the local origin of an operand or, of a sphere, the centre: the first in the order
+    of coordinates, so that the order of operands does not matter.  Raises ValueError where
+    coordinates overflow.
     """
-    standing = list(_standing(solid, ()))
+    operands_with_steps = list(_placed_operands(solid, ()))
     try:
-        maps = [_map_of(shape, steps) for shape, steps in standing]
+        maps = [_map_of(shape, steps) for shape, steps in operands_with_steps]
         anchor = min(maps, key=lambda m: tuple(m[:, 3]))[:, 3].astype(np.float64)
         for m in maps:
             m[:, 3] -= _exact(anchor)
@@ -56,7 +58,7 @@ def anchored(solid: Shape) -> Anchored:
         operands = operands_of(solid, identity(), None)
         return Anchored(np.zeros(3), [(shape, outer) for shape, outer, _, _ in operands])
     seen: list[tuple[Shape, Affine]] = []
-    for (shape, _), m in zip(standing, floats, strict=True):
+    for (shape, _), m in zip(operands_with_steps, floats, strict=True):
         update: dict[str, Any] = {"transform": ()}
         if hasattr(shape, "center"):
             update["center"] = (0.0, 0.0, 0.0)  # in the map
@@ -64,18 +66,18 @@ def anchored(solid: Shape) -> Anchored:
     return Anchored(anchor, seen)
 
 
-def _standing(shape: Shape, outer: Transform) -> Iterator[tuple[Shape, Transform]]:
+def _placed_operands(shape: Shape, outer: Transform) -> Iterator[tuple[Shape, Transform]]:
     """(operand, the steps from its own coordinates to the world's)."""
     steps = (*shape.transform, *outer)
     if not isinstance(shape, Solid):
         yield shape, steps
         return
     for operand in shape.of:
-        yield from _standing(operand, steps)
+        yield from _placed_operands(operand, steps)
 
 
 def _map_of(shape: Shape, steps: Transform) -> Any:
-    """The map (3, 4), exactly; a shape's centre, where it has one, is taken for its origin."""
+    """The map (3, 4), exactly; the centre of a shape that has one is taken as its origin."""
     linear, offset = _exact(np.eye(3)), _exact(getattr(shape, "center", (0.0, 0.0, 0.0)))
     for step in steps:
         m = _exact(step.matrix_of())
@@ -85,12 +87,12 @@ def _map_of(shape: Shape, steps: Transform) -> Any:
 
 @kernel
 def ray_near(solids: Solids | None, s: int, ray: Ray) -> tuple[Ray, float]:
-    """(the ray from the anchor of solid s, begin): its t is begin + t of that ray; as it is for
-    s = -1.
+    """(the ray relative to the anchor of solid s, begin): the ray's t is begin + t of that ray;
+    unchanged for s = -1.
 
-    A ray from far outside of all operands begins next to them, found without rounding
-    (`along_from`): its crossings then round as the solid is large, not as it is far.  Where even
-    the t of that place rounds by more than the solid is large it begins where it did.
+    The origin of a ray from far outside of all operands is moved next to them, without rounding
+    (`along_from`): its crossings then round in proportion to the solid's size, not to its distance.
+    If already the rounding of begin is larger than the solid, the origin is not moved.
     """
     if solids is None:
         return ray, 0.0
@@ -112,10 +114,10 @@ def ray_near(solids: Solids | None, s: int, ray: Ray) -> tuple[Ray, float]:
 
 @kernel
 def out_of_solid(solids: Solids | None, s: int, point: SurfacePoint) -> SurfacePoint:
-    """A point that counts from the anchor of solid s, in the world; as it is for s = -1.
+    """A point relative to the anchor of solid s, in the world; unchanged for s = -1.
 
-    Three roundings more, of numbers no larger than the anchor and the point: of the point, of the
-    next ray's origin off it, and of that seen from the anchor.
+    That adds three roundings, of numbers no larger than the anchor and the point: of the point, of
+    the next ray's origin next to it, and of that relative to the anchor.
     """
     if solids is None:
         return point

@@ -1,4 +1,4 @@
-"""The tree of a solid as a scene describes it, and its program."""
+"""The tree of a solid as a scene describes it: its operands and its postfix program."""
 
 from collections.abc import Iterator
 from typing import Annotated
@@ -23,8 +23,8 @@ for _model in (Solid, Union, Intersection, Difference):
 def operands_of(
     shape: Shape, outer: Affine, material: str | None, turned: bool = False
 ) -> Iterator[tuple[Shape, Affine, str | None, bool]]:
-    """The primitive operands of a tree, from left to right: (shape, the map that its own transform
-    is followed by, material, whether the solid's outside is its inside)."""
+    """The primitive operands of a tree, from left to right: (shape, the map that is applied after
+    its own transform, material, whether the solid's outside is its inside)."""
     material = shape.material if shape.material is not None else material
     if not isinstance(shape, Solid):
         yield shape, outer, material, turned

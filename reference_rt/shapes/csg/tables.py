@@ -5,18 +5,17 @@ from typing import NamedTuple
 from reference_rt.core.arrays import FloatArray, IntArray
 
 OR, AND, NOT = -1, -2, -3
-"""Steps of a program, besides the numbers 0, 1, 2... that stand for the operands."""
+"""Operators of a program; the numbers 0, 1, 2... are the operands."""
 
 
 class Solids(NamedTuple):
     """n solids of m operands in all.
 
     first, operands (n,): a solid's operands;  step_first, step_count (n,): its program in `steps`;
-    depth (n,): the most values that its program holds at once.
-    kind, row (m,): which primitive an operand is;  root (m,): for a mesh, whose row is -1, the node
-    of the hierarchy over its triangles.
-    anchor (n, 3): from where all coordinates of a solid's operands count;  reach (n,): no point of
-    them is further from there, inf for infinite ones.
+    depth (n,): the stack depth of its program.  kind, row (m,): the table and row of an operand's
+    primitive;  root (m,): for a mesh, whose row is -1, the root of the BVH over its triangles.
+    anchor (n, 3): the local origin for the coordinates of a solid's operands;  reach (n,): the
+    largest distance of their points from there, inf for infinite ones.
     """
 
     first: IntArray
@@ -33,11 +32,11 @@ class Solids(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """What the owner numbers of primitives mean that are parts of something.
+    """For the owner numbers of primitives that are parts of a solid or of a group.
 
-    shape (k,): index in the scene;  part (k,): number of the operand in its solid, or of the shape
-    in its group;  solid (k,): number of that solid, -1 elsewhere;  turned (k,): 1 where the outside
-    of the solid is the inside of the operand, as what a difference takes away.
+    shape (k,): the shape id, an index in the scene;  part (k,): the operand id in the solid, or the
+    index of the shape in the group;  solid (k,): number of the solid, -1 if it is none;  turned
+    (k,): 1 if the outside of the solid is the inside of the operand, as of a subtracted one.
     """
 
     shape: IntArray

@@ -27,7 +27,7 @@ class Cone(Shape):
     capped: bool = True
     """Whether this is a solid, closed by disks; else it is the side alone, seen from both sides."""
 
-    def tabulate(self, place: Place) -> Quadrics:
+    def tabulate(self, context: Place) -> Quadrics:
         r, top = Fraction(self.radius), Fraction(self.top_radius)
         slope = (top - r) / Fraction(self.height)
         zero, one = Fraction(0), Fraction(1)
@@ -35,4 +35,4 @@ class Cone(Shape):
         reach = max(self.radius, self.top_radius)
         lower, upper = (-reach, -reach, 0.0), (reach, reach, self.height)
         clipped = (False, False, True)
-        return tabulate(place, self.map_in(place), form, lower, upper, clipped, self.capped)
+        return tabulate(context, self.map_in(context), form, lower, upper, clipped, self.capped)

@@ -33,9 +33,9 @@ class Cylinder(Shape):
             raise ValueError("expected 'z_min' below 'z_max'")
         return self
 
-    def tabulate(self, place: Place) -> Quadrics:
+    def tabulate(self, context: Place) -> Quadrics:
         r = self.radius
         form = (*map(Fraction, (1, 1, 0, 0, 0, 0, 0, 0, 0)), -(Fraction(r) ** 2))
         lower, upper = (-r, -r, self.z_min), (r, r, self.z_max)
         clipped = (False, False, True)
-        return tabulate(place, self.map_in(place), form, lower, upper, clipped, self.capped)
+        return tabulate(context, self.map_in(context), form, lower, upper, clipped, self.capped)

@@ -1,4 +1,4 @@
-"""The kernels of a quadric in its clip box.
+"""Quadratic surfaces in local coordinates: values, gradients, roots along a line, clip box.
 
 f(q) = A x² + B y² + C z² + D xy + E yz + F xz + G x + H y + I z + J;  `k` holds the coefficients in
 this order (10,).  Along a line, f is a t² + 2 b t + c.
@@ -28,7 +28,7 @@ def value(k: FloatArray, q: Vec3) -> float:
 
 @kernel
 def noise(k: FloatArray, q: Vec3) -> float:
-    """A bound on the error of `value`: each of the ten terms rounds at most 9 times, its
+    """A bound on the error of `value`: each of the ten terms has at most 9 roundings, that of its
     coefficient included."""
     x, y, z = abs(q.x), abs(q.y), abs(q.z)
     terms: float = (
@@ -51,7 +51,7 @@ def gradient(k: FloatArray, q: Vec3) -> Vec3:
 
 @kernel
 def second_degree(k: FloatArray, d: Vec3) -> float:
-    """The terms of second degree at d."""
+    """The terms of second degree of f, at d."""
     f: float = (
         d.x * (k[0] * d.x + k[3] * d.y + k[5] * d.z)
         + d.y * (k[1] * d.y + k[4] * d.z)
@@ -62,9 +62,9 @@ def second_degree(k: FloatArray, d: Vec3) -> float:
 
 @kernel
 def short(t: float, step: float, d: Vec3) -> float:
-    """t rounded to a multiple of about what d goes `step` in: o + t d does not round if o and d are
-    short numbers, as on a lattice."""
-    large = 2.0**52 * step / max_abs(d)  # the spacing of floats there is the multiple
+    """t rounded to a multiple of about step / |d|: then o + t d does not round if o and d are short
+    numbers, as those of a lattice."""
+    large = 2.0**52 * step / max_abs(d)  # the spacing of floats at `large` is the multiple
     return (t + large) - large
 
 
@@ -72,8 +72,9 @@ def short(t: float, step: float, d: Vec3) -> float:
 def _discriminant(k: FloatArray, ray: Ray, a: float, b: float, c: float) -> float:
     """b² - a c, the same for any origin on the line.
 
-    Where the roots are close together, seen from this one, the products cancel and c has rounded
-    off what is between the roots: there the origin is moved next to both, and b and c are small.
+    If the roots are close together compared with their distance from the origin, the products
+    cancel and the rounding of c is larger than the difference of the roots.  The origin is then
+    moved next to both, where b and c are small.
     """
     found = b * b - a * c
     if not abs(found) < 0.0625 * (b * b):
@@ -84,17 +85,17 @@ def _discriminant(k: FloatArray, ray: Ray, a: float, b: float, c: float) -> floa
 
 
 STEEP = 0.5
-"""Of the largest gradients, which are 1 to 2 where a row's own coordinates are 1 (`fit`)."""
+"""A gradient below this is flat: the largest are 1 to 2, where local coordinates are 1 (`fit`)."""
 
 
 @kernel
-def _nearer(k: FloatArray, ray: Ray, a: float, slope: float, t: float) -> float:
-    """The root that is close to t, where f grows by 2 `slope`, seen from there if f is flat there.
+def _refined_root(k: FloatArray, ray: Ray, a: float, slope: float, t: float) -> float:
+    """The root t, where f grows by 2 `slope`, refined from an origin next to it if f is flat there.
 
-    a, b and c round by u times the square of how far the line has come, which moves a root as far
-    as would a ray that passes this over the gradient beside it: next to the apex of a cone, by any
-    number of u.  Seen from next to it f rounds by u times the gradient, as if the ray had moved by
-    u.  The sign of t, which that of c decided, stays.
+    a, b and c round by u times the square of the distance from the origin.  That moves a root as
+    much as moving the ray sideways by this error over the gradient would: next to the apex of a
+    cone, by any number of u.  From an origin next to the root f rounds by u times the gradient, as
+    if the ray had moved by u.  The sign of t, which that of c has decided, stays.
     """
     p = ray.o + ray.d * t
     g = gradient(k, p)
@@ -107,8 +108,8 @@ def _nearer(k: FloatArray, ray: Ray, a: float, slope: float, t: float) -> float:
 
 
 class Roots(NamedTuple):
-    """Where f <= 0 on a line: between t0 and t1 (nowhere where t0 > t1), or else up to t0 and from
-    t1 on."""
+    """The part of a line with f <= 0: if `between`, from t0 to t1 (empty if t0 > t1), or else up to
+    t0 and from t1 on."""
 
     t0: float
     t1: float
@@ -119,8 +120,8 @@ class Roots(NamedTuple):
 def roots(k: FloatArray, ray: Ray) -> Roots:
     """By q = -(b ± sqrt(b² - a c)) without cancellation: q / a and c / q.
 
-    The sign of c says on which side the ray begins, and those of the roots follow from it without
-    rounding: a ray that leaves the surface is not seen to meet it where it begins.
+    The sign of c says on which side the ray begins, and the signs of the roots follow from it
+    without rounding: a ray that leaves the surface does not meet it again at its own origin.
     """
     nowhere, everywhere = Roots(math.inf, -math.inf, True), Roots(-math.inf, math.inf, True)
     a = second_degree(k, ray.d)
@@ -133,19 +134,19 @@ def roots(k: FloatArray, ray: Ray) -> Roots:
         return everywhere if rest < 0.0 and a < 0.0 else nowhere
     half = math.copysign(math.sqrt(rest), b)
     q = -(b + half)
-    # A line along which f has no quadratic term meets it there at ±inf, as IEEE says.
+    # Where f has no quadratic term along the line, one root is ±inf, as IEEE says.
     t0 = q / a if a != 0.0 else q * math.inf
     t1 = c / q if q != 0.0 else t0
-    t0, t1 = _nearer(k, ray, a, -half, t0), _nearer(k, ray, a, half, t1)
+    t0, t1 = _refined_root(k, ray, a, -half, t0), _refined_root(k, ray, a, half, t1)
     return Roots(min(t0, t1), max(t0, t1), a >= 0.0)
 
 
 @kernel
 def _slab(lower: float, upper: float, clipped: int, o: float, d: float) -> tuple[float, float]:
-    """Where a line enters and leaves the space between two planes; NaN for the plane that it runs
-    in, which `box.inside` passes over.
+    """The t at which a line enters and leaves the slab between two planes; NaN for a plane that
+    contains the line, which `box.inside` ignores.
 
-    Divided, as the roots are: what meets at a rim in exact numbers then meets there in floats.
+    By division, as the roots: a root that is at a plane in exact numbers is then there in floats.
     """
     if clipped == 0:
         return -math.inf, math.inf
@@ -155,8 +156,8 @@ def _slab(lower: float, upper: float, clipped: int, o: float, d: float) -> tuple
 
 @kernel
 def slabs(lower: FloatArray, upper: FloatArray, clipped: IntArray, ray: Ray) -> Slabs:
-    """As `box.slabs`, for a box with the corners `lower` and `upper` (3,) and the axes that it
-    clips (3,); across the others all is inside."""
+    """`box.slabs` for a box with the corners `lower` and `upper` (3,);  clipped (3,): the axes that
+    it clips; across the others all points are inside."""
     o, d = ray.o, ray.d
     x_in, x_out = _slab(lower[0], upper[0], clipped[0], o.x, d.x)
     y_in, y_out = _slab(lower[1], upper[1], clipped[1], o.y, d.y)

@@ -1,6 +1,7 @@
-"""f(x, y, z) = A x² + B y² + C z² + D xy + E yz + F xz + G x + H y + I z + J, in exact arithmetic.
+"""Quadratic forms f(x, y, z) = A x² + B y² + C z² + D xy + E yz + F xz + G x + H y + I z + J,
+exactly.
 
-What is decided once, when a scene is read, is decided without rounding.
+Decisions that are made once, when a scene is built, are made in exact arithmetic.
 """
 
 from collections.abc import Sequence
@@ -37,10 +38,10 @@ Coefficients = Annotated[
 
 
 def definite_sign(form: Form) -> int:
-    """-1 where f <= 0 everywhere, else 1 where f >= 0 everywhere, else 0: f changes its sign.
+    """-1 if f <= 0 everywhere, else 1 if f >= 0 everywhere, else 0: f changes its sign.
 
     f is the quadratic form of a symmetric 4x4 matrix at (x, y, z, 1).  Such a form is nowhere
-    negative exactly where no principal minor of its matrix is (Sylvester).
+    negative if and only if no principal minor of its matrix is negative (Sylvester).
     """
     a, b, c, d, e, f, g, h, i, j = form
     rows = [
@@ -61,7 +62,7 @@ def definite_sign(form: Form) -> int:
 
 
 def center(form: Form) -> list[Fraction] | None:
-    """The point where the gradient vanishes; None where it is not a single point."""
+    """The point where the gradient vanishes; None if that is not a single point."""
     a, b, c, d, e, f, g, h, i, _ = form
     rows = [[2 * a, d, f], [d, 2 * b, e], [f, e, 2 * c]]
     determinant = _determinant(rows)
@@ -77,7 +78,7 @@ def center(form: Form) -> list[Fraction] | None:
 
 
 def seen_from(form: Form, origin: Point) -> Form:
-    """The coefficients in coordinates that begin at `origin`."""
+    """The coefficients in coordinates whose origin is `origin`."""
     a, b, c, d, e, f, g, h, i, j = form
     x, y, z = (Fraction(v) for v in origin)
     gradient = (
@@ -90,7 +91,7 @@ def seen_from(form: Form, origin: Point) -> Form:
 
 
 def scaled(form: Form, unit: Point) -> Form:
-    """The coefficients in coordinates whose units are `unit`, long as seen in the old ones."""
+    """The coefficients in coordinates whose units have the lengths `unit` in the old ones."""
     x, y, z = (Fraction(v) for v in unit)
     factors = (x * x, y * y, z * z, x * y, y * z, x * z, x, y, z, Fraction(1))
     return tuple(value * factor for value, factor in zip(form, factors, strict=True))
@@ -114,10 +115,10 @@ class Fitted(NamedTuple):
 
 
 def fit(form: Form, lower: Point, upper: Point) -> Fitted:
-    """The form, up to a factor, and the box in coordinates in which floats serve them best.
+    """The form, up to a factor, and the box in coordinates in which f rounds least.
 
-    The box lies in [-1, 1]³ and reaches to beyond 1/2 along each axis, the largest coefficient lies
-    in (1/2, 1], and the origin is the point of the box next to where the gradient vanishes (the
+    The box is within [-1, 1]³ and extends beyond 1/2 along each axis, the largest coefficient is in
+    (1/2, 1], and the origin is the point of the box closest to where the gradient vanishes (the
     middle of an ellipsoid, the apex of a cone), around which f rounds least.  Units are powers of
     two: they do not round.
     """
@@ -138,7 +139,7 @@ def fit(form: Form, lower: Point, upper: Point) -> Fitted:
 
 
 def _determinant(rows: Rows) -> Fraction:
-    """By the first row (Laplace)."""
+    """By expansion along the first row (Laplace)."""
     if not rows:
         return Fraction(1)
     total = Fraction(0)

@@ -1,7 +1,7 @@
 """Quadric: a surface of second degree, clipped to a box; how rows of the table are made.
 
-Cylinders, cones and ellipsoids are rows of it too.  A row's own coordinates are those of
-`quadratic_form.fit`.
+Cylinders, cones and ellipsoids are rows of the same table.  The local coordinates of a row are
+those of `quadratic_form.fit`.
 """
 
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ class Quadric(Shape):
             raise ValueError("expected each coordinate of 'lower' to be below that of 'upper'")
         return self
 
-    def tabulate(self, place: Place) -> "Quadrics":
+    def tabulate(self, context: Place) -> "Quadrics":
         form = tuple(Fraction(x) for x in self.coefficients)
         sign = definite_sign(form)
         if sign != 0:
@@ -65,16 +65,16 @@ class Quadric(Shape):
                 )
             form = (*[Fraction(0)] * 9, Fraction(sign))
         clipped = (True, True, True)
-        m = self.map_in(place)
-        return tabulate(place, m, form, self.lower, self.upper, clipped, self.capped)
+        m = self.map_in(context)
+        return tabulate(context, m, form, self.lower, self.upper, clipped, self.capped)
 
 
 _LARGEST = 1e140
-"""Of the entries of a map and of its inverse: squares of ten times these are finite."""
+"""The largest entry of a map and of its inverse: the square of ten times this is finite."""
 
 
 def tabulate(
-    place: Place,
+    context: Place,
     m: Affine,
     form: Form,
     lower: Point,
@@ -82,7 +82,7 @@ def tabulate(
     clipped: Sequence[bool],
     capped: bool,
 ) -> Quadrics:
-    """One row; `m` maps the coordinates of the form and the box to the place's.
+    """One row; `m` maps the coordinates of the form and the box to those of the context.
 
     The box must contain the whole surface along the axes that it does not clip.
     """
@@ -90,7 +90,7 @@ def tabulate(
         fitted = fit(form, lower, upper)
     except OverflowError:
         raise ValueError("its size overflows; expected finite numbers") from None
-    # Exactly: an origin far away and a map that brings it back do not cancel.
+    # In exact arithmetic: an origin far away and a map that brings it back would cancel.
     offset = [
         float(
             sum((Fraction(a) * Fraction(o) for a, o in zip(r[:3], fitted.origin, strict=True)), r3)
@@ -98,7 +98,7 @@ def tabulate(
         for r, r3 in zip(m, map(Fraction, m[:, 3]), strict=True)
     ]
     table = Quadrics(
-        **columns(np.column_stack([m[:, :3] * fitted.unit, offset]), place),
+        **columns(np.column_stack([m[:, :3] * fitted.unit, offset]), context),
         coefficients=np.array([fitted.form]),
         lower=np.array([fitted.lower]),
         upper=np.array([fitted.upper]),
@@ -112,10 +112,10 @@ def tabulate(
     return table
 
 
-def ellipsoid(place: Place, m: Affine, middle: Vector, radius: float) -> Quadrics:
-    """The sphere around `middle`, where m takes it."""
+def ellipsoid(context: Place, m: Affine, middle: Vector, radius: float) -> Quadrics:
+    """The image under m of the sphere around `middle`."""
     unit_sphere = tuple(Fraction(k) for k in (1, 1, 1, 0, 0, 0, 0, 0, 0))
     form = seen_from((*unit_sphere, -(Fraction(radius) ** 2)), [-Fraction(x) for x in middle])
     lower = [Fraction(x) - Fraction(radius) for x in middle]
     upper = [Fraction(x) + Fraction(radius) for x in middle]
-    return tabulate(place, m, form, lower, upper, (False, False, False), True)
+    return tabulate(context, m, form, lower, upper, (False, False, False), True)

@@ -1,4 +1,4 @@
-"""Where a line meets a quadric and its clip box, next to it."""
+"""A line against a quadric and its clip box, in local coordinates."""
 
 import math
 from typing import Any, NamedTuple
@@ -14,13 +14,13 @@ from reference_rt.shapes.shape import Spans, no_spans, one_span
 
 
 @kernel
-def _nearby(quadrics: Any, i: int, ray: Ray) -> tuple[Ray, float, float]:
+def _rebased_ray(quadrics: Any, i: int, ray: Ray) -> tuple[Ray, float, float]:
     """(the ray in local coordinates, begin, unit): the world's t is begin + t unit.
 
-    A ray from afar begins next to the local origin, found in the world without rounding off what is
-    small beside the distance: f along it then rounds as numbers of the shape's size.  One that
-    begins within the box, or next to it, must not be moved: see `roots`.  Directions whose powers
-    would overflow or vanish are made 1 long.
+    The origin of a ray from far away is moved next to the local origin, in the world and without
+    the rounding of large numbers (`along_from`): f along the ray then rounds as numbers of the
+    shape's size do.  A ray that begins within the box, or next to it, must not be moved: see
+    `roots`.  Directions whose powers would overflow or underflow are scaled to length 1.
     """
     local = local_ray(quadrics, i, ray)
     size = max_abs(local.d)
@@ -38,8 +38,9 @@ def _nearby(quadrics: Any, i: int, ray: Ray) -> tuple[Ray, float, float]:
 class Line(NamedTuple):
     """A line's roots, where it enters and leaves the clip box, and the codes of the caps there.
 
-    All t are those of `_nearby`: far away the world's are further apart than rims and roots are,
-    and what comes first is decided before they are rounded to these.
+    All t are those of `_rebased_ray`.  Far away the spacing of the world's t is larger than the
+    distance between a rim and a root: their order is decided before they are rounded to the world's
+    t.
     """
 
     t0: float
@@ -55,7 +56,7 @@ class Line(NamedTuple):
 
 @kernel
 def line_of(quadrics: Any, i: int, ray: Ray) -> Line:
-    near, begin, unit = _nearby(quadrics, i, ray)
+    near, begin, unit = _rebased_ray(quadrics, i, ray)
     r = roots(quadrics.coefficients[i], near)
     s = slabs(quadrics.lower[i], quadrics.upper[i], quadrics.clipped[i], near)
     t_in, t_out = inside(s)
@@ -65,13 +66,13 @@ def line_of(quadrics: Any, i: int, ray: Ray) -> Line:
 
 @kernel
 def in_world(line: Line, t: float) -> float:
-    """A t of the line as the ray's own."""
+    """The world's t of a t of the line."""
     return line.begin + t * line.unit
 
 
 @kernel
 def solid_along(line: Line) -> Spans:
-    """Where it runs in the solid, in t of the line: see `quadrics.spans`."""
+    """The parts inside the solid, in t of the line: see `quadrics.spans`."""
     t0, t1, between, t_in, t_out, cap_in, cap_out, _, _ = line
     if not t_in <= t_out:
         return no_spans()

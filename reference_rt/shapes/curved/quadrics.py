@@ -34,10 +34,9 @@ from reference_rt.shapes.shape import Spans, Tangents, any_tangents, one_span
 
 
 class Quadrics(NamedTuple):
-    """n quadrics: center (n, 3), rows of the inverse map (n, 9), columns of the map (n, 9), f's
-    coefficients (n, 10), the box's corners lower and upper (n, 3), for each axis 1 where the box
-    clips and 0 where f itself ends within it (n, 3), capped (n,): 1 for solids; owner, the shape's
-    index in the scene; material, light: rows of those tables; face (n,)."""
+    """n quadrics: center, to_local and edges as in `shapes.placement`; f's coefficients (n, 10);
+    the box's corners lower and upper (n, 3); clipped (n, 3), for each axis 1 if the box clips f and
+    0 if f ends within it; capped (n,), 1 for solids; the columns of `owners`."""
 
     center: FloatArray
     to_local: FloatArray
@@ -64,8 +63,8 @@ def is_solid(quadrics: Quadrics) -> bool:
 
 @kernel
 def spans(quadrics: Quadrics, i: int, ray: Ray) -> Spans:
-    """Where the line runs in the solid: f <= 0 within the box.  An end's u is 0 on f's surface, and
-    1 + the box's face (axis, + 3 on the positive side) on a cap."""
+    """The parts of the line inside the solid: f <= 0 within the box.  An end's u is 0 on f's
+    surface, and 1 + the box's face (axis, + 3 on the positive side) on a cap."""
     line = line_of(quadrics, i, ray)
     s = solid_along(line)
     return Spans(
@@ -82,9 +81,9 @@ def spans(quadrics: Quadrics, i: int, ray: Ray) -> Spans:
 
 @kernel
 def intersect(quadrics: Quadrics, i: int, ray: Ray) -> Crossing:
-    """Where the ray meets quadric i, and as u which surface of it: see `spans`.
+    """Where the ray meets quadric i; u: which surface of it, see `spans`.
 
-    A surface that is not capped includes its rim.  A line that lies in it does not meet it.
+    A surface that is not capped includes its rim.  A line within the surface does not meet it.
     """
     if quadrics.capped[i] != 0:
         s = spans(quadrics, i, ray)
@@ -106,7 +105,7 @@ def intersect(quadrics: Quadrics, i: int, ray: Ray) -> Crossing:
 
 @kernel
 def crossings(quadrics: Quadrics, i: int, ray: Ray) -> Spans:
-    """All crossings of the line and quadric i in order, of a surface that is not capped too."""
+    """All crossings of the line and quadric i in order, also of a surface that is not capped."""
     if quadrics.capped[i] != 0:
         return spans(quadrics, i, ray)
     line = line_of(quadrics, i, ray)
@@ -115,15 +114,15 @@ def crossings(quadrics: Quadrics, i: int, ray: Ray) -> Spans:
     return one_span(min(first, second), 0.0, max(first, second), 0.0)
 
 
-# ---- where it was met ---------------------------------------------------------------------------
+# ---- the surface at a hit -----------------------------------------------------------------------
 
 
 @kernel
 def _on_surface(quadrics: Quadrics, i: int, q: Vec3) -> Vec3:
-    """q moved onto f = 0 along the world's normal, by Newton's steps while they lead closer.
+    """q moved onto f = 0 along the world's normal, by Newton's steps as long as |f| decreases.
 
-    Each squares the distance, in radii of curvature: four are for a point that is off by a
-    hundredth, of a ray from 1e13 sizes away.
+    Each step squares the distance, in radii of curvature: four are enough for an error of a
+    hundredth, that of a ray from 1e13 sizes away.
     """
     k = quadrics.coefficients[i]
     for _ in range(4):
@@ -168,11 +167,12 @@ def surface(quadrics: Quadrics, ray: Ray, hit: Hit) -> SurfacePoint:
 
 @kernel
 def _error(quadrics: Quadrics, i: int, q: Vec3) -> float:
-    """How far q must move along the normal for f's computed sign there to be right: what f is at q,
-    its noise here, and that of the next ray's origin, with one to spare for rounding.
+    """The distance by which q must move along the normal so that f's computed sign is right there:
+    for f at q, its noise there, and the noise at the next ray's origin, with one to spare for
+    rounding.
 
-    Next to a point where the gradient vanishes, f grows as the square of the distance from it, and
-    this is the distance within which the noise hides it.
+    Next to a point where the gradient vanishes, f grows as the square of the distance from it;
+    there this is the distance within which f is smaller than its noise.
     """
     k = quadrics.coefficients[i]
     uncertain = abs(value(k, q)) + 3.0 * noise(k, q)
@@ -196,8 +196,8 @@ def _in_box(quadrics: Quadrics, i: int, q: Vec3) -> Vec3:
 @kernel
 def uv(quadrics: Quadrics, ray: Ray, hit: Hit) -> tuple[float, float]:
     """In coordinates where the box is the cube [-1, 1]³: (phi / 2 pi around z from +x, z from 0 to
-    1); of an ellipsoid as a sphere's; of a cap as a box's face: the two other coordinates in the
-    order x, y, z, from 0 to 1."""
+    1); for an ellipsoid as for a sphere; for a cap as for a box's face: the two other coordinates
+    in the order x, y, z, from 0 to 1."""
     i, code = hit.row, int(hit.u)
     x, y, z = _in_box(quadrics, i, local_point(quadrics, i, at(ray, hit.t)))
     if code > 0:
@@ -214,7 +214,8 @@ def uv(quadrics: Quadrics, ray: Ray, hit: Hit) -> tuple[float, float]:
 
 @kernel
 def tangents(quadrics: Quadrics, ray: Ray, hit: Hit) -> Tangents:
-    """Any where u and v are no coordinates of the surface: on the z axis, and where v is level."""
+    """Any tangents where u and v are no coordinates of the surface: on the z axis, and where v is
+    constant along the surface."""
     i, code = hit.row, int(hit.u)
     size = row(quadrics.upper, i) - row(quadrics.lower, i)
     q = local_point(quadrics, i, at(ray, hit.t))
@@ -228,7 +229,7 @@ def tangents(quadrics: Quadrics, ray: Ray, hit: Hit) -> Tangents:
     q = _on_surface(quadrics, i, q)
     x, y, z = _in_box(quadrics, i, q)
     rho2 = x * x + y * y
-    # The gradients of u, v and f, the former times numbers: dp/du is what only u grows along.
+    # The gradients of u, v and f, those of u and v scaled: along dp/du only u changes.
     du, u_size = Vec3(-y, x, 0.0), 2.0 * math.pi * rho2
     dv, v_size = Vec3(0.0, 0.0, 1.0), 2.0
     if quadrics.clipped[i, 2] == 0:

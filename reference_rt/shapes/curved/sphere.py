@@ -41,32 +41,32 @@ class Sphere(Shape):
     center: Vector = (0.0, 0.0, 0.0)
     radius: Positive = 1.0
 
-    def tabulate(self, place: Place) -> "Spheres | Quadrics":
-        m = self.map_in(place)
+    def tabulate(self, context: Place) -> "Spheres | Quadrics":
+        m = self.map_in(context)
         if m is transform.IDENTITY:
             return Spheres(
                 center=np.array([self.center]),
                 radius=np.array([self.radius]),
                 to_local=np.eye(3).reshape(1, 9),
-                **owners(place),
+                **owners(context),
             )
-        size = np.abs(m[:, :3]).max()  # kept apart: squares of extreme scales overflow
+        size = np.abs(m[:, :3]).max()  # a factor of its own: squares of extreme scales overflow
         linear = m[:, :3] / size
         factor = math.sqrt(float(np.trace(linear.T @ linear)) / 3.0)
         # A similarity has A^T A = s² 1; each entry of the product rounds at most 8 times.
         if np.max(np.abs(linear.T @ linear - factor**2 * np.eye(3))) > 8e-16 * 4 * factor**2:
-            return ellipsoid(place, m, self.center, self.radius)
+            return ellipsoid(context, m, self.center, self.radius)
         return Spheres(
             center=transform.apply_points(m, np.array([self.center])),
             radius=np.array([self.radius * factor * size]),
             to_local=np.asarray(np.linalg.inv(linear / factor), np.float64).reshape(1, 9),
-            **owners(place),
+            **owners(context),
         )
 
 
 class Spheres(NamedTuple):
-    """n spheres: center (n, 3), radius (n,), world-to-local rotation (n, 9) for uv; owner, the
-    shape's index in the scene; material, light: rows of those tables; face (n,)."""
+    """n spheres: center (n, 3), radius (n,), to_local (n, 9), the world-to-local rotation for uv;
+    the columns of `owners`."""
 
     center: FloatArray
     radius: FloatArray
@@ -88,18 +88,19 @@ def areas(spheres: Spheres) -> FloatArray:
 
 
 def pack_all(spheres: Spheres) -> FloatArray:
-    """What `distance` takes, as packets."""
+    """The arguments of `distance`, as packets."""
     return pack(spheres.center, spheres.radius)
 
 
 @kernel
 def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
-    """(whether the line meets the sphere, where it enters, where it leaves), t of any sign.
+    """(whether the line meets the sphere, t where it enters, t where it leaves), t of any sign.
 
     The quadratic in a form without cancellation for far or small spheres (Haines et al. 2019, "Ray
     Tracing Gems", ch. 7): the discriminant from the closest approach, the second root from c / q.
-    There the closest approach is off by u D for an origin D away; here it is found without that
-    (`along_from`), and what its t was off by along d is taken out again: D is of no account.
+    There the error of the closest approach is u D for an origin at distance D.  Here it is computed
+    without that error (`along_from`), and the error of its t, along d, is subtracted again: the
+    result does not depend on D.
     """
     f = ray.o - center
     a = dot(ray.d, ray.d)
@@ -116,7 +117,7 @@ def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
 
 @kernel
 def distance(ray: Ray, center: Vec3, r: float) -> float:
-    """The smallest t > 0 at which a ray meets a sphere, inf where it does not."""
+    """The smallest t > 0 at which a ray meets a sphere, inf for a miss."""
     meets, near, far = roots(ray, center, r)
     t = select(near > 0.0, near, far)
     nearest: float = select(meets & (t > 0.0), t, math.inf)
@@ -134,7 +135,7 @@ def spans(spheres: Spheres, i: int, ray: Ray) -> Spans:
 
 @kernel
 def found(spheres: Spheres, i: int, ray: Ray, t: float) -> Crossing:
-    """The crossing of sphere i at t: nothing else is needed."""
+    """The crossing of sphere i at t; u and v are not used."""
     return Crossing(t, 0.0, 0.0)
 
 
@@ -152,7 +153,7 @@ def lane_distance(spheres: Spheres, packets: FloatArray, k: int, lane: int, ray:
 
 @kernel
 def surface(spheres: Spheres, ray: Ray, hit: Hit) -> SurfacePoint:
-    """The point, put back on the sphere: that leaves the rounding of c + r n alone."""
+    """The point, projected onto the sphere, so that only the rounding of c + r n is left."""
     i = hit.row
     center = row(spheres.center, i)
     r = spheres.radius[i]
@@ -175,7 +176,7 @@ def uv(spheres: Spheres, ray: Ray, hit: Hit) -> tuple[float, float]:
 
 @kernel
 def tangents(spheres: Spheres, ray: Ray, hit: Hit) -> Tangents:
-    """Eastwards and southwards; any at a pole."""
+    """Eastwards and southwards; any tangents at a pole."""
     i = hit.row
     n = normalize(at(ray, hit.t) - row(spheres.center, i))
     x, y, z = local_vector(spheres, i, n)
@@ -191,21 +192,21 @@ def tangents(spheres: Spheres, ray: Ray, hit: Hit) -> Tangents:
 
 @kernel
 def is_outside(p: Vec3, center: Vec3, r: float) -> bool:
-    """Whether `p` is off the sphere by more than its own error bound: a point of the sphere itself
-    sees none of it, whatever side its rounding put it on."""
+    """Whether `p` is outside the sphere by more than its own error bound: from a point of the
+    sphere itself none of it is visible, on whichever side rounding has put the point."""
     return length(center - p) - r > surface_error(p, center, 2.0 * r)
 
 
 @kernel
 def cone_of_sight(distance2: float, r: float) -> float:
-    """1 - cos(theta_max) of the cone in which a sphere is seen, without cancellation."""
+    """1 - cos(theta_max) of the cone that a sphere subtends, without cancellation."""
     sin2 = r * r / distance2
     return sin2 / (1.0 + math.sqrt(1.0 - sin2))
 
 
 @kernel
 def sample(spheres: Spheres, i: int, area: float, p: Vec3, u0: float, u1: float) -> LightPoint:
-    """A point of the sphere seen from `p` outside, uniform in the cone of sight.
+    """A point of the sphere visible from `p` outside, uniform in the cone that it subtends.
 
     pdf per solid angle: 1 / (2 pi (1 - cos theta_max)) (Shirley, Wang & Zimmerman 1996).
     """
@@ -223,7 +224,7 @@ def sample(spheres: Spheres, i: int, area: float, p: Vec3, u0: float, u1: float)
     cos_phi, sin_phi = on_circle(u1)
     frame = frame_from_normal(to_center * (1.0 / math.sqrt(distance2)))
     wi = to_world(frame, Vec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta))
-    # The nearer root of the quadratic; at the rim rounding may leave it a hair below zero.
+    # The nearer root of the quadratic; at the rim rounding may make it negative.
     half_chord2 = max(0.0, r * r - distance2 * sin2)
     along = math.sqrt(distance2) * cos_theta - math.sqrt(half_chord2)
     n = normalize(p + wi * along - center)

@@ -32,7 +32,7 @@ class Torus(Shape):
     minor_radius: Positive = 0.25
     """r, of the tube; less than R."""
 
-    def tabulate(self, place: Place) -> "Tori":
+    def tabulate(self, context: Place) -> "Tori":
         if not self.minor_radius < self.major_radius:
             raise ValueError(
                 f"minor_radius is {self.minor_radius:g}; expected less than major_radius, "
@@ -41,12 +41,13 @@ class Torus(Shape):
         return Tori(
             major=np.array([self.major_radius]),
             minor=np.array([self.minor_radius]),
-            **columns(self.map_in(place), place),
+            **columns(self.map_in(context), context),
         )
 
 
 class Tori(NamedTuple):
-    """n tori: radii R and r (n,); center, to_local and edges as in `shapes.placement`; owners."""
+    """n tori: radii R and r (n,); center, to_local and edges as in `shapes.placement`; the columns
+    of `owners`."""
 
     major: FloatArray
     minor: FloatArray
@@ -70,8 +71,8 @@ def bounds(tori: Tori) -> Bounds:
 def excess(p: Vec3, major: float, minor: float) -> float:
     """(rho - R)² + z² - r², with rho the distance from the axis: negative inside.
 
-    The quartic in the coordinates is this times a number above 0.  It cancels far less: an error of
-    a few u R in rho is one of as much in the place of the surface.
+    The torus's quartic is this times a positive number.  This form cancels far less: an error of a
+    few u R in rho moves the surface by as much.
     """
     off = math.sqrt(p.x * p.x + p.y * p.y) - major
     return off * off + p.z * p.z - minor * minor
@@ -86,13 +87,13 @@ def _slope(p: Vec3, d: Vec3, major: float) -> float:
 
 
 STEPS = 80
-"""More than halving an interval takes to come to two neighbouring floats of ordinary size; Newton's
-steps, tried first, take about five."""
+"""More steps than bisection takes down to two neighbouring floats of ordinary size; Newton's steps,
+tried first, take about five."""
 
 
 @kernel
 def _turning_point(a2: float, a1: float, low: float, high: float) -> float:
-    """The zero between `low` and `high` of 4 s³ + 2 a2 s + a1, which has other signs there."""
+    """The zero of 4 s³ + 2 a2 s + a1 between `low` and `high`, where its signs differ."""
     rises = (4.0 * high * high + 2.0 * a2) * high + a1 > 0.0
     s = 0.5 * (low + high)
     for _ in range(STEPS):
@@ -115,8 +116,8 @@ def _turning_point(a2: float, a1: float, low: float, high: float) -> float:
 def _root(
     m: Vec3, d: Vec3, major: float, minor: float, low: float, high: float, out: bool
 ) -> float:
-    """The zero of `excess` at m + s d between `low` and `high`, at whose upper end it is above 0
-    with `out`, at whose lower end without."""
+    """The zero s of `excess` at m + s d between `low` and `high`;  out: whether `excess` is above 0
+    at `high` (and below at `low`), or else the other way round."""
     s = 0.5 * (low + high)
     for _ in range(STEPS):
         p = m + d * s
@@ -129,7 +130,7 @@ def _root(
         following = s - value / slope if slope != 0.0 else low
         if not (low < following and following < high):
             following = 0.5 * (low + high)
-        # A last step that is below what m and s themselves are rounded by.
+        # The step is smaller than the rounding of m and s themselves.
         if abs(following - s) <= 0.5 * UNIT_ROUNDOFF * (abs(s) + major):
             return following
         s = following
@@ -138,12 +139,13 @@ def _root(
 
 @kernel
 def _crossings(tori: Tori, i: int, ray: Ray, t: FloatArray) -> int:
-    """All t at which the line meets torus i, in order, into t (4,); how many: 0, 2 or 4.
+    """Writes all t at which the line meets torus i, in order, to t (4,); returns their number: 0, 2
+    or 4.
 
-    From the point m nearest to the middle, along a unit d, the quartic has no cubic term: s⁴ +
-    a2 s² + a1 s + a0.  Between its turning points there is at most one zero, found by `excess`,
-    whose sign at them says whether there is one: the ray begins and ends outside, so that zeros
-    come in pairs.
+    From the point m closest to the middle, along a unit d, the quartic has no cubic term: s⁴ +
+    a2 s² + a1 s + a0.  Between two turning points there is at most one zero, and the signs of
+    `excess` at them say whether there is one.  The line begins and ends outside, so that the number
+    of zeros is even.
     """
     local = local_ray(tori, i, ray)
     major, minor = tori.major[i], tori.minor[i]
@@ -152,7 +154,7 @@ def _crossings(tori: Tori, i: int, ray: Ray, t: FloatArray) -> int:
     d = local.d * (1.0 / speed)
     middle = -dot(local.o, d) / speed
     m = local_vector(tori, i, along_from(ray.o, ray.d, row(tori.center, i), middle))
-    # Once more: what rounding left along d is of no account far away, and m is small.
+    # Once more, since rounding leaves a part along d: m is small now, and so is the error.
     rest = -dot(m, d)
     m = m + d * rest
     k = dot(m, m)
@@ -189,7 +191,7 @@ def _crossings(tori: Tori, i: int, ray: Ray, t: FloatArray) -> int:
 
 @kernel
 def intersect(tori: Tori, i: int, ray: Ray) -> Crossing:
-    """Where the ray meets torus i; u and v are not needed."""
+    """Where the ray meets torus i; u and v are not used."""
     t = local_floats(4)
     for k in range(_crossings(tori, i, ray, t)):
         if t[k] > 0.0:
@@ -207,13 +209,13 @@ def spans(tori: Tori, i: int, ray: Ray) -> Spans:
 
 @kernel
 def surface(tori: Tori, ray: Ray, hit: Hit) -> SurfacePoint:
-    """The point, put back onto the tube around the nearest point of the circle."""
+    """The point, projected onto the tube around the closest point of the circle."""
     i = hit.row
     major, minor = tori.major[i], tori.minor[i]
     q = local_point(tori, i, at(ray, hit.t))
     rho = math.sqrt(q.x * q.x + q.y * q.y)
     c, n = Vec3(major, 0.0, 0.0), Vec3(0.0, 0.0, 1.0)
-    if rho > 0.0:  # what rounds to the axis, or out of sight, of an eye 1/u sizes away: any point
+    if rho > 0.0:  # else q has been rounded to the axis, 1/u sizes from the eye: any point will do
         c = Vec3(major * q.x / rho, major * q.y / rho, 0.0)
     across = q - c
     distance = length(across)
@@ -226,7 +228,8 @@ def surface(tori: Tori, ray: Ray, hit: Hit) -> SurfacePoint:
 
 @kernel
 def uv(tori: Tori, ray: Ray, hit: Hit) -> tuple[float, float]:
-    """phi / 2 pi around the axis from local +x, and around the tube from the outside upwards."""
+    """(phi / 2 pi around the axis from local +x, the same around the tube from the outside
+    upwards)."""
     i = hit.row
     q = local_point(tori, i, at(ray, hit.t))
     around = math.atan2(q.y, q.x) / (2.0 * math.pi)

@@ -1,8 +1,8 @@
 """Flat shapes: a plane with coordinates x, y of its own, p = center + x x_edge + y y_edge.
 
 Their tables have center, unit normal, the covectors x_of and y_of, and the edges, all (n, 3).  The
-covectors lie in the plane, x = x_of · (p - center): how far rounding leaves a point off the plane
-does not change its coordinates, whatever else the shape's map does to space.
+covectors lie in the plane, x = x_of · (p - center): a point that rounding has moved off the plane
+has the same coordinates, also under a map that shears.
 """
 
 import math
@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.ray import Crossing, Ray, SurfacePoint, miss, surface_error
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
 from reference_rt.core.transform import FLAT, Affine
 from reference_rt.core.vec3 import Vec3, dot, max_abs, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.placement import owners
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import Place, lift
 
 Integers = npt.NDArray[np.object_]
 
@@ -31,12 +31,12 @@ def integers(a: FloatArray) -> tuple[Integers, int]:
 
 
 def columns(
-    center: FloatArray, x_edge: FloatArray, y_edge: FloatArray, place: Place
+    center: FloatArray, x_edge: FloatArray, y_edge: FloatArray, context: Place
 ) -> dict[str, Any]:
-    """The columns that every flat table has, one row; the normal is that of x_edge x y_edge.
+    """The columns of every flat table, one row; the normal is that of x_edge x y_edge.
 
-    Integers make them right but for their own rounding: a thin shape's normal is as exact as any,
-    and squares of extreme scales do not overflow.  Raises ValueError.
+    They are computed in integers and rounded once, so that the normal of a thin shape is as exact
+    as any other, and squares of extreme scales do not overflow.  Raises ValueError.
     """
     edges = np.array([x_edge, y_edge])
     if not np.isfinite(edges).all():
@@ -60,18 +60,24 @@ def columns(
         "y_of": y_of[None],
         "x_edge": x_edge.copy()[None],
         "y_edge": y_edge.copy()[None],
-        **owners(place),
+        **owners(context),
     }
 
 
-def facing_z(m: Affine, place: Place) -> dict[str, Any]:
-    """`columns` for the plane z = 0 with normal +z under the map m: a map that mirrors space leaves
-    the normal on the side that +z goes to."""
-    made = columns(m[:, 3], m[:, 0], m[:, 1], place)
+def facing_z(m: Affine, context: Place) -> dict[str, Any]:
+    """`columns` for the plane z = 0 with normal +z under the map m; also for a map that flips
+    orientation the normal is on the side that +z is mapped to."""
+    made = columns(m[:, 3], m[:, 0], m[:, 1], context)
     (x, y, z), _ = integers(m[:, :3].T)
     if np.cross(x, y) @ z < 0:
         made["normal"] = -made["normal"]
     return made
+
+
+def check_area(what: str, area: float) -> None:
+    """Raises ValueError for an area that float64 cannot hold."""
+    if not 0.0 < area < math.inf:
+        raise ValueError(f"the {what}'s area is not a float64; expected an ordinary size")
 
 
 @kernel
@@ -92,9 +98,9 @@ def meet(table: Any, i: int, ray: Ray) -> Crossing:
     """Where the ray meets plane i, on either side; its u, v are x and y.
 
     A parallel ray, in the plane or not, has t = ±inf or NaN: it misses.  The two products with the
-    normal round 6 u |o - center| and 5 u |d|, so with r = |o - center| + t |d| and the angle of
-    incidence, t |d| is off by at most 7 u r / cos, x by 13 u r |x_of| / cos and y likewise: who
-    asks them decides right beyond that.
+    normal round by 6 u |o - center| and 5 u |d|.  With r = |o - center| + t |d| and the angle of
+    incidence, the error of t |d| is at most 7 u r / cos, of x 13 u r |x_of| / cos, and of y
+    likewise: a decision by x or y is right if it has a larger margin.
     """
     t = -signed_distance(table, i, ray.o) / dot(ray.d, row(table.normal, i))
     if (t > 0.0) & (t < math.inf):
@@ -105,13 +111,13 @@ def meet(table: Any, i: int, ray: Ray) -> Crossing:
 
 @kernel
 def surface_at(table: Any, i: int, x: float, y: float) -> SurfacePoint:
-    """The point at x, y: in the plane by construction, but for rounding.
+    """The point at x, y: in the plane by construction, except for rounding.
 
-    Two sums and two products, of numbers no larger than |center| and `reach`, and the normal's
-    own rounding across `reach` are 2 |center| + 5 reach of u a component; seeing the next origin
-    from the plane is |p| + 4 reach: within what `surface_error` bounds, however large x and y.
-    `reach` is the shape's own size at least: at x = y = 0 of a shape at the origin nothing rounds,
-    but the bound must still take a ray off the surface.
+    Two sums and two products, of numbers no larger than |center| and `reach`, and the rounding of
+    the normal across `reach` are 2 |center| + 5 reach times u for each component; the distance of
+    the next ray's origin from the plane has |p| + 4 reach.  That is within `surface_error`, however
+    large x and y are.  `reach` is at least the shape's own size: at x = y = 0 of a shape at the
+    origin nothing rounds, but the bound must still move a ray off the surface.
     """
     x_edge, y_edge = row(table.x_edge, i), row(table.y_edge, i)
     center, n = row(table.center, i), row(table.normal, i)
@@ -119,3 +125,18 @@ def surface_at(table: Any, i: int, x: float, y: float) -> SurfacePoint:
     reach = max_abs(x_edge) * max(1.0, abs(x)) + max_abs(y_edge) * max(1.0, abs(y))
     error = surface_error(p, center, reach)
     return SurfacePoint(p, n, n, error, table.material[i], table.light[i])
+
+
+@kernel
+def surface(table: Any, ray: Ray, hit: Hit) -> SurfacePoint:
+    """The point at a hit whose u, v are x and y."""
+    return surface_at(table, hit.row, hit.u, hit.v)
+
+
+@kernel
+def lift_of(table: Any, i: int, p: Vec3) -> float:
+    """`shape.lift` for a shape whose |x| and |y| are at most 1: its error bound is the largest that
+    `surface_at` gives."""
+    a, b, center = row(table.x_edge, i), row(table.y_edge, i), row(table.center, i)
+    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
+    return lift(p - center, reach, surface_error(p, center, max_abs(a) + max_abs(b)))

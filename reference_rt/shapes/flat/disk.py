@@ -6,16 +6,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.core.ray import (
-    UNIT_ROUNDOFF,
-    Crossing,
-    Hit,
-    Ray,
-    SurfacePoint,
-    miss,
-    surface_error,
-)
-from reference_rt.core.vec3 import Vec3, max_abs, row
+from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.sampling.warp import concentric_disk
 from reference_rt.shapes.flat import base
@@ -25,7 +17,6 @@ from reference_rt.shapes.shape import (
     Shape,
     Tangents,
     any_tangents,
-    lift,
     outward,
     solid_angle_pdf,
 )
@@ -36,17 +27,15 @@ class Disk(Shape):
 
     type: Literal["disk"] = "disk"
 
-    def tabulate(self, place: Place) -> "Disks":
-        disks = Disks(**base.facing_z(self.map_in(place), place))
-        if not 0.0 < areas(disks)[0] < math.inf:
-            raise ValueError("the disk's area is not a float64; expected an ordinary size")
+    def tabulate(self, context: Place) -> "Disks":
+        disks = Disks(**base.facing_z(self.map_in(context), context))
+        base.check_area("disk", areas(disks)[0])
         return disks
 
 
 class Disks(NamedTuple):
-    """n ellipses: see `flat` for center, normal, x_of, y_of and for x_edge, y_edge, which are
-    conjugate radii; owner, the shape's index in the scene; material, light: rows of those tables;
-    face (n,)."""
+    """n ellipses: the columns of `flat.base`, with x_edge and y_edge as conjugate radii, and of
+    `placement.owners`."""
 
     center: FloatArray
     normal: FloatArray
@@ -83,9 +72,7 @@ def intersect(disks: Disks, i: int, ray: Ray) -> Crossing:
     return miss()
 
 
-@kernel
-def surface(disks: Disks, ray: Ray, hit: Hit) -> SurfacePoint:
-    return base.surface_at(disks, hit.row, hit.u, hit.v)
+surface = base.surface
 
 
 @kernel
@@ -99,21 +86,13 @@ def uv(disks: Disks, ray: Ray, hit: Hit) -> tuple[float, float]:
 
 @kernel
 def tangents(disks: Disks, ray: Ray, hit: Hit) -> Tangents:
-    """Of polar coordinates; any in the middle."""
+    """Those of polar coordinates; any in the middle."""
     i, x, y = hit.row, hit.u, hit.v
     r = math.sqrt(x * x + y * y)
     if r == 0.0:
         return any_tangents(row(disks.normal, i))
     a, b = row(disks.x_edge, i), row(disks.y_edge, i)
     return Tangents(a * (x / r) + b * (y / r), (b * x - a * y) * (2.0 * math.pi))
-
-
-@kernel
-def lift_of(disks: Disks, i: int, p: Vec3) -> float:
-    """See `shape.lift`; its error by the whole size holds for every point of the disk."""
-    a, b, center = row(disks.x_edge, i), row(disks.y_edge, i), row(disks.center, i)
-    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
-    return lift(p - center, reach, surface_error(p, center, max_abs(a) + max_abs(b)))
 
 
 @kernel
@@ -127,4 +106,4 @@ def sample(disks: Disks, i: int, area: float, p: Vec3, u0: float, u1: float) -> 
 @kernel
 def pdf(disks: Disks, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, at the point `q` of the disk."""
-    return solid_angle_pdf(p, q.p, q.n, area, lift_of(disks, i, p))
+    return solid_angle_pdf(p, q.p, q.n, area, base.lift_of(disks, i, p))

@@ -19,13 +19,12 @@ class Plane(Shape):
 
     type: Literal["plane"] = "plane"
 
-    def tabulate(self, place: Place) -> "Planes":
-        return Planes(**base.facing_z(self.map_in(place), place))
+    def tabulate(self, context: Place) -> "Planes":
+        return Planes(**base.facing_z(self.map_in(context), context))
 
 
 class Planes(NamedTuple):
-    """n planes: see `flat` for center, normal, x_of, y_of, x_edge, y_edge; owner, the shape's index
-    in the scene; material, light: rows of those tables; face (n,)."""
+    """n planes: the columns of `flat.base` and of `placement.owners`."""
 
     center: FloatArray
     normal: FloatArray
@@ -46,8 +45,8 @@ def bounds(planes: Planes) -> Bounds:
 
 @kernel
 def intersect(planes: Planes, i: int, ray: Ray) -> Crossing:
-    """Where the ray meets plane i, from the front or from behind; a parallel ray does nowhere, one
-    in the plane included."""
+    """Where the ray meets plane i, from the front or from behind; a parallel ray misses, also one
+    in the plane."""
     return base.meet(planes, i, ray)
 
 

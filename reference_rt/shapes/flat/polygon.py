@@ -1,9 +1,9 @@
 """Polygon: rings of points in a plane, concave, with holes, crossing themselves.
 
-The plane has the coordinates that are left when the largest axis of its normal is dropped, in the
-shape's own space: the scene's own numbers, but for a power of two.  Polygons of points at z = 0
-under one transform therefore see a point of a ray as the same two numbers, and where they share an
-edge or a corner exactly one of them has it.
+The coordinates in the plane are those of the shape's own space without the largest axis of the
+normal: the scene's own numbers, up to a power of two.  For polygons of points at z = 0 under one
+transform, a point of a ray therefore has the same two coordinates, and a point on a shared edge or
+corner belongs to exactly one of them.
 """
 
 import math
@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, ValidationError, WithJsonSchema, Wr
 from reference_rt.core import transform
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
 from reference_rt.core.model import Vector
-from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, miss
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.flat import base
@@ -26,12 +26,12 @@ from reference_rt.shapes.rounding import product_error
 from reference_rt.shapes.shape import Place, Shape, Tangents, outward
 
 OFF_PLANE = 64
-"""How far a point may be off the plane of the others, in u times the largest coordinate: a map
-rounds a point's coordinates some eight times, and a plane through three points is off by up to
-eight times as much where the others are."""
+"""The largest distance of a point from the plane of the others, in u times the largest coordinate:
+a map rounds a point's coordinates some eight times, and at the other points the error of a plane
+through three points is up to eight times as large."""
 
 MASKS = {"even_odd": 1, "nonzero": -1}
-"""The bits of a winding number of which one must be 1 inside."""
+"""The bits of a winding number of which at least one is 1 inside."""
 
 
 def _point(value: Any, handler: Any) -> Any:
@@ -79,15 +79,15 @@ class Polygon(Shape):
     ring in a ring is a hole), or points that the rings go round a number of times that is not 0 (a
     hole is a ring in a ring the other way round)."""
 
-    def tabulate(self, place: Place) -> "Polygons":
-        m = self.map_in(place)
+    def tabulate(self, context: Place) -> "Polygons":
+        m = self.map_in(context)
         points = np.array([p for ring in self.rings for p in ring])
         if np.abs(points).max() > 2.0**1000:
             raise ValueError("its coordinates overflow; expected finite numbers")
         ends = np.cumsum([len(ring) for ring in self.rings])
         axis, origin, slopes = _plane(points, ends)
         kept = [(axis + 1) % 3, (axis + 2) % 3]
-        # A power of two, and so exact: products of coordinates of any scale neither over- nor
+        # A power of two, which is exact: products of scaled coordinates neither overflow nor
         # underflow.
         scale = math.ldexp(1.0, math.frexp(np.abs(points[:, kept]).max())[1])
         rings = np.split(points[:, kept] / scale, ends[:-1])
@@ -101,7 +101,7 @@ class Polygon(Shape):
         edges = [
             (linear[:, k] - s * linear[:, axis]) * scale for k, s in zip(kept, slopes, strict=True)
         ]
-        made = base.columns(linear[:, axis] * origin + m[:, 3], edges[0], edges[1], place)
+        made = base.columns(linear[:, axis] * origin + m[:, 3], edges[0], edges[1], context)
         if clockwise != transform.mirrors(m):
             made["normal"] = -made["normal"]
         return Polygons(
@@ -118,10 +118,9 @@ class Polygon(Shape):
 class Polygons(NamedTuple):
     """n polygons of m edges in all.
 
-    center, normal, x_of, y_of, x_edge, y_edge (n, 3): see `flat`;  lower, upper (n, 2): corners of
-    the bounding rectangle;  mask (n,): the bits of a winding number that must not all be 0 inside;
-    first, size (n,): a polygon's edges in `outline`;  outline (m, 4): x, y of both ends;  owner,
-    the shape's index in the scene; material, light: rows of those tables; face (n,).
+    The columns of `flat.base` and of `placement.owners`;  lower, upper (n, 2): corners of the
+    bounding rectangle;  mask (n,): the bits of a winding number that are not all 0 inside;
+    first, size (n,): a polygon's edges in `outline`;  outline (m, 4): x, y of both ends.
     """
 
     center: FloatArray
@@ -166,10 +165,11 @@ def bounds(polygons: Polygons) -> Bounds:
 
 
 def _plane(points: FloatArray, ends: IntArray) -> tuple[int, float, tuple[float, float]]:
-    """Where the points (m, 3) lie: (k, a, (s, r)) of x_k = a - s x_(k+1) - r x_(k+2), in which k is
-    the largest axis of the normal.
+    """The plane of the points (m, 3): (k, a, (s, r)) of x_k = a - s x_(k+1) - r x_(k+2), in which k
+    is the largest axis of the normal.
 
-    Exact but for the last rounding.  The plane is that of three points as far apart as there are.
+    Exact except for the last rounding.  It is the plane of the first point and of two others that
+    are as far away as possible.
     """
     p, one = integers(points)
     from_first = p - p[0]
@@ -196,8 +196,8 @@ def _plane(points: FloatArray, ends: IntArray) -> tuple[int, float, tuple[float,
 
 
 def _has_edges(outline: FloatArray, fill: str) -> bool:
-    """Whether any edge counts, of all that the rings run through to and fro (for the even-odd rule,
-    that they run through an even number of times)."""
+    """Whether any edge is left when those that the rings go along in both directions cancel (for
+    the even-odd rule, those that they go along an even number of times)."""
     times: Counter[tuple[float, ...]] = Counter()
     for a_x, a_y, b_x, b_y in (outline + 0.0).tolist():  # -0 + 0 is 0
         if (a_x, a_y) < (b_x, b_y):
@@ -208,7 +208,7 @@ def _has_edges(outline: FloatArray, fill: str) -> bool:
 
 
 def _is_clockwise(outline: FloatArray, ends: IntArray) -> bool:
-    """Which way round the rings go as a whole; exact."""
+    """Whether the rings go round clockwise as a whole; exact."""
     edges, _ = integers(outline)
     area = (edges[:, 0] * edges[:, 3] - edges[:, 1] * edges[:, 2]).sum()
     if area == 0:
@@ -220,7 +220,8 @@ def _is_clockwise(outline: FloatArray, ends: IntArray) -> bool:
 
 
 def _turns(steps: Integers) -> Integers:
-    """How steps (k, 2) turn, each into the next: above 0 counter-clockwise; no straight ones."""
+    """The turn from each of the steps (k, 2) to the next: above 0 if counter-clockwise; without
+    straight ones."""
     steps = steps[(steps != 0).any(axis=1)]
     following = np.roll(steps, -1, axis=0)
     turns: Integers = steps[:, 0] * following[:, 1] - steps[:, 1] * following[:, 0]
@@ -229,8 +230,8 @@ def _turns(steps: Integers) -> Integers:
 
 @kernel
 def exceeds(a: float, b: float, c: float, d: float) -> bool:
-    """Whether a b > c d: rounding keeps the order of products, or makes them equal, and then what
-    it took away decides."""
+    """Whether a b > c d, exactly: rounding keeps the order of the products or makes them equal;
+    then the rounding errors decide."""
     p, q = a * b, c * d
     if p != q:
         return p > q
@@ -240,13 +241,14 @@ def exceeds(a: float, b: float, c: float, d: float) -> bool:
 
 @kernel
 def winding_number(polygons: Polygons, i: int, x: float, y: float) -> int:
-    """How many times polygon i goes round the point counter-clockwise: the edges that cross the
-    line from it to +x upwards, less those downwards (Sunday 2001).  Its last bit is 1 where their
-    number is odd.
+    """The winding number of polygon i around the point: the number of edges that cross the line
+    from it to +x upwards, less those downwards (Sunday 2001).  Its last bit is 1 if the number of
+    edges is odd.
 
-    A vertex on the line counts as below, an edge through the point as passing on its left: so a
-    point on edges belongs to what is right of it or, on level ones, above.  Vertices are seen from
-    the point, rounded once, in the same way for all edges there; of these, `exceeds` is exact.
+    A vertex on the line counts as below, an edge through the point as passing on its left: a point
+    on an edge belongs to the polygon on its right or, if the edge is level, above.  Vertices are
+    taken relative to the point, rounded once, in the same way for all edges there; from these,
+    `exceeds` is exact.
     """
     outline = polygons.outline
     winding = 0
@@ -266,11 +268,11 @@ def winding_number(polygons: Polygons, i: int, x: float, y: float) -> int:
 
 @kernel
 def intersect(polygons: Polygons, i: int, ray: Ray) -> Crossing:
-    """Where the ray meets polygon i, at a cost in proportion to its edges; u, v are x, y of the
-    plane."""
+    """Where the ray meets polygon i, at a cost proportional to the number of its edges; u, v are x,
+    y of the plane."""
     found = base.meet(polygons, i, ray)
     x, y = found.u, found.v
-    # What is outside of the bounding rectangle has crossings in pairs, or none.
+    # Outside of the bounding rectangle the winding number is 0.
     if found.t == math.inf or x < polygons.lower[i, 0] or x > polygons.upper[i, 0]:
         return miss()
     if y < polygons.lower[i, 1] or y > polygons.upper[i, 1]:
@@ -280,9 +282,7 @@ def intersect(polygons: Polygons, i: int, ray: Ray) -> Crossing:
     return miss()
 
 
-@kernel
-def surface(polygons: Polygons, ray: Ray, hit: Hit) -> SurfacePoint:
-    return base.surface_at(polygons, hit.row, hit.u, hit.v)
+surface = base.surface
 
 
 @kernel

@@ -6,8 +6,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
-from reference_rt.core.vec3 import Vec3, dot, max_abs, row
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import select
 from reference_rt.shapes.flat import base, spherical_rectangle
@@ -19,28 +19,27 @@ from reference_rt.shapes.shape import (
     Shape,
     Tangents,
     lane_vector,
-    lift,
     outward,
     pack,
     solid_angle_pdf,
 )
 
 _RIGHT = 2.0**-40
-"""The cosine between edges that counts as none: solid angles are then wrong by as little, and
-turned edges are right to a few u = 2^-53."""
+"""Edges whose cosine is at most this count as perpendicular: the error of solid angles is then as
+small."""
 
 _NEAR = 3.0
-"""Half diagonals within which a light is sampled by solid angle.  Measured at this distance: by
-area, the irradiance has a relative variance per sample of 0.002 seen from the front, of 0.08 to
-0.16 obliquely, which a path's own outweighs and stratified numbers remove; solid angles take
-70 ns more."""
+"""A light nearer than this number of half diagonals is sampled by solid angle.  Measured at this
+distance: sampled by area, the irradiance has a relative variance per sample of 0.002 for a receiver
+in front and of 0.08 to 0.16 obliquely, which is less than that of a path and which stratified
+numbers remove; solid angles take 70 ns more."""
 
 _LEAST_SOLID_ANGLE = 2.0**-26
-"""Places in it are found by differences of angles, which round by a few u = 2^-53: here half of
-their digits are left.  Below, by area."""
+"""A light of a smaller solid angle is sampled by area: points in it are found by differences of
+angles, which round by a few u = 2^-53, so that here half of their digits are left."""
 
 _LEAST_HEIGHT = 2.0**-500
-"""In half diagonals: its square is a float64."""
+"""In half diagonals: the square of this is a float64."""
 
 
 class Rectangle(Shape):
@@ -48,25 +47,23 @@ class Rectangle(Shape):
 
     type: Literal["rectangle"] = "rectangle"
 
-    def tabulate(self, place: Place) -> "Rectangles":
-        m = self.map_in(place)
-        rectangles = Rectangles(**base.facing_z(m, place), lengths=_lengths(m[:, 0], m[:, 1]))
-        if not 0.0 < areas(rectangles)[0] < math.inf:
-            raise ValueError("the rectangle's area is not a float64; expected an ordinary size")
+    def tabulate(self, context: Place) -> "Rectangles":
+        m = self.map_in(context)
+        rectangles = Rectangles(**base.facing_z(m, context), lengths=_lengths(m[:, 0], m[:, 1]))
+        base.check_area("rectangle", areas(rectangles)[0])
         return rectangles
 
 
 def _lengths(x_edge: FloatArray, y_edge: FloatArray) -> FloatArray:
-    """(1, 2): of the half edges; 0 where they are not perpendicular."""
+    """The lengths (1, 2) of the half edges; 0 if they are not perpendicular."""
     x, y = math.hypot(*x_edge), math.hypot(*y_edge)
     is_right = abs(float((x_edge / x) @ (y_edge / y))) <= _RIGHT
     return np.array([[x, y] if is_right else [0.0, 0.0]])
 
 
 class Rectangles(NamedTuple):
-    """n parallelograms: see `flat` for center, normal, x_of, y_of and for the half edges x_edge and
-    y_edge; lengths (n, 2) of these, 0 where they are not perpendicular; owner, the shape's index in
-    the scene; material, light: rows of those tables; face (n,)."""
+    """n parallelograms: the columns of `flat.base`, with x_edge and y_edge as half edges; lengths
+    (n, 2) of these, 0 where they are not perpendicular; the columns of `placement.owners`."""
 
     center: FloatArray
     normal: FloatArray
@@ -93,13 +90,13 @@ def areas(rectangles: Rectangles) -> FloatArray:
 
 
 def pack_all(rectangles: Rectangles) -> FloatArray:
-    """What `distance` takes, as packets."""
+    """The arguments of `distance`, as packets."""
     return pack(rectangles.center, rectangles.normal, rectangles.x_of, rectangles.y_of)
 
 
 @kernel
 def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> float:
-    """The t > 0 at which a ray meets a rectangle, inf where it does not."""
+    """The t > 0 at which a ray meets a rectangle, inf for a miss."""
     from_center = ray.o - center
     # For a parallel ray this is ±inf or NaN: both fail the comparisons.
     t = -dot(from_center, normal) / dot(ray.d, normal)
@@ -142,36 +139,7 @@ def lane_distance(
     )
 
 
-@kernel
-def place(rectangles: Rectangles, i: int, x: float, y: float) -> Vec3:
-    """The point at local (x, y): in the plane by construction."""
-    return row(rectangles.center, i) + row(rectangles.x_edge, i) * x + row(rectangles.y_edge, i) * y
-
-
-@kernel
-def error_at(rectangles: Rectangles, i: int, p: Vec3) -> float:
-    """By the whole size, unlike `flat.surface_at`: at the center of a rectangle at the origin that
-    bound is 0, and a light's point has to be off it."""
-    size = max_abs(row(rectangles.x_edge, i)) + max_abs(row(rectangles.y_edge, i))
-    return surface_error(p, row(rectangles.center, i), size)
-
-
-@kernel
-def lift_of(rectangles: Rectangles, i: int, p: Vec3) -> float:
-    """See `shape.lift`."""
-    a, b = row(rectangles.x_edge, i), row(rectangles.y_edge, i)
-    reach = Vec3(abs(a.x) + abs(b.x), abs(a.y) + abs(b.y), abs(a.z) + abs(b.z))
-    return lift(p - row(rectangles.center, i), reach, error_at(rectangles, i, p))
-
-
-@kernel
-def surface(rectangles: Rectangles, ray: Ray, hit: Hit) -> SurfacePoint:
-    i = hit.row
-    p = place(rectangles, i, hit.u, hit.v)
-    n = row(rectangles.normal, i)
-    return SurfacePoint(
-        p, n, n, error_at(rectangles, i, p), rectangles.material[i], rectangles.light[i]
-    )
+surface = base.surface
 
 
 @kernel
@@ -187,16 +155,16 @@ def tangents(rectangles: Rectangles, ray: Ray, hit: Hit) -> Tangents:
 
 
 @kernel
-def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
-    """Rectangle i from `p` in front of it, in units of half its diagonal; of solid angle 0 where it
-    is to be sampled by area."""
+def _as_seen_from(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
+    """Rectangle i as seen from `p` in front of it, in units of half its diagonal; its solid angle
+    is 0 where it is to be sampled by area."""
     w = p - row(rectangles.center, i)
     width, height = rectangles.lengths[i, 0], rectangles.lengths[i, 1]
     half_diagonal2 = width * width + height * height
     if dot(w, w) >= _NEAR * _NEAR * half_diagonal2:
         return spherical_rectangle.unseen()
     height_of_p = dot(w, row(rectangles.normal, i))
-    if height_of_p <= lift_of(rectangles, i, p):
+    if height_of_p <= base.lift_of(rectangles, i, p):
         return spherical_rectangle.unseen()  # behind it, or a point of the rectangle itself
     unit = 1.0 / math.sqrt(half_diagonal2)
     h = height_of_p * unit
@@ -213,15 +181,16 @@ def _see(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
 def sample(
     rectangles: Rectangles, i: int, area: float, p: Vec3, u0: float, u1: float
 ) -> LightPoint:
-    """A point as a light for `p`: near by uniform over the solid angle, else over the area."""
-    seen = _see(rectangles, i, p)
+    """A point as a light for `p`, uniform over the solid angle if `p` is near, else over the
+    area."""
+    seen = _as_seen_from(rectangles, i, p)
     if seen.solid_angle < _LEAST_SOLID_ANGLE:
         return sample_by_area(rectangles, i, area, p, u0, u1)
     x, y = spherical_rectangle.sample(seen, u0, u1)
     x = 2.0 * (x - seen.x0) / (seen.x1 - seen.x0) - 1.0
     y = 2.0 * (y - seen.y0) / (seen.y1 - seen.y0) - 1.0
-    q, n = place(rectangles, i, x, y), row(rectangles.normal, i)
-    return LightPoint(q, n, error_at(rectangles, i, q), 1.0 / seen.solid_angle, x, y)
+    q = base.surface_at(rectangles, i, x, y)
+    return LightPoint(q.p, q.n, q.error, 1.0 / seen.solid_angle, x, y)
 
 
 @kernel
@@ -230,21 +199,21 @@ def sample_by_area(
 ) -> LightPoint:
     """A point uniform over the area, as a light for `p`."""
     x, y = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
-    q, n = place(rectangles, i, x, y), row(rectangles.normal, i)
-    density = solid_angle_pdf(p, q, n, area, lift_of(rectangles, i, p))
-    return LightPoint(q, n, error_at(rectangles, i, q), density, x, y)
+    q = base.surface_at(rectangles, i, x, y)
+    density = solid_angle_pdf(p, q.p, q.n, area, base.lift_of(rectangles, i, p))
+    return LightPoint(q.p, q.n, q.error, density, x, y)
 
 
 @kernel
 def middle(rectangles: Rectangles, i: int, area: float, p: Vec3) -> LightPoint:
-    """Its middle as a light for `p`, of the density that the whole area has there."""
+    """Its middle as a light for `p`, with the density of sampling by area."""
     return sample_by_area(rectangles, i, area, p, 0.5, 0.5)
 
 
 @kernel
 def pdf(rectangles: Rectangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, at the point `q` of the rectangle."""
-    seen = _see(rectangles, i, p)
+    seen = _as_seen_from(rectangles, i, p)
     if seen.solid_angle < _LEAST_SOLID_ANGLE:
-        return solid_angle_pdf(p, q.p, q.n, area, lift_of(rectangles, i, p))
+        return solid_angle_pdf(p, q.p, q.n, area, base.lift_of(rectangles, i, p))
     return 1.0 / seen.solid_angle

@@ -1,10 +1,10 @@
-"""A rectangle as seen from a point: its solid angle, and points of it uniform in that.
+"""Spherical rectangles: the solid angle of a rectangle at a point, and sampling it uniformly.
 
 Urena, Fajardo & King 2013, "An Area-Preserving Parametrization for Spherical Rectangles" (Computer
 Graphics Forum 32(4)), in a form that loses no digits where the rectangle is seen edge-on.
 
 The point is the origin, the rectangle lies at distance h along -z of axes along its edges, from x0
-to x1 and from y0 to y1.  What lies below (x, y) there, from the middle, has the solid angle
+to x1 and from y0 to y1.  The rectangle from the middle (0, 0) to (x, y) has the solid angle
 G(x, y) = atan(x y / (h sqrt(x² + y² + h²))) = asin(s b), with the sines s = x / sqrt(x² + h²) and
 b = y / sqrt(y² + h²).
 """
@@ -16,8 +16,8 @@ from reference_rt.jit.kernel import kernel, reciprocal
 
 
 class Seen(NamedTuple):
-    """h > 0; the sides; phi, the signed solid angle between y0 and y1 from x = 0 to x0; and the
-    rectangle's own, solid_angle."""
+    """h > 0; the sides; phi, the signed solid angle between y0 and y1 from x = 0 to x0;
+    solid_angle, that of the rectangle."""
 
     h: float
     x0: float
@@ -36,7 +36,7 @@ def _corner(x: float, y: float, h: float) -> float:
 
 @kernel
 def solid_angle_of(h: float, x0: float, x1: float, y0: float, y1: float) -> float:
-    """Of two triangles, that of each by tan(omega / 2) = |a b c| / (abc + (a·b) c + (b·c) a +
+    """The sum of two triangles, each by tan(omega / 2) = |a b c| / (abc + (a·b) c + (b·c) a +
     (c·a) b) (van Oosterom & Strackee 1983, "The Solid Angle of a Plane Triangle"): the triple
     product is h times twice the area, so that small ones keep their digits, which differences of
     angles at corners lose."""
@@ -59,7 +59,7 @@ def see(h: float, x0: float, x1: float, y0: float, y1: float) -> Seen:
 
 @kernel
 def unseen() -> Seen:
-    """Of no solid angle."""
+    """A rectangle of solid angle 0."""
     return Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

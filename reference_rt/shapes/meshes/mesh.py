@@ -11,17 +11,22 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.diagnosis import FieldError
 from reference_rt.core.numpy_fields import AS_DIGEST, Floats2, Floats3, Integers3
 from reference_rt.core.transform import IDENTITY, Affine
-from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.files import MeshData, read_mesh
 from reference_rt.shapes.meshes.files.data import RawMesh, checked
+from reference_rt.shapes.meshes.triangle_table import (
+    Triangles,
+    facing,
+    geometric_normals,
+    soup,
+)
 from reference_rt.shapes.meshes.vertex_normals import smooth_normals
 from reference_rt.shapes.shape import Place, Shape
 
 _MOST_NAMED = 12
-"""Of what a file has besides, a warning names so many."""
+"""The number of ignored parts of a file that a warning names."""
 
 _LONGEST = 60
-"""Characters of a name, which a damaged file may make any."""
+"""Characters of a name in a warning: a damaged file may have any names."""
 
 
 class Mesh(Shape):
@@ -72,7 +77,7 @@ class Mesh(Shape):
         return self
 
     def __eq__(self, other: object) -> bool:
-        """Equal descriptions, arrays by what they hold."""
+        """Whether the descriptions are equal; arrays are compared by value."""
         return type(other) is type(self) and self._key() == other._key()
 
     def __hash__(self) -> int:
@@ -82,22 +87,22 @@ class Mesh(Shape):
         return self.model_dump_json(context=AS_DIGEST)
 
     def data(self, folder: Path) -> MeshData:
-        """What the file holds, or the arrays.  Raises ValueError."""
+        """The mesh of the file, or of the arrays.  Raises ValueError."""
         if self.file is not None:
             return read_mesh(folder / self.file)
         assert self.vertices is not None
         assert self.faces is not None
         return checked(RawMesh(self.vertices, self.faces, self.normals, self.uv, self.colours))
 
-    def tabulate(self, place: Place) -> triangle.Triangles:
-        m = self.map_in(place)
-        data = self.data(place.folder)
-        name = "the mesh" if self.file is None else f"mesh {place.folder / self.file}"
+    def tabulate(self, context: Place) -> Triangles:
+        m = self.map_in(context)
+        data = self.data(context.folder)
+        name = "the mesh" if self.file is None else f"mesh {context.folder / self.file}"
         if data.ignored:
-            place.warn(place.owner, f"{name}: {_told(data.ignored)}")
+            context.warn(context.owner, f"{name}: {_ignored_message(data.ignored)}")
         vertices = transform.apply_points(m, data.vertices)[data.faces].reshape(-1, 9)
-        # Without area there is no normal, but rounding alone makes rays hit: left out.
-        n = triangle.geometric_normals(vertices)
+        # Triangles without area have no normal, and rays meet them by rounding alone: left out.
+        n = geometric_normals(vertices)
         has_area = np.einsum("ij,ij->i", n, n) > 0.0
         if not has_area.any():
             raise ValueError(f"{name}: no triangle has any area; expected one that has")
@@ -105,28 +110,28 @@ class Mesh(Shape):
         if not has_area.all():
             numbers = np.flatnonzero(has_area)
             vertices, faces = vertices[has_area], faces[has_area]
-            place.warn(
-                place.owner,
+            context.warn(
+                context.owner,
                 f"{name}: {len(has_area) - len(numbers):,} of {len(has_area):,} triangles have no "
                 "area, or one that float64 cannot hold, and are left out (the others keep their "
                 "numbers); expected triangles with an area",
             )
-        triangles = triangle.soup(
+        triangles = soup(
             np.ascontiguousarray(vertices),
-            place,
+            context,
             normals=self._normals(data, faces, m),
             uvs=_at_corners(data.uv, faces),
             colours=_at_corners(data.colours, faces),
             face=numbers,
         )
-        return triangle.facing(m, triangles)
+        return facing(m, triangles)
 
     def makes_normals(self, data: MeshData) -> bool:
-        """Whether the mesh has vertex normals that its data have not."""
+        """Whether the mesh has vertex normals that its data do not have."""
         return self.smooth and data.normals is None
 
     def _normals(self, data: MeshData, faces: IntArray, m: Affine) -> FloatArray | None:
-        """Unit normals (m, 9) at the corners of faces where the map takes them."""
+        """Unit normals (m, 9) at the corners of faces, in the world."""
         if self.makes_normals(data):
             made = smooth_normals(data.vertices, faces, data.uv).reshape(-1, 3)
             return (made if m is IDENTITY else transform.apply_normals(m, made)).reshape(-1, 9)
@@ -135,7 +140,7 @@ class Mesh(Shape):
         return _at_corners(transform.apply_normals(m, data.normals), faces)
 
 
-def _told(ignored: tuple[str, ...]) -> str:
+def _ignored_message(ignored: tuple[str, ...]) -> str:
     names = [name[:_LONGEST] for name in ignored[:_MOST_NAMED]]
     more = [f"{len(ignored) - len(names)} more"] if len(ignored) > len(names) else []
     return (

@@ -1,4 +1,4 @@
-"""Is a mesh closed, and where not: for shapes that need an inside."""
+"""Whether a mesh is closed, and where it is not: for solids, which need an inside."""
 
 from typing import NamedTuple
 
@@ -9,10 +9,10 @@ from reference_rt.core.arrays import FloatArray, IntArray
 
 
 class BoundaryEdges(NamedTuple):
-    """k edges that keep a mesh from being closed, in the order in which the faces come to them.
+    """The k edges at which a mesh is not closed, in the order of the first face that has them.
 
-    `ends` (k, 2, 3): positions; `forward`, `backward` (k,): how many faces go along the edge from
-    its first to its second end, and how many back.
+    `ends` (k, 2, 3): positions; `forward`, `backward` (k,): the number of faces that go along the
+    edge from its first to its second end, and back.
     """
 
     ends: FloatArray
@@ -24,8 +24,8 @@ def boundary_edges(faces: npt.NDArray[np.integer], vertices: FloatArray) -> Boun
     """The edges that are not used exactly once in each direction.
 
     `faces` (m, 3), `vertices` (n, 3).  Vertices with identical coordinates are the same.  A face
-    with two equal corners has no inside, and is taken as not being there; one without area but
-    three different corners counts, since leaving it out would leave a gap between edges.
+    with two equal corners has no inside and is ignored; one without area but with three different
+    corners counts, since ignoring it would leave a gap between edges.
     """
     point, firsts = number_rows(vertices)
     f = point[faces]
@@ -34,7 +34,7 @@ def boundary_edges(faces: npt.NDArray[np.integer], vertices: FloatArray) -> Boun
     n = len(firsts)  # below 3e9, so that products fit
     there, back = np.sort(start * n + end), np.sort(end * n + start)
     if np.array_equal(there, back) and np.all(there[1:] != there[:-1]):
-        nothing = np.zeros(0, np.int64)  # closed, as most meshes are: no need to name edges
+        nothing = np.zeros(0, np.int64)  # the fast path: closed, as most meshes are
         return BoundaryEdges(np.zeros((0, 2, 3)), nothing, nothing)
     _, first, edge, uses = np.unique(
         np.minimum(start, end) * n + np.maximum(start, end),
@@ -52,8 +52,8 @@ def boundary_edges(faces: npt.NDArray[np.integer], vertices: FloatArray) -> Boun
 
 
 def number_rows(rows: FloatArray) -> tuple[IntArray, IntArray]:
-    """The number of each of n rows (n, k), the same for equal ones; and of each number, a row that
-    has it."""
+    """Numbers the different rows of (n, k): the number of each row, (n,), and for each number the
+    index of a row that has it."""
     order = np.lexsort(rows.T)  # -0 and 0 compare as equal, here and below
     new = np.ones(len(rows), bool)
     new[1:] = np.any(rows[order[1:]] != rows[order[:-1]], axis=1)
@@ -63,8 +63,8 @@ def number_rows(rows: FloatArray) -> tuple[IntArray, IntArray]:
 
 
 def describe_boundary(triangles: FloatArray, most: int = 3) -> str:
-    """One line on why triangles, (m, 9) or (m, 3, 3), are not closed: the number of the edges in
-    the way and the first ones of them; "" if they are closed."""
+    """One line on why triangles, (m, 9) or (m, 3, 3), are not closed: the number of edges at fault
+    and the first of them; "" if they are closed."""
     corners = triangles.reshape(-1, 3)
     edges = boundary_edges(np.arange(len(corners)).reshape(-1, 3), corners)
     count = len(edges.ends)

@@ -1,13 +1,12 @@
 """Triangle: three vertices, watertight along shared edges."""
 
 import math
-from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from reference_rt.core import transform
-from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Vector
 from reference_rt.core.ray import (
     UNIT_ROUNDOFF,
@@ -20,7 +19,21 @@ from reference_rt.core.ray import (
 )
 from reference_rt.core.vec3 import Vec3, cross, dot, max_abs, normalize, triple
 from reference_rt.jit.kernel import kernel
-from reference_rt.shapes.meshes.watertight import Projection, Shear, exactly, project, project_lane
+from reference_rt.shapes.meshes.triangle_table import (
+    Triangles,
+    align,
+    areas,
+    bounds,
+    facing,
+    soup,
+)
+from reference_rt.shapes.meshes.watertight import (
+    Projection,
+    Shear,
+    exact_edge_function,
+    project,
+    project_lane,
+)
 from reference_rt.shapes.shape import (
     LightPoint,
     Place,
@@ -41,123 +54,13 @@ class Triangle(Shape):
     v1: Vector
     v2: Vector
 
-    def tabulate(self, place: Place) -> "Triangles":
-        m = self.map_in(place)
+    def tabulate(self, context: Place) -> "Triangles":
+        m = self.map_in(context)
         vertices = transform.apply_points(m, np.array([self.v0, self.v1, self.v2]))
-        triangles = facing(m, soup(vertices.reshape(1, 9), place))
+        triangles = facing(m, soup(vertices.reshape(1, 9), context))
         if areas(triangles)[0] == 0.0:
             raise ValueError("the triangle has no area; expected three points not on a line")
         return triangles
-
-
-class Triangles(NamedTuple):
-    """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), texture coordinates (n, 6)
-    and linear sRGB colours (n, 9; -1 for none) of the vertices, each None where no triangle has
-    any; owners (n,); face, the number within its shape, of a mesh that in its file."""
-
-    vertices: FloatArray
-    normals: FloatArray | None
-    uvs: FloatArray | None
-    colours: FloatArray | None
-    owner: IntArray
-    material: IntArray
-    light: IntArray
-    face: IntArray
-
-
-def soup(
-    vertices: FloatArray,
-    place: Place,
-    normals: FloatArray | None = None,
-    uvs: FloatArray | None = None,
-    colours: FloatArray | None = None,
-    face: IntArray | None = None,
-) -> Triangles:
-    """Triangles of one shape: see `Triangles`; without numbers, `face` counts them."""
-    n = len(vertices)
-    return Triangles(
-        vertices=vertices,
-        normals=normals,
-        uvs=uvs,
-        colours=colours,
-        owner=np.full(n, place.owner),
-        material=np.full(n, place.material),
-        light=np.full(n, -1),
-        face=np.arange(n) if face is None else face,
-    )
-
-
-def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
-    """The triangles, whose vertices the map m has taken where they are, with their fronts where it
-    takes those: a mirror turns the corners' order round, and they are turned back."""
-    if not transform.mirrors(m):
-        return triangles
-    uvs = _barycentrics(triangles) if triangles.uvs is None else triangles.uvs
-    return triangles._replace(
-        vertices=_exchanged(triangles.vertices),
-        normals=None if triangles.normals is None else _exchanged(triangles.normals),
-        uvs=_exchanged(uvs),
-        colours=None if triangles.colours is None else _exchanged(triangles.colours),
-    )
-
-
-def _exchanged(corners: FloatArray) -> FloatArray:
-    """(n, 3 k): the second corner and the third in each other's place."""
-    return np.ascontiguousarray(
-        corners.reshape(len(corners), 3, -1)[:, [0, 2, 1]].reshape(corners.shape)
-    )
-
-
-def _barycentrics(triangles: Triangles) -> FloatArray:
-    """The coordinates of triangles that have none of their own (n, 6)."""
-    return np.repeat([[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]], len(triangles.face), axis=0)
-
-
-def align(parts: Sequence[Triangles]) -> list[Triangles]:
-    """Tables with the same columns: what one has, the others get."""
-    parts = list(parts)
-    if any(part.normals is not None for part in parts):
-        parts = [
-            part._replace(normals=_flat_normals(part)) if part.normals is None else part
-            for part in parts
-        ]
-    if any(part.uvs is not None for part in parts):
-        parts = [
-            part._replace(uvs=_barycentrics(part)) if part.uvs is None else part for part in parts
-        ]
-    if any(part.colours is not None for part in parts):
-        parts = [
-            part._replace(colours=np.full((len(part.face), 9), -1.0))
-            if part.colours is None
-            else part
-            for part in parts
-        ]
-    return parts
-
-
-def _flat_normals(triangles: Triangles) -> FloatArray:
-    """Each triangle's own normal at its vertices."""
-    n = geometric_normals(triangles.vertices)
-    with np.errstate(invalid="ignore"):
-        n = np.nan_to_num(n / np.linalg.norm(n, axis=1, keepdims=True))
-    return np.tile(n, 3)
-
-
-def geometric_normals(vertices: FloatArray) -> FloatArray:
-    """Normals (n, 3) of twice the area's length, of vertices (n, 9)."""
-    v = vertices.reshape(-1, 3, 3)
-    return np.asarray(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]))
-
-
-def areas(triangles: Triangles) -> FloatArray:
-    return np.asarray(0.5 * np.linalg.norm(geometric_normals(triangles.vertices), axis=1))
-
-
-def bounds(triangles: Triangles) -> Bounds:
-    """Boxes (n, 3), (n, 3): minima and maxima of vertices are exact."""
-    a, b, c = triangles.vertices.reshape(-1, 3, 3).transpose(1, 0, 2)
-    # Two at a time: along an axis of three NumPy takes ten times as long.
-    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 @kernel
@@ -170,7 +73,7 @@ def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
 def intersect_lane(
     corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
 ) -> Crossing:
-    """The same of a triangle of a leaf, see `watertight.see`."""
+    """`intersect` for a triangle of a BVH leaf, see `watertight.see`."""
     return _crossing(project_lane(corners, first, size, lane, shear, seen), shear)
 
 
@@ -182,19 +85,20 @@ def _crossing(seen: Projection, shear: Shear) -> Crossing:
 
 @kernel
 def on_line(seen: Projection, shear: Shear) -> Crossing:
-    """Where the ray's line crosses a triangle, at t of any sign."""
+    """Where the line of the ray crosses a triangle, at t of any sign."""
     if seen.side == 0:
         return miss()
     inverse = 1.0 / (seen.e0 + seen.e1 + seen.e2)
     u, v = seen.e1 * inverse, seen.e2 * inverse
-    # Edge functions times depths would overflow from sizes of 1e102 on, barycentrics do not.
+    # From sizes of 1e102 on edge functions times depths would overflow; barycentrics do not.
     t = (seen.e0 * inverse * seen.a_z + u * seen.b_z + v * seen.c_z) * shear.s_z
     return Crossing(t, u, v)
 
 
 @kernel
 def enters(triangles: Triangles, i: int, shear: Shear) -> int:
-    """+1 where the ray comes to the front of triangle i, -1 where it comes from behind."""
+    """+1 if the ray comes to triangle i from the front, -1 if it comes from behind, 0 for a
+    miss."""
     return project(triangles.vertices, i, shear).side
 
 
@@ -209,27 +113,27 @@ def normal(triangles: Triangles, i: int) -> Vec3:
     """Perpendicular to the edges, on slivers too.
 
     Products of edges a and b round by u |a| |b|, and so n's direction by some 6 u over the sine of
-    their angle: below 1/4 they are made exact.  A ray along a sliver that leaves it by what `leave`
-    takes would else come back to it.
+    their angle: for sines below 1/4 the products are made exact.  Otherwise a ray along a sliver
+    that starts off it by `SurfacePoint.error` could meet it again.
     """
     v0 = triple(triangles.vertices, i, 0)
     a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
     n = cross(a, b)
     if dot(n, n) < 0.0625 * (dot(a, a) * dot(b, b)):
-        x, _ = exactly(a.y, a.z, b.y, b.z)
-        y, _ = exactly(a.z, a.x, b.z, b.x)
-        z, _ = exactly(a.x, a.y, b.x, b.y)
+        x, _ = exact_edge_function(a.y, a.z, b.y, b.z)
+        y, _ = exact_edge_function(a.z, a.x, b.z, b.x)
+        z, _ = exact_edge_function(a.x, a.y, b.x, b.y)
         n = Vec3(x, y, z)
     return normalize(n)
 
 
 @kernel
 def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
-    """However thin the triangle is.
+    """`SurfacePoint.error`, valid however thin the triangle is.
 
-    A ray that begins next to it projects its vertices to within 7 u of their distances, at most the
-    longest edge, and names the point of the triangle that it meets to within `CANCELLED` u + 4 u of
-    that: twice the edge in `surface_error`, which has p's own rounding besides.
+    A ray that begins next to the triangle projects its vertices to within 7 u of their distances,
+    at most the longest edge, and the error of the point that it meets is `CANCELLED` u + 4 u times
+    that: twice the edge in `surface_error`, which adds the rounding of p itself.
     """
     v = triangles.vertices
     v0, v1, v2 = triple(v, i, 0), triple(v, i, 1), triple(v, i, 2)
@@ -250,7 +154,7 @@ def lift_of(triangles: Triangles, i: int, p: Vec3) -> float:
 
 @kernel
 def shading_normal(normals: FloatArray | None, i: int, u: float, v: float, n: Vec3) -> Vec3:
-    """The interpolated vertex normal made unit; `n` where there is none."""
+    """The interpolated vertex normal, normalised; `n` if there is none."""
     if normals is None:
         return n
     ns = interpolate(normals, i, u, v)
@@ -289,7 +193,7 @@ def pdf(triangles: Triangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> 
 
 @kernel
 def uv(triangles: Triangles, ray: Ray, hit: Hit) -> tuple[float, float]:
-    """The interpolated texture coordinates; without any, the barycentrics of v1 and v2."""
+    """The interpolated texture coordinates; if there are none, the barycentrics of v1 and v2."""
     return _interpolated_uv(triangles.uvs, hit)
 
 
@@ -304,7 +208,7 @@ def _interpolated_uv(uvs: FloatArray | None, hit: Hit) -> tuple[float, float]:
 
 @kernel
 def tangents(triangles: Triangles, ray: Ray, hit: Hit) -> Tangents:
-    """Those of texture coordinates without area are any."""
+    """Any tangents if the triangle has no area in texture coordinates."""
     i = hit.row
     v0 = triple(triangles.vertices, i, 0)
     a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
@@ -319,7 +223,7 @@ def _tangents_of_uv(uvs: FloatArray | None, i: int, a: Vec3, b: Vec3, n: Vec3) -
     w = uvs[i]
     du_a, dv_a, du_b, dv_b = w[2] - w[0], w[3] - w[1], w[4] - w[0], w[5] - w[1]
     x, y = du_a * dv_b, dv_a * du_b
-    # Differences and products round x and y by 3 u each, and their difference by another.
+    # Differences and products round x and y by 3 u each, and their difference rounds by u.
     if abs(x - y) <= 4.0 * UNIT_ROUNDOFF * (abs(x) + abs(y)):
         return any_tangents(n)
     inverse = 1.0 / (x - y)
@@ -331,7 +235,7 @@ def _tangents_of_uv(uvs: FloatArray | None, i: int, a: Vec3, b: Vec3, n: Vec3) -
 
 @kernel
 def colour(triangles: Triangles | None, hit: Hit, without: Vec3) -> Vec3:
-    """The interpolated colour of the vertices; `without` any, that."""
+    """The interpolated colour of the vertices; `without` if there are none."""
     if triangles is None:
         return without
     return _interpolated_colour(triangles.colours, hit, without)
@@ -350,3 +254,28 @@ def _interpolated_colour(colours: FloatArray | None, hit: Hit, without: Vec3) ->
 def face_of(triangles: Triangles, hit: Hit) -> int:
     """The number of the triangle in its mesh."""
     return int(triangles.face[hit.row])
+
+
+__all__ = [
+    "Triangle",
+    "Triangles",
+    "align",
+    "areas",
+    "bounds",
+    "colour",
+    "enters",
+    "error_at",
+    "face_of",
+    "interpolate",
+    "intersect",
+    "intersect_lane",
+    "lift_of",
+    "normal",
+    "on_line",
+    "pdf",
+    "sample",
+    "shading_normal",
+    "surface",
+    "tangents",
+    "uv",
+]

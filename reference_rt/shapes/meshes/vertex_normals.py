@@ -1,7 +1,7 @@
-"""Vertex normals of triangles that have none: the normals of the faces around a vertex, each
-weighted with the face's angle there (Thürmer & Wüthrich 1998, "Computing vertex normals from
-polygonal facets", Journal of Graphics Tools 3(1)).  How finely a surface is cut into triangles does
-not change them, as it would with weights of area or with none.
+"""Vertex normals for meshes without any: the mean normal of the faces around a vertex, weighted by
+each face's angle there (Thürmer & Wüthrich 1998, "Computing vertex normals from polygonal facets",
+Journal of Graphics Tools 3(1)).  Unlike with weights of area, or equal ones, the result does not
+depend on how a surface is cut into triangles.
 """
 
 from typing import Any
@@ -14,20 +14,20 @@ from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.shapes.meshes.topology import number_rows
 
 TERM = 16
-"""Roundings, at most, of what a face adds to a sum: its normal's direction, made unit, takes ten,
-its angle three, their product one."""
+"""The most roundings of a face's term of a sum: ten of its unit normal, three of its angle, one of
+their product."""
 
 
 def smooth_normals(vertices: FloatArray, faces: IntArray, uv: FloatArray | None) -> FloatArray:
-    """Unit normals (m, 9) of the corners of faces (m, 3), from positions (n, 3).
+    """Unit normals (m, 9) at the corners of faces (m, 3), from positions (n, 3).
 
     Vertices of the same position and texture coordinates uv (n, 2) are one: files repeat a vertex
     for each face (.stl does), but along a seam of the texture the two sides have normals of their
-    own, as Mitsuba and trimesh make them.
+    own, as in Mitsuba and trimesh.
 
     A face without area adds nothing.  Where the normals of a vertex cancel, as on two sides of a
-    sheet, and where no face around it has an area, each face has its own normal there; (0, 0, 1)
-    where that has no area either.
+    sheet, and where no face around it has an area, each corner has the normal of its own face, or
+    (0, 0, 1) if that has no area either.
     """
     number, firsts = number_rows(vertices if uv is None else np.column_stack([vertices, uv]))
     vertex = number[faces]
@@ -38,7 +38,7 @@ def smooth_normals(vertices: FloatArray, faces: IntArray, uv: FloatArray | None)
     sums = np.stack([_summed(vertex, terms[:, :, k], len(firsts)) for k in range(3)], axis=1)
     total = _summed(vertex, weights, len(firsts))
     count = _summed(vertex, np.ones(vertex.shape), len(firsts))
-    # A sum of k terms is off by k - 1 roundings of the sum of their sizes, and by those of each.
+    # The error of a sum of k terms: k - 1 roundings of the sum of their sizes, and those of each.
     error = UNIT_ROUNDOFF * (count + TERM) * total
     smooth = np.linalg.norm(sums, axis=1) > error
     own = np.where(has_area[:, None], n, [0.0, 0.0, 1.0])
@@ -47,7 +47,7 @@ def smooth_normals(vertices: FloatArray, faces: IntArray, uv: FloatArray | None)
 
 
 def unit(vectors: FloatArray) -> FloatArray:
-    """(n, 3) vectors made unit, however long they are; 0 stays 0."""
+    """(n, 3) vectors, of any length, normalised; 0 stays 0."""
     largest = np.abs(vectors).max(axis=1, keepdims=True)
     scaled = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0.0)
     length = np.linalg.norm(scaled, axis=1, keepdims=True)
@@ -62,7 +62,7 @@ def _summed(vertex: IntArray, values: FloatArray, count: int) -> FloatArray:
 
 def _normals_and_angles(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Unit normals (m, 3), 0 without area, and the angles (m, 3) at the corners (m, 3, 3)."""
-    # Powers of two, which are exact, keep differences and products within float64's range.
+    # Scaled by powers of two, which is exact, so that no difference or product overflows.
     corners = _near_one(corners)
     edges = _near_one(np.roll(corners, -1, axis=1) - corners)  # from each corner to the next
     a, b = edges[:, 0], -edges[:, 2]
@@ -75,13 +75,13 @@ def _normals_and_angles(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _near_one(rows: FloatArray) -> FloatArray:
-    """(m, 3, 3), each of the m times the power of two that makes its largest number about 1."""
+    """(m, 3, 3), each of the m scaled by a power of two so that its largest number is about 1."""
     _, exponent = np.frexp(np.abs(rows).max(axis=(1, 2)))
     return np.asarray(np.ldexp(rows, -exponent[:, None, None]))
 
 
 def _determinant(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
-    """a d - b c to within two roundings, on slivers too, whose two products nearly cancel."""
+    """a d - b c to within two roundings, also for slivers, whose two products nearly cancel."""
     x, y = a * d, b * c
     return np.asarray((x - y) + (_lost(a, d, x) - _lost(b, c, y)))
 

@@ -1,4 +1,4 @@
-"""A triangle as a ray sees it: edge functions that decide every ray, those through edges too."""
+"""Watertight ray-triangle test: edge functions in ray space, exact for rays through edges too."""
 
 from typing import Any, NamedTuple
 
@@ -12,8 +12,8 @@ from reference_rt.shapes.rounding import product_error
 
 
 class Shear(NamedTuple):
-    """A ray turned so that its direction is the unit z axis: the axes permuted to x y z, and the
-    shear that remains (Woop, Benthin & Wald 2013, JCGT 2(1))."""
+    """The transform to ray space, where the direction is the unit z axis: the axes permuted to x y
+    z, the origin, and the shear (Woop, Benthin & Wald 2013, JCGT 2(1))."""
 
     x: int
     y: int
@@ -28,7 +28,7 @@ class Shear(NamedTuple):
 
 @kernel
 def shear_of(ray: Ray) -> Shear:
-    """Once per ray: the largest axis of d becomes z; x and y swap to keep the winding."""
+    """Computed once per ray: the largest axis of d becomes z; x and y swap to keep the winding."""
     z = 2
     if abs(ray.d.x) >= abs(ray.d.y) and abs(ray.d.x) >= abs(ray.d.z):
         z = 0
@@ -52,16 +52,17 @@ def shear_of(ray: Ray) -> Shear:
 
 
 CANCELLED = 16.0
-"""How many times larger than a triangle's area the products may be that it is the sum of.
+"""The largest ratio of the products of edge functions to the triangle's projected area, their sum,
+at which the rounded edge functions are used.
 
-They round by u each, and so barycentrics by CANCELLED u: the point that they name is off by that
-share of the triangle as the ray sees it.  Where more is cancelled, on slivers and grazing rays, it
-would be off by up to the whole of it."""
+The products round by u each, and so the barycentrics by CANCELLED u: the error of the point is this
+fraction of the projected triangle.  Where more digits cancel, on slivers and for grazing rays, the
+error could be as large as the triangle."""
 
 
 class Projection(NamedTuple):
-    """A triangle as a ray sees it: its edge functions, whose sum is twice its area, and the depths
-    of its vertices; side, 0 where the ray passes by, else 1 at the front and -1 from behind."""
+    """A triangle in ray space: its edge functions, whose sum is twice its area, and the depths of
+    its vertices; side: 0 for a miss, 1 if the ray comes from the front, -1 from behind."""
 
     side: int
     e0: float
@@ -74,7 +75,7 @@ class Projection(NamedTuple):
 
 @kernel
 def project(vertices: FloatArray, i: int, shear: Shear) -> Projection:
-    """The triangle in row i of `vertices` (n, 9), seen along a ray."""
+    """The triangle in row i of `vertices` (n, 9), in ray space."""
     return _project(vertices.reshape(-1), 9 * i, 1, shear)
 
 
@@ -82,7 +83,7 @@ def project(vertices: FloatArray, i: int, shear: Shear) -> Projection:
 def project_lane(
     corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
 ) -> Projection:
-    """A triangle of a leaf, of which `see` has left what it can, seen along a ray."""
+    """A triangle of a BVH leaf, in ray space;  seen: the results that `see` has stored."""
     if seen[_DOUBT + lane] == 0.0:
         e0 = seen[lane]
         side = 1 if e0 > 0.0 else -1
@@ -97,10 +98,10 @@ def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection
     """The triangle whose nine coordinates are v[start], v[start + stride], ... (Woop, Benthin &
     Wald 2013).
 
-    Each vertex is projected by arithmetic of its own, and two neighbours' edge functions differ in
-    sign alone.  Products round monotonically: a difference that is not 0 has the right sign.  Where
-    it is 0, `exactly` decides: of the triangles around an edge or a vertex that a ray passes
-    through, it passes through exactly those that it would pass through a hair beside it.
+    The projection of a vertex does not depend on the triangle, and the edge functions of two
+    neighbours differ only in sign.  Products round monotonically: a difference that is not 0 has
+    the right sign.  Where it is 0, `exact_edge_function` decides: a ray through a shared edge or
+    vertex meets exactly those of the triangles around it that it would meet a hair beside it.
     """
     x, y, z = start + stride * shear.x, start + stride * shear.y, start + stride * shear.z
     a_z = v[z] - shear.o_z
@@ -124,13 +125,13 @@ def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection
     if side != 0:
         size = abs(left0) + abs(right0) + abs(left1) + abs(right1) + abs(left2) + abs(right2)
         if size > CANCELLED * abs(e0 + e1 + e2):
-            e0, _ = exactly(c_x, c_y, b_x, b_y)
-            e1, _ = exactly(a_x, a_y, c_x, c_y)
-            e2, _ = exactly(b_x, b_y, a_x, a_y)
+            e0, _ = exact_edge_function(c_x, c_y, b_x, b_y)
+            e1, _ = exact_edge_function(a_x, a_y, c_x, c_y)
+            e2, _ = exact_edge_function(b_x, b_y, a_x, a_y)
     elif e0 == 0.0 or e1 == 0.0 or e2 == 0.0:
-        e0, s0 = exactly(c_x, c_y, b_x, b_y)
-        e1, s1 = exactly(a_x, a_y, c_x, c_y)
-        e2, s2 = exactly(b_x, b_y, a_x, a_y)
+        e0, s0 = exact_edge_function(c_x, c_y, b_x, b_y)
+        e1, s1 = exact_edge_function(a_x, a_y, c_x, c_y)
+        e2, s2 = exact_edge_function(b_x, b_y, a_x, a_y)
         side = s0 if s0 == s1 and s1 == s2 else 0
     return Projection(side, e0, e1, e2, a_z, b_z, c_z)
 
@@ -154,8 +155,8 @@ def _see(
     s_y: Any,
     seen: Any,
 ) -> Any:
-    """`_project` of the triangles of a leaf, by the same operations, and where it takes more than
-    these; those whose edge functions do not differ in sign."""
+    """`_project` for the triangles of a BVH leaf, by the same operations, without the exact cases:
+    stores which triangles need these.  Returns those whose edge functions do not differ in sign."""
     x, y, z = start + x * size, start + y * size, start + z * size
     a_z = corners.load(z) - o_z
     b_z = corners.load(z + 3 * size) - o_z
@@ -184,12 +185,13 @@ def _see(
 
 @kernel
 def see(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArray) -> int:
-    """The triangles of a leaf, as bits, that `project_lane` may find met: all that are, and some on
-    whose edges the ray passes;  seen (SEEN_FLOATS,): what it need not do again.
+    """Projects the triangles of a BVH leaf in SIMD.  Returns, as bits, for which of them
+    `project_lane` must be called: all that the ray meets, and some whose edges it passes through;
+    seen (`SEEN_FLOATS`,): where the results are stored for that.
 
-    The vertices of references first .. first + size, LANES at most, lie in `corners` from 9 first
-    on: the first coordinate of each, the second of each, and so on.  What follows the last one's
-    takes up the lanes that are left.
+    The vertices of references first .. first + size, VECTOR_WIDTH at most, are in `corners` from 9
+    first on: the first coordinate of each, the second of each, and so on.  Lanes beyond the last
+    reference read the numbers that follow, and are ignored.
     """
     met = _see(
         corners,
@@ -209,11 +211,11 @@ def see(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArr
 
 
 @kernel
-def exactly(p_x: float, p_y: float, q_x: float, q_y: float) -> tuple[float, int]:
-    """The edge function p_x q_y - p_y q_x to within one rounding, and its sign, which is right.
+def exact_edge_function(p_x: float, p_y: float, q_x: float, q_y: float) -> tuple[float, int]:
+    """The edge function p_x q_y - p_y q_x to within one rounding, and its exact sign.
 
-    On the edge it is that beside the edge, as if the ray were moved by (h, h²) for an h above 0 and
-    below everything else: 0 only for an edge without length.
+    On the edge it is the sign beside the edge, as if the ray were moved by (h, h²) for an
+    infinitesimal h > 0 (simulation of simplicity): 0 only for an edge without length.
     """
     left, right = p_x * q_y, p_y * q_x
     e = left - right + (product_error(p_x, q_y, left) - product_error(p_y, q_x, right))

@@ -12,7 +12,10 @@ from reference_rt.core.model import Description
 from reference_rt.shapes.csg import Solid
 from reference_rt.textures.texture import UvMap
 
-BASES = {"Camera", "CentralCamera", "Filter", "Material", "Shape", "Solid", "Texture", "Wrapper"}
+BASES = {
+    *("Camera", "CentralCamera", "Filter", "Shape", "Solid", "Texture"),
+    *("Material", "Coated", "Metal", "Transparent", "Wrapper"),
+}
 BALLS = [{"type": "sphere"}, {"type": "box", "transform": [{"scale": 0.5}]}]
 REQUIRED = {
     "ThinLens": {"aperture_radius": 0.25},

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference_rt.core.vec3 import Vec3, dot
-from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, evaluate, sample
+from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, both, sample
 from reference_rt.materials.microfacet.fresnel import MOST_INDEX, fresnel, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import bend, half_vector, refract
 from reference_rt.sampling.warp import uniform_sphere
@@ -105,7 +105,7 @@ def test_refracted_directions_are_unit_and_obey_snell(up, phi, n, side):
 @pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
 def test_glass_that_hardly_bends(index, distribution):
     """Directions pass as good as straight, with a weight that only the masking takes from; and
-    samples are found again by `evaluate`."""
+    samples are found again by `both`."""
     material = RoughDielectric.model_validate(
         {
             "type": "rough_dielectric",
@@ -124,7 +124,7 @@ def test_glass_that_hardly_bends(index, distribution):
             assert found.pdf > 0.0
             assert dot(found.wi, -wo) > 1.0 - 1e-7
             assert 0.9 < found.weight.x <= 1.0 + abs(index - 1.0) * 4.0
-            value = evaluate(table, 0, AT, wo, found.wi).x
+            value = both(table, 0, AT, wo, found.wi).value.x
             # A direction tells the half vector's slope to u / |n - 1|, D to 14 / alpha of it.
             off = 4 * 14.0 / 0.2 * U / abs(index - 1.0)
             assert value == pytest.approx(found.weight.x * found.pdf, rel=32 * U + off)

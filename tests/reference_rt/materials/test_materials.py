@@ -125,8 +125,8 @@ def test_diffuse_sample_evaluate_and_pdf_agree(cosine, u0, u1):
     table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate(NO_TEXTURES)
     wo = towards(cosine, 0.3)
     drawn = diffuse.sample(table, 0, AT, wo, 0.5, u0, u1)
-    value = diffuse.evaluate(table, 0, AT, wo, drawn.wi)
-    assert drawn.pdf == diffuse.pdf(table, 0, AT, wo, drawn.wi)
+    value, density = diffuse.both(table, 0, AT, wo, drawn.wi)
+    assert drawn.pdf == density
     assert not drawn.is_delta
     for k in range(3):
         assert value[k] == pytest.approx(drawn.weight[k] * drawn.pdf, rel=4 * U)
@@ -138,11 +138,13 @@ def test_diffuse_is_one_sided_and_reciprocal(a, b):
     table = rt.Diffuse().tabulate(NO_TEXTURES)
     wo, wi = towards(a, 0.3), towards(b, 2.0)
     below = Vec3(wi.x, wi.y, -wi.z)
-    assert diffuse.evaluate(table, 0, AT, wo, below) == (0.0, 0.0, 0.0)
-    assert diffuse.evaluate(table, 0, AT, below, wo) == (0.0, 0.0, 0.0)
-    assert diffuse.pdf(table, 0, AT, wo, below) == diffuse.pdf(table, 0, AT, below, wo) == 0.0
+    assert diffuse.both(table, 0, AT, wo, below) == ((0.0, 0.0, 0.0), 0.0)
+    assert diffuse.both(table, 0, AT, below, wo) == ((0.0, 0.0, 0.0), 0.0)
     assert diffuse.sample(table, 0, AT, below, 0.5, 0.5, 0.5).pdf == 0.0
-    there, back = diffuse.evaluate(table, 0, AT, wo, wi).x, diffuse.evaluate(table, 0, AT, wi, wo).x
+    there, back = (
+        diffuse.both(table, 0, AT, wo, wi).value.x,
+        diffuse.both(table, 0, AT, wi, wo).value.x,
+    )
     assert there / wi.z == pytest.approx(back / wo.z, rel=4 * U)
 
 
@@ -150,7 +152,7 @@ def test_diffuse_reflects_its_reflectance():
     """The integral of f cos over the hemisphere, by the midpoint rule in cos and phi."""
     table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate(NO_TEXTURES)
     ticks = (np.arange(64) + 0.5) / 64
-    values = [diffuse.evaluate(table, 0, AT, Vec3(0, 0, 1), towards(c, 0.0)) for c in ticks]
+    values = [diffuse.both(table, 0, AT, Vec3(0, 0, 1), towards(c, 0.0)).value for c in ticks]
     # Linear in the cosine: the midpoint rule is exact.
     assert 2 * math.pi * np.mean(values, axis=0) == pytest.approx((0.1, 0.5, 0.9), rel=1e-14)
 

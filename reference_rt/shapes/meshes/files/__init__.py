@@ -1,12 +1,19 @@
 """Mesh files: `read_mesh` reads one and checks it; one module per format.
 
-Readers of our own where trimesh would change what a file says without a word: it takes cut .stl
-and .off files for whole or empty ones, gives a vertex of an .obj one normal for all of its faces
-and leaves out faces that do not exist, refuses binary .ply files of mixed polygons, and fills what
-a .gltf file only promises with zeros, however much that is.  It reads every other format.
+A reader takes the content of a file, and its folder, and returns a `RawMesh`: arrays as the file
+has them, polygons cut into triangles, and the names of what it ignored.  It raises ValueError with
+the line or the element at fault.  Indices, finiteness and lengths are checked for all formats
+alike, in `data.checked`.
 
-A file is read as data and nothing else: it runs nothing, and nothing that it names is opened, but
-the buffers of a .gltf file beside it.
+Readers of our own where trimesh would silently change a file's content: it takes cut .stl and .off
+files for whole or empty ones, gives a vertex of an .obj one normal for all of its faces and leaves
+out faces that do not exist, refuses binary .ply files of mixed polygons, and fills missing data of
+a .gltf file with zeros, however much that is.  It reads every other format.
+
+Reading a file runs no code, and opens no file that it names, except buffers of a .gltf file in its
+folder.
+
+To add a format: a module with `read`, a line in `_READERS`, a row in the tests of damaged files.
 """
 
 from collections.abc import Callable
@@ -41,7 +48,7 @@ def read_mesh(path: Path) -> MeshData:
     if reader is None and (reader := other.reader(suffix)) is None:
         known = ", ".join([*_READERS, *other.suffixes()])
         raise ValueError(f"mesh {path}: '{suffix}' is not supported; expected one of {known}")
-    with np.errstate(all="ignore"):  # what overflows, and what is NaN, is found by the checks
+    with np.errstate(all="ignore"):  # the checks find overflow and NaN
         raw = _parsed(path, reader, content)
         try:
             return checked(raw)
@@ -55,7 +62,7 @@ def _parsed(path: Path, reader: Reader, content: bytes) -> RawMesh:
     except MemoryError:
         raise ValueError(f"mesh {path}: it does not fit into memory") from None
     except Exception as error:
-        # Whatever parsing stumbles over, deep inside libraries, too, means a malformed file.
+        # Any error of parsing, also one raised inside a library, means a malformed file.
         detail = (str(error).splitlines() or [""])[0][:200]
         if not isinstance(error, ValueError):
             detail = f"{type(error).__name__} {detail}"

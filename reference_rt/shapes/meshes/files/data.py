@@ -1,4 +1,4 @@
-"""What every mesh file is read into, and the checks that all of them share."""
+"""`MeshData`, which every mesh file is read into, and the checks for all formats."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -12,12 +12,12 @@ from reference_rt.core.diagnosis import FieldError
 
 @dataclass(frozen=True, eq=False)
 class MeshData:
-    """A checked mesh.  What the file does not give for every vertex is None.
+    """A checked mesh.  A property that the file does not have for every vertex is None.
 
     Triangles are numbered in the order of the file, those of a polygon one after the other; those
-    without area are among them.  A vertex that differs in normal, uv or colour from
-    face to face is several vertices.  Polygons are fans about their first corner: exact for convex
-    ones; a concave one's fan may cover area outside of it.
+    without area are included.  A vertex whose normal, uv or colour differs between faces is several
+    vertices.  Polygons become fans about their first corner: exact for convex ones; the fan of a
+    concave one may cover area outside of it.
     """
 
     vertices: FloatArray
@@ -31,11 +31,11 @@ class MeshData:
     colours: FloatArray | None = None
     """(n, 3) linear sRGB, finite, not negative."""
     ignored: tuple[str, ...] = ()
-    """Names of what the file has besides, as the format calls it."""
+    """Names of ignored parts of the file, as the format calls them."""
 
 
 class RawMesh(NamedTuple):
-    """`MeshData` as a reader finds it, before the checks: normals of any length."""
+    """`MeshData` as a reader returns it, before the checks: normals of any length."""
 
     vertices: npt.NDArray[Any]
     faces: npt.NDArray[Any]
@@ -46,7 +46,7 @@ class RawMesh(NamedTuple):
 
 
 def checked(mesh: RawMesh) -> MeshData:
-    """Raises FieldError, whose text is the rest of a line that begins with the file's name."""
+    """Checks a mesh.  Raises FieldError, whose text follows the file's name in a message."""
     if len(mesh.vertices) == 0 or len(mesh.faces) == 0:
         field = "faces" if len(mesh.vertices) else "vertices"
         raise FieldError(field, " is empty; expected vertices and faces")
@@ -106,7 +106,8 @@ def _unit(normals: npt.NDArray[Any] | None) -> FloatArray | None:
 def fans(corners: npt.NDArray[Any], counts: IntArray) -> npt.NDArray[Any]:
     """Triangles (m, 3) of polygons: a fan about the first corner of each.
 
-    `corners`: the indices of all polygons, one after the other; `counts`: how many each has.
+    `corners`: the indices of all polygons, one after the other; `counts`: the number of corners of
+    each.
     """
     if len(counts) and counts.min() < 3:
         bad = int(np.argmin(counts >= 3))
@@ -119,7 +120,7 @@ def fans(corners: npt.NDArray[Any], counts: IntArray) -> npt.NDArray[Any]:
 
 
 def ramps(counts: IntArray) -> IntArray:
-    """0 1 2 ... up to each count, one after the other."""
+    """0, 1, ..., count - 1 for each count, one after the other."""
     return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 

@@ -1,8 +1,8 @@
 """glTF 2.0 (ISO/IEC 12113), .gltf and .glb: the triangles of its scene, as one mesh.
 
-Read are POSITION, NORMAL, TEXCOORD_0 and COLOR_0 (linear, as the format has it), at rest: without
-animations, skins and morphing.  Points, lines, materials, images and all else are ignored, and
-named.  A buffer may be a file, in the mesh's folder or below it.
+It reads POSITION, NORMAL, TEXCOORD_0 and COLOR_0 (linear, as the format says), without animations,
+skins and morphing.  It ignores points, lines, materials, images and everything else, and names
+them.  A buffer may be a file, in the mesh's folder or below it.
 """
 
 import base64
@@ -27,7 +27,7 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # points and lines are 0 to 3
 _READ = ("POSITION", "NORMAL", "TEXCOORD_0", "COLOR_0")
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 
-# What may be required although it is not known here: it does not change the shape.
+# Extensions that a file may require although they are unknown here: they do not change the shape.
 _HARMLESS = (
     "KHR_materials_",
     "KHR_texture_",
@@ -115,7 +115,7 @@ class _File:
                         self.has_lines = True
 
     def ignored(self) -> tuple[str, ...]:
-        """What the file has besides its parts, as far as it changes what is seen."""
+        """Ignored parts of the file that would change the image."""
         names = [key for key in ("materials", "animations", "skins") if self.root.get(key)]
         return (*names, *(["points or lines"] if self.has_lines else []))
 
@@ -147,7 +147,8 @@ class _File:
         return RawMesh(points, faces, normals, uv, rgb, tuple(map(str, ignored)))
 
     def accessor(self, index: Any, widths: tuple[int, ...], fraction: bool = False) -> Rows:
-        """Rows (count, one of `widths`); fraction: integers are those of [0, 1] or [-1, 1]."""
+        """Rows (count, one of `widths`); fraction: integers stand for numbers of [0, 1] or [-1,
+        1]."""
         accessor = self.item("accessors", index)
         if "sparse" in accessor or "bufferView" not in accessor:
             raise ValueError(
@@ -217,12 +218,12 @@ def _faces(corners: npt.NDArray[np.int64], mode: int) -> npt.NDArray[Any]:
     if mode == _FAN:
         return fans(corners, np.array([len(corners)]))
     i = np.arange(len(corners) - 2)
-    odd = i % 2  # every other triangle of a strip is turned
+    odd = i % 2  # every other triangle of a strip has the reverse winding
     return np.stack([corners[i], corners[i + 1 + odd], corners[i + 2 - odd]], axis=1)
 
 
 def _local(node: dict[str, Any]) -> transform.Affine:
-    """A node's map to its parent: a matrix, by columns; or scaled, turned, moved."""
+    """A node's map to its parent: a matrix, by columns; or a scale, a rotation, a translation."""
 
     def vector(key: str, default: list[float]) -> npt.NDArray[np.float64]:
         found = np.array(node.get(key, default), np.float64)

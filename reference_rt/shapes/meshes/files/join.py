@@ -1,4 +1,4 @@
-"""The parts of a scene file as one mesh."""
+"""Joins the parts of a scene file to one mesh."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -11,15 +11,16 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes.meshes.files.data import RawMesh
 
 LIMIT = 2**24
-"""Vertices, and triangles: about 1 GB.  A small file can name the same part any number of times,
-and must not fill the memory."""
+"""The most vertices, and triangles: about 1 GB.  A small file can name the same part any number of
+times and must not fill the memory."""
 
 
 def joined(parts: Iterable[tuple[RawMesh, transform.Affine]]) -> RawMesh:
     """Parts, each with its map (3, 4) to the scene.
 
-    Normals, uv and colours that not all parts have are ignored.  A map that mirrors turns the
-    winding, so that the front stays outside.  Raises ValueError for indices beyond their own part.
+    Normals, uv and colours that not all parts have are ignored.  For a map that flips orientation
+    the winding is reversed, so that the front stays outside.  Raises ValueError for indices beyond
+    their own part.
     """
     vertices, faces, n_vertices, n_faces = [], [], 0, 0
     others: dict[str, list[npt.NDArray[Any] | None]] = {"normals": [], "uv": [], "colours": []}

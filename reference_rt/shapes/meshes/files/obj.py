@@ -1,8 +1,8 @@
 """Wavefront .obj (Advanced Visualizer manual, appendix B1): polygons of v, vt and vn.
 
 Vertex colours, `v x y z r g b`, are no part of the format but widely written, from 0 to 1 and as
-displayed (by Blender, MeshLab and three.js): they are taken as sRGB-encoded.  All groups and
-objects are one mesh.  Materials, lines, points, curves and all else are ignored, and named.
+displayed (by Blender, MeshLab and three.js): they are read as sRGB-encoded.  All groups and objects
+are one mesh.  Materials, lines, points, curves and everything else are ignored, and named.
 """
 
 import math
@@ -20,14 +20,14 @@ Triple = tuple[int, int, int]
 _WIDTHS = {b"v": 3, b"vt": 2, b"vn": 3}
 
 _NAMES_ONLY = (b"", b"g", b"o")
-"""Without a meaning for the surface: blank lines, names of groups and objects."""
+"""Lines that do not change the surface: blank ones, names of groups and objects."""
 
 
 class _Corners(dict[bytes, int]):
-    """The number of the vertex that a corner means, by its text: "v", "v/vt", "v//vn", "v/vt/vn".
+    """The index of a corner's vertex, by the corner's text: "v", "v/vt", "v//vn", "v/vt/vn".
 
-    `rows`: the numbers of the v, vt and vn lines so far; `triples`: indices into these, from 0 and
-    -1 for none, of each vertex in the order of their numbers.
+    `rows`: the values of the v, vt and vn lines so far; `triples`: for each vertex, in the order of
+    their indices, the indices into these, from 0 and -1 for none.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class _Corners(dict[bytes, int]):
             self._index(vn, b"vn") if vn else -1,
         )
         number = self.triples.setdefault(triple, len(self.triples))
-        if b"-" not in text:  # what a negative index means depends on where it stands
+        if b"-" not in text:  # a negative index counts back from its own line
             self[text] = number
         return number
 
@@ -63,7 +63,8 @@ class _Corners(dict[bytes, int]):
 def read(content: bytes) -> RawMesh:
     """Vertices are numbered in the order of their first use; unused ones are left out.
 
-    An index counts the lines before it.  Normals, uv and colours that not all have are ignored.
+    An index may only refer to lines before it.  Normals and uv that not all corners have, and
+    colours that not all vertices have, are ignored.
     """
     vertex_of = _Corners()
     rows = vertex_of.rows
@@ -103,7 +104,7 @@ def read(content: bytes) -> RawMesh:
     positions, uv, normals = (_table(rows[kind], width) for kind, width in _WIDTHS.items())
     rgb = _table(colours, 3)
     if len(normals) and np.all(vn >= 0):
-        others.pop("s (smoothing groups)", None)  # the normals say the same
+        others.pop("s (smoothing groups)", None)  # the normals contain them
     for name, table, complete in (
         ("vn of some corners", normals, np.all(vn >= 0)),
         ("vt of some corners", uv, np.all(vt >= 0)),
@@ -128,7 +129,7 @@ def _keyword(kind: bytes) -> str:
 
 
 def _logical_lines(content: bytes) -> Iterable[tuple[int, bytes]]:
-    """The lines and their numbers; a backslash at its end continues a line on the next."""
+    """The lines and their numbers; a line that ends with a backslash continues on the next."""
     lines = enumerate(content.splitlines(), start=1)
     return _continued(lines) if b"\\" in content else lines
 
@@ -136,7 +137,7 @@ def _logical_lines(content: bytes) -> Iterable[tuple[int, bytes]]:
 def _continued(lines: Iterable[tuple[int, bytes]]) -> Iterator[tuple[int, bytes]]:
     begun, first = list[bytes](), 0
     for number, line in lines:
-        text = line.partition(b"#")[0].rstrip()  # a comment does not go on
+        text = line.partition(b"#")[0].rstrip()  # a comment does not continue
         first = first or number
         goes_on = text.endswith(b"\\")
         begun.append(text[:-1] if goes_on else text)

@@ -1,5 +1,5 @@
-"""Object files, .off (Geomview): polygons in ascii.  Of COFF, NOFF, STOFF only the positions are
-read; colours, normals and texture coordinates are ignored, and named."""
+"""Object files, .off (Geomview): polygons in ascii.  Of COFF, NOFF and STOFF files only the
+positions are read; colours, normals and texture coordinates are ignored, and named."""
 
 import re
 from array import array
@@ -14,7 +14,7 @@ from reference_rt.shapes.meshes.files.data import RawMesh, fans
 def read(content: bytes) -> RawMesh:
     lines = _lines(content)
     number, words = next(lines, (1, [b""]))
-    # Not 4OFF and nOFF: they have other coordinates than x y z.
+    # Not 4OFF and nOFF, whose coordinates are not x y z.
     if not re.fullmatch(rb"(ST)?C?N?OFF", words[0]):
         raise ValueError("expected 'OFF' as its first word")
     kind = _kind(words[0])
@@ -64,14 +64,14 @@ def read(content: bytes) -> RawMesh:
 
 
 def _kind(word: bytes) -> str:
-    """What the first word of a file says that its vertices have besides positions."""
+    """The properties of vertices besides positions, according to the first word of the file."""
     letters = {b"ST": "texture coordinates", b"C": "colours", b"N": "normals"}
     found = [what for letter, what in letters.items() if letter in word.removesuffix(b"OFF")]
     return " and ".join(found) or "further numbers"
 
 
 def _lines(content: bytes) -> Iterator[tuple[int, list[bytes]]]:
-    """The words of each line that has any, and its number."""
+    """The number and the words of each line that is not blank."""
     for number, line in enumerate(content.splitlines(), start=1):
         if words := line.partition(b"#")[0].split():
             yield number, words

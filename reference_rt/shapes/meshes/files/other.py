@@ -1,7 +1,8 @@
-"""Formats that trimesh reads, where what it needs for them is installed (.3mf: lxml, networkx).
+"""Formats that trimesh reads, if the packages that it needs for them are installed (.3mf: lxml,
+networkx).
 
-Positions and triangles, in the scene that the file describes; no normals, uv or colours (these two
-are named as ignored).
+It reads positions and triangles, in the scene that the file describes, without normals, uv and
+colours (the last two are named as ignored).
 """
 
 import io
@@ -16,11 +17,11 @@ from reference_rt.core import transform
 from reference_rt.shapes.meshes.files.data import RawMesh
 from reference_rt.shapes.meshes.files.join import joined
 
-# Read here, or without surfaces.
+# Formats with readers of our own, or without surfaces.
 _LEFT_OUT = {"obj", "ply", "stl", "stl_ascii", "off", "gltf", "glb", "xyz"}
 
 UNPACKED = 2**28
-"""Bytes that an archive may unpack to: as text, some millions of triangles."""
+"""The most bytes that an archive may unpack to: as text, some millions of triangles."""
 
 
 def suffixes() -> list[str]:
@@ -30,7 +31,7 @@ def suffixes() -> list[str]:
 
 
 def reader(suffix: str) -> Callable[[bytes, Path], RawMesh] | None:
-    """What reads files with this suffix, if anything does."""
+    """The reader of files with this suffix; None if there is none."""
     if suffix not in suffixes():
         return None
     return lambda content, folder: joined(_parts(content, suffix[1:]))
@@ -47,7 +48,7 @@ def _parts(content: bytes, kind: str) -> Iterator[tuple[RawMesh, transform.Affin
     file.seek(0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        # The resolver finds no other file, whichever the content asks for.
+        # With this resolver no other file is opened, whatever the content names.
         scene = trimesh.load(file, file_type=kind, resolver={}, force="scene", process=False)
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]

@@ -1,12 +1,12 @@
 """Polygon files, .ply (Turk 1994): ascii, binary of both byte orders, any mixture of polygons.
 
-Read are the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u texture_v) and a
-colour, and the element `face` with its list vertex_indices or vertex_index; all else is ignored,
-and named.  A colour is red green blue, or r g b; or diffuse_red and so on; or as Mitsuba writes it,
-color_0 color_1 color_2, and in the other forms that it reads, color_r and vertex_color_x among
-them.  Of several it is the first in this order.  Colours of integers are sRGB-encoded, 255 or 65535
-being 1: as displayed, which is what scanners and modellers write.  Colours of floats are linear: as
-computed.
+It reads the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u texture_v) and a
+colour, and the element `face` with its list vertex_indices or vertex_index; everything else is
+ignored, and named.  A colour is red green blue, or r g b; or diffuse_red and so on; or as Mitsuba
+writes it, color_0 color_1 color_2, and in the other forms that it reads, color_r and vertex_color_x
+among them; the first of these that the file has.  Colours of integers are sRGB-encoded, 255 or
+65535 being 1: as displayed, which is what scanners and modellers write.  Colours of floats are
+linear: as computed.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from reference_rt.shapes.meshes.files.ply_body import (
     numbers,
 )
 
-# Both sets of names that are in use.
+# Both sets of names are in use.
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
     "float": "f4", "double": "f8",
@@ -57,7 +57,7 @@ class Header(NamedTuple):
 
 
 def read(content: bytes) -> RawMesh:
-    """Numbers of ascii files are read as float64, whatever float type the header names."""
+    """Reads numbers of ascii files as float64, whatever float type the header names."""
     header = _header(content)
     ascii_ = header.order == "="
     body = memoryview(content)[header.size :]
@@ -103,7 +103,7 @@ def read(content: bytes) -> RawMesh:
 
 
 def _first(table: dict[str, Array], sets: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-    """The first of several sets of names that is there as a whole; () for none."""
+    """The first of several sets of names that is complete in the table; () for none."""
     return next((names for names in sets if all(n in table for n in names)), ())
 
 
@@ -175,7 +175,7 @@ def _header(content: bytes) -> Header:
 
 def _property(words: list[str], order: str) -> Property:
     def stored(name: str) -> np.dtype[Any]:
-        # The numbers of an ascii body become float64, whatever they are declared to be.
+        # The numbers of an ascii body become float64, whatever their declared type.
         return np.dtype(np.float64 if order == "=" else order + _TYPES[name])
 
     match words:

@@ -1,7 +1,7 @@
 """The numbers after the header of a .ply file, as arrays.
 
-An ascii body becomes a binary one of float64, so that both are read by the same functions.  Nothing
-is allocated before the file is known to be long enough for it.
+An ascii body is converted to a binary one of float64, so that the same functions read both.  Memory
+is allocated only after a check that the file is long enough.
 """
 
 import struct
@@ -62,7 +62,7 @@ def _expect_number(word: bytes, line: int) -> None:
 
 
 def columns(body: memoryview, start: int, element: Element) -> tuple[dict[str, Array], int]:
-    """The properties (rows,) of an element without lists, and where it ends."""
+    """The properties (rows,) of an element without lists, and the position of its end."""
     if any(p.length is not None for p in element.properties):
         raise ValueError(f"its element '{element.name}' has a list; expected numbers alone")
     size = element.least_size()
@@ -76,8 +76,8 @@ def columns(body: memoryview, start: int, element: Element) -> tuple[dict[str, A
 def lists(
     body: memoryview, start: int, element: Element, wanted: Property | None
 ) -> tuple[Array, IntArray, int]:
-    """The numbers of all lists of one property, one list after the other; how many each list has;
-    where the element ends."""
+    """The numbers of all lists of one property, one list after the other; the length of each list;
+    the position of the element's end."""
     end = _end(body, start, element, element.least_size())
     if element.rows == 0 or all(p.length is None for p in element.properties):
         return np.zeros(0), np.zeros(0, np.int64), end
@@ -95,14 +95,14 @@ def _end(body: memoryview, start: int, element: Element, row: int) -> int:
 def _strided(
     body: memoryview, start: int, shape: tuple[int, ...], item: np.dtype[Any], row: int
 ) -> Array:
-    """The number at the same place of every row, (rows,), or n from there on, (rows, n)."""
+    """The number at the same offset of every row, (rows,), or n from there on, (rows, n)."""
     return np.ndarray(shape, item, body, start, (row, item.itemsize)[: len(shape)])
 
 
 def _lists_of_equal_rows(
     body: memoryview, start: int, element: Element, wanted: Property | None
 ) -> tuple[Array, IntArray, int] | None:
-    """`lists`; None where not every row has the same counts as the first one."""
+    """`lists` if every row has the same counts as the first one, else None."""
     size = _lists_by_row(body, start, element._replace(rows=1), None)[2] - start
     end = start + element.rows * size
     if end > len(body):
@@ -126,7 +126,7 @@ def _lists_of_equal_rows(
 def _lists_by_row(
     body: memoryview, position: int, element: Element, wanted: Property | None
 ) -> tuple[Array, IntArray, int]:
-    """`lists`, where a row begins depending on all the counts before it."""
+    """`lists` for rows of different lengths, one after the other."""
     first, counts = array("q"), array("q")
     for row in range(element.rows):
         for p in element.properties:
@@ -150,7 +150,7 @@ def _lists_by_row(
 
 
 def _count(body: memoryview, position: int, length: np.dtype[Any]) -> int:
-    """The count of a list; 0 where the file ends before it."""
+    """The count of a list; 0 if the file ends before it."""
     if position + length.itemsize > len(body):
         return 0
     order = ">" if length.str[0] == ">" else "<"

@@ -1,7 +1,8 @@
 """Stereolithography files, .stl (3D Systems 1989): separate triangles, binary or ascii.
 
-Normals are not read, being those of the winding; nor are the attributes of binary files, which have
-no agreed meaning, and are named where there are any.  The solids of an ascii file become one mesh.
+Normals are not read, since they are those of the winding; nor are the attributes of binary files,
+which have no agreed meaning: they are named as ignored.  The solids of an ascii file become one
+mesh.
 """
 
 import re
@@ -27,7 +28,7 @@ _END = re.compile(rb"\s*endsolid\b[^\r\n]*", re.IGNORECASE)
 
 
 def read(content: bytes) -> RawMesh:
-    # Binary files may begin with "solid", too: their length tells.
+    # Binary files may also begin with "solid": their length decides.
     count = struct.unpack_from("<I", content, 80)[0] if len(content) >= 84 else -1
     ignored: tuple[str, ...] = ()
     size = 84 + count * _TRIANGLE.itemsize

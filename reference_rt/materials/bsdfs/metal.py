@@ -1,0 +1,50 @@
+"""The description that smooth and rough conductors share."""
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator
+
+from reference_rt.core.model import Colour
+from reference_rt.core.vec3 import Vec3
+from reference_rt.materials.material import Material
+from reference_rt.materials.microfacet.fresnel import conductor_colour
+from reference_rt.textures import Palette, ReflectanceParameter
+
+
+def _above_zero(eta: tuple[float, float, float]) -> tuple[float, float, float]:
+    if min(eta) <= 0.0:
+        raise ValueError(f"expected indices of refraction above 0, got {min(eta):g}")
+    return eta
+
+
+Index = Annotated[Colour, AfterValidator(_above_zero)]
+"""Real parts of indices of refraction at the three primaries, above 0."""
+
+
+class Metal(Material):
+    """The boundary of a metal; its back is black."""
+
+    type: str  # first, so that `to_json` writes it first
+    eta: Index
+    """The index of refraction, relative to what is outside."""
+    k: Colour
+    """The extinction coefficient: the imaginary part of the index."""
+    reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
+    """What the mirrored light is multiplied with: 1 is physical."""
+
+    @property
+    def colour(self) -> tuple[float, float, float] | str:
+        """The reflectance at normal incidence; the texture, where it has one."""
+        if isinstance(self.reflectance, str):
+            return self.reflectance
+        r, g, b = conductor_colour(1.0, Vec3(*self.eta), Vec3(*self.k)) * Vec3(*self.reflectance)
+        return r, g, b
+
+    def columns(self, palette: Palette) -> dict[str, Any]:
+        """The columns that the tables share, one row: eta, k, reflectance."""
+        return {
+            "eta": np.array([self.eta]),
+            "k": np.array([self.k]),
+            "reflectance": palette.colours(self.reflectance),
+        }

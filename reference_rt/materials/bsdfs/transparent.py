@@ -1,0 +1,40 @@
+"""The description that smooth, thin and rough dielectrics share."""
+
+from typing import Any
+
+import numpy as np
+
+from reference_rt.core.model import Positive
+from reference_rt.materials.material import Material
+from reference_rt.materials.microfacet.fresnel import relative_index
+from reference_rt.textures import Palette, ReflectanceParameter
+
+
+class Transparent(Material):
+    """A boundary of two transparent media."""
+
+    type: str  # first, so that `to_json` writes it first
+    interior_ior: Positive = 1.5
+    """Index of refraction behind the normal."""
+    exterior_ior: Positive = 1.0
+    """Index of refraction on the normal's side."""
+    reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
+    """What the mirrored light is multiplied with: 1 is physical."""
+    transmittance: ReflectanceParameter = (1.0, 1.0, 1.0)
+    """What the refracted light is multiplied with."""
+
+    @property
+    def colour(self) -> tuple[float, float, float] | str:
+        return self.transmittance
+
+    @property
+    def transmits(self) -> bool:
+        return True
+
+    def columns(self, palette: Palette) -> dict[str, Any]:
+        """The columns that the tables share, one row: eta, reflectance, transmittance."""
+        return {
+            "eta": np.array([relative_index(self.interior_ior, self.exterior_ior)]),
+            "reflectance": palette.colours(self.reflectance),
+            "transmittance": palette.colours(self.transmittance),
+        }
