@@ -6,6 +6,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Crossing, Hit, Ray, miss, no_hit
 from reference_rt.core.ray_block import Hits, Rays, ray_of
 from reference_rt.core.vec3 import row, triple
+from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import LANES
 from reference_rt.shapes import box
@@ -21,13 +22,9 @@ from reference_rt.shapes.ray_simd import begin, end
 from reference_rt.shapes.shape import nearest_lane
 from reference_rt.shapes.tables import (
     BOX,
-    DISK,
-    PLANE,
-    POLYGON,
-    QUADRIC,
     RECTANGLE,
     SPHERE,
-    TORUS,
+    TABLES,
     TRIANGLE,
     Shapes,
     of_table,
@@ -97,23 +94,33 @@ def nearest(shapes: Shapes, packets: Packets, ray: Ray) -> Hit:
     return _nearest_of_others(shapes, ray, closest)
 
 
+_without_packets = ByCode(
+    (code, field, module)
+    for code, field, _, module in TABLES
+    if code != TRIANGLE and not hasattr(module, "lane_distance")
+)
+_nearest_in_tables = _without_packets.in_turn(_nearest_in_table)
+
+
 @kernel
 def _nearest_of_others(shapes: Shapes, ray: Ray, closest: Hit) -> Hit:
     """The nearest of `closest` and what has no packets."""
-    closest = _nearest_triangle(shapes.triangles, ray, closest)
-    closest = _nearest_in_table(DISK, shapes.disks, ray, closest)
-    closest = _nearest_in_table(PLANE, shapes.planes, ray, closest)
-    closest = _nearest_in_table(POLYGON, shapes.polygons, ray, closest)
-    closest = _nearest_in_table(QUADRIC, shapes.quadrics, ray, closest)
-    return _nearest_in_table(TORUS, shapes.tori, ray, closest)
+    found: Hit = _nearest_in_tables(shapes, ray, _nearest_triangle(shapes.triangles, ray, closest))
+    return found
+
+
+@kernel
+def _yes(kind: int, table: Any, found: bool) -> bool:
+    return True
+
+
+_any_in_tables = _without_packets.in_turn(_yes)
 
 
 @kernel
 def _has_others(shapes: Shapes) -> bool:
     """Whether there is what has no packets: a constant."""
-    flat = shapes.disks is not None or shapes.planes is not None or shapes.polygons is not None
-    curved = shapes.quadrics is not None or shapes.tori is not None
-    return shapes.triangles is not None or flat or curved
+    return bool(_any_in_tables(shapes, shapes.triangles is not None))
 
 
 @kernel

@@ -9,18 +9,7 @@ from reference_rt.shapes.curved.quadrics import Quadrics, crossings
 from reference_rt.shapes.dispatch import intersect, spans
 from reference_rt.shapes.meshes.watertight import Shear
 from reference_rt.shapes.shape import Spans, no_spans, one_span
-from reference_rt.shapes.tables import (
-    BOX,
-    DISK,
-    PLANE,
-    POLYGON,
-    QUADRIC,
-    RECTANGLE,
-    SPHERE,
-    TORUS,
-    TRIANGLE,
-    Shapes,
-)
+from reference_rt.shapes.tables import BOX, QUADRIC, SPHERE, TORUS, Shapes, by_code
 
 MOST = 4
 """Of one primitive: a torus has so many, and so has a capped quadric of two sheets."""
@@ -53,32 +42,11 @@ def _of_quadric(quadrics: Quadrics | None, i: int, ray: Ray) -> Spans:
 
 
 @kernel
+def _rows(table: Any) -> int:
+    return len(table.owner)
+
+
+@by_code(lambda module: _rows)
 def number_of(shapes: Shapes, kind: int) -> int:
     """How many primitives of a kind there are."""
-    count = 0
-    if kind == SPHERE:
-        count = _rows(shapes.spheres)
-    elif kind == RECTANGLE:
-        count = _rows(shapes.rectangles)
-    elif kind == BOX:
-        count = _rows(shapes.boxes)
-    elif kind == TRIANGLE:
-        count = _rows(shapes.triangles)
-    elif kind == DISK:
-        count = _rows(shapes.disks)
-    elif kind == PLANE:
-        count = _rows(shapes.planes)
-    elif kind == POLYGON:
-        count = _rows(shapes.polygons)
-    elif kind == QUADRIC:
-        count = _rows(shapes.quadrics)
-    elif kind == TORUS:
-        count = _rows(shapes.tori)
-    return count
-
-
-@kernel
-def _rows(table: Any) -> int:
-    if table is None:
-        return 0
-    return len(table.owner)
+    return 0

@@ -8,6 +8,7 @@ function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass
 from reference_rt.shapes import box
 from reference_rt.shapes.box import Box, Boxes
@@ -75,6 +76,15 @@ TABLES: tuple[tuple[int, str, type, Any], ...] = (
     (TORUS, "tori", Tori, torus),
 )
 """(code, field of Shapes, table, module with its kernels), in the order of the codes."""
+
+
+by_code = ByCode((code, field, module) for code, field, _, module in TABLES)
+"""Decorates kernels that choose among the shapes; see `jit/by_code.py`."""
+
+by_code_but_triangles = ByCode(
+    (code, field, module) for code, field, _, module in TABLES if code != TRIANGLE
+)
+"""The same without triangles, whose `intersect` takes a `Shear` in place of a ray."""
 
 
 def of_table(name: str, without: Callable[..., Any]) -> Callable[..., Any]:

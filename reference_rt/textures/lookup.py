@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, row
+from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.textures import bitmap, checker
 from reference_rt.textures.bitmap import Bitmaps
 from reference_rt.textures.checker import Checkers
-from reference_rt.textures.texture import BITMAP, CHECKER, map_uv
+from reference_rt.textures.texture import BITMAP, CHECKER, VERTEX_COLOURS, map_uv
 from reference_rt.textures.vertex_colours import VertexColourTable
 
 
@@ -42,6 +43,19 @@ class At(NamedTuple):
     colour: Vec3
 
 
+_by_code = ByCode([(CHECKER, "checkers", checker), (BITMAP, "bitmaps", bitmap)])
+
+
+@_by_code("lookup")
+def _lookup_uv(textures: Textures, kind: int, i: int, u: float, v: float) -> Vec3:
+    return Vec3(0.0, 0.0, 0.0)
+
+
+@_by_code("gradient")
+def _gradient_uv(textures: Textures, kind: int, i: int, u: float, v: float) -> tuple[float, float]:
+    return 0.0, 0.0
+
+
 @kernel
 def lookup(k: int, at: At) -> Vec3:
     """The colour of texture k."""
@@ -64,11 +78,9 @@ def _looked(looked: Looked, k: int, at: At) -> Vec3:
 def _ask(textures: Textures, k: int, at: At) -> Vec3:
     kind, i = textures.kind[k], textures.row[k]
     u, v = map_uv(textures.uv, k, at.u, at.v)
-    if kind == CHECKER:
-        return _checker(textures.checkers, i, u, v)
-    if kind == BITMAP:
-        return _bitmap(textures.bitmaps, i, u, v)
-    return _vertex_colours(textures.vertex_colours, i, at)
+    if kind == VERTEX_COLOURS:
+        return _vertex_colours(textures.vertex_colours, i, at)
+    return _lookup_uv(textures, kind, i, u, v)
 
 
 _choice = ByClass("lookup")
@@ -76,20 +88,6 @@ _choice.register(type(None), _no_colour)
 _choice.register(Looked, _looked)
 _choice.register(Textures, _ask)
 _lookup = _choice.function
-
-
-@kernel
-def _checker(checkers: Checkers | None, i: int, u: float, v: float) -> Vec3:
-    if checkers is None:
-        return Vec3(0.0, 0.0, 0.0)
-    return checker.lookup(checkers, i, u, v)
-
-
-@kernel
-def _bitmap(bitmaps: Bitmaps | None, i: int, u: float, v: float) -> Vec3:
-    if bitmaps is None:
-        return Vec3(0.0, 0.0, 0.0)
-    return bitmap.lookup(bitmaps, i, u, v)
 
 
 @kernel
@@ -107,11 +105,12 @@ def _flat(textures: None, k: int, at: At) -> tuple[float, float]:
 
 @kernel
 def _gradient(textures: Textures, k: int, at: At) -> tuple[float, float]:
-    if textures.kind[k] != BITMAP:
+    kind, i = textures.kind[k], textures.row[k]
+    if kind != BITMAP:
         return 0.0, 0.0
     m = textures.uv[k]
     u, v = map_uv(textures.uv, k, at.u, at.v)
-    along_u, along_v = _bitmap_gradient(textures.bitmaps, textures.row[k], u, v)
+    along_u, along_v = _gradient_uv(textures, kind, i, u, v)
     return m[0] * along_u + m[3] * along_v, m[1] * along_u + m[4] * along_v
 
 
@@ -119,13 +118,6 @@ _by_class = ByClass("lookup_gradient")
 _by_class.register(type(None), _flat)
 _by_class.register(Textures, _gradient)
 _slopes = _by_class.function
-
-
-@kernel
-def _bitmap_gradient(bitmaps: Bitmaps | None, i: int, u: float, v: float) -> tuple[float, float]:
-    if bitmaps is None:
-        return 0.0, 0.0
-    return bitmap.gradient(bitmaps, i, u, v)
 
 
 @kernel
