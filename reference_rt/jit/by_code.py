@@ -49,10 +49,10 @@ class ByCode:
     ) -> Callable[[F], F]:
         """Decorates f(tables, ...), to choose among the kernels `name` of the modules.
 
-        name: or a function from a module to its kernel, None where it has none;  code: the code, as
-        an expression of f's parameters.  Kernels take their table and f's other parameters, without
-        one that is the code itself.  The body of f is for all other codes: those of absent tables,
-        of modules that have no such kernel, and of no type.
+        name: or a function from a module to its kernel, None if it has none;  code: an expression
+        of f's parameters.  A kernel is called with its table and those of f's parameters that it
+        names.  The body of f is for all other codes: those of absent tables, of modules without
+        the kernel, and of no type.  Raises TypeError for a kernel with a parameter that f lacks.
         """
         found = [
             (number, field, name(m) if callable(name) else getattr(m, name, None))
@@ -61,13 +61,20 @@ class ByCode:
         rows = [(number, field, of_row) for number, field, of_row in found if of_row is not None]
 
         def decorate(otherwise: F) -> F:
-            parameters = [*inspect.signature(otherwise).parameters]
-            tables, given = parameters[0], ", ".join(p for p in parameters[1:] if p != code)
+            parameters = _parameters(otherwise)
+            for _, field, of_row in rows:
+                unknown = set(_parameters(of_row)[1:]) - set(parameters[1:])
+                if unknown:
+                    raise TypeError(
+                        f"{of_row.__module__}.{of_row.__name__}, for {field}: parameters {unknown} "
+                        f"are none of those of {otherwise.__module__}.{otherwise.__name__}"
+                    )
 
             def lines(present: Sequence[_Row]) -> Iterable[str]:
-                for number, field, _ in present:
+                for number, field, of_row in present:
+                    given = [f"{parameters[0]}.{field}", *_parameters(of_row)[1:]]
                     yield f"if {code} == {number}:"
-                    yield f"    return {field}({tables}.{field}, {given})"
+                    yield f"    return {field}({', '.join(given)})"
                 yield f"return otherwise({', '.join(parameters)})"
 
             return _generated(otherwise, parameters, rows, lines, otherwise=kernel(otherwise))
@@ -78,7 +85,7 @@ class ByCode:
         """f(tables, ..., result): what step(code, table, ..., result) returns for the last table
         that is present, the result of each being passed to the next; no loop, so that the code and
         the type of the table are constants in each step."""
-        _, _, *others = inspect.signature(step).parameters
+        _, _, *others = _parameters(step)
         given, result = ", ".join(others), others[-1]
         rows = [(number, field, step) for number, field, _ in self._rows]
 
@@ -88,6 +95,10 @@ class ByCode:
             yield f"return {result}"
 
         return _generated(step, ["tables", *others], rows, lines)
+
+
+def _parameters(function: Callable[..., Any]) -> list[str]:
+    return [*inspect.signature(function).parameters]
 
 
 def _generated(

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import Vec3, row
+from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.lights.emitters import area, constant, directional, environment_map, point, spot
 from reference_rt.lights.emitters.area import Areas
@@ -61,6 +62,16 @@ def _of_environment(name: str, without: Any) -> Any:
     kernels.register(EnvironmentMaps, getattr(environment_map, name))
     return kernels.function
 
+
+_by_code = ByCode(
+    [
+        (AREA, "areas", area),
+        (POINT, "points", point),
+        (SPOT, "spots", spot),
+        (DIRECTIONAL, "directionals", directional),
+    ]
+)
+"""Without the environment, which is no table: it is what the bodies below are for."""
 
 background = _of_environment("radiance", _black)
 """background(environment, d) -> the radiance of a ray that hits nothing."""
@@ -132,32 +143,6 @@ def sample_one(
 
 
 @kernel
-def middle(
-    lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3
-) -> LightSample:
-    """The same without numbers: from the one point that stands for all of an area light."""
-    if _is_area(lights.choice, k):
-        return _middle_of_area(lights.areas, k, shapes, textures, p)
-    return sample_one(lights, k, shapes, textures, p, 0.5, 0.5)
-
-
-@kernel
-def _is_area(entries: Choice | None, k: int) -> bool:
-    if entries is None:
-        return False
-    return bool(entries.kind[k] == AREA)
-
-
-@kernel
-def _middle_of_area(
-    areas: Areas | None, i: int, shapes: Shapes, textures: Textures | None, p: Vec3
-) -> LightSample:
-    if areas is None:
-        return no_light()
-    return area.middle(areas, i, shapes, textures, p)
-
-
-@kernel
 def _sample_one(
     entries: Choice | None,
     lights: Lights,
@@ -170,24 +155,13 @@ def _sample_one(
 ) -> LightSample:
     if entries is None:
         return no_light()
-    kind, i = entries.kind[k], entries.row[k]
-    # A kind that the scene lacks is not asked for; where there is but the last, none is.
-    if lights.areas is not None and kind == AREA:
-        found: LightSample = _from_area(lights.areas, i, shapes, textures, p, u0, u1)
-    elif lights.points is not None and kind == POINT:
-        found = _from_point(lights.points, i, p)
-    elif lights.spots is not None and kind == SPOT:
-        found = _from_spot(lights.spots, i, p)
-    elif lights.directionals is not None and kind == DIRECTIONAL:
-        found = _from_directional(lights.directionals, i)
-    else:
-        found = _environment_sample(lights.environment, u0, u1)
-    return found
+    return _sample(lights, entries.kind[k], entries.row[k], shapes, textures, p, u0, u1)
 
 
-@kernel
-def _from_area(
-    areas: Areas | None,
+@_by_code("sample")
+def _sample(
+    lights: Lights,
+    kind: int,
     i: int,
     shapes: Shapes,
     textures: Textures | None,
@@ -195,30 +169,37 @@ def _from_area(
     u0: float,
     u1: float,
 ) -> LightSample:
-    if areas is None:
-        return no_light()
-    return area.sample(areas, i, shapes, textures, p, u0, u1)
+    found: LightSample = _environment_sample(lights.environment, u0, u1)
+    return found
 
 
 @kernel
-def _from_point(points: Points | None, i: int, p: Vec3) -> LightSample:
-    if points is None:
-        return no_light()
-    return point.sample(points, i, p)
+def middle(
+    lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3
+) -> LightSample:
+    """The same without random numbers: an area light is replaced by one point."""
+    return _middle_of_one(lights.choice, lights, k, shapes, textures, p)
 
 
 @kernel
-def _from_spot(spots: Spots | None, i: int, p: Vec3) -> LightSample:
-    if spots is None:
+def _middle_of_one(
+    entries: Choice | None,
+    lights: Lights,
+    k: int,
+    shapes: Shapes,
+    textures: Textures | None,
+    p: Vec3,
+) -> LightSample:
+    if entries is None:
         return no_light()
-    return spot.sample(spots, i, p)
+    return _middle(lights, entries.kind[k], entries.row[k], shapes, textures, p)
 
 
-@kernel
-def _from_directional(directionals: Directionals | None, i: int) -> LightSample:
-    if directionals is None:
-        return no_light()
-    return directional.sample(directionals, i)
+@_by_code("middle")
+def _middle(
+    lights: Lights, kind: int, i: int, shapes: Shapes, textures: Textures | None, p: Vec3
+) -> LightSample:
+    return _sample(lights, kind, i, shapes, textures, p, 0.5, 0.5)
 
 
 @kernel

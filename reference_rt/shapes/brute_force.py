@@ -13,7 +13,6 @@ from reference_rt.shapes import box
 from reference_rt.shapes.box import Boxes
 from reference_rt.shapes.curved import sphere
 from reference_rt.shapes.curved.sphere import Spheres
-from reference_rt.shapes.dispatch import intersect_row
 from reference_rt.shapes.flat import rectangle
 from reference_rt.shapes.flat.rectangle import Rectangles
 from reference_rt.shapes.meshes.triangle import Triangles
@@ -39,7 +38,9 @@ class Packets(NamedTuple):
     boxes: FloatArray | None
 
 
-_lane_distance = of_table("lane_distance", miss)
+@kernel
+def _no_crossing(table: Any, i: int, ray: Any) -> Crossing:
+    return miss()
 
 
 @kernel
@@ -47,6 +48,10 @@ def _not_found(table: Any, i: int, ray: Ray, t: float) -> Crossing:
     return miss()
 
 
+intersect_row = of_table("intersect", _no_crossing)
+"""intersect_row(table, i, ray): `intersect` of one table's row i; triangles take a `Shear`."""
+
+_lane_distance = of_table("lane_distance", miss)
 _found = of_table("found", _not_found)
 
 

@@ -11,30 +11,13 @@ from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.meshes.watertight import Shear
 from reference_rt.shapes.shape import LightPoint, Spans, Tangents, no_light_point, no_spans
-from reference_rt.shapes.tables import TRIANGLE, Shapes, by_code, by_code_but_triangles, of_table
+from reference_rt.shapes.tables import Shapes, by_code
 
 
-@kernel
-def _no_crossing(table: Any, i: int, ray: Any) -> Crossing:
-    return miss()
-
-
-intersect_row = of_table("intersect", _no_crossing)
-"""intersect_row(table, i, ray): `intersect` of row i of one table; triangles take a `Shear`."""
-
-
-@by_code_but_triangles("intersect")
-def _intersect_other(shapes: Shapes, kind: int, i: int, ray: Ray) -> Crossing:
-    return miss()
-
-
-@kernel
+@by_code("intersect")
 def intersect(shapes: Shapes, kind: int, i: int, ray: Ray, shear: Shear) -> Crossing:
-    """Where the ray meets one primitive first, beyond t = 0."""
-    if kind == TRIANGLE:
-        found: Crossing = intersect_row(shapes.triangles, i, shear)
-        return found
-    return _intersect_other(shapes, kind, i, ray)
+    """Where the ray meets one primitive first, beyond t = 0.  shear: the ray's, for triangles."""
+    return miss()
 
 
 @by_code("surface", code="hit.kind")

@@ -81,11 +81,6 @@ TABLES: tuple[tuple[int, str, type, Any], ...] = (
 by_code = ByCode((code, field, module) for code, field, _, module in TABLES)
 """Decorates kernels that choose among the shapes; see `jit/by_code.py`."""
 
-by_code_but_triangles = ByCode(
-    (code, field, module) for code, field, _, module in TABLES if code != TRIANGLE
-)
-"""The same without triangles, whose `intersect` takes a `Shear` in place of a ray."""
-
 
 def of_table(name: str, without: Callable[..., Any]) -> Callable[..., Any]:
     """The kernel `name` of the module of the table that is the first argument."""

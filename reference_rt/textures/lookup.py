@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.vec3 import Vec3, row
+from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.textures import bitmap, checker
+from reference_rt.textures import bitmap, checker, vertex_colours
 from reference_rt.textures.bitmap import Bitmaps
 from reference_rt.textures.checker import Checkers
 from reference_rt.textures.texture import BITMAP, CHECKER, VERTEX_COLOURS, map_uv
@@ -43,16 +43,26 @@ class At(NamedTuple):
     colour: Vec3
 
 
-_by_code = ByCode([(CHECKER, "checkers", checker), (BITMAP, "bitmaps", bitmap)])
+_by_code = ByCode(
+    [
+        (CHECKER, "checkers", checker),
+        (BITMAP, "bitmaps", bitmap),
+        (VERTEX_COLOURS, "vertex_colours", vertex_colours),
+    ]
+)
 
 
 @_by_code("lookup")
-def _lookup_uv(textures: Textures, kind: int, i: int, u: float, v: float) -> Vec3:
+def _lookup_in_table(
+    textures: Textures, kind: int, i: int, u: float, v: float, colour: Vec3
+) -> Vec3:
     return Vec3(0.0, 0.0, 0.0)
 
 
 @_by_code("gradient")
-def _gradient_uv(textures: Textures, kind: int, i: int, u: float, v: float) -> tuple[float, float]:
+def _gradient_in_table(
+    textures: Textures, kind: int, i: int, u: float, v: float
+) -> tuple[float, float]:
     return 0.0, 0.0
 
 
@@ -78,9 +88,7 @@ def _looked(looked: Looked, k: int, at: At) -> Vec3:
 def _ask(textures: Textures, k: int, at: At) -> Vec3:
     kind, i = textures.kind[k], textures.row[k]
     u, v = map_uv(textures.uv, k, at.u, at.v)
-    if kind == VERTEX_COLOURS:
-        return _vertex_colours(textures.vertex_colours, i, at)
-    return _lookup_uv(textures, kind, i, u, v)
+    return _lookup_in_table(textures, kind, i, u, v, at.colour)
 
 
 _choice = ByClass("lookup")
@@ -110,7 +118,7 @@ def _gradient(textures: Textures, k: int, at: At) -> tuple[float, float]:
         return 0.0, 0.0
     m = textures.uv[k]
     u, v = map_uv(textures.uv, k, at.u, at.v)
-    along_u, along_v = _gradient_uv(textures, kind, i, u, v)
+    along_u, along_v = _gradient_in_table(textures, kind, i, u, v)
     return m[0] * along_u + m[3] * along_v, m[1] * along_u + m[4] * along_v
 
 
@@ -118,13 +126,3 @@ _by_class = ByClass("lookup_gradient")
 _by_class.register(type(None), _flat)
 _by_class.register(Textures, _gradient)
 _slopes = _by_class.function
-
-
-@kernel
-def _vertex_colours(table: VertexColourTable | None, i: int, at: At) -> Vec3:
-    if table is None:
-        return Vec3(0.0, 0.0, 0.0)
-    if at.colour.x < 0.0:
-        return row(table.without, i)
-    scaled: Vec3 = at.colour * table.scale[i]
-    return scaled
