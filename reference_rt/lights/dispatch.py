@@ -1,4 +1,8 @@
-"""What is asked of the lights of a scene."""
+"""The lights of a scene: pick one, sample it, and the densities of both.
+
+`pick` chooses an entry k of the light sampler (`Choice`), by power or by a tree; `sample_one` draws
+a direction to it.  p and n are the point and the shading normal for which light is sampled.
+"""
 
 from typing import Any, NamedTuple
 
@@ -23,11 +27,11 @@ from reference_rt.textures import Textures
 
 
 class Lights(NamedTuple):
-    """The tables of each kind, None for absent ones;  ambient (1, 3);  choice, None without any
-    light that can be picked;  tree, None where there are few.
+    """The table of each type, None for types that the scene lacks.
 
-    The choice lists all areas, then points, spots, directional lights, then the environment: area
-    light i is entry i.
+    ambient (1, 3): the ambient radiance;  choice: the entries of the light sampler, None if no
+    light can be picked;  tree: the light tree, None for few lights.  Entries are in this order: all
+    areas, points, spots, directional lights, the environment.  So area light i is entry i.
     """
 
     points: Points | None
@@ -71,10 +75,10 @@ _by_code = ByCode(
         (DIRECTIONAL, "directionals", directional),
     ]
 )
-"""Without the environment, which is no table: it is what the bodies below are for."""
+"""The bodies of the functions below are for the environment, of which there is only one."""
 
 background = _of_environment("radiance", _black)
-"""background(environment, d) -> the radiance of a ray that hits nothing."""
+"""background(environment, d): the radiance from direction d."""
 
 _environment_pdf = _of_environment("pdf", _never)
 _environment_sample = _of_environment("sample", _nothing)
@@ -82,8 +86,8 @@ _environment_sample = _of_environment("sample", _nothing)
 
 @kernel
 def pick(lights: Lights, p: Vec3, n: Vec3, u: float) -> Pick:
-    """A light for a surface at `p` with normal `n`, 0 for light from all sides; its probability is
-    0 where there is none."""
+    """A light for a surface at `p` with normal `n`, which is 0 for light from all sides.  Its
+    probability is 0 if there is none."""
     return _pick(lights.choice, lights.tree, p, n, u)
 
 
@@ -96,7 +100,7 @@ def _pick(lights: Choice | None, tree: LightTree | None, p: Vec3, n: Vec3, u: fl
 
 @kernel
 def pick_probability(lights: Lights, p: Vec3, n: Vec3, k: int) -> float:
-    """The probability that `pick` gives light k."""
+    """The probability that `pick` returns light k."""
     return _pick_probability(lights.choice, lights.tree, p, n, k)
 
 
@@ -111,19 +115,19 @@ def _pick_probability(
 
 @kernel
 def asks_place(lights: Lights) -> bool:
-    """Whether any chance or density depends on the place that a light is picked for: a constant."""
+    """Whether any probability or density depends on the point p: a constant."""
     return lights.areas is not None or lights.tree is not None
 
 
 @kernel
 def asks_normal(lights: Lights) -> bool:
-    """Whether any depends on the normal there: a constant."""
+    """Whether any probability depends on the normal n: a constant."""
     return lights.tree is not None
 
 
 @kernel
 def count(lights: Lights) -> int:
-    """How many lights can be picked."""
+    """The number of entries that can be picked."""
     return _count(lights.choice)
 
 
@@ -138,7 +142,7 @@ def _count(lights: Choice | None) -> int:
 def sample_one(
     lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3, u0: float, u1: float
 ) -> LightSample:
-    """Light from entry k of the choice at `p`; the pdf does not count the choice."""
+    """A sample of the light from entry k at `p`; its pdf is without the probability of k."""
     return _sample_one(lights.choice, lights, k, shapes, textures, p, u0, u1)
 
 
@@ -212,8 +216,8 @@ def is_area(areas: Areas | None, q: SurfacePoint) -> bool:
 
 @kernel
 def area_pdf(lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint) -> float:
-    """The density per solid angle, choice included, with which light sampling for a surface at `p`
-    with normal `n` finds `q`."""
+    """The density per solid angle of `pick` and `sample_one` together, for a surface at `p` with
+    normal `n`, at the point `q` of an area light; 0 for other points."""
     return _area_pdf(lights.areas, lights, shapes, p, n, q)
 
 
@@ -231,7 +235,7 @@ def _area_pdf(
 
 @kernel
 def environment_pdf(lights: Lights, p: Vec3, n: Vec3, d: Vec3) -> float:
-    """The same for a direction `d` in which nothing is hit."""
+    """The same for a direction `d` to the environment."""
     return _surrounding_pdf(lights.environment, lights, p, n, d)
 
 
@@ -248,7 +252,7 @@ def _surrounding_pdf(
 
 @kernel
 def ambient(lights: Lights) -> Vec3:
-    """The text-book's I_a."""
+    """The ambient radiance I_a of the Phong model."""
     return _ambient(lights.ambient)
 
 

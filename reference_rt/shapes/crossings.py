@@ -1,4 +1,4 @@
-"""All crossings of a ray with one primitive, which path tracing, after the first, does not need."""
+"""All crossings of a ray with one primitive; path tracing needs only the first of them."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,11 +12,11 @@ from reference_rt.shapes.shape import Spans, no_spans, one_span
 from reference_rt.shapes.tables import BOX, QUADRIC, SPHERE, TORUS, Shapes, by_code
 
 MOST = 4
-"""Of one primitive: a torus has so many, and so has a capped quadric of two sheets."""
+"""The most crossings of one primitive: of a torus, and of a capped quadric of two sheets."""
 
 
 class Along(NamedTuple):
-    """Up to MOST crossings of a ray: `Spans`, with what more its first needs, as `Crossing.v`."""
+    """Up to MOST crossings of a ray.  spans: t and u of each;  v: `Crossing.v` of the first."""
 
     spans: Spans
     v: float
@@ -24,8 +24,8 @@ class Along(NamedTuple):
 
 @kernel
 def along(shapes: Shapes, kind: int, i: int, ray: Ray, shear: Shear) -> Along:
-    """Those of primitive i of a kind, in order; the t of those of shapes that can have several may
-    be 0 and below."""
+    """The crossings with primitive i of a kind, in order.  For shapes that can have several, t may
+    be 0 or negative."""
     if kind in (SPHERE, BOX, TORUS):
         return Along(spans(shapes, kind, i, ray), 0.0)
     if kind == QUADRIC:
@@ -48,5 +48,5 @@ def _rows(table: Any) -> int:
 
 @by_code(lambda module: _rows)
 def number_of(shapes: Shapes, kind: int) -> int:
-    """How many primitives of a kind there are."""
+    """The number of primitives of a kind."""
     return 0

@@ -1,7 +1,8 @@
-"""The kernels of all shapes: each chooses, by the code of a hit's kind, that of the shape's type.
+"""The kernels that all shapes have in common: each calls that of the shape's type.
 
-What the body of a function says is for a kernel that a shape lacks: only solids have `spans`, only
-lights `sample` and `pdf`.
+kind is the code of a table (`Hit.kind`), i a row of it.  The chains of `if kind == ...` are
+generated from `TABLES`.  A function's body is for types without the kernel (only solids have
+`spans`, only shapes that can be lights `sample` and `pdf`) and for absent tables.
 """
 
 from typing import Any
@@ -22,14 +23,14 @@ def intersect(shapes: Shapes, kind: int, i: int, ray: Ray, shear: Shear) -> Cros
 
 @by_code("surface", code="hit.kind")
 def surface(shapes: Shapes, ray: Ray, hit: Hit) -> SurfacePoint:
-    """The surface at a hit of a primitive."""
+    """The surface point at a hit of a primitive."""
     nothing = Vec3(0.0, 0.0, 0.0)
     return SurfacePoint(nothing, nothing, nothing, 0.0, -1, -1)
 
 
 @by_code("uv", code="hit.kind")
 def uv(shapes: Shapes, ray: Ray, hit: Hit) -> tuple[float, float]:
-    """The surface coordinates at a hit."""
+    """The surface coordinates u, v at a hit."""
     return 0.0, 0.0
 
 
@@ -59,7 +60,7 @@ def owner(shapes: Shapes, kind: int, i: int) -> int:
 
 @by_code("spans")
 def spans(shapes: Shapes, kind: int, i: int, ray: Ray) -> Spans:
-    """Where the line of the ray runs inside one solid."""
+    """The intervals of t in which the ray's line is inside one solid."""
     return no_spans()
 
 
@@ -67,7 +68,8 @@ def spans(shapes: Shapes, kind: int, i: int, ray: Ray) -> Spans:
 def sample(
     shapes: Shapes, kind: int, i: int, area: float, p: Vec3, u0: float, u1: float
 ) -> LightPoint:
-    """A point of one primitive as a light for `p`; its density is what `pdf` returns."""
+    """A point sampled on one primitive as a light for `p`; `pdf` returns its density.  area: of the
+    primitive."""
     return no_light_point()
 
 

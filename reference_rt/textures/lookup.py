@@ -1,4 +1,4 @@
-"""The choice among textures: what colour each has where."""
+"""Texture lookup: the colour of a texture at a place of a surface."""
 
 from typing import NamedTuple
 
@@ -14,8 +14,8 @@ from reference_rt.textures.vertex_colours import VertexColourTable
 
 
 class Textures(NamedTuple):
-    """kind (n,) and row (n,): which table each texture is a row of; uv (n, 6): its map, see
-    `UvMap`; None for absent tables."""
+    """kind (n,), row (n,): the table and row of each texture;  uv (n, 6): its map, see `UvMap`;  a
+    table for each type, None for types that the scene lacks."""
 
     kind: IntArray
     row: IntArray
@@ -26,16 +26,18 @@ class Textures(NamedTuple):
 
 
 class Looked(NamedTuple):
-    """Answers in place of textures: values (3 n,), the colours of those of all n that the material
-    at hand has, where it is."""
+    """Cached lookups, in place of `Textures`.  values (3 n,): the colours, at the hit, of those of
+    all n textures that its material uses."""
 
     values: FloatArray
 
 
 class At(NamedTuple):
-    """Where on a surface textures are asked: its coordinates u, v, and the interpolated colour of a
-    mesh's vertices, negative where there is none;  textures: None where the scene has no texture,
-    and the rest then means nothing."""
+    """A place for texture lookups.
+
+    u, v: surface coordinates;  colour: the interpolated vertex colour of a mesh, negative if there
+    is none;  textures: None if the scene has none; the other fields are then undefined.
+    """
 
     textures: Textures | Looked | None
     u: float
@@ -101,7 +103,7 @@ _lookup = _choice.function
 @kernel
 def lookup_gradient(k: int, at: At) -> tuple[float, float]:
     """The derivatives of texture k's luminance by the surface coordinates u and v; (0, 0) for all
-    but bitmaps.  They are not among what is `Looked`."""
+    but bitmaps.  Not for cached lookups."""
     found: tuple[float, float] = _slopes(at.textures, k, at)
     return found
 

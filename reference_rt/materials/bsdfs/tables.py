@@ -1,8 +1,9 @@
-"""The materials that scatter by a law of their own: the choice among their kernels.
+"""The tables of all BSDFs (materials that are not made of others), and the choice among them.
 
-`At` is where on the surface textures are asked.  Every kernel of a table that the scene lacks, and
-one that a material lacks (smooth ones have no `branches`, perfect mirrors nothing else), is
-replaced by the one that finds nothing, at compile time.
+kind is the code of a table, i a row of it, `at` the place on the surface for texture lookups; wo
+and wi are unit vectors in the shading frame.  The chains of `if kind == ...` are generated from
+`TABLES`.  A function's body is for absent tables and for materials without the kernel: perfect
+mirrors and glass have `branches` alone, most others have none.
 """
 
 from typing import Any, NamedTuple
@@ -45,7 +46,7 @@ from reference_rt.materials.material import (
 )
 from reference_rt.textures import At
 
-# Codes of the tables; CLEAR is what is not there, BLACK scatters nothing.
+# Codes of the tables.  CLEAR lets all light pass (a hole of a mask), BLACK scatters nothing.
 (
     DIFFUSE,
     MIRROR,
@@ -63,7 +64,7 @@ CLEAR, BLACK = 100, 101
 
 
 class Leaves(NamedTuple):
-    """The tables of all materials that are not made of others; None for absent ones."""
+    """The table of every BSDF; None for those that the scene lacks."""
 
     diffuses: Diffuses | None
     mirrors: Mirrors | None
@@ -107,20 +108,20 @@ _last = by_code.in_turn(_code)
 
 @kernel
 def only(leaves: Leaves) -> int:
-    """The code of the table where there is but one: a constant, so that choices vanish."""
+    """The code of the only table, for scenes with one: a constant, so that branches vanish."""
     code: int = _last(leaves, PHONG)
     return code
 
 
 @by_code("evaluate")
 def evaluate(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi| of one leaf, without what it mirrors or refracts perfectly."""
+    """f(wo, wi) |cos wi| of one BSDF, without perfect reflection and refraction."""
     return Vec3(0.0, 0.0, 0.0)
 
 
 @by_code("pdf")
 def pdf(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle; discrete directions do not count."""
+    """The density of `sample` per solid angle, without discrete directions."""
     return 0.0
 
 
@@ -139,13 +140,13 @@ def _both_of(module: Any) -> Any:
 
 @by_code(_both_of)
 def both(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`, which share much of their work."""
+    """`evaluate` and `pdf` at once, which share much of their work."""
     return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
 
 
 @by_code("branches")
 def branches(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3) -> Branches:
-    """The perfectly mirrored and refracted directions; black where there are none."""
+    """The perfectly reflected and refracted directions; factors of 0 if there are none."""
     return straight_on(wo) if kind == CLEAR else no_branches()
 
 
@@ -153,11 +154,12 @@ def branches(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3) -> Branches:
 def sample(
     leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """A direction drawn for `wo`; pdf = 0 where the leaf scatters nothing."""
+    """A direction sampled for `wo`; pdf = 0 if nothing is scattered.  Of a material that has only
+    `branches`, one of these."""
     return sample_branch(branches(leaves, kind, i, at, wo), u_lobe)
 
 
 @by_code("ambient")
 def ambient(leaves: Leaves, kind: int, i: int, at: At) -> Vec3:
-    """The text-book's k_a of one leaf."""
+    """The ambient reflectance k_a of the Phong model; black for others."""
     return Vec3(0.0, 0.0, 0.0)
