@@ -1,8 +1,9 @@
-"""The compiler of kernels: ours, which replaces private parts of Numba, or Numba's own.
+"""Which compiler pipeline kernels use: ours, which replaces private parts of Numba, or Numba's.
 
-Ours (`jit/numba_pipeline.py`) compiles several times faster.  It is written for the private parts
-of one release of Numba, and another may have renamed them.  Then Numba's own takes its place, with
-a warning: pictures have the same bits, and the first render of a kind of scene takes longer.
+Ours (`numba_pipeline.py`) compiles several times faster.  It depends on private parts of one
+release of Numba, which another release may have renamed.  In that case Numba's own pipeline is
+used, with a warning: images have the same bits, and the first render of a kind of scene takes
+longer.
 """
 
 import os
@@ -20,16 +21,16 @@ SUPPORTED = "0.68"
 """The release of Numba that `jit/numba_pipeline.py` is written for, as in pyproject.toml."""
 
 CHOICE = "REFERENCE_RT_COMPILER"
-"""The environment variable that names a compiler: `INLINING` or `STOCK`."""
+"""The environment variable that names a compiler, `INLINING` or `STOCK`."""
 
 INLINING, STOCK = "inlining", "stock"
 
 
 class Compiler(NamedTuple):
-    """Options for `numba.njit`, and how compiled code calls an entry kernel at an address.
+    """Options for `numba.njit`, and how compiled code calls an entry kernel through a pointer.
 
-    kernel, entry: the options of kernels, which are inlined, and of entry kernels;  invoke: as
-    `inlining.invoke`.
+    kernel, entry: the options for kernels, which are inlined, and for entry kernels;  invoke: like
+    `numba_pipeline.invoke`.
     """
 
     name: str
@@ -39,8 +40,8 @@ class Compiler(NamedTuple):
 
 
 def choose() -> Compiler:
-    """The compiler that REFERENCE_RT_COMPILER names; by default ours where it fits Numba, else
-    Numba's own and a warning."""
+    """The compiler that REFERENCE_RT_COMPILER names.  By default ours if it supports the installed
+    Numba, else Numba's own, with a warning."""
     named = os.environ.get(CHOICE, "")
     if named == STOCK:
         return _stock()
@@ -52,7 +53,7 @@ def choose() -> Compiler:
             return _inlining()
         except (ImportError, AttributeError) as error:
             problem = f"lacks what it replaces ({error})"
-    # In one line: without a line of the source, which Python shows where it knows the file.
+    # warn() would add a line of source code; this keeps the warning on one line.
     warnings.warn_explicit(
         f"reference_rt's compiler is written for Numba {SUPPORTED}, and the installed Numba "
         f"{numba.__version__} {problem}: Numba's own compiler is used, which is slower and gives "
@@ -69,11 +70,11 @@ def _release() -> str:
     return ".".join(numba.__version__.split(".")[:2])
 
 
-# Without _nrt=False, calls count references of every array of the scene, atomically: measured 5
-# times slower on the Cornell box, with threads that contend.
+# Without _nrt=False every call atomically counts references to every array of the scene, for which
+# threads contend (measured: the Cornell box renders 5 times slower).
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 
-# Nothing calls kernels from C.
+# Kernels are never called from C.
 _INSIDE = _OPTIONS | {"no_cfunc_wrapper": True, "forceinline": True}
 
 _ENTRY = _OPTIONS | {"nogil": True}
@@ -91,14 +92,14 @@ def _stock() -> Compiler:
 
 
 def _known(options: dict[str, Any]) -> dict[str, Any]:
-    """Those that this Numba has: all but error_model and nogil only save time."""
+    """The options that this Numba supports.  All but error_model and nogil only save time."""
     return {name: value for name, value in options.items() if hasattr(cpu_target.options, name)}
 
 
 def _invoke(
     context: Any, builder: Any, function: Any, returns: Any, types: Any, arguments: Any
 ) -> Any:
-    """Write a call as Numba's own compiler does."""
+    """Emit a call as Numba's own compiler does."""
     status, value = context.call_conv.call_function(builder, function, returns, types, arguments)
     with builder.if_then(status.is_error, likely=False):
         context.call_conv.return_status_propagate(builder, status)
@@ -106,8 +107,8 @@ def _invoke(
 
 
 def _refusing(named: str) -> Compiler:
-    """Raises UsageError when the first kernel is to be compiled: at import it would be a traceback
-    before any command could tell it in one line."""
+    """A compiler that raises UsageError for its first kernel.  Raised at import, the error would be
+    a traceback; this late, commands print it as one line."""
 
     class Refusing(CompilerBase):  # type: ignore[misc]
         def __init__(self, *args: Any, **options: Any) -> None:

@@ -1,7 +1,7 @@
-"""Kernels that are compiled by themselves and called through their address.
+"""Calls of entry kernels through function pointers.
 
-A caller that takes an address is compiled without what stands there: both can be compiled at the
-same time (`jit/parallel_compile.py`), and what is kept of one serves all callers of its types.
+The caller is compiled without the callee's code.  So the two can be compiled in parallel
+(`parallel_compile.py`), and the callee's cached code serves all callers with its argument types.
 """
 
 from collections.abc import Callable
@@ -16,21 +16,20 @@ from numba.extending import intrinsic
 from reference_rt.jit.kernel import COMPILER, Signature
 
 Address = npt.NDArray[np.intp]
-"""(1,) where a kernel stands; what it holds is written before any call."""
+"""(1,) the function pointer of an entry kernel, stored before the first call."""
 
 
 def address_of(compiled: Callable[..., Any], signature: Signature) -> int:
-    """Where the machine code of an entry kernel stands that is compiled for arguments of these
-    types."""
+    """The function pointer of an entry kernel that is compiled for arguments of these types."""
     found = compiled.overloads[signature]  # type: ignore[attr-defined]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def call_at(typing_context: Any, address: Any, arguments: Any) -> Any:
-    """Call the entry kernel at an address with a tuple of arguments; it returns nothing.
+    """Call the entry kernel at `address` with a tuple of arguments; it returns nothing.
 
-    The arguments must be of the types that it was compiled for.
+    The arguments must have the types for which it was compiled.
     """
     declared = types.Tuple([types.unliteral(t) for t in arguments])
 

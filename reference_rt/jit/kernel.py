@@ -1,15 +1,15 @@
-"""`@kernel`, `@entry_kernel`: the one way to compile; `ByClass` for choice.
+"""`@kernel` and `@entry_kernel`, the only ways to compile; `ByClass`, a choice at compile time.
 
-Compiled code is kept on disk (`kernel_cache.py`).
+Compiled code is cached on disk (`kernel_cache.py`).
 
 A kernel is plain scalar code on floats, integers, arrays and NamedTuples of these.  With
-``NUMBA_DISABLE_JIT=1`` the same text runs as plain Python with bit-identical results; the rules
-that this asks for are few:
+``NUMBA_DISABLE_JIT=1`` the same source runs as plain Python with bit-identical results.  Kernels
+follow these rules for that:
 
 - IEEE arithmetic only: no fastmath, no ``**`` (Python's ``pow`` and LLVM's differ in the last bit);
-- no allocation: arrays come from outside, scratch from `local_floats` and `local_integers`;
+- no allocation: arrays are arguments, small scratch buffers are `local_floats` and the like;
 - integers that wrap are ``np.uint64`` throughout, constants included;
-- ``math.sqrt`` of what may be negative, and division of two Python floats by what may be zero,
+- ``math.sqrt`` of a number that may be negative, and division by a Python float that may be zero,
   are guarded (`reciprocal`): Python raises where the machine returns NaN or infinity.
 """
 
@@ -36,27 +36,27 @@ CACHE_FOLDER = prepare_folder(COMPILER.name)
 
 
 def kernel(function: F) -> F:
-    """Let compiled code call `function`, inlined; called from Python it runs as plain Python.
+    """Make `function` callable from compiled code, inlined; Python runs it as plain Python.
 
-    IEEE arithmetic in the order written.  The machine's calling convention would pass the scene's
-    tables field by field, some 400 words a call: hence the inlining (measured: 1.5 times faster).
-    How it comes about, without compiling anything twice, is in `jit/numba_pipeline.py`;
-    `compiler.py` chooses between that and Numba's own compiler.
+    IEEE arithmetic in the order written.  Always inlined, because the machine's calling convention
+    would pass the scene's tables field by field, some 400 words a call (measured: inlined, a render
+    is 1.5 times faster).  `numba_pipeline.py` does that without compiling anything twice;
+    `compiler.py` chooses between it and Numba's own compiler.
     """
     inlined: F = register_jitable(**COMPILER.kernel)(function)
     return inlined
 
 
 def overload_kernel(function: Any) -> Callable[[F], F]:
-    """`numba.extending.overload` for what kernels call: decorates a function of the types of the
-    arguments that returns the kernel to be run for them, None for none."""
+    """`numba.extending.overload` for functions that kernels call: decorates a function that takes
+    the arguments' types and returns the kernel for them, or None."""
     decorate: Callable[[F], F] = overload(function, jit_options=COMPILER.kernel, strict=False)
     return decorate
 
 
 def entry_kernel(function: F) -> F:
-    """Compile `function`, which Python calls with arrays, on first call for each set of argument
-    types; keep the result on disk.  Releases the GIL."""
+    """Compile `function`, which Python calls with arrays, at the first call for each set of
+    argument types, and cache the result on disk.  Runs without the GIL."""
     compiled: F = njit(**COMPILER.entry)(function)
     if CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
         with suppress(OSError):  # without a source file
@@ -69,16 +69,16 @@ Signature = tuple[Any, ...]
 
 
 def signature_of(*args: Any) -> Signature:
-    """Numba's types of arguments: of a scene's tables more than 1 ms (measured)."""
+    """Numba's types of arguments.  For a scene's tables this takes more than 1 ms (measured)."""
     return () if numba.config.DISABLE_JIT else tuple(numba.typeof(a) for a in args)
 
 
 def precompile(compiled: Callable[..., Any], signature: Signature) -> Callable[..., Any]:
-    """Compile `compiled` for arguments of these types, or load it from the cache, without running
-    it.
+    """Compile an entry kernel for arguments of these types, or load it from the cache.
 
-    What is returned runs it for such arguments, which must be right: of a scene's tables Numba asks
-    some 400 types at every call otherwise (34 us against 2, measured).
+    Returns a function that calls it without checking the arguments' types, which the caller must
+    get right: Numba's check of a scene's tables looks at some 400 types in every call (measured:
+    34 us a call with it, 2 us without).
     """
     if numba.config.DISABLE_JIT:
         return compiled
@@ -87,7 +87,7 @@ def precompile(compiled: Callable[..., Any], signature: Signature) -> Callable[.
 
 
 def is_compiled(compiled: Callable[..., Any], signature: Signature) -> bool:
-    """Whether it is compiled for arguments of these types, in this process or in the cache."""
+    """Whether an entry kernel is compiled for these types, in this process or in the cache."""
     if numba.config.DISABLE_JIT or signature in compiled.overloads:  # type: ignore[attr-defined]
         return True
     cache, codegen = compiled._cache, compiled.targetctx.codegen()  # type: ignore[attr-defined]
@@ -95,16 +95,17 @@ def is_compiled(compiled: Callable[..., Any], signature: Signature) -> bool:
 
 
 def is_named_tuple(numba_type: Any, cls: type) -> bool:
-    """Whether a Numba type is that of instances of the NamedTuple `cls`."""
+    """Whether a Numba type is the type of the NamedTuple `cls`."""
     return isinstance(numba_type, types.BaseNamedTuple) and numba_type.instance_class is cls
 
 
 class ByClass:
-    """A function that runs the kernel registered for the class of its first argument.
+    """A function that calls the kernel registered for the class of its first argument.
 
-    For choices made once per render (camera, sampler, filter, integrator; a table or its absence):
-    the first argument is a NamedTuple or None, its class is known when the caller compiles, and the
-    choice costs nothing at run time.  Register kernels with `register`; see `reference_rt.cameras`.
+    For what is the same in a whole render: camera, sampler, filter, integrator; a table, or None in
+    its place.  The first argument is a NamedTuple or None.  Its class is known when the caller is
+    compiled, so the choice costs nothing at run time.  Example: `reference_rt.cameras`.  For a
+    choice by a number that varies from hit to hit see `by_code.py`.
     """
 
     def __init__(self, name: str) -> None:
@@ -126,14 +127,14 @@ class ByClass:
             return None
 
     def register(self, cls: type, function: Callable[..., Any]) -> None:
-        """Run `function` where the first argument is a `cls`; type(None) stands for None."""
+        """Call `function` if the first argument is a `cls`; `cls` is type(None) for None."""
         self._kernels[cls] = function
 
 
 def _local_array(dtype: Any) -> Any:
-    """An intrinsic that makes an uninitialised 1-D array on the machine's stack.
+    """An intrinsic that returns an uninitialised 1-D array on the machine's stack.
 
-    It lives as long as the kernel that asks for it, once per call: not inside loops.
+    The array is freed when the calling kernel returns.  In a loop, each pass would take more stack.
     """
 
     @intrinsic  # type: ignore[untyped-decorator]
@@ -143,7 +144,7 @@ def _local_array(dtype: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             item = context.get_data_type(dtype)
             data = builder.alloca(item, size=arguments[0])
-            data.align = 64  # a line of the cache: vectors that cross its end take longer
+            data.align = 64  # a cache line: loads of vectors that straddle two take longer
             item_size = context.get_constant(types.intp, context.get_abi_sizeof(item))
             array = context.make_array(array_type)(context, builder)
             arrayobj.populate_array(
@@ -164,7 +165,7 @@ def _local_array(dtype: Any) -> Any:
 if numba.config.DISABLE_JIT:
 
     def local_floats(n: int) -> npt.NDArray[np.float64]:
-        """Scratch for `n` floats that lives as long as the calling kernel; not for use in loops."""
+        """Scratch for `n` floats, freed when the calling kernel returns; not for use in loops."""
         return np.empty(n)
 
     def local_integers(n: int) -> npt.NDArray[np.int64]:
@@ -172,7 +173,7 @@ if numba.config.DISABLE_JIT:
         return np.empty(n, np.int64)
 
     def local_naturals(n: int) -> npt.NDArray[np.uint32]:
-        """Scratch for `n` integers that are not negative, likewise."""
+        """Scratch for `n` unsigned 32-bit integers, likewise."""
         return np.empty(n, np.uint32)
 
 else:
@@ -183,7 +184,7 @@ else:
 
 @kernel
 def reciprocal(x: float) -> float:
-    """1/x as IEEE says, 1/±0 = ±inf, also in plain Python."""
+    """1/x by IEEE's rules, 1/±0 = ±inf, also in plain Python."""
     if x == 0.0:
         return math.copysign(math.inf, x)
     return 1.0 / x

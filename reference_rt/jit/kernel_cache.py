@@ -1,14 +1,14 @@
-"""Compiled kernels on disk: one file for each kernel and set of argument types, checked when read.
+"""The cache of compiled kernels on disk: one checksummed file per kernel and set of argument types.
 
-Numba's own cache trusts what it reads.  It writes an index of a function's files before the files
-themselves, without fsync: after a crash, a full disk or a damaged sector every later process fails
-while it unpickles, or runs damaged machine code.  Here there is no index: the name of a file is a
-digest of what it is for.  A file appears whole or not at all (`files.replacing`) and begins with a
-checksum; where that is wrong, the file is deleted and the kernel compiled again.  No lock is
-needed: if two processes write the same file, the second one's replaces the first one's.
+Numba's own cache does not verify what it reads.  It writes an index of a function's files before
+the files themselves, without fsync: after a crash, a full disk or a damaged sector every later
+process fails while unpickling, or runs damaged machine code.  This cache has no index: a file's
+name is a digest of its key.  A file is written atomically (`files.replacing`) and begins with a
+checksum; if that is wrong, the file is deleted and the kernel compiled again.  No lock is needed:
+if two processes write the same file, the second replaces the first.
 
-The checksum is against accidents, not against people: the payload is a pickle, which can run any
-code, so that only the owner may read or write the folder (mode 0700).
+The checksum protects against accidents, not against attackers: the payload is a pickle, which can
+run any code, so only the owner may read or write the folder (mode 0700).
 """
 
 import hashlib
@@ -32,10 +32,11 @@ from reference_rt.util.errors import ImageError
 from reference_rt.util.files import replacing
 
 _UNUSED_FOR = 14 * 24 * 3600.0
-"""Seconds after which another version's kernels are deleted: compiling them again takes ten."""
+"""Seconds without use after which another version's kernels are deleted (compiling them again takes
+ten)."""
 
 _UNFINISHED_FOR = 3600.0
-"""Seconds after which a temporary file is deleted: its writer, which needs less than one, was
+"""Seconds after which a temporary file is deleted: writing takes less than one, so its writer was
 killed."""
 
 _MAGIC = b"reference_rt kernel\n"
@@ -43,7 +44,8 @@ _CHECKSUM_BYTES = 32
 
 
 def _sources_digest(compiler: str) -> str:
-    """Numba's own key misses an edit in a callee's file and the bounds-check flag (numba#1833)."""
+    """Digest of all sources, versions and the bounds-check flag.  Numba's own key lacks that flag
+    and edits in a callee's file (numba#1833)."""
     digest = hashlib.sha256()
     for version in (sys.version, numba.__version__, llvmlite.__version__, compiler):
         digest.update(version.encode())
@@ -56,10 +58,10 @@ def _sources_digest(compiler: str) -> str:
 
 
 def prepare_folder(compiler: str) -> str | None:
-    """The folder for the kernels of exactly these sources and versions; None where none can be
-    written.  Deletes what is no longer used.
+    """Create the folder for kernels of exactly these sources and versions; None if it cannot be
+    written.  Deletes folders that are no longer used.
 
-    compiler: a name that tells one way to compile the same sources from another.
+    compiler: the name of the compiler, part of the key.
     """
     root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
     folder = Path(root) / "kernels" / _sources_digest(compiler)
@@ -84,7 +86,7 @@ def _make(folder: Path) -> None:
 
 
 def _delete_old(folder: Path, pattern: str, seconds: float) -> None:
-    """Another process may delete the same ones at the same time."""
+    """Errors are ignored: another process may be deleting the same files."""
     with suppress(OSError):
         for path in folder.glob(pattern):
             with suppress(OSError):
@@ -93,7 +95,7 @@ def _delete_old(folder: Path, pattern: str, seconds: float) -> None:
 
 
 def _delete(path: Path) -> None:
-    """A file, or what stands in its place."""
+    """Delete a file, or a folder in its place."""
     try:
         path.unlink(missing_ok=True)
     except OSError:  # a folder
@@ -101,18 +103,18 @@ def _delete(path: Path) -> None:
 
 
 class KernelCache:
-    """The compiled kernels of one function.  Numba's dispatcher calls `load_overload` before it
-    compiles and `save_overload` afterwards (its attribute `_cache`).
+    """The cache of one function.  Assigned to the attribute `_cache` of Numba's dispatcher, which
+    calls `load_overload` before it compiles and `save_overload` afterwards.
 
-    Raises OSError for a function without a source file, as one typed into a console: nothing would
-    tell when it changes.
+    Raises OSError for a function without a source file, such as one typed into a console: a change
+    of it could not be detected.
     """
 
     def __init__(self, function: Callable[..., Any], folder: str) -> None:
         self._function, self._folder = function, Path(folder)
         code = function.__code__
         self._name = f"{Path(code.co_filename).stem}.{code.co_name.strip('<>')}"
-        # The folder's name says nothing of a function outside this package.
+        # The folder's name covers the sources of this package only; functions may be outside.
         source = hashlib.blake2b(Path(code.co_filename).read_bytes()).digest()
         self._identity = code.co_filename, function.__qualname__, code.co_firstlineno, source
         self._head = _MAGIC + self._folder.name.encode()
@@ -127,40 +129,40 @@ class KernelCache:
         return self._path(self._key(signature, codegen)).is_file()
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """The compiled kernel for arguments of these types, a `CompileResult`; None where there is
-        none, or its file is damaged and now deleted."""
+        """The `CompileResult` for arguments of these types; None if there is none, or if its file
+        was damaged, and is deleted now."""
         target_context.refresh()
         key = self._key(signature, target_context.codegen())
         path = self._path(key)
         try:
             kept, parts = pickle.loads(self._opened(path.read_bytes()))
-            # Two classes of tuples may have the same name, and so the same file.
+            # Two NamedTuple classes may have the same name, and so the same file.
             return CompileResult._rebuild(target_context, *parts) if kept == key else None
         except FileNotFoundError:
             return None
-        except Exception:  # unpickling raises whatever the damage leads to
+        except Exception:  # damaged data makes unpickling raise anything
             _delete(path)
             return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Keep a compiled kernel.  Where that fails, on a full disk for example, the next process
+        """Write a compiled kernel.  If that fails, on a full disk for example, the next process
         compiles it again."""
         if compiled.lifted or compiled.library.has_dynamic_globals:
-            return  # it holds addresses of this process
+            return  # it contains addresses that are valid in this process only
         key = self._key(signature, compiled.library.codegen)
         with suppress(OSError, ImageError):
-            _make(self._folder)  # somebody may have emptied the cache
+            _make(self._folder)  # the cache may have been deleted
             with replacing(self._path(key)) as temporary:
                 temporary.write_bytes(self._sealed(dumps((key, compiled._reduce()))))
 
     def flush(self) -> None:
-        """Forget this function's kernels."""
+        """Delete this function's kernels."""
         for path in self._folder.glob(f"{self._name}-*"):
             _delete(path)
 
     def _key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        """All that the machine code depends on, but for what names the folder: types of arguments,
-        processor, the function and what it closes over."""
+        """All that the machine code depends on and the folder's name lacks: argument types,
+        processor, the function and its closure."""
         cells = tuple(cell.cell_contents for cell in self._function.__closure__ or ())
         function = (*self._identity, self._function.__code__.co_code, dumps(cells))
         digest = hashlib.blake2b(repr(function).encode()).hexdigest()
@@ -171,12 +173,12 @@ class KernelCache:
         return self._folder / f"{self._name}-{digest}"
 
     def _sealed(self, payload: bytes) -> bytes:
-        """What a file holds: what it is, for which version, a checksum of all, and the payload."""
+        """A file's content: magic, version, a checksum of everything, and the payload."""
         checksum = hashlib.blake2b(self._head + payload, digest_size=_CHECKSUM_BYTES).digest()
         return self._head + checksum + payload
 
     def _opened(self, data: bytes) -> bytes:
-        """The payload.  Raises ValueError where not every bit is as `_sealed` made it."""
+        """The payload.  Raises ValueError unless every bit is as `_sealed` wrote it."""
         payload = data[len(self._head) + _CHECKSUM_BYTES :]
         if self._sealed(payload) != data:
             raise ValueError("damaged, or of another version")

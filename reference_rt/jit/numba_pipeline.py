@@ -1,13 +1,13 @@
-"""How kernels become machine code: linked as they are, then optimised once, as a whole.
+"""Our Numba pipeline: an entry kernel links all kernels that it calls, then is optimised once.
 
-Numba optimises every function and makes machine code of it before it is linked into its callers,
-which do both again.  Kernels are inlined without exception, so that this work is for nothing: of
-the 33 s that a scene of many materials took to compile, two thirds (measured).  Here a kernel stays
-as it was lowered until an entry kernel links all that it calls.
+Numba optimises every function and generates its machine code before it links the function into its
+callers, which do both again.  Kernels are always inlined, so this work is wasted: two thirds of the
+33 s that a scene of many materials took to compile (measured).  Here a kernel stays unoptimised
+LLVM IR until an entry kernel links it.
 
-Nor are arguments taken apart.  Numba passes every number in a tuple by itself: some 400 for the
-tables of a scene, with an instruction for each at both ends of every call.  Inlining removes them
-all, but they are to be written, read and removed: a third of the time that was left.
+Tuples are passed as one LLVM struct.  Numba flattens them into scalar arguments: some 400 for the
+tables of a scene, with an instruction for each at both ends of every call.  Inlining would remove
+these, but writing, reading and removing them took a third of the remaining time.
 """
 
 from typing import Any
@@ -47,8 +47,8 @@ REPLACED: tuple[tuple[type, str], ...] = (
     (NativeLowering, "run_pass"),
     (DeadBranchPrune, "run_pass"),
 )
-"""Methods of Numba that are replaced or called below, beside the imports.  A renamed one that is
-replaced would still be found here, and never be called."""
+"""Methods of Numba that are overridden or called below.  Checked at import, because an override of
+a method that Numba has renamed would silently never be called."""
 
 for _owner, _method in REPLACED:
     if not hasattr(_owner, _method):
@@ -56,7 +56,7 @@ for _owner, _method in REPLACED:
 
 
 class _Inlined(JITCodeLibrary):
-    """The code of a kernel: as it was lowered, without that of what it calls."""
+    """The LLVM IR of a kernel: unoptimised, and without its callees."""
 
     def _optimize_functions(self, module: Any) -> None:
         module.data_layout = self._codegen._data_layout
@@ -64,14 +64,14 @@ class _Inlined(JITCodeLibrary):
     def finalize(self) -> None:
         for function in self._final_module.functions:
             if function.linkage == binding.Linkage.external and not function.is_declaration:
-                function.linkage = "linkonce_odr"  # may go where it is inlined
+                function.linkage = "linkonce_odr"  # LLVM may drop it once it is inlined
         self._finalized = True
 
     def _get_module_for_linking(self) -> Any:
         return self._final_module
 
     def _called(self, found: dict[Any, None]) -> dict[Any, None]:
-        """All that is called from here, added to `found`, each once (a dict keeps the order)."""
+        """Adds to `found` all direct and indirect callees, each once (a dict keeps the order)."""
         for library in self._linking_libraries:
             if library not in found:
                 found[library] = None
@@ -81,12 +81,12 @@ class _Inlined(JITCodeLibrary):
 
 
 class _Entry(_Inlined):
-    """The code of an entry kernel, with all that it calls."""
+    """The code of an entry kernel, with all its callees."""
 
     def finalize(self) -> None:
         for library in self._called({}):
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        # Numba's cheap passes, which come before these, are for reference counts; there are none.
+        # Not preceded by Numba's cheap passes: these are for reference counts, and there are none.
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
         self._final_module.verify()
@@ -99,8 +99,8 @@ class _Entry(_Inlined):
 def invoke(
     context: Any, builder: Any, function: Any, returns: Any, types: Any, arguments: Any
 ) -> Any:
-    """Write a call of a kernel: as Numba's own, without asking whether it raised anything, which
-    takes five blocks; but for indices out of bounds, where these are checked, none does."""
+    """Emit a call of a kernel, as Numba does, but without the five basic blocks that check whether
+    it raised an exception.  Kernels raise none, except with NUMBA_BOUNDSCHECK=1 an IndexError."""
     if config.BOUNDSCHECK:
         status, value = context.call_conv.call_function(
             builder, function, returns, types, arguments
@@ -116,7 +116,7 @@ def invoke(
 
 
 def _call(called: Any, library: Any) -> Any:
-    """What writes a call of a kernel that is to be inlined."""
+    """A function that emits a call of a kernel that will be inlined."""
 
     def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         function = context.declare_function(builder.module, called)
@@ -129,7 +129,7 @@ def _call(called: Any, library: Any) -> Any:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _LowerInlined(NativeLowering):
-    """Without an address: nothing but kernels calls the result."""
+    """Lower a kernel, without machine code or a function pointer: only kernels call it."""
 
     _name = "lower_inlined"
 
@@ -138,7 +138,7 @@ class _LowerInlined(NativeLowering):
         state.flags.no_compile = True
         super().run_pass(state)
         lowered = state["cr"]
-        # Calls find code by an object that stands for it.
+        # Numba's key for the code of a callee is a function object: this one is never called.
         name = lowered.fndesc.qualname
         stands_for_it = _dynfunc.make_function(
             lowered.fndesc.lookup_module(), name, name, 0, lowered.env, (state.library,)
@@ -159,9 +159,9 @@ class _LowerEntry(NativeLowering):
         return bool(super().run_pass(state))
 
 
-class _Whole:
-    """Mixed into the model of a kind of tuple: an argument, and what is returned, is the tuple
-    itself."""
+class _AsStruct:
+    """Mixin for the data model of a kind of tuple: as an argument and as a return value, it is one
+    LLVM struct."""
 
     def get_argument_type(self) -> Any:
         return self.get_value_type()
@@ -182,52 +182,52 @@ class _Whole:
         return value
 
 
-class _WholeTuple(_Whole, TupleModel):
+class _StructTuple(_AsStruct, TupleModel):
     pass
 
 
-class _WholeUniTuple(_Whole, UniTupleModel):
+class _StructUniTuple(_AsStruct, UniTupleModel):
     pass
 
 
 _MODELS = DataModelManager().chain(default_manager)
-_MODELS.register(types.NamedTuple, _WholeTuple)
-_MODELS.register(types.NamedUniTuple, _WholeUniTuple)
+_MODELS.register(types.NamedTuple, _StructTuple)
+_MODELS.register(types.NamedUniTuple, _StructUniTuple)
 
 _INTERNAL: dict[Any, Any] = {}
-"""Numba's own functions that kernels call, compiled for these models."""
+"""Numba's cache of its own functions that kernels call, here compiled for these data models."""
 
 
-class _There:
-    """In place of the type of an argument: certainly not that of None."""
+class _NotNone:
+    """Marks the type of an argument, for Numba's dead-branch pass, as not that of None."""
 
     def __init__(self, numba_type: Any) -> None:
-        self.literal_type = numba_type  # what Numba's pass compares with None's
+        self.literal_type = numba_type  # which that pass compares with the type of None
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Prune(DeadBranchPrune):
-    """Remove the branches that `x is None` decides.
+    """Remove the dead branches of `if x is None`, for arguments x.
 
-    Numba's own leaves `if x is None:` where x is there, and what stands below is compiled for
-    nothing, with all that it calls: a scene without a hierarchy's intersection of a few shapes in
-    one with a hierarchy.
+    Numba's own pass removes the branch for an x that is present only if x is None.  It keeps the
+    branch for None if x is present, which is then compiled with all its callees: for example the
+    intersection of scenes without a hierarchy, in a scene that has one.
     """
 
     _name = "prune"
 
     def run_pass(self, state: Any) -> bool:
         maybe = (types.NoneType, types.Omitted, types.Optional)
-        known = [t if isinstance(t, maybe) else _There(t) for t in state.args]
+        known = [t if isinstance(t, maybe) else _NotNone(t) for t in state.args]
         dead_branch_prune(state.func_ir, known)
         return True
 
 
 _LEFT_OUT = (
-    NativeLowering,  # others come in their place
+    NativeLowering,  # replaced by _LowerInlined or _LowerEntry, and DeadBranchPrune by _Prune
     DeadBranchPrune,
-    # For what no kernel has: closures, `with`, generators, loops over literals, expressions of
-    # whole arrays, references to count.
+    # For features that no kernel uses: closures, `with`, generators, loops over literals,
+    # whole-array expressions, reference counts.
     typed_passes.InlineOverloads,
     typed_passes.NopythonRewrites,
     typed_passes.NoPythonSupportedFeatureValidation,
@@ -245,14 +245,14 @@ _LEFT_OUT = (
 
 
 class _Flags(Flags):
-    """Numba's options.
+    """Numba's options, with a fast comparison.
 
-    It asks some 30,000 times a scene whether two are the same, to find a kernel that is compiled
-    already, and takes all 25 of both apart each time: a tenth of its calls (measured).
+    To find kernels that are compiled already, Numba compares options some 30,000 times a scene, and
+    all 25 of them each time: a tenth of its function calls (measured).
     """
 
     def __hash__(self) -> int:
-        return 0  # all kernels have the same, but for a few
+        return 0  # all but a few kernels have equal options
 
     def __eq__(self, other: object) -> bool:
         if isinstance(other, _Flags) and self._values == other._values:
@@ -261,7 +261,7 @@ class _Flags(Flags):
 
 
 class _Compiler(CompilerBase):
-    """Numba's compiler with another lowering, and tuples as above."""
+    """Numba's compiler with the passes and the data models above."""
 
     lowering: type[NativeLowering]
 
@@ -282,12 +282,12 @@ class _Compiler(CompilerBase):
 
 
 class InlinedCompiler(_Compiler):
-    """Of kernels."""
+    """For kernels."""
 
     lowering = _LowerInlined
 
 
 class EntryCompiler(_Compiler):
-    """Of entry kernels."""
+    """For entry kernels."""
 
     lowering = _LowerEntry

@@ -1,5 +1,7 @@
-"""Compiling in two processes at once: Numba's compiler is Python code, and a process runs one
-thread of that at a time."""
+"""Compilation in two processes at once: a forked child compiles some of the kernels.
+
+Threads would not help: Numba's compiler is Python code, and holds the GIL.
+"""
 
 import os
 import signal
@@ -17,19 +19,19 @@ from reference_rt.jit.kernel import CACHE_FOLDER, Signature, is_compiled, precom
 from reference_rt.util.child_processes import end_with_parent
 
 PATIENCE = 60.0
-"""Seconds that the other process is waited for when nothing else is left to do: all kernels of a
-scene take less."""
+"""Seconds to wait for the child when nothing else is left to do; all kernels of a scene compile in
+less."""
 
 Call = tuple[Callable[..., Any], Signature]
-"""An entry kernel, and the types of arguments that it is to be compiled for."""
+"""An entry kernel, and the argument types to compile it for."""
 
 
 def precompile_all(calls: Sequence[Call], threads: int) -> list[Callable[..., Any]]:
-    """`kernel.precompile` of entry kernels: what runs each for arguments of its types.
+    """`kernel.precompile` of several entry kernels, in parallel where possible.
 
-    Of those that are to be compiled the first is compiled here, the others meanwhile in a copy of
-    this process that leaves them in the cache; where there is no such process (one of the `threads`
-    that may be used, no `fork`, no cache, not the main thread), or it comes to nothing, here too.
+    The first that is not in the cache is compiled here; a forked child compiles the others
+    meanwhile and stores them in the cache.  Without a child (threads = 1, no `fork`, no cache, not
+    in the main thread), or if it fails, this process compiles all of them.
     """
     missing: list[Call] = []
     if len(calls) > 1 and threads > 1 and may_fork():
@@ -48,7 +50,7 @@ def precompile_all(calls: Sequence[Call], threads: int) -> list[Callable[..., An
 
 
 def may_fork() -> bool:
-    """Whether another process could be begun, and its kernels found."""
+    """Whether a child can be forked, and can hand over its kernels through the cache."""
     return (
         sys.platform == "linux"
         and CACHE_FOLDER is not None
@@ -57,12 +59,12 @@ def may_fork() -> bool:
 
 
 def _fork(calls: Sequence[Call]) -> int:
-    """The number of a new process that compiles these and does nothing else."""
-    # Nobody else holds the compiler's lock then: the new process has this thread only, and what
-    # other threads hold stays locked in it.
+    """The process id of a new child that compiles these and then exits."""
+    # Holding the compiler's lock, so that no other thread does: the child has this thread only, and
+    # a lock held by another would stay locked in it for ever.
     parent = os.getpid()
     with global_compiler_lock, warnings.catch_warnings():
-        # Python 3.12 warns of that.
+        # Python 3.12 warns of a fork in a process with threads.
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child != 0:
@@ -72,14 +74,14 @@ def _fork(calls: Sequence[Call]) -> int:
         for call in calls:
             precompile(*call)
     finally:
-        # Neither buffers are written nor handlers called a second time; nor is an error told: who
-        # compiles it again will.
+        # At once: buffers must not be flushed, nor exit handlers run, a second time.  An error is
+        # not reported, since the parent compiles the kernel again and reports it.
         os._exit(0)
 
 
 def _wait(child: int) -> None:
     end = time.monotonic() + PATIENCE
-    with suppress(ChildProcessError):  # where somebody else waits for all that end
+    with suppress(ChildProcessError):  # other code of this process may have reaped the child
         while os.waitpid(child, os.WNOHANG)[0] == 0:
             if time.monotonic() > end:
                 _end(child)

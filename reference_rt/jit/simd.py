@@ -1,15 +1,15 @@
-"""Numbers side by side: one text for plain Python, compiled code and vector code.
+"""SIMD vectors: functions that run as vector instructions, as scalar code and as plain Python.
 
-LLVM does not turn the loops over a node's boxes, a leaf's triangles or a block's rays into vector
-instructions by itself.  A text that works on LANES numbers at once is called, while a kernel
-compiles, with `Lanes`, whose operators write LLVM's vector operations; with NumPy's arrays of LANES
-numbers, or with single numbers, the same text runs as it stands.  Each operation rounds once, by
-IEEE's rules, in the order written: the results are the same bits.  Where the processor has no
-vectors that wide LLVM uses narrower ones.
+LLVM does not vectorise the loops over a node's boxes, a leaf's triangles or a block's rays by
+itself.  Instead a generic function is traced: it is called while a kernel compiles, with `Lanes`
+operands, whose operators emit LLVM vector instructions.  With NumPy arrays of LANES numbers, or
+with single numbers, the same function runs as it is.  Each operation rounds once, by IEEE's rules,
+in the order written: all results have the same bits.  On processors with narrower vectors LLVM
+splits the instructions.
 
-Such a text has no branches.  Where it chooses, it calls `select`, `smaller` and `larger`; the
-square root and the sign are those below; conditions are joined by &, | and ~.  How kernels call it
-is in `lane_kernels`.
+A generic function has no branches.  It uses `select`, `smaller` and `larger` instead, the square
+root and the sign functions below, and &, | and ~ for conditions.  `simd_kernels.py` makes such a
+function callable from kernels.
 """
 
 import math
@@ -26,14 +26,14 @@ from numba.extending import intrinsic
 from reference_rt.jit.kernel import overload_kernel
 
 LANES = 8
-"""Numbers of a vector: eight float64 are one register of AVX-512."""
+"""The vector width: eight float64 are one AVX-512 register."""
 
 I32, I64 = ir.IntType(32), ir.IntType(64)
 REALS = ir.VectorType(ir.DoubleType(), LANES)
 
 
 class Mask:
-    """Which lanes fulfil a condition."""
+    """A condition of each lane: an LLVM vector of booleans."""
 
     def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
         self.builder, self.value = builder, value
@@ -49,17 +49,17 @@ class Mask:
 
 
 class Lanes:
-    """A number in each lane, computed by code that is being written."""
+    """A vector of LANES float64 in the code that is being generated."""
 
     def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
         self.builder, self.value = builder, value
 
     def of(self, x: Any) -> ir.Value:
-        """The value of `x`: of lanes, or the same number in all."""
+        """The LLVM value of `x`, a vector or a number that is the same in all lanes."""
         return x.value if isinstance(x, Lanes) else ir.Constant(REALS, [float(x)] * LANES)
 
     def call(self, name: str, *others: Any) -> "Lanes":
-        """An instruction that LLVM writes as a function."""
+        """Emit a call of an LLVM intrinsic."""
         values = [self.value, *map(self.of, others)]
         of_type = ir.FunctionType(REALS, [REALS] * len(values))
         name = f"llvm.{name}.v{LANES}f64"
@@ -67,7 +67,7 @@ class Lanes:
         return Lanes(self.builder, self.builder.call(function, values))
 
     def moved(self, by: int) -> "Lanes":
-        """In each lane the number of that whose index differs in the bits of `by`."""
+        """A shuffle: lane k gets the number of lane k ^ by."""
         which = ir.Constant(ir.VectorType(I32, LANES), [lane ^ by for lane in range(LANES)])
         undefined = ir.Constant(REALS, ir.Undefined)
         return Lanes(self.builder, self.builder.shuffle_vector(self.value, undefined, which))
@@ -113,7 +113,7 @@ class Lanes:
 
 
 def select(condition: Any, a: Any, b: Any) -> Any:
-    """`a` where the condition is fulfilled, else `b`."""
+    """`a` in lanes where the condition is true, else `b`."""
     if isinstance(condition, Mask):
         builder = condition.builder
         lanes = Lanes(builder, condition.value)
@@ -124,17 +124,17 @@ def select(condition: Any, a: Any, b: Any) -> Any:
 
 
 def smaller(a: Any, b: Any) -> Any:
-    """Python's min(a, b): `a` where they do not compare."""
+    """Python's min(a, b): `a` if either is NaN."""
     return select(b < a, b, a)
 
 
 def larger(a: Any, b: Any) -> Any:
-    """Python's max(a, b): `a` where they do not compare."""
+    """Python's max(a, b): `a` if either is NaN."""
     return select(b > a, b, a)
 
 
 def least(x: Any) -> Any:
-    """The smallest of the lanes, of which none may be NaN, in all of them."""
+    """The minimum over the lanes, in every lane; none may be NaN."""
     if not isinstance(x, Lanes):
         return np.full(LANES, np.min(x))
     for half in (4, 2, 1):
@@ -153,8 +153,8 @@ def with_sign(x: Any, sign: Any) -> Any:
 
 
 def product_error(x: Any, y: Any, product: Any) -> Any:
-    """x y - product, exactly, for product = fl(x y): one instruction on most processors, which
-    rounds the difference alone ("fused multiply-add"), here in rational numbers."""
+    """The rounding error x y - product, exactly, for product = fl(x y).  Compiled it is one fused
+    multiply-add; plain Python computes it in rational numbers."""
     if isinstance(x, Lanes):
         return x.call("fma", y, -product)
     if isinstance(x, np.ndarray):
@@ -168,7 +168,7 @@ def product_error(x: Any, y: Any, product: Any) -> Any:
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _fused(typing_context: Any, x: Any, y: Any, z: Any) -> Any:
-    """x y + z, rounded once."""
+    """The fused multiply-add x y + z, rounded once."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         return builder.fma(*values)
@@ -178,7 +178,7 @@ def _fused(typing_context: Any, x: Any, y: Any, z: Any) -> Any:
 
 
 def _compiled_as(function: Callable[..., Any], one: Callable[..., Any]) -> None:
-    """What compiled code calls for single numbers."""
+    """Compiled code calls `one` in place of `function`, with single numbers."""
     overload_kernel(function)(lambda *_: one)
 
 
@@ -191,7 +191,7 @@ _compiled_as(product_error, lambda x, y, product: _fused(x, y, -product))
 
 
 def in_all_lanes(builder: ir.IRBuilder, x: ir.Value, of: ir.Type = REALS) -> ir.Value:
-    """A vector of one number."""
+    """A vector with `x` in every lane."""
     undefined = ir.Constant(of, ir.Undefined)
     one = builder.insert_element(undefined, x, I32(0))
     which = ir.Constant(ir.VectorType(I32, LANES), [0] * LANES)

@@ -1,4 +1,4 @@
-"""Texts for LANES numbers at once as functions that kernels call: see `lanes`."""
+"""`lane_kernel`: makes a generic function of `simd.py` callable from kernels."""
 
 import functools
 import inspect
@@ -15,7 +15,7 @@ from reference_rt.jit.simd import I32, I64, LANES, REALS, Lanes, in_all_lanes
 
 
 class _Index:
-    """An integer of the code that is being written."""
+    """An integer in the code that is being generated."""
 
     def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
         self.builder, self.value = builder, value
@@ -36,7 +36,7 @@ class _Index:
 
 
 class _Memory:
-    """An array of which LANES numbers are loaded and stored at once."""
+    """An array in the code that is being generated: loads and stores of vectors."""
 
     def __init__(self, builder: ir.IRBuilder, data: ir.Value, is_single: bool) -> None:
         self.builder, self.data, self.is_single = builder, data, is_single
@@ -84,7 +84,7 @@ def _conditions(found: Any) -> tuple[Any, ...]:
 
 
 def plain(function: Callable[..., Any]) -> Callable[..., int]:
-    """A lane kernel as plain Python on NumPy's arrays."""
+    """A SIMD kernel as plain Python on NumPy arrays of LANES numbers."""
 
     @functools.wraps(function)
     def run(*arguments: Any) -> int:
@@ -101,13 +101,16 @@ def plain(function: Callable[..., Any]) -> Callable[..., int]:
 
 
 def lane_kernel(function: Callable[..., Any]) -> Callable[..., int]:
-    """Let kernels call `function`, which returns the lanes that fulfil a condition, as bits; of
-    several conditions the first's are the lowest.
+    """Make a generic function callable from kernels.
 
-    Its arguments are C-contiguous arrays of float64 or float32, with load(i) of LANES numbers from
-    number i on, everywhere(i) of number i in every lane, and store(i, lanes) (float64 only), or of
-    uint32, with natural(i); float64 numbers, which stand in every lane; and integers, which may be
-    added and multiplied.
+    `function` returns a condition, or several.  The kernel returns them as a bit mask, one bit per
+    lane; the first condition's bits are the lowest.  Arguments of `function`:
+
+    - C-contiguous arrays of float64 or float32: load(i) is the vector of LANES numbers from number
+      i on, everywhere(i) is number i in every lane, store(i, lanes) (float64 only) stores a vector;
+    - C-contiguous arrays of uint32: natural(i) is number i, an integer;
+    - float64 numbers: the same number in every lane;
+    - integers, which may be added and multiplied.
     """
     if numba.config.DISABLE_JIT:
         return plain(function)
@@ -131,7 +134,7 @@ def lane_kernel(function: Callable[..., Any]) -> Callable[..., int]:
 
         return types.int64(*map(_taken_as, arguments)), generate
 
-    # Numba asks how many arguments there are.
+    # Numba reads the number of arguments from the signature.
     names = ("typing_context", *inspect.signature(function).parameters)
     kind = inspect.Parameter.POSITIONAL_ONLY
     typed.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
@@ -150,11 +153,11 @@ def _taken_as(of: Any) -> Any:
 if numba.config.DISABLE_JIT:
 
     def lowest(bits: int) -> int:
-        """The number of the lowest bit that is set (one must be)."""
+        """The index of the lowest set bit; at least one must be set."""
         return int(bits & -bits).bit_length() - 1
 
     def prefetch(array: Any, start: int) -> None:
-        """Ask for a number of an array, which will be read soon."""
+        """Prefetch a number of an array, which will be read soon, into the cache."""
 
 else:
 
@@ -173,7 +176,7 @@ else:
             of_type = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
             function = builder.module.declare_intrinsic("llvm.prefetch", [byte], of_type)
             place = builder.bitcast(builder.gep(data, [values[1]]), byte)
-            # To be read, kept in all caches, data.
+            # For reading, in all cache levels, data not instructions.
             builder.call(function, [place, I32(0), I32(3), I32(1)])
             return context.get_dummy_value()
 

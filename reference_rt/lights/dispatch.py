@@ -1,10 +1,15 @@
-"""What is asked of the lights of a scene."""
+"""The lights of a scene: pick one, sample it, and the densities of both.
+
+`pick` chooses an entry k of the light sampler (`Choice`), by power or by a tree; `sample_one` draws
+a direction to it.  p and n are the point and the shading normal for which light is sampled.
+"""
 
 from typing import Any, NamedTuple
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import Vec3, row
+from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.lights.emitters import area, constant, directional, environment_map, point, spot
 from reference_rt.lights.emitters.area import Areas
@@ -22,11 +27,11 @@ from reference_rt.textures import Textures
 
 
 class Lights(NamedTuple):
-    """The tables of each kind, None for absent ones;  ambient (1, 3);  choice, None without any
-    light that can be picked;  tree, None where there are few.
+    """The table of each type, None for types that the scene lacks.
 
-    The choice lists all areas, then points, spots, directional lights, then the environment: area
-    light i is entry i.
+    ambient (1, 3): the ambient radiance;  choice: the entries of the light sampler, None if no
+    light can be picked;  tree: the light tree, None for few lights.  Entries are in this order: all
+    areas, points, spots, directional lights, the environment.  So area light i is entry i.
     """
 
     points: Points | None
@@ -62,8 +67,18 @@ def _of_environment(name: str, without: Any) -> Any:
     return kernels.function
 
 
+_by_code = ByCode(
+    [
+        (AREA, "areas", area),
+        (POINT, "points", point),
+        (SPOT, "spots", spot),
+        (DIRECTIONAL, "directionals", directional),
+    ]
+)
+"""The bodies of the functions below are for the environment, of which there is only one."""
+
 background = _of_environment("radiance", _black)
-"""background(environment, d) -> the radiance of a ray that hits nothing."""
+"""background(environment, d): the radiance from direction d."""
 
 _environment_pdf = _of_environment("pdf", _never)
 _environment_sample = _of_environment("sample", _nothing)
@@ -71,8 +86,8 @@ _environment_sample = _of_environment("sample", _nothing)
 
 @kernel
 def pick(lights: Lights, p: Vec3, n: Vec3, u: float) -> Pick:
-    """A light for a surface at `p` with normal `n`, 0 for light from all sides; its probability is
-    0 where there is none."""
+    """A light for a surface at `p` with normal `n`, which is 0 for light from all sides.  Its
+    probability is 0 if there is none."""
     return _pick(lights.choice, lights.tree, p, n, u)
 
 
@@ -85,7 +100,7 @@ def _pick(lights: Choice | None, tree: LightTree | None, p: Vec3, n: Vec3, u: fl
 
 @kernel
 def pick_probability(lights: Lights, p: Vec3, n: Vec3, k: int) -> float:
-    """The probability that `pick` gives light k."""
+    """The probability that `pick` returns light k."""
     return _pick_probability(lights.choice, lights.tree, p, n, k)
 
 
@@ -100,19 +115,19 @@ def _pick_probability(
 
 @kernel
 def asks_place(lights: Lights) -> bool:
-    """Whether any chance or density depends on the place that a light is picked for: a constant."""
+    """Whether any probability or density depends on the point p: a constant."""
     return lights.areas is not None or lights.tree is not None
 
 
 @kernel
 def asks_normal(lights: Lights) -> bool:
-    """Whether any depends on the normal there: a constant."""
+    """Whether any probability depends on the normal n: a constant."""
     return lights.tree is not None
 
 
 @kernel
 def count(lights: Lights) -> int:
-    """How many lights can be picked."""
+    """The number of entries that can be picked."""
     return _count(lights.choice)
 
 
@@ -127,34 +142,8 @@ def _count(lights: Choice | None) -> int:
 def sample_one(
     lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3, u0: float, u1: float
 ) -> LightSample:
-    """Light from entry k of the choice at `p`; the pdf does not count the choice."""
+    """A sample of the light from entry k at `p`; its pdf is without the probability of k."""
     return _sample_one(lights.choice, lights, k, shapes, textures, p, u0, u1)
-
-
-@kernel
-def middle(
-    lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3
-) -> LightSample:
-    """The same without numbers: from the one point that stands for all of an area light."""
-    if _is_area(lights.choice, k):
-        return _middle_of_area(lights.areas, k, shapes, textures, p)
-    return sample_one(lights, k, shapes, textures, p, 0.5, 0.5)
-
-
-@kernel
-def _is_area(entries: Choice | None, k: int) -> bool:
-    if entries is None:
-        return False
-    return bool(entries.kind[k] == AREA)
-
-
-@kernel
-def _middle_of_area(
-    areas: Areas | None, i: int, shapes: Shapes, textures: Textures | None, p: Vec3
-) -> LightSample:
-    if areas is None:
-        return no_light()
-    return area.middle(areas, i, shapes, textures, p)
 
 
 @kernel
@@ -170,24 +159,13 @@ def _sample_one(
 ) -> LightSample:
     if entries is None:
         return no_light()
-    kind, i = entries.kind[k], entries.row[k]
-    # A kind that the scene lacks is not asked for; where there is but the last, none is.
-    if lights.areas is not None and kind == AREA:
-        found: LightSample = _from_area(lights.areas, i, shapes, textures, p, u0, u1)
-    elif lights.points is not None and kind == POINT:
-        found = _from_point(lights.points, i, p)
-    elif lights.spots is not None and kind == SPOT:
-        found = _from_spot(lights.spots, i, p)
-    elif lights.directionals is not None and kind == DIRECTIONAL:
-        found = _from_directional(lights.directionals, i)
-    else:
-        found = _environment_sample(lights.environment, u0, u1)
-    return found
+    return _sample(lights, entries.kind[k], entries.row[k], shapes, textures, p, u0, u1)
 
 
-@kernel
-def _from_area(
-    areas: Areas | None,
+@_by_code("sample")
+def _sample(
+    lights: Lights,
+    kind: int,
     i: int,
     shapes: Shapes,
     textures: Textures | None,
@@ -195,30 +173,37 @@ def _from_area(
     u0: float,
     u1: float,
 ) -> LightSample:
-    if areas is None:
-        return no_light()
-    return area.sample(areas, i, shapes, textures, p, u0, u1)
+    found: LightSample = _environment_sample(lights.environment, u0, u1)
+    return found
 
 
 @kernel
-def _from_point(points: Points | None, i: int, p: Vec3) -> LightSample:
-    if points is None:
-        return no_light()
-    return point.sample(points, i, p)
+def middle(
+    lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3
+) -> LightSample:
+    """The same without random numbers: an area light is replaced by one point."""
+    return _middle_of_one(lights.choice, lights, k, shapes, textures, p)
 
 
 @kernel
-def _from_spot(spots: Spots | None, i: int, p: Vec3) -> LightSample:
-    if spots is None:
+def _middle_of_one(
+    entries: Choice | None,
+    lights: Lights,
+    k: int,
+    shapes: Shapes,
+    textures: Textures | None,
+    p: Vec3,
+) -> LightSample:
+    if entries is None:
         return no_light()
-    return spot.sample(spots, i, p)
+    return _middle(lights, entries.kind[k], entries.row[k], shapes, textures, p)
 
 
-@kernel
-def _from_directional(directionals: Directionals | None, i: int) -> LightSample:
-    if directionals is None:
-        return no_light()
-    return directional.sample(directionals, i)
+@_by_code("middle")
+def _middle(
+    lights: Lights, kind: int, i: int, shapes: Shapes, textures: Textures | None, p: Vec3
+) -> LightSample:
+    return _sample(lights, kind, i, shapes, textures, p, 0.5, 0.5)
 
 
 @kernel
@@ -231,8 +216,8 @@ def is_area(areas: Areas | None, q: SurfacePoint) -> bool:
 
 @kernel
 def area_pdf(lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint) -> float:
-    """The density per solid angle, choice included, with which light sampling for a surface at `p`
-    with normal `n` finds `q`."""
+    """The density per solid angle of `pick` and `sample_one` together, for a surface at `p` with
+    normal `n`, at the point `q` of an area light; 0 for other points."""
     return _area_pdf(lights.areas, lights, shapes, p, n, q)
 
 
@@ -250,7 +235,7 @@ def _area_pdf(
 
 @kernel
 def environment_pdf(lights: Lights, p: Vec3, n: Vec3, d: Vec3) -> float:
-    """The same for a direction `d` in which nothing is hit."""
+    """The same for a direction `d` to the environment."""
     return _surrounding_pdf(lights.environment, lights, p, n, d)
 
 
@@ -267,7 +252,7 @@ def _surrounding_pdf(
 
 @kernel
 def ambient(lights: Lights) -> Vec3:
-    """The text-book's I_a."""
+    """The ambient radiance I_a of the Phong model."""
     return _ambient(lights.ambient)
 
 

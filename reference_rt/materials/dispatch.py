@@ -1,14 +1,19 @@
-"""What is asked of the materials of a scene: of the leaf at a point, or of its layers."""
+"""The materials of a scene: evaluate, sample and pdf, of one BSDF or of several layers.
+
+Directions are in the shading frame; `shading.wo` points to the viewer.  m is a material's number.
+A material that is made of others (mask, blend, bump, ...) is a list of layers, each a BSDF with a
+weight and a frame (`nested/flattened.py`).
+"""
 
 from typing import NamedTuple
 
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.vec3 import Vec3, to_local, to_world
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs import tables as any_leaf
+from reference_rt.materials.bsdfs import tables as bsdf
 from reference_rt.materials.bsdfs.tables import Leaves
 from reference_rt.materials.material import Branches, BsdfSample, Scattered, no_sample
-from reference_rt.materials.nested import flattened as any_layer
+from reference_rt.materials.nested import flattened
 from reference_rt.materials.nested.flattened import Layer, Layers, layer_at, lets
 from reference_rt.materials.shading import Shading
 from reference_rt.materials.textured import Textured, looked_floats
@@ -16,15 +21,20 @@ from reference_rt.textures import At, Colours
 
 
 class Materials(NamedTuple):
-    """Of each material: kind (n,) and row (n,), which table it is a row of, where it is no layers,
-    kind None where there is but one table, row None too where each is the row of its own number;
-    smooth (n,), whether lights can be sampled, None where all are smooth;  chooses (n,), whether
-    `sample` uses `u_lobe`, None where none does;  behind (n,), whether light from both sides of
-    the surface counts, None where it never does;  shown (n), its colour to ray casting.
+    """The n materials of a scene.  None stands for an array that the scene does not need.
 
-    oriented (1,) where any scatters differently along u and v, or is tilted by a texture, else
-    None;  asks (n,), whether it asks a texture, None where all or none do;  textured, None where
-    none has one for a colour;  layers, None where none is made of others;  leaves, the tables."""
+    kind (n,), row (n,): the table and row of a material's BSDF, without layers; kind is None if
+    there is only one table, row is None too if material m is row m of it.
+    smooth (n,): whether lights can be sampled; None if all are smooth.
+    chooses (n,): whether `sample` uses `u_lobe`; None if none does.
+    behind (n,): whether light from both sides of the surface counts; None if it never does.
+    shown (n): the colour for ray casting.
+    oriented (1,): present if any material is anisotropic, or tilted by a texture.
+    asks (n,): whether a texture is used; None if all or none use one.
+    textured: None if no colour is textured.
+    layers: None if no material is made of others.
+    leaves: the tables of BSDFs.
+    """
 
     kind: IntArray | None
     row: IntArray | None
@@ -40,7 +50,7 @@ class Materials(NamedTuple):
 
 
 def any_smooth(materials: Materials) -> bool:
-    """Whether there is any to sample lights for."""
+    """Whether there is any material for which lights can be sampled."""
     return materials.smooth is None or bool(materials.smooth.any())
 
 
@@ -54,7 +64,7 @@ def _flag(flags: IntArray | None, m: int, of_all: bool) -> bool:
 @kernel
 def _kind(kinds: IntArray | None, materials: Materials, m: int) -> int:
     if kinds is None:
-        return any_leaf.only(materials.leaves)
+        return bsdf.only(materials.leaves)
     return int(kinds[m])
 
 
@@ -67,49 +77,49 @@ def _row(rows: IntArray | None, m: int) -> int:
 
 @kernel
 def is_smooth(materials: Materials, m: int) -> bool:
-    """Whether the material scatters to a continuum of directions, so that lights can be sampled."""
+    """Whether lights can be sampled: the material scatters into a continuum of directions."""
     return _flag(materials.smooth, m, True)
 
 
 @kernel
 def chooses(materials: Materials, m: int) -> bool:
-    """Whether `sample` uses its number for the choice of a lobe."""
+    """Whether `sample` uses `u_lobe`, its random number for the choice of a lobe."""
     return _flag(materials.chooses, m, False)
 
 
 @kernel
 def asks_textures(materials: Materials, m: int) -> bool:
-    """Whether it matters where textures are asked."""
+    """Whether the material has textures, so that texture coordinates are needed."""
     return _flag(materials.asks, m, True)
 
 
 @kernel
 def takes_light_from_behind(materials: Materials, m: int) -> bool:
-    """Whether light that comes from both sides of the surface may reach the viewer."""
+    """Whether light from both sides of the surface may reach the viewer."""
     return _flag(materials.behind, m, False)
 
 
 @kernel
 def any_transmits(materials: Materials) -> bool:
-    """Whether light passes to the other side of any: a constant."""
+    """Whether any material transmits light: a constant."""
     return materials.behind is not None
 
 
 @kernel
 def evaluate(materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi|, without what is mirrored or refracted perfectly."""
+    """f(wo, wi) |cos wi|, without perfect reflection and refraction."""
     return both(materials, shading, wi).value
 
 
 @kernel
 def pdf(materials: Materials, shading: Shading, wi: Vec3) -> float:
-    """The density per solid angle with which `sample` picks `wi`; discrete directions apart."""
+    """The density per solid angle with which `sample` picks `wi`, without discrete directions."""
     return both(materials, shading, wi).density
 
 
 @kernel
 def both(materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf`, which share much of their work."""
+    """`evaluate` and `pdf` at once, which share much of their work."""
     return _both(materials.layers, materials, shading, wi)
 
 
@@ -118,7 +128,7 @@ def _both(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec
     m = shading.point.material
     if layers is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
-        return any_leaf.both(materials.leaves, kind, i, shading.at, shading.wo, wi)
+        return bsdf.both(materials.leaves, kind, i, shading.at, shading.wo, wi)
     value, density, total = Vec3(0.0, 0.0, 0.0), 0.0, 0.0
     first = layers.first[m]
     for k in range(layers.number[m]):
@@ -127,10 +137,10 @@ def _both(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec
             total += layer.weight
             wo_in, wi_in = to_local(layer.basis, shading.wo), to_local(layer.basis, wi)
             kind, i = layers.kind[first + k], layers.row[first + k]
-            one = any_leaf.both(materials.leaves, kind, i, shading.at, wo_in, wi_in)
+            one = bsdf.both(materials.leaves, kind, i, shading.at, wo_in, wi_in)
             if lets(layer, wi):
                 value = value + one.value * layer.weight
-            elif layers.number[m] == 1:  # `sample` gives up what it draws there
+            elif layers.number[m] == 1:  # `sample` rejects such directions
                 continue
             density += one.density * layer.weight
     return Scattered(value, density / total if total > 0.0 else 0.0)
@@ -140,7 +150,7 @@ def _both(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec
 def sample(
     materials: Materials, shading: Shading, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
-    """A direction drawn for `shading.wo`; pdf = 0 where the material scatters nothing."""
+    """A direction sampled for `shading.wo`; pdf = 0 if the material scatters nothing."""
     return _sample(materials.layers, materials, shading, u_lobe, u0, u1)
 
 
@@ -156,15 +166,15 @@ def _sample(
     m = shading.point.material
     if layers is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
-        return any_leaf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
+        return bsdf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
     first, count = layers.first[m], layers.number[m]
     total = 0.0
     for k in range(count):
         total += layer_at(shading, k).weight
     if not total > 0.0:
         return no_sample()
-    # The layer whose stretch of the sum of the weights holds u_lobe; its place there, stretched,
-    # is the number for the layer's own choice.
+    # Choose a layer with probability weight / total; u_lobe, rescaled within the layer's interval,
+    # is the random number for the layer's own choice.
     rest, chosen = u_lobe * total, 0
     layer = layer_at(shading, 0)
     while rest >= layer.weight and chosen + 1 < count:
@@ -176,7 +186,7 @@ def _sample(
     u_inner = min(rest / layer.weight, 1.0 - 2.0**-53)
     wo_in = to_local(layer.basis, shading.wo)
     kind, i = layers.kind[first + chosen], layers.row[first + chosen]
-    drawn = any_leaf.sample(materials.leaves, kind, i, shading.at, wo_in, u_inner, u0, u1)
+    drawn = bsdf.sample(materials.leaves, kind, i, shading.at, wo_in, u_inner, u0, u1)
     wi = to_world(layer.basis, drawn.wi)
     if drawn.pdf == 0.0:
         return no_sample()
@@ -184,12 +194,12 @@ def _sample(
         if not lets(layer, wi):
             return no_sample()
     if drawn.is_delta:
-        # Its share of the whole over the chance of the layer, weight / total.
+        # weight / total is the probability of the layer, by which its contribution is divided.
         probability = drawn.pdf * (layer.weight / total)
         return BsdfSample(wi, drawn.weight * total, probability, drawn.eta, True)
     if count == 1:
         return BsdfSample(wi, drawn.weight * total, drawn.pdf, drawn.eta, False)
-    # All layers could have drawn it.
+    # Any of the layers could have sampled this direction: use the sum of their densities.
     found = _both(layers, materials, shading, wi)
     if not found.density > 0.0:
         return no_sample()
@@ -198,7 +208,7 @@ def _sample(
 
 @kernel
 def branch_count(materials: Materials, m: int) -> int:
-    """How many `branches` a material has."""
+    """The number of `branches` of a material."""
     return _branch_count(materials.layers, m)
 
 
@@ -212,26 +222,26 @@ def _branch_count(layers: Layers | None, m: int) -> int:
 @kernel
 def most_branches(materials: Materials) -> int:
     """The largest `branch_count`."""
-    return max(1, any_layer.most(materials.layers))
+    return max(1, flattened.most(materials.layers))
 
 
 @kernel
 def kept_floats(materials: Materials) -> int:
-    """The size of the array that `shade` must have for this scene's materials."""
-    layers = any_layer.SIZE * any_layer.most(materials.layers)
+    """The size of the scratch buffer that `shade` needs for this scene's materials."""
+    layers = flattened.SIZE * flattened.most(materials.layers)
     return looked_floats(materials.textured) + layers
 
 
 @kernel
 def prepare(materials: Materials, shading: Shading, at: At) -> None:
-    """Fills `shading.layers`: before anything else is asked.  `at`: where to ask textures that were
-    not looked up."""
-    any_layer.prepare(materials.layers, shading, at)
+    """Write `shading.layers`, which all other functions need.  `at`: the place for textures whose
+    lookups are not cached."""
+    flattened.prepare(materials.layers, shading, at)
 
 
 @kernel
 def ambient(materials: Materials, shading: Shading) -> Vec3:
-    """The text-book's k_a, of what has it."""
+    """The ambient reflectance k_a of the Phong model, summed over the layers; black for others."""
     return _ambient(materials.layers, materials, shading)
 
 
@@ -240,20 +250,20 @@ def _ambient(layers: Layers | None, materials: Materials, shading: Shading) -> V
     m = shading.point.material
     if layers is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
-        return any_leaf.ambient(materials.leaves, kind, i, shading.at)
+        return bsdf.ambient(materials.leaves, kind, i, shading.at)
     total = Vec3(0.0, 0.0, 0.0)
     first = layers.first[m]
     for k in range(layers.number[m]):
         weight = layer_at(shading, k).weight
         kind, i = layers.kind[first + k], layers.row[first + k]
-        value = any_leaf.ambient(materials.leaves, kind, i, shading.at)
+        value = bsdf.ambient(materials.leaves, kind, i, shading.at)
         total = total + value * weight
     return total
 
 
 @kernel
 def branches(materials: Materials, shading: Shading, k: int) -> Branches:
-    """The perfectly mirrored and refracted directions number k of a material."""
+    """The perfectly reflected and refracted directions of layer k of a material."""
     return _branches(materials.layers, materials, shading, k)
 
 
@@ -262,12 +272,12 @@ def _branches(layers: Layers | None, materials: Materials, shading: Shading, k: 
     m = shading.point.material
     if layers is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
-        return any_leaf.branches(materials.leaves, kind, i, shading.at, shading.wo)
+        return bsdf.branches(materials.leaves, kind, i, shading.at, shading.wo)
     layer = layer_at(shading, k)
     k += layers.first[m]
     wo_in = to_local(layer.basis, shading.wo)
     kind, i = layers.kind[k], layers.row[k]
-    found = any_leaf.branches(materials.leaves, kind, i, shading.at, wo_in)
+    found = bsdf.branches(materials.leaves, kind, i, shading.at, wo_in)
     reflected = to_world(layer.basis, found.reflected)
     refracted = to_world(layer.basis, found.refracted)
     return Branches(

@@ -1,9 +1,9 @@
-"""The textures of a material, all asked once where a surface is hit.
+"""Texture lookups of a material, evaluated once per hit and cached.
 
-What a material scatters is asked several times at each hit, and every parameter of it may be a
-texture.  Asking them beforehand spares asking again, and there is one place that they are asked
-from: with a copy of all textures' code at every parameter, half of what is compiled for a scene
-like textured_room was these (measured, before and after optimisation).
+A material is evaluated several times at each hit, and each of its parameters may be a texture.  The
+cache avoids repeated lookups, and keeps the lookup code in one place.  With the code inlined at
+every parameter it was half of what is compiled for a scene like textured_room (measured, before
+and after optimisation).
 """
 
 from collections.abc import Mapping
@@ -22,8 +22,11 @@ from reference_rt.textures.lookup import Looked, lookup
 
 
 class Textured(NamedTuple):
-    """Of each material, those that it is made of included: first (m,) and number (m,) of its
-    entries in texture (k,), the numbers of its textures;  size: that of the scene's textures."""
+    """The textures of each material, and of those that it is made of.
+
+    first (m,), number (m,): a material's range of texture (k,), which holds numbers of textures;
+    size: the number of textures of the scene.
+    """
 
     first: IntArray
     number: IntArray
@@ -32,7 +35,7 @@ class Textured(NamedTuple):
 
 
 def textured_table(materials: Mapping[str, Material], palette: Palette) -> Textured | None:
-    """None where no material has any texture."""
+    """None if no material has a texture."""
     found = [_textures(name, materials, palette) for name in materials]
     if not any(found):
         return None
@@ -42,26 +45,26 @@ def textured_table(materials: Mapping[str, Material], palette: Palette) -> Textu
 
 
 def _textures(name: str, materials: Mapping[str, Material], palette: Palette) -> set[int]:
-    """The numbers of the textures that a material asks for colours."""
+    """The numbers of the textures that a material uses for colours."""
     material = materials[name]
     found = {
         palette.numbers_of[texture]
         for field, texture in texture_names(material).items()
-        # Of heights, the slopes are asked, and there is one place for that anyway.
+        # Of heights the gradient is needed, not the colour, and in one place only.
         if not (isinstance(material, Bump) and field == "height")
     }
     return found.union(*(_textures(base, materials, palette) for base in _bases(material)))
 
 
 def asks_textures(name: str, materials: Mapping[str, Material]) -> bool:
-    """Whether a material asks any texture, also for heights."""
+    """Whether a material uses any texture, also for heights."""
     material = materials[name]
     asked = [asks_textures(base, materials) for base in _bases(material)]
     return bool(texture_names(material)) or any(asked)
 
 
 def _bases(material: Material) -> list[str]:
-    """The names of those that a material is made of."""
+    """The names of the materials of which a material is made."""
     if isinstance(material, Wrapper):
         named = [getattr(material, base) for base in material.bases]
     else:
@@ -71,7 +74,7 @@ def _bases(material: Material) -> list[str]:
 
 @kernel
 def looked_floats(textured: Textured | None) -> int:
-    """The size of the array that `look` fills."""
+    """The size of the array that `look` writes."""
     if textured is None:
         return 0
     return 3 * textured.size
@@ -95,5 +98,5 @@ _choice = ByClass("look")
 _choice.register(type(None), _nothing)
 _choice.register(Textured, _look)
 look = _choice.function
-"""look(textured, m, at, colours) -> the place where `lookup` finds what the textures of material m
-have at `at`: in `colours`, while that lives."""
+"""look(textured, m, at, colours) -> At.  Evaluates the textures of material m at `at`, into the
+scratch buffer `colours`, and returns a place where `lookup` reads these."""

@@ -1,4 +1,8 @@
-"""A few shapes, without a hierarchy: the nearest of all of them."""
+"""Closest hits by brute force, without a BVH: faster for scenes of a few shapes.
+
+Spheres, rectangles and boxes are tested with SIMD: LANES shapes against one ray (`nearest`), or
+one shape against LANES rays (`nearest_of_rays`).
+"""
 
 from typing import Any, NamedTuple
 
@@ -6,13 +10,13 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Crossing, Hit, Ray, miss, no_hit
 from reference_rt.core.ray_block import Hits, Rays, ray_of
 from reference_rt.core.vec3 import row, triple
+from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import LANES
 from reference_rt.shapes import box
 from reference_rt.shapes.box import Boxes
 from reference_rt.shapes.curved import sphere
 from reference_rt.shapes.curved.sphere import Spheres
-from reference_rt.shapes.dispatch import intersect_row
 from reference_rt.shapes.flat import rectangle
 from reference_rt.shapes.flat.rectangle import Rectangles
 from reference_rt.shapes.meshes.triangle import Triangles
@@ -21,13 +25,9 @@ from reference_rt.shapes.ray_simd import begin, end
 from reference_rt.shapes.shape import nearest_lane
 from reference_rt.shapes.tables import (
     BOX,
-    DISK,
-    PLANE,
-    POLYGON,
-    QUADRIC,
     RECTANGLE,
     SPHERE,
-    TORUS,
+    TABLES,
     TRIANGLE,
     Shapes,
     of_table,
@@ -35,14 +35,16 @@ from reference_rt.shapes.tables import (
 
 
 class Packets(NamedTuple):
-    """Shapes as `nearest_in_packets` takes them, where no hierarchy leads to them; else None."""
+    """The shapes in the SoA layout of `_nearest_in_packets`; None for those that are in a BVH."""
 
     spheres: FloatArray | None
     rectangles: FloatArray | None
     boxes: FloatArray | None
 
 
-_lane_distance = of_table("lane_distance", miss)
+@kernel
+def _no_crossing(table: Any, i: int, ray: Any) -> Crossing:
+    return miss()
 
 
 @kernel
@@ -50,6 +52,10 @@ def _not_found(table: Any, i: int, ray: Ray, t: float) -> Crossing:
     return miss()
 
 
+intersect_row = of_table("intersect", _no_crossing)
+"""intersect_row(table, i, ray): `intersect` of one table's row i; triangles take a `Shear`."""
+
+_lane_distance = of_table("lane_distance", miss)
 _found = of_table("found", _not_found)
 
 
@@ -57,7 +63,7 @@ _found = of_table("found", _not_found)
 def _nearest_in_packets(
     kind: int, table: Any, packets: FloatArray | None, ray: Ray, closest: Hit
 ) -> Hit:
-    """The nearest of `closest` and all shapes of a table, LANES of them side by side."""
+    """The nearest of `closest` and all shapes of a table, LANES shapes at a time."""
     if table is None:
         return closest
     if packets is None:
@@ -76,7 +82,7 @@ def _nearest_in_packets(
 
 @kernel
 def _nearest_in_table(kind: int, table: Any, ray: Any, closest: Hit) -> Hit:
-    """The nearest of `closest` and all primitives of a table, one after another."""
+    """The nearest of `closest` and all primitives of a table, one at a time."""
     if table is None:
         return closest
     for i in range(len(table.owner)):
@@ -88,8 +94,8 @@ def _nearest_in_table(kind: int, table: Any, ray: Any, closest: Hit) -> Hit:
 
 @kernel
 def nearest(shapes: Shapes, packets: Packets, ray: Ray) -> Hit:
-    """The nearest primitive of all; of several at the same t, the first in the order of the codes
-    and then of the scene."""
+    """The closest hit of one ray.  Of several at the same t, the first in the order of the codes,
+    then of the scene."""
     closest = Hit(ray.t_max, -1, -1, 0.0, 0.0, -1)
     closest = _nearest_in_packets(SPHERE, shapes.spheres, packets.spheres, ray, closest)
     closest = _nearest_in_packets(RECTANGLE, shapes.rectangles, packets.rectangles, ray, closest)
@@ -97,23 +103,33 @@ def nearest(shapes: Shapes, packets: Packets, ray: Ray) -> Hit:
     return _nearest_of_others(shapes, ray, closest)
 
 
+_without_packets = ByCode(
+    (code, field, module)
+    for code, field, _, module in TABLES
+    if code != TRIANGLE and not hasattr(module, "lane_distance")
+)
+_nearest_in_tables = _without_packets.in_turn(_nearest_in_table)
+
+
 @kernel
 def _nearest_of_others(shapes: Shapes, ray: Ray, closest: Hit) -> Hit:
-    """The nearest of `closest` and what has no packets."""
-    closest = _nearest_triangle(shapes.triangles, ray, closest)
-    closest = _nearest_in_table(DISK, shapes.disks, ray, closest)
-    closest = _nearest_in_table(PLANE, shapes.planes, ray, closest)
-    closest = _nearest_in_table(POLYGON, shapes.polygons, ray, closest)
-    closest = _nearest_in_table(QUADRIC, shapes.quadrics, ray, closest)
-    return _nearest_in_table(TORUS, shapes.tori, ray, closest)
+    """The nearest of `closest` and all shapes of types without SIMD kernels."""
+    found: Hit = _nearest_in_tables(shapes, ray, _nearest_triangle(shapes.triangles, ray, closest))
+    return found
+
+
+@kernel
+def _yes(kind: int, table: Any, found: bool) -> bool:
+    return True
+
+
+_any_in_tables = _without_packets.in_turn(_yes)
 
 
 @kernel
 def _has_others(shapes: Shapes) -> bool:
-    """Whether there is what has no packets: a constant."""
-    flat = shapes.disks is not None or shapes.planes is not None or shapes.polygons is not None
-    curved = shapes.quadrics is not None or shapes.tori is not None
-    return shapes.triangles is not None or flat or curved
+    """Whether the scene has types of shapes without SIMD kernels: a constant."""
+    return bool(_any_in_tables(shapes, shapes.triangles is not None))
 
 
 @kernel
@@ -124,13 +140,14 @@ def _nearest_triangle(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hi
 
 
 _KIND = 2**40
-"""The code of a primitive that a ray among several has found is kind * _KIND + row."""
+"""`Hits.codes` are kind * _KIND + row."""
 
 
 @kernel
 def nearest_of_rays(shapes: Shapes, rays: Rays, hits: Hits, n: int, any_hit: bool) -> None:
-    """What `nearest_of_ray` makes the hits of the first n of `rays` of; where `any_hit`, only
-    whether there is any, by the sign of its code."""
+    """Test the first n of `rays`, LANES at a time, against the types with SIMD kernels; writes
+    `hits`, which `nearest_of_ray` completes.  any_hit: against all types, and the result is only
+    whether a ray hits anything, which is the sign of its code."""
     t, codes = local_floats(LANES), local_integers(LANES)
     for at in range(0, n, LANES):
         begin(rays.numbers, at, t, codes)
@@ -147,7 +164,7 @@ def nearest_of_rays(shapes: Shapes, rays: Rays, hits: Hits, n: int, any_hit: boo
 
 @kernel
 def nearest_of_ray(shapes: Shapes, ray: Ray, hits: Hits, j: int) -> Hit:
-    """`nearest` for ray number j of those that `nearest_of_rays` was asked for."""
+    """`nearest` for ray number j, after `nearest_of_rays`."""
     closest = _hit_of_code(shapes, ray, hits.codes[j], hits.numbers[j])
     return _nearest_of_others(shapes, ray, closest)
 
@@ -158,7 +175,7 @@ def _hit_of_code(shapes: Shapes, ray: Ray, code: int, t: float) -> Hit:
         return no_hit(ray)
     kind, i = code // _KIND, code % _KIND
     if shapes.rectangles is None and shapes.boxes is None:
-        kind = SPHERE  # a constant, so that choices vanish
+        kind = SPHERE  # a constant, so that the branches below vanish
     found = Crossing(t, 0.0, 0.0)
     if kind == RECTANGLE:
         found = _found(shapes.rectangles, i, ray, t)

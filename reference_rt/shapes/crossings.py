@@ -1,4 +1,4 @@
-"""All crossings of a ray with one primitive, which path tracing, after the first, does not need."""
+"""All crossings of a ray with one primitive; path tracing needs only the first of them."""
 
 import math
 from typing import Any, NamedTuple
@@ -9,25 +9,14 @@ from reference_rt.shapes.curved.quadrics import Quadrics, crossings
 from reference_rt.shapes.dispatch import intersect, spans
 from reference_rt.shapes.meshes.watertight import Shear
 from reference_rt.shapes.shape import Spans, no_spans, one_span
-from reference_rt.shapes.tables import (
-    BOX,
-    DISK,
-    PLANE,
-    POLYGON,
-    QUADRIC,
-    RECTANGLE,
-    SPHERE,
-    TORUS,
-    TRIANGLE,
-    Shapes,
-)
+from reference_rt.shapes.tables import BOX, QUADRIC, SPHERE, TORUS, Shapes, by_code
 
 MOST = 4
-"""Of one primitive: a torus has so many, and so has a capped quadric of two sheets."""
+"""The most crossings of one primitive: of a torus, and of a capped quadric of two sheets."""
 
 
 class Along(NamedTuple):
-    """Up to MOST crossings of a ray: `Spans`, with what more its first needs, as `Crossing.v`."""
+    """Up to MOST crossings of a ray.  spans: t and u of each;  v: `Crossing.v` of the first."""
 
     spans: Spans
     v: float
@@ -35,8 +24,8 @@ class Along(NamedTuple):
 
 @kernel
 def along(shapes: Shapes, kind: int, i: int, ray: Ray, shear: Shear) -> Along:
-    """Those of primitive i of a kind, in order; the t of those of shapes that can have several may
-    be 0 and below."""
+    """The crossings with primitive i of a kind, in order.  For shapes that can have several, t may
+    be 0 or negative."""
     if kind in (SPHERE, BOX, TORUS):
         return Along(spans(shapes, kind, i, ray), 0.0)
     if kind == QUADRIC:
@@ -53,32 +42,11 @@ def _of_quadric(quadrics: Quadrics | None, i: int, ray: Ray) -> Spans:
 
 
 @kernel
-def number_of(shapes: Shapes, kind: int) -> int:
-    """How many primitives of a kind there are."""
-    count = 0
-    if kind == SPHERE:
-        count = _rows(shapes.spheres)
-    elif kind == RECTANGLE:
-        count = _rows(shapes.rectangles)
-    elif kind == BOX:
-        count = _rows(shapes.boxes)
-    elif kind == TRIANGLE:
-        count = _rows(shapes.triangles)
-    elif kind == DISK:
-        count = _rows(shapes.disks)
-    elif kind == PLANE:
-        count = _rows(shapes.planes)
-    elif kind == POLYGON:
-        count = _rows(shapes.polygons)
-    elif kind == QUADRIC:
-        count = _rows(shapes.quadrics)
-    elif kind == TORUS:
-        count = _rows(shapes.tori)
-    return count
-
-
-@kernel
 def _rows(table: Any) -> int:
-    if table is None:
-        return 0
     return len(table.owner)
+
+
+@by_code(lambda module: _rows)
+def number_of(shapes: Shapes, kind: int) -> int:
+    """The number of primitives of a kind."""
+    return 0

@@ -1,6 +1,7 @@
-"""Rays side by side: the plain kernels of shapes' distances, made into vector code.
+"""A block of rays against one shape, LANES rays at a time, as vector instructions.
 
-The kernel `distance` of such a shape is a text for LANES rays at once too: see `lanes`.
+The shape's kernel `distance` is a generic function (`jit/simd.py`): it runs for one ray, and for
+LANES rays at once.
 """
 
 import math
@@ -22,13 +23,13 @@ _FIRST = I64(0)
 
 
 class _Writer:
-    """What the intrinsics below share."""
+    """Loads, stores and broadcasts that the intrinsics below emit."""
 
     def __init__(self, context: Any, builder: ir.IRBuilder) -> None:
         self.context, self.builder = context, builder
 
     def _place(self, array_type: Any, array: ir.Value, of: ir.Type, at: ir.Value) -> ir.Value:
-        """Where item `at` of an array begins, as a pointer to `of`."""
+        """A pointer to item `at` of an array, of type `of`."""
         data = self.context.make_array(array_type)(self.context, self.builder, array).data
         return self.builder.bitcast(self.builder.gep(data, [at]), of.as_pointer())
 
@@ -41,17 +42,17 @@ class _Writer:
         self.builder.store(value, self._place(array_type, array, value.type, at), align=8)
 
     def lanes(self, value: ir.Value, *at: int) -> Lanes:
-        """A number of a tuple, the same in all lanes."""
+        """A number of a tuple, in every lane."""
         number = self.builder.extract_value(value, at)
         return Lanes(self.builder, in_all_lanes(self.builder, number))
 
     def vector(self, value: ir.Value, k: int) -> Vec3:
-        """Vector k of a tuple, the same in all lanes."""
+        """Item k of a tuple, a `Vec3`, in every lane."""
         components: list[Any] = [self.lanes(value, k, axis) for axis in range(3)]
         return Vec3(*components)
 
     def column(self, array_type: Any, rays: ir.Value, column: int, at: ir.Value) -> Lanes:
-        """A number of each of LANES rays."""
+        """One component (see `Rays.numbers`) of LANES rays."""
         place = self.builder.add(at, I64(column * BLOCK))
         return Lanes(self.builder, self.load(array_type, rays, REALS, place))
 
@@ -59,8 +60,9 @@ class _Writer:
 def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
     """The kernel nearer(rays, at, shape, code, t, codes) of a `distance(ray, *shape)`.
 
-    For each of LANES rays of `rays` (`streams.Rays.numbers`) from number `at` on: where the shape
-    is nearer than t (LANES,), its distance there, and `code` into codes (LANES,).
+    It tests LANES rays, from number `at` on, of `rays` (`ray_block.Rays.numbers`) against a shape.
+    For each that meets the shape before t (LANES,), it writes the distance to t and `code` to codes
+    (LANES,).
     """
     if numba.config.DISABLE_JIT:
         return nearer_plainly(distance)
@@ -97,7 +99,7 @@ def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
 
 
 def nearer_plainly(distance: Callable[..., Any]) -> Callable[..., None]:
-    """What `nearer_by` returns, as plain Python."""
+    """The kernel that `nearer_by` returns, as plain Python."""
 
     def nearer(
         rays: FloatArray, at: int, shape: Any, code: int, t: FloatArray, codes: IntArray
@@ -112,12 +114,12 @@ def nearer_plainly(distance: Callable[..., Any]) -> Callable[..., None]:
 
 
 def _begin(rays: FloatArray, at: int, t: FloatArray, codes: IntArray) -> None:
-    """Nothing found by LANES rays from number `at` on: t their ends, codes -1."""
+    """Initialise for LANES rays from number `at` on, without hits: t = t_max, codes = -1."""
     t[:], codes[:] = rays[6 * BLOCK + at : 6 * BLOCK + at + LANES], -1
 
 
 def _end(t: FloatArray, codes: IntArray, at: int, to: FloatArray, to_codes: IntArray) -> None:
-    """What LANES rays have found, to where those from `at` on are kept."""
+    """Store t and codes of LANES rays to the results of the rays from number `at` on."""
     to[at : at + LANES], to_codes[at : at + LANES] = t, codes
 
 

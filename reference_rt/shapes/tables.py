@@ -1,13 +1,13 @@
-"""The tables of all shapes, and what is primitive.
+"""The tables of all types of shapes, and their codes.
 
-To add a shape: its file with description, table and kernels; here, a code, a field of `Shapes`, a
-line in `TABLES`, a member of `Primitive`; in `dispatch.py` one `if` in each kernel; a translator
-function in `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
+To add a shape: a file with its description, table and kernels; here its code, its field of
+`Shapes`, its line in `TABLES`, and `Primitive`.  docs/extending.md has the whole recipe.
 """
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass
 from reference_rt.shapes import box
 from reference_rt.shapes.box import Box, Boxes
@@ -27,7 +27,7 @@ from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.mesh import Mesh
 from reference_rt.shapes.meshes.triangle import Triangle, Triangles
 
-# Codes of `Hit.kind`: which table a primitive is a row of.
+# Codes of `Hit.kind`: the table of which a primitive is a row.
 SPHERE, RECTANGLE, BOX, TRIANGLE, DISK, PLANE, POLYGON, QUADRIC, TORUS = range(9)
 
 Primitive = (
@@ -44,13 +44,11 @@ Primitive = (
     | Cone
     | Torus
 )
-"""The descriptions that are primitives by themselves; `reference_rt.shapes.csg` adds what is made
-of them.
-"""
+"""The descriptions that are primitives; `reference_rt.shapes.csg` adds solids made of them."""
 
 
 class Shapes(NamedTuple):
-    """Every primitive of a scene; None for a table that the scene does not have."""
+    """Every primitive of a scene, one table per type; None for a type that the scene lacks."""
 
     spheres: Spheres | None
     rectangles: Rectangles | None
@@ -77,8 +75,13 @@ TABLES: tuple[tuple[int, str, type, Any], ...] = (
 """(code, field of Shapes, table, module with its kernels), in the order of the codes."""
 
 
+by_code = ByCode((code, field, module) for code, field, _, module in TABLES)
+"""Decorates kernels that choose among the shapes; see `jit/by_code.py`."""
+
+
 def of_table(name: str, without: Callable[..., Any]) -> Callable[..., Any]:
-    """The kernel `name` of the module of the table that is the first argument."""
+    """f(table, ...), which calls the kernel `name` of the table's module, or `without` for None and
+    for modules without that kernel."""
     choice = ByClass(name)
     choice.register(type(None), without)
     for _, _, table, module in TABLES:

@@ -1,20 +1,21 @@
-"""The choice among textures: what colour each has where."""
+"""Texture lookup: the colour of a texture at a place of a surface."""
 
 from typing import NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.vec3 import Vec3, row
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.textures import bitmap, checker
+from reference_rt.textures import bitmap, checker, vertex_colours
 from reference_rt.textures.bitmap import Bitmaps
 from reference_rt.textures.checker import Checkers
-from reference_rt.textures.texture import BITMAP, CHECKER, map_uv
+from reference_rt.textures.texture import BITMAP, CHECKER, VERTEX_COLOURS, map_uv
 from reference_rt.textures.vertex_colours import VertexColourTable
 
 
 class Textures(NamedTuple):
-    """kind (n,) and row (n,): which table each texture is a row of; uv (n, 6): its map, see
-    `UvMap`; None for absent tables."""
+    """kind (n,), row (n,): the table and row of each texture;  uv (n, 6): its map, see `UvMap`;  a
+    table for each type, None for types that the scene lacks."""
 
     kind: IntArray
     row: IntArray
@@ -25,21 +26,46 @@ class Textures(NamedTuple):
 
 
 class Looked(NamedTuple):
-    """Answers in place of textures: values (3 n,), the colours of those of all n that the material
-    at hand has, where it is."""
+    """Cached lookups, in place of `Textures`.  values (3 n,): the colours, at the hit, of those of
+    all n textures that its material uses."""
 
     values: FloatArray
 
 
 class At(NamedTuple):
-    """Where on a surface textures are asked: its coordinates u, v, and the interpolated colour of a
-    mesh's vertices, negative where there is none;  textures: None where the scene has no texture,
-    and the rest then means nothing."""
+    """A place for texture lookups.
+
+    u, v: surface coordinates;  colour: the interpolated vertex colour of a mesh, negative if there
+    is none;  textures: None if the scene has none; the other fields are then undefined.
+    """
 
     textures: Textures | Looked | None
     u: float
     v: float
     colour: Vec3
+
+
+_by_code = ByCode(
+    [
+        (CHECKER, "checkers", checker),
+        (BITMAP, "bitmaps", bitmap),
+        (VERTEX_COLOURS, "vertex_colours", vertex_colours),
+    ]
+)
+
+
+@_by_code("lookup")
+def _lookup_in_table(
+    textures: Textures, kind: int, i: int, u: float, v: float, colour: Vec3
+) -> Vec3:
+    return Vec3(0.0, 0.0, 0.0)
+
+
+@_by_code("gradient")
+def _gradient_in_table(
+    textures: Textures, kind: int, i: int, u: float, v: float
+) -> tuple[float, float]:
+    return 0.0, 0.0
 
 
 @kernel
@@ -64,11 +90,7 @@ def _looked(looked: Looked, k: int, at: At) -> Vec3:
 def _ask(textures: Textures, k: int, at: At) -> Vec3:
     kind, i = textures.kind[k], textures.row[k]
     u, v = map_uv(textures.uv, k, at.u, at.v)
-    if kind == CHECKER:
-        return _checker(textures.checkers, i, u, v)
-    if kind == BITMAP:
-        return _bitmap(textures.bitmaps, i, u, v)
-    return _vertex_colours(textures.vertex_colours, i, at)
+    return _lookup_in_table(textures, kind, i, u, v, at.colour)
 
 
 _choice = ByClass("lookup")
@@ -79,23 +101,9 @@ _lookup = _choice.function
 
 
 @kernel
-def _checker(checkers: Checkers | None, i: int, u: float, v: float) -> Vec3:
-    if checkers is None:
-        return Vec3(0.0, 0.0, 0.0)
-    return checker.lookup(checkers, i, u, v)
-
-
-@kernel
-def _bitmap(bitmaps: Bitmaps | None, i: int, u: float, v: float) -> Vec3:
-    if bitmaps is None:
-        return Vec3(0.0, 0.0, 0.0)
-    return bitmap.lookup(bitmaps, i, u, v)
-
-
-@kernel
 def lookup_gradient(k: int, at: At) -> tuple[float, float]:
     """The derivatives of texture k's luminance by the surface coordinates u and v; (0, 0) for all
-    but bitmaps.  They are not among what is `Looked`."""
+    but bitmaps.  Not for cached lookups."""
     found: tuple[float, float] = _slopes(at.textures, k, at)
     return found
 
@@ -107,11 +115,12 @@ def _flat(textures: None, k: int, at: At) -> tuple[float, float]:
 
 @kernel
 def _gradient(textures: Textures, k: int, at: At) -> tuple[float, float]:
-    if textures.kind[k] != BITMAP:
+    kind, i = textures.kind[k], textures.row[k]
+    if kind != BITMAP:
         return 0.0, 0.0
     m = textures.uv[k]
     u, v = map_uv(textures.uv, k, at.u, at.v)
-    along_u, along_v = _bitmap_gradient(textures.bitmaps, textures.row[k], u, v)
+    along_u, along_v = _gradient_in_table(textures, kind, i, u, v)
     return m[0] * along_u + m[3] * along_v, m[1] * along_u + m[4] * along_v
 
 
@@ -119,20 +128,3 @@ _by_class = ByClass("lookup_gradient")
 _by_class.register(type(None), _flat)
 _by_class.register(Textures, _gradient)
 _slopes = _by_class.function
-
-
-@kernel
-def _bitmap_gradient(bitmaps: Bitmaps | None, i: int, u: float, v: float) -> tuple[float, float]:
-    if bitmaps is None:
-        return 0.0, 0.0
-    return bitmap.gradient(bitmaps, i, u, v)
-
-
-@kernel
-def _vertex_colours(table: VertexColourTable | None, i: int, at: At) -> Vec3:
-    if table is None:
-        return Vec3(0.0, 0.0, 0.0)
-    if at.colour.x < 0.0:
-        return row(table.without, i)
-    scaled: Vec3 = at.colour * table.scale[i]
-    return scaled

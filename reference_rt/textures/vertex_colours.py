@@ -7,6 +7,8 @@ import numpy as np
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Colour, Positive
+from reference_rt.core.vec3 import Vec3, row
+from reference_rt.jit.kernel import kernel
 from reference_rt.textures.texture import Texture
 
 
@@ -33,3 +35,12 @@ class VertexColourTable(NamedTuple):
 def greatest(table: VertexColourTable) -> float:
     """The largest value of any channel; the readers of meshes ensure that colours are at most 1."""
     return float(max(table.without.max(), table.scale.max()))
+
+
+@kernel
+def lookup(table: VertexColourTable, i: int, colour: Vec3) -> Vec3:
+    """The colour at a point with the interpolated colour `colour`, negative for none."""
+    if colour.x < 0.0:
+        return row(table.without, i)
+    scaled: Vec3 = colour * table.scale[i]
+    return scaled

@@ -26,9 +26,9 @@ from comparisons.mitsuba.backend import scalar
 from reference_rt.core.transform import Matrix, Transform, rotate
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes import Cone, Cylinder, Quadric, Sphere, Torus
+from reference_rt.shapes.brute_force import intersect_row
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.curved.torus import Tori
-from reference_rt.shapes.dispatch import intersect_row
 from reference_rt.shapes.shape import Place, Shape
 from reference_rt.textbook.method import ray_of
 
