@@ -3,7 +3,7 @@
 import functools
 import math
 from collections.abc import Callable
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import ClassVar, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -38,28 +38,28 @@ class Scene(BuiltScene):
     method has the parameters and the documentation of the function of `reference_rt.query`.
     """
 
-    intersect = _of_tables(query.intersect)
+    intersect: ClassVar = _of_tables(query.intersect)
     """The first hit of each ray at t_min < t < t_max, with points, normals and uv."""
 
-    first_hits = _of_tables(query.first_hits)
+    first_hits: ClassVar = _of_tables(query.first_hits)
     """`intersect` without points, normals and uv, in less time."""
 
-    crossings = _of_tables(query.crossings)
+    crossings: ClassVar = _of_tables(query.crossings)
     """All crossings of each ray with the surfaces of all shapes, in order."""
 
-    camera_rays = query.camera_rays
+    camera_rays: ClassVar = query.camera_rays
     """The camera's rays through pixels; by default all (height, width)."""
 
-    radiance = query.radiance
+    radiance: ClassVar = query.radiance
     """The radiance along rays by an integrator, default the scene's own, and its standard error."""
 
-    light_sources = query.light_sources
+    light_sources: ClassVar = query.light_sources
     """The shape or light of the scene that each light number stands for."""
 
-    sample_lights = _of_tables(query.sample_lights)
+    sample_lights: ClassVar = _of_tables(query.sample_lights)
     """A randomly selected light, and a direction towards it, for each point."""
 
-    light_pdf = _of_tables(query.light_pdf)
+    light_pdf: ClassVar = _of_tables(query.light_pdf)
     """The density with which `sample_lights` draws directions."""
 
     def occluded(
