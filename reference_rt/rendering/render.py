@@ -25,7 +25,7 @@ from reference_rt.rendering.tiles import cast_band, first_hits_band, render_band
 from reference_rt.scene.build import BuiltScene, build_tables
 from reference_rt.scene.likely_mistakes import likely_mistakes
 
-SAMPLES_PER_BAND = 1 << 15
+SAMPLES_PER_TILE = 1 << 15
 """Samples of one kernel call, about 20 ms: short enough for progress and Ctrl-C, long against the
 0.1 ms that a task of the thread pool costs."""
 
@@ -223,12 +223,12 @@ def run_bands(
         # In plain Python (NUMBA_DISABLE_JIT=1) NumPy would warn of intended infinities (IEEE
         # division) and intended overflow (integer hashes).
         with np.errstate(all="ignore"):
-            for first in range(0, spp, SAMPLES_PER_BAND):
+            for first in range(0, spp, SAMPLES_PER_TILE):
                 if stop.is_set():
                     return
-                kernel(*arguments, begin, end, first, min(first + SAMPLES_PER_BAND, spp))
+                kernel(*arguments, begin, end, first, min(first + SAMPLES_PER_TILE, spp))
 
-    step = max(1, min(pixels, SAMPLES_PER_BAND // spp))
+    step = max(1, min(pixels, SAMPLES_PER_TILE // spp))
     say("render", 0.0)
     pool = ThreadPoolExecutor(threads, thread_name_prefix="tile")
     try:
