@@ -45,7 +45,7 @@ class Direct(Description):
 
     @property
     def follows_scattered(self) -> bool:
-        """Whether scattered rays bring the light of what is sampled too."""
+        """Whether BSDF-sampled rays collect emission that light sampling can sample, too."""
         return self.bsdf_samples > 0
 
     def setup(self) -> "DirectSetup":

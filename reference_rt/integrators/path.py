@@ -79,7 +79,7 @@ class Path(Description):
 
     @property
     def follows_scattered(self) -> bool:
-        """Whether scattered rays bring the light of what is sampled too."""
+        """Whether BSDF-sampled rays collect emission that light sampling can sample, too."""
         return self.sampling != "lights"
 
     def setup(self) -> "PathSetup":

@@ -103,7 +103,7 @@ def render(
     integrator = scene.integrator
     tables, tracer = with_tracer(tables, integrator)
     if isinstance(integrator, RayCast):
-        shown, (jobs, layers) = integrator.show, _cast_jobs(scene, tables)
+        shown, (jobs, layers) = integrator.show, _aov_jobs(scene, tables)
     else:
         shown, (jobs, layers) = "colour", _render_jobs(scene, integrator.setup(), tables)
     say("compile", 0.0)
@@ -147,7 +147,7 @@ def compile_bands(
     return kernels
 
 
-def _cast_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:
+def _aov_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:
     """The AOV pass (one ray through each pixel's centre), and the layers that it writes."""
     film = scene.film
     out = np.zeros((film.height, film.width, 10))
@@ -183,7 +183,7 @@ def _render_jobs(
         hits = [layers[name].reshape(-1, 3) for name in ("albedo", "normal")]
         jobs.append(_Job(first_hits_band, (*setups, *hits), spp))
     if {"depth", "id"} & set(film.layers):
-        centres, cast = _cast_jobs(scene, tables)
+        centres, cast = _aov_jobs(scene, tables)
         jobs += centres
         layers |= {"depth": cast["distance"], "id": cast["id"]}
     return jobs, {name: layers[name] for name in ("colour", *film.layers)}

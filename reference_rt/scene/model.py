@@ -3,6 +3,7 @@
 import hashlib
 import json
 import warnings
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -32,6 +33,12 @@ from reference_rt.util.files import read_text
 MOST_NESTED = 100
 """Nesting depth of set operations: pydantic serialises at most 255 levels of lists and keys, of
 which each operation takes two."""
+
+
+def no_such(kind: str, name: str, known: Iterable[str]) -> str:
+    """The message for a name that the scene does not define."""
+    listed = ", ".join(f"'{k}'" for k in known) or "none"
+    return f"there is no {kind} '{name}'; expected one of: {listed}"
 
 
 class SceneModel(Description):
@@ -92,11 +99,8 @@ class SceneModel(Description):
         """Check that the textures and materials that a material names exist and fit."""
         for field, texture in texture_names(material).items():
             if texture not in self.textures:
-                known = ", ".join(f"'{t}'" for t in self.textures) or "none"
-                raise SceneError(
-                    f"there is no texture '{texture}'; expected one of: {known}",
-                    ("materials", name, field),
-                )
+                message = no_such("texture", texture, self.textures)
+                raise SceneError(message, ("materials", name, field))
         bases: tuple[str, ...] = ()
         if isinstance(material, Emissive):
             bases = ("base",)
@@ -124,10 +128,8 @@ class SceneModel(Description):
                 self._check_shape(operand, *path, "of", k)
         if isinstance(shape, Instance):
             if shape.group not in self.groups:
-                known = ", ".join(f"'{g}'" for g in self.groups) or "none"
-                raise SceneError(
-                    f"there is no group '{shape.group}'; expected one of: {known}", (*path, "group")
-                )
+                message = no_such("group", shape.group, self.groups)
+                raise SceneError(message, (*path, "group"))
             if shape.material is not None:
                 raise SceneError(
                     "an instance has the materials of its group; expected none here",
@@ -136,8 +138,7 @@ class SceneModel(Description):
 
     def _check_material(self, name: str | None, *path: str | int) -> None:
         if name is not None and name not in self.materials:
-            known = ", ".join(f"'{m}'" for m in self.materials) or "none"
-            raise SceneError(f"there is no material '{name}'; expected one of: {known}", path)
+            raise SceneError(no_such("material", name, self.materials), path)
 
     def __eq__(self, other: object) -> bool:
         """Equality of descriptions; file names do not count."""

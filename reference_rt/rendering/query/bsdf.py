@@ -23,6 +23,7 @@ from reference_rt.rendering.query.rays import (
     shaped,
 )
 from reference_rt.scene.build import BuiltScene
+from reference_rt.scene.model import no_such
 from reference_rt.shapes import Sphere
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Textures
@@ -129,8 +130,7 @@ class Bsdf:
         elif name in scene.materials:
             number = list(scene.materials).index(name)
         else:
-            known = ", ".join(f"'{m}'" for m in scene.materials) or "none"
-            raise SceneError(f"there is no material '{name}'; expected one of: {known}")
+            raise SceneError(no_such("material", name, scene.materials))
         self._tables, self._number = scene.tables, number
 
     def evaluate(
