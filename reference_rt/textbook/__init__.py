@@ -1,7 +1,7 @@
 """Textbook intersection methods, by name, to measure what each costs and where it fails.
 
-The renderer does not use them; a docstring that ends "the renderer's method" marks the one that it
-has, too.  `intersect(name, parameters, origins, directions)` intersects one shape, solid or scene;
+The renderer does not use them; a docstring that says "the renderer's method" marks the one that it
+also has.  `intersect(name, parameters, origins, directions)` intersects one shape, solid or scene;
 `METHODS` has each method's textbook row, summary and source.
 
 Contract of a method: a kernel of a ray and the prepared parameters that returns the smallest t > 0
