@@ -25,7 +25,7 @@ from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_in
 
 
 class HitArrays(NamedTuple):
-    """The arrays of `Intersections`, which kernels fill; p, n, ns and uv are empty for `Hits`."""
+    """The arrays of `Intersections`, which kernels fill; p, n, ns and uv may be left empty."""
 
     t: FloatArray
     shape: IntArray
