@@ -1,4 +1,12 @@
-"""reference_rt: an independent float64 reference ray tracer."""
+"""reference_rt: an independent float64 reference ray tracer.
+
+The public interface: descriptions of scenes (`Scene` and its parts), `render`, `build_tables`,
+`json_schema` and the errors, all exported here; `reference_rt.query` (array queries of a scene's
+tables), `reference_rt.transform` (affine maps) and `reference_rt.textbook` (textbook intersection
+methods).  Other modules are internal.  Folders from the lowest to the highest, each of which may
+import those before it: util, jit, core, sampling, textures, shapes, cameras, accel, materials,
+lights, integrators, scene, rendering, textbook, cli.
+"""
 
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import (

@@ -1,6 +1,8 @@
-"""The command line `reference-rt`.
+"""The command line `reference-rt`: render, explain, schema.
 
-`main.py` holds the program and its commands `render`, `explain` and `schema`; other packages add
-commands through the entry-point group `reference_rt.commands`.  `explain.py` writes what a scene
-needs, `limits.py` the sizes and distances up to which float64 keeps its digits in it.
+`main` has the commands and their exit codes; `explain` and `limits` compute what `explain` prints.
+Contract: results go to files or standard output; progress and errors to standard error.  Every
+error is one line and an exit code, without a traceback (`main.guarded`).  To add a command: a
+function in `main` with `@app.command()` and `@guarded`; another package registers its own through
+the entry point `reference_rt.commands`.
 """

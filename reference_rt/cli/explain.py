@@ -1,4 +1,4 @@
-"""What a scene needs, what was left out, and why."""
+"""What a scene uses, and what is specialised away because the scene lacks it."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -29,37 +29,37 @@ _METHODS = {
     "sah": "BVH by surface area heuristic",
     "median": "BVH by median split",
     "spatial": "BVH with spatial splits",
-    "none": "each shape in turn",
+    "none": "brute force",
 }
 
 
 def explain(scene: Scene, tables: SceneTables) -> tuple[Lines, Lines]:
-    """(what is used, what was left out), each a list of (what, how much or why)."""
+    """(what is used, what is specialised away), each a list of (what, how much or why)."""
     used: Lines = []
-    left_out: Lines = []
-    _shapes(tables, used, left_out)
-    _meshes(scene, used, left_out)
-    _hierarchy(scene, tables, used, left_out)
-    _materials(tables, used, left_out)
-    _textures(tables, used, left_out)
-    _lights(scene, tables, used, left_out)
-    _integration(scene, tables, used, left_out)
-    left_out.append(("Mitsuba", "rendering never imports it; only comparing does"))
-    return used, left_out
+    pruned: Lines = []
+    _shapes(tables, used, pruned)
+    _meshes(scene, used, pruned)
+    _hierarchy(scene, tables, used, pruned)
+    _materials(tables, used, pruned)
+    _textures(tables, used, pruned)
+    _lights(scene, tables, used, pruned)
+    _integration(scene, tables, used, pruned)
+    pruned.append(("Mitsuba", "rendering never imports it; only comparing does"))
+    return used, pruned
 
 
 def margins(scene: Scene) -> tuple[Lines, Lines]:
-    """(how near the scene comes to float64's limits, where it is beyond), each (law, what)."""
+    """(how close the scene is to float64's limits, where it exceeds them), each (limit, what)."""
     found = limits_of(scene)
     near = [(limit.law, told(limit)) for limit in found if not limit.is_beyond]
     return near, [(limit.law, told(limit)) for limit in found if limit.is_beyond]
 
 
-def _shapes(tables: SceneTables, used: Lines, left_out: Lines) -> None:
+def _shapes(tables: SceneTables, used: Lines, pruned: Lines) -> None:
     for _, field, _, _ in SHAPE_TABLES:
         table = getattr(tables.geometry.shapes, field)
         if table is None:
-            left_out.append((field, "the scene has none: their kernels are not compiled"))
+            pruned.append((field, "the scene has none: their kernels are not compiled"))
         else:
             size = sum(a.nbytes for a in table if a is not None)
             used.append((field, f"{len(table.owner):,} ({_bytes(size)})"))
@@ -67,34 +67,34 @@ def _shapes(tables: SceneTables, used: Lines, left_out: Lines) -> None:
     if triangles is not None:
         for column, name, otherwise in (
             (triangles.normals, "vertex normals", "triangles are shaded flat"),
-            (triangles.uvs, "texture coordinates", "a triangle's own are its barycentrics"),
-            (triangles.colours, "vertex colours", "a triangle's is its material's"),
+            (triangles.uvs, "texture coordinates", "triangles have their barycentrics"),
+            (triangles.colours, "vertex colours", "triangles have their material's colour"),
         ):
             if column is None:
-                left_out.append((name, f"no mesh brings any: {otherwise}"))
+                pruned.append((name, f"no mesh has any: {otherwise}"))
     solids, instances = tables.geometry.solids, tables.geometry.instances
     if solids is None:
-        left_out.append(("solids", "no union, intersection or difference"))
+        pruned.append(("solids", "no union, intersection or difference"))
     else:
         used.append(("solids", f"{len(solids.first):,} of {len(solids.kind):,} operands"))
     if instances is None:
-        left_out.append(("instances", "no group is drawn"))
+        pruned.append(("instances", "no group is drawn"))
     else:
         used.append(("instances", f"{len(instances.root):,} of {len(np.unique(instances.root)):,}"))
 
 
-def _meshes(scene: Scene, used: Lines, left_out: Lines) -> None:
-    """What of its meshes is left out, and what is made for them."""
+def _meshes(scene: Scene, used: Lines, pruned: Lines) -> None:
+    """What mesh files have that is not used, and which vertex normals are computed."""
     for name, mesh in _named_meshes(scene):
 
         def left(_: int, note: str, name: str = name) -> None:
-            left_out.append((f"of {name}", note))
+            pruned.append((f"of {name}", note))
 
         mesh.tabulate(Place(folder=scene.folder, warn=left))
         if mesh.smooth and mesh.makes_normals(mesh.data(scene.folder)):
             used.append((f"smooth {name}", "its vertex normals are made, weighted by angle"))
         elif mesh.smooth:
-            left_out.append((f"smooth {name}", "it has vertex normals of its own"))
+            pruned.append((f"smooth {name}", "it has vertex normals of its own"))
 
 
 def _named_meshes(scene: Scene) -> Iterator[tuple[str, Mesh]]:
@@ -112,15 +112,15 @@ def _named_meshes(scene: Scene) -> Iterator[tuple[str, Mesh]]:
             yield from of(f"groups.{group}[{k}]", shape)
 
 
-def _hierarchy(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> None:
+def _hierarchy(scene: Scene, tables: SceneTables, used: Lines, pruned: Lines) -> None:
     hierarchy = tables.geometry.bvh
     shapes = tables.geometry.shapes
     count = sum(len(table.owner) for table in shapes if table is not None)
     if hierarchy is None:
-        reason = f"{count} primitives: testing a few one after another is faster"
-        left_out.append(("hierarchy", reason))
+        reason = f"{count} primitives: brute force is faster"
+        pruned.append(("hierarchy", reason))
         return
-    # The three views of the nodes are of the same memory.
+    # The three arrays of nodes are views of the same memory.
     size = hierarchy.boxes.nbytes + hierarchy.references.nbytes
     if hierarchy.corners is not None:
         size += hierarchy.corners.nbytes
@@ -138,24 +138,24 @@ def _hierarchy(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) 
     used.append(("memory", f"{total / count:.0f} bytes per primitive, hierarchy included"))
 
 
-def _materials(tables: SceneTables, used: Lines, left_out: Lines) -> None:
+def _materials(tables: SceneTables, used: Lines, pruned: Lines) -> None:
     materials = tables.materials
     for _, field, _, _, _ in MATERIAL_TABLES:
         table = getattr(materials.leaves, field)
         if table is None:
-            left_out.append((field, "no material of this kind: its kernels are not compiled"))
+            pruned.append((field, "no material of this kind: its kernels are not compiled"))
         else:
             used.append((field, f"{_rows(table):,}"))
-    _layers(materials.layers, used, left_out)
+    _layers(materials.layers, used, pruned)
     if materials.oriented is None:
-        left_out.append(("tangents", "no material depends on where u and v point"))
+        pruned.append(("tangents", "no material depends on the directions of u and v"))
     else:
         used.append(("tangents", "dp/du and dp/dv at every hit"))
 
 
-def _layers(layers: Layers | None, used: Lines, left_out: Lines) -> None:
+def _layers(layers: Layers | None, used: Lines, pruned: Lines) -> None:
     if layers is None:
-        left_out.append(("layers", "no material is made of others"))
+        pruned.append(("layers", "no material is nested"))
         return
     used.append(("layers", f"{len(layers.kind):,}, of {len(layers.first):,} materials"))
     for name, table, what in (
@@ -164,26 +164,26 @@ def _layers(layers: Layers | None, used: Lines, left_out: Lines) -> None:
         ("normal maps", layers.normal_maps, "normal map"),
     ):
         if table is None:
-            left_out.append((name, f"no material is a {what}"))
+            pruned.append((name, f"no material is a {what}"))
         else:
             used.append((name, f"{_rows(table):,}"))
 
 
-def _textures(tables: SceneTables, used: Lines, left_out: Lines) -> None:
+def _textures(tables: SceneTables, used: Lines, pruned: Lines) -> None:
     if tables.textures is None:
-        left_out.append(("textures", "the scene has none: surface coordinates are not found"))
+        pruned.append(("textures", "the scene has none: surface coordinates are not computed"))
         return
     for _, field, _, _ in TEXTURE_TABLES:
         table = getattr(tables.textures, field)
         if table is None:
-            left_out.append((f"textures: {field}", "no texture of this kind"))
+            pruned.append((f"textures: {field}", "no texture of this kind"))
         else:
             size = _bytes(sum(column.nbytes for column in table))
             used.append((f"textures: {field}", f"{len(table[-1]):,} ({size})"))
 
 
 def _rows(table: Any) -> int:
-    """How many rows a table has, whose columns may be tables; 0 for one that is not there."""
+    """The number of rows of a table, whose columns may be tables; 0 for None."""
     if table is None:
         return 0
     first = table
@@ -192,10 +192,10 @@ def _rows(table: Any) -> int:
     return len(first)
 
 
-def _lights(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> None:
+def _lights(scene: Scene, tables: SceneTables, used: Lines, pruned: Lines) -> None:
     lights = tables.lights
     if isinstance(scene.integrator, RayCast):
-        left_out.append(("lights", "ray casting shows surfaces as they are"))
+        pruned.append(("lights", "ray casting shows surfaces without light"))
         return
     for name, table in (
         ("point lights", lights.points),
@@ -204,22 +204,22 @@ def _lights(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> 
         ("emissive primitives", lights.areas),
     ):
         if table is None:
-            left_out.append((name, "the scene has none"))
+            pruned.append((name, "the scene has none"))
         else:
             used.append((name, f"{_rows(table):,}"))
-    _surroundings(scene, lights, used, left_out)
+    _surroundings(scene, lights, used, pruned)
     hidden = 0 if lights.areas is None else int(np.count_nonzero(lights.areas.area == np.inf))
     if hidden:
-        reason = "of types that cannot be sampled, in groups or in solids: scattered rays find them"
-        left_out.append((f"sampling of {hidden:,} emissive primitives", reason))
-    _picking(tables, used, left_out)
+        reason = "of types without sampling, in groups or in solids: BSDF sampling hits them"
+        pruned.append((f"sampling of {hidden:,} emissive primitives", reason))
+    _light_selection(tables, used, pruned)
 
 
-def _surroundings(scene: Scene, lights: Lights, used: Lines, left_out: Lines) -> None:
+def _surroundings(scene: Scene, lights: Lights, used: Lines, pruned: Lines) -> None:
     whitted = isinstance(scene.integrator, Whitted)
     environment = lights.environment
     if environment is None:
-        left_out.append(("environment", "the scene has none: rays that miss are black"))
+        pruned.append(("environment", "the scene has none: rays that miss are black"))
     elif isinstance(environment, EnvironmentMaps):
         height, width = environment.texels.shape[:2]
         size = _bytes(sum(column.nbytes for column in environment))
@@ -227,53 +227,53 @@ def _surroundings(scene: Scene, lights: Lights, used: Lines, left_out: Lines) ->
     else:
         used.append(("environment", "constant"))
     if environment is not None and whitted:
-        left_out.append(("light of the environment", "Whitted sees it, but does not gather it"))
+        pruned.append(("light of the environment", "Whitted shows it, but does not sample it"))
     if lights.ambient is None:
-        left_out.append(("ambient light", "the scene has none"))
+        pruned.append(("ambient light", "the scene has none"))
     elif whitted:
         used.append(("ambient light", "added by materials with a k_a: those of type phong"))
     else:
-        left_out.append(("ambient light", "Whitted alone knows it: it comes from nowhere"))
+        pruned.append(("ambient light", "only Whitted has it: it comes from no direction"))
 
 
-def _picking(tables: SceneTables, used: Lines, left_out: Lines) -> None:
+def _light_selection(tables: SceneTables, used: Lines, pruned: Lines) -> None:
     choice, tree = tables.lights.choice, tables.lights.tree
     if choice is None:
-        left_out.append(("light sampling", "there is no light to sample"))
+        pruned.append(("light sampling", "there is no light to sample"))
         return
     if not any_smooth(tables.materials):
-        left_out.append(
-            ("light sampling", "every material mirrors or refracts: it would find none")
-        )
+        pruned.append(("light sampling", "every BSDF is a delta lobe: it would contribute nothing"))
     if len(choice.kind) == 1:
-        left_out.append(("picking a light", "there is one"))
+        pruned.append(("light selection", "there is one light"))
     elif tree is None:
-        left_out.append(("light tree", "few lights: they are picked by their power"))
+        pruned.append(("light tree", "few lights: they are selected by power"))
     else:
         size = _bytes(sum(column.nbytes for column in tree))
         placed = np.count_nonzero(tree.light >= 0)
         used.append(("light tree", f"{placed:,} lights, by power, distance and direction ({size})"))
 
 
-def _integration(scene: Scene, tables: SceneTables, used: Lines, left_out: Lines) -> None:
+def _integration(scene: Scene, tables: SceneTables, used: Lines, pruned: Lines) -> None:
     integrator, sampler = scene.integrator, scene.resolved_sampler
     used.append(("camera", scene.camera.type))
     used.append(("integrator", integrator.type))
     film = scene.film
     used.append(("film", f"{film.width} x {film.height}, {film.filter.type} filter"))
     if isinstance(integrator, RayCast):
-        left_out.append(("sampler", "one ray through each pixel's centre"))
+        pruned.append(("sampler", "one ray through each pixel's centre"))
     elif isinstance(sampler, Grid):
-        left_out.append(("random numbers", "a deterministic integrator on a grid draws none"))
+        pruned.append(("random numbers", "a deterministic integrator on a grid draws none"))
         used.append(("samples", f"{sampler.spp} fixed per pixel"))
     else:
         used.append(("samples", f"{sampler.spp} per pixel, {sampler.type}, seed {sampler.seed}"))
     if film.filter.type in ("box", "tent"):
-        left_out.append(("filter weights", f"samples lie as dense as a {film.filter.type} weighs"))
+        pruned.append(
+            ("filter weights", f"samples are distributed as the {film.filter.type} filter")
+        )
     if isinstance(integrator, RayCast):
-        left_out.append(("film layers", "ray casting writes its own"))
+        pruned.append(("film layers", "ray casting has its own"))
     elif not film.layers:
-        left_out.append(("film layers", "none beside the colour is asked for"))
+        pruned.append(("film layers", "none beside the colour is requested"))
     else:
         used.append(("film layers", ", ".join(film.layers)))
 

@@ -1,8 +1,9 @@
-"""Where float64 itself ends: what of a scene is about as small as the error of what rays hit.
+"""The limits of float64: details of a scene that are about as small as the error of hit points.
 
-The law is that of `reference_rt.core.ray.surface_error`: a point p on a surface is known to
-16 sqrt(3) u (|anchor| + |p| + size).  A shape that is smaller, a gap that is narrower, or an index
-that is as near to 1 as it is rounded, is not resolved.  Products of coordinates must be finite.
+The error bound is that of `reference_rt.core.ray.surface_error`: a point p on a surface has an
+error of at most 16 sqrt(3) u (|anchor| + |p| + size).  A smaller shape, a narrower gap, or an index
+of refraction as close to 1 as its rounding, is not resolved.  Products of coordinates must be
+finite.
 """
 
 import math
@@ -24,15 +25,15 @@ from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Place, Shape
 
 MOST = 2000
-"""Shapes that are looked at, copies of groups and operands of solids included; of a mesh in a group
-the first copy alone, as each copy's table is made for it."""
+"""Most shapes that are examined, instances and operands of solids included.  Of a mesh in a group
+only the first copy is, because a table is made for each."""
 
 LISTED = 10
-"""Of what is beyond a law, the worst are named."""
+"""Most violations that are listed, the worst first."""
 
 
 class Limit(NamedTuple):
-    """Something of `size` that must be told apart, where float64's error is at most `bound`."""
+    """A detail of size `size`, to be resolved where float64's error is at most `bound`."""
 
     law: str
     what: str
@@ -41,7 +42,7 @@ class Limit(NamedTuple):
 
     @property
     def margin(self) -> float:
-        """How many times the bound fits: 1 or less is beyond float64."""
+        """size / bound: 1 or less is beyond float64."""
         return self.size / self.bound if self.bound > 0.0 else math.inf
 
     @property
@@ -50,8 +51,8 @@ class Limit(NamedTuple):
 
 
 class Leaf(NamedTuple):
-    """A primitive shape where it stands.  name: for people;  field, table: its rows;  lower, upper
-    (n, 3): their bounds;  error (n,): how far off the points are that rays from the eye hit."""
+    """A primitive shape in world space.  name: for display;  field, table: its rows;  lower, upper
+    (n, 3): their bounds;  error (n,): error bound of the points that rays from the camera hit."""
 
     name: str
     field: str
@@ -62,8 +63,8 @@ class Leaf(NamedTuple):
 
 
 def limits_of(scene: Scene) -> list[Limit]:
-    """The nearest that the scene comes to float64's limits, by law, and all (at most LISTED) that
-    is beyond; the least margin first."""
+    """The closest detail to each kind of limit, and the violations (at most LISTED); the smallest
+    margin first."""
     leaves: list[Leaf] = []
     for name, shape, outer in _placed(scene):
         if len(leaves) == MOST:
@@ -78,7 +79,7 @@ def limits_of(scene: Scene) -> list[Limit]:
 
 
 def _placed(scene: Scene) -> Iterator[tuple[str, Shape, Affine]]:
-    """(name, primitive, the map that its own transform is followed by) of all there is."""
+    """(name, primitive, outer transform, applied after its own) of all shapes."""
 
     seen: set[int] = set()
 
@@ -107,7 +108,7 @@ def _leaf(name: str, shape: Shape, outer: Affine, scene: Scene) -> Leaf:
     lower, upper = module.bounds(table)
     far = np.maximum(np.abs(lower), np.abs(upper)).max(axis=1)
     extent = (upper - lower).max(axis=1)
-    # A ray begins at the eye, whose coordinates are rounded as those of the hit are.
+    # A ray begins at the camera, whose coordinates are rounded like those of the hit.
     eye = max(map(abs, scene.camera.eye))
     far = np.where(np.isfinite(far), far, eye)
     error = LAW * (far + np.maximum(far, eye) + np.where(np.isfinite(extent), extent, 0.0))
@@ -122,7 +123,7 @@ LAW = surface_error(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0)
 
 
 def _thin(leaves: list[Leaf]) -> Iterator[Limit]:
-    """Each shape's thinnest part against the error of the points on it."""
+    """The thickness of each shape, against the error of the points on it."""
     for leaf in leaves:
         size = _thickness(leaf)
         k = int(np.argmin(size / leaf.error))
@@ -132,7 +133,7 @@ def _thin(leaves: list[Leaf]) -> Iterator[Limit]:
 
 
 def _thickness(leaf: Leaf) -> FloatArray:
-    """(n,): the shortest way through or across each row; inf for what has none."""
+    """(n,): the smallest extent of each row; inf if it has none."""
     table = leaf.table
     if leaf.field == "spheres":
         return np.asarray(2.0 * table.radius)
@@ -140,7 +141,7 @@ def _thickness(leaf: Leaf) -> FloatArray:
         v = table.vertices.reshape(-1, 3, 3)
         longest = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1)
         area = np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
-        # One without area is met by no ray: nothing is lost with it.
+        # A triangle without area is never hit: nothing is lost with it.
         height = np.divide(area, longest, out=np.full_like(area, np.inf), where=area > 0.0)
         return np.asarray(height)
     if leaf.field in ("rectangles", "disks"):
@@ -158,12 +159,12 @@ def _thickness(leaf: Leaf) -> FloatArray:
 
 
 LARGEST = 2.0**510 / 6.0
-"""Of coordinates, 5.6e152: the edge functions of rays at a triangle that is six times as far away
-are sums of 16 products of two, which are to be finite."""
+"""The largest coordinate, 5.6e152: edge functions of rays at a triangle six times as far away are
+sums of 16 products of two coordinates, which must be finite."""
 
 
 def _large(leaves: list[Leaf]) -> Iterator[Limit]:
-    """The largest coordinate of each shape that has an end."""
+    """The largest coordinate of each finite shape."""
     for leaf in leaves:
         reach = float(np.maximum(np.abs(leaf.lower), np.abs(leaf.upper)).max())
         if math.isfinite(reach):
@@ -177,9 +178,9 @@ RANGE = "range"
 
 
 def _contacts(leaves: list[Leaf]) -> Iterator[Limit]:
-    """The gaps between spheres, and between parallel planes of boxes, rectangles and disks: two
-    surfaces, each known to its own error, are apart by more than both together.  What is exactly in
-    one place is no gap."""
+    """Gaps between spheres, and between parallel planes of boxes, rectangles and disks.  Two
+    surfaces are resolved if they are farther apart than the sum of their errors.  Coincident
+    surfaces are no gap."""
     spheres = [leaf for leaf in leaves if leaf.field == "spheres"]
     if len(spheres) > 1:
         center = np.concatenate([leaf.table.center for leaf in spheres])
@@ -192,7 +193,7 @@ def _contacts(leaves: list[Leaf]) -> Iterator[Limit]:
                 np.abs(apart - (radius[i] + rest)), np.abs(apart - np.abs(radius[i] - rest))
             )
             bound = error[i] + error[i + 1 :]
-            # Less than what these few operations round by is exactly in one place.
+            # A distance below the rounding of these operations means coincident.
             rounding = 8.0 * UNIT_ROUNDOFF * (apart + radius[i] + rest)
             yield from _gaps(spheres, i, gap, bound, rounding)
     faces = [face for leaf in leaves for face in _faces(leaf)][:MOST_FACES]
@@ -209,10 +210,10 @@ def _contacts(leaves: list[Leaf]) -> Iterator[Limit]:
 
 
 PARALLEL = 2.0**-40
-"""Of a cosine: planes turned by less than a millionth."""
+"""Largest 1 - cosine of planes that count as parallel: turned by less than a millionth."""
 
 MOST_FACES = 400
-"""Planes that are compared with each other."""
+"""Most planes that are compared with each other."""
 
 
 def _gaps(
@@ -238,7 +239,7 @@ def _faces(leaf: Leaf) -> Iterator[tuple[Leaf, FloatArray, FloatArray]]:
 
 
 def _near(a: Leaf, b: Leaf) -> bool:
-    """Whether the boxes of two shapes come as near as their errors."""
+    """Whether the boxes of two shapes are closer than their errors."""
     slack = a.error[0] + b.error[0]
     low, high = np.maximum(a.lower[0], b.lower[0]), np.minimum(a.upper[0], b.upper[0])
     return bool((low <= high + slack).all())
@@ -248,8 +249,8 @@ def _near(a: Leaf, b: Leaf) -> bool:
 
 
 def _indices(scene: Scene) -> Iterator[Limit]:
-    """What bends rays bends them by eta - 1, where each index is rounded when it is read, and their
-    quotient when it is made: three times u."""
+    """Refraction depends on eta - 1.  Both indices and their quotient are rounded: an error of
+    3 u."""
     for name, material in scene.materials.items():
         inside = getattr(material, "interior_ior", None)
         outside = getattr(material, "exterior_ior", None)
@@ -265,6 +266,3 @@ def told(limit: Limit) -> str:
     if limit.is_beyond:
         return f"{limit.what}: {limit.size:.3g}, float64's error is {limit.bound:.3g}"
     return f"{limit.what}: {limit.size:.3g} is {limit.margin:.2g} times float64's error"
-
-
-__all__ = ["Limit", "limits_of", "told"]

@@ -1,4 +1,4 @@
-"""`reference-rt`: render, explain, schema; other packages add commands through an entry point."""
+"""`reference-rt`: render, explain, schema, and the commands that other packages register."""
 
 import errno
 import functools
@@ -43,7 +43,7 @@ SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or
 
 
 def guarded(command: F) -> F:
-    """Every error of a command as one line on standard error and its exit code; no traceback."""
+    """Report every error of a command as one line on standard error, with its exit code."""
 
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> Any:
@@ -69,31 +69,31 @@ def guarded(command: F) -> F:
 
 
 def say(text: str, err: bool = False) -> None:
-    """Print one line, with escapes in place of what does not print."""
+    """Print one line; unprintable characters are escaped."""
     typer.echo(printable(text), err=err)
 
 
 def lost_output(error: BaseException) -> str:
-    """What is said where printing failed."""
+    """The message for a failed print."""
     reason = getattr(error, "strerror", None)
     return f"standard output cannot be written: {reason}; expected a place with room"
 
 
 def is_output_lost(error: BaseException) -> bool:
-    """Whether printing failed, as on a full disk.  Files that we write raise ImageError."""
+    """Whether a print failed, as on a full disk.  Our output files raise ImageError instead."""
     lost = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
     return isinstance(error, OSError) and error.errno in lost and error.filename is None
 
 
 @contextmanager
-def scene_warnings(tell: Callable[[str], None]) -> Iterator[None]:
-    """Call `tell` with the text of each `SceneWarning`; other warnings stay Python's."""
+def scene_warnings(report: Callable[[str], None]) -> Iterator[None]:
+    """Call `report` with the text of each `SceneWarning`; other warnings are Python's."""
     with warnings.catch_warnings():
         others = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **to: Any) -> None:
             if issubclass(category, SceneWarning):
-                tell(str(message))
+                report(str(message))
             else:
                 others(message, category, *place, **to)
 
@@ -103,7 +103,7 @@ def scene_warnings(tell: Callable[[str], None]) -> Iterator[None]:
 
 
 def _fail(message: str, code: int) -> None:
-    with suppress(OSError):  # of standard error, too, which then tells nothing
+    with suppress(OSError):  # standard error may fail, too
         say(f"error: {message}", err=True)
     raise typer.Exit(code)
 
@@ -156,7 +156,8 @@ def render(
 @app.command()
 @guarded
 def explain(scene: SceneArgument) -> None:
-    """Print what a scene needs, what is left out, and why; how far it is from float64's limits."""
+    """Print what a scene uses, what is specialised away and why, and its distance from float64's
+    limits."""
     from rich.console import Console
     from rich.table import Table
 
@@ -167,7 +168,7 @@ def explain(scene: SceneArgument) -> None:
 
     description = Scene.load(scene)
     tables = build_tables(description)
-    used, left_out = explain_scene(description, tables)
+    used, pruned = explain_scene(description, tables)
     near, beyond = margins(description)
     mistakes = [
         (str(description.error("", *mistake.path)), mistake.message)
@@ -176,7 +177,7 @@ def explain(scene: SceneArgument) -> None:
     console = Console()
     for title, lines in (
         ("used", used),
-        ("left out", left_out),
+        ("specialised away", pruned),
         ("nearest to float64's limits", near),
         ("warning: beyond float64", beyond),
         ("warning: probably a mistake", mistakes),
@@ -206,7 +207,7 @@ def adjusted(
     integrator: str | None = None,
     seed: int | None = None,
 ) -> Scene:
-    """The scene with the command line's changes.  Raises UsageError."""
+    """The scene with the options of the command line.  Raises UsageError."""
     parts: dict[str, Any] = {}
     if size is not None:
         width, _, height = size.lower().partition("x")
@@ -232,7 +233,7 @@ def adjusted(
 
 
 def _changed(part: Any, option: str, **fields: Any) -> Any:
-    """`part` with other fields, checked."""
+    """`part` with some fields changed, checked again."""
     try:
         return type(part)(
             **{name: getattr(part, name) for name in type(part).model_fields} | fields
@@ -242,7 +243,7 @@ def _changed(part: Any, option: str, **fields: Any) -> Any:
 
 
 def provenance(scene: Scene) -> dict[str, str]:
-    """What made a picture, for its header: the same scene gives the same bytes."""
+    """The provenance of a picture, for its header: the same scene has the same bytes."""
     sampler = scene.resolved_sampler
     return {
         "software": f"reference_rt {importlib.metadata.version('reference-rt')}",
@@ -256,8 +257,8 @@ def provenance(scene: Scene) -> dict[str, str]:
 
 @contextmanager
 def _without_blas() -> Iterator[None]:
-    """Numba imports SciPy, where there is one, with its first kernel, to learn whether it brings
-    BLAS: 0.1 s for what no kernel of ours uses."""
+    """Stop Numba from importing SciPy with its first kernel to look for BLAS: 0.1 s for a feature
+    that no kernel of ours uses."""
     name = "scipy.linalg.cython_blas"
     absent = name not in sys.modules
     if absent:
@@ -270,7 +271,7 @@ def _without_blas() -> Iterator[None]:
 
 
 def _add_commands() -> None:
-    """Let installed packages add their commands; one that is broken must not take the others."""
+    """Register the commands of installed packages; a broken one must not disable the others."""
     for entry in importlib.metadata.entry_points(group="reference_rt.commands"):
         try:
             entry.load()(app)
@@ -283,19 +284,19 @@ def main() -> None:
     catch_signals()
     try:
         _add_commands()
-        gc.freeze()  # what the imports made stays: 0.04 s less of looking through it for garbage
-        # Compiling makes millions of small objects, few of them in cycles: looked through a
-        # thirtieth as often the first render of mesh_knot takes 11.9 in place of 12.9 s (means of
-        # two), and 3 MB more.
+        gc.freeze()  # exclude the imported modules from collections: saves 0.04 s
+        # Compiling makes millions of small objects, few of them in cycles.  With a thirtieth of the
+        # collections the first render of mesh_knot takes 11.9 instead of 12.9 s (means of two), and
+        # 3 MB more.
         gc.set_threshold(20_000)
         app()
-    except KeyboardInterrupt as error:  # before or after a command, which has its own answer
+    except KeyboardInterrupt as error:  # outside of a command: commands handle it themselves
         sys.exit(exit_code_of(error))
-    except OSError as error:  # of what prints outside of a command, such as --help
+    except OSError as error:  # printing outside of a command, such as --help
         if not is_output_lost(error):
             raise
         with suppress(OSError):
             say(f"error: {lost_output(error)}", err=True)
-        # What is left in the buffer would fail again when Python ends.
+        # Flushing the rest of the buffer would fail again when Python exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         sys.exit(ImageError.exit_code)

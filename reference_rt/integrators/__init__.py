@@ -1,7 +1,15 @@
-"""All integrators: one file each; here, the choice among them.
+"""Integrators: one file each; here, the dispatch among them.
+
+Contract: a description (pydantic; `deterministic`: it draws no random numbers;
+`follows_scattered`: BSDF-sampled rays collect emission too) whose `setup()` is a NamedTuple of
+parameters, and a kernel `radiance(setup, scene, ray, sampler)`.  It returns the radiance in
+W sr^-1 m^-2, linear sRGB, that arrives at the ray's origin from its (unit) direction; 0 is black.
+`RayCast` alone has no such kernel: `ray_cast.cast` computes AOVs.  Shared by all: `shading` (from a
+hit to the BSDF's input), `direct_light` (one light sample, power heuristic), `scene_tables` (what
+kernels read), `scratch` and `path_state` (buffers of a block).
 
 To add an integrator: its file with description, NamedTuple and `radiance` kernel; `AnyIntegrator`
-and one registration below; a twin in `comparisons`.
+and one registration in each table below; its counterpart in `comparisons`.
 """
 
 from typing import Annotated, Any
@@ -26,7 +34,7 @@ _radiance.register(PathSetup, path.radiance)
 _radiance.register(DirectSetup, direct.radiance)
 _radiance.register(WhittedSetup, whitted.radiance)
 radiance = _radiance.function
-"""radiance(setup, scene, ray, sampler) -> Vec3, W sr^-1 m^-2."""
+"""radiance(setup, scene, ray, sampler) -> Vec3: see above."""
 
 
 @kernel

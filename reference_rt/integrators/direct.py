@@ -1,4 +1,8 @@
-"""Direct light: what surfaces send to the eye without any other surface between."""
+"""Direct illumination: emission, and light that one surface scatters towards the camera.
+
+L = L_e + the integral of f |cos| L_e over directions, estimated at the first hit by n light samples
+and m BSDF samples with multiple importance sampling (`path` says which integral each one is).
+"""
 
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
@@ -11,7 +15,7 @@ from reference_rt.accel.geometry import closest_hit, surface
 from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
-from reference_rt.integrators.direct_light import direct, power_heuristic, receiver
+from reference_rt.integrators.direct_light import direct, light_selection_normal, power_heuristic
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.shading import shade, texture_place
 from reference_rt.jit.kernel import kernel, local_floats
@@ -41,7 +45,7 @@ class Direct(Description):
 
     @property
     def follows_scattered(self) -> bool:
-        """Whether scattered rays bring the light of what is sampled too."""
+        """Whether BSDF-sampled rays collect emission that light sampling can sample, too."""
         return self.bsdf_samples > 0
 
     def setup(self) -> "DirectSetup":
@@ -55,7 +59,7 @@ class DirectSetup(NamedTuple):
 
 @kernel
 def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
-    """An estimate of the radiance along `ray` by paths of at most two edges; its mean is exact."""
+    """An unbiased estimate of the radiance along `ray`, by paths of at most two edges."""
     lights = scene.lights
     hit = closest_hit(scene.geometry, ray)
     if hit.kind < 0:
@@ -64,17 +68,17 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: sampling
     kept = local_floats(any_material.kept_floats(scene.materials))
     shading = shade(scene, ray, hit, kept)
     total = area.emitted(lights.areas, shading.point, shading.at, -ray.d)
-    normal = receiver(scene, shading)
+    normal = light_selection_normal(scene, shading)
     if any_material.is_smooth(scene.materials, shading.point.material):
         for k in range(setup.light_samples):
-            total = total + _from_light(setup, scene, shading, normal, sampler, k)
+            total = total + _light_sample(setup, scene, shading, normal, sampler, k)
     for k in range(setup.bsdf_samples):
-        total = total + _from_bsdf(setup, scene, shading, normal, sampler, k)
+        total = total + _bsdf_sample(setup, scene, shading, normal, sampler, k)
     return total
 
 
 @kernel
-def _from_light(
+def _light_sample(
     setup: DirectSetup,
     scene: SceneTables,
     shading: Shading,
@@ -82,7 +86,7 @@ def _from_light(
     sampler: sampling.Sample,
     k: int,
 ) -> Vec3:
-    """Light sample k of n, as its share of the estimate."""
+    """What light sample k of n adds to the estimate: its MIS-weighted f |cos| L_e / (n pdf)."""
     black = Vec3(0.0, 0.0, 0.0)
     if any_light.count(scene.lights) == 0:
         return black
@@ -104,7 +108,7 @@ def _from_light(
 
 
 @kernel
-def _from_bsdf(
+def _bsdf_sample(
     setup: DirectSetup,
     scene: SceneTables,
     shading: Shading,
@@ -112,7 +116,7 @@ def _from_bsdf(
     sampler: sampling.Sample,
     k: int,
 ) -> Vec3:
-    """Sample k of m of the material, as its share of the estimate."""
+    """What BSDF sample k of m adds to the estimate: its MIS-weighted f |cos| L_e / (m pdf)."""
     black = Vec3(0.0, 0.0, 0.0)
     lights = scene.lights
     dimension = sampling.PER_BOUNCE * k

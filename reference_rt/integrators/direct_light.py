@@ -1,4 +1,4 @@
-"""What integrators share: direct light from one light, and the heuristic that joins estimators."""
+"""Direct light of one light at a surface, and the power heuristic: shared by the integrators."""
 
 from typing import NamedTuple
 
@@ -13,8 +13,11 @@ from reference_rt.materials import Shading
 
 
 class Direct(NamedTuple):
-    """What one light sample sends to the viewer: f cos L, 0 in shadow, not yet divided by a pdf;
-    bsdf_pdf: the density with which the material's own sampling picks `wi`."""
+    """A light sample scattered towards the viewer.
+
+    wi: the direction to the light, in the shading frame;  contribution: f |cos| L_e, 0 in shadow,
+    not divided by a pdf;  bsdf_pdf: solid-angle density with which BSDF sampling draws `wi`.
+    """
 
     light: LightSample
     wi: Vec3
@@ -24,7 +27,7 @@ class Direct(NamedTuple):
 
 @kernel
 def direct(scene: SceneTables, shading: Shading, k: int, u0: float, u1: float) -> Direct:
-    """Light k of the scene's choice at a surface; the result's `wi` is local."""
+    """A sample of light number k at a surface, tested for visibility."""
     shapes, p = scene.geometry.shapes, shading.point.p
     light = any_light.sample_one(scene.lights, k, shapes, scene.textures, p, u0, u1)
     return direct_from(scene, shading, light)
@@ -32,10 +35,10 @@ def direct(scene: SceneTables, shading: Shading, k: int, u0: float, u1: float) -
 
 @kernel
 def direct_from(scene: SceneTables, shading: Shading, light: LightSample) -> Direct:
-    """A light sample at a surface; the result's `wi` is local."""
+    """A light sample at a surface, tested for visibility."""
     found = unshadowed(scene, shading, light)
     black = Vec3(0.0, 0.0, 0.0)
-    # Most shadow rays to the wrong side of a surface are spared here.
+    # No shadow ray is needed where the BSDF is 0, such as on the wrong side of the surface.
     if is_black(found.contribution):
         return found
     if occluded(scene.geometry, shadow_ray(shading.point, light)):
@@ -45,7 +48,7 @@ def direct_from(scene: SceneTables, shading: Shading, light: LightSample) -> Dir
 
 @kernel
 def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Direct:
-    """The same, whatever may be in the way."""
+    """A light sample at a surface, without the visibility test."""
     if light.pdf == 0.0:
         black = Vec3(0.0, 0.0, 0.0)
         return Direct(light, black, black, 0.0)
@@ -56,15 +59,16 @@ def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Dire
 
 @kernel
 def power_heuristic(pdf: float, other: float) -> float:
-    """The weight of a sample of density `pdf` that `other` could have found too: p² / (p² + q²)
-    (Veach 1997, eq. 9.13), as a ratio, which cannot overflow."""
+    """MIS weight p² / (p² + q²) of a sample drawn with density p = `pdf`, which the other strategy
+    draws with density q = `other` (Veach 1997, eq. 9.13).  It is computed from q / p, so that no
+    square of a density overflows."""
     ratio = other / pdf
     return 1.0 / (1.0 + ratio * ratio)
 
 
 @kernel
-def receiver(scene: SceneTables, shading: Shading) -> Vec3:
-    """The normal that lights are picked for: none where light may come from both sides."""
+def light_selection_normal(scene: SceneTables, shading: Shading) -> Vec3:
+    """The shading normal for light selection; 0 if the material takes light from both sides."""
     if any_material.takes_light_from_behind(scene.materials, shading.point.material):
         return Vec3(0.0, 0.0, 0.0)
     return shading.frame.n

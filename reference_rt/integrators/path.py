@@ -1,4 +1,24 @@
-"""Path tracing: the rendering equation by Monte Carlo (Kajiya 1986)."""
+"""Path tracing: a Monte Carlo estimate of the rendering equation (Kajiya 1986).
+
+The radiance that leaves a surface point x in direction w_o is
+
+    L(x, w_o) = L_e(x, w_o) + integral over w_i of f(x, w_i, w_o) |cos w_i| L(y, -w_i),
+
+where y is what the ray from x along w_i hits first.  A path estimates the integral with one random
+direction at each surface.  Its throughput is the product of f |cos| / pdf along the way.  Each edge
+of the path takes three steps:
+
+1. `_environment_emission` or `_hit_emission`: throughput times L_e of what the ray has hit.
+2. `_next_event_estimation`: throughput f |cos| L_e / pdf of one sampled point on a light, if its
+   shadow ray is not occluded.
+3. `_scatter`: the BSDF samples the next direction; Russian roulette may end the path.
+
+Step 2 and the next edge's step 1 estimate the same direct light.  `_mis_weight` weights them so
+that it is counted once (multiple importance sampling, Veach 1997).
+
+`radiance` is the algorithm for a single path; `radiances` runs the same steps for a block of paths,
+edge by edge, with the same bits.
+"""
 
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -13,7 +33,11 @@ from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.ray_block import add_vector, put_ray, put_vector, ray_of, vector_of
 from reference_rt.core.vec3 import Vec3, is_black, max_component, to_world
-from reference_rt.integrators.direct_light import power_heuristic, receiver, unshadowed
+from reference_rt.integrators.direct_light import (
+    light_selection_normal,
+    power_heuristic,
+    unshadowed,
+)
 from reference_rt.integrators.path_state import State, put_state, start, state_of
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.scratch import Scratch
@@ -26,15 +50,16 @@ from reference_rt.sampling import Samplers, draw_pair, sampler_of
 
 UNLIMITED = 2**31
 ROULETTE_CAP = 0.999
-"""The highest chance of survival: it ends paths between perfect mirrors.
+"""The highest survival probability of Russian roulette: below 1, so that paths between perfect
+mirrors end.
 
-Weights grow by albedo / cap a bounce where the albedo exceeds the cap, with a variance that is
-infinite from albedo² = cap on.  Mitsuba's cap of 0.95 reaches that at an albedo of 0.975; the mean
-is the same.
+Where the albedo exceeds the cap, a path's weight grows by albedo / cap per bounce, and its variance
+is infinite from albedo² = cap on.  Mitsuba's cap of 0.95 reaches that at an albedo of 0.975.  The
+mean does not depend on the cap.
 """
 
-_LIGHTS, _BSDF = range(2)
-_ALONE = {"lights": _LIGHTS, "bsdf": _BSDF}
+_LIGHT_SAMPLING, _BSDF_SAMPLING = range(2)
+_STRATEGIES = {"lights": _LIGHT_SAMPLING, "bsdf": _BSDF_SAMPLING}
 
 
 class Path(Description):
@@ -54,24 +79,25 @@ class Path(Description):
 
     @property
     def follows_scattered(self) -> bool:
-        """Whether scattered rays bring the light of what is sampled too."""
+        """Whether BSDF-sampled rays collect emission that light sampling can sample, too."""
         return self.sampling != "lights"
 
     def setup(self) -> "PathSetup":
         limit = UNLIMITED if self.max_depth is None else min(self.max_depth, UNLIMITED)
-        return PathSetup(limit, self.rr_depth, _ALONE.get(self.sampling))
+        return PathSetup(limit, self.rr_depth, _STRATEGIES.get(self.sampling))
 
 
 class PathSetup(NamedTuple):
-    """alone: the one thing that is to find lights; None for both, so that nothing is asked."""
+    """strategy: the only sampling strategy for direct light, `_LIGHT_SAMPLING` or `_BSDF_SAMPLING`;
+    None for both with multiple importance sampling, which compiles to no branch."""
 
     max_depth: int
     rr_depth: int
-    alone: int | None
+    strategy: int | None
 
 
 class Step(NamedTuple):
-    """How a path leaves a surface: goes_on, whether it does, along `ray` with `state`."""
+    """A path after scattering.  goes_on: whether it continues, along `ray` with `state`."""
 
     goes_on: bool
     ray: Ray
@@ -79,8 +105,8 @@ class Step(NamedTuple):
 
 
 class Lit(NamedTuple):
-    """The light, weighted, that comes by way of a surface if nothing is on the ray `shadow`; 0
-    where nothing can."""
+    """Next-event estimation before its visibility test.  light: what it adds to the path's
+    radiance, weight included, if the ray `shadow` is not occluded; 0 for no contribution."""
 
     light: Vec3
     shadow: Ray
@@ -88,20 +114,21 @@ class Lit(NamedTuple):
 
 @kernel
 def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
-    """An estimate of the radiance that arrives along `ray` at its origin; its mean is exact."""
+    """An unbiased estimate of the radiance that arrives at the origin of `ray` from its
+    direction."""
     total = Vec3(0.0, 0.0, 0.0)
     state = start(ray)
     kept = local_floats(any_material.kept_floats(scene.materials))
     for depth in range(path.max_depth):
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
-            return total + _from_sky(path, scene, state, ray)
+            return total + _environment_emission(path, scene, state, ray)
         shading = shade(scene, ray, hit, kept)
         if any_light.is_area(scene.lights.areas, shading.point):
-            total = total + _from_lamp(path, scene, state, ray, shading)
+            total = total + _hit_emission(path, scene, state, ray, shading)
         if depth + 1 >= path.max_depth:
             break
-        lit = _next_event(path, scene, state, shading, sampler, depth)
+        lit = _next_event_estimation(path, scene, state, shading, sampler, depth)
         if not is_black(lit.light):
             if not occluded(scene.geometry, lit.shadow):
                 total = total + lit.light
@@ -116,8 +143,11 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sa
 def radiances(
     path: PathSetup, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
 ) -> None:
-    """`radiance` of the first n of `scratch.rays`, into `scratch.totals`: all paths at once, edge
-    by edge, so that rays are traced side by side and no path waits for another."""
+    """`radiance` of the first n of `scratch.rays`, into `scratch.totals`.
+
+    All paths advance together, edge by edge, so that their rays are traced as one block.  Ended
+    paths are removed: number j of the active paths belongs to sample `scratch.samples[j]`.
+    """
     rays, shadows, hits = scratch.rays, scratch.shadows, scratch.hits
     for j in range(n):
         put_state(scene, scratch, j, j, start(ray_of(rays, j)))
@@ -133,15 +163,15 @@ def radiances(
             ray = ray_of(rays, j)
             hit = hit_of(scene.geometry, ray, hits, j)
             if hit.kind < 0:
-                add_vector(scratch.totals, 0, k, _from_sky(path, scene, state, ray))
+                add_vector(scratch.totals, 0, k, _environment_emission(path, scene, state, ray))
                 continue
             shading = shade(scene, ray, hit, scratch.kept)
             if any_light.is_area(scene.lights.areas, shading.point):
-                add_vector(scratch.totals, 0, k, _from_lamp(path, scene, state, ray, shading))
+                add_vector(scratch.totals, 0, k, _hit_emission(path, scene, state, ray, shading))
             if depth + 1 >= path.max_depth:
                 continue
             sampler = sampler_of(samplers, k)
-            found = _next_event(path, scene, state, shading, sampler, depth)
+            found = _next_event_estimation(path, scene, state, shading, sampler, depth)
             if not is_black(found.light):
                 put_ray(shadows, lit, found.shadow)
                 put_vector(scratch.lights, 0, lit, found.light)
@@ -160,40 +190,44 @@ def radiances(
 
 
 @kernel
-def _from_sky(path: PathSetup, scene: SceneTables, state: State, ray: Ray) -> Vec3:
-    """What a path finds that hits nothing, weighted."""
+def _environment_emission(path: PathSetup, scene: SceneTables, state: State, ray: Ray) -> Vec3:
+    """Emission of the environment along a ray that hits nothing: throughput L_e, MIS-weighted."""
     lights, weight = scene.lights, 1.0
     if state.bsdf_pdf > 0.0:
         light_pdf = any_light.environment_pdf(lights, state.previous, state.normal, ray.d)
-        weight = _weight(path.alone, _BSDF, state.bsdf_pdf, light_pdf)
+        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
     emitted: Vec3 = any_light.background(lights.environment, ray.d)
     return state.throughput * emitted * weight
 
 
 @kernel
-def _from_lamp(
+def _hit_emission(
     path: PathSetup, scene: SceneTables, state: State, ray: Ray, shading: Shading
 ) -> Vec3:
-    """What a path finds that hits an area light, weighted."""
+    """Emission of the area light that the ray has hit: throughput L_e, MIS-weighted."""
     lights, point, weight = scene.lights, shading.point, 1.0
     if state.bsdf_pdf > 0.0:
         shapes = scene.geometry.shapes
         light_pdf = any_light.area_pdf(lights, shapes, state.previous, state.normal, point)
-        weight = _weight(path.alone, _BSDF, state.bsdf_pdf, light_pdf)
+        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
     return state.throughput * area.emitted(lights.areas, point, shading.at, -ray.d) * weight
 
 
 @kernel
-def _weight(alone: int | None, way: int, pdf: float, other: float) -> float:
-    """The weight of what one way of sampling found with density `pdf`, and the other could have
-    with `other`; all or nothing where one way alone is asked for."""
-    if alone is None:
+def _mis_weight(only: int | None, strategy: int, pdf: float, other: float) -> float:
+    """The weight of a sample that `strategy` drew with density `pdf`, and the other strategy would
+    draw with density `other`.
+
+    With the single strategy `only`, samples of the other count nothing, except where the single
+    one cannot draw them (other = 0).
+    """
+    if only is None:
         return power_heuristic(pdf, other)
-    return 1.0 if alone == way or other == 0.0 else 0.0
+    return 1.0 if only == strategy or other == 0.0 else 0.0
 
 
 @kernel
-def _next_event(
+def _next_event_estimation(
     path: PathSetup,
     scene: SceneTables,
     state: State,
@@ -201,7 +235,8 @@ def _next_event(
     sampler: sampling.Sample,
     depth: int,
 ) -> Lit:
-    """Direct light from one light picked at random, weighted against the BSDF's own sampling."""
+    """Direct light of one randomly selected light: throughput f |cos| L_e / pdf, MIS-weighted
+    against BSDF sampling.  Random numbers that decide nothing are not drawn."""
     point, dimension = shading.point, sampling.PER_BOUNCE * depth
     nothing = Lit(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
     count = any_light.count(scene.lights)
@@ -210,7 +245,7 @@ def _next_event(
     u_pick = 0.5
     if count > 1:
         u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
-    picked = any_light.pick(scene.lights, point.p, receiver(scene, shading), u_pick)
+    picked = any_light.pick(scene.lights, point.p, light_selection_normal(scene, shading), u_pick)
     if picked.probability == 0.0:
         return nothing
     u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
@@ -222,7 +257,7 @@ def _next_event(
     pdf = light.pdf * picked.probability
     weight = 1.0
     if not light.is_delta:
-        weight = _weight(path.alone, _LIGHTS, pdf, sample.bsdf_pdf)
+        weight = _mis_weight(path.strategy, _LIGHT_SAMPLING, pdf, sample.bsdf_pdf)
     arriving = sample.contribution * (weight / pdf)
     return Lit(state.throughput * arriving, shadow_ray(point, light))
 
@@ -236,7 +271,7 @@ def _scatter(
     sampler: sampling.Sample,
     depth: int,
 ) -> Step:
-    """From the surface that edge number `depth` of a path has hit to the next ray."""
+    """Sample the BSDF at the surface that edge number `depth` has hit; apply Russian roulette."""
     point, dimension = shading.point, sampling.PER_BOUNCE * depth
     ended = Step(False, Ray(point.p, point.n, 0.0), state)
     u_lobe = 0.5
@@ -249,7 +284,8 @@ def _scatter(
     throughput = state.throughput * scattered.weight
     eta = state.eta * scattered.eta
     if depth + 1 >= path.rr_depth:
-        # eta² undoes the change of radiance in glass: what counts is the power that is left.
+        # Radiance changes by 1 / eta² on entering a medium.  eta² undoes that: survival depends on
+        # the power that is left.
         survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)
         u_roulette, _ = draw_pair(sampler, dimension + sampling.ROULETTE)
         if not u_roulette < survival:  # also ends what is NaN
@@ -257,4 +293,5 @@ def _scatter(
         throughput = throughput * (1.0 / survival)
     bsdf_pdf = 0.0 if scattered.is_delta else scattered.pdf
     ray = ray_from(point, to_world(shading.frame, scattered.wi))
-    return Step(True, ray, State(throughput, eta, bsdf_pdf, point.p, receiver(scene, shading)))
+    normal = light_selection_normal(scene, shading)
+    return Step(True, ray, State(throughput, eta, bsdf_pdf, point.p, normal))

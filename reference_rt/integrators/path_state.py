@@ -1,4 +1,4 @@
-"""What a path is between two surfaces, and how those of a block are kept."""
+"""The state of a path between two surfaces, and its SoA storage for a block of paths."""
 
 from typing import NamedTuple
 
@@ -13,11 +13,12 @@ from reference_rt.jit.kernel import kernel
 
 
 class State(NamedTuple):
-    """What a path is when it goes on.
+    """The state of a path along its current ray.
 
-    throughput: the weight of what it finds;  eta: of the product of the media's it has entered;
-    how its ray was chosen: with density bsdf_pdf, 0 for the eye and for delta lobes, whose finds no
-    light sample competes for, from `previous`, for a light-picking normal.
+    throughput: product of f |cos| / pdf so far;  eta: product of the relative indices of the media
+    it has entered;  bsdf_pdf: solid-angle density of the ray's direction, 0 for camera rays and
+    delta lobes, whose MIS weight is 1;  previous, normal: the vertex that the ray left and its
+    `light_selection_normal`, from which the light sampler's density is evaluated.
     """
 
     throughput: Vec3
@@ -29,13 +30,13 @@ class State(NamedTuple):
 
 @kernel
 def start(ray: Ray) -> State:
-    """A path at the eye."""
+    """The state of a camera ray."""
     return State(Vec3(1.0, 1.0, 1.0), 1.0, 0.0, ray.o, ray.d)
 
 
 @kernel
 def state_of(scene: SceneTables, scratch: Scratch, j: int) -> State:
-    """That of path number j of those that go on."""
+    """The state of active path j."""
     numbers, nowhere = scratch.states, Vec3(0.0, 0.0, 0.0)
     eta = numbers[4 * BLOCK + j] if any_material.any_transmits(scene.materials) else 1.0
     previous = vector_of(numbers, 5, j) if any_light.asks_place(scene.lights) else nowhere
@@ -45,8 +46,8 @@ def state_of(scene: SceneTables, scratch: Scratch, j: int) -> State:
 
 @kernel
 def put_state(scene: SceneTables, scratch: Scratch, j: int, k: int, state: State) -> None:
-    """As number j of the paths that go on, the path of sample k; what this scene never asks is
-    left out (measured: storing all takes 3 % longer, of spheres under a sky)."""
+    """Store the state of sample k's path as active path j.  Fields that this scene's kernels never
+    read are not stored (measured: storing all takes 3 % longer for spheres under a sky)."""
     scratch.samples[j] = k
     numbers = scratch.states
     put_vector(numbers, 0, j, state.throughput)

@@ -1,4 +1,4 @@
-"""Ray casting: what the ray through each pixel's centre hits first, and nothing more."""
+"""Ray casting: the first hit of the ray through each pixel's centre, as colour and other AOVs."""
 
 from typing import ClassVar, Literal, NamedTuple
 
@@ -26,8 +26,9 @@ class RayCast(Description):
 
 
 class Cast(NamedTuple):
-    """colour of the mesh's vertices or of the material;  distance, inf for a miss;  n, 0 for a
-    miss;  id, -1 for a miss;  u, v, 0 for a miss."""
+    """All layers at one ray.  colour: interpolated vertex colour, or the material's;  distance: inf
+    for a miss;  n: unit geometric normal, 0 for a miss;  id: index of the shape, -1 for a miss;
+    u, v: surface coordinates, 0 for a miss."""
 
     colour: Vec3
     distance: float

@@ -1,4 +1,4 @@
-"""`SceneTables`: the arrays of a scene, which `reference_rt.scene.build` makes."""
+"""`SceneTables`: the arrays of a scene, which `reference_rt.scene.build` makes for the kernels."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,8 @@ from reference_rt.textures import Textures
 
 
 class SceneTables(NamedTuple):
-    """A scene as its kernels see it."""
+    """All arrays that kernels read.  A feature that the scene lacks is None, and its branches are
+    removed when the kernels are compiled."""
 
     geometry: Geometry
     materials: Materials

@@ -1,4 +1,4 @@
-"""A block of samples: the scratch of a band of pixels."""
+"""Scratch buffers for one block of samples, reused for all blocks of a tile."""
 
 from typing import NamedTuple
 
@@ -12,11 +12,13 @@ VECTOR_FLOATS = 3 * BLOCK
 
 
 class Scratch(NamedTuple):
-    """rays: from the eye at first;  totals (VECTOR_FLOATS,): the radiance along each of these.
+    """rays: input, the camera rays; integrators overwrite them;  totals (VECTOR_FLOATS,): output,
+    the radiance along each camera ray.
 
-    While an integrator works: shadows, rays that may be blocked, and the light (VECTOR_FLOATS,)
-    that each brings to sample `lit` (BLOCK,);  hits;  states (STATE_FLOATS,) of paths, and the
-    sample (BLOCK,) that each is of;  kept (`materials.kept_floats`,) for `shade`.
+    Buffers of integrators: shadows, the shadow rays; for each of them lights (VECTOR_FLOATS,), what
+    it adds if it is not occluded, and lit (BLOCK,), the sample that it belongs to;  hits;  states
+    (STATE_FLOATS,) of the active paths and samples (BLOCK,), the sample of each;  kept
+    (`materials.kept_floats`,), the buffer of `shade`.
     """
 
     rays: Rays
@@ -32,8 +34,8 @@ class Scratch(NamedTuple):
 
 @kernel
 def prepare(scratch: Scratch) -> None:
-    """Before the first rays.  Lanes without a ray are traced too, and memory that nobody has
-    written may hold subnormal numbers, on which some processors are a hundred times slower."""
+    """Initialise the rays.  Vector lanes without a ray are traced too, and uninitialised memory may
+    hold subnormal numbers, on which some processors are a hundred times slower."""
     for k in range(RAY_FLOATS):
         scratch.rays.numbers[k] = 1.0
         scratch.shadows.numbers[k] = 1.0

@@ -1,4 +1,4 @@
-"""From a hit to what materials are asked about: the point, its frame, where textures are asked."""
+"""From a hit to the input of the BSDF: the point, its shading frame, its texture lookups."""
 
 from reference_rt.accel.geometry import Geometry, coordinates, surface, tangents
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -17,9 +17,9 @@ _NO_COLOUR = Vec3(-1.0, -1.0, -1.0)
 
 @kernel
 def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
-    """What the material at a hit (which must be one) is asked about, seen along the ray.
+    """The BSDF's input at a hit (not a miss), seen along the ray.
 
-    `kept` (`materials.kept_floats`,) is scratch that the answer lives in.
+    kept (`materials.kept_floats`,): buffer for texture values and layers; the result refers to it.
     """
     point = surface(scene.geometry, ray, hit)
     world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
@@ -35,7 +35,7 @@ def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
 
 @kernel
 def _place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
-    """Where the textures of material m are asked at a hit; anywhere, if it has none."""
+    """Texture coordinates at a hit for material m; any, if it has no textures."""
     if not asks_textures(scene.materials, m):
         return At(scene.textures, 0.0, 0.0, _NO_COLOUR)
     return texture_place(scene.textures, scene.geometry, ray, hit)
@@ -43,7 +43,7 @@ def _place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
 
 @kernel
 def texture_place(textures: Textures | None, geometry: Geometry, ray: Ray, hit: Hit) -> At:
-    """Where textures are asked at a hit: computed only where the scene has any."""
+    """Texture coordinates at a hit; computed only if the scene has textures."""
     if textures is None:
         return At(textures, 0.0, 0.0, _NO_COLOUR)
     found = coordinates(geometry, ray, hit)

@@ -1,4 +1,8 @@
-"""Whitted: recursive ray tracing (Whitted 1980), deterministic."""
+"""Whitted: recursive ray tracing (Whitted 1980), deterministic.
+
+At each hit: L = L_e + ambient + the direct light of every light at its middle point + for each
+perfect mirror or refraction its reflectance or transmittance times L along that ray.
+"""
 
 import math
 from typing import Annotated, ClassVar, Literal, NamedTuple
@@ -63,8 +67,8 @@ def _vector(stack: FloatArray, k: int) -> Vec3:
 
 @kernel
 def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
-    """The radiance along `ray`.  The tree of rays is walked depth first on a stack of its own:
-    each level leaves all its branches but one waiting at most."""
+    """The radiance along `ray`: a depth-first walk of the ray tree with an explicit stack.  Each
+    level leaves at most all its branches but one on the stack."""
     waiting = 2 * any_material.most_branches(scene.materials) - 1
     stack = local_floats(10 * (waiting * whitted.max_depth + 2))
     kept = local_floats(any_material.kept_floats(scene.materials))
@@ -107,7 +111,8 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampl
 
 @kernel
 def _direct_light(scene: SceneTables, choice: Choice | None, shading: Shading) -> Vec3:
-    """Every light that is a point or a direction, and the middle of every area light."""
+    """Direct light of every point, spot and directional light, and of the middle of every area
+    light."""
     total = Vec3(0.0, 0.0, 0.0)
     if choice is None:
         return total

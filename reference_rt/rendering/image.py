@@ -28,13 +28,13 @@ _CHANNELS: dict[str, tuple[str, ...]] = {
 
 
 def check_suffix(path: Path) -> None:
-    """Raise UsageError where `write` does not know the format."""
+    """Raise UsageError if `write` does not support the file format."""
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"{path}: '{path.suffix}' is not supported; expected .exr or .png")
 
 
 def write(path: Path, picture: Picture, provenance: Mapping[str, str]) -> None:
-    """Write a picture, whole or not at all: every layer to .exr, the shown one to .png."""
+    """Write every layer to .exr, or the shown one to .png.  No partial file is ever left."""
     check_suffix(path)
     if path.suffix.lower() == ".png":
         write_png(path, display(picture), provenance)
@@ -43,8 +43,8 @@ def write(path: Path, picture: Picture, provenance: Mapping[str, str]) -> None:
 
 
 def channels(layers: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """The layers (height, width[, channels]) of a picture as planes (height, width) by the names
-    that they have in .exr files."""
+    """The layers (height, width[, channels]) of a picture as planes (height, width), by EXR channel
+    name."""
     planes = {}
     for name, layer in layers.items():
         for k, channel in enumerate(_CHANNELS[name]):
@@ -66,7 +66,7 @@ def write_png(path: Path, image: FloatArray, provenance: Mapping[str, str]) -> N
 
 
 def srgb(linear: npt.ArrayLike) -> FloatArray:
-    """The sRGB transfer function (IEC 61966-2-1) of linear values; NaN and infinity stay."""
+    """The sRGB transfer function (IEC 61966-2-1) of linear values; NaN and infinity are kept."""
     x = np.asarray(linear, dtype=np.float64)
     with np.errstate(invalid="ignore"):
         high = 1.055 * np.power(np.maximum(x, 0.0031308), 1.0 / 2.4) - 0.055
@@ -76,9 +76,9 @@ def srgb(linear: npt.ArrayLike) -> FloatArray:
 def display(picture: Picture) -> FloatArray:
     """The shown layer as display values (height, width, 3), nominally in [0, 1].
 
-    Radiance by sRGB's transfer function; distances from white (nearest) to black, misses black;
-    normals as (n + 1) / 2, misses black; each id a colour of its own, misses black; u as red, v as
-    green, by what they are beyond a whole number.
+    Radiance: sRGB-encoded.  Distance: from white (nearest) to dark grey.  Normals: (n + 1) / 2.
+    Id: a colour for each.  u and v: their fractional parts as red and green.  Misses of distances,
+    normals and ids are black.
     """
     layer = picture.layers[picture.shown]
     if picture.shown == "colour":
@@ -98,7 +98,7 @@ def _nearness(distance: FloatArray) -> FloatArray:
     if not hit.any():
         return np.zeros_like(distance)
     near, far = distance[hit].min(), distance[hit].max()
-    # The farthest hit keeps a tenth of white: it is not a miss.
+    # The farthest hit is 0.1, which tells it from a miss.
     scale = 0.9 / (far - near) if far > near else 0.0
     return np.where(hit, 1.0 - scale * (np.where(hit, distance, near) - near), 0.0)
 
@@ -108,7 +108,7 @@ def _grey(values: FloatArray) -> FloatArray:
 
 
 def _palette(ids: npt.NDArray[np.int64]) -> FloatArray:
-    """Hues a golden angle apart: neighbours in number are far apart in colour."""
+    """Hues a golden angle apart, so that consecutive ids have clearly different colours."""
     hue = np.mod(ids[..., None] * 0.6180339887498949 + np.array([0.0, 2 / 3, 1 / 3]), 1.0)
     colour = np.clip(np.abs(6.0 * hue - 3.0) - 1.0, 0.0, 1.0) * 0.75 + 0.2
     return np.where(ids[..., None] < 0, 0.0, colour)

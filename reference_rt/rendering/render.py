@@ -1,4 +1,7 @@
-"""Rendering: bands of pixels on all cores, with progress and a clean stop."""
+"""Rendering: compile the kernels of `tiles`, and run them on a thread pool, one tile per task.
+
+A tile is a run of consecutive pixels, counted along rows.
+"""
 
 import os
 import threading
@@ -22,24 +25,23 @@ from reference_rt.rendering.tiles import cast_band, first_hits_band, render_band
 from reference_rt.scene.build import BuiltScene, build_tables
 from reference_rt.scene.likely_mistakes import likely_mistakes
 
-SAMPLES_PER_BAND = 1 << 15
-"""A band takes some 20 ms: short enough for progress and Ctrl-C, long against the 0.1 ms that
-handing it to a thread costs."""
+SAMPLES_PER_TILE = 1 << 15
+"""Samples of one kernel call, about 20 ms: short enough for progress and Ctrl-C, long against the
+0.1 ms that a task of the thread pool costs."""
 
 Progress = Callable[[str, float], None]
-"""Called with what is being done ("compile", "render") and the fraction of it that is done."""
+"""Called with the phase ("compile" or "render") and the fraction of it that is done."""
 
 
 @dataclass(frozen=True)
 class Picture:
     """A rendered scene.
 
-    layers: (height, width, 3) float64 linear radiance as "colour", and what `Film.layers` asks for:
-    albedo, normal and variance (height, width, 3), depth and id (height, width); or for ray casting
-    all of colour (height, width, 3), distance (height, width), normal (height, width, 3), id
-    (height, width) and uv (height, width, 2);  shown: the layer that is the picture;  seconds: wall
-    clock of "tables" (files, arrays, hierarchy), "compile" (or loading what was compiled before)
-    and "render".
+    layers: float64 arrays by name.  "colour" (height, width, 3) is linear radiance; the others are
+    those of `Film.layers`: albedo, normal and variance (height, width, 3), depth and id (height,
+    width).  Ray casting always has colour and normal (height, width, 3), distance and id (height,
+    width), uv (height, width, 2).  shown: the layer that is the picture.  seconds: wall-clock time
+    of "tables" (files, arrays, hierarchy), "compile" (or loading cached kernels) and "render".
     """
 
     layers: dict[str, FloatArray]
@@ -53,8 +55,9 @@ class Picture:
 
     @property
     def nonfinite_pixels(self) -> IntArray:
-        """(n, 2) column and row, along rows, of the pixels with a NaN, or with more than float32,
-        which files hold, can; in all layers but the depth, which is inf for a miss."""
+        """(n, 2) column and row, along rows, of the pixels that have a NaN or a value beyond the
+        range of float32 (the files' format) in any layer but depth and distance, which are inf for
+        a miss."""
         most = np.finfo(np.float32).max
         bad = np.zeros(self.colour.shape[:2], np.bool_)
         for name, layer in self.layers.items():
@@ -69,9 +72,10 @@ class Picture:
 
 
 class _Job(NamedTuple):
-    """A kernel of `bands`, its arguments but for the last four, and its samples per pixel."""
+    """A kernel of `tiles`, its arguments except the last four (begin, end, first, last), and its
+    samples per pixel."""
 
-    band: Any
+    kernel: Any
     arguments: tuple[Any, ...]
     spp: int
 
@@ -85,9 +89,9 @@ def render(
 ) -> Picture:
     """Render a scene.
 
-    The same scene gives the same bits for any number of `threads` (default: all cores).  `tables`
-    spares building them again.  Ctrl-C stops within a band.  Raises SceneError; issues a
-    SceneWarning for what looks like a mistake (`likely_mistakes`).
+    threads: default all cores; their number changes no bit.  tables: the scene's tables, if they
+    are built already.  progress: called as the render goes on.  Ctrl-C stops it within a tile.
+    Raises SceneError; issues a SceneWarning for each of `likely_mistakes`.
     """
     say = progress or (lambda what, fraction: None)
     _check(scene)
@@ -99,30 +103,30 @@ def render(
     integrator = scene.integrator
     tables, tracer = with_tracer(tables, integrator)
     if isinstance(integrator, RayCast):
-        shown, (jobs, layers) = integrator.show, _cast_jobs(scene, tables)
+        shown, (jobs, layers) = integrator.show, _aov_jobs(scene, tables)
     else:
         shown, (jobs, layers) = "colour", _render_jobs(scene, integrator.setup(), tables)
     say("compile", 0.0)
     threads = threads or os.cpu_count() or 1
-    calls = [(job.band, signature_of(*job.arguments, 0, 0, 0, 0)) for job in jobs]
-    bands = compile_bands(calls, tables, tracer, threads)
+    calls = [(job.kernel, signature_of(*job.arguments, 0, 0, 0, 0)) for job in jobs]
+    kernels = compile_bands(calls, tables, tracer, threads)
     say("compile", 1.0)
     clock.append(time.perf_counter())
     pixels = scene.film.width * scene.film.height
-    for k, (band, job) in enumerate(zip(bands, jobs, strict=True)):
+    for k, (kernel, job) in enumerate(zip(kernels, jobs, strict=True)):
 
         def say_part(what: str, fraction: float, k: int = k) -> None:
             say(what, (k + fraction) / len(jobs))
 
-        run_bands(band, job.arguments, pixels, job.spp, threads, say_part)
+        run_bands(kernel, job.arguments, pixels, job.spp, threads, say_part)
     clock.append(time.perf_counter())
     seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
     return Picture(layers, shown, seconds)
 
 
 def with_tracer(tables: SceneTables, integrator: Any) -> tuple[SceneTables, Call | None]:
-    """The tables with room for the address of the kernel that traces the rays of paths, and that
-    kernel; None where it is inlined."""
+    """The tables with a slot for the function pointer of the kernel that traces the rays of path
+    tracing, and that kernel's compile call; None if the kernel is inlined."""
     tracer = tracer_of(tables.geometry) if isinstance(integrator, Path | PathSetup) else None
     if tracer is not None:
         geometry = tables.geometry._replace(tracer=np.zeros(1, np.intp))
@@ -133,17 +137,18 @@ def with_tracer(tables: SceneTables, integrator: Any) -> tuple[SceneTables, Call
 def compile_bands(
     calls: Sequence[Call], tables: SceneTables, tracer: Call | None, threads: int
 ) -> Sequence[Callable[..., Any]]:
-    """Kernels that are ready to be called, once the tables know where the tracer is."""
+    """Compile kernels, in parallel with the tracer; write the tracer's function pointer into the
+    tables.  The kernels, ready to be called."""
     if tracer is None:
         return precompile_all(calls, threads)
-    *bands, _ = precompile_all([*calls, tracer], threads)
+    *kernels, _ = precompile_all([*calls, tracer], threads)
     address: Any = tables.geometry.tracer
     address[0] = address_of(*tracer)
-    return bands
+    return kernels
 
 
-def _cast_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:
-    """What fills the layers of ray casting, and these layers."""
+def _aov_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:
+    """The AOV pass (one ray through each pixel's centre), and the layers that it writes."""
     film = scene.film
     out = np.zeros((film.height, film.width, 10))
     view = scene.camera.setup(film.width, film.height)
@@ -161,42 +166,43 @@ def _cast_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict
 def _render_jobs(
     scene: BuiltScene, integrator: Any, tables: SceneTables
 ) -> tuple[list[_Job], dict[str, FloatArray]]:
-    """What fills the picture and the layers that the film asks for, and these."""
+    """The jobs that compute the picture and the film's layers, and these layers."""
     film, sampler = scene.film, scene.resolved_sampler
     shape, spp = (film.width, film.height), sampler.spp
     out = np.zeros((film.height, film.width, 3))
-    spread = np.zeros_like(out) if "variance" in film.layers else None
-    rows = None if spread is None else spread.reshape(-1, 3)
+    variance = np.zeros_like(out) if "variance" in film.layers else None
+    rows = None if variance is None else variance.reshape(-1, 3)
     view = scene.camera.setup(*shape)
     setups = (tables, view, film.filter.setup(), sampler.setup(), shape, spp)
     arguments = (integrator, *setups, out.reshape(-1, 3), rows)
     jobs, layers = [_Job(render_band, arguments, spp)], {"colour": out}
-    if spread is not None:
-        layers["variance"] = spread
+    if variance is not None:
+        layers["variance"] = variance
     if {"albedo", "normal"} & set(film.layers):
         layers |= {"albedo": np.zeros_like(out), "normal": np.zeros_like(out)}
         hits = [layers[name].reshape(-1, 3) for name in ("albedo", "normal")]
         jobs.append(_Job(first_hits_band, (*setups, *hits), spp))
     if {"depth", "id"} & set(film.layers):
-        centres, cast = _cast_jobs(scene, tables)
+        centres, cast = _aov_jobs(scene, tables)
         jobs += centres
         layers |= {"depth": cast["distance"], "id": cast["id"]}
     return jobs, {name: layers[name] for name in ("colour", *film.layers)}
 
 
 def _check(scene: BuiltScene) -> None:
-    """Refuse a picture that cannot fit, before anything is allocated, or cannot be estimated."""
+    """Raise SceneError for a picture that needs more than the machine's memory, before anything is
+    allocated, and for a variance of one sample."""
     film = scene.film
     casts = isinstance(scene.integrator, RayCast)
     if "variance" in film.layers and scene.resolved_sampler.spp < 2 and not casts:
         raise scene.error(
             "one sample per pixel has no variance; expected at least 2", "film", "layers"
         )
-    # At most 10 channels of float64, 22 with layers, and as much again while files are written.
+    # At most 10 channels of float64, 22 with layers, and the same again while files are written.
     needed = film.width * film.height * (22 if film.layers else 10) * 2 * 8
     try:
         available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError, AttributeError):  # not every system tells
+    except (ValueError, OSError, AttributeError):  # not every system has these
         available = 1 << 36
     if needed > available:
         raise scene.error(
@@ -207,28 +213,29 @@ def _check(scene: BuiltScene) -> None:
 
 
 def run_bands(
-    band: Any, arguments: Sequence[Any], pixels: int, spp: int, threads: int, say: Progress
+    kernel: Any, arguments: Sequence[Any], pixels: int, spp: int, threads: int, say: Progress
 ) -> None:
-    """Bands on a pool.  Kernels release the GIL; the main thread reports and listens to Ctrl-C."""
+    """Run a kernel for all tiles on a thread pool.  Kernels release the GIL; the main thread
+    reports progress and handles Ctrl-C."""
     stop = threading.Event()
 
     def run(begin: int, end: int) -> None:
-        # In plain Python (NUMBA_DISABLE_JIT=1) NumPy would warn of the infinities that IEEE
-        # division and wrapping hashes are meant to make.
+        # In plain Python (NUMBA_DISABLE_JIT=1) NumPy would warn of intended infinities (IEEE
+        # division) and intended overflow (integer hashes).
         with np.errstate(all="ignore"):
-            for first in range(0, spp, SAMPLES_PER_BAND):
+            for first in range(0, spp, SAMPLES_PER_TILE):
                 if stop.is_set():
                     return
-                band(*arguments, begin, end, first, min(first + SAMPLES_PER_BAND, spp))
+                kernel(*arguments, begin, end, first, min(first + SAMPLES_PER_TILE, spp))
 
-    step = max(1, min(pixels, SAMPLES_PER_BAND // spp))
+    step = max(1, min(pixels, SAMPLES_PER_TILE // spp))
     say("render", 0.0)
-    pool = ThreadPoolExecutor(threads, thread_name_prefix="band")
+    pool = ThreadPoolExecutor(threads, thread_name_prefix="tile")
     try:
         waiting = {pool.submit(run, k, min(k + step, pixels)) for k in range(0, pixels, step)}
         total = len(waiting)
         while waiting:
-            # Woken for each of 256 bands, this thread takes 0.1 s to ask what is left (measured).
+            # Polled: waking this thread after each of 256 tiles costs 0.1 s (measured).
             done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_EXCEPTION)
             for future in done:
                 future.result()

@@ -1,7 +1,7 @@
-"""What is computed for a band of pixels: the kernels that `render` hands to threads.
+"""The kernels of a tile: what each thread of `render` runs.
 
-All take samples first..last of the pixels begin..end, counted along rows, and write the rows of
-these pixels.
+A tile is the pixels begin <= k < end, counted along rows.  Each kernel takes samples first to
+last - 1 of these pixels, of spp in all, and writes the pixels' rows of its output arrays.
 """
 
 import math
@@ -43,15 +43,15 @@ from reference_rt.textures import colour_at
 
 
 class FilmRay(NamedTuple):
-    """A ray through a point near a pixel, and the weight of what it brings there."""
+    """A camera ray through a film point, and the filter weight of its radiance in the pixel."""
 
     ray: Ray
     weight: float
 
 
 class GivenRays(NamedTuple):
-    """In place of a camera, with None for the filter: the ray of pixel x of a single row, from
-    origins o (n, 3) into unit directions d (n, 3)."""
+    """Given rays in place of a camera: a film of n pixels in one row, without a filter (None).
+    Pixel x has the ray from o[x] along the unit direction d[x]; o, d (n, 3)."""
 
     o: FloatArray
     d: FloatArray
@@ -94,14 +94,15 @@ def render_band(
     shape: tuple[int, int],
     spp: int,
     out: FloatArray,
-    spread: FloatArray | None,
+    variance: FloatArray | None,
     begin: int,
     end: int,
     first: int,
     last: int,
 ) -> None:
-    """Radiance, added to out (n, 3); with the last of all `spp` samples the sum becomes the mean,
-    and spread (n, 3) the estimate of the mean's variance."""
+    """Radiance: its sum over samples in out (n, 3), which the last of all `spp` samples turns into
+    the mean.  variance (n, 3), if any: M2, the sum of squared deviations, which the last sample
+    turns into the variance of the mean."""
     scratch = Scratch(
         rays=Rays(local_floats(RAY_FLOATS)),
         totals=local_floats(VECTOR_FLOATS),
@@ -139,37 +140,39 @@ def render_band(
             pixel, sample = samplers.pixels[k], samplers.numbers[k]
             one = vector_of(scratch.totals, 0, k) * weights[k]
             total = row(out, pixel) + one
-            _add_spread(spread, pixel, sample, one, total)
+            _add_to_m2(variance, pixel, sample, one, total)
             if sample + 1 == spp:
                 total = total / spp
-                _finish_spread(spread, pixel, spp)
+                _m2_to_variance(variance, pixel, spp)
             out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
 
 
 @kernel
-def _add_spread(spread: FloatArray | None, pixel: int, sample: int, one: Vec3, total: Vec3) -> None:
-    """The sum of squared differences from the mean, with number `sample`; total: the sum with it
-    (Youngs & Cramer 1971: squares of differences, so that nothing cancels)."""
-    if spread is None:
+def _add_to_m2(m2: FloatArray | None, pixel: int, sample: int, one: Vec3, total: Vec3) -> None:
+    """Update M2, the sum of squared deviations from the mean, with sample number `sample`, whose
+    value is `one`; total: the sum including it.  Youngs & Cramer 1971: only squares are added, so
+    that nothing cancels."""
+    if m2 is None:
         return
     if sample > 0:
         count = sample + 1.0
         off = one * count - total
         scale = 1.0 / (count * sample)
-        spread[pixel, 0] += off.x * off.x * scale
-        spread[pixel, 1] += off.y * off.y * scale
-        spread[pixel, 2] += off.z * off.z * scale
+        m2[pixel, 0] += off.x * off.x * scale
+        m2[pixel, 1] += off.y * off.y * scale
+        m2[pixel, 2] += off.z * off.z * scale
 
 
 @kernel
-def _finish_spread(spread: FloatArray | None, pixel: int, spp: int) -> None:
-    if spread is None:
+def _m2_to_variance(m2: FloatArray | None, pixel: int, spp: int) -> None:
+    """Turn M2 into the variance of the mean of spp samples; a single sample has no estimate."""
+    if m2 is None:
         return
-    if spp < 2:  # no estimate
+    if spp < 2:
         return
     scale = 1.0 / (spp * (spp - 1.0))
     for k in range(3):
-        spread[pixel, k] *= scale
+        m2[pixel, k] *= scale
 
 
 @entry_kernel
@@ -187,8 +190,8 @@ def first_hits_band(
     first: int,
     last: int,
 ) -> None:
-    """Albedo and shading normal of what the rays of `render_band` hit first, their means into
-    albedos (n, 3) and normals (n, 3)."""
+    """Mean albedo and shading normal at the first hits of the rays of `render_tile`, into albedos
+    (n, 3) and normals (n, 3)."""
     for pixel in range(begin, end):
         y, x = pixel // shape[0], pixel % shape[0]
         albedo, normal = row(albedos, pixel), row(normals, pixel)
@@ -219,8 +222,8 @@ def cast_band(
     first: int,
     last: int,
 ) -> None:
-    """All layers of ray casting at the pixels' centres, into out (n, 10); `first` and `last` are
-    there for the likeness to `render_band`."""
+    """The AOV pass: all layers of ray casting at the pixels' centres, into out (n, 10): colour,
+    distance, normal, id, u, v.  `first` and `last` are not used; all kernels have them."""
     width, height = shape
     for pixel in range(begin, end):
         y, x = pixel // width, pixel % width

@@ -1,1 +1,12 @@
-"""Scenes: their description, how files are read, and how kernels' tables are built of them."""
+"""Scenes: the description, reading and checking of scene files, and the kernels' tables.
+
+`model` is the description (pydantic) with its checks, YAML and JSON.  `yaml_text` reads YAML 1.2,
+`yaml_lines` finds the line of an error.  `build` makes `SceneTables` from a description, with one
+file each for geometry, hierarchies, lights and materials.  `likely_mistakes` finds valid scenes
+that probably are not what was meant.
+
+Contract: a description is checked when it is made; every error is a SceneError with file, line, key
+path and what was expected.  Tables are C-contiguous float64 or int64 arrays; a feature that the
+scene lacks is None, and its kernel branches are not compiled.  To add a field: in `SceneModel`,
+with its check, and in the `build_...` file whose table it changes.
+"""

@@ -1,8 +1,8 @@
 """Scene -> SceneTables: the only place that makes a scene's arrays.
 
-Every array is float64 or int64, C-contiguous and writable, so that one feature set is one set of
-Numba types and compiles once.  What a scene lacks is None: the kernels' branches for it vanish at
-compile time.
+Every array is float64 or int64, C-contiguous and writable, so that scenes with the same features
+have the same Numba types and share compiled kernels.  A feature that the scene lacks is None, and
+its branches are removed when the kernels are compiled.
 """
 
 from collections.abc import Sequence
@@ -23,24 +23,24 @@ from reference_rt.textures.parameter import join
 
 
 class BuiltScene(SceneModel):
-    """A description together with the tables that are built of it."""
+    """A description, together with the tables that are built from it."""
 
     _tables: SceneTables | None = PrivateAttr(default=None)
 
     @property
     def tables(self) -> SceneTables:
-        """What kernels see, built once.  Raises SceneError for files that cannot be used."""
+        """The kernels' tables, built on first use.  Raises SceneError for unusable files."""
         if self._tables is None:
             self._tables = build_tables(self)
         return self._tables
 
 
 def build_tables(scene: SceneModel) -> SceneTables:
-    """The tables of a scene.  Raises SceneError, with the place in the scene file."""
+    """The tables of a scene.  Raises SceneError with file, line and key path."""
     numbers: dict[str | None, int] = {name: i for i, name in enumerate(scene.materials)}
     numbers[None] = len(numbers)
     textures, palette = _texture_tables(scene)
-    with np.errstate(over="ignore", invalid="ignore"):  # found as what is not finite
+    with np.errstate(over="ignore", invalid="ignore"):  # checked afterwards: not finite
         geometry = assemble(scene, numbers)
         return SceneTables(
             geometry=geometry,
@@ -51,13 +51,13 @@ def build_tables(scene: SceneModel) -> SceneTables:
 
 
 def _has_material(geometry: Geometry, number: int) -> bool:
-    """Whether any primitive is made of a material."""
+    """Whether any primitive has this material."""
     tables = [table for table in geometry.shapes if table is not None]
     return any(bool((table.material == number).any()) for table in tables)
 
 
 def _texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
-    """The textures, and how parameters name them."""
+    """The textures, and the palette by which material parameters refer to them."""
     if not scene.textures:
         return None, Palette({}, ())
     parts: dict[int, list[Any]] = {}

@@ -1,4 +1,4 @@
-"""All shapes of a scene, its groups and solids -> Geometry: the tables and what leads to them."""
+"""Shapes, groups and solids of a scene -> Geometry: tables and acceleration structures."""
 
 import math
 from collections.abc import Sequence
@@ -22,13 +22,13 @@ from reference_rt.shapes.shape import Place, outward
 _CODES = {table: code for code, _, table, _ in TABLES}
 
 MOST_INSTANCES = 1_000_000
-"""Copies that a group may expand to: some 500 bytes each while the scene is built."""
+"""Instances that a group may expand to: each takes some 500 bytes while the scene is built."""
 
 
 def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
-    """The geometry of a scene; `materials` are the rows of its materials.
+    """The geometry of a scene.  materials: the row of each material.
 
-    Raises SceneError, with the place in the scene file.
+    Raises SceneError with file, line and key path.
     """
     work = _Assembly(scene, materials)
     top: list[Reference] = []
@@ -46,7 +46,7 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
     bounds: dict[int, Bounds] = {}
     for code, field, _, module in TABLES:
         tables[field] = None
-        if work.tables[code]:  # taken out: of a large mesh no two copies are kept
+        if work.tables[code]:  # popped, so that a large mesh is never held twice
             table = tables[field] = _concatenate(work.tables.pop(code))
             work.check_finite(table)
             bounds[code] = module.bounds(table)
@@ -67,8 +67,8 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
 
 
 class _Program:
-    """A solid: its first operand and their number, its program, where they are seen from and how
-    far from there they reach; its box (1, 3), (1, 3), in the world."""
+    """A solid: first operand, number of operands, postfix program, stack depth, local origin of its
+    coordinates (anchor), reach from there, and box (1, 3), (1, 3) in the world."""
 
     def __init__(
         self, first: int, steps: list[int], boxes: Sequence[Bounds], anchor: FloatArray
@@ -76,20 +76,21 @@ class _Program:
         self.first, self.count, self.steps, self.anchor = first, len(boxes), steps, anchor
         (lower, upper), self.depth = _solid_bounds(steps, boxes)
         self.bounds = outward(lower + anchor, upper + anchor)
-        # Of a corner; twice, so that no rounding of it counts.
+        # The distance of a corner, doubled to cover its rounding.
         self.reach = 2.0 * math.sqrt(3.0) * float(np.abs(boxes).max())
 
 
 class _Assembly:
-    """Collects the primitives of a scene, its groups and its solids."""
+    """Collects the primitives of a scene's shapes, groups and solids."""
 
     def __init__(self, scene: SceneModel, materials: dict[str | None, int]) -> None:
         self.scene, self.materials = scene, materials
         self.tables: dict[int, list[Any]] = {code: [] for code, _, _, _ in TABLES}
         self.rows = dict.fromkeys(self.tables, 0)
-        # What each hierarchy but the scene's own is over, and whether it must not cut primitives.
+        # The primitives of each hierarchy except the scene's own, and whether spatial splits are
+        # forbidden in it.
         self.trees: list[tuple[list[Reference], bool]] = []
-        # Where in the scene file owners are that are not shapes of the scene.
+        # Key paths of owners that are not top-level shapes of the scene.
         self.paths: dict[int, tuple[str | int, ...]] = {}
         # (shape, part, solid, turned) by owner number: the scene's shapes first.
         self.parts = [(i, 0, -1, 0) for i in range(len(scene.shapes))]
@@ -99,7 +100,7 @@ class _Assembly:
         self.expansions: dict[str, tuple[IntArray, FloatArray]] = {}
 
     def add(self, shape: Shape, place: Place) -> Reference:
-        """A primitive shape's rows, put into their table."""
+        """Add a primitive shape's rows to their table."""
         table = shape.tabulate(place)
         code = _CODES[type(table)]
         first = self.rows[code]
@@ -108,7 +109,7 @@ class _Assembly:
         return Reference(code, np.arange(first, self.rows[code]))
 
     def check_finite(self, table: Any) -> None:
-        """Raises SceneError for a shape whose numbers overflowed."""
+        """Raise SceneError for a shape whose numbers have overflowed."""
         for column in table:
             if column is not None and not np.all(np.isfinite(column)):
                 finite = np.isfinite(column.reshape(len(column), -1)).all(axis=1)
@@ -119,7 +120,7 @@ class _Assembly:
                 )
 
     def member(self, shape: Shape, owner: int, material: str | None) -> Reference:
-        """Any shape of the scene, or of a group, but an instance."""
+        """Add a shape of the scene or of a group that is not an instance."""
         name = shape.material if shape.material is not None else material
         if isinstance(shape, Solid):
             return Reference(SOLID, np.array([self.solid(shape, owner, name)]))
@@ -128,7 +129,7 @@ class _Assembly:
     def part(
         self, shape: int, number: int, material: str | None, solid: int = -1, turned: bool = False
     ) -> Place:
-        """The place of a part of a shape, with an owner number of its own."""
+        """The tabulation context of a part of a shape, with a new owner number."""
         self.parts.append((shape, number, solid, int(turned)))
         return self.place(len(self.parts) - 1, material)
 
@@ -136,7 +137,7 @@ class _Assembly:
         return Place(owner, self.materials[material], self.scene.folder, warn=self.warn)
 
     def path_of(self, owner: int) -> tuple[str | int, ...]:
-        """Where in the scene file an owner is."""
+        """The key path of an owner in the scene file."""
         return self.paths.get(owner, ("shapes", owner))
 
     def warn(self, owner: int, message: str) -> None:
@@ -145,8 +146,8 @@ class _Assembly:
     # ---- solids ---------------------------------------------------------------------------------
 
     def solid(self, shape: Solid, owner: int, material: str | None) -> int:
-        """The number of a solid, whose operands become primitives that no hierarchy of shapes
-        leads to."""
+        """Add a solid, and return its number.  Its operands become primitives that are in no
+        hierarchy of shapes."""
         first, boxes = len(self.operands), []
         operands = csg.operands_of(shape, identity(), material)
         anchor, seen = csg.anchored(shape)
@@ -162,7 +163,7 @@ class _Assembly:
         return len(self.solids) - 1
 
     def operand(self, shape: Shape, place: Place) -> Bounds:
-        """Adds an operand; its box (3,), (3,)."""
+        """Add an operand, and return its box (3,), (3,)."""
         reference = self.add(shape, place)
         code = reference.kind
         table, module = self.tables[code][-1], TABLES[code][3]
@@ -170,7 +171,7 @@ class _Assembly:
             problem = describe_boundary(table.vertices)
             if problem:
                 raise ValueError(problem)
-            # A walk through it counts triangles, each once.
+            # Crossings are counted, so that each triangle must be referenced once.
             self.trees.append(([reference], True))
             self.operands.append((code, -1, len(self.trees) - 1))
         elif hasattr(module, "spans") and getattr(module, "is_solid", lambda _: True)(table):
@@ -181,7 +182,7 @@ class _Assembly:
         return lower.min(axis=0), upper.max(axis=0)
 
     def box_of(self, reference: Reference) -> Bounds:
-        """The boxes of what was added last."""
+        """The boxes of the shape that was added last."""
         if reference.kind == SOLID:
             return self.solids[-1].bounds
         bounds: Bounds = TABLES[reference.kind][3].bounds(self.tables[reference.kind][-1])
@@ -214,7 +215,7 @@ class _Assembly:
     # ---- groups ---------------------------------------------------------------------------------
 
     def expand(self, name: str, path: Sequence[str] = ()) -> tuple[IntArray, FloatArray]:
-        """Trees (k,) and maps (k, 3, 4) of all that an instance of a group stands for."""
+        """Hierarchies (k,) and transforms (k, 3, 4) of a group's instance, nested ones included."""
         if name in path:
             raise ValueError(
                 f"the group contains itself: {' -> '.join([*path, name])}; expected no circle"
@@ -257,12 +258,12 @@ def _type_of(shape: Shape) -> str:
 
 def _map_of(instance: Instance) -> Affine:
     outer = affine(instance.transform)
-    invert(outer)  # refuses singular maps
+    invert(outer)  # raises for singular maps
     return outer
 
 
 def _composed(maps: FloatArray, outer: Affine) -> FloatArray:
-    """Each of the maps (k, 3, 4), followed by `outer`."""
+    """The composition of each map (k, 3, 4), followed by `outer`."""
     result = np.empty_like(maps)
     result[:, :, :3] = outer[:, :3] @ maps[:, :, :3]
     result[:, :, 3] = maps[:, :, 3] @ outer[:, :3].T + outer[:, 3]
@@ -275,7 +276,7 @@ def _concatenated_bounds(parts: Sequence[Bounds]) -> Bounds:
 
 
 def _concatenate(parts: Sequence[Any]) -> Any:
-    """One table from several: the rows one after another."""
+    """Concatenate tables."""
     table = type(parts[0])
     align = getattr(TABLES[_CODES[table]][3], "align", None)
     if align is not None:
@@ -288,14 +289,14 @@ def _concatenate(parts: Sequence[Any]) -> Any:
 
 
 def _joined(arrays: Sequence[Any]) -> Any:
-    """The arrays one after another; of a single one no copy."""
+    """Concatenate arrays; a single one is not copied."""
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def _solid_bounds(steps: Sequence[int], boxes: Sequence[Bounds]) -> tuple[Bounds, int]:
-    """A box (1, 3), (1, 3) that a solid lies in, infinite where it does, and its program's depth.
+    """A bounding box (1, 3), (1, 3) of a solid, possibly infinite, and its program's stack depth.
 
-    The complement of anything may be everywhere; an intersection lies in both boxes.
+    A complement is unbounded; an intersection lies in both boxes, a union in the box around both.
     """
     stack: list[Bounds] = []
     depth = 0
@@ -310,5 +311,5 @@ def _solid_bounds(steps: Sequence[int], boxes: Sequence[Bounds]) -> tuple[Bounds
             stack.append((low(a[0], b[0]), high(a[1], b[1])))
         depth = max(depth, len(stack))
     lower, upper = stack.pop()
-    # Boxes that do not meet: the solid is empty, and any point will do.
+    # If the boxes are disjoint, the solid is empty, and any box will do.
     return (np.minimum(lower, upper)[None], np.maximum(lower, upper)[None]), depth

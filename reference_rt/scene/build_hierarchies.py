@@ -1,4 +1,4 @@
-"""Hierarchies over what a scene's rays are led to, and the tables in the order of their leaves."""
+"""Acceleration structures over a scene's shapes and instances; tables sorted into leaf order."""
 
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
@@ -14,21 +14,22 @@ from reference_rt.shapes.instances import Instances
 from reference_rt.shapes.placement import bounds as placed_bounds
 
 BVH_FROM = 40
-"""Primitives from which a hierarchy pays: random rays among random shapes were as fast either way
-at 45 spheres, 80 boxes and 90 rectangles tested side by side, and at 4 triangles, which are tested
-one by one and so count for ONE_BY_ONE each (a core with AVX-512)."""
+"""Number of primitives from which a hierarchy pays.  Random rays among random shapes took the same
+time with and without one at 45 spheres, 80 boxes and 90 rectangles, which brute force tests with
+vector instructions, and at 4 triangles, which it tests one by one and which therefore count as
+ONE_BY_ONE each (a core with AVX-512)."""
 ONE_BY_ONE = 10
 
 
 class Reference(NamedTuple):
-    """Primitives or solids of one kind, by their rows (n,)."""
+    """Primitives or solids of one kind: their rows (n,)."""
 
     kind: int
     rows: IntArray
 
 
 class Copies(NamedTuple):
-    """What an instance stands for: its index in the scene, trees (k,) and maps (k, 3, 4)."""
+    """An expanded instance: its index in the scene, hierarchies (k,) and transforms (k, 3, 4)."""
 
     owner: int
     trees: IntArray
@@ -36,9 +37,9 @@ class Copies(NamedTuple):
 
 
 class Trees:
-    """Collects hierarchies into the arrays of one `Bvh`.
+    """Builds the hierarchies of a scene and joins them into the arrays of one `Bvh`.
 
-    method: see `bvh.build`, or "auto";  tables: by field of `Shapes`;  bounds: boxes of each kind.
+    method: of `bvh.build`, or "auto";  tables: by field of `Shapes`;  bounds: boxes of each kind.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class Trees:
         self._scene: int | None = None
 
     def add(self, references: Sequence[Reference], whole: bool = False) -> int:
-        """A hierarchy over these; its number.  With `whole` each is referenced once only."""
+        """Build a hierarchy over these, and return its number.  whole: reference each only once."""
         kinds, rows = _joined(references)
         lower, upper = self._bounds_of(kinds, rows)
         method: bvh.Method = "sah" if self.method == "auto" else self.method
@@ -70,8 +71,8 @@ class Trees:
     def finish(
         self, top: Sequence[Reference], copies: Sequence[Copies], roots: Sequence[int]
     ) -> None:
-        """The scene's own hierarchy, over shapes and instances; `roots` are the numbers of the
-        trees that `copies` name.  Puts the tables' rows into leaf order."""
+        """Build the scene's top-level hierarchy over shapes and instances, and sort the tables into
+        leaf order.  roots: the numbers of the hierarchies that `copies` refer to."""
         if copies:
             self._instances = self._place(copies, roots)
             count = len(self._instances.owner)
@@ -80,7 +81,7 @@ class Trees:
         if len(kinds) > 0 and not (self.method == "auto" and self._is_few(kinds)):
             lower, upper = self._bounds_of(kinds, rows)
             finite = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
-            del lower, upper  # `add` asks again: of a million triangles two copies count
+            del lower, upper  # `add` computes them again: two copies would double the memory
             kinds_of = kinds[finite], kinds[~finite]
             rows_of = rows[finite], rows[~finite]
             if finite.any():
@@ -99,7 +100,7 @@ class Trees:
         self._order_rows()
 
     def hierarchy(self) -> Bvh | None:
-        """All hierarchies, the scene's first; None where a few shapes are better tested in turn."""
+        """All hierarchies, the scene's first; None if brute force is faster for few shapes."""
         if self._scene is None:
             return None
         order = [self._scene, *(k for k in range(len(self._wide)) if k != self._scene)]
@@ -113,14 +114,14 @@ class Trees:
         return joined._replace(unbounded=-1 if self._unbounded < 0 else self.start(self._unbounded))
 
     def start(self, tree: int) -> int:
-        """The first node of a tree among all nodes."""
+        """The index of a hierarchy's root among all nodes."""
         if tree == self._scene:
             return 0
         before = sum(len(self._wide[k].codes) for k in range(tree) if k != self._scene)
         return before + (0 if self._scene is None else len(self._wide[self._scene].codes))
 
     def packets(self) -> Packets:
-        """The tables side by side, where nothing else leads to their rows."""
+        """The tables packed for vector instructions, if there is no hierarchy (brute force)."""
         modules = {field: module for _, field, _, module in TABLES}
         few = self._scene is None
         return Packets(
@@ -139,7 +140,7 @@ class Trees:
         return self._instances._replace(root=starts[self._instances.root])
 
     def new_row(self, kind: int, row: int) -> int:
-        """Where a row of a table has gone."""
+        """The new index of a row of a table after sorting."""
         return int(self._new_rows[kind][row])
 
     # ---- how ------------------------------------------------------------------------------------
@@ -170,7 +171,7 @@ class Trees:
         return lower, upper
 
     def _corners(self, kinds: IntArray, rows: IntArray) -> FloatArray | None:
-        """The vertices (n, 9) of triangles, which spatial splits clip; NaN for other kinds."""
+        """The vertices (n, 9) of triangles for clipping by spatial splits; NaN for other kinds."""
         if self.method != "spatial":
             return None
         corners = np.full((len(kinds), 9), np.nan)
@@ -180,7 +181,7 @@ class Trees:
         return corners
 
     def _place(self, copies: Sequence[Copies], roots: Sequence[int]) -> Instances:
-        """The table of instances, whose `root` is the number of the tree; and their bounds."""
+        """The table of instances, with the hierarchy's number as `root`.  Computes their bounds."""
         maps = np.concatenate([c.maps for c in copies])
         trees = np.array(roots)[np.concatenate([c.trees for c in copies])]
         counts = [len(c.trees) for c in copies]
@@ -199,7 +200,7 @@ class Trees:
         return table
 
     def _order_rows(self) -> None:
-        """Tables in the order in which leaves name their rows: neighbours lie side by side in
+        """Sort the tables into the order of the leaves, so that neighbours are adjacent in
         memory."""
         kinds = np.concatenate([np.zeros(0, np.int64), *self._kinds])
         rows = np.concatenate([np.zeros(0, np.int64), *self._rows])
@@ -224,15 +225,15 @@ class Trees:
 
 
 def _distinct(kinds: IntArray) -> list[int]:
-    """The codes among kinds (n,), which are small numbers: np.unique takes 0.2 s for a million."""
+    """The distinct codes in kinds (n,), small numbers; np.unique takes 0.2 s for a million."""
     return np.flatnonzero(np.bincount(kinds)).tolist()
 
 
 def _first_named(rows: IntArray, count: int) -> IntArray:
-    """All of 0 to count - 1 once: those of rows (m,) in the order of their first mention, then the
-    rest."""
+    """A permutation of range(count): first those in rows (m,), in the order of their first
+    occurrence, then the rest."""
     first = np.full(count, len(rows))
-    # Backwards, so that of several mentions the first is what stays.
+    # Backwards, so that the first of several occurrences wins.
     first[rows[::-1]] = np.arange(len(rows))[::-1]
     return np.argsort(first, kind="stable")
 

@@ -1,4 +1,4 @@
-"""The lights of a scene as tables."""
+"""The lights of a scene -> Lights: emitter tables and the light sampler."""
 
 from typing import Any
 
@@ -33,18 +33,19 @@ from reference_rt.textures.parameter import join
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 SKY_SHARE = 0.125
-"""How often a constant environment is picked at most, beside other lights that have power.
+"""The highest selection probability of a constant environment beside other lights with power.
 
-Scattered rays find it as well as its own samples do, so that these are better spent on what is hard
-to find; its power, which is reckoned over the whole scene, would take most of them.  Measured in 14
-scenes with a lamp or a sun: the variance falls to 0.29 to 1.0 of what it was, at the median to
-0.64.  A quarter and a sixteenth do about as well; powers of 1/2 fit the strata of the samples.
+BSDF sampling hits a constant environment as well as light sampling does, so that light samples are
+better spent on lights that BSDF sampling rarely hits.  By its power, which is that on the whole
+scene, it would get most of them.  Measured in 14 scenes with a lamp or a sun: the variance falls to
+0.29 to 1.0 of its value, at the median to 0.64.  A quarter and a sixteenth do about as well; powers
+of 1/2 fit the strata of the samples.
 """
 
 
 def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lights:
-    """All lights, each as likely to be picked as its share of the power; writes the primitives'
-    `light` columns.  Raises SceneError."""
+    """All lights, selected in proportion to their power.  Writes the primitives' `light` columns.
+    Raises SceneError."""
     radius = scene_radius(geometry)
     areas, powers = _area_lights(scene, geometry, palette)
     kinds, rows, weights = [AREA] * len(powers), [*range(len(powers))], [powers]
@@ -62,7 +63,7 @@ def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lig
         kinds.append(ENVIRONMENT)
         rows.append(0)
         weights.append(module.power(environment, radius))
-    # What overflows counts as much as a number can; 0 times infinity is dark.
+    # Overflow is clamped to the largest number; 0 times infinity counts as 0.
     power = np.nan_to_num(np.concatenate(weights), nan=0.0, posinf=np.finfo(np.float64).max)
     choice = _choice(np.array(kinds), np.array(rows), power)
     if choice is not None and isinstance(environment, constant.Environment):
@@ -80,7 +81,7 @@ def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lig
 
 
 def scene_radius(geometry: Geometry) -> float:
-    """About the radius of all that is finite: what distant lights' power is reckoned by."""
+    """Approximate radius of all finite shapes, for the power of distant lights."""
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     for _, field, _, module in SHAPE_TABLES:
         table = getattr(geometry.shapes, field)
@@ -94,8 +95,8 @@ def scene_radius(geometry: Geometry) -> float:
 
 
 def _choice(kind: Any, row: Any, weight: FloatArray) -> Choice | None:
-    """None where no light has power that could be picked."""
-    # Extremes apart, whose sum or quotient would overflow or vanish.
+    """The light sampler by power; None if no light that can be sampled has power."""
+    # Scaled by the largest, so that extreme values neither overflow nor vanish in the sum.
     largest = weight.max(initial=0.0)
     if largest == 0.0:
         return None
@@ -110,8 +111,8 @@ def _choice_by(kind: Any, row: Any, probability: FloatArray) -> Choice:
 
 
 def _mostly_others(choice: Choice) -> Choice:
-    """With a constant environment, the last of the choice, picked at most SKY_SHARE of the time,
-    where there are others with power."""
+    """The light sampler with the constant environment, its last light, capped at SKY_SHARE if other
+    lights have power."""
     others = choice.probability[:-1]
     power = others.sum()
     if choice.probability[-1] <= SKY_SHARE or power == 0.0:
@@ -121,7 +122,7 @@ def _mostly_others(choice: Choice) -> Choice:
 
 
 def _tree(lights: Lights, geometry: Geometry, power: FloatArray) -> LightTree | None:
-    """Over the lights that have a place and power, where these are more than FEW."""
+    """The light tree over lights with a position and power, if there are more than FEW."""
     if lights.choice is None:
         return None
     kind = lights.choice.kind
@@ -161,9 +162,9 @@ def _ambient(scene: SceneModel) -> FloatArray | None:
 def _area_lights(
     scene: SceneModel, geometry: Geometry, palette: Palette
 ) -> tuple[Areas | None, FloatArray]:
-    """The emissive primitives and the luminance of their power, pi times area times radiance, of a
-    texture its greatest; 0 for those that only scattered rays find: of types that cannot be
-    sampled, and parts of groups and of solids."""
+    """The emissive primitives, and the luminance of their power: pi times area times radiance (for
+    a texture its maximum).  It is 0 for primitives that only BSDF-sampled rays hit: those of types
+    that cannot be sampled, and parts of groups and of solids."""
     materials = [*scene.materials.values(), None]
     emissive = [k for k, m in enumerate(materials) if isinstance(m, Emissive)]
     if not emissive:
@@ -200,7 +201,7 @@ def _area_lights(
 def _radiances(
     scene: SceneModel, emissive: list[int], palette: Palette
 ) -> tuple[Colours, FloatArray]:
-    """The radiance of each emissive material, and its greatest luminance."""
+    """The radiance of each emissive material, and its maximum luminance."""
     materials = list(scene.materials.values())
     columns, brightness = [], []
     for k in emissive:

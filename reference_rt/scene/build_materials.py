@@ -1,4 +1,4 @@
-"""The materials of a scene as tables."""
+"""The materials of a scene -> Materials: BSDF tables, and flattened nested materials."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,14 +20,14 @@ from reference_rt.textures import Palette
 from reference_rt.textures.parameter import join
 
 DEFAULT = "\0"
-"""The name, which no scene can use, of what shapes without a material are made of."""
+"""The name of the default material, of shapes without one; no scene can use this name."""
 
 
 def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Materials:
-    """The materials of a scene in its order, then the default one, if that is used (`default`) or
-    there is no other.
+    """The materials of a scene in its order; then the default material, if it is used (`default`)
+    or there is no other.
 
-    An emissive material scatters as its base does.  Raises SceneError.
+    An emissive material has the BSDF of its base.  Raises SceneError.
     """
     materials: dict[str, Material] = {**scene.materials}
     if default or not materials:
@@ -73,8 +73,8 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
 
 
 def _check_energy(found: list[Way], materials: Mapping[str, Material], palette: Palette) -> None:
-    """Raises ValueError for the text-book's local shading where it is no law that paths can follow:
-    it may return more light than arrives."""
+    """Raise ValueError for a Phong material that reflects more light than arrives, which path
+    tracing cannot render."""
     for way in found:
         leaf = materials[way.leaf] if way.leaf is not None else None
         if isinstance(leaf, Phong) and leaf.energy_bound(palette) > 1.0:
@@ -85,13 +85,13 @@ def _check_energy(found: list[Way], materials: Mapping[str, Material], palette: 
 
 
 def _scattering(name: str, materials: Mapping[str, Material]) -> str | None:
-    """The name of the material that scatters: of an emissive one its base, if it has any."""
+    """The name of the material with the BSDF: an emissive one's base, or None without a base."""
     material = materials[name]
     return material.base if isinstance(material, Emissive) else name
 
 
 def _shown(name: str, materials: Mapping[str, Material]) -> tuple[float, float, float] | str:
-    """The colour of a material, of a wrapper that of the first that it wraps."""
+    """The colour of a material; of a nested one, that of its first base."""
     material = materials[name]
     while isinstance(material, Wrapper):
         material = materials[getattr(material, material.bases[0])]
@@ -109,7 +109,7 @@ def _traits(found: list[Way], materials: Mapping[str, Material]) -> tuple[bool, 
 
 
 class _Leaves:
-    """Collects the rows of leaves, each once."""
+    """Collects the table rows of leaf BSDFs, each once."""
 
     def __init__(self, materials: Mapping[str, Material], palette: Palette) -> None:
         self.materials, self.palette = materials, palette

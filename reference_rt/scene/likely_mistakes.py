@@ -1,5 +1,5 @@
-"""Scenes that are valid, but probably not what their author meant: what `render` and `explain` warn
-of."""
+"""Valid scenes that are probably not what their author meant: the warnings of `render` and
+`explain`."""
 
 import math
 from collections.abc import Iterator
@@ -17,24 +17,24 @@ from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import Solid
 
 _SMALLEST_FOV = 0.1
-"""Radians, 5.7 degrees: as an angle of view nearly no scene has less."""
+"""Radians, 5.7 degrees: hardly any scene has a smaller field of view."""
 
 _ROUND = math.pi / 12.0
-"""15 degrees: angles that people write in radians are multiples of it."""
+"""15 degrees: round angles in radians are multiples of it."""
 
 _DIGITS = 6e-4
-"""How far, relatively, the radians of such an angle are off if written with two decimals: 1.57."""
+"""Relative error of such an angle in radians with two decimals, such as 1.57."""
 
 
 class Mistake(NamedTuple):
-    """What is probably wrong, and the keys of the scene where."""
+    """A warning, and the key path of the scene that it is about."""
 
     message: str
     path: tuple[str | int, ...]
 
 
 def likely_mistakes(scene: SceneModel, tables: SceneTables) -> list[Mistake]:
-    """What in a scene that is about to be rendered looks like a slip, in the order of its keys."""
+    """Probable mistakes in a scene that is about to be rendered, in the order of its keys."""
     return [*_camera(scene), *_shapes(scene, tables), *_angles(scene), *_darkness(scene, tables)]
 
 
@@ -88,7 +88,7 @@ def _is_round_in_radians(angle: float) -> bool:
 
 
 def _rotations(scene: SceneModel) -> Iterator[tuple[float, tuple[str | int, ...]]]:
-    """Each rotation of the scene: degrees, and where."""
+    """Each rotation of the scene: degrees, and key path."""
     for i, shape in enumerate(scene.shapes):
         yield from _rotations_of(shape, ("shapes", i))
     for name, shapes in scene.groups.items():
@@ -117,10 +117,10 @@ def _steps(
 
 
 def _darkness(scene: SceneModel, tables: SceneTables) -> Iterator[Mistake]:
-    """Nothing that shines: no light to sample, and none that scattered rays could find."""
+    """A scene without emission: no light to sample, and none that BSDF-sampled rays could hit."""
     lights, integrator = tables.lights, scene.integrator
     if isinstance(integrator, RayCast) or scene.film.layers or lights.choice is not None:
-        return  # layers show surfaces in the dark, too
+        return  # layers are of use without light, too
     if lights.areas is not None and np.any(lights.areas.area == np.inf):
         return
     if lights.ambient is not None and isinstance(integrator, Whitted):

@@ -1,8 +1,9 @@
-"""`SceneModel`: the description of a scene: its fields, its checks, YAML and JSON in and out."""
+"""`SceneModel`, the description of a scene: fields, checks, reading and writing YAML and JSON."""
 
 import hashlib
 import json
 import warnings
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -30,8 +31,14 @@ from reference_rt.util.errors import SceneError, SceneWarning, printable
 from reference_rt.util.files import read_text
 
 MOST_NESTED = 100
-"""Set operations in each other: pydantic writes 255 levels of lists and keys at most, of which each
-takes two."""
+"""Nesting depth of set operations: pydantic serialises at most 255 levels of lists and keys, of
+which each operation takes two."""
+
+
+def no_such(kind: str, name: str, known: Iterable[str]) -> str:
+    """The message for a name that the scene does not define."""
+    listed = ", ".join(f"'{k}'" for k in known) or "none"
+    return f"there is no {kind} '{name}'; expected one of: {listed}"
 
 
 class SceneModel(Description):
@@ -89,14 +96,11 @@ class SceneModel(Description):
         return self
 
     def _check_parts(self, name: str, material: Material) -> None:
-        """Whether the textures and materials that a material names are there and fit."""
+        """Check that the textures and materials that a material names exist and fit."""
         for field, texture in texture_names(material).items():
             if texture not in self.textures:
-                known = ", ".join(f"'{t}'" for t in self.textures) or "none"
-                raise SceneError(
-                    f"there is no texture '{texture}'; expected one of: {known}",
-                    ("materials", name, field),
-                )
+                message = no_such("texture", texture, self.textures)
+                raise SceneError(message, ("materials", name, field))
         bases: tuple[str, ...] = ()
         if isinstance(material, Emissive):
             bases = ("base",)
@@ -124,10 +128,8 @@ class SceneModel(Description):
                 self._check_shape(operand, *path, "of", k)
         if isinstance(shape, Instance):
             if shape.group not in self.groups:
-                known = ", ".join(f"'{g}'" for g in self.groups) or "none"
-                raise SceneError(
-                    f"there is no group '{shape.group}'; expected one of: {known}", (*path, "group")
-                )
+                message = no_such("group", shape.group, self.groups)
+                raise SceneError(message, (*path, "group"))
             if shape.material is not None:
                 raise SceneError(
                     "an instance has the materials of its group; expected none here",
@@ -136,30 +138,29 @@ class SceneModel(Description):
 
     def _check_material(self, name: str | None, *path: str | int) -> None:
         if name is not None and name not in self.materials:
-            known = ", ".join(f"'{m}'" for m in self.materials) or "none"
-            raise SceneError(f"there is no material '{name}'; expected one of: {known}", path)
+            raise SceneError(no_such("material", name, self.materials), path)
 
     def __eq__(self, other: object) -> bool:
-        """Equal descriptions; where they were read from does not count."""
+        """Equality of descriptions; file names do not count."""
         return isinstance(other, SceneModel) and self._key() == other._key()
 
     def __hash__(self) -> int:
         return hash(self._key())
 
     def _key(self) -> str:
-        """As `to_json`, with a digest in place of each array."""
+        """The JSON of `to_json`, with a digest in place of each array."""
         return self.model_dump_json(exclude_none=True, indent=1, context=AS_DIGEST)
 
     # ---- where it comes from --------------------------------------------------------------------
 
     @property
     def folder(self) -> Path:
-        """What file names in the scene are relative to."""
+        """The folder that file names in the scene are relative to."""
         return self._folder
 
     @property
     def name(self) -> str:
-        """The scene file's name without its suffix; escapes in place of what does not print."""
+        """The scene file's name without its suffix; unprintable characters are escaped."""
         return printable(Path(self._source[0]).stem) if self._source else "scene"
 
     @property
@@ -168,16 +169,16 @@ class SceneModel(Description):
         return self._source is not None
 
     def error(self, message: str, *path: str | int) -> SceneError:
-        """An error about the part at `path`, with file and line where the scene has them."""
+        """An error about the part at the key path, with file and line if the scene was read."""
         if self._source is None:
             return SceneError(message, path)
         name, text = self._source
         return SceneError(message, path, name, line_of(text, path))
 
     def warn(self, message: str, *path: str | int) -> None:
-        """Issue a `SceneWarning` about the part at `path`, with file and line as in `error`.
+        """Issue a `SceneWarning` about the part at the key path, with file and line as in `error`.
 
-        Once: a second table of the scene, or one of a `changed` scene, has nothing new to say.
+        Each warning is issued once, also if tables are built again or for a `changed` scene.
         """
         text = str(self.error(message, *path))
         if text not in self._warned:
@@ -186,20 +187,20 @@ class SceneModel(Description):
 
     @property
     def resolved_sampler(self) -> AnySampler:
-        """The sampler, or what stands in for none."""
+        """The sampler, or the default one for the integrator."""
         if self.sampler is not None:
             return self.sampler
         return Grid() if self.integrator.deterministic else Sobol()
 
     def digest(self) -> str:
-        """SHA-256 of the description: what pictures name as their source."""
+        """SHA-256 of the description, which pictures record as their source."""
         return hashlib.sha256(self._key().encode()).hexdigest()
 
     # ---- in -------------------------------------------------------------------------------------
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a .yaml, .yml or .json file.  Raises SceneError (file, line, keys, what and why)."""
+        """Read a .yaml, .yml or .json file.  Raises SceneError (file, line, key path, reason)."""
         path = Path(path)
         if path.suffix.lower() not in (".yaml", ".yml", ".json"):
             raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))
@@ -215,7 +216,7 @@ class SceneModel(Description):
 
     @classmethod
     def parse(cls, text: str, name: str = "<scene>", folder: Path | None = None) -> Self:
-        """A scene from YAML or JSON text; `name` stands in errors, `folder` holds its files."""
+        """A scene from YAML or JSON text.  name: for errors;  folder: of the files it refers to."""
         try:
             data = _load_data(text)
         except yaml_text.MalformedError as error:
@@ -234,7 +235,7 @@ class SceneModel(Description):
         return scene
 
     def changed(self, **parts: Any) -> Self:
-        """The same scene with other parts (film=..., sampler=...), checked again."""
+        """A copy of the scene with other parts (film=..., sampler=...), checked again."""
         fields = {name: getattr(self, name) for name in self.model_fields_set} | parts
         scene = type(self)(**fields)
         scene._folder, scene._source = self._folder, self._source
@@ -244,19 +245,19 @@ class SceneModel(Description):
     # ---- out ------------------------------------------------------------------------------------
 
     def to_json(self) -> str:
-        """The scene as JSON text, which `parse` takes."""
+        """The scene as JSON text, which `parse` reads."""
         return self.model_dump_json(exclude_defaults=False, exclude_none=True, indent=1)
 
     def to_yaml(self) -> str:
-        """The scene as YAML text, which `parse` takes."""
+        """The scene as YAML text, which `parse` reads."""
         return yaml_text.dump(json.loads(self.to_json()))
 
 
 def _load_data(text: str) -> Any:
-    """Data from JSON or YAML 1.2.  Data only: no tags make objects."""
+    """Data from JSON or YAML 1.2.  Data only: tags create no objects."""
     if text.lstrip().startswith("{"):
-        # What is wrong, and in which line, YAML's reader says for both. It lacks some of JSON:
-        # pairs of surrogates, and control characters.
+        # Errors in either are reported by the YAML reader, with their line.  It cannot read all of
+        # JSON: it lacks surrogate pairs and control characters.
         with suppress(ValueError):
             return json.loads(text, object_pairs_hook=_distinct)
     return yaml_text.load(text)

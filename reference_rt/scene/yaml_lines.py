@@ -1,6 +1,6 @@
-"""Where in a YAML text a part of its data is: read only when an error is to be told.
+"""The line of a part of YAML data, found by reading the text again when an error is reported.
 
-Keeping the lines of all parts would make every text slower to read.
+Recording the lines of all parts would make every text slower to read.
 """
 
 from typing import Any
@@ -12,7 +12,7 @@ from reference_rt.scene.yaml_text import Events, MalformedError, Parser
 
 
 def line_of(text: str, keys: tuple[str | int, ...]) -> int | None:
-    """The line, from 1, of the part at `keys`, or of the closest part around it; None where the
+    """The line, from 1, of the part at the key path, or of the closest part around it; None if the
     text is not YAML."""
     try:
         walk = _Walk(text)
@@ -34,12 +34,12 @@ def line_of(text: str, keys: tuple[str | int, ...]) -> int | None:
 
 
 class _Walk(Events):
-    """A way through the events to one part of the text."""
+    """Walks the parser's events to one part of the text."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self.count = 0
-        self.anchors: dict[str, int] = {}  # the number of the event that each names
+        self.anchors: dict[str, int] = {}  # event number of each anchor
 
     def following(self) -> Any:
         event = super().following()
@@ -50,7 +50,7 @@ class _Walk(Events):
         return event
 
     def target(self, event: Any) -> Any:
-        """The event that an alias stands for: the text is read again up to there."""
+        """The event that an alias refers to: the text is read again up to there."""
         if not isinstance(event, AliasEvent) or event.anchor not in self.anchors:
             return event
         wanted = self.anchors[event.anchor]
@@ -60,7 +60,7 @@ class _Walk(Events):
         return self.following()
 
     def enter_key(self, wanted: str) -> tuple[int, Any] | None:
-        """The line of a key of the mapping that has begun, and the first event of its value."""
+        """The line of a key in the current mapping, and the first event of its value."""
         while self.is_start(key := self.following()):
             if isinstance(key, ScalarEvent) and key.value == wanted:
                 return key.start_mark.line + 1, self.following()
@@ -69,7 +69,7 @@ class _Walk(Events):
         return None
 
     def enter_item(self, wanted: int) -> tuple[int, Any] | None:
-        """The same of an item of the list that has begun."""
+        """The line of an item in the current list, and its first event."""
         while self.is_start(item := self.following()):
             if wanted == 0:
                 return item.start_mark.line + 1, item
@@ -82,7 +82,7 @@ class _Walk(Events):
         return isinstance(event, yaml.NodeEvent)
 
     def skip(self, event: Any) -> None:
-        """Go to the end of the value that begins with `event`."""
+        """Skip to the end of the value that begins with `event`."""
         depth = 0
         while True:
             if isinstance(event, yaml.CollectionStartEvent):

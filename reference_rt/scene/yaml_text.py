@@ -1,9 +1,9 @@
 """YAML 1.2 text to plain data, and back.
 
-libyaml, through PyYAML, finds the parts of the text.  What a part means is decided here, by the
-core schema of YAML 1.2 (chapter 10.3): PyYAML itself follows YAML 1.1, where `1e5` is text, `no`
-is false, `010` is eight and `1:30` is ninety.  Beyond the core schema, numbers may have underscores
-or be binary (0b101), and `<<` merges mappings, as in YAML 1.1.
+libyaml, through PyYAML, parses the text into events.  This module converts scalars by the core
+schema of YAML 1.2 (chapter 10.3), because PyYAML itself follows YAML 1.1, where `1e5` is text, `no`
+is false, `010` is eight and `1:30` is ninety.  As in YAML 1.1, and beyond the core schema, numbers
+may have underscores or be binary (0b101), and `<<` merges mappings.
 """
 
 import math
@@ -24,12 +24,12 @@ from yaml.events import (
 )
 
 MOST_REPEATED = 1 << 22
-"""Values that aliases may stand for, in all.  A few lines of aliases of aliases can stand for any
-number of values.  This many is 100,000 shapes of 40 values each, every one an alias, and takes
-about 0.4 GB once it is checked.  Values that are written out are bounded by the file's size."""
+"""Most values that aliases may expand to, in all: a few lines of aliases of aliases can expand to
+any number.  This many is 100,000 shapes of 40 values each, every one an alias, and takes about
+0.4 GB once it is checked.  Values that are written out are bounded by the file's size."""
 
 MOST_NESTED = 1000
-"""Lists and mappings in each other: as deep as Python nests calls, which bounds JSON, too."""
+"""Nesting depth of lists and mappings: Python's recursion limit, which bounds JSON too."""
 
 _NUMBER = re.compile(
     r"[-+]?(?:(?P<float>(?:[0-9][0-9_]*\.[0-9_]*|\.[0-9][0-9_]*)(?:[eE][-+]?[0-9]+)?"
@@ -51,12 +51,12 @@ _KINDS: dict[str, tuple[type, ...]] = {
     "null": (type(None),),
 }
 
-# Where PyYAML was built without libyaml, its own parser does the same, forty times slower.
+# If PyYAML was built without libyaml, its own parser has the same result, forty times slower.
 Parser: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
 class MalformedError(ValueError):
-    """The text is not YAML, or more than data.  line: from 1, None where it is not known."""
+    """The text is not YAML, or is more than data.  line: from 1, None if unknown."""
 
     def __init__(self, message: str, line: int | None) -> None:
         super().__init__(message)
@@ -65,10 +65,10 @@ class MalformedError(ValueError):
 
 @dataclass(slots=True)
 class _Open:
-    """A list or mapping whose end has not been read.
+    """A list or mapping whose end has not been read yet.
 
-    begun: how many values had been read before it;  key: of a mapping, the key that waits for its
-    value;  merged: of a mapping, what `<<` adds to it.
+    begun: number of values read before it;  key: of a mapping, the key whose value comes next;
+    merged: of a mapping, the mappings that `<<` merges into it.
     """
 
     content: Any
@@ -80,13 +80,13 @@ class _Open:
 
 
 class _Reader:
-    """Data from events: a stack of open lists and mappings, and what anchors name."""
+    """Builds data from events, with a stack of open lists and mappings, and the anchors' values."""
 
     def __init__(self) -> None:
         self.open: list[_Open] = []
-        self.anchors: dict[str, tuple[Any, int]] = {}  # what each names, and of how many values
+        self.anchors: dict[str, tuple[Any, int]] = {}  # value, and its number of values
         self.read = self.repeated = 0
-        self.words: dict[str, str] = {}  # equal keys are one object
+        self.words: dict[str, str] = {}  # interned keys
 
     def document(self, following: Callable[[], Event]) -> Any:
         """The value whose first event comes next."""
@@ -128,13 +128,13 @@ class _Reader:
             raise _malformed(f"nested too deeply; expected at most {MOST_NESTED} levels", event)
         self.open.append(_Open(content, event, self.read))
         self.read += 1
-        self.anchors.pop(event.anchor, None)  # until its end it names nothing
+        self.anchors.pop(event.anchor, None)  # undefined until its end
 
     def end(self) -> Any:
         ended = self.open.pop()
         content = ended.content
         if ended.merged is not None:
-            # The mapping's own keys win, then those of the mappings that are named first.
+            # The mapping's own keys take precedence, then those of the mappings listed first.
             content = {}
             for mapping in reversed(ended.merged):
                 content.update(mapping)
@@ -176,11 +176,11 @@ class _Reader:
 
 
 _MERGE = object()
-"""In place of the key `<<`."""
+"""Stands for the key `<<`."""
 
 
 def _scalar(event: Any) -> Any:
-    """What a word means: text if it is quoted, otherwise by how it looks; or what its tag says."""
+    """The value of a scalar: by its tag; else text if it is quoted, or by the core schema."""
     word: str = event.value
     if event.implicit[0]:
         return _plain(word, event)
@@ -207,7 +207,7 @@ def _plain(word: str, event: Any) -> Any:
         return float(digits.replace(".", "", 1) if digits[-1] in "fF" else digits)
     try:
         return int(digits, 10 if match["decimal"] is not None else 0)
-    except ValueError as error:  # Python reads numbers of 4300 digits
+    except ValueError as error:  # Python's limit is 4300 digits
         raise _malformed(str(error).partition(";")[0], event) from None
 
 
@@ -241,15 +241,15 @@ class Events:
             raise MalformedError(error.reason, before.count(b"\n") + 1) from None
 
     def begin(self) -> bool:
-        """Go to the first value, if there is one."""
+        """Advance to the first value; whether there is one."""
         self.following()
         return isinstance(self.following(), DocumentStartEvent)
 
 
 def load(text: str) -> Any:
-    """The data of one document: None, bool, int, float, str, list, dict.  No tag makes an object.
+    """The data of one document: None, bool, int, float, str, list, dict.  Tags create no objects.
 
-    What an alias repeats is one object.  Raises MalformedError (what is wrong, and in which line).
+    An alias is the same object as its anchor.  Raises MalformedError (reason and line).
     """
     try:
         events = Events(text)
@@ -269,16 +269,16 @@ def load(text: str) -> Any:
 
 
 class _Dumper(yaml.SafeDumper):  # type: ignore[misc]
-    """Quotes texts that would read as something else by the rules above, besides those that are so
-    by YAML 1.1, for other programs' sake."""
+    """Quotes text that the rules above would read as another type, and, for other programs, text
+    that YAML 1.1 would."""
 
     def ignore_aliases(self, data: Any) -> bool:
-        return True  # equal parts are written out: files are for people to read
+        return True  # repeated parts are written out, for readability
 
 
 def _text(dumper: Any, text: str) -> Any:
-    # Characters that do not print need escapes, which only this style has: U+0085 and U+2028 end
-    # lines for YAML 1.1.
+    # Unprintable characters need escapes, which only double quotes have; YAML 1.1 takes U+0085 and
+    # U+2028 for line ends.
     return dumper.represent_scalar(_TAG + "str", text, style=None if text.isprintable() else '"')
 
 
@@ -289,7 +289,7 @@ _Dumper.add_implicit_resolver(
 
 
 def dump(data: Any) -> str:
-    """Data as YAML text, every number to its last bit, keys in their order."""
+    """Data as YAML text; numbers keep all bits, keys their order."""
     text: str = yaml.dump(
         data, Dumper=_Dumper, default_flow_style=None, sort_keys=False, allow_unicode=True
     )

@@ -1,10 +1,13 @@
-"""The text-book's alternatives, by name, on arrays of rays: to see what each costs and where it
-fails.  The renderer does not use them; "the form that renders" in their docstrings says which it
-has.
+"""Textbook intersection methods, by name, to measure what each costs and where it fails.
 
-`intersect(name, parameters, origins, directions)` asks one shape, solid or scene; `METHODS` has
-each method's text-book row, summary and source.  To add a family, write a file with its parameters,
-kernels and `METHODS` beside these and name it below.
+The renderer does not use them; a docstring that says "the renderer's method" marks the one that it
+also has.  `intersect(name, parameters, origins, directions)` intersects one shape, solid or scene;
+`METHODS` has each method's textbook row, summary and source.
+
+Contract of a method: a kernel of a ray and the prepared parameters that returns the smallest t > 0
+in units of |d|, inf for a miss; its docstring states "Cost:" (operations) and "Fails:" (known
+failures), which `reference-rt methods` prints and the tests check.  In both, u = 2^-53.  To add a
+family: a file with its parameters (a NamedTuple), kernels and `METHODS`, named in `METHODS` below.
 """
 
 from typing import Any

@@ -1,6 +1,6 @@
-"""Box along the axes, closed: six planes, and two kinds of slabs (row T8).
+"""Axis-aligned closed box: six planes, and two slab tests (row T8).
 
-The costs are of a hit from outside, compares apart.
+Costs are for a hit from outside, without comparisons.
 """
 
 import math
@@ -48,11 +48,11 @@ def face(ray: Ray, lower: Vec3, upper: Vec3, axis: int, plane: float) -> float:
 
 @kernel
 def six_planes(ray: Ray, lower: Vec3, upper: Vec3) -> float:
-    """Each face by itself: its plane, then whether the point lies within; the nearest wins.
+    """Each face separately: intersect its plane, test the point against the face; the nearest wins.
 
     Cost: 24 +, 18 *, 6 /.
-    Fails: at edges, where both faces' points may round to the outside.  The ray passes between them
-    and gets the far side, a wrong t: measured, one ray in 200 aimed at a ridge.
+    Fails: at edges, where the points of both faces may round to the outside.  The ray passes
+    between them and hits the far side, a wrong t: measured, one ray in 200 aimed at an edge.
     """
     closest = math.inf
     for axis in range(3):
@@ -67,12 +67,12 @@ def six_planes(ray: Ray, lower: Vec3, upper: Vec3) -> float:
 
 @kernel
 def slabs_parallel_test(ray: Ray, lower: Vec3, upper: Vec3) -> float:
-    """The box as three slabs: the last way in and the first way out; parallel rays by an if.
+    """Three slabs: the last entry and the first exit; parallel rays by a test.
 
     For d_axis = 0 the origin must lie in the slab, or the ray misses.  Else t = (plane - o) / d for
     both planes, in order.  Origin inside: t_far.
     Cost: 6 +, 6 /.
-    Fails: only where t_near and t_far are within two roundings of each other: at a silhouette.
+    Fails: only where t_near and t_far differ by at most two roundings, at a silhouette.
     """
     t_near, t_far = -math.inf, math.inf
     for axis in range(3):
@@ -96,12 +96,12 @@ def slabs_parallel_test(ray: Ray, lower: Vec3, upper: Vec3) -> float:
 
 @kernel
 def slabs_ieee(ray: Ray, lower: Vec3, upper: Vec3) -> float:
-    """Slabs by the reciprocal of d, whose infinities do the parallel test; the form that renders.
+    """Slabs by 1 / d, whose infinities replace the parallel test; the renderer's method.
 
-    1 / ±0 = ±inf puts the planes at -inf and +inf for an origin in the slab and both on one side
-    for any other.  An origin in the plane itself gives 0 * inf = NaN, which every compare passes
-    over: the box is closed.  The reciprocals belong to the ray, so many boxes share three
-    divisions.
+    1 / ±0 = ±inf puts the planes at -inf and +inf for an origin in the slab, and both on one side
+    for any other.  An origin in the plane itself gives 0 * inf = NaN, for which every comparison is
+    false: the box is closed.  The reciprocals depend on the ray alone, so that many boxes share
+    three divisions.
     Cost: 6 +, 6 *, 3 /.
     Fails: as `slabs_parallel_test`, with three roundings; |d_axis| < 2**-1024 counts as parallel.
     """

@@ -1,10 +1,10 @@
-"""Solids by lists of intervals, and by inside tests of all crossings (row T12).
+"""CSG solids by interval lists, and by inside tests between all crossings (row T12).
 
-Both begin with the crossings of each operand and the ray's line, which are the renderer's own.
-From there, the intervals know of an operand only where the line goes in and out; the inside tests
-only whether a point is in it, which `inside` finds from the operand's description.  The form that
-renders is neither: `csg.evaluate` passes the crossings one after another, and those that rounding
-cannot tell apart at once.
+Both begin with the crossings of the ray's line with each operand, computed by the renderer's own
+kernels.  The interval method then uses only the intervals in which the line is inside an operand;
+the other uses only point-in-operand tests, which `inside` computes from the description.  The
+renderer does neither: `accel.csg.evaluate` walks through the crossings in order, and merges those
+that rounding cannot separate.
 """
 
 import functools
@@ -37,7 +37,7 @@ from reference_rt.textbook.operands import (
 
 @kernel
 def holds(operation: int, in_a: bool, in_b: bool) -> bool:
-    """Whether a point is in the combination of a and b."""
+    """Whether a point is inside the combination of a and b."""
     if operation == UNION:
         return in_a or in_b
     if operation == INTERSECTION:
@@ -47,8 +47,8 @@ def holds(operation: int, in_a: bool, in_b: bool) -> bool:
 
 @entry_kernel
 def _combine(operation: int, a: FloatArray, b: FloatArray, out: FloatArray) -> None:
-    """Boundaries (n, j) and (n, k) merged into (n, j + k): both are passed in order, those at the
-    same t at once, and the ones where the answer changes are kept."""
+    """Merge boundaries (n, j) and (n, k) into (n, j + k): sweep both in order, those at the same t
+    together, and keep the ones where the combination changes."""
     for r in range(len(out)):
         i, j, n = 0, 0, 0
         in_a, in_b, inside = False, False, False
@@ -73,7 +73,7 @@ def _combine(operation: int, a: FloatArray, b: FloatArray, out: FloatArray) -> N
 
 
 def interval_list(tree: Tree, o: FloatArray, d: FloatArray) -> FloatArray:
-    """The boundaries of a whole tree: see `boundaries`."""
+    """The boundaries of a tree: see `boundaries`."""
     if isinstance(tree, Operand):
         return boundaries(tree, o, d)
 
@@ -86,13 +86,13 @@ def interval_list(tree: Tree, o: FloatArray, d: FloatArray) -> FloatArray:
 
 
 def intervals(tree: Tree, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
-    """Each operand's intervals inside, combined pairwise up the tree; the first end beyond 0.
+    """Combine the operands' inside intervals pairwise up the tree; the first end at t > 0.
 
     Cost: of k crossings in all, one compare each at every level of the tree above them.
-    Fails: where faces coincide.  Crossings that should be one differ by their roundings, and what
-    is between them stays as a film, or a gap, that thin: of a turned box without one side of it,
-    measured, up to half of the rays through what is gone meet a film.  A ray that leaves a surface
-    may meet it at once.
+    Fails: where faces coincide.  Crossings that should be equal differ by rounding, and a film or a
+    gap of that thickness remains between them: for a rotated box minus one side of it, measured, up
+    to half of the rays through the removed part hit a film.  A ray that leaves a surface may hit it
+    again at once.
     """
     ends = interval_list(tree, o, d)
     np.min(np.where(ends > 0.0, ends, math.inf), axis=1, initial=math.inf, out=t)
@@ -121,13 +121,13 @@ def contains(tree: Tree, p: FloatArray) -> BoolArray:
 
 
 def inside_tests(tree: Tree, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
-    """All crossings of all operands, in order: one is on the surface of the solid where a point
-    just before it is inside and one just after it is not, or the other way round.
+    """Sort all crossings of all operands: one is on the solid's surface if exactly one of the
+    points before and after it is inside the solid.
 
-    Such points are the middles between one crossing and the next.
-    Cost: for each of k crossings up to the one that shows, the inside tests of all operands.
-    Fails: as `intervals` does, though less: the inside tests round otherwise than the crossings and
-    often find no point in a film.  Of the same box, one ray in ten meets one.
+    These points are the midpoints between consecutive crossings.
+    Cost: for each of k crossings up to the visible one, the inside tests of all operands.
+    Fails: as `intervals` does, though less: the inside tests round differently from the crossings,
+    and often no point is inside a film.  For the same box, one ray in ten hits one.
     """
     every = np.concatenate([boundaries(operand, o, d) for operand in leaves(tree)], axis=1)
     ahead = np.sort(np.where(every > 0.0, every, math.inf), axis=1)
@@ -139,7 +139,7 @@ def inside_tests(tree: Tree, o: FloatArray, d: FloatArray, t: FloatArray) -> Non
     before = _contains_at(tree, o, d, searching, 0.5 * ahead[searching, 0])
     for k in range(ahead.shape[1] - 1):
         here, following = ahead[searching, k], ahead[searching, k + 1]
-        # After the last crossing, any point will do.
+        # Beyond the last crossing, any point will do.
         end = np.where(following < math.inf, following, 2.0 * here)
         after = _contains_at(tree, o, d, searching, here + 0.5 * (end - here))
         shows = before != after
@@ -151,7 +151,7 @@ def inside_tests(tree: Tree, o: FloatArray, d: FloatArray, t: FloatArray) -> Non
 def _contains_at(
     tree: Tree, o: FloatArray, d: FloatArray, rays: IntArray, t: FloatArray
 ) -> BoolArray:
-    """`contains` for the points of these rays at t."""
+    """`contains` at the points of these rays at t."""
     return contains(tree, o[rays] + t[:, None] * d[rays])
 
 

@@ -1,4 +1,4 @@
-"""Is a point inside a solid: of each shape from its description alone, in its own coordinates."""
+"""Point-in-solid tests of each shape, from its description alone, in its own coordinates."""
 
 import math
 from collections.abc import Callable
@@ -82,11 +82,11 @@ def _solid_angles(triangles: FloatArray, p: FloatArray, total: FloatArray) -> No
 
 
 def in_closed_mesh(triangles: FloatArray, p: FloatArray) -> BoolArray:
-    """Whether triangles (m, 9) go round points (n, 3).
+    """Whether points (n, 3) are inside a closed mesh of triangles (m, 9).
 
-    The solid angles under which a point sees them, with signs, sum to 4 pi times the winding
-    number; halfway to 1 tells inside from outside.  tan(angle / 2) is the quotient above
-    (Van Oosterom & Strackee 1983, IEEE Trans. Biomed. Eng. 30(2)).
+    The signed solid angles of the triangles sum to 4 pi times the winding number, which is compared
+    with 1/2.  tan(angle / 2) is the quotient in `_solid_angles` (Van Oosterom & Strackee 1983, IEEE
+    Trans. Biomed. Eng. 30(2)).
     """
     total = np.empty(len(p))
     _solid_angles(triangles, np.ascontiguousarray(p), total)

@@ -1,4 +1,4 @@
-"""What a method is: a name, where it comes from, and what it does with arrays of rays."""
+"""`Method`, one textbook method with its name and source, and the checks of its arrays."""
 
 import math
 from collections.abc import Callable
@@ -17,12 +17,12 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Method:
-    """One way to intersect one shape, solid or scene with n rays.
+    """A method that intersects one shape, solid or scene with n rays.
 
-    name: "family.method";  row: the text-book row that asks for it;  summary: one line;  source:
-    author, year;  parameters: the NamedTuple of the family;  prepare: checks these and makes what
-    `run` takes;  run(prepared, origins, directions, t): writes t (n,).
-    To measure time alone, call `prepare` once and `run` many times.
+    name: "family.method";  row: the textbook row that it is from;  summary: one line;  source:
+    author, year;  parameters: the NamedTuple of the family;  prepare(parameters): checks them and
+    returns the first argument of `run`;  run(prepared, origins, directions, t): writes t (n,).
+    To measure time, call `prepare` once and `run` many times.
     """
 
     name: str
@@ -36,9 +36,9 @@ class Method:
     def intersect(
         self, parameters: Any, origins: npt.ArrayLike, directions: npt.ArrayLike
     ) -> FloatArray:
-        """The smallest t > 0 (n,) at which each ray meets the surface, inf for a miss.
+        """The smallest t > 0 (n,) at which each ray hits the surface, inf for a miss.
 
-        Origins and directions are (n, 3); directions of any length: t counts in units of |d|.
+        Origins and directions are (n, 3); directions may have any length: t is in units of |d|.
         """
         if not isinstance(parameters, self.parameters):
             raise ValueError(
@@ -70,7 +70,7 @@ def points(value: npt.ArrayLike, name: str) -> FloatArray:
 
 
 def vector(value: npt.ArrayLike, name: str) -> Vec3:
-    """`value` as a Vec3 of float64, which divide by zero as IEEE says also in plain Python."""
+    """`value` as a Vec3 of np.float64, which divides by zero as in IEEE 754 in plain Python too."""
     array = np.asarray(value, dtype=np.float64)
     if array.shape != (3,) or not np.isfinite(array).all():
         raise ValueError(f"{name}: expected three finite numbers, got {value!r}")
@@ -79,5 +79,5 @@ def vector(value: npt.ArrayLike, name: str) -> Vec3:
 
 @kernel
 def ray_of(origins: FloatArray, directions: FloatArray, i: int) -> Ray:
-    """Ray i, without end."""
+    """Ray i, with t_max = inf."""
     return Ray(row(origins, i), row(directions, i), math.inf)

@@ -1,4 +1,4 @@
-"""Solids as trees of operands, and where lines go in and out of these: for the methods of `csg`."""
+"""Solids as trees of operands, and the intervals of lines in them: for the methods of `csg`."""
 
 import math
 from pathlib import Path
@@ -20,15 +20,15 @@ from reference_rt.textbook.method import FloatArray, ray_of
 
 class CsgParameters(NamedTuple):
     """A solid in world coordinates: `rt.Sphere() & rt.Box()`, or any shape that encloses space;
-    folder: what the file names of meshes are relative to."""
+    folder: of the meshes' files."""
 
     solid: Shape
     folder: Path = Path()
 
 
 class Operand(NamedTuple):
-    """A shape, the map from the world to its own coordinates, and its table, the only one of
-    `shapes`: row 0, or for a mesh all of it."""
+    """A shape, the transform from the world to its own coordinates, and its table, the only one in
+    `shapes`: row 0, or all rows of a mesh."""
 
     shape: Shape
     to_own: Affine
@@ -37,7 +37,7 @@ class Operand(NamedTuple):
 
 
 class Combination(NamedTuple):
-    """UNION, INTERSECTION or DIFFERENCE of these."""
+    """UNION, INTERSECTION or DIFFERENCE of trees."""
 
     operation: int
     of: "tuple[Tree, ...]"
@@ -53,7 +53,7 @@ _OPERATIONS = {
 
 
 def prepare(parameters: CsgParameters) -> Tree:
-    """The tree, with the maps of all solids passed on to the operands."""
+    """The tree, with the transforms of nested solids composed into the operands."""
     return _tree(parameters.solid, identity(), parameters.folder)
 
 
@@ -79,13 +79,13 @@ def type_of(shape: Shape) -> str:
 
 
 def leaves(tree: Tree) -> tuple[Operand, ...]:
-    """The leaves, from left to right."""
+    """The operands, from left to right."""
     if isinstance(tree, Operand):
         return (tree,)
     return tuple(operand for part in tree.of for operand in leaves(part))
 
 
-# ---- where a line goes in and out of an operand -------------------------------------------------
+# ---- boundaries of a line in an operand ---------------------------------------------------------
 
 
 @entry_kernel
@@ -97,8 +97,8 @@ def _spans(shapes: Shapes, kind: int, o: FloatArray, d: FloatArray, t: FloatArra
 
 @kernel
 def _mesh_crossing(triangles: Triangles, i: int, shear: Shear) -> tuple[float, int]:
-    """Where the line crosses triangle i, at t of any sign, and +1 where it goes in, -1 where it
-    comes out, 0 where it passes by."""
+    """t, of any sign, at which the line crosses triangle i, and +1 for entering, -1 for leaving, 0
+    for a miss."""
     seen = project(triangles.vertices, i, shear)
     return on_line(seen, shear).t, seen.side
 
@@ -127,9 +127,9 @@ def _mesh_crossings(
 
 
 def boundaries(operand: Operand, o: FloatArray, d: FloatArray) -> FloatArray:
-    """All t (n, k), in order, at which the lines go in or out, in turn; the rest is inf.
+    """All t (n, k) in order at which the lines enter and leave, alternately; padded with inf.
 
-    Every line begins outside; one that comes from inside the operand goes in at -inf.
+    Every line begins outside; one that comes from inside the operand enters at -inf.
     """
     triangles = operand.shapes.triangles
     if triangles is None:
@@ -144,12 +144,12 @@ def boundaries(operand: Operand, o: FloatArray, d: FloatArray) -> FloatArray:
     order = np.argsort(t, axis=1, kind="stable")
     winding = np.cumsum(np.take_along_axis(sign, order, axis=1), axis=1)
     inside = np.pad(winding != 0, ((0, 0), (1, 0)))
-    # Where a mesh cuts through itself, a crossing may lie within it.
+    # Where a mesh intersects itself, a crossing may be in its interior.
     changes = inside[:, 1:] != inside[:, :-1]
     return trimmed(np.where(changes, np.take_along_axis(t, order, axis=1), math.inf))
 
 
 def trimmed(t: FloatArray) -> FloatArray:
-    """Each row in order, without columns that are all inf."""
+    """Each row sorted, without columns that are all inf."""
     t = np.sort(t, axis=1)
     return np.ascontiguousarray(t[:, np.any(t < math.inf, axis=0)])

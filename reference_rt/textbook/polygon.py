@@ -1,8 +1,8 @@
 """Planar polygon of one or more rings: even-odd, winding number and angle sum (row T9).
 
-All meet the plane first, then drop the largest axis of the normal and ask in two dimensions whether
-the point is inside.  There, vertices are taken relative to the point.  The costs are per edge,
-beside 10 +, 9 *, 1 / for the plane.
+All intersect the plane, project along the largest axis of the normal, and test in two dimensions
+whether the point is inside.  There, vertices are relative to the point.  Costs are per edge, beside
+10 +, 9 *, 1 / for the plane.
 """
 
 import math
@@ -19,31 +19,33 @@ from reference_rt.textbook.method import FloatArray, Method, points, ray_of, vec
 
 
 class PolygonParameters(NamedTuple):
-    """Rings, each (k, 3) points in world coordinates, k >= 3, all in one plane; closed by itself.
+    """Rings, each (k, 3) points in world coordinates, k >= 3, all in one plane.  The last point is
+    joined to the first.
 
-    Rings may be concave and cross themselves and each other.  For `even_odd` a ring within a ring
-    is a hole; for `winding` and `angle_sum` it is where it runs the other way round.
+    Rings may be concave and cross themselves and each other.  A ring within a ring is a hole for
+    `even_odd`; for `winding` and `angle_sum` only if it has the opposite orientation.
     """
 
     rings: Sequence[npt.ArrayLike]
 
 
 Prepared = tuple[FloatArray, Vec3, Vec3, int]
-"""edges (m, 4): both ends in the two coordinates kept; normal; a point of the plane; axis left."""
+"""edges (m, 4): both ends in two dimensions; normal; a point of the plane; the projected axis."""
 
 
 def _plane(vertices: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(normal (3,), point (3,)) of the plane of all vertices.
 
-    Spanned by the vertex farthest from the first and the one farthest from their line, as a normal
-    by area (Newell) is zero where rings cross themselves.  What is along that line is taken out
-    first: the product of two long legs of a thin polygon rounds by more than its thickness.
+    It is spanned by the vertex farthest from the first and the one farthest from their line,
+    because the area normal (Newell) may be zero for rings that cross themselves.  The component
+    along that line is removed first: the cross product of two long legs of a thin polygon rounds by
+    more than its thickness.
     """
     legs = vertices - vertices[0]
     along = legs[np.argmax(np.linalg.norm(legs, axis=1))]
-    # An affine map rounds each coordinate some 8 times; all that is compared here as often again.
+    # An affine map rounds each coordinate some 8 times, and the computation here as often again.
     error = 32.0 * UNIT_ROUNDOFF * np.abs(vertices).max()
-    # tiny: where all vertices are one.
+    # tiny: if all vertices are equal.
     across = legs - np.outer(legs @ along / max(along @ along, np.finfo(float).tiny), along)
     heights = np.linalg.norm(across, axis=1)
     if not heights.max() > error:
@@ -69,7 +71,7 @@ def prepare(polygon: PolygonParameters) -> Prepared:
 
 @kernel
 def plane_distance(ray: Ray, normal: Vec3, point: Vec3) -> float:
-    """t > 0 where the ray meets the plane; inf where it is parallel or points away."""
+    """t > 0 at which the ray hits the plane; inf if it is parallel or points away."""
     slope = dot(normal, ray.d)
     if slope == 0.0:
         return math.inf
@@ -79,13 +81,13 @@ def plane_distance(ray: Ray, normal: Vec3, point: Vec3) -> float:
 
 @kernel
 def even_odd(ray: Ray, edges: FloatArray, normal: Vec3, point: Vec3, axis: int) -> float:
-    """Inside where a line from the point to +x crosses an odd number of edges (Jordan).
+    """Inside if a line from the point to +x crosses an odd number of edges (Jordan).
 
     Vertex rule: a vertex on the line counts as above it, so an edge spans the half-open range
     of y from its lower end (included) to its upper, and each vertex passed counts once.  An edge
     that spans y = 0 crosses at x = a_x - a_y (b_x - a_x) / (b_y - a_y).
     Cost: 4 +; an edge that spans needs 3 +, 1 *, 1 / more.
-    Fails: at edges.  The crossing of the edge reversed rounds otherwise: of points on the edge of
+    Fails: at edges.  The crossing of the reversed edge rounds differently: of points on the edge of
     two neighbours, measured, one in five belongs to neither and one in ten to both.
     """
     t = plane_distance(ray, normal, point)
@@ -105,13 +107,13 @@ def even_odd(ray: Ray, edges: FloatArray, normal: Vec3, point: Vec3, axis: int) 
 
 @kernel
 def winding(ray: Ray, edges: FloatArray, normal: Vec3, point: Vec3, axis: int) -> float:
-    """Inside where the rings go round the point: a signed count of crossings that is not zero.
+    """Inside if the rings wind around the point: a signed count of crossings that is not zero.
 
     An edge that crosses the line to +x upwards counts +1, downwards -1, by the same vertex rule;
-    the sign of a x b says on which side of the point it passes.  That sign is exactly the
-    opposite for the edge reversed, so of two neighbours that see the same point, one owns it.
+    the sign of a x b says on which side of the point it passes.  That sign is exactly the opposite
+    for the reversed edge, so that a point belongs to exactly one of two neighbours.
     Cost: 4 +; an edge that spans needs 1 +, 2 * more.
-    Fails: at edges in oblique planes, where neighbours compute the point itself differently.
+    Fails: at edges in oblique planes, where neighbours round the point itself differently.
     """
     t = plane_distance(ray, normal, point)
     if t == math.inf:
@@ -133,12 +135,12 @@ def winding(ray: Ray, edges: FloatArray, normal: Vec3, point: Vec3, axis: int) -
 
 @kernel
 def angle_sum(ray: Ray, edges: FloatArray, normal: Vec3, point: Vec3, axis: int) -> float:
-    """Inside where the signed angles under which the edges are seen sum to ±2 pi, not to 0.
+    """Inside if the signed angles that the edges subtend sum to ±2 pi, not to 0.
 
-    The sum is 2 pi times the winding number; halfway, pi, tells them apart.
+    The sum is 2 pi times the winding number; it is compared with pi.
     Cost: 7 +, 4 *, 1 atan2.
     Fails: at edges, where the angle is pi or -pi by the sign of a zero: both neighbours may own the
-    point.  The rounding of the sum is no trouble: some m u for m edges, against pi.
+    point.  The rounding of the sum is harmless: some m u for m edges, against pi.
     """
     t = plane_distance(ray, normal, point)
     if t == math.inf:

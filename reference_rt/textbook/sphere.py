@@ -1,6 +1,6 @@
 """Sphere |p - c| = r: the algebraic, the geometric and the robust method (row T5).
 
-The costs are of a hit from outside, compares apart.
+Costs are for a hit from outside, without comparisons.
 """
 
 import math
@@ -35,14 +35,14 @@ def prepare(sphere: SphereParameters) -> Prepared:
 
 @kernel
 def algebraic(ray: Ray, center: Vec3, r: float) -> float:
-    """Put p(t) into |p - c|² = r²: a t² + b t + c = 0, and tell by the discriminant.
+    """Substitute p(t) into |p - c|² = r²: a t² + b t + c = 0, with the cases of the discriminant.
 
     With f = o - c: a = d·d, b = 2 d·f, c = f·f - r², D = b² - 4ac.  D < 0: no point; D = 0: one,
     -b / 2a; D > 0: two, (-b ± sqrt(D)) / 2a.
     Cost: 13 +, 16 *, 2 /, 1 sqrt.
-    Fails: far away.  D is a difference of numbers of the size of 4 |d|² |f|² that leaves 4 |d|² h²,
-    h half the chord: measured, t |d| is off by up to 3 u |f|² / h.  At 1e7 radii that is a tenth of
-    a radius, at 1e8 a fifth of all hits is lost.
+    Fails: far away.  D = 4 |d|² h², h half the chord, is a difference of numbers of about
+    4 |d|² |f|²: measured, the error of t |d| is up to 3 u |f|² / h.  At 1e7 radii that is a tenth
+    of a radius; at 1e8 a fifth of all hits is lost.
     """
     f = ray.o - center
     a = dot(ray.d, ray.d)
@@ -64,14 +64,14 @@ def algebraic(ray: Ray, center: Vec3, r: float) -> float:
 
 @kernel
 def geometric(ray: Ray, center: Vec3, r: float) -> float:
-    """By the closest approach to the centre, with what cannot hit rejected early.
+    """By the closest approach to the centre, with early rejection.
 
     L = c - o.  Outside (L² > r²) and t_ca = L·d < 0: the sphere is behind.  d² = L² - t_ca² > r²:
-    the line passes it.  Else t_hc = sqrt(r² - d²), t = t_ca - t_hc from outside, t_ca + t_hc from
+    the line misses it.  Else t_hc = sqrt(r² - d²), t = t_ca - t_hc from outside, t_ca + t_hc from
     inside.  Lectures take |d| = 1; here t_ca and t_hc are divided by d·d and |d|.
     Cost: 12 +, 11 *, 2 /, 1 sqrt; a sphere behind needs 7 +, 7 *.
     Fails: far away, as `algebraic` does, since L² - t_ca² cancels like the discriminant.  At 1e8
-    radii almost half of all hits is lost.
+    radii almost half of all hits are lost.
     """
     to_center = center - ray.o
     l2 = dot(to_center, to_center)
@@ -92,16 +92,16 @@ def geometric(ray: Ray, center: Vec3, r: float) -> float:
 
 @kernel
 def robust(ray: Ray, center: Vec3, r: float) -> float:
-    """The quadratic without its two cancellations; the form that renders, there with a closest
-    approach that does not round by its distance (`shapes.rounding.along_from`).
+    """The quadratic without its two cancellations; the renderer's method, which also computes the
+    closest approach with an error that does not grow with distance (`shapes.rounding.along_from`).
 
-    r² - |f + t_ca d|², the closest approach as a vector, stands for the discriminant: it is small
-    where the ray is near the centre, and its error is u |f| r in place of u |f|².  The root of
-    larger magnitude comes from q = b ± sqrt(D) without cancellation, the other from c / q.
+    r² - |f + t_ca d|², with the closest approach as a vector, replaces the discriminant: its error
+    is u |f| r instead of u |f|².  The root of larger magnitude comes from q = b ± sqrt(D) without
+    cancellation, the other from c / q.
     Cost: 17 +, 18 *, 3 /, 1 sqrt.
-    Fails: near the surface, as the others do.  c = f·f - r² rounds by u r² there, whatever is done
-    with it, so a root near zero is off by some u r and may have the wrong sign: leave a surface
-    by more than that.  Near the rim, from far away: it is lost within some u |f|.
+    Fails: near the surface, as the others do.  There c = f·f - r² has an error of u r², so that a
+    root near zero is off by some u r and may have the wrong sign: offset rays that leave a surface
+    by more.  Near the silhouette from far away: hits within some u |f| of it are lost.
     """
     f = ray.o - center
     a = dot(ray.d, ray.d)

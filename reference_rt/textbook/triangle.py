@@ -1,10 +1,10 @@
 """Triangle v0 v1 v2, hit from both sides, edges included: five methods (row T7).
 
-All but the first two steps of `two_step` and `watertight` solve
+All except `two_step` and `watertight` solve
 
     u (v1 - v0) + v (v2 - v0) - t d = o - v0
 
-for t and the barycentrics u, v.  The costs are of a hit, compares apart.
+for t and the barycentrics u, v.  Costs are for a hit, without comparisons.
 """
 
 import math
@@ -40,8 +40,8 @@ def two_step(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
 
     With n = (v1 - v0) x (v2 - v0), `p` is inside where n·((b - a) x (p - a)) >= 0 for every edge.
     Cost: 52 +, 42 *, 1 /.
-    Fails: at edges.  Two neighbours see two points p, each rounded off its plane: of rays aimed at
-    the shared edges of a solid, measured, one in five slips between them.
+    Fails: at edges.  Two neighbours compute two points p, each rounded off its plane: of rays aimed
+    at the shared edges of a solid, measured, one in five passes between them.
     """
     n = cross(v1 - v0, v2 - v0)
     slope = dot(n, ray.d)
@@ -62,18 +62,18 @@ def two_step(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
 
 @kernel
 def determinant(a: Vec3, b: Vec3, c: Vec3) -> float:
-    """Of the matrix with these columns: a·(b x c)."""
+    """The determinant of the matrix with these columns: a·(b x c)."""
     return dot(a, cross(b, c))
 
 
 @kernel
 def cramer(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
-    """Cramer's rule, with its four determinants written out: u = |s e2 -d| / |e1 e2 -d|, ...
+    """Cramer's rule with all four determinants: u = |s e2 -d| / |e1 e2 -d|, ...
 
     Cost: 30 +, 36 *, 3 /.
-    Fails: with slivers and grazing rays, as each determinant rounds by u |e1| |e2| |s|, whatever
-    is left of it: on triangles 1e-6 high, measured, t is off by 4e5 u in the median.  At edges,
-    since 1 - u - v is not what the neighbour computes: one ray in 20 aimed there slips through.
+    Fails: with slivers and grazing rays, as each determinant has an error of u |e1| |e2| |s|,
+    however small it is: on triangles 1e-6 high, measured, t is off by 4e5 u in the median.  At
+    edges, where neighbours round 1 - u - v differently: one ray in 20 aimed there passes through.
     """
     e1, e2, s, back = v1 - v0, v2 - v0, ray.o - v0, -ray.d
     whole = determinant(e1, e2, back)
@@ -87,13 +87,13 @@ def cramer(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
 
 @kernel
 def lu(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
-    """LU factors of the 3x3 matrix, rows exchanged so that each pivot is its column's largest.
+    """LU factorisation of the 3x3 matrix with partial pivoting.
 
     Rows are x, y, z; columns u, v, t.  P A = L U; then L y = P s forwards, U (u, v, t) = y back.
     Cost: 21 +, 11 *, 6 /.
-    Fails: at edges, where one ray in 25 slips through.  Not with slivers: elimination solves
-    exactly for a matrix whose entries differ by a few roundings, and t, unlike u and v, does not
-    depend on how thin the triangle is.  On those 1e-6 high t is off by 1 u in the median.
+    Fails: at edges, where one ray in 25 passes through.  Not with slivers: elimination is backward
+    stable (exact for a matrix whose entries differ by a few roundings), and t, unlike u and v, is
+    well-conditioned for thin triangles.  On those 1e-6 high t is off by 1 u in the median.
     """
     e1, e2, s = v1 - v0, v2 - v0, ray.o - v0
     row0, b0 = Vec3(e1.x, e2.x, -ray.d.x), s.x
@@ -126,9 +126,9 @@ def lu(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
 
 @kernel
 def moller_trumbore(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
-    """Cramer's rule with two cross products for all four determinants, and rejection on the way.
+    """Cramer's rule with two cross products for all four determinants, and early rejection.
 
-    d x e2 and s x e1 are shared; the published tolerance of the determinant is left out.
+    d x e2 and s x e1 are shared; the published epsilon for the determinant is omitted.
     Cost: 24 +, 27 *, 1 /; a miss by u needs 16 +, 13 *, 1 /.
     Fails: as `cramer` does.
     """
@@ -154,15 +154,15 @@ def moller_trumbore(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
 def watertight(ray: Ray, v0: Vec3, v1: Vec3, v2: Vec3) -> float:
     """Shear space so that the ray is the z axis; the signs of three 2-D edge functions decide.
 
-    The largest axis of d becomes z.  Each vertex is projected by arithmetic of its own, and an edge
-    function of the reversed edge is its exact negative: neighbours cannot both reject a ray
-    through their edge.  The form that renders, but for edge functions that round to 0: those the
-    renderer works out exactly, and what is on the edge it gives to one neighbour alone, as if the
-    ray were moved by less than any number (`shapes.watertight.project`).
+    The largest axis of d becomes z.  Each vertex is projected independently of its triangle, and
+    the edge function of a reversed edge is the exact negative: neighbours cannot both reject a ray
+    through their edge.  The renderer's method, except for edge functions that round to 0: the
+    renderer computes those exactly, and assigns a hit on an edge to exactly one neighbour, as if
+    the ray were moved infinitesimally (`shapes.meshes.watertight.project`).
     Cost: 22 +, 16 *, 4 /.
     Fails: never at edges, but a ray whose edge function rounds to 0 hits both neighbours; with
-    slivers, where t is off by 3e3 u in the median, and with grazing rays, as all do.  (In float32
-    it was published with zero edge functions computed again in float64.)
+    slivers, where t is off by 3e3 u in the median, and with grazing rays, as all do.  (It was
+    published for float32, with zero edge functions computed again in float64.)
     """
     z = 2
     if abs(ray.d.x) >= abs(ray.d.y) and abs(ray.d.x) >= abs(ray.d.z):

@@ -12,7 +12,7 @@ METAL, SKY = "material_rough_conductor", "environment"
 FAULTS = (
     SourceFault(
         "direct light counted twice", BOX, "integrators/path.py",
-        "        weight = _weight(path.alone, _BSDF, state.bsdf_pdf, light_pdf)\n"
+        "        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)\n"
         "    return state.throughput * area",
         "    return state.throughput * area",
     ),

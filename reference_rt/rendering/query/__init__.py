@@ -1,15 +1,17 @@
-"""What can be asked about a scene with arrays of rays, points and directions.
+"""Array queries of a scene: rays, points and directions in, hits, densities and radiance out.
 
-`Scene` has all of it as methods; most functions here take the scene's tables, for callers that have
-these.  `hits` and `crossings`: which surfaces rays meet;  `light`:
-samples of lights and their densities;  `bsdf`: what a material scatters;  `camera`: the camera's
-rays;  `radiance`: the light along given rays, by any integrator;  `rays`: how arrays are checked.
+`hits`: first hits and occlusion;  `crossings`: all hits along a ray;  `camera`: camera rays;
+`bsdf`: evaluate and sample a material;  `light`: light samples and densities;  `radiance`: any
+integrator along given rays;  `tracing`: the entry kernels;  `rays`: checks, broadcasting, threads.
+`Scene` has the queries as methods; most functions here take the scene's tables instead.
 
-All arrays are float64 or int64; origins and directions are (..., 3) in world coordinates and scene
-units, and broadcast; directions need not have unit length: t counts in units of |d|.  A ray of
-which a number is not finite, or whose direction is 0, meets nothing; neither does one that would at
-a point, or a t, beyond float64's range.  Arrays of other shapes, and what is not numbers, raise
+Contract: all arrays are float64 or int64.  Origins and directions are (..., 3) in world coordinates
+and scene units, and broadcast.  Directions may have any length; t counts in units of |d|.  A ray
+misses if one of its numbers is not finite, if its direction is 0, or if its hit would have a point
+or t beyond float64's range.  Arrays of other shapes, and arrays that are not numeric, raise
 ValueError.
+
+To add a query: a function here with its entry kernel, exported below; a line in `Scene`.
 """
 
 import warnings
@@ -49,9 +51,9 @@ def closest(
     directions: npt.ArrayLike,
     threads: int | None = None,
 ) -> Closest:
-    """Deprecated: `first_hits` tells the numbers of shapes in place of internal codes."""
+    """Deprecated: use `first_hits`, which returns shape indices instead of internal codes."""
     warnings.warn(
-        "query.closest tells internal codes; use Scene.first_hits or query.first_hits",
+        "query.closest returns internal codes; use Scene.first_hits or query.first_hits",
         DeprecationWarning,
         stacklevel=2,
     )
@@ -61,7 +63,7 @@ def closest(
 def whitted_radiance(
     scene: SceneTables, integrator: Any, origins: npt.ArrayLike, directions: npt.ArrayLike
 ) -> FloatArray:
-    """Deprecated: the name of `radiance_without_noise` says what it does."""
+    """Deprecated: the old name of `radiance_without_noise`."""
     warnings.warn(
         "query.whitted_radiance is now query.radiance_without_noise; see also Scene.radiance",
         DeprecationWarning,

@@ -1,4 +1,4 @@
-"""What a material scatters: its BSDF, in the shading frame of a surface."""
+"""The BSDF of a material, evaluated and sampled in the shading frame of a surface."""
 
 import math
 from dataclasses import dataclass
@@ -15,8 +15,15 @@ from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
 from reference_rt.materials import Materials, Shading, kept_floats
 from reference_rt.materials.textured import look, looked_floats
 from reference_rt.rendering.query.hits import BoolArray
-from reference_rt.rendering.query.rays import in_blocks, numbers, shaped, together
+from reference_rt.rendering.query.rays import (
+    broadcast,
+    check_in_unit_cube,
+    in_blocks,
+    numbers,
+    shaped,
+)
 from reference_rt.scene.build import BuiltScene
+from reference_rt.scene.model import no_such
 from reference_rt.shapes import Sphere
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Textures
@@ -25,12 +32,12 @@ from reference_rt.util.errors import SceneError
 
 @dataclass(frozen=True)
 class BsdfSamples:
-    """Directions that a material draws for `wo`.
+    """Directions that BSDF sampling draws for `wo`.
 
     wi (..., 3): unit directions;  weight (..., 3): f(wo, wi) |cos wi| / pdf;  pdf (...): density
-    per solid angle, 0 where nothing is scattered, or light goes nowhere that counts;  eta (...):
-    index of refraction of wi's side over wo's, 1 unless it went through;  is_delta (...): whether
-    the direction is one of a few (mirrored, refracted, straight on): pdf is then its probability.
+    per solid angle, 0 if nothing is scattered;  eta (...): index of refraction on wi's side over
+    that on wo's side, 1 for reflection;  is_delta (...): whether wi is from a delta lobe (mirrored,
+    refracted, transmitted straight on): pdf is then its probability.
     """
 
     wi: FloatArray
@@ -45,7 +52,7 @@ def _shading(
     materials: Materials, textures: Textures | None, m: int, wo: Vec3, at: FloatArray,
     kept: FloatArray,
 ) -> Shading:  # fmt: skip
-    """A point whose shading frame is that of the world;  at (11,): u, v, colour, dp/du, dp/dv."""
+    """A point whose shading frame is the world's.  at (11,): u, v, colour, dp/du, dp/dv."""
     zero, z = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 1.0)
     frame = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), z)
     tangents = Tangents(Vec3(at[5], at[6], at[7]), Vec3(at[8], at[9], at[10]))
@@ -58,7 +65,7 @@ def _shading(
     return shading
 
 
-# It takes the materials and the textures alone: scenes of other shapes and lights share it.
+# It takes only materials and textures, so that scenes with other shapes and lights share it.
 @entry_kernel
 def _scatter(
     materials: Materials,
@@ -70,8 +77,8 @@ def _scatter(
     at: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Into out (n, 4): value and density towards wi;  or, where u has rows, into out (n, 9): wi,
-    weight, density, eta and whether it is one of a few, of what u draws."""
+    """Evaluate, if u is `NOTHING`: value and density towards wi, into out (n, 4).  Or sample with
+    u: wi, weight, pdf, eta and is_delta, into out (n, 9)."""
     kept = local_floats(kept_floats(materials))
     origin = Vec3(0.0, 0.0, 0.0)
     for i in range(len(wo)):
@@ -98,33 +105,32 @@ def _scatter(
 
 
 NOTHING = np.empty((0, 3))
+"""In place of wi or u."""
 
 
 class Bsdf:
-    """What one material of a scene scatters, whatever it is made of.
+    """The BSDF of one material of a scene, leaf or nested.
 
-    All directions are in the shading frame, z along the shading normal, x along dp/du, and point
-    away from the surface: `wo` to where the radiance goes (the viewer), `wi` to where it comes from
-    (the light).  They may have any length; along what is no direction nothing is scattered.
-    Mitsuba gives the two names the other way round.  Values are those of radiance, not of
-    importance: what enters glass of index eta is multiplied by 1 / eta².
+    Directions are in the shading frame (z along the shading normal, x along dp/du) and point away
+    from the surface: `wo` towards the viewer, `wi` towards the light.  (Mitsuba swaps the two
+    names.)  They may have any length; for one that is 0 or not finite the value is 0.  Values are
+    for radiance, not importance: radiance that enters glass of index eta is multiplied by 1 / eta².
 
-    Where on the surface textures are asked, every method takes as `uv` (..., 2); `colour` (..., 3),
-    the interpolated colour of a mesh's vertices, negative for none; `dpdu` and `dpdv` (..., 3), how
-    the point moves with u and v, which bump and normal maps ask.  All arrays broadcast; single
-    directions give numbers.  Raises ValueError for arrays of other shapes.
+    Every method takes the place on the surface: `uv` (..., 2) for textures; `colour` (..., 3), the
+    interpolated vertex colour of a mesh, negative for none; `dpdu` and `dpdv` (..., 3), the
+    derivatives of the point, for bump and normal maps.  All arrays broadcast; single directions
+    give numbers.  Raises ValueError for arrays of other shapes.
     """
 
     def __init__(self, scene: BuiltScene, name: str | None) -> None:
-        """Of material `name`; none: what shapes without a material are made of.  Raises SceneError
-        where there is no such material."""
+        """The BSDF of material `name`; None: the default material, of shapes that have none.
+        Raises SceneError if the scene has no such material."""
         if name is None:
             scene, number = BuiltScene(shapes=(Sphere(),)), 0
         elif name in scene.materials:
             number = list(scene.materials).index(name)
         else:
-            known = ", ".join(f"'{m}'" for m in scene.materials) or "none"
-            raise SceneError(f"there is no material '{name}'; expected one of: {known}")
+            raise SceneError(no_such("material", name, scene.materials))
         self._tables, self._number = scene.tables, number
 
     def evaluate(
@@ -137,9 +143,9 @@ class Bsdf:
         dpdv: npt.ArrayLike = (0.0, 1.0, 0.0),
         threads: int | None = None,
     ) -> FloatArray:
-        """f(wo, wi) |cos wi| (..., 3), the cosine included, without what is mirrored or refracted
-        perfectly: that has no finite value, and only `sample` finds it."""
-        out, shape = self._ask(wo, wi, None, (uv, colour, dpdu, dpdv), threads)
+        """f(wo, wi) |cos wi| (..., 3), the cosine included, without delta lobes: these have no
+        finite value, and only `sample` draws them."""
+        out, shape = self._scatter(wo, wi, None, (uv, colour, dpdu, dpdv), threads)
         return shaped(out[:, :3], shape)  # type: ignore[no-any-return]
 
     def pdf(
@@ -152,9 +158,9 @@ class Bsdf:
         dpdv: npt.ArrayLike = (0.0, 1.0, 0.0),
         threads: int | None = None,
     ) -> FloatArray:
-        """The density per solid angle (...) with which `sample` draws wi, perfect mirrors and glass
-        apart: where it draws those too, the density's integral is less than 1."""
-        out, shape = self._ask(wo, wi, None, (uv, colour, dpdu, dpdv), threads)
+        """The density per solid angle (...) with which `sample` draws wi, without delta lobes: if
+        the material has any, the density integrates to less than 1."""
+        out, shape = self._scatter(wo, wi, None, (uv, colour, dpdu, dpdv), threads)
         return shaped(out[:, 3], shape)  # type: ignore[no-any-return]
 
     def sample(
@@ -167,13 +173,13 @@ class Bsdf:
         dpdv: npt.ArrayLike = (0.0, 1.0, 0.0),
         threads: int | None = None,
     ) -> BsdfSamples:
-        """A direction drawn for wo;  u (..., 3): numbers in [0, 1), the first for the choice among
-        lobes, two for the direction in one."""
-        out, shape = self._ask(wo, None, u, (uv, colour, dpdu, dpdv), threads)
+        """A direction drawn for wo.  u (..., 3): numbers in [0, 1), the first selects the lobe, the
+        other two the direction in it."""
+        out, shape = self._scatter(wo, None, u, (uv, colour, dpdu, dpdv), threads)
         columns = (out[:, 0:3], out[:, 3:6], out[:, 6], out[:, 7], out[:, 8] != 0.0)
         return BsdfSamples(*(shaped(column, shape) for column in columns))
 
-    def _ask(
+    def _scatter(
         self,
         wo: npt.ArrayLike,
         wi: npt.ArrayLike | None,
@@ -187,16 +193,16 @@ class Bsdf:
         sizes = (("uv", 2), ("colour", 3), ("dpdu", 3), ("dpdv", 3))
         for (label, size), values in zip(sizes, place, strict=True):
             arrays.append((label, numbers(label, values, size), 1))
-        shape, (back, other, *at) = together(*arrays)
-        if u is not None and not ((other >= 0.0) & (other < 1.0)).all():
-            raise ValueError("u: expected numbers from 0 up to, not including, 1")
+        shape, (back, other, *at) = broadcast(*arrays)
+        if u is not None:
+            check_in_unit_cube(other)
         where = np.concatenate(at, axis=1)
         out = np.empty((len(back), 4 if u is None else 9))
         materials, textures = self._tables.materials, self._tables.textures
 
-        def ask(k: slice) -> None:
+        def scatter(k: slice) -> None:
             wi_of, u_of = (other[k], NOTHING) if u is None else (NOTHING, other[k])
             _scatter(materials, textures, self._number, back[k], wi_of, u_of, where[k], out[k])
 
-        in_blocks(ask, len(back), threads)
+        in_blocks(scatter, len(back), threads)
         return out, shape

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from reference_rt.cameras import LENS_CENTRE, camera_ray
 from reference_rt.core.arrays import FloatArray
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.rendering.query.rays import in_blocks, numbers, shaped, together
+from reference_rt.rendering.query.rays import broadcast, in_blocks, numbers, shaped
 from reference_rt.scene.build import BuiltScene
 
 
@@ -20,7 +20,7 @@ class CameraRays(NamedTuple):
     directions: FloatArray
 
 
-# Typed by the camera alone.
+# It takes only the camera, so that all scenes with such a camera share it.
 @entry_kernel
 def _camera_rays(
     view: Any, x: FloatArray, y: FloatArray, lens: FloatArray, o: FloatArray, d: FloatArray
@@ -38,18 +38,18 @@ def camera_rays(
     lens: npt.ArrayLike = LENS_CENTRE,
     threads: int | None = None,
 ) -> CameraRays:
-    """The rays that the camera sends through its film.
+    """The camera's rays through points of the film, as `render` traces them.
 
-    pixels (..., 2): column and row, counted from the top left; none: all, (height, width);  offsets
+    pixels (..., 2): column and row, counted from the top left; None: all, (height, width);  offsets
     (..., 2): from the pixel's centre, in pixels to the right and down, within [-1/2, 1/2] for
-    points of the pixel itself;  lens (..., 2): the numbers in [0, 1) that pick the point of a thin
-    lens, (1/2, 1/2) its middle; other cameras have none.  They broadcast.  These are the very rays
-    that `render` traces.  Raises ValueError.
+    points of the pixel itself;  lens (..., 2): the numbers in [0, 1) that select the point of a
+    thin lens, (1/2, 1/2) for its middle; other cameras ignore them.  All broadcast.  Raises
+    ValueError.
     """
     width, height = scene.film.width, scene.film.height
     if pixels is None:
         pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1)
-    shape, (pixel, offset, on_lens) = together(
+    shape, (pixel, offset, on_lens) = broadcast(
         ("pixels", numbers("pixels", pixels, 2), 1),
         ("offsets", numbers("offsets", offsets, 2), 1),
         ("lens", numbers("lens", lens, 2), 1),

@@ -1,4 +1,4 @@
-"""What rays meet first, and whether they meet anything."""
+"""First hits of rays, and occlusion."""
 
 import math
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.query.rays import Rays, checked_rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.query.tracing import (
     NO_LIMIT,
-    find,
+    empty_hits,
+    empty_primitives,
     first_beyond,
-    many,
-    no_answers,
-    no_primitives,
-    part_of,
+    rows_of,
+    trace_first_hits,
+    trace_in_ray_order,
 )
 
 BoolArray = npt.NDArray[np.bool_]
@@ -28,13 +28,13 @@ BoolArray = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Hits:
-    """Which surfaces n rays meet.
+    """The surfaces that n rays hit.
 
     t (n,): inf for a miss;  shape (n,): index in the scene's shapes, -1 for a miss;  primitive
-    (n,): number of the triangle in its mesh, counting those of the file that are left out too (see
-    `MeshData`), or of the face of a solid (of a box: axis, + 3 on the positive side);  part (n,):
-    number of the operand in its solid, or of the shape in its group;  instance (n,): number of the
-    copy that the shape stands for, -1 outside groups.
+    (n,): number of the triangle in its mesh file, counting triangles that the reader drops (see
+    `MeshData`), or of the face of a shape (box: axis, + 3 on the positive side);  part (n,): number
+    of the operand in its solid, or of the shape in its group;  instance (n,): number of the group's
+    copy, -1 outside groups.
     """
 
     t: FloatArray
@@ -45,17 +45,17 @@ class Hits:
 
     @property
     def hit(self) -> BoolArray:
-        """Whether each ray meets anything (n,)."""
+        """Whether each ray hits anything (n,)."""
         return self.shape >= 0
 
 
 @dataclass(frozen=True)
 class Intersections(Hits):
-    """Which surfaces n rays meet, and where.
+    """The surfaces that n rays hit, and where.
 
-    p, n, ns (n, 3): point, unit geometric and shading normal, 0 for a miss;  uv (n, 2): the surface
-    coordinates.  n points outwards, or to where a mesh's winding says; it is not turned towards the
-    ray.
+    p, n, ns (n, 3): point, unit geometric normal and unit shading normal, 0 for a miss;  uv (n, 2):
+    surface coordinates.  n points outwards, for a mesh by its winding; it is not flipped towards
+    the ray.
     """
 
     p: FloatArray
@@ -72,18 +72,18 @@ def _occluded(
 
 
 def _trace(scene: SceneTables, rays: Rays, threads: int | None, surfaces: bool) -> list[Any]:
-    """The columns of `Answers`, as the rays were shaped."""
+    """The columns of `HitArrays`, in the shape of the given rays."""
     low, high, n = rays.t_min, rays.t_max, len(rays.o)
-    out = no_answers(n, surfaces)
+    out = empty_hits(n, surfaces)
 
     def trace(k: slice) -> None:
-        find(
+        trace_first_hits(
             scene.geometry,
             rays.o[k],
             rays.d[k],
             None if low is None else low[k],
             NO_LIMIT if high is None else high[k],
-            part_of(out, k),
+            rows_of(out, k),
             n,
         )
 
@@ -99,15 +99,15 @@ def intersect(
     t_max: npt.ArrayLike = math.inf,
     threads: int | None = None,
 ) -> Intersections:
-    """What each ray meets first at t_min < t < t_max, and where.
+    """The first hit of each ray at t_min < t < t_max, with points, normals and uv.
 
     Origins and directions (..., 3) broadcast: one origin serves many directions, and a single ray
     gives numbers and (3,) vectors.  t_min >= 0 and t_max: numbers, or one for each ray, in units of
-    |d|.  On `threads` threads (default: all cores); their number changes no bit.  Raises ValueError
-    for arrays of other shapes, and for what is not numbers.
+    |d|.  threads: default all cores; their number changes no bit.  Raises ValueError for arrays of
+    other shapes, and for arrays that are not numeric.
 
-    With t_min > 0 every surface in between counts as not there, to the last bit of t: the next
-    crossing of the same shape is found, no ray is moved.
+    t_min is exact to the last bit of t: origins are not moved, and all crossings at t <= t_min are
+    skipped, so that the same shape may be hit further along.
     """
     rays = rays_of(origins, directions, t_min, t_max)
     return Intersections(*_trace(scene, rays, threads, surfaces=True))
@@ -154,11 +154,11 @@ def occluded(
 
 @dataclass(frozen=True)
 class Closest:
-    """What n rays meet first, by the rows of internal tables: for tests of traversal.
+    """First hits of n rays as rows of internal tables: for tests of traversal.
 
-    t (n,): inf for a miss;  kind, row (n,): the table of `SceneTables.geometry.shapes` by the code
-    that `reference_rt.shapes` gives it, and the row in it, -1 for a miss;  uv (n, 2): the
-    coordinates that the test itself found, of a triangle its barycentrics.
+    t (n,): inf for a miss;  kind, row (n,): code in `reference_rt.shapes` of the table in
+    `SceneTables.geometry.shapes`, and the row in it, -1 for a miss;  uv (n, 2): the coordinates
+    that the intersection test computes, for triangles barycentrics.
     """
 
     t: FloatArray
@@ -175,15 +175,15 @@ def closest_primitives(
 ) -> Closest:
     """See `Closest`."""
     o, d = checked_rays(origins, directions)
-    found, out = no_primitives(len(o)), no_answers(len(o), surfaces=False)
+    found, out = empty_primitives(len(o)), empty_hits(len(o), surfaces=False)
 
     def trace(k: slice) -> None:
-        met = many(scene.geometry, o[k], d[k], NO_LIMIT, part_of(out, k))
+        met = trace_in_ray_order(scene.geometry, o[k], d[k], NO_LIMIT, rows_of(out, k))
         for whole, part in zip(found, met, strict=True):
             whole[k] = part
 
     in_blocks(trace, len(o), threads)
-    # What float64 has no numbers for is no hit.
+    # A hit beyond the range of float64 is a miss.
     missed = out.shape < 0
     found.codes[missed], found.uv[missed] = -1, 0.0
     return Closest(out.t, found.codes[:, 0].copy(), found.codes[:, 1].copy(), found.uv)

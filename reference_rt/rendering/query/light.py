@@ -1,4 +1,4 @@
-"""Samples of a scene's lights, their densities, and the direct light of single ones."""
+"""Light samples, their densities, and the direct light of single lights."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from reference_rt import lights as any_light
 from reference_rt.accel.array_query import Primitives
 from reference_rt.accel.geometry import Geometry, closest_hit, surface
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.ray import Hit, Ray
+from reference_rt.core.ray import Ray
 from reference_rt.core.scaled_ray import scaled
 from reference_rt.core.vec3 import normalize, row
 from reference_rt.integrators.direct_light import direct
@@ -21,14 +21,15 @@ from reference_rt.lights import TABLES, Constant, EnvironmentMap, Lights
 from reference_rt.materials import kept_floats
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.query.rays import (
+    broadcast,
+    check_in_unit_cube,
     checked_rays,
     in_blocks,
     numbers,
     rays_of,
     shaped,
-    together,
 )
-from reference_rt.rendering.query.tracing import NO_LIMIT, find, no_answers
+from reference_rt.rendering.query.tracing import NO_LIMIT, empty_hits, hit_of, trace_first_hits
 from reference_rt.scene.build import BuiltScene
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Shapes
@@ -37,14 +38,15 @@ from reference_rt.textures import Textures
 
 @dataclass(frozen=True)
 class LightSamples:
-    """Light that arrives at n points if nothing is in the way.
+    """Light samples at n points, without visibility.
 
-    light (n,): number of the light that was picked, see `light_paths`, -1 for none;  wi (n, 3): the
-    unit direction towards it;  distance (n,): inf for directions and environments;  target (n, 3):
-    the point on the light, moved off its surface by its rounding;  radiance (n, 3): what arrives
-    along wi; of a point, spot or directional light its irradiance across wi (intensity / r²);  pdf
-    (n,): density of wi per solid angle, the chance of the light included; 0 where nothing arrives;
-    is_delta (n,): whether the light has no extent: pdf is then the chance of the light alone.
+    light (n,): number of the selected light, see `light_sources`, -1 for none;  wi (n, 3): unit
+    direction towards it;  distance (n,): inf for directional lights and environments;  target (n,
+    3): the point on the light, offset from its surface by its error bound;  radiance (n, 3): what
+    arrives along wi; for a point, spot or directional light its irradiance perpendicular to wi
+    (intensity / r²);  pdf (n,): solid-angle density of wi times the probability of the light; 0 if
+    nothing arrives;  is_delta (n,): whether the light is a point, spot or direction: pdf is then
+    the probability of the light alone.
     """
 
     light: IntArray
@@ -58,7 +60,7 @@ class LightSamples:
 
 @dataclass(frozen=True)
 class DirectLight:
-    """Direct light of one light at what n rays hit first.
+    """Direct light of one light at the first hits of n rays.
 
     target (n, 3): the point on the light, or the direction towards an environment;  pdf (n,): its
     density per solid angle, 1 for a point light, 0 where no light can arrive or nothing was hit;
@@ -70,7 +72,7 @@ class DirectLight:
     contribution: FloatArray
 
 
-# They take the lights, the shapes and the textures alone: scenes of other materials share them.
+# They take only lights, shapes and textures, so that scenes with other materials share them.
 @entry_kernel
 def _sample(
     lights: Lights,
@@ -117,19 +119,10 @@ def _pdf(
         ray, _, valid = scaled(row(p, i), row(d, i), math.inf)
         if not valid:
             continue
-        kind = found.codes[i, 0]
-        if kind < 0:
+        if found.codes[i, 0] < 0:
             out[i] = any_light.environment_pdf(lights, ray.o, row(n, i), normalize(ray.d))
             continue
-        hit = Hit(
-            found.t[i],
-            kind,
-            found.codes[i, 1],
-            found.uv[i, 0],
-            found.uv[i, 1],
-            found.codes[i, 2],
-        )
-        q = surface(geometry, ray, hit)
+        q = surface(geometry, ray, hit_of(found, i))
         out[i] = any_light.area_pdf(lights, geometry.shapes, ray.o, row(n, i), q)
 
 
@@ -151,12 +144,12 @@ def _direct(
 
 @dataclass(frozen=True)
 class LightSources:
-    """What the numbers of lights mean, an entry for each.
+    """The shape or light of the scene that each light number stands for.
 
-    shape (m,): the index in the scene's shapes of an area light, of which a mesh has one for each
-    triangle; -1 for what is no shape, and within groups;  light (m,): the index in the scene's
-    lights, -1 for area lights;  probability (m,): the chance by power alone, 0 of a light that
-    cannot be sampled (a part of a group or of a solid, a shape without such a kernel).
+    shape (m,): index of an area light in the scene's shapes (a mesh has a light for each triangle);
+    -1 for other lights, and within groups;  light (m,): index in the scene's lights, -1 for area
+    lights;  probability (m,): selection probability by power, 0 for a light that cannot be sampled
+    (in a group or a solid, or a shape without a sampling kernel).
     """
 
     shape: IntArray
@@ -165,7 +158,7 @@ class LightSources:
 
 
 def light_sources(scene: BuiltScene) -> LightSources:
-    """The lights of a scene in the order of their numbers."""
+    """The lights of a scene, in the order of their numbers."""
     tables = scene.tables
     areas, choice = tables.lights.areas, tables.lights.choice
     shape = []
@@ -193,19 +186,19 @@ def sample_lights(
     normals: npt.ArrayLike = (0.0, 0.0, 0.0),
     threads: int | None = None,
 ) -> LightSamples:
-    """A light for each point, and a direction towards it.
+    """A randomly selected light, and a direction towards it, for each point.
 
-    points (..., 3);  u (..., 3): numbers in [0, 1), the first for the light, two for its point;
-    normals (..., 3): unit normals on the side that light may come from, by which many lights are
-    picked; 0 for light from both sides.  They broadcast; a single point gives numbers.  The
-    estimate of what a surface sends is f |cos| radiance / pdf, where `occluded` finds nothing in
-    the way.  Raises ValueError.
+    points (..., 3);  u (..., 3): numbers in [0, 1), the first selects the light, the other two the
+    point on it;  normals (..., 3): unit normals on the lit side, which the light tree uses; 0 for
+    light from both sides.  All broadcast; a single point gives numbers.  The estimate of the
+    scattered radiance is f |cos| radiance / pdf, or 0 if the ray is `occluded`.  Raises ValueError.
     """
-    shape, (p, u, n) = together(
+    shape, (p, u, n) = broadcast(
         ("points", numbers("points", points, 3), 1),
-        ("u", _in_unit_cube(numbers("u", u, 3)), 1),
+        ("u", numbers("u", u, 3), 1),
         ("normals", numbers("normals", normals, 3), 1),
     )
+    check_in_unit_cube(u)
     light, out = np.empty(len(p), np.int64), np.empty((len(p), 12))
 
     def sample(k: slice) -> None:
@@ -217,12 +210,6 @@ def sample_lights(
     return LightSamples(*(shaped(column, shape) for column in (light, *columns)))
 
 
-def _in_unit_cube(u: FloatArray) -> FloatArray:
-    if not ((u >= 0.0) & (u < 1.0)).all():
-        raise ValueError("u: expected numbers from 0 up to, not including, 1")
-    return u
-
-
 def light_pdf(
     scene: SceneTables,
     points: npt.ArrayLike,
@@ -231,11 +218,13 @@ def light_pdf(
     t_min: npt.ArrayLike = 0.0,
     threads: int | None = None,
 ) -> FloatArray:
-    """The density per solid angle with which `sample_lights` picks what is seen from points
-    (..., 3) in directions (..., 3): an area light, if that is met first at t > t_min, or the
-    environment, if nothing is; 0 where neither is.  The chance of the light is included.  Raises
-    ValueError."""
-    shape, (p, d, n, low) = together(
+    """The solid-angle density with which `sample_lights` draws directions (..., 3) at points
+    (..., 3), the probability of the light included.
+
+    The light is the area light that the ray hits first at t > t_min, or the environment if it hits
+    nothing; the density is 0 if there is neither.  Raises ValueError.
+    """
+    shape, (p, d, n, low) = broadcast(
         ("points", numbers("points", points, 3), 1),
         ("directions", numbers("directions", directions, 3), 1),
         ("normals", numbers("normals", normals, 3), 1),
@@ -244,13 +233,15 @@ def light_pdf(
     rays = rays_of(p, d, low if low.any() else 0.0)
     out = np.empty(len(p))
 
-    def ask(k: slice) -> None:
-        answers = no_answers(len(p[k]), surfaces=False)
+    def density(k: slice) -> None:
+        answers = empty_hits(len(p[k]), surfaces=False)
         begin = None if rays.t_min is None else rays.t_min[k]
-        found = find(scene.geometry, p[k], d[k], begin, NO_LIMIT, answers, len(p), rows=True)
+        found = trace_first_hits(
+            scene.geometry, p[k], d[k], begin, NO_LIMIT, answers, len(p), rows=True
+        )
         _pdf(scene.geometry, scene.lights, p[k], n[k], d[k], found, out[k])
 
-    in_blocks(ask, len(p), threads)
+    in_blocks(density, len(p), threads)
     return shaped(out, shape)  # type: ignore[no-any-return]
 
 
@@ -261,7 +252,7 @@ def direct_light(
     light: int,
     u: tuple[float, float] = (0.5, 0.5),
 ) -> DirectLight:
-    """Light from light number `light`, see `light_sources`, at its point that `u` picks."""
+    """Direct light of number `light` (see `light_sources`) from the point that `u` selects."""
     o, d = checked_rays(origins, directions)
     choice = scene.lights.choice
     if choice is None or choice.probability[light] == 0.0:

@@ -1,4 +1,4 @@
-"""The light that arrives along given rays, by any of the integrators."""
+"""The radiance along given rays, by any integrator."""
 
 import math
 import os
@@ -46,15 +46,14 @@ def radiance(
     integrator: AnyIntegrator | None = None,
     threads: int | None = None,
 ) -> Radiance:
-    """The radiance that arrives at each origin from the direction that its ray goes.
+    """The radiance that arrives at each origin from the direction of its ray.
 
-    Rays as for `intersect`: directions may have any length, and along what is no ray nothing
-    arrives.  integrator: another than the scene's; with `Path(max_depth=1)` what is seen directly.
-    Of `RayCast`, the colour that it shows.  spp: samples for each ray (none: as many as the scene's
-    sampler takes for a pixel; one suffices where nothing is random).  Their numbers are a pure
-    function of (seed, number of the ray along the rows, sample): independent ones, as the standard
-    error asks for.  The result has the same bits on any number of `threads` (default: all cores).
-    Raises ValueError, SceneError.
+    Rays as for `intersect`; a ray that is not finite or has no direction gets 0.  integrator:
+    default the scene's; `Path(max_depth=1)` gives emission only, `RayCast` its colour.  spp:
+    samples per ray; None: as many as the scene's sampler takes per pixel, or one for a
+    deterministic integrator.  The random numbers are independent, as the standard error requires,
+    and a pure function of (seed, number of the ray along the rows, sample).  threads: default all
+    cores; their number changes no bit.  Raises ValueError, SceneError.
     """
     integrator = scene.integrator if integrator is None else integrator
     if spp is None:
@@ -77,7 +76,7 @@ def radiance(
 
 
 def _tables_for(scene: BuiltScene, integrator: AnyIntegrator) -> SceneTables:
-    """The scene's own where they would be the same for the other integrator."""
+    """The scene's tables for another integrator: its own, if they would be the same."""
     own = scene.integrator
     if own.follows_scattered == integrator.follows_scattered and (
         isinstance(own, Path) or not isinstance(integrator, Path)
@@ -93,10 +92,10 @@ class _UnitRays(NamedTuple):
 
 
 def _unit(rays: Rays) -> _UnitRays:
-    """Rays with directions of length 1, some ray in the place of what is none.
+    """Rays with unit directions; an arbitrary ray in place of each invalid one.
 
-    What has unit length already, to within the rounding of making it so, is left alone: rays of a
-    camera are then the same bits that are rendered with.
+    Directions that are unit to within rounding are kept, so that camera rays keep the bits that
+    `render` traces.
     """
     with np.errstate(all="ignore"):
         size = np.abs(rays.d).max(axis=1, initial=0.0, keepdims=True)
@@ -134,21 +133,21 @@ def estimate(
     sampler = Independent(spp=spp, seed=seed)
     o, d, valid = _unit(rays)
     n = len(o)
-    mean, spread = np.zeros((n, 3)), np.zeros((n, 3))
+    mean, variance = np.zeros((n, 3)), np.zeros((n, 3))
     threads = threads or os.cpu_count() or 1
     if n > 0:
         tables, tracer = with_tracer(tables, setup)
         arguments = (
             *(setup, tables, GivenRays(o, d), None, sampler.setup(), (n, 1), spp),
-            *(mean, spread),
+            *(mean, variance),
         )
         call = render_band, signature_of(*arguments, 0, 0, 0, 0)
-        (band,) = compile_bands([call], tables, tracer, threads)
-        run_bands(band, arguments, n, spp, threads, lambda what, fraction: None)
+        (kernel,) = compile_bands([call], tables, tracer, threads)
+        run_bands(kernel, arguments, n, spp, threads, lambda what, fraction: None)
     if spp == 1:
-        spread[:] = math.inf
-    mean[~valid], spread[~valid] = 0.0, 0.0
-    return mean, np.sqrt(spread)
+        variance[:] = math.inf
+    mean[~valid], variance[~valid] = 0.0, 0.0
+    return mean, np.sqrt(variance)
 
 
 def radiance_without_noise(

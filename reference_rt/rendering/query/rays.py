@@ -1,4 +1,4 @@
-"""Arrays of rays: checked and brought to one shape, and handed to threads."""
+"""Arrays of rays: checks, broadcasting, and blocks for threads."""
 
 import math
 import os
@@ -13,8 +13,8 @@ from reference_rt.core.arrays import FloatArray
 
 
 def numbers(name: str, values: npt.ArrayLike, *tail: int) -> FloatArray:
-    """Values as a float64 array whose shape ends in `tail`.  Raises ValueError for what is not
-    numbers, or has another shape."""
+    """Values as a float64 array whose shape ends in `tail`.  Raises ValueError for other shapes and
+    for values that are not real numbers."""
     try:
         array = np.asarray(values)
     except ValueError:  # rows of different lengths
@@ -27,14 +27,13 @@ def numbers(name: str, values: npt.ArrayLike, *tail: int) -> FloatArray:
     return np.asarray(array, np.float64)
 
 
-def together(
+def broadcast(
     *arrays: tuple[str, FloatArray, int],
 ) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Arrays (name, array, number of dimensions of one entry) of one leading shape, to which they
-    are broadcast: that shape, and each as (n, ...).  Raises ValueError.
+    """Broadcast arrays (name, array, number of trailing dimensions of an entry) to one leading
+    shape: that shape, and each array as (n, ...).  Raises ValueError.
 
-    Kernels are compiled for arrays that are contiguous and writable: what is so already is not
-    copied.
+    Kernels need contiguous and writable arrays; arrays that are so already are not copied.
     """
     leading = [a.shape[: a.ndim - tail] for _, a, tail in arrays]
     try:
@@ -52,9 +51,8 @@ def together(
 
 
 class Rays(NamedTuple):
-    """n rays from o (n, 3) into directions d (n, 3);  t_min, t_max (n,): None where nothing is
-    limited;  shape: that of the arrays that were given, broadcast, without their last dimension, ()
-    for a single ray."""
+    """n rays.  o, d (n, 3): origins and directions;  t_min, t_max (n,): None for no limit;  shape:
+    of the given arrays, broadcast, without the last dimension; () for a single ray."""
 
     shape: tuple[int, ...]
     o: FloatArray
@@ -71,7 +69,7 @@ def rays_of(
 ) -> Rays:
     """Origins (..., 3) and directions (..., 3), and t_min and t_max (...), broadcast.
 
-    Raises ValueError; of t also for NaN, and for a t_min below 0.
+    Raises ValueError, also for a t that is NaN and for a negative t_min.
     """
     arrays = [
         ("origins", numbers("origins", origins, 3), 1),
@@ -85,7 +83,7 @@ def rays_of(
             arrays.append((name, limit, 0))
     if (limits["t_min"][0] < 0.0).any():
         raise ValueError("t_min: expected 0 or above")
-    shape, flat = together(*arrays)
+    shape, flat = broadcast(*arrays)
     found = {name: array for (name, _, _), array in zip(arrays, flat, strict=True)}
     return Rays(shape, flat[0], flat[1], found.get("t_min"), found.get("t_max"))
 
@@ -99,21 +97,27 @@ def checked_rays(
 
 
 def shaped(values: npt.NDArray[Any], shape: tuple[int, ...]) -> Any:
-    """(n, ...) as the given rays were shaped; of a single ray, whose shape is (), a number."""
+    """(n, ...) in the shape of the given rays; a number for a single ray, whose shape is ()."""
     return values.reshape(shape + values.shape[1:])[()]
 
 
+def check_in_unit_cube(u: FloatArray) -> None:
+    """Raise ValueError for random numbers outside [0, 1)."""
+    if not ((u >= 0.0) & (u < 1.0)).all():
+        raise ValueError("u: expected numbers from 0 up to, not including, 1")
+
+
 _LEAST, _MOST = 1 << 12, 1 << 16
-"""Rays that a thread takes at once.  To hand them over it has to wait for Python's lock: with 2^14
-at once two threads took 43 ns of both together for a camera ray, with 2^16 and more 34, one thread
-31 (measured, a million rays)."""
+"""Fewest and most rays of a thread's block.  Each block costs a wait for the GIL: for a camera ray
+two threads together took 43 ns with blocks of 2^14, 34 ns with 2^16 and more, one thread 31 ns
+(measured, a million rays)."""
 
 
 def in_blocks(
     trace: Callable[[slice], None], n: int, threads: int | None, least: int = _LEAST
 ) -> None:
-    """`trace` of all of n rays, on threads (None: all cores), at least `least` of them at once:
-    kernels release the GIL.  Raises ValueError for a number of threads below 1."""
+    """Call `trace` for blocks of at least `least` of n rays, on threads (None: all cores; kernels
+    release the GIL).  Raises ValueError for a number of threads below 1."""
 
     def run(k: slice) -> None:
         with np.errstate(all="ignore"):
@@ -122,7 +126,7 @@ def in_blocks(
     if threads is not None and threads < 1:
         raise ValueError(f"threads: expected 1 or more, got {threads}")
     threads = threads or os.cpu_count() or 1
-    # Eight shares of each thread: then none waits long for another's last.
+    # Eight blocks per thread, so that no thread waits long for the last block of another.
     size = min(max(n // (8 * threads), least), _MOST)
     blocks = [slice(k, min(k + size, n)) for k in range(0, n, size)]
     if len(blocks) < 2 or threads == 1:

@@ -1,4 +1,4 @@
-"""All crossings of rays and a solid, not the first alone: what its laws are tested by."""
+"""All crossings of rays with one CSG solid, with error bounds: for tests of the solid's laws."""
 
 import math
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ from reference_rt.rendering.query.rays import checked_rays
 
 @dataclass(frozen=True)
 class SolidCrossings:
-    """Where n rays go in and out of a solid, in order, over all t > 0.
+    """The crossings of n rays with the surface of a solid, in order, at all t > 0.
 
-    t (n, k): inf where there are fewer than k;  width (n, k): how far rounding may have moved t:
-    crossings closer together than the sum of theirs are passed at once, and what is between them,
-    material or gap, is not told;  part (n, k): number of the operand that shows;  count (n,).
+    t (n, k): inf where there are fewer than k;  width (n, k): error bound of t: crossings closer
+    than the sum of their widths are merged, so that material or a gap between them is not reported;
+    part (n, k): number of the operand whose surface is crossed;  count (n,): number of crossings.
     """
 
     t: FloatArray
@@ -70,8 +70,8 @@ def crossings(
     directions: npt.ArrayLike,
     most: int = 64,
 ) -> SolidCrossings:
-    """All crossings of each ray with the solid of that number, in the scene's order; `most` of
-    them, though `count` counts all."""
+    """All crossings of each ray with solid number `solid`, in the scene's order of solids.  At most
+    `most` per ray are returned; `count` counts all."""
     solids = scene.geometry.solids
     if solids is None or not 0 <= solid < len(solids.first):
         known = 0 if solids is None else len(solids.first)

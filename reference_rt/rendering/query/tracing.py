@@ -1,4 +1,4 @@
-"""From arrays of rays to what they meet: the entry kernels, and how they follow each other."""
+"""Entry kernels of array queries: first hits and crossings of arrays of rays."""
 
 import math
 from typing import Any, NamedTuple
@@ -24,9 +24,8 @@ from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_integers
 
 
-class Answers(NamedTuple):
-    """The arrays of `Intersections` as kernels fill them; those of surfaces are empty where only
-    `Hits` are asked for."""
+class HitArrays(NamedTuple):
+    """The arrays of `Intersections`, which kernels fill; p, n, ns and uv may be left empty."""
 
     t: FloatArray
     shape: IntArray
@@ -39,32 +38,32 @@ class Answers(NamedTuple):
     uv: FloatArray
 
 
-def no_answers(n: int, surfaces: bool) -> Answers:
-    """Room for n, not filled."""
+def empty_hits(n: int, surfaces: bool) -> HitArrays:
+    """Uninitialised arrays for n hits, with or without p, n, ns and uv."""
     m = n if surfaces else 0
     shape, primitive, part, instance = np.empty((4, n), np.int64)
     p, normal, ns = np.empty((3, m, 3))
-    return Answers(np.empty(n), shape, primitive, part, instance, p, normal, ns, np.empty((m, 2)))
+    return HitArrays(np.empty(n), shape, primitive, part, instance, p, normal, ns, np.empty((m, 2)))
 
 
-def no_primitives(n: int) -> Primitives:
-    """Room for n, not filled."""
+def empty_primitives(n: int) -> Primitives:
+    """Uninitialised arrays for n hits."""
     return Primitives(np.empty(n), np.empty((n, 3), np.int64), np.empty((n, 2)))
 
 
-def part_of(arrays: Any, k: slice | IntArray) -> Any:
-    """Rows k of each array of a NamedTuple; those of no rows stay as they are."""
+def rows_of(arrays: Any, k: slice | IntArray) -> Any:
+    """Rows k of each array of a NamedTuple; empty arrays stay empty."""
     return type(arrays)(*(a[k] if len(a) > 0 else a for a in arrays))
 
 
 EVERY_RAY = np.empty(0, np.int64)
-"""In place of the numbers of rays: each hit is of the ray of its own number."""
+"""In place of ray numbers: hit i is of ray i."""
 
 NO_LIMIT = np.empty(0)
-"""In place of a t for each ray."""
+"""In place of t_max for each ray: no limit."""
 
 
-# The kernels take the geometry alone: scenes of other materials and lights share them.
+# The kernels take only the geometry, so that scenes with other materials and lights share them.
 @entry_kernel
 def closest(
     geometry: Geometry,
@@ -73,13 +72,13 @@ def closest(
     t_max: FloatArray,
     found: Primitives,
     numbers: IntArray,
-    out: Answers,
+    out: HitArrays,
 ) -> None:
-    """What rays meet first, into `out`.
+    """First hits of rays, into `out`.
 
-    found, numbers: buffers of at least MOST_ADDED.  Hits are described while they are in the
-    processor's cache: a pass of its own over all of them took a third longer (measured).  Of
-    len(o) + MOST_ADDED, they keep all that was found.
+    found, numbers: buffers of at least MOST_ADDED entries.  With len(o) + MOST_ADDED entries they
+    keep all hits.  Hits are described while they are in the processor's cache: a separate pass
+    over all of them took a third longer (measured).
     """
     work = Work(
         Rays(local_floats(RAY_FLOATS)),
@@ -104,11 +103,11 @@ def closest_of_few(geometry: Geometry, o: FloatArray, d: FloatArray, found: Prim
 
 
 BUFFER = 256
-"""Hits between which `closest` describes what it found: their 14 KiB stay in the cache."""
+"""Size of the buffers of `closest` that need not keep all hits: 14 KiB, which stay in the cache."""
 
 FEW = 1 << 12
-"""Rays that are traced one by one: `closest` would find the same some milliseconds earlier, but
-takes 3 to 5 s longer to compile for a kind of scene (measured)."""
+"""Up to this many rays are traced one by one: `closest` has the same result some milliseconds
+earlier, but takes 3 to 5 s longer to compile for a kind of scene (measured)."""
 
 
 @entry_kernel
@@ -119,12 +118,20 @@ def describe(
     rays: IntArray,
     t_max: FloatArray,
     found: Primitives,
-    out: Answers,
+    out: HitArrays,
 ) -> None:
-    """rays: number of each hit's ray, or `EVERY_RAY`;  t_max (len(o),), or `NO_LIMIT`."""
+    """Fill `out` from the hits `found`.  rays: number of each hit's ray, or `EVERY_RAY`;  t_max
+    (len(o),) or `NO_LIMIT`."""
     for i in range(len(out.t)):
         r = rays[i] if len(rays) > 0 else i
         _describe(geometry, o, d, r, t_max, found, i, out, i)
+
+
+@kernel
+def hit_of(found: Primitives, k: int) -> Hit:
+    """Hit number k."""
+    codes = found.codes
+    return Hit(found.t[k], codes[k, 0], codes[k, 1], found.uv[k, 0], found.uv[k, 1], codes[k, 2])
 
 
 @kernel
@@ -136,18 +143,16 @@ def _describe(
     t_max: FloatArray,
     found: Primitives,
     k: int,
-    out: Answers,
+    out: HitArrays,
     i: int,
 ) -> None:
-    """Hit k of ray r as answer i: the one place where hits get the numbers that the public sees."""
-    kind = found.codes[k, 0]
-    if kind < 0:
+    """Write hit k, of ray r, to row i of `out`: the one place where internal codes become shape
+    indices."""
+    if found.codes[k, 0] < 0:
         _put_miss(out, i)
         return
     ray, unit, _ = scaled(row(o, r), row(d, r), math.inf)
-    hit = Hit(
-        found.t[k], kind, found.codes[k, 1], found.uv[k, 0], found.uv[k, 1], found.codes[k, 2]
-    )
+    hit = hit_of(found, k)
     t = hit.t * unit
     if len(t_max) > 0 and not t < t_max[r]:
         _put_miss(out, i)
@@ -170,7 +175,7 @@ def _describe(
 
 
 @kernel
-def _put_miss(out: Answers, i: int) -> None:
+def _put_miss(out: HitArrays, i: int) -> None:
     out.t[i], out.shape[i], out.primitive[i] = math.inf, -1, -1
     out.part[i], out.instance[i] = -1, -1
     if len(out.p) > 0:
@@ -193,9 +198,10 @@ def cross(
     rays: IntArray,
     found: Primitives,
 ) -> int:
-    """The crossings of rays from number `begin` on at t_min < t < t_max, at most `most` of each:
-    how many each has, into counts (len(o),), and the rays and crossings, one ray after another,
-    while there is room.  The number of the first ray for which there was none."""
+    """The crossings of the rays from number `begin` on, at t_min < t < t_max, at most `most` per
+    ray.  counts (len(o),): crossings of each ray;  rays, found: ray and hit of each crossing, one
+    ray after another, until the arrays are full.  Returns the number of the first ray that no
+    longer fits."""
     filled = 0
     for i in range(begin, len(o)):
         first = filled
@@ -209,7 +215,7 @@ def cross(
             hit, t = after.hit, after.hit.t * unit
             if hit.kind < 0 or not (t < t_max[i] and is_told(t, at(ray, hit.t))):
                 break
-            if not t > t_min[i]:  # where the quotient by `unit` was too small for float64
+            if not t > t_min[i]:  # t_min / unit has underflowed
                 continue
             if filled == len(rays):
                 return i
@@ -223,40 +229,40 @@ def cross(
     return len(o)
 
 
-def many(
-    geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: Answers
+def trace_in_ray_order(
+    geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: HitArrays
 ) -> Primitives:
-    """`closest`, and what it found in the order of the rays."""
+    """First hits, into `out`; also as primitives, in the order of the rays."""
     size = len(o) + MOST_ADDED
-    unordered, numbers = no_primitives(size), np.empty(size, np.int64)
+    unordered, numbers = empty_primitives(size), np.empty(size, np.int64)
     closest(geometry, o, d, t_max, unordered, numbers, out)
-    found = no_primitives(len(o))
+    found = empty_primitives(len(o))
     for ordered, values in zip(found, unordered, strict=True):
         ordered[numbers[: len(o)]] = values[: len(o)]
     return found
 
 
-def find(
+def trace_first_hits(
     geometry: Geometry,
     o: FloatArray,
     d: FloatArray,
     t_min: FloatArray | None,
     t_max: FloatArray,
-    out: Answers,
+    out: HitArrays,
     total: int,
     rows: bool = False,
 ) -> Primitives:
-    """What rays, of `total` in all, meet first, into `out`; where `rows` are asked for, also as it
-    stands in the tables."""
-    found = no_primitives(0)
+    """First hits of a block of rays, of `total` in all blocks, at t_min < t < t_max, into `out`;
+    with `rows` (or few rays) also as primitives."""
+    found = empty_primitives(0)
     if total <= FEW:
-        found = no_primitives(len(o))
+        found = empty_primitives(len(o))
         closest_of_few(geometry, o, d, found)
         describe(geometry, o, d, EVERY_RAY, t_max, found, out)
     elif rows:
-        found = many(geometry, o, d, t_max, out)
+        found = trace_in_ray_order(geometry, o, d, t_max, out)
     else:
-        buffer = no_primitives(BUFFER), np.empty(BUFFER, np.int64)
+        buffer = empty_primitives(BUFFER), np.empty(BUFFER, np.int64)
         closest(geometry, o, d, t_max, *buffer, out)
     if t_min is None:
         return found
@@ -265,9 +271,9 @@ def find(
         n, o, d, t_min = len(again), o[again], d[again], t_min[again]
         t_max = np.full(n, math.inf) if t_max is NO_LIMIT else t_max[again]
         beyond = first_beyond(geometry, o, d, t_min, t_max)
-        answers = no_answers(n, len(out.p) > 0)
-        describe(geometry, o, d, EVERY_RAY, t_max, beyond, answers)
-        for whole, part in zip((*found, *out), (*beyond, *answers), strict=True):
+        hits = empty_hits(n, len(out.p) > 0)
+        describe(geometry, o, d, EVERY_RAY, t_max, beyond, hits)
+        for whole, part in zip((*found, *out), (*beyond, *hits), strict=True):
             if len(whole) > 0:
                 whole[again] = part
     return found
@@ -278,10 +284,10 @@ def first_beyond(
 ) -> Primitives:
     """The first crossing of each ray at t_min < t < t_max."""
     n = len(o)
-    met, rays, counts = no_primitives(n), np.empty(n, np.int64), np.empty(n, np.int64)
+    met, rays, counts = empty_primitives(n), np.empty(n, np.int64), np.empty(n, np.int64)
     cross(geometry, o, d, t_min, t_max, 0, 1, counts, rays, met)
     m = int(counts.sum())
-    found = no_primitives(n)
+    found = empty_primitives(n)
     found.codes[:] = -1
     for whole, part in zip(found, met, strict=True):
         whole[rays[:m]] = part[:m]

@@ -27,7 +27,7 @@ def cornell():
 def test_same_bits_for_any_threads_and_tiling(cornell, band, monkeypatch):
     expected = render(cornell, threads=1).colour
     monkeypatch.setattr(
-        importlib.import_module("reference_rt.rendering.render"), "SAMPLES_PER_BAND", band
+        importlib.import_module("reference_rt.rendering.render"), "SAMPLES_PER_TILE", band
     )
     for threads in (1, 2, 3):
         assert np.array_equal(render(cornell, threads=threads).colour, expected)
@@ -84,7 +84,7 @@ def test_an_interrupt_while_bands_are_handed_out(monkeypatch):
 
     monkeypatch.setattr(module, "ThreadPoolExecutor", Pool)
     with pytest.raises(KeyboardInterrupt):
-        module.run_bands(band, (), 1000, module.SAMPLES_PER_BAND, 1, lambda what, fraction: None)
+        module.run_bands(band, (), 1000, module.SAMPLES_PER_TILE, 1, lambda what, fraction: None)
     assert len(ran) < 50
 
 

@@ -21,12 +21,12 @@ SMALL_BAND = 64
 
 def threads(draw: Draw, x: float) -> Outcomes:
     """In bands so small that threads have something to share."""
-    previous = _module.SAMPLES_PER_BAND
-    _module.SAMPLES_PER_BAND = SMALL_BAND
+    previous = _module.SAMPLES_PER_TILE
+    _module.SAMPLES_PER_TILE = SMALL_BAND
     try:
         found = {OURS: over(draw, lambda scene: rt.render(scene, threads=int(x)).colour)}
     finally:
-        _module.SAMPLES_PER_BAND = previous
+        _module.SAMPLES_PER_TILE = previous
     if draw.mitsuba:
         found[MITSUBA] = _mitsuba_threads(draw, SCALAR, rt.BoxFilter(), int(x))
     return found
