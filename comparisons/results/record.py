@@ -32,11 +32,18 @@ _NUMBER = "number"
 
 _CHANNELS = "RGB"
 
+_KEYS = {
+    f.name: {"rungs": "tiers"}.get(f.name, f.name)
+    for f in dataclasses.fields(Case)
+    if f.name != "images"
+}
+"""The key in `case.json` of each field of `Case`, the pictures left out."""
+
 _hints = get_type_hints(Case)
 _CaseFields: type[BaseModel] = create_model(  # type: ignore[call-overload]
     "_CaseFields",
     __config__=ConfigDict(extra="forbid"),
-    **{f.name: (_hints[f.name], ...) for f in dataclasses.fields(Case) if f.name != "images"},
+    **{key: (_hints[name], ...) for name, key in _KEYS.items()},
 )
 
 
@@ -67,13 +74,12 @@ def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> No
 
     An interruption leaves the former case, the new one, or one that `read_case` refuses.
     """
-    fields = {f.name: getattr(case, f.name) for f in dataclasses.fields(case)}
-    images = fields.pop("images")
+    images = case.images
     document = {
         "schema": SCHEMA,
         "key": key,
         "wall": wall,
-        "case": _encoded(fields),
+        "case": _encoded({key: getattr(case, name) for name, key in _KEYS.items()}),
         "pictures": {},
         "sha256": "",
     }
@@ -101,9 +107,7 @@ def read_case(folder: Path) -> Case:
     except ValidationError as error:
         raise RecordError(f"{path}: is not a stored case: {_first(error)}") from None
     images = _read_pictures(folder / PICTURES, record) if record.pictures else None
-    return Case(
-        **{name: getattr(fields, name) for name in type(fields).model_fields}, images=images
-    )
+    return Case(**{name: getattr(fields, key) for name, key in _KEYS.items()}, images=images)
 
 
 def read_record(folder: Path) -> Record:
@@ -200,6 +204,3 @@ def _decoded(value: Any) -> Any:
 def _first(error: ValidationError) -> str:
     first = error.errors()[0]
     return f"{'.'.join(str(key) for key in first['loc'])}: {first['msg']}"
-
-
-__all__ = ["CASE", "PICTURES", "Record", "RecordError", "read_case", "read_record", "write_case"]
