@@ -54,10 +54,8 @@ class Twin:
                 "ray, but its integrators cannot render solids"
             )
         if self.crowd is not None:
-            return (
-                f"{len(self.crowd.pieces)} instances: Mitsuba's integrators take minutes to "
-                "compile for more than a few"
-            )
+            count = len(self.crowd.pieces)
+            return f"{count} instances: Mitsuba takes minutes to compile its integrators for them"
         return ""
 
     def notes(self) -> list[str]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import singledispatch
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -35,9 +35,9 @@ class Surroundings:
     native: bool = False
     images: dict[Any, Any] = field(default_factory=dict)
 
-    @staticmethod
-    def of(scene: Scene, native: bool = False) -> "Surroundings":
-        return Surroundings(scene.materials, scene.textures, scene.folder, native=native)
+    @classmethod
+    def of(cls, scene: Scene, native: bool = False) -> Self:
+        return cls(scene.materials, scene.textures, scene.folder, native=native)
 
 
 def rgb(colour: tuple[float, float, float]) -> dict[str, Any]:
