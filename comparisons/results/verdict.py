@@ -16,7 +16,7 @@ _FAILURES: tuple[Status, ...] = (
 PASSING: tuple[Status, ...] = ("agree", "reference-limited")
 
 
-def decide(tiers: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]:
+def decide(results: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]:
     """The verdict on one scene and the reason, which names the first rung that gives it.
 
     The gravest status of any rung decides: `invalid` (also by pixels not finite in the pictures),
@@ -24,9 +24,9 @@ def decide(tiers: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]
     first one of RUNGS gives the reason. Otherwise the scene agrees if at least one rung other than
     `input` agrees; if none does it is `not-comparable`. Raises ValueError for a name not in RUNGS.
     """
-    if unknown := {tier.name for tier in tiers} - set(RUNGS):
+    if unknown := {tier.name for tier in results} - set(RUNGS):
         raise ValueError(f"not a rung: {', '.join(sorted(unknown))}; the rungs are {RUNGS}")
-    ladder = sorted(tiers, key=lambda tier: RUNGS.index(tier.name))
+    ladder = sorted(results, key=lambda tier: RUNGS.index(tier.name))
     pixels = metrics.nonfinite if metrics else 0
     if pixels and not any(tier.status == "invalid" for tier in ladder):
         return "invalid", f"images: {pixels} pixel{'s' if pixels > 1 else ''} not finite"

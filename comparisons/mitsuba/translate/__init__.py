@@ -64,14 +64,14 @@ def load(scene: Scene, frame: Frame | None = None) -> Twin:
     return Twin(mi_scene, found.pieces, tuple(found.solids), crowd, frame)
 
 
-MOST_INSTANCES = 32
+FEW = 32
 """Most instances in a scene of Mitsuba's fast variants: see `InstancedGroup`."""
 
 
 def _instanced_group(found: _Translated) -> InstancedGroup | None:
-    """Move the instances out of what is translated, if there are more than MOST_INSTANCES."""
+    """Move the instances out of what is translated, if there are more than FEW."""
     names = [name for name, mi_shape in found.pieces.items() if mi_shape.plugin.group is not None]
-    if len(names) <= MOST_INSTANCES:
+    if len(names) <= FEW:
         return None
     pieces = {name: found.pieces.pop(name) for name in names}
     instances = {name: found.plain.pop(name) for name in names}
