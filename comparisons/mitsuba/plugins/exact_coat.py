@@ -44,8 +44,8 @@ def fresnel(cosine: FloatArray, eta: float) -> FloatArray:
 def smooth_reflectance(eta: float) -> float:
     """R: the integral of 2 F cos over the cosines, inside a medium of index eta.
 
-    By quadrature over the square root of the cosine; for eta > 1 from outside, and by reciprocity
-    1 / eta² of the transmittance from outside is that from inside.
+    By quadrature over the square root of the cosine.  For eta > 1 the integral is taken outside: by
+    reciprocity the transmittance from inside is 1 / eta² of that from outside.
     """
     if eta < 1.0:
         x, weight = _rule(400)
