@@ -29,8 +29,9 @@ def suite(
         list[str] | None,
         typer.Option(metavar="GLOB", help="Only cases of such names, like 'material_*'."),
     ] = None,
-    tier: Annotated[
-        list[str] | None, typer.Option(metavar="RUNG", help=f"Only these: {', '.join(COMPARED)}.")
+    rung: Annotated[
+        list[str] | None,
+        typer.Option("--rung", "--tier", metavar="RUNG", help=f"Only: {', '.join(COMPARED)}."),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes at once.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
@@ -53,9 +54,9 @@ def suite(
         from comparisons.suites.suite import load_suite, plan
     from reference_rt.util.files import check_writable
 
-    rungs = tuple(tier or ())
-    if unknown := [rung for rung in rungs if rung not in COMPARED]:
-        raise UsageError(f"--tier: expected one of {', '.join(COMPARED)}, got '{unknown[0]}'")
+    rungs = tuple(rung or ())
+    if unknown := [name for name in rungs if name not in COMPARED]:
+        raise UsageError(f"--rung: expected one of {', '.join(COMPARED)}, got '{unknown[0]}'")
     source = load_suite(name)
     planned = plan(source, scenes, tuple(only or ()), rungs)
     folder = out or Path("out") / source.name

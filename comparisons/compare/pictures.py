@@ -5,11 +5,11 @@ import time
 import numpy as np
 
 from comparisons.compare.judge import Rendered, of_replicates
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.counterpart import Twin, trace
 from comparisons.mitsuba.hits import Answers
 from comparisons.results.case import Images
-from comparisons.rungs.rays.bounds import ShapeSizes
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.whitted import plugin_radiance

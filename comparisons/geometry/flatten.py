@@ -1,7 +1,7 @@
-"""Which primitives a scene is made of: its groups, instances and solids taken apart.
+"""A scene as primitives: its groups, instances and solids expanded.
 
-Made from the description alone, not from our tables: what those make of nested groups and of trees
-of solids is compared too.
+It is made from the description alone, not from our tables: their expansion of nested groups and CSG
+trees is under test too.
 """
 
 from collections.abc import Iterator
@@ -16,8 +16,8 @@ from reference_rt.shapes.shape import Place, Shape
 
 
 class Leaf(NamedTuple):
-    """A primitive shape: its description, the map that its own transform is followed by, the name
-    of its material;  part: its number in its group or its solid."""
+    """A primitive shape: its description;  outer: the map applied after its own transform;  the
+    name of its material;  part: its number in its group or its solid."""
 
     shape: Shape
     outer: Affine
@@ -26,25 +26,26 @@ class Leaf(NamedTuple):
 
 
 class Tree(NamedTuple):
-    """A set operation, "union", "intersection" or "difference", of trees and of leaves, which stand
-    there by their numbers."""
+    """A CSG tree: the operation ("union", "intersection" or "difference"), and its operands: trees,
+    or numbers of leaves."""
 
     operation: str
     of: tuple["Tree | int", ...]
 
 
 class Member(NamedTuple):
-    """A shape of the scene or of a group: one leaf, or all the leaves of a solid and its tree."""
+    """A shape of the scene or of a group: one leaf, or the leaves of a solid and its CSG tree."""
 
     leaves: tuple[Leaf, ...]
     tree: Tree | None
 
 
 class Copy(NamedTuple):
-    """Shapes as they stand in the scene.
+    """A shape, or one instance of a group, in the scene.
 
-    shape: index in the scene;  instance: number of the copy, -1 for what is no instance;  group:
-    its name, "" likewise;  members, in the group's coordinates, and the map to the scene's.
+    shape: index in the scene;  instance: number of the instance, -1 for a plain shape;  group: the
+    group's name, "" for a plain shape;  members: in the group's coordinates;  outer: the map to
+    scene coordinates.
     """
 
     shape: int
@@ -55,13 +56,13 @@ class Copy(NamedTuple):
 
 
 def place_of(scene: Scene, leaf: Leaf, outer: Affine) -> Place:
-    """As what a leaf is tabulated, where `outer` takes its group."""
+    """The place with which a leaf is tabulated;  outer: the map of its group to the scene."""
     return Place(folder=scene.folder, outer=transform.compose(leaf.outer, outer))
 
 
 def copies_of(scene: Scene) -> list[Copy]:
-    """Everything that rays can hit.  A group of groups stands for its own shapes first, then for
-    those of its instances, one after another."""
+    """Everything that rays can hit.  A nested group expands to its own shapes first, then to those
+    of its instances, in order."""
     groups = {
         name: tuple(
             member_of(shape, k) for k, shape in enumerate(shapes) if not isinstance(shape, Instance)
@@ -79,7 +80,7 @@ def copies_of(scene: Scene) -> list[Copy]:
 
 
 def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple[str, Affine]]:
-    """(group, map to the scene) of each copy of shapes that an instance stands for."""
+    """(group, map to the scene) of each copy that an instance expands to."""
     outer = transform.compose(transform.affine(instance.transform), outer)
     shapes = scene.groups[instance.group]
     if not all(isinstance(shape, Instance) for shape in shapes):
@@ -90,7 +91,7 @@ def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple
 
 
 def member_of(shape: Shape, number: int) -> Member:
-    """A shape that is no instance, number `number` of its group."""
+    """The member for a shape that is no instance, with index `number` in its group."""
     if not isinstance(shape, Solid):
         leaf = Leaf(shape, transform.identity(), shape.material, number)
         return Member((leaf,), None)
@@ -101,7 +102,7 @@ def member_of(shape: Shape, number: int) -> Member:
 
 
 def _tree(shape: Shape, outer: Affine, material: str | None, leaves: list[Leaf]) -> Tree | int:
-    """Puts the operands into `leaves`, from left to right."""
+    """The CSG tree of a shape; appends its operands to `leaves`, from left to right."""
     material = shape.material if shape.material is not None else material
     if not isinstance(shape, Solid):
         leaves.append(Leaf(shape, outer, material, len(leaves)))

@@ -1,4 +1,4 @@
-"""The primitives of a scene one by one, and their lengths, which bounds are made of."""
+"""Lengths of the primitives of a scene, from which error bounds are made."""
 
 from typing import Any
 
@@ -15,11 +15,11 @@ from reference_rt.shapes.shape import Shape
 
 
 class LeafSizes:
-    """Lengths of one primitive shape, in its group's coordinates: `feature` is the smallest over
-    which its surface coordinates and its normal change.
+    """Lengths of one primitive shape, in its group's coordinates: `feature_at` is the smallest
+    length over which its uv or its normal change.
 
-    shape: the description;  material: its name;  table: its rows, of field `field` of `Shapes`;
-    bounds: (3,), (3,).
+    shape: the description;  material: its name;  table: its rows;  field: the field of `Shapes`
+    that they belong to;  bounds: lower and upper, (3,) each, infinite for a plane.
     """
 
     def __init__(self, shape: Shape, material: str | None, table: Any) -> None:
@@ -31,25 +31,25 @@ class LeafSizes:
         self._faces = None if self.field == "quadrics" else _features(self.field, table)
 
     def feature_at(self, p: FloatArray, primitive: IntArray) -> FloatArray:
-        """(n,) for points p of the faces `primitive`."""
+        """(n,): the feature size at points p (n, 3) of the faces `primitive` (n,)."""
         if self._faces is None:
             return _quadric_features(self.table, p, primitive)
         return np.asarray(self._faces[np.clip(self.row_of(primitive), 0, len(self._faces) - 1)])
 
     def row_of(self, primitive: IntArray) -> IntArray:
-        """The rows (n,) of the table whose faces have the numbers `primitive`: of a mesh those of
-        its file, of which the table lacks those without area."""
+        """The rows (n,) of the table for the faces `primitive`: faces of a mesh are numbered as in
+        its file, and the table lacks those without area."""
         if self.field != "triangles":
             return primitive
         return np.searchsorted(self.table.face, primitive)
 
 
 class ShapeSizes:
-    """Lengths of a scene's shapes, for bounds.
+    """Lengths of a scene's shapes.
 
-    reach (shapes,): the largest coordinate on each shape, counted from the middle of `frame`, 0 on
-    infinite ones;  lower, upper (3,): the bounds of all that is finite;  copies: of the scene;
-    leaves: the different primitives;  frame: the coordinates of the scene's twin.
+    reach (shapes,): the largest coordinate on each shape, counted from the origin of `frame`, 0 for
+    infinite planes;  lower, upper (3,): the bounds of all finite shapes;  copies: `copies_of` the
+    scene;  leaves: its distinct primitives;  frame: the coordinates of the scene's counterpart.
     """
 
     def __init__(self, scene: Scene, frame: Frame = OURS) -> None:
@@ -58,13 +58,13 @@ class ShapeSizes:
         self.reach = np.zeros(len(scene.shapes))
         self.lower, self.upper = np.full(3, np.inf), np.full(3, -np.inf)
         self.leaves: list[LeafSizes] = []
-        # Of each group, or of a shape that is no instance: the leaf of each part.
+        # For each group, or shape that is no instance: the index of the leaf of each part.
         self._parts: dict[str, list[int]] = {}
         for copy in self.copies:
             self._add(scene, copy)
         maps = np.array([copy.outer for copy in self.copies]).reshape(-1, 3, 4)
         self._offset, self._inverse = maps[:, :, 3], np.linalg.inv(maps[:, :, :3])
-        # A map shrinks lengths by its smallest singular value at most.
+        # A map shrinks lengths at most by its smallest singular value.
         self._least = np.linalg.svd(maps[:, :, :3], compute_uv=False)[:, -1]
         self._first_copy = np.searchsorted(
             [c.shape for c in self.copies], np.arange(len(self.reach))
@@ -73,7 +73,7 @@ class ShapeSizes:
         groups = {name: k for k, name in enumerate(self._parts)}
         self._leaf_of = np.array([x + [-1] * (most - len(x)) for x in self._parts.values()])
         self._group_of = np.array([groups[_name(copy)] for copy in self.copies], np.int64)
-        if not np.isfinite(self.lower).all():  # infinite planes alone
+        if not np.isfinite(self.lower).all():  # only infinite planes
             eye, target = np.array(scene.camera.eye), np.array(scene.camera.target)
             size = np.abs(eye - target).max()
             self.lower = np.minimum(eye, target) - size
@@ -98,25 +98,25 @@ class ShapeSizes:
                 self.reach[copy.shape] = max(self.reach[copy.shape], reach)
 
     def leaves_of(self, copy: Copy) -> list[LeafSizes]:
-        """The primitives of a copy of shapes."""
+        """The primitives of a copy."""
         return [self.leaves[number] for number in self._parts[_name(copy)] if number >= 0]
 
     def by_part(self, copy: Copy) -> dict[int, LeafSizes]:
-        """The same, by their parts."""
+        """The primitives of a copy, by part."""
         numbers = enumerate(self._parts[_name(copy)])
         return {part: self.leaves[number] for part, number in numbers if number >= 0}
 
     def reach_of(self, shape: IntArray) -> FloatArray:
-        """(n,): 0 for no shape."""
+        """(n,): the reach of the shapes with these indices, 0 for -1."""
         return np.asarray(np.append(self.reach, 0.0)[shape])
 
     def copy_of(self, hits: Intersections) -> IntArray:
-        """(n,): which of `copies` was hit; of no meaning for a miss."""
+        """(n,): the index in `copies` that was hit; arbitrary for a miss."""
         shape = np.maximum(hits.shape, 0)
         return np.asarray(self._first_copy[shape] + np.maximum(hits.instance, 0))
 
     def leaf_of(self, hits: Intersections) -> IntArray:
-        """(n,): which of `leaves` was hit, -1 for none."""
+        """(n,): the index in `leaves` that was hit, -1 for a miss."""
         known = hits.shape >= 0
         numbers = np.full(len(known), -1)
         group = self._group_of[self.copy_of(hits)[known]]
@@ -124,13 +124,13 @@ class ShapeSizes:
         return numbers
 
     def local_points(self, hits: Intersections) -> FloatArray:
-        """(n, 3): the points that were hit, in the coordinates of their groups."""
+        """(n, 3): the hit points in the coordinates of their groups."""
         copy = self.copy_of(hits)
         moved = hits.p - self._offset[copy]
         return np.asarray(np.einsum("nij,nj->ni", self._inverse[copy], moved))
 
     def feature_of(self, hits: Intersections) -> FloatArray:
-        """(n,): infinite for no shape."""
+        """(n,): the feature size at each hit, in scene units; infinite for a miss."""
         found = np.full(len(hits.t), np.inf)
         copy, leaf, local = self.copy_of(hits), self.leaf_of(hits), self.local_points(hits)
         for number in np.unique(leaf[leaf >= 0]).tolist():
@@ -141,19 +141,20 @@ class ShapeSizes:
 
 
 def _name(copy: Copy) -> str:
-    """Of what a copy has in common with others: no group has a number for its name and a colon."""
+    """The key that copies with the same leaves share: the group, or a shape's index and a colon,
+    which no group's name has."""
     return copy.group if copy.instance >= 0 else f"{copy.shape}:"
 
 
 def corners_of(bounds: Bounds, m: transform.Affine) -> FloatArray:
-    """The eight corners of a box where a map takes them."""
+    """(8, 3): the corners of a box, mapped by m."""
     ends = np.stack(bounds)
     pick = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     return transform.apply_points(m, ends[pick, [0, 1, 2]])
 
 
 def _features(field: str, table: Any) -> FloatArray:
-    """(faces,): the smallest length of each face; of a shape that is all alike, of one."""
+    """(faces,): the smallest length of each face; one entry if all faces are alike."""
     if field == "spheres":
         return np.asarray(table.radius)
     if field in ("rectangles", "disks", "planes"):
@@ -179,8 +180,8 @@ def _features(field: str, table: Any) -> FloatArray:
 
 
 def _quadric_features(table: Any, p: FloatArray, primitive: IntArray) -> FloatArray:
-    """The length over which f's gradient turns, |grad f| / |Hessian|, in the group's coordinates;
-    of a cap, the smallest height of the clip box."""
+    """(n,): the length over which f's gradient turns, |grad f| / |Hessian|, in the group's
+    coordinates; for a cap the smallest height of the clip box."""
     m = table.to_local[0].reshape(3, 3)
     k = table.coefficients[0]
     hessian = np.array([[2 * k[0], k[3], k[5]], [k[3], 2 * k[1], k[4]], [k[5], k[4], 2 * k[2]]])

@@ -1,5 +1,5 @@
-"""How exact materials are, where ours are tables or Mitsuba's formulas lose digits: what a
-comparison must allow for."""
+"""Relative errors of materials that a comparison must allow for: of our tables, and of Mitsuba's
+formulas in float32."""
 
 import functools
 from importlib import import_module
@@ -20,17 +20,18 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.textures import NO_TEXTURES, At
 
 PAIRS = 256
-"""Pairs of directions at which tables are compared with the integrals they stand for."""
+"""Pairs of directions at which tables are compared with the integrals that they tabulate."""
 
 MARGIN = 1.5
-"""Of the largest difference found: what a finer set of directions may add."""
+"""Factor on the largest error found, for directions in between."""
 
 MOST = 5e-3
-"""Tables that are off by more are wrong, not coarse."""
+"""Largest error that is allowed for: a table with a larger one is wrong, not coarse."""
 
 
 def accuracy(scene: Scene, name: str | None) -> float:
-    """How far, relatively, what material `name` sends may be off by our tables or in Mitsuba."""
+    """The relative error of the light that material `name` scatters, by our tables or in Mitsuba; 0
+    for exact materials, and for None."""
     if name is None:
         return 0.0
     material: Material = scene.materials[name]
@@ -39,7 +40,7 @@ def accuracy(scene: Scene, name: str | None) -> float:
     elif isinstance(material, Emissive):
         bases = [material.base]
     elif isinstance(material, RoughPlastic):
-        # The base alone is from tables.  White: how it bounces between base and coat counts most.
+        # Only the base is tabulated.  White maximises interreflection between base and coat.
         white = {"reflectance": (1.0, 1.0, 1.0), "specular": (0.0, 0.0, 0.0)}
         return min(MOST, MARGIN * table_error(material.model_copy(update=white)))
     elif isinstance(material, Principled) and material.clearcoat != 0.0:
@@ -50,8 +51,8 @@ def accuracy(scene: Scene, name: str | None) -> float:
 
 
 def clearcoat_error(material: Principled) -> float:
-    """Of Mitsuba's clear coat, relatively: 1 + (alpha² - 1) cos² in float32 is off by some 4 u, and
-    is alpha² where it is least."""
+    """The relative error of Mitsuba's clear coat: 1 + (alpha² - 1) cos² is off by some 4 u in
+    float32, and its least value is alpha²."""
     gloss = 1.0 if isinstance(material.clearcoat_gloss, str) else material.clearcoat_gloss
     alpha = 0.1 + (0.001 - 0.1) * gloss
     return 4.0 * UNIT_ROUNDOFF / alpha**2
@@ -59,13 +60,14 @@ def clearcoat_error(material: Principled) -> float:
 
 @functools.lru_cache(maxsize=64)
 def table_error(material: RoughPlastic) -> float:
-    """The largest relative difference of our rough plastic from its twin of finer tables."""
+    """The largest relative difference of our rough plastic from its counterpart with finer
+    tables."""
     ours, theirs = both_sides(material, *directions(PAIRS, seed=0))
     return float((np.abs(ours - theirs) / theirs).max())
 
 
 def directions(n: int, seed: int, both: bool = False) -> tuple[FloatArray, FloatArray]:
-    """n pairs of unit vectors (n, 3), float32 values, z > 0 unless `both` sides are wanted."""
+    """n pairs of unit vectors (n, 3), float32 values; z > 0 unless `both`."""
     rng = np.random.default_rng(seed)
     v = rng.normal(size=(2, n, 3))
     v /= np.linalg.norm(v, axis=-1, keepdims=True)
@@ -78,8 +80,8 @@ def directions(n: int, seed: int, both: bool = False) -> tuple[FloatArray, Float
 def both_sides(
     material: Material, wo: FloatArray, wi: FloatArray, theirs: bool = True
 ) -> tuple[FloatArray, FloatArray]:
-    """f cos (n, 3) for local directions (n, 3) by our kernels and by the twin, where `theirs` is
-    wanted, without textures."""
+    """f cos (n, 3) for local directions (n, 3), by our kernels and, if `theirs`, by the
+    counterpart; without textures."""
     import drjit as dr
 
     kernels = import_module(type(material).__module__)

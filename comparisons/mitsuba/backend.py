@@ -1,7 +1,7 @@
-"""Which Mitsuba variant runs here: llvm_ad_rgb where an LLVM is proven to work, else scalar_rgb.
+"""Chooses the Mitsuba variant: llvm_ad_rgb if an LLVM works on this machine, else scalar_rgb.
 
-A libLLVM that does not fit the machine aborts the process instead of raising, so a library is
-tried in a child process before this one depends on it.
+An unsuitable libLLVM aborts the process instead of raising an exception, so each library is first
+tried in a child process.
 """
 
 import contextlib
@@ -32,10 +32,10 @@ FORCE = "REFERENCE_RT_MITSUBA_VARIANT"
 SCALAR, LLVM = "scalar_rgb", "llvm_ad_rgb"
 
 _PROOF_SECONDS = 120.0
-"""A proof takes 1 to 3 s alone; the rest is for a machine that others keep busy."""
+"""Time limit of a trial, which takes 1 to 3 s on an idle machine."""
 
 _MOST_PROOFS = 4
-"""Libraries that are tried: each costs seconds."""
+"""Most libraries that are tried: each takes seconds."""
 
 _PROOF = """
 import ctypes
@@ -62,8 +62,8 @@ sys.exit(0 if np.isfinite(image).all() and image.max() > 0 else 3)
 class Backend:
     """The Mitsuba that comparisons run against.
 
-    variant: what `mitsuba.set_variant` gets;  version: of the mitsuba package;  reason: one line,
-    why this variant;  llvm_path: the library it needs, None for variants without LLVM.
+    variant: the argument of `mitsuba.set_variant`;  version: of the mitsuba package;  reason: why
+    this variant, in one line;  llvm_path: the library it needs, None for variants without LLVM.
     """
 
     variant: str
@@ -123,8 +123,8 @@ def mitsuba() -> Any:
         mi.set_variant(chosen.variant)
     except (ImportError, AttributeError, RuntimeError, OSError) as error:
         raise ReferenceUnavailableError(f"Mitsuba does not start: {error}") from None
-    # Plugins log a warning per load in scalar variants ("terrible performance"): known, and told
-    # by `Backend.reason`.
+    # In scalar variants every loaded plugin logs a warning ("terrible performance"), which
+    # `Backend.reason` states already.
     mi.set_log_level(mi.LogLevel.Error)
     _register_once(chosen.variant)
     return mi
@@ -132,7 +132,7 @@ def mitsuba() -> Any:
 
 @contextlib.contextmanager
 def variant(name: str) -> Iterator[Any]:
-    """Mitsuba in another variant, our plugins registered there too, while the context lasts."""
+    """A context with Mitsuba in another variant, our plugins registered there too."""
     mi = mitsuba()
     chosen = mi.variant()
     _set_variant(mi, name)
@@ -144,8 +144,8 @@ def variant(name: str) -> Iterator[Any]:
 
 
 def _set_variant(mi: Any, name: str) -> None:
-    """Mitsuba defines all of its own plugins anew, and after a thousand definitions Dr.Jit warns,
-    each time, that this is slow."""
+    """Set the variant without Dr.Jit's warnings: Mitsuba defines all of its plugins again, and
+    after a thousand definitions Dr.Jit warns each time that this is slow."""
     if mi.variant() != name:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
@@ -163,12 +163,12 @@ def _register_once(name: str) -> None:
 
 
 def scalar() -> contextlib.AbstractContextManager[Any]:
-    """Mitsuba in its scalar variant, while the context lasts."""
+    """A context with Mitsuba in its scalar variant."""
     return variant(SCALAR)
 
 
 def prove(variant: str, llvm_path: str | None) -> str | None:
-    """Render a small scene in a child process: None if it works, else what happened."""
+    """Render a small scene in a child process: None if it works, else the problem."""
     environment = dict(os.environ)
     needed: list[str] = []
     if llvm_path is not None:
@@ -203,7 +203,7 @@ def _version() -> str:
     return importlib.metadata.version("mitsuba")
 
 
-# ---- what was proven before ---------------------------------------------------------------------
+# ---- results of earlier trials ------------------------------------------------------------------
 
 
 def _memory_file() -> Path:
@@ -222,7 +222,7 @@ def _remembered_proof(version: str, variant: str, path: str) -> str | None:
     if key in memory:
         return memory[key]
     problem = prove(variant, path)
-    if problem is None or "did not answer" not in problem:  # a busy machine proves nothing
+    if problem is None or "did not answer" not in problem:  # a time-out may be a busy machine
         _write_memory(_read_memory() | {key: problem})
     return problem
 
@@ -238,7 +238,8 @@ def _read_memory() -> dict[str, str | None]:
 
 
 def _write_memory(memory: dict[str, str | None]) -> None:
-    """By renaming, so that no other process reads half a file; without a folder nothing is kept."""
+    """Write by renaming, so that no other process reads half a file; does nothing if the folder
+    cannot be written."""
     file = _memory_file()
     part = file.with_suffix(f".{os.getpid()}")
     try:

@@ -1,4 +1,4 @@
-"""A scene's twin in Mitsuba, and what rays hit in it."""
+"""A scene's counterpart in Mitsuba, and the first hits of rays in it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,34 +8,37 @@ import numpy as np
 
 from comparisons.geometry.frame import OURS, Frame
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.csg import SLIGHT, SolidTwin
-from comparisons.mitsuba.hits import Answers, nothing, put_nearer, read
+from comparisons.mitsuba.csg import SLIGHT, SolidCounterpart
+from comparisons.mitsuba.hits import Answers, assign_nearer, misses, read
 from comparisons.mitsuba.scene import first_hits
-from comparisons.mitsuba.stand_ins import Extent, Piece, StandIn
+from comparisons.mitsuba.stand_ins import Extent, MitsubaShape, StandIn
 from reference_rt.core.arrays import FloatArray
 
 
-class Crowd(NamedTuple):
-    """Instances in a scene of Mitsuba's scalar variant, where they are many: in others, every shape
-    is asked about every other, so that a thousand instances take half a minute to compile.
+class InstancedGroup(NamedTuple):
+    """All instances of a scene with many, in a scene of Mitsuba's scalar variant.
 
-    pieces: what the instances stand for, by their ids.
+    Other variants compile code for every shape, half a minute for a thousand instances.  pieces:
+    the primitives that the instances represent, by id.
     """
 
     mi_scene: Any
-    pieces: Mapping[str, Piece]
+    pieces: Mapping[str, MitsubaShape]
 
 
 @dataclass(frozen=True)
 class Twin:
-    """mi_scene: Mitsuba's scene, without what follows;  pieces: what its shapes stand for, by their
-    ids;  solids: what set operations make;  crowd: instances, where they are many;  frame: the
-    coordinates of all these, lengths of pieces and solids included."""
+    """A scene's counterpart in Mitsuba.
+
+    mi_scene: Mitsuba's scene, without solids and instanced group;  pieces: the primitives that its
+    shapes represent, by id;  solids: counterparts of CSG solids;  crowd: the instances, if there
+    are many, else None;  frame: the coordinates of all these, and of the lengths in them.
+    """
 
     mi_scene: Any
-    pieces: Mapping[str, Piece]
-    solids: tuple[SolidTwin, ...] = ()
-    crowd: Crowd | None = None
+    pieces: Mapping[str, MitsubaShape]
+    solids: tuple[SolidCounterpart, ...] = ()
+    crowd: InstancedGroup | None = None
     frame: Frame = OURS
 
     def sensors(self) -> Any:
@@ -44,24 +47,22 @@ class Twin:
 
     @property
     def lacking(self) -> str:
-        """Why light cannot be compared; empty where it can."""
+        """Why light cannot be compared; empty if it can."""
         if self.solids:
             return (
-                "Mitsuba has no set operations: what rays hit is found from its hits of each "
-                "operand, but its integrators see no solids"
+                "Mitsuba has no set operations (CSG): its hits of the operands are combined ray by "
+                "ray, but its integrators cannot render solids"
             )
         if self.crowd is not None:
-            return (
-                f"{len(self.crowd.pieces)} instances: Mitsuba's integrators take minutes to "
-                "compile for more than a few"
-            )
+            count = len(self.crowd.pieces)
+            return f"{count} instances: Mitsuba takes minutes to compile its integrators for them"
         return ""
 
     def notes(self) -> list[str]:
-        """What a reader should know of what stands for what."""
+        """Notes on a moved frame, and on meshes that stand in for shapes."""
         return self._moved() + [
-            f"a mesh of {s.triangles:,} triangles stands in for shape {shape} ({s.name}), within "
-            f"{s.sag:.2g} of it; {s.ratio:.2g} times more at half the fineness"
+            f"a mesh of {s.triangles:,} triangles stands in for shape {shape} ({s.name}); it is at "
+            f"most {s.sag:.2g} off, {s.ratio:.2g} times that with half as many triangles a side"
             for shape, found in self.stand_ins().items()
             for s in dict.fromkeys(found)
         ]
@@ -71,12 +72,13 @@ class Twin:
             return []
         middle = ", ".join(f"{x:.6g}" for x in self.frame.center)
         return [
-            f"Mitsuba sees the scene moved by minus ({middle}) and {self.frame.scale:.6g} times as "
-            "large: where it is, rays would begin further off surfaces than a hundredth of its size"
+            f"Mitsuba renders the scene moved by minus ({middle}) and scaled by "
+            f"{self.frame.scale:.6g}: otherwise its rays would start more than a hundredth of the "
+            "scene's size off surfaces"
         ]
 
-    def all_pieces(self) -> list[Piece]:
-        """Everything that stands for something, operands of solids included."""
+    def all_mi_shapes(self) -> list[MitsubaShape]:
+        """The Mitsuba shapes of all scenes, operands of solids included."""
         found = list(self.pieces.values())
         if self.crowd is not None:
             found += self.crowd.pieces.values()
@@ -86,7 +88,7 @@ class Twin:
         return found
 
     def extents(self) -> dict[int, Extent]:
-        """What there is of infinite planes, by the index of the shape."""
+        """The extents of meshes that stand in for infinite planes, by the index of the shape."""
         return {
             p.shape: Extent(
                 self.frame.out(p.plugin.extent.middle), p.plugin.extent.radius / self.frame.scale
@@ -96,21 +98,22 @@ class Twin:
         }
 
     def stand_ins(self) -> dict[int, list[StandIn]]:
-        """The meshes that stand for something else, by the index of the shape."""
+        """The errors of meshes that stand in for curved surfaces, by the index of the shape, in
+        scene units."""
         found: dict[int, list[StandIn]] = {}
-        for piece in self.all_pieces():
-            if piece.plugin.stand_in is not None:
-                one = piece.plugin.stand_in
+        for mi_shape in self.all_mi_shapes():
+            if mi_shape.plugin.stand_in is not None:
+                one = mi_shape.plugin.stand_in
                 one = one._replace(sag=one.sag / self.frame.scale)
-                found.setdefault(piece.shape, []).append(one)
+                found.setdefault(mi_shape.shape, []).append(one)
         return found
 
 
 def trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -> Answers:
-    """What Mitsuba hits first, in the same record as `reference_rt.query.intersect` returns.
+    """Mitsuba's first hits, in the same form as `reference_rt.query.intersect` returns ours.
 
-    Mitsuba sees the rays in the twin's frame and rounded to float32.  `tolerance`: see
-    `SolidTwin.trace`.
+    Mitsuba gets the rays in the counterpart's frame, rounded to float32.  `tolerance`: see
+    `SolidCounterpart.trace`.
     """
     if twin.frame.is_ours:
         return _trace(twin, o, d, tolerance)
@@ -122,22 +125,24 @@ def trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -
 
 
 def _trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float) -> Answers:
-    """The same in the twin's coordinates."""
+    """The same in the counterpart's coordinates."""
     found = _hits(twin.mi_scene, twin.pieces, o, d)
     everything = np.arange(len(o))
     if twin.crowd is not None and len(o) > 0:
         with scalar():
-            put_nearer(found, everything, _hits(twin.crowd.mi_scene, twin.crowd.pieces, o, d))
+            assign_nearer(found, everything, _hits(twin.crowd.mi_scene, twin.crowd.pieces, o, d))
     for solid in twin.solids:
         near = solid.near(o, d)
         if len(near) == 0:
             continue
-        put_nearer(found, near, solid.trace(o[near], d[near], tolerance))
+        assign_nearer(found, near, solid.trace(o[near], d[near], tolerance))
     return found
 
 
-def _hits(mi_scene: Any, pieces: Mapping[str, Piece], o: FloatArray, d: FloatArray) -> Answers:
-    if not pieces or len(o) == 0:  # Dr.Jit takes no empty arrays
-        return nothing(len(o))
+def _hits(
+    mi_scene: Any, pieces: Mapping[str, MitsubaShape], o: FloatArray, d: FloatArray
+) -> Answers:
+    if not pieces or len(o) == 0:  # Dr.Jit does not accept empty arrays
+        return misses(len(o))
     ids = {name: k for k, name in enumerate(pieces)}
     return read(first_hits(mi_scene, ids, o, d), list(pieces.values()), o)

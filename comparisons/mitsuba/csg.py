@@ -1,9 +1,8 @@
-"""Solids by Mitsuba's hits: all crossings of each operand, then the set operation in NumPy.
+"""CSG solids from Mitsuba's hits: all crossings of each operand, then the set operation in NumPy.
 
-Each operand is a Mitsuba scene of its own, so that faces that coincide are all seen.  Nothing is
-shared with `reference_rt.shapes.csg`, and nothing of how it works: there, a program runs on the
-states of operands as a ray passes them; here, crossings of all rays are sorted and trees of Boolean
-arrays evaluated.
+Each operand is a Mitsuba scene of its own, so that coincident faces are all found.  Code and method
+are independent of `reference_rt.shapes.csg`: there a program updates the operands' states along
+each ray; here the crossings of all rays are sorted, and CSG trees of Boolean arrays evaluated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,31 +13,32 @@ import numpy as np
 
 from comparisons.geometry.flatten import Leaf, Tree
 from comparisons.geometry.float32 import delta, round32
-from comparisons.mitsuba.hits import Answers, BoolArray, nothing, put, read, rows_of
+from comparisons.mitsuba.hits import Answers, BoolArray, assign, misses, read, rows_of
 from comparisons.mitsuba.scene import first_hits
-from comparisons.mitsuba.stand_ins import Piece
+from comparisons.mitsuba.stand_ins import MitsubaShape
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes import Plane
 from reference_rt.shapes.shape import Place
 
 MOST_CROSSINGS = 200
-"""Of a ray with one operand, after which the search is given up: the knot has a dozen."""
+"""Most crossings of a ray with one operand; the torus knot has a dozen."""
 
 STEEPEST = 64.0
-"""How far along a ray float32 may put a surface grows as 1 over the cosine; a walk takes no steps,
-and tells no two crossings apart, by more than this many times as far as head-on."""
+"""Cap of one over the cosine: float32 moves a crossing along the ray by the error at normal
+incidence over the cosine.  The step of a walk, and the distance of crossings that count as one, use
+this cap."""
 
 
 SLIGHT = 0.125
-"""Of float32's bound: one rounding, by which faces that coincide are apart."""
+"""Fraction of float32's bound, one rounding: how far apart coincident faces may be."""
 
 
 class Crossings(NamedTuple):
-    """Where k rays cross the surface of an operand next.
+    """The next crossings of k rays with the surface of an operand.
 
-    rays (k,): numbers of the rays;  enters: whether they go in;  slack (k,): how far float32 may
-    have moved t;  at: the hits, t counted from the rays' own origins.
+    rays (k,): indices of the rays;  enters (k,): whether they enter it;  slack (k,): how far
+    float32 may have moved t;  at: the hits, with t from the rays' own origins.
     """
 
     rays: IntArray
@@ -48,21 +48,22 @@ class Crossings(NamedTuple):
 
 
 class Operand(NamedTuple):
-    """mi_scene: the operand's own;  pieces: by id;  leaf, place: what it is and where it stands."""
+    """mi_scene: the operand's own Mitsuba scene;  pieces: its shapes, by id;  leaf, place: the
+    primitive and its placement."""
 
     mi_scene: Any
-    pieces: Mapping[str, Piece]
+    pieces: Mapping[str, MitsubaShape]
     leaf: Leaf
     place: Place
 
     def walk(self, o: FloatArray, d: FloatArray) -> tuple[BoolArray, list[Crossings]]:
-        """Whether rays begin inside, and all their crossings in order."""
+        """Whether rays start inside (n,), and all their crossings in order."""
         ids = {name: k for k, name in enumerate(self.pieces)}
         pieces = list(self.pieces.values())
         box = self.mi_scene.bbox()
         reach = float(np.abs([np.array(box.min), np.array(box.max)]).max())
         if isinstance(self.leaf.shape, Plane):
-            reach = 0.0  # its corners are far away from what rays meet
+            reach = 0.0  # the corners of its mesh are far from where rays hit
         rays, origin = np.arange(len(o)), o.copy()
         length2 = np.sum(d * d, axis=1)
         found: list[Crossings] = []
@@ -81,7 +82,7 @@ class Operand(NamedTuple):
             along = np.sum((origin - o[rays]) * d[rays], axis=1) / length2[rays]
             hits.t[:] += along
             enters = way < 0.0
-            # Else met again from behind, or at an edge, of which the other side was missed.
+            # Otherwise the ray hits the same face again, or an edge whose other side it missed.
             new = enters != within[rays]
             within[rays] = enters
             found.append(Crossings(rays[new], enters[new], slack[new], rows_of(hits, new)))
@@ -89,11 +90,11 @@ class Operand(NamedTuple):
         return inside, found
 
     def _inside(
-        self, ids: Mapping[str, int], pieces: list[Piece], o: FloatArray, d: FloatArray
+        self, ids: Mapping[str, int], pieces: list[MitsubaShape], o: FloatArray, d: FloatArray
     ) -> BoolArray:
-        """Where rays begin inside: what lies behind them is left that way.
+        """(n,): whether rays start inside: a ray traced backwards then leaves the operand.
 
-        Behind and not ahead, as that may be an edge that they are aimed at.
+        Backwards, since ahead may be an edge that the rays are aimed at.
         """
         if isinstance(self.leaf.shape, Plane):
             to_local = transform.invert(self.leaf.shape.map_in(self.place))
@@ -103,20 +104,20 @@ class Operand(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SolidTwin:
-    """Operands, by the numbers that the leaves of the tree are."""
+class SolidCounterpart:
+    """The counterpart of a CSG solid: its operands, in the order of the tree's leaves."""
 
     operands: Sequence[Operand]
     tree: Tree
 
     @property
     def place(self) -> tuple[int, int]:
-        """The shape, and the instance, that the solid is."""
-        piece = next(iter(self.operands[0].pieces.values()))
-        return piece.shape, piece.instance
+        """(shape, instance) of the solid."""
+        mi_shape = next(iter(self.operands[0].pieces.values()))
+        return mi_shape.shape, mi_shape.instance
 
     def near(self, o: FloatArray, d: FloatArray) -> IntArray:
-        """The rays (k,) that come near any of the operands."""
+        """Indices (k,) of the rays that pass near any of the operands."""
         if any(isinstance(operand.leaf.shape, Plane) for operand in self.operands):
             return np.arange(len(o))
         boxes = [operand.mi_scene.bbox() for operand in self.operands]
@@ -125,16 +126,16 @@ class SolidTwin:
         margin = 1e-3 * (upper - lower).max()
         with np.errstate(divide="ignore", invalid="ignore"):
             a, b = (lower - margin - o) / d, (upper + margin - o) / d
-        # A ray within a plane of the box: 0/0 does not limit it.
+        # A ray in a plane of the box: 0/0 sets no limit.
         t_in = np.nan_to_num(np.minimum(a, b), nan=-np.inf).max(axis=1)
         t_out = np.nan_to_num(np.maximum(a, b), nan=np.inf).min(axis=1)
         return np.flatnonzero((t_in <= t_out) & (t_out > 0.0))
 
     def trace(self, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -> Answers:
-        """The first points of the solid's surface.
+        """The first hits of the solid's surface.
 
-        Crossings that are closer together than `tolerance` times float32's bound are passed at
-        once: faces that coincide leave no film between them.
+        Crossings closer together than `tolerance` times float32's bound count as one, so that
+        coincident faces leave no thin film between them.
         """
         n = len(o)
         states = np.zeros((len(self.operands), n), bool)
@@ -144,7 +145,7 @@ class SolidTwin:
             states[k], some = operand.walk(o, d)
             crossings += some
             whose += [k] * len(some)
-        result = nothing(n)
+        result = misses(n)
         if not crossings:
             return result
         column = np.full((len(crossings), n), -1)  # the row of a ray in each set of crossings
@@ -159,14 +160,14 @@ class SolidTwin:
         for j, crossing in enumerate(crossings):
             rays = np.flatnonzero(changed == j)
             some_hits = rows_of(crossing.at, column[j, rays])
-            put(result, rays, some_hits)
+            assign(result, rays, some_hits)
         return self._facing(result, d, evaluated(self.tree, states))
 
     def meets(
         self, o: FloatArray, d: FloatArray, part: IntArray, t: FloatArray, primitive: IntArray
     ) -> BoolArray:
-        """Whether the operands with the numbers `part` (n,) have a crossing, of this primitive, at
-        t to within float32."""
+        """(n,): whether the ray crosses face `primitive` of operand `part` at t, within float32's
+        bound."""
         found = np.zeros(len(o), bool)
         for operand in self.operands:
             rows = np.flatnonzero(part == operand.leaf.part)
@@ -186,13 +187,13 @@ class SolidTwin:
         whose: list[int],
         sorted_: tuple[IntArray, IntArray, FloatArray, FloatArray],
     ) -> IntArray:
-        """Which crossing (n,) is the first where rays come in or out of the solid, -1 for none: of
-        those that are passed at once, the last at which the inside changes."""
+        """(n,): the index of the first crossing at which the ray enters or leaves the solid, -1 for
+        none; among crossings that count as one, the last that changes the solid's state."""
         order, column, t, slack = sorted_
         n = t.shape[1]
         everything = np.arange(n)
         states = states.copy()
-        began = evaluated(self.tree, states)  # before the crossings that are passed at once
+        began = evaluated(self.tree, states)  # before the current group of crossings
         inside, candidate = began.copy(), np.full(n, -1)
         changed = np.full(n, -1)
         done = np.zeros(n, bool)
@@ -207,7 +208,7 @@ class SolidTwin:
             now = evaluated(self.tree, states)
             candidate = np.where(active & (now != inside), j, candidate)
             inside = np.where(active, now, inside)
-            # The last of its group where the next one is clearly further.
+            # A crossing ends its group if the next one is clearly further.
             if k + 1 < len(order):
                 with np.errstate(invalid="ignore"):
                     last = ~(t[k + 1] - t[k] <= slack[k] + slack[k + 1])
@@ -222,7 +223,7 @@ class SolidTwin:
         return changed
 
     def _facing(self, hits: Answers, d: FloatArray, inside: BoolArray) -> Answers:
-        """The hits with the normals of the solid: towards the ray where it comes in."""
+        """The hits with outward normals of the solid: against the ray where it enters."""
         away = np.sum(hits.n * d, axis=1) > 0.0
         turned = away != inside
         for normal in (hits.n, hits.ns):
@@ -231,7 +232,7 @@ class SolidTwin:
 
 
 def evaluated(tree: Tree | int, states: BoolArray) -> BoolArray:
-    """Who is inside the solid (n,), of states (operands, n): who is inside each operand."""
+    """(n,): whether points are inside the solid;  states (operands, n): inside each operand."""
     if isinstance(tree, int):
         return np.asarray(states[tree])
     values = [evaluated(part, states) for part in tree.of]

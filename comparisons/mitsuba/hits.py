@@ -1,4 +1,4 @@
-"""What Mitsuba's hits are in our terms."""
+"""Mitsuba's hits, converted to our numbering of shapes, faces and uv."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.geometry.float32 import UNIT_ROUNDOFF
-from comparisons.mitsuba.scene import Hits
-from comparisons.mitsuba.stand_ins import Piece, same_uv
+from comparisons.mitsuba.scene import RawHits
+from comparisons.mitsuba.stand_ins import MitsubaShape, same_uv
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.rendering.query import Intersections
 
@@ -20,10 +20,13 @@ AnyHits = TypeVar("AnyHits", bound=Intersections)
 
 @dataclass(frozen=True)
 class Answers(Intersections):
-    """Intersections, and for each: has_uv, whether its uv mean what ours do;  sag, turn (n,): how
-    far the surface that was hit, and its shading normal, may be from those of the shape that it
-    stands for, in scene units and radians, beyond float32's common bound;  stands_in: whether it is
-    a mesh for a curved surface, whose geometric normals are those of flat triangles."""
+    """Mitsuba's hit records in our terms: `Intersections`, and for each hit:
+
+    has_uv (n,): whether uv can be compared;  sag, turn (n,): the distance in scene units, and the
+    angle in radians, by which the hit surface and its shading normal may differ from those of our
+    shape, beyond float32's common bound;  stands_in (n,): whether the hit is on a mesh that stands
+    in for a curved surface, and has the geometric normal of a flat triangle.
+    """
 
     has_uv: BoolArray
     sag: FloatArray
@@ -32,15 +35,15 @@ class Answers(Intersections):
 
 
 CURVED = 4.0
-"""A quadratic's discriminant, solved in float32 for a surface of radius r at the distance D, is
-off by some u D²: t by this many times u D² / r at most.  Measured for Mitsuba's cylinders in llvm
-variants, up to D / r = 100: 2.6; for its spheres, whose quadratic is a better one, within
-instances: 3.3."""
+"""Error bound of t, in units of u D² / r, where Mitsuba solves a quadratic in float32 for a surface
+of radius r at the distance D: the discriminant is off by some u D².  Measured up to D / r = 100:
+2.6 for Mitsuba's cylinders in llvm variants; 3.3 for its spheres in instances, whose quadratic is
+better conditioned."""
 
 
-def read(hits: Hits, pieces: Sequence[Piece], o: FloatArray) -> Answers:
-    """The hits of rays from o in our terms; `hits.which` counts the pieces."""
-    found = nothing(len(hits.t))
+def read(hits: RawHits, pieces: Sequence[MitsubaShape], o: FloatArray) -> Answers:
+    """The hits of rays from o in our terms; `hits.which` is an index of `pieces`."""
+    found = misses(len(hits.t))
     met = hits.which >= 0
     for name in ("t", "p", "n", "ns"):
         getattr(found, name)[:] = getattr(hits, name)
@@ -50,10 +53,10 @@ def read(hits: Hits, pieces: Sequence[Piece], o: FloatArray) -> Answers:
     for number, rows in zip(numbers.tolist(), np.split(order, starts[1:]), strict=True):
         if number < 0:
             continue
-        piece = pieces[number]
-        plugin = piece.plugin
-        found.shape[rows], found.part[rows] = piece.shape, piece.part
-        found.instance[rows] = piece.instance
+        mi_shape = pieces[number]
+        plugin = mi_shape.plugin
+        found.shape[rows], found.part[rows] = mi_shape.shape, mi_shape.part
+        found.instance[rows] = mi_shape.instance
         if plugin.faces is not None:
             found.primitive[rows] = plugin.faces[hits.prim[rows]]
         if plugin.uv is not None:
@@ -70,7 +73,7 @@ def read(hits: Hits, pieces: Sequence[Piece], o: FloatArray) -> Answers:
     return found
 
 
-def nothing(n: int) -> Answers:
+def misses(n: int) -> Answers:
     """n misses."""
     none = [np.full(n, -1) for _ in range(4)]
     return Answers(
@@ -91,17 +94,17 @@ def nothing(n: int) -> Answers:
 
 
 def rows_of(hits: AnyHits, rows: Any) -> AnyHits:
-    """Some of the hits."""
+    """The hits of some rows."""
     return type(hits)(**{name: array[rows] for name, array in vars(hits).items()})
 
 
-def put(hits: AnyHits, rows: Any, some: AnyHits) -> None:
-    """Writes `some` over the hits that `rows` names."""
+def assign(hits: AnyHits, rows: Any, some: AnyHits) -> None:
+    """Overwrite the hits of `rows` with `some`."""
     for name, array in vars(some).items():
         getattr(hits, name)[rows] = array
 
 
-def put_nearer(hits: Answers, rows: IntArray, some: Answers) -> None:
-    """Writes those of `some` that are nearer than the hits at `rows`."""
+def assign_nearer(hits: Answers, rows: IntArray, some: Answers) -> None:
+    """Overwrite those hits of `rows` for which `some` is nearer."""
     nearer = some.t < hits.t[rows]
-    put(hits, rows[nearer], rows_of(some, nearer))
+    assign(hits, rows[nearer], rows_of(some, nearer))

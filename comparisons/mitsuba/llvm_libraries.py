@@ -1,9 +1,9 @@
-"""Where a libLLVM for Mitsuba's llvm variants may be: named by the user, in a wheel, in the system.
+"""Finds a libLLVM for Mitsuba's llvm variants: named by the user, in a wheel, or in the system.
 
-The extra `compare` brings the wheel `karellen-llvm-core` where there is one (Linux, x86_64).  Its
+The extra `compare` installs the wheel `karellen-llvm-core` where there is one (Linux, x86_64).  Its
 libLLVM needs the libc++ of the same wheel, which the system's loader finds only through links that
-the wheel makes when Python first starts: without the right to write there, it never does.  So they
-are loaded first, by their own names.
+the wheel creates when Python first starts, if it may write there.  So these libraries are loaded
+first, by their own paths.
 """
 
 import ctypes.util
@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 LIBRARY = "DRJIT_LIBLLVM_PATH"
-"""The environment variable that tells Dr.Jit which library to load."""
+"""The environment variable with the library that Dr.Jit loads."""
 
 ADVICE = (
     "pip install 'reference-rt[compare]' brings it on Linux x86_64; elsewhere install LLVM with "
@@ -24,7 +24,7 @@ ADVICE = (
 _WHEEL = "karellen-llvm-core"
 
 _NEEDED = ("libunwind", "libc++abi", "libc++")
-"""Of the wheel's libLLVM, each after those that it needs itself."""
+"""Libraries that the wheel's libLLVM needs, in the order of their own dependencies."""
 
 _PLACES = (
     "/usr/lib/*/libLLVM*.so*",
@@ -39,8 +39,8 @@ _PLACES = (
 
 
 def candidates() -> list[str]:
-    """Paths of libraries in the order to try them: only the user's own where one is named; else the
-    wheel's, which is the same on every machine, and the system's, the newest first."""
+    """Paths of libraries in the order to try them: only the one that the user names, if any; else
+    the wheel's, which is the same on every machine, then the system's, the newest first."""
     own = os.environ.get(LIBRARY)
     if own:
         return [own]
@@ -52,7 +52,7 @@ def candidates() -> list[str]:
 
 
 def needed_by(path: str) -> list[str]:
-    """Libraries to load before the libLLVM at `path`, in this order: none but for the wheel's."""
+    """Libraries to load before the libLLVM at `path`, in this order; only the wheel's needs any."""
     files = list(_files_of_wheel())
     if Path(path).resolve() not in files:
         return []
@@ -64,13 +64,13 @@ def needed_by(path: str) -> list[str]:
 
 
 def load_needed(path: str) -> None:
-    """Load what the libLLVM at `path` needs into this process.  Raises OSError."""
+    """Load the libraries that the libLLVM at `path` needs.  Raises OSError."""
     for library in needed_by(path):
         ctypes.CDLL(library)
 
 
 def _files_of_wheel() -> Iterable[Path]:
-    """Libraries that the wheel has installed, each by its real name; none where it is absent."""
+    """Libraries that the wheel has installed, each by its real path; none if it is absent."""
     try:
         files = importlib.metadata.files(_WHEEL) or ()
     except importlib.metadata.PackageNotFoundError:
@@ -84,7 +84,7 @@ def _files_of_system() -> Iterable[Path]:
     if "CONDA_PREFIX" in os.environ:
         places.append(os.environ["CONDA_PREFIX"].lstrip("/") + "/lib/libLLVM*")
     root = Path("/")
-    # One file has many names; its real one holds the full version.
+    # A file has several links; the real name has the full version.
     return {p.resolve() for place in places for p in root.glob(place.lstrip("/")) if p.is_file()}
 
 
@@ -93,8 +93,8 @@ def _newest_first(files: Iterable[Path]) -> list[str]:
 
 
 def version_of(path: str) -> tuple[int, ...]:
-    """(19, 1) of .../libLLVM.so.19.1 or .../libLLVM-19.so.1; from the folder's name on macOS, (0,)
-    where that has none; () for a file that is not all of LLVM."""
+    """(19, 1) for .../libLLVM.so.19.1 or .../libLLVM-19.so.1; on macOS from the folder's name, (0,)
+    if that has none; () for a file that is not the whole LLVM."""
     if not re.match(r"libLLVM[-.]\w", Path(path).name):
         return ()
     for part in reversed(Path(path).parts):

@@ -1,4 +1,4 @@
-"""What a reader should know of materials whose twins are not Mitsuba's own alone."""
+"""Notes for the reader on materials whose counterpart is not simply Mitsuba's own material."""
 
 from functools import singledispatch
 from typing import Any
@@ -23,21 +23,22 @@ from reference_rt.rendering.scene import Scene
 
 
 def notes_of(scene: Scene) -> list[str]:
-    """One for each kind of material that is used so."""
+    """The notes on a scene's materials, each text once."""
     around = Surroundings.of(scene)
     found = [note_of(material, around) for material in scene.materials.values()]
     for name in scene.materials:
         off = accuracy(scene, name)
         if off > 0.0:
             found.append(
-                f"'{name}': {off:.2g} of its light is allowed for, see comparisons.mitsuba.accuracy"
+                f"'{name}': a relative error of {off:.2g} of its light is allowed for (tables, "
+                "float32: comparisons.mitsuba.accuracy)"
             )
     return list(dict.fromkeys(note for note in found if note))
 
 
 @singledispatch
 def note_of(material: Any, around: Surroundings) -> str:
-    """What to say of a material; nothing where Mitsuba's own stands for it as it is."""
+    """The note on a material; empty if Mitsuba's own material is its exact counterpart."""
     return ""
 
 
@@ -47,8 +48,8 @@ def _(material: RoughConductor | RoughDielectric, around: Surroundings) -> str:
     if material.distribution == "ggx":
         return ""
     return (
-        "Mitsuba's masking of Beckmann microfacets, an approximation up to 0.31 % off for each of "
-        "the two directions, is replaced by the exact one"
+        "Mitsuba's masking function of Beckmann microfacets, an approximation up to 0.31 % off for "
+        "each of the two directions, is replaced by the exact one"
     )
 
 
@@ -56,7 +57,7 @@ def _(material: RoughConductor | RoughDielectric, around: Surroundings) -> str:
 def _(material: Plastic, around: Surroundings) -> str:
     eta = material.interior_ior / material.exterior_ior
     return (
-        f"Mitsuba's fit of what a coat mirrors from within, which makes its base {_off(eta)} at a "
+        f"Mitsuba's fit of a coat's internal reflectance, which makes the base {_off(eta)} at a "
         f"relative index of {eta:.4g}, is replaced by the integral"
     )
 
@@ -66,14 +67,14 @@ def _(material: RoughPlastic, around: Surroundings) -> str:
     eta = material.interior_ior / material.exterior_ior
     alpha = max(material.alpha, MIN_ALPHA)
     return (
-        "Mitsuba's tables of what a rough coat lets pass and mirrors from within, which make its "
+        "Mitsuba's tables of a rough coat's transmittance and internal reflectance, which make the "
         f"base {_off(eta, material.distribution, alpha)} at alpha {alpha:g} "
         f"({material.distribution}) and a relative index of {eta:.4g}, are replaced by finer ones"
     )
 
 
 def _off(eta: float, distribution: str = "", alpha: float = 0.0) -> str:
-    """How far the base of Mitsuba's own plastic is from the exact law, in words."""
+    """The error of the base of Mitsuba's own plastic, in words."""
     low, high = (100.0 * off for off in base_error(eta, distribution, alpha))
     if low < 0.0 < high:
         return f"{-low:.2f} % darker to {high:.2f} % brighter"
@@ -83,7 +84,7 @@ def _off(eta: float, distribution: str = "", alpha: float = 0.0) -> str:
 
 @note_of.register(Phong)
 def _(material: Phong, around: Surroundings) -> str:
-    return "Mitsuba has no Phong: a material written for it stands in"
+    return "Mitsuba has no Phong material: our plugin is used instead"
 
 
 @note_of.register(Blend)
@@ -91,21 +92,21 @@ def _(material: Blend, around: Surroundings) -> str:
     if not has_delta(material, around):
         return ""
     return (
-        "Mitsuba's blend is wrong where one of the two mirrors perfectly: a mirror with a share w "
-        "has (w + (1 - w) f) / (w + (1 - w) p) of its light, with f what the other one scatters "
-        "into the mirrored direction and p its density there; one written for it stands in"
+        "Mitsuba's blend is wrong if one of the two is a perfect mirror: with the weight w it "
+        "reflects (w + (1 - w) f) / (w + (1 - w) p) of its light, where f is the other's BSDF "
+        "times cosine in the mirrored direction, and p its pdf there; our plugin is used instead"
     )
 
 
 @note_of.register(Mask)
 def _(material: Mask, around: Surroundings) -> str:
-    return "shadow rays take masks for opaque, on both sides"
+    return "shadow rays treat masks as opaque, in both renderers"
 
 
 @note_of.register(Bump)
 @note_of.register(NormalMap)
 def _(material: Bump | NormalMap, around: Surroundings) -> str:
     return (
-        "Mitsuba's bump and normal maps are told not to turn normals that face away, nor to darken "
-        "by a shadowing term"
+        "Mitsuba's bump and normal maps run with flip_invalid_normals and use_shadowing_function "
+        "off"
     )

@@ -1,4 +1,4 @@
-"""How far Mitsuba's own plastics are from the exact law, as measured on its BSDF."""
+"""The error of Mitsuba's own plastic materials, measured on its BSDF."""
 
 import itertools
 import math
@@ -9,15 +9,15 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.exact_coat import CELLS, fresnel, rough_coat, smooth_reflectance
 
 COSINES = (0.2, 0.5, 0.75, 1.0)
-"""Cosines of the directions in which `base_error` compares the two."""
+"""Cosines of the directions at which `base_error` compares Mitsuba with the exact integral."""
 
 
 def base_error(eta: float, distribution: str = "", alpha: float = 0.0) -> tuple[float, float]:
-    """How far the light that the base of Mitsuba's own plastic scatters is from the exact law, the
-    relative difference, least and greatest over pairs of directions with COSINES.
+    """The relative error of the light that the base of Mitsuba's own plastic scatters: the least
+    and the greatest over pairs of directions with COSINES.
 
-    eta: relative index of the coat;  distribution, alpha: of a rough coat, none of a smooth one.
-    Of a base that is linear, or white; a nonlinear one that is darker errs less.
+    eta: relative index of the coat;  distribution, alpha: of a rough coat, empty for a smooth one.
+    For a base that is linear, or white; a darker nonlinear one has a smaller error.
     """
     import drjit as dr
 

@@ -1,7 +1,7 @@
-"""Rays and pictures out of a Mitsuba scene, as float64 NumPy arrays, in any variant.
+"""Hits and pictures from a Mitsuba scene, as float64 NumPy arrays, in any variant.
 
-llvm and cuda variants take all rays at once; scalar variants take one at a time: the functions that
-are passed to `for_rays` are written once for both.
+llvm and cuda variants process all rays at once, scalar variants one at a time: functions passed to
+`for_rays` work for both.
 """
 
 import time
@@ -39,9 +39,9 @@ class Replicates(NamedTuple):
 def for_rays(
     function: Callable[..., tuple[Any, ...]], *columns: npt.NDArray[Any]
 ) -> tuple[npt.NDArray[Any], ...]:
-    """`function` of Mitsuba values, applied to arrays: (n, 3) become Vector3f, (n,) Float.
+    """Apply a function of Mitsuba values to arrays: (n, 3) become Vector3f, (n,) Float.
 
-    What it returns, a tuple of Mitsuba numbers and vectors, comes back as arrays (n,) and (n, k).
+    The tuple of Mitsuba numbers and vectors that it returns is converted to arrays (n,) and (n, k).
     """
     mi = mitsuba()
     n = len(columns[0])
@@ -69,18 +69,18 @@ def _scalar_result(value: Any) -> Any:
 
 
 def _array(value: Any, n: int) -> npt.NDArray[Any]:
-    """(n,) or (n, k); what does not depend on the ray is repeated."""
+    """(n,) or (n, k); values that do not depend on the ray are repeated."""
     array = np.array(value)
     if array.dtype == np.float32:
         array = array.astype(np.float64)
     return np.broadcast_to(array, (*array.shape[:-1], n)).T.copy()
 
 
-class Hits(NamedTuple):
-    """What rays hit in a Mitsuba scene.
+class RawHits(NamedTuple):
+    """Hits as Mitsuba returns them.
 
-    t (n,), inf for a miss;  which (n,): number of the id among those asked for, -1 for a miss;
-    prim (n,): Mitsuba's prim_index;  p, n, ns (n, 3), uv (n, 2).
+    t (n,): inf for a miss;  which (n,): number of the shape's id, -1 for a miss;  prim (n,):
+    Mitsuba's prim_index;  p, n, ns (n, 3), uv (n, 2): 0 for a miss.
     """
 
     t: FloatArray
@@ -92,10 +92,10 @@ class Hits(NamedTuple):
     uv: FloatArray
 
 
-def first_hits(mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArray) -> Hits:
-    """What Mitsuba hits first; `ids` are the numbers of its shapes, of an instance its own.
+def first_hits(mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArray) -> RawHits:
+    """Mitsuba's first hits;  ids: the numbers of its shapes, by id; an instance has its own number.
 
-    Mitsuba sees the rays rounded to float32.
+    Mitsuba gets the rays rounded to float32.
     """
     mi = mitsuba()
     number = _shape_numbers(ids)
@@ -109,12 +109,12 @@ def first_hits(mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArr
     missed = which < 0
     for array in (prim, p, n, ns, uv):
         array[missed] = 0
-    return Hits(np.where(missed, np.inf, t), which, prim.astype(np.int64), p, n, ns, uv)
+    return RawHits(np.where(missed, np.inf, t), which, prim.astype(np.int64), p, n, ns, uv)
 
 
 def _shape_numbers(ids: Mapping[str, int]) -> Callable[[Any], Any]:
-    """How to tell the shape, or instance, of a hit: its number in scalar variants, its registry id
-    otherwise."""
+    """The function that gives the shape, or instance, of a hit: its number in scalar variants, its
+    registry id otherwise."""
     mi = mitsuba()
     if mi.variant().startswith("scalar"):
 
@@ -149,14 +149,14 @@ def _decoded(mi_scene: Any, ids: Mapping[str, int], numbers: npt.NDArray[Any]) -
 def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicates:
     """Pictures with the seeds seed, seed + 1, ...
 
-    A small picture goes before and is thrown away: it compiles the kernels, which a run time must
-    not count.
+    A small picture is rendered first and discarded: it compiles the kernels, which the measured
+    time must not include.
     """
     mi = mitsuba()
     if not mi.variant().startswith("scalar"):
-        # Dr.Jit divides by powers of two in another way: those are kernels of their own.
-        alike = 1 if spp & (spp - 1) == 0 else 3
-        picture(mi_scene, alike, seed + replicates)
+        # Dr.Jit divides by powers of two in another way, and then compiles another kernel.
+        warm_up_spp = 1 if spp & (spp - 1) == 0 else 3
+        picture(mi_scene, warm_up_spp, seed + replicates)
     pictures, seconds = [], []
     for k in range(replicates):
         start = time.perf_counter()
@@ -167,12 +167,12 @@ def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicate
 
 def picture(mi_scene: Any, spp: int, seed: int) -> FloatArray:
     """One picture (height, width, 3)."""
-    # The array is what forces the lazy rendering to happen.
+    # The conversion to an array forces the lazy evaluation.
     return np.array(mitsuba().render(mi_scene, spp=spp, seed=seed), dtype=np.float64)[..., :3]
 
 
 __all__ = [
-    "Hits",
+    "RawHits",
     "Replicates",
     "first_hits",
     "for_rays",

@@ -1,4 +1,7 @@
-"""The Mitsuba shapes that stand for ours, and how to read their hits."""
+"""The Mitsuba shapes that represent our shapes, and how to convert their hits.
+
+Where Mitsuba lacks a shape, a mesh stands in for it: `StandIn` says how close that is.
+"""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -6,15 +9,15 @@ from typing import Any, NamedTuple
 from reference_rt.core.arrays import FloatArray, IntArray
 
 UvMap = Callable[[FloatArray], FloatArray]
-"""Mitsuba's uv (n, 2) of a shape -> ours."""
+"""Mitsuba's uv (n, 2) of a shape -> our uv."""
 
 
 class StandIn(NamedTuple):
-    """How close a mesh is to the surface that it stands for.
+    """The error of a mesh that stands in for a curved surface.
 
-    name: of the shape;  triangles: their number;  sag: the largest distance between them, in scene
-    units;  turn: the largest angle between their normals, in radians;  ratio: how many times
-    larger the sag is with half as many triangles along each side.
+    name: of the shape;  triangles: their number;  sag: the largest distance between mesh and
+    surface, in scene units;  turn: the largest angle between their normals, in radians;  ratio: the
+    sag of a mesh with half as many triangles along each side, over this one's.
     """
 
     name: str
@@ -25,21 +28,22 @@ class StandIn(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """A disk, all that there is of an infinite plane: middle (3,) and radius."""
+    """The disk inside the mesh that stands in for an infinite plane: middle (3,) and radius."""
 
     middle: FloatArray
     radius: float
 
 
 class Plugin(NamedTuple):
-    """One of Mitsuba's shapes.
+    """The translation of a shape, or of a part of one, to a Mitsuba shape.
 
     value: its dict, or the object;  suffix: of its id;  faces: our numbers of its primitives, None
-    where they are the same;  uv: how its uv become ours, None where the two have nothing in common;
-    stand_in: for a mesh in place of a surface that Mitsuba does not have;  extent: what it is of an
-    infinite plane;  within: of an instance;  curved: the radius of a surface whose equation Mitsuba
-    solves in float32 (see `answers.read`), 0 for none;  faceted: whether it is so many small
-    triangles that float32 turns their own normals: those of the corners tell the surface's.
+    if they are the same;  uv: its uv -> ours, None if they cannot be converted;  stand_in: the
+    error of a mesh that stands in for a surface that Mitsuba lacks;  extent: of a mesh that stands
+    in for an infinite plane;  group: the group of an instance;  curved: the radius of a surface
+    whose quadratic Mitsuba solves in float32 (see `hits.CURVED`), else 0;  faceted: whether its
+    triangles are so small that float32 turns their geometric normals, so that shading normals are
+    compared.
     """
 
     value: Any
@@ -48,24 +52,25 @@ class Plugin(NamedTuple):
     uv: UvMap | None = None
     stand_in: StandIn | None = None
     extent: Extent | None = None
-    within: "Within | None" = None
+    group: "ShapeGroup | None" = None
     curved: float = 0.0
     faceted: bool = False
 
 
-class Within(NamedTuple):
-    """What an instance holds: the id of the group;  member: the dict of the one Mitsuba shape in
-    it, or a function that makes the object in the variant that is set."""
+class ShapeGroup(NamedTuple):
+    """The Mitsuba `shapegroup` of an instance: its id;  member: the dict of the one Mitsuba shape
+    in it, or a function that makes the object in the current variant."""
 
     name: str
     member: Any
 
 
-class Piece(NamedTuple):
-    """A Mitsuba shape that stands for a leaf, or for part of one, of our scene.
+class MitsubaShape(NamedTuple):
+    """A Mitsuba shape in a loaded scene, and the primitive of our scene that it represents, or a
+    part of one.
 
-    shape, part, instance: as in `Intersections`;  leaf: its description;  plugin: how to read its
-    hits.
+    shape, part, instance: as in `Intersections`;  leaf: the primitive's description;  plugin: how
+    to convert its hits.
     """
 
     shape: int
@@ -76,5 +81,5 @@ class Piece(NamedTuple):
 
 
 def same_uv(uv: FloatArray) -> FloatArray:
-    """Mitsuba's uv are ours."""
+    """The `UvMap` of shapes whose uv are the same in Mitsuba."""
     return uv

@@ -1,4 +1,4 @@
-"""What a comparison found, as data: what `results.json` and the report are made from."""
+"""The result of one comparison as data, from which `results.json` and the report are made."""
 
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -11,17 +11,17 @@ FloatArray = npt.NDArray[np.float64]
 Status = Literal[
     "agree",  # the same within the stated bound
     "differ",  # different beyond the stated bound
-    "reference-limited",  # different, and the cause is Mitsuba's own float32, shown by the arbiter
-    "inconclusive",  # too noisy to tell: no bias seen, but one that matters could hide
-    "not-comparable",  # nothing to compare with, and why
-    "not-applicable",  # a rung that this scene does not have
-    "invalid",  # non-finite pixels, wrong size: no statement about agreement is possible
+    "reference-limited",  # different because of Mitsuba's float32 precision, as the arbiter shows
+    "inconclusive",  # too noisy: no bias is proven, but one that matters could be hidden
+    "not-comparable",  # Mitsuba has no counterpart of the scene
+    "not-applicable",  # the rung does not apply to this scene
+    "invalid",  # non-finite pixels, wrong size: the pictures cannot be compared
 ]
 
 RUNGS = ("scene", "run", "input", "film", "geometry", "direct", "whitted", "statistics", "images")
 """The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
-where the scene or a file that it names is invalid, `run` only where the case could not be carried
-through; `input` says what is wrong with pictures as such."""
+if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`
+checks the pictures themselves."""
 
 COMPARED = RUNGS[3:]
 """The rungs that compare the two renderers: those a suite can be limited to."""
@@ -29,7 +29,8 @@ COMPARED = RUNGS[3:]
 
 @dataclass(frozen=True)
 class Tier:
-    """One rung of the ladder for one scene: its outcome, why, and the numbers behind it."""
+    """The result of one rung for one scene: a name of RUNGS, the status, the reason in one
+    sentence, and the numbers behind it."""
 
     name: str
     status: Status
@@ -65,8 +66,8 @@ class Images:
 
 @dataclass(frozen=True)
 class Place:
-    """A part of the pictures that is worth a look: its left and upper edge and its size in pixels,
-    and what is the matter there."""
+    """A region of the pictures that differs: its left and upper edge and its size in pixels, and
+    how it differs."""
 
     x: int
     y: int
@@ -80,7 +81,8 @@ class Cause:
     """The likeliest cause of a difference.
 
     name: in a few words, such as "half-pixel shift";  evidence: one sentence with the numbers that
-    speak for it;  explained: which fraction of the squared difference beyond noise it accounts for.
+    support it;  explained: the fraction of the squared difference beyond noise that it accounts
+    for.
     """
 
     name: str
@@ -90,7 +92,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Case:
-    """Everything that was found out about one scene."""
+    """The complete result for one scene."""
 
     scene: str
     verdict: Status
@@ -101,29 +103,27 @@ class Case:
     """Wall clock by side and step: "load" (files, arrays, hierarchy), "compile", "render"."""
     images: Images | None = None
     notes: tuple[str, ...] = ()
-    """What a reader should know besides: translations that are approximate."""
+    """Further remarks for the reader, such as approximate translations."""
     sides: tuple[str, str] = ("ours", "Mitsuba's")
     """Whose pictures the candidate and the reference are."""
     cause: Cause | None = None
     worst: tuple[Place, ...] = ()
-    """Where the pictures differ most, the worst first."""
+    """The regions where the pictures differ most, the worst first."""
     left_out: tuple[str, ...] = ()
-    """What the scene does not need, and so was not run."""
+    """Features that the scene does not use, which were compiled out."""
     again: str = ""
     """The command that repeats this case alone."""
 
 
 WARNING = "warning: "
-"""Begins the notes of a case that are warnings about its scene."""
+"""Prefix of those notes of a case that are warnings about its scene."""
 
 INTERRUPTED = "the run was interrupted before this case"
-"""Why a case that was asked for is missing."""
+"""Why a requested case is missing."""
 
 
 def how_many(run: int, missing: int) -> str:
-    """How many cases were run, of how many that were asked for, in words: "64 cases", or
-    "17 of 64 cases run" where the rest is missing."""
-    asked = run + missing
+    """The number of cases in words: "64 cases", or "17 of 64 cases run" if some are missing."""
     if missing:
-        return f"{run} of {asked} cases run"
-    return f"{asked} case{'s' if asked != 1 else ''}"
+        return f"{run} of {run + missing} cases run"
+    return f"{run} case{'s' if run != 1 else ''}"

@@ -1,7 +1,7 @@
-"""A case on disk: `case.json`, exact and strict, and `pictures.exr`; both whole or it is not read.
+"""A stored case: `case.json` and `pictures.exr`, which are read back exactly or refused.
 
-`results.json` is for others to read; this is for us to read again: to render a report once more,
-and not to do again what is done.
+Stored cases let a report be rendered again, and a run continue without repeating finished cases.
+`results.json` is the summary for other programs.
 """
 
 import dataclasses
@@ -24,54 +24,62 @@ from reference_rt.util.files import read_input, read_text, replacing
 CASE, PICTURES = "case.json", "pictures.exr"
 
 SCHEMA = 2
-"""Raised whenever a reader of the former layout would misread the new one."""
+"""Version of the layout; raised whenever a reader of the former layout would misread the new
+one."""
 
 _NUMBER = "number"
-"""The only key of an object that stands for a number which JSON has not: {"number": "nan"}."""
+"""The only key of an object that encodes a number that JSON lacks: {"number": "nan"}."""
 
 _CHANNELS = "RGB"
+
+_KEYS = {
+    f.name: {"rungs": "tiers"}.get(f.name, f.name)
+    for f in dataclasses.fields(Case)
+    if f.name != "images"
+}
+"""The key in `case.json` of each field of `Case`, the pictures left out."""
 
 _hints = get_type_hints(Case)
 _CaseFields: type[BaseModel] = create_model(  # type: ignore[call-overload]
     "_CaseFields",
     __config__=ConfigDict(extra="forbid"),
-    **{f.name: (_hints[f.name], ...) for f in dataclasses.fields(Case) if f.name != "images"},
+    **{key: (_hints[name], ...) for name, key in _KEYS.items()},
 )
 
 
 class RecordError(ImageError):
-    """A record is missing, damaged, or not of this version."""
+    """A stored case is missing, damaged, or not of this version."""
 
 
 class Record(BaseModel):
-    """What `case.json` holds."""
+    """The contents of `case.json`."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
     version: int = Field(alias="schema")
     key: str
-    """What the case was made with, as `comparisons.suites.keys` tells; "" if nobody asked."""
+    """Fingerprint of everything that the case depends on (`comparisons.suites.keys`); "" if it was
+    not computed."""
     wall: float
-    """Seconds that the case took, all in all."""
+    """Seconds that the case took in total."""
     case: dict[str, Any]
     pictures: dict[str, tuple[int, int]]
-    """Height and width of each picture in `pictures.exr`, by name; none without pictures."""
+    """Height and width of each picture in `pictures.exr`, by name; empty without pictures."""
     sha256: str
-    """Of `pictures.exr`, "" without."""
+    """Checksum of `pictures.exr`; "" without pictures."""
 
 
 def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> None:
     """Write `case` into `folder`, replacing the one that is there.  Raises ImageError.
 
-    An interruption leaves the former record, the new one, or one that `read_case` refuses.
+    An interruption leaves the former case, the new one, or one that `read_case` refuses.
     """
-    fields = {f.name: getattr(case, f.name) for f in dataclasses.fields(case)}
-    images = fields.pop("images")
+    images = case.images
     document = {
         "schema": SCHEMA,
         "key": key,
         "wall": wall,
-        "case": _encoded(fields),
+        "case": _encoded({key: getattr(case, name) for name, key in _KEYS.items()}),
         "pictures": {},
         "sha256": "",
     }
@@ -81,7 +89,7 @@ def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> No
         document["sha256"] = _digest(folder / PICTURES)
     text = json.dumps(sealed(document), indent=1, ensure_ascii=False, allow_nan=False)
     with replacing(folder / CASE) as temporary:
-        # A lone surrogate, of a file name that is not UTF-8, becomes JSON's escape for it.
+        # A lone surrogate, from a file name that is not UTF-8, becomes JSON's escape for it.
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     if images is None:
         (folder / PICTURES).unlink(missing_ok=True)
@@ -90,37 +98,34 @@ def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> No
 def read_case(folder: Path) -> Case:
     """The case that `write_case` wrote.  Raises RecordError.
 
-    Pictures come back as float32 holds them; arrays and tuples among the numbers of a tier as
-    lists.
+    Pictures come back rounded to float32; arrays and tuples among the numbers of a rung as lists.
     """
     path = folder / CASE
     record = read_record(folder)
     try:
         fields = _CaseFields.model_validate(_decoded(record.case))
     except ValidationError as error:
-        raise RecordError(f"{path}: is not a record of a case: {_first(error)}") from None
+        raise RecordError(f"{path}: is not a stored case: {_first(error)}") from None
     images = _read_pictures(folder / PICTURES, record) if record.pictures else None
-    return Case(
-        **{name: getattr(fields, name) for name in type(fields).model_fields}, images=images
-    )
+    return Case(**{name: getattr(fields, key) for name, key in _KEYS.items()}, images=images)
 
 
 def read_record(folder: Path) -> Record:
-    """What `case.json` says, without the pictures.  Raises RecordError."""
+    """The contents of `case.json`, without the pictures.  Raises RecordError."""
     path = folder / CASE
     try:
         data = json.loads(read_text(path))
         if isinstance(data, dict) and data.get("schema") != SCHEMA:
-            raise RecordError(f"{path}: is not of schema {SCHEMA}; expected one of this version")
+            raise RecordError(f"{path}: has another schema; expected schema {SCHEMA}")
         data = unsealed(data)
         data["pictures"] = {name: tuple(size) for name, size in data["pictures"].items()}
         return Record.model_validate(data)
     except OSError as error:
         raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
     except ValidationError as error:
-        raise RecordError(f"{path}: is not a record of a case: {_first(error)}") from None
+        raise RecordError(f"{path}: is not a stored case: {_first(error)}") from None
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise RecordError(f"{path}: is not a record of a case") from None
+        raise RecordError(f"{path}: is not a stored case") from None
 
 
 # ---- pictures -----------------------------------------------------------------------------------
@@ -129,7 +134,8 @@ def read_record(folder: Path) -> Record:
 def _write_pictures(
     path: Path, images: Images, header: Mapping[str, str]
 ) -> dict[str, tuple[int, int]]:
-    """All pictures as channels of one file, at its upper left; the rest of a smaller one is NaN."""
+    """All pictures as channels of one file, in its upper left corner; smaller ones are padded with
+    NaN."""
     pictures = {f.name: getattr(images, f.name) for f in dataclasses.fields(images)}
     pictures = {name: picture for name, picture in pictures.items() if picture is not None}
     for name, picture in pictures.items():
@@ -149,7 +155,7 @@ def _write_pictures(
 def _read_pictures(path: Path, record: Record) -> Images:
     try:
         if _digest(path) != record.sha256:
-            raise RecordError(f"{path}: is not the file that {CASE} tells of")
+            raise RecordError(f"{path}: does not have the checksum in {CASE}")
     except OSError as error:
         raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
     channels, _ = read_exr(path)
@@ -160,7 +166,7 @@ def _read_pictures(path: Path, record: Record) -> Images:
         }
         return Images(**pictures)
     except (KeyError, TypeError):
-        raise RecordError(f"{path}: lacks a picture that {CASE} tells of") from None
+        raise RecordError(f"{path}: lacks a picture that {CASE} lists") from None
 
 
 def _digest(path: Path) -> str:
@@ -198,6 +204,3 @@ def _decoded(value: Any) -> Any:
 def _first(error: ValidationError) -> str:
     first = error.errors()[0]
     return f"{'.'.join(str(key) for key in first['loc'])}: {first['msg']}"
-
-
-__all__ = ["CASE", "PICTURES", "Record", "RecordError", "read_case", "read_record", "write_case"]

@@ -1,6 +1,7 @@
-"""Files that a later run continues from: what is damaged is not believed, and made again.
+"""Files with checksums that a later run continues from: a damaged file is ignored and made again.
 
-Arrays lie in .npz archives, whose members have checksums; JSON objects have a seal.
+Arrays are stored in .npz archives, whose members have checksums; JSON objects get a "seal", the
+SHA-256 of their contents.
 """
 
 import hashlib
@@ -20,34 +21,34 @@ SEAL = "seal"
 
 
 def read_arrays(path: Path) -> Arrays:
-    """The arrays that `write_arrays` wrote, by name; none where the file is missing or damaged."""
-    # NumPy and zipfile raise whatever the damage leads them to: also RuntimeError, for what zipfile
-    # cannot do, SyntaxError, since headers of arrays are parsed as Python, and TypeError.
+    """The arrays that `write_arrays` wrote, by name; empty if the file is missing or damaged."""
+    # A damaged file makes NumPy and zipfile raise almost anything: also RuntimeError (unsupported
+    # by zipfile), SyntaxError (headers of arrays are parsed as Python) and TypeError.
     with suppress(Exception):
         return _arrays(path)
     return {}
 
 
 def _arrays(path: Path) -> Arrays:
-    # Opened here, since NumPy leaves a file that is no archive open.
+    # Opened here, since NumPy does not close a file that is no archive.
     with open_input(path) as stream, np.load(stream, allow_pickle=False) as file:
         return {name: np.array(file[name]) for name in file.files}
 
 
 def write_arrays(path: Path, **arrays: npt.ArrayLike) -> None:
-    """Write arrays, whole or not at all.  Raises ImageError where that is not possible."""
+    """Write arrays, whole or not at all.  Raises ImageError if they cannot be written."""
     with replacing(path) as temporary:
         np.savez(temporary, **arrays)  # type: ignore[arg-type]
 
 
 def sealed(data: dict[str, Any]) -> dict[str, Any]:
-    """The object with a digest of all that it holds: against damage and edits by hand, not against
-    forgers."""
+    """The object with a SHA-256 of its contents, against damage and edits by hand (not against
+    forgery)."""
     return data | {SEAL: _digest(data)}
 
 
 def unsealed(data: Any) -> dict[str, Any]:
-    """The object that was sealed.  Raises ValueError where it is not as it was."""
+    """The object without its seal.  Raises ValueError if its contents have changed."""
     if not isinstance(data, dict):
         raise ValueError("expected an object")
     inside = {name: value for name, value in data.items() if name != SEAL}

@@ -1,32 +1,32 @@
-"""From the rungs of one scene to its verdict, and from the verdicts of a run to its exit code."""
+"""The verdict of a scene from its rungs, and the exit code of a run from its verdicts."""
 
 from collections.abc import Sequence
 
 from comparisons.results.case import RUNGS, Case, Metrics, Status, Tier
 
 _FAILURES: tuple[Status, ...] = (
-    "invalid",  # nothing else can be believed
+    "invalid",  # makes every other result meaningless
     "differ",
     "inconclusive",
-    "not-comparable",  # a rung the scene has, but that could not be climbed: not yet agreement
+    "not-comparable",  # a rung that applies but could not be run: agreement is not shown
     "reference-limited",
 )
-"""What keeps a scene from agreeing, gravest first."""
+"""The statuses that keep a scene from agreeing, gravest first."""
 
 PASSING: tuple[Status, ...] = ("agree", "reference-limited")
 
 
-def decide(tiers: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]:
+def decide(results: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]:
     """The verdict on one scene and the reason, which names the first rung that gives it.
 
     The gravest status of any rung decides: `invalid` (also by pixels not finite in the pictures),
     `differ`, `inconclusive`, `not-comparable`, `reference-limited`; among rungs of that status the
-    first one of RUNGS is told. Otherwise the scene agrees if at least one rung but `input` did; a
-    scene without one is `not-comparable`. Raises ValueError for a tier that is not of RUNGS.
+    first one of RUNGS gives the reason. Otherwise the scene agrees if at least one rung other than
+    `input` agrees; if none does it is `not-comparable`. Raises ValueError for a name not in RUNGS.
     """
-    if unknown := {tier.name for tier in tiers} - set(RUNGS):
+    if unknown := {tier.name for tier in results} - set(RUNGS):
         raise ValueError(f"not a rung: {', '.join(sorted(unknown))}; the rungs are {RUNGS}")
-    ladder = sorted(tiers, key=lambda tier: RUNGS.index(tier.name))
+    ladder = sorted(results, key=lambda tier: RUNGS.index(tier.name))
     pixels = metrics.nonfinite if metrics else 0
     if pixels and not any(tier.status == "invalid" for tier in ladder):
         return "invalid", f"images: {pixels} pixel{'s' if pixels > 1 else ''} not finite"
@@ -38,18 +38,17 @@ def decide(tiers: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]
     if not any(tier.name != "input" for tier in agreed):
         return "not-comparable", "no rung applies to this scene"
     rungs = ", ".join(tier.name for tier in agreed)
-    # Where there is noise, what could have been seen says how much the agreement is worth.
-    told = next((tier for tier in agreed if tier.name == "statistics"), agreed[-1])
-    return "agree", f"{rungs}: {told.reason}"
+    # The statistics' reason states the smallest detectable bias: how much the agreement is worth.
+    summary = next((tier for tier in agreed if tier.name == "statistics"), agreed[-1])
+    return "agree", f"{rungs}: {summary.reason}"
 
 
 def exit_code(cases: Sequence[Case], missing: Sequence[str] = ()) -> int:
-    """0 if every case agrees or is limited by the reference only, otherwise the highest of these:
+    """0 if every case passes (`agree` or `reference-limited`), otherwise the highest of these:
 
-    - 4: a case could not be carried through (its process died or hung), or there is no case, since
-      a run that compared nothing has not passed;
-    - 3: a scene, or a file that it names, is invalid;
-    - 1: any other case does not pass, or cases are `missing`, because the run was interrupted.
+    - 4: a case could not be completed (its process died or hung), or there is no case at all;
+    - 3: a scene, or one of its files, is invalid;
+    - 1: any other case does not pass, or cases are `missing` because the run was interrupted.
     """
     failed = {tier.name for case in cases for tier in case.tiers} & {"scene", "run"}
     if not cases or "run" in failed:

@@ -1,8 +1,18 @@
-"""The deterministic rungs: the film's filter; geometry, direct light, the Whitted tree.
+"""Rungs: the tests of one scene, from the camera's rays up to the finished pictures.
 
-Each but the first takes the scene, our tables of it and Mitsuba's scene.  `differ` means a
-difference that float32 and Mitsuba's own epsilons do not explain; every ray that differs is first
-put to our float64 tracer as the arbiter (`comparisons.rungs.rays.arbiter`).
+A rung is one test of the ladder `comparisons.results.case.RUNGS`.  `film`, `geometry`, `direct` and
+`whitted` compare without noise, ray by ray; `input` checks the pictures themselves, `images`
+compares them by metrics, `comparisons.statistics` their means.  `limited` changes `differ` to
+`reference-limited` above a rung that shows that Mitsuba's precision is too low.
+
+Contract: a rung takes the scene, our tables and Mitsuba's counterpart (or pictures), and returns a
+`RungResult`: its name, a status, one sentence why, and the numbers behind it (lengths in scene
+units, radiance in W/sr/m²).  `differ` means a difference that float32 and Mitsuba's ray epsilons do
+not explain: for every ray that differs our float64 tracer first traces its neighbours
+(`comparisons.rungs.rays.arbiter`).
+
+To add one: such a function, its name in `RUNGS`, its call in `comparisons.compare`, a test that a
+planted fault breaks it.
 """
 
 from comparisons.rungs.direct import direct

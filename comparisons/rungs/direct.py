@@ -1,4 +1,4 @@
-"""The second rung: direct light, one light at a time."""
+"""The rung of direct light: f cos L of one point of one light at a time."""
 
 import math
 from collections.abc import Sequence
@@ -6,15 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Twin
 from comparisons.mitsuba.hits import rows_of
 from comparisons.results.case import Tier
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.bounds import ShapeSizes
+from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext
 from comparisons.rungs.rays.light_error import bounds, slopes_of, stand_ins
 from comparisons.rungs.rays.mitsuba_light import is_dark, mitsuba_direct
-from comparisons.rungs.rays.rays import Rays, mixed_rays
-from comparisons.rungs.rays.setting import POINT_LIKE, Setting
+from comparisons.rungs.rays.rays import mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.materials import any_smooth
@@ -23,22 +23,26 @@ from reference_rt.rendering.query import DirectLight
 from reference_rt.rendering.scene import Scene
 
 PIXELS = 1024
-"""Camera rays at most; as many random and secondary rays join them."""
+"""Most camera rays; as many random and as many secondary rays are added."""
 
 LIGHTS = 8
-"""Lights that are tested at most, evenly spread over the scene's."""
+"""Most lights that are tested, evenly spread over the scene's."""
 
 POINTS = ((0.5, 0.4), (0.13, 0.71), (0.83, 0.22), (0.37, 0.93))
 """(u, v) that pick a point on a light: none on the edge of a face of any shape."""
 
 FEWEST = 20
-"""Values that differ from which their ratio is told."""
+"""Least number of differing values for which the statistics of their ratio are reported."""
 
 
 class Outcome(NamedTuple):
-    """One light point: rays compared, the rays that differ unexplained, how many are explained, the
-    largest error and the largest error over its bound of the rest;  ratio, cosine (m,): of those
-    that differ and are lit on both sides, ours over Mitsuba's, and the cosine at the surface."""
+    """The comparison at one point of one light.
+
+    rays: how many were compared;  unexplained: indices of those that differ;  explained: how many
+    the arbiter explains;  max_error, max_ratio: the largest error, and error over bound, of the
+    rest;  ratio, cosine (m,): of rays that differ and are lit on both sides, our value over
+    Mitsuba's, and the cosine at the surface.
+    """
 
     rays: int
     unexplained: IntArray
@@ -52,10 +56,10 @@ class Outcome(NamedTuple):
 def direct(
     scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS, seed: int = 0
 ) -> Tier:
-    """Compare f cos L of single lights at what camera, random and secondary rays hit.
+    """Compare f cos L of single lights where camera, random and secondary rays hit.
 
-    At most LIGHTS of the scene's lights, at POINTS each.  Where ours is lit and Mitsuba's is not,
-    or the reverse, the arbiter repeats Mitsuba's shadow ray, with its epsilons, in our tracer.
+    At most LIGHTS of the scene's lights, at POINTS each.  Where only one renderer sees the light,
+    the arbiter traces Mitsuba's shadow ray, with its epsilons, in our tracer.
     """
     choice = tables.lights.choice
     if choice is None:
@@ -63,11 +67,12 @@ def direct(
     if twin.lacking:
         return Tier("direct", "not-comparable", twin.lacking)
     if not any_smooth(tables.materials):
-        return Tier("direct", "not-applicable", "no material scatters light that a light sends")
+        reason = "no material has a diffuse or glossy lobe, so that lights are not sampled"
+        return Tier("direct", "not-applicable", reason)
     sizes = ShapeSizes(scene, twin.frame)
     rays = mixed_rays(scene, tables, sizes, pixels, seed)
     hits = query.intersect(tables, rays.o, rays.d)
-    setting = Setting(scene, tables, twin, rays, hits, sizes)
+    context = LightContext(scene, tables, twin, rays, hits, sizes)
     lights = np.flatnonzero(choice.probability > 0.0)
     count = len(lights)
     tested = lights[np.unique(np.linspace(0, count - 1, min(count, LIGHTS)).round().astype(int))]
@@ -78,7 +83,7 @@ def direct(
             answers[light, u] = query.direct_light(tables, rays.o, rays.d, light, u)
     brightest = max((float(a.contribution.max(initial=0.0)) for a in answers.values()), default=0.0)
     outcomes = {
-        (light, u): _compare(setting, light, u, ours, brightest)
+        (light, u): _compare(context, light, u, ours, brightest)
         for (light, u), ours in answers.items()
     }
     total = sum(o.rays for o in outcomes.values())
@@ -98,20 +103,28 @@ def direct(
         if len(outcome.unexplained):
             k = int(outcome.unexplained[0])
             reason = (
-                f"{unexplained} of {total} differ; the first: light {light} at u = {u}, the ray "
-                f"from {rays.o[k].tolist()} along {rays.d[k].tolist()}"
+                f"{unexplained} of {total} values differ by more than float32 explains; the first: "
+                f"light {light}, point u = {u}, the ray from {rays.o[k].tolist()} along "
+                f"{rays.d[k].tolist()}"
             )
             return Tier("direct", "differ", reason, numbers)
-    shadows = f"{explained} of {total} lie on edges or in reach of Mitsuba's shadow epsilon"
+    shadows = (
+        f"{explained} of {total} values are not resolved by Mitsuba: at edges, or within its "
+        "shadow epsilon"
+    )
     if arbiter.too_many(explained, total):
         return Tier("direct", "reference-limited", shadows, numbers)
-    reason = f"{len(tested)} of {count} lights agree to {numbers['max_error_over_bound']:.2g} of "
-    return Tier("direct", "agree", f"{reason}float32's bound; {shadows}", numbers)
+    reason = (
+        f"{len(tested)} of {count} lights compared; the largest error is "
+        f"{numbers['max_error_over_bound']:.2g} times float32's bound; {shadows}"
+    )
+    return Tier("direct", "agree", reason, numbers)
 
 
 def _ratios(outcomes: Sequence[Outcome]) -> dict[str, float]:
-    """How ours goes with Mitsuba's where they differ: the median of the ratio, and how widely it is
-    spread (between quartiles, over the median), as it is and times the cosine at the surface."""
+    """The ratio of ours to Mitsuba's where they differ: its median, and its spread (between the
+    quartiles, over the median), as it is and times the cosine at the surface.  Empty for fewer than
+    FEWEST values."""
     ratio = np.concatenate([outcome.ratio for outcome in outcomes])
     cosine = np.concatenate([outcome.cosine for outcome in outcomes])
     if len(ratio) < FEWEST:
@@ -129,19 +142,19 @@ def _spread(values: FloatArray) -> float:
 
 
 def _compare(
-    setting: Setting, light: int, u: tuple[float, float], ours: DirectLight, brightest: float
+    context: LightContext, light: int, u: tuple[float, float], ours: DirectLight, brightest: float
 ) -> Outcome:
-    """One point of one light at all hits;  brightest: of all points of all lights."""
-    rays, hits, tables = setting.rays, setting.hits, setting.tables
+    """One point of one light at all hits;  brightest: the largest value of all lights' points."""
+    rays, hits, tables = context.rays, context.hits, context.tables
     target = _targets(ours)
     known = np.flatnonzero((hits.shape >= 0) & np.isfinite(target).all(axis=1))
     if len(known) == 0:
         return Outcome(0, known, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
-    rays, hits, target = Rays(rays.o[known], rays.d[known]), rows_of(hits, known), target[known]
+    rays, hits, target = rays.rows(known), rows_of(hits, known), target[known]
     value = ours.contribution[known]
-    theirs, their_cosine = mitsuba_direct(setting, light, rays, target)
-    bound = bounds(setting, light, rays, hits, target, (value, theirs, their_cosine), brightest)
-    bound += slopes_of(setting, light, u, rays, hits, value)
+    theirs, their_cosine = mitsuba_direct(context, light, rays, target)
+    bound = bounds(context, light, rays, hits, target, (value, theirs, their_cosine), brightest)
+    bound += slopes_of(context, light, u, rays, hits, value)
     error = np.abs(theirs - value).max(axis=1)
     wrong = np.flatnonzero(~(error <= bound))
 
@@ -150,14 +163,14 @@ def _compare(
             tables, rays.o[numbers] + offsets, rays.d[numbers], light, u
         ).contribution
         # The move itself shifts the value by as much as the bound: twice is allowed.
-        apart = np.abs(there - theirs[numbers]).max(axis=1)
+        error = np.abs(there - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
         lit_differs = value[numbers].any(axis=1) == dark
-        now_dark = is_dark(setting, light, rows_of(hits, numbers), target[numbers], offsets)
-        return np.asarray((apart <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
+        now_dark = is_dark(context, light, rows_of(hits, numbers), target[numbers], offsets)
+        return np.asarray((error <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
-    radius = setting.sizes.frame.delta(rays.o, hits.p, setting.sizes.reach_of(hits.shape))
-    radius += stand_ins(setting, hits)[0]
+    radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
+    radius += stand_ins(context, hits)[0]
     settled = arbiter.explained(wrong, radius[wrong], like_theirs)
     right = error <= bound
     left = wrong[~settled]
@@ -176,10 +189,10 @@ def _compare(
 
 
 def _targets(ours: DirectLight) -> FloatArray:
-    """(n, 3) the point on the light for each ray; NaN where it is not known.
+    """(n, 3): the point on the light for each ray; NaN where it is not known.
 
-    Ours tells none where nothing can arrive.  A light whose point is the same for all rays is
-    asked about there too: Mitsuba's has to be dark as well.
+    Our query returns no point where no light can arrive.  If a light has the same point for all
+    rays, that point is used there too, to check that Mitsuba is dark as well.
     """
     seen = ours.pdf > 0.0
     target = np.full_like(ours.target, np.nan)

@@ -1,7 +1,7 @@
-"""The rung below all others: the film's reconstruction filter, as a function.
+"""The lowest rung: the film's reconstruction filter, compared as a function.
 
-Pictures are compared with a box filter, whose pixels share no samples; that the filters agree is
-seen here, where there is no noise.
+Pictures are compared with a box filter, whose pixels share no samples.  The scene's own filter is
+compared here instead, without noise.
 """
 
 from typing import Any
@@ -15,22 +15,24 @@ from comparisons.results.case import Tier
 from reference_rt.cameras.filters import Filter, GaussianFilter
 
 POINTS = 1000
-"""At which the two are asked, evenly across the filter and a tenth beyond."""
+"""Points at which both are evaluated, evenly across the filter and a tenth beyond."""
 
 CELLS = 64 * POINTS
-"""Of the midpoint rule for Mitsuba's integral: Lanczos' of 64 lobes has 500 for each."""
+"""Cells of the midpoint rule for the integral of Mitsuba's filter: 500 per lobe of a Lanczos filter
+of 64 lobes."""
 
 TOLERANCE = 1e-5
-"""Of the middle's value: float32's few 1e-7, more where cubics' terms cancel."""
+"""Largest error, as a fraction of the peak: float32 makes a few 1e-7, more where the terms of cubic
+filters cancel."""
 
 GAUSSIAN = 5e-4
-"""The same for Gaussians: Mitsuba has a polynomial, 4.2e-4 below exp at the middle
+"""The same for Gaussians: Mitsuba has a polynomial, 4.2e-4 below exp at the peak
 (src/rfilters/gaussian.cpp)."""
 
 
 def film(ours: Filter, reference: Filter) -> Tier:
-    """Compare our filter with Mitsuba's of another, usually the same; both divided by their
-    integrals."""
+    """Compare our filter with Mitsuba's version of `reference`, usually the same filter; both are
+    normalised by their integrals."""
     plugin = mitsuba().load_dict(translate_filter(reference))
     radius = float(plugin.radius())
 
@@ -45,5 +47,5 @@ def film(ours: Filter, reference: Filter) -> Tier:
     error = float(np.abs(values - theirs(x) / integral).max() / ours.value(0.0))
     bound = GAUSSIAN if isinstance(reference, GaussianFilter) else TOLERANCE
     numbers = {"points": POINTS, "max_error": error, "max_error_over_bound": error / bound}
-    told = f"the filters differ by {error:.2g} of their middle at most"
-    return Tier("film", "agree" if error <= bound else "differ", told, numbers)
+    text = f"the filters differ by at most {error:.2g} of their peak"
+    return Tier("film", "agree" if error <= bound else "differ", text, numbers)

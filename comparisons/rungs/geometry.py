@@ -1,4 +1,4 @@
-"""The first rung: the same rays hit the same places."""
+"""The rung of geometry: the same rays hit the same surfaces at the same points."""
 
 import dataclasses
 from collections.abc import Callable
@@ -7,17 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.geometry.exact.referee import Referee
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Twin, trace
 from comparisons.mitsuba.hits import Answers, BoolArray, rows_of
 from comparisons.results.case import Status, Tier
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.adversarial_rays import aimed_rays
-from comparisons.rungs.rays.bounds import ShapeSizes
 from comparisons.rungs.rays.camera import compare_camera
 from comparisons.rungs.rays.coincidence import coincident, in_one_place
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
 from comparisons.rungs.rays.judgement import FEW, MOST_JUDGED, Judgement, judged
-from comparisons.rungs.rays.rays import Rays, mixed_rays
+from comparisons.rungs.rays.rays import Rays, joined, mixed_rays
 from comparisons.rungs.rays.resolution import resolution
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import RayCast
@@ -27,13 +27,13 @@ from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 
 PIXELS = 16_700
-"""Camera rays that are compared at most, evenly strided.  With these make 50,000 random rays and
-rays from hits; 50,000 more are aimed: see `mixed_rays` and `aimed_rays`."""
+"""Most camera rays, evenly strided.  Random and secondary rays make them 50,000; 50,000 more are
+aimed at edges: see `mixed_rays` and `aimed_rays`."""
 
 
-class Answered(NamedTuple):
-    """Rays, what ours and Mitsuba's found, errors over bounds (n, KINDS), and how far a ray may be
-    moved for the arbiter (n,)."""
+class TracedRays(NamedTuple):
+    """Rays and their hits in both tracers;  ratios (n, KINDS): errors over bounds;  radius (n,):
+    how far the arbiter may move each ray."""
 
     rays: Rays
     ours: Intersections
@@ -45,35 +45,35 @@ class Answered(NamedTuple):
 def geometry(
     scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS, seed: int = 0
 ) -> Tier:
-    """Compare camera rays, and what rays hit: 3 `pixels` of the camera, at random and from hits,
-    and as many that are aimed at edges, drawn with `seed`.
+    """Compare the cameras, and the first hits of rays: 3 `pixels` of the camera, at random and from
+    hits, and as many that are aimed at edges, drawn with `seed`.
 
     Both tracers get the same float32 numbers.  Agreement needs every ray's hit, shape, face, t,
-    normals and uv to be within float32's bound, or the arbiter to say that float32 cannot resolve
-    the ray.  What remains is told, and whose fault it is.
+    normals and uv to be within float32's bound, or the arbiter to find that float32 cannot resolve
+    the ray.  For what remains exact arithmetic decides which tracer is wrong.
     """
     camera = compare_camera(scene, twin, pixels)
     sizes = ShapeSizes(scene, twin.frame)
     unaimed = mixed_rays(scene, tables, sizes, pixels, seed)
     aimed = aimed_rays(tables, sizes, len(unaimed.o), seed)
-    rays = Rays(*(np.concatenate(pair) for pair in zip(unaimed, aimed, strict=True)))
+    rays = joined(unaimed, aimed)
     is_aimed = np.arange(len(rays.o)) >= len(unaimed.o)
     comparer = Comparer(sizes)
-    answered, beyond = _answered(tables, twin, comparer, rays)
-    wrong = np.flatnonzero((answered.ratios > 1.0).any(axis=1))
-    settled = _explained(tables, comparer, answered, wrong)
+    traced, beyond = _traced(tables, twin, comparer, rays)
+    wrong = np.flatnonzero((traced.ratios > 1.0).any(axis=1))
+    settled = _explained(tables, comparer, traced, wrong)
     left = wrong[~settled]
-    together = coincident(scene, twin, comparer, answered, left)
+    together = coincident(scene, twin, comparer, traced, left)
     mismatches = left[~together]
     # What the arbiter explained may lie in one place too.
-    apart = wrong[settled][~in_one_place(comparer, answered, wrong[settled])]
+    apart = wrong[settled][~in_one_place(comparer, traced, wrong[settled])]
     mismatches = mismatches[np.argsort(is_aimed[mismatches], kind="stable")]
-    verdict = judged(Referee(sizes), rays, answered.ours, answered.theirs, mismatches)
+    verdict = judged(Referee(sizes), rays, traced.ours, traced.theirs, mismatches)
     explained = apart
-    right = answered.ratios[(answered.ratios <= 1.0).all(axis=1)]
+    right = traced.ratios[(traced.ratios <= 1.0).all(axis=1)]
     numbers: dict[str, Any] = {
         "rays": len(rays.o),
-        "hits": int(np.count_nonzero(answered.ours.shape >= 0)),
+        "hits": int(np.count_nonzero(traced.ours.shape >= 0)),
         "mismatches": len(mismatches),
         "decided_ours": len(verdict.ours),
         "decided_mitsuba": len(verdict.mitsuba),
@@ -90,10 +90,10 @@ def geometry(
             if k >= DISCRETE
         },
         "mismatches_by_kind": {
-            kind: int(np.count_nonzero(answered.ratios[mismatches, k] > 1.0))
+            kind: int(np.count_nonzero(traced.ratios[mismatches, k] > 1.0))
             for k, kind in enumerate(KINDS)
         },
-        "mitsuba_wrong": [_describe(answered, k) for k in verdict.mitsuba[:LISTED].tolist()],
+        "mitsuba_wrong": [_describe(traced, k) for k in verdict.mitsuba[:LISTED].tolist()],
         "stand_ins": {
             f"shape_{shape}": [s._asdict() for s in found]
             for shape, found in twin.stand_ins().items()
@@ -104,68 +104,75 @@ def geometry(
         numbers["resolution"] = resolution(scene, tables, twin, seed)._asdict()
     if camera.problem:
         return Tier("geometry", "differ", camera.problem, numbers)
-    status, reason = _outcome(answered, verdict, is_aimed, numbers)
+    status, reason = _outcome(traced, verdict, is_aimed, numbers)
     return Tier("geometry", status, reason, numbers)
 
 
 LISTED = 20
-"""Rays that Mitsuba gets wrong, of those that are listed."""
+"""Most rays that are listed of those that Mitsuba gets wrong."""
 
 
 def _outcome(
-    answered: Answered, verdict: Judgement, is_aimed: BoolArray, numbers: dict[str, Any]
+    traced: TracedRays, verdict: Judgement, is_aimed: BoolArray, numbers: dict[str, Any]
 ) -> tuple[Status, str]:
-    """What the mismatches mean: those that are Mitsuba's own are its limit, where they are few."""
+    """The status and the reason.  Few hits that Mitsuba alone gets wrong are its precision; many
+    mean that its scene is another one."""
     total, mitsuba = len(is_aimed), verdict.mitsuba
     count = int(np.count_nonzero(~is_aimed))
     unaimed = int(np.count_nonzero(~is_aimed[mitsuba]))
     ours = np.concatenate([verdict.ours, verdict.undecided])
-    if len(ours) and (len(verdict.ours) or not _is_rest(answered, verdict, is_aimed)):
-        told = f"{numbers['mismatches']} of {total} rays differ"
+    if len(ours) and (len(verdict.ours) or not _is_rest(traced, verdict, is_aimed)):
+        text = f"{numbers['mismatches']} of {total} rays differ"
         if len(verdict.ours):
-            told += f", {len(verdict.ours)} by our fault"
+            text += f", {len(verdict.ours)} by our fault (exact arithmetic decides)"
         first = int((verdict.ours if len(verdict.ours) else ours)[0])
-        return "differ", f"{told}; the first: {_describe(answered, first)}"
+        return "differ", f"{text}; the first: {_describe(traced, first)}"
     if arbiter.too_many(unaimed, count, FEW):
-        where = _describe(answered, int(mitsuba[0]))
+        where = _describe(traced, int(mitsuba[0]))
         return "differ", (
-            f"{numbers['mismatches']} of {total} rays differ, and ours are right about what they "
-            f"meet: Mitsuba's scene is another; the first: {where}"
+            f"{numbers['mismatches']} of {total} rays differ; by exact arithmetic our hits are "
+            f"right, so Mitsuba's scene is a different one; the first: {where}"
         )
-    told = (
-        f"{numbers['explained']} of {count} rays meet edges that float32 cannot resolve "
-        f"({numbers['aimed_explained']} of {total - count} aimed at edges)"
+    text = (
+        f"{numbers['explained']} of {count} rays pass too close to an edge for float32 "
+        f"({numbers['aimed_explained']} of {total - count} rays aimed at edges)"
     )
     if numbers["coincident"]:
-        told += f", {numbers['coincident']} two surfaces in one place"
+        text += f"; {numbers['coincident']} rays hit coincident surfaces"
     if numbers["beyond_planes"]:
-        told += f", {numbers['beyond_planes']} an infinite plane beyond its twin"
+        text += (
+            f"; {numbers['beyond_planes']} rays hit an infinite plane beyond the finite mesh that "
+            "stands in for it"
+        )
     if numbers["mismatches"]:
         aimed = numbers["aimed_mismatches"]
-        told += f"; {unaimed} and {aimed} aimed are Mitsuba's mistakes, by exact arithmetic"
+        text += (
+            f"; by exact arithmetic Mitsuba's hit is wrong for {unaimed} rays and {aimed} rays "
+            "aimed at edges"
+        )
     many_aimed = arbiter.too_many(numbers["aimed_mismatches"], total - count)
     if arbiter.too_many(numbers["explained"], count) or unaimed or many_aimed:
-        return "reference-limited", told
+        return "reference-limited", text
     worst = max(v for k, v in numbers.items() if k.endswith("error_over_bound"))
-    return "agree", f"{total} rays agree to {worst:.2g} of float32's bound; {told}"
+    return "agree", f"{total} rays agree, within {worst:.2g} of float32's bound; {text}"
 
 
-def _is_rest(answered: Answered, verdict: Judgement, is_aimed: BoolArray) -> bool:
-    """Whether what is undecided are aimed rays for which there was no time, all others of which
-    were found to be Mitsuba's."""
+def _is_rest(traced: TracedRays, verdict: Judgement, is_aimed: BoolArray) -> bool:
+    """Whether all undecided mismatches are aimed rays beyond MOST_JUDGED, and Mitsuba was wrong for
+    all that were judged."""
     count = len(verdict.mitsuba) + len(verdict.undecided)
     return (
         len(verdict.mitsuba) == MOST_JUDGED < count
         and bool(is_aimed[verdict.undecided].all())
-        and bool((answered.ratios[verdict.undecided, :DISCRETE] > 1.0).any(axis=1).all())
+        and bool((traced.ratios[verdict.undecided, :DISCRETE] > 1.0).any(axis=1).all())
     )
 
 
-def _answered(
+def _traced(
     tables: SceneTables, twin: Twin, comparer: Comparer, rays: Rays
-) -> tuple[Answered, int]:
-    """What both found, and how many rays are left out: those that meet an infinite plane beyond
-    what there is of it in Mitsuba."""
+) -> tuple[TracedRays, int]:
+    """The hits of both tracers, and how many rays are left out: those that hit an infinite plane
+    beyond the finite mesh that stands in for it."""
     ours, theirs = query.intersect(tables, rays.o, rays.d), trace(twin, rays.o, rays.d)
     ratios = comparer.ratios(rays, ours, theirs)
     beyond = _beyond(twin, ours)
@@ -177,7 +184,7 @@ def _answered(
         sag[shape] = max(s.sag for s in found)
     radius = sizes.frame.delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
     radius += np.maximum(sag[ours.shape], sag[theirs.shape])
-    return Answered(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
+    return TracedRays(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
 
 
 def _beyond(twin: Twin, ours: Intersections) -> BoolArray:
@@ -189,21 +196,21 @@ def _beyond(twin: Twin, ours: Intersections) -> BoolArray:
 
 
 def _explained(
-    tables: SceneTables, comparer: Comparer, answered: Answered, wrong: IntArray
+    tables: SceneTables, comparer: Comparer, traced: TracedRays, wrong: IntArray
 ) -> BoolArray:
-    """Which of the rays `wrong` (m,) float32 cannot resolve: beside them, ours has Mitsuba's
-    answer.
+    """Which of the rays `wrong` (m,) float32 cannot resolve: a ray next to them has Mitsuba's hit
+    in our tracer.
 
-    Or two rays beside have it together: one comes as far as Mitsuba's hit, and one that begins just
-    before meets what it hit.  Along an edge Mitsuba may miss one side and yet hit the other from
-    behind, as no single ray can.
+    Or two rays next to them have it together: one reaches as far as Mitsuba's hit, and one that
+    starts just before that hits the same surface.  At an edge Mitsuba may miss the front face and
+    hit the back face from behind, as no single ray can.
     """
-    rays, radius = answered.rays, answered.radius
-    found = arbiter.explained(wrong, radius[wrong], _same_answer(tables, comparer, answered))
-    rest = np.flatnonzero(~found & (answered.theirs.shape[wrong] >= 0))
+    rays, radius = traced.rays, traced.radius
+    found = arbiter.explained(wrong, radius[wrong], _same_hit(tables, comparer, traced))
+    rest = np.flatnonzero(~found & (traced.theirs.shape[wrong] >= 0))
     numbers = wrong[rest]
-    theirs = rows_of(answered.theirs, numbers)
-    near = rows_of_rays(rays, numbers)
+    theirs = rows_of(traced.theirs, numbers)
+    near = rays.rows(numbers)
     length = np.linalg.norm(near.d, axis=1)
     along = np.abs(np.sum(theirs.n * near.d, axis=1)) / length
     margin = 4.0 * radius[numbers] / np.maximum(along, 1.0 / STEEPEST) / length
@@ -215,30 +222,26 @@ def _explained(
     here = np.arange(len(numbers))
     comes = arbiter.explained(here, radius[numbers], comes_so_far)
     meets = np.zeros(len(numbers), bool)
-    for way in (1.0, -1.0):  # from just before Mitsuba's hit, and from just behind it, back
+    for way in (1.0, -1.0):  # start just before Mitsuba's hit, or just behind it and go back
         start = near.o + near.d * (theirs.t - way * margin)[:, None]
         some = dataclasses.replace(theirs, t=margin)
-        beside = answered._replace(rays=Rays(start, way * near.d), theirs=some)
+        beside = traced._replace(rays=Rays(start, way * near.d), theirs=some)
         open_ = np.flatnonzero(comes & ~meets)
-        same = _same_answer(tables, comparer, beside)
+        same = _same_hit(tables, comparer, beside)
         meets[open_] = arbiter.explained(open_, radius[numbers[open_]], same)
     found[rest] = meets
     return found
 
 
-def rows_of_rays(rays: Rays, rows: IntArray) -> Rays:
-    return Rays(rays.o[rows], rays.d[rows])
-
-
 STEEPEST = 64.0
-"""Of one over the cosine, for where a ray begins just before a hit."""
+"""Cap of one over the cosine, for how far before a hit a ray starts."""
 
 
-def _same_answer(
-    tables: SceneTables, comparer: Comparer, answered: Answered
+def _same_hit(
+    tables: SceneTables, comparer: Comparer, traced: TracedRays
 ) -> Callable[[IntArray, FloatArray], BoolArray]:
-    """Whether rays that are moved have Mitsuba's answer in ours."""
-    rays, theirs = answered.rays, answered.theirs
+    """The arbiter's test: whether moved rays have Mitsuba's hit in our tracer."""
+    rays, theirs = traced.rays, traced.theirs
 
     def like_theirs(numbers: IntArray, offsets: FloatArray) -> BoolArray:
         moved = Rays(rays.o[numbers] + offsets, rays.d[numbers])
@@ -250,12 +253,13 @@ def _same_answer(
     return like_theirs
 
 
-def _describe(answered: Answered, k: int) -> str:
-    rays = answered.rays
-    kind = KINDS[int(np.argmax(answered.ratios[k]))]
+def _describe(traced: TracedRays, k: int) -> str:
+    rays = traced.rays
+    kind = KINDS[int(np.argmax(traced.ratios[k]))]
     sides = [
-        f"{who} shape {hits.shape[k]} part {hits.part[k]} primitive {hits.primitive[k]} instance "
-        f"{hits.instance[k]} at t = {hits.t[k]:.9g}, n = {hits.n[k]}"
-        for who, hits in (("ours", answered.ours), ("Mitsuba's", answered.theirs))
+        f"{who}: shape {hits.shape[k]}, part {hits.part[k]}, primitive {hits.primitive[k]}, "
+        f"instance {hits.instance[k]}, t = {hits.t[k]:.9g}, n = {hits.n[k]}"
+        for who, hits in (("ours", traced.ours), ("Mitsuba's", traced.theirs))
     ]
-    return f"{kind}, from {rays.o[k].tolist()} along {rays.d[k].tolist()}: {'; '.join(sides)}"
+    ray = f"the ray from {rays.o[k].tolist()} along {rays.d[k].tolist()}"
+    return f"{kind} of {ray}: {'; '.join(sides)}"

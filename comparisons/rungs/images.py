@@ -1,7 +1,7 @@
-"""The rung of the pictures as wholes: every metric against what noise alone would give.
+"""The rung of whole pictures: every image metric against its threshold.
 
-Without noise each metric has a fixed threshold.  With noise the threshold is what noise alone would
-give, see `comparisons.statistics.metric_null`, and an allowance.
+Without noise each metric has a fixed threshold.  With noise the threshold is the metric's value
+from noise alone (`comparisons.statistics.metric_null`) plus an allowance.
 """
 
 import math
@@ -22,11 +22,12 @@ from comparisons.statistics.metric_null import (
 from comparisons.statistics.metrics import decibels
 
 MEAN_BIAS = 0.001
-"""Of a channel's mean: what is left to Mitsuba's ray epsilon, as in the statistics; without noise
-6e-5 was measured.  A gain of 0.5 %, the least that matters, is five times that."""
+"""Permitted relative bias of a channel's mean: Mitsuba's ray epsilon causes some, as in the
+statistics; without noise 6e-5 was measured.  A gain of 0.5 %, the least that matters, is five times
+the permitted bias."""
 
 DARK = 0.1
-"""Of the mean over all channels: the floor of what a channel's bias is relative to."""
+"""Fraction of the mean over all channels: the least mean that a channel's bias is divided by."""
 
 NOISE_FREE = {
     "ssim": (
@@ -53,12 +54,14 @@ NOISE_FREE = {
         "a gain of 1 % (measured: 9e-6 and less)",
     ),
 }
-"""Thresholds of pictures without noise, and their reasons.  With noise none is stricter."""
+"""Thresholds of pictures without noise, and their reasons.  With noise no threshold is stricter."""
 
 
 class Gate(NamedTuple):
-    """One metric: its value, what noise alone gives, its threshold, and whether it passed; NaN for
-    what is not known, and for the threshold where the metric is not judged."""
+    """One metric: its value, its value from noise alone, its threshold, and whether it passed.
+
+    NaN where a value is not known, and as the threshold of a metric that is not judged.
+    """
 
     value: float
     by_noise: float
@@ -72,19 +75,18 @@ class Gate(NamedTuple):
 def images_tier(
     images: Images, metrics: Metrics, replicates: tuple[FloatArray, FloatArray] | None
 ) -> Tier:
-    """Judge the means of the two sides: what the rungs below cannot see, an error that averages
-    out.
+    """Compare the two pictures by metrics, which see errors that average out in the rungs below.
 
     replicates: the noisy pictures (replicates, height, width, 3) of the candidate and the
-    reference, two or more of each, that `images` are the means of;  None for pictures without
-    noise.  The pictures differ if any one metric is beyond its threshold.
+    reference, two or more of each, whose means `images` are;  None for pictures without noise.
+    The pictures differ if any one metric is beyond its threshold.
     """
     if metrics.nonfinite:
         return Tier("images", "invalid", f"{metrics.nonfinite} pixels are not finite")
     if np.array_equal(images.candidate, images.reference):
         return Tier("images", "agree", "the pictures are equal", {"noisy": replicates is not None})
     numbers: dict[str, Any] = {"noisy": replicates is not None}
-    told, failed = [], []
+    facts, failed = [], []
     if replicates is not None:
         ratio, standard_error = noise_ratio(*replicates)
         numbers |= {
@@ -92,12 +94,12 @@ def images_tier(
             "standard_error": standard_error,
             "difference_over_noise_limit": NOISE_LIMIT,
         }
-        told.append(
+        facts.append(
             f"the squared difference is {ratio:.3g} ± {standard_error:.2g} times that of the noise"
         )
         # Five standard errors: the mean over tiles is near normal, one false alarm in 10^6.
         if ratio - 5.0 * standard_error > NOISE_LIMIT:
-            failed.append(f"{told[0]}, expected {NOISE_LIMIT} at most")
+            failed.append(f"{facts[0]}, expected {NOISE_LIMIT} at most")
     gates = {**_metric_gates(images, metrics, replicates), "bias": _bias(images, replicates)}
     numbers |= {name: gate.as_json() for name, gate in gates.items()}
     for name, gate in gates.items():
@@ -105,15 +107,15 @@ def images_tier(
             failed.append(f"{LABEL[name]} {gate.value:.4g}, expected {_expected(name, gate)}")
     if failed:
         return Tier("images", "differ", "; ".join(failed), numbers)
-    told.append(", ".join(f"{LABEL[name]} {gate.value:.4g}" for name, gate in gates.items()))
-    return Tier("images", "agree", "; ".join(told), numbers)
+    facts.append(", ".join(f"{LABEL[name]} {gate.value:.4g}" for name, gate in gates.items()))
+    return Tier("images", "agree", "; ".join(facts), numbers)
 
 
 LABEL = {
     "ssim": "SSIM",
     "flip": "FLIP",
     "psnr": "PSNR",
-    "relative_rmse": "RMSE over the reference's",
+    "relative_rmse": "relative RMSE",
     "relmse": "relMSE",
     "bias": "bias of the mean",
 }
@@ -122,8 +124,8 @@ MORE_IS_BETTER = ("ssim", "psnr")
 
 
 def _expected(name: str, gate: Gate) -> str:
-    told = f"{gate.threshold:.4g} at {'least' if name in MORE_IS_BETTER else 'most'}"
-    return f"{told} (noise alone: {gate.by_noise:.4g})" if math.isfinite(gate.by_noise) else told
+    text = f"{gate.threshold:.4g} at {'least' if name in MORE_IS_BETTER else 'most'}"
+    return f"{text} (noise alone: {gate.by_noise:.4g})" if math.isfinite(gate.by_noise) else text
 
 
 def _metric_gates(
@@ -189,7 +191,7 @@ def _bias(images: Images, replicates: tuple[FloatArray, FloatArray] | None) -> G
 
 
 _BY_PIXELS = 1000
-"""Degrees of freedom where the error comes from many pixels."""
+"""Degrees of freedom of an error that is estimated from many pixels."""
 
 
 def _error_of_mean(pictures: FloatArray) -> FloatArray:

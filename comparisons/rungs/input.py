@@ -1,4 +1,8 @@
-"""The rung of the input: what is wrong with pictures as such, before anything is compared."""
+"""The rung of the input: whether the pictures can be compared at all.
+
+It finds wrong shapes and sizes, values that are not finite, transparent, black or constant
+pictures, repeated or correlated replicates, 8-bit quantisation and clamped highlights.
+"""
 
 import math
 from itertools import combinations
@@ -12,34 +16,36 @@ from comparisons.statistics.metrics import nonfinite_pixels, white_level
 from comparisons.statistics.shared_noise import common_noise, largest_correlation
 
 DIM = 1e-3
-"""Of the reference's white: a pixel above it is lit."""
+"""Fraction of the reference's white level above which a pixel counts as lit."""
 
 CODES = 255.0
 """The largest code of 8 bits."""
 
 ON_GRID = 0.07
-"""Of a code: how far a value may be from one.  Half floats round by 2^-12 at most, which is 0.062
-of a code; of values that are not quantised 14 % are so near to one by chance."""
+"""How far a value may be from an 8-bit code, in codes.  Half floats round by 2^-12 at most, which
+is 0.062 of a code; of values that are not quantised 14 % are so near to a code by chance."""
 
 FEWEST_CODES = 16
-"""Different values: a picture of fewer may be of flat colours, which are no sign of 8 bits."""
+"""Least number of different values: a picture with fewer may have flat colours, which do not prove
+8 bits."""
 
 CLAMPED = 1.05
-"""How far, as a factor, the reference is above values that are said to be clamped."""
+"""Factor by which the reference must be above values that are reported as clamped."""
 
 FEWEST_CLAMPED = 16
-"""Values that share a maximum, and may be so by chance or by the flat radiance of a lamp."""
+"""Least number of values at the maximum: fewer share it by chance, or are the flat radiance of a
+lamp."""
 
 
 def input_tier(
     candidate: npt.ArrayLike, reference: npt.ArrayLike, opacity: npt.ArrayLike | None = None
 ) -> Tier:
-    """Say what first is wrong with the pictures, if anything.
+    """Report the first problem of the pictures; `agree` if there is none.
 
     candidate: (R, height, width, 3) replicates, or one picture (height, width, 3) without noise;
     reference: likewise, or the mean of noisy ones;  opacity: the candidate's alpha, (R, height,
-    width) or (height, width).  `invalid` if no statement about agreement is possible, `differ` if
-    the candidate is the wrong picture for sure.
+    width) or (height, width).  `invalid` if the pictures cannot be compared, `differ` if the
+    candidate is certainly wrong.
     """
     a, b = np.asarray(candidate, dtype=np.float64), np.asarray(reference, dtype=np.float64)
     alone = a.ndim == 3
@@ -69,10 +75,10 @@ def input_tier(
     problem = _clamped(a, b)
     if problem is not None:
         return _tier("differ", problem, numbers)
-    told = f"{a.shape[2]} x {a.shape[1]} pixels, all finite"
+    text = f"{a.shape[2]} x {a.shape[1]} pixels, all finite"
     if numbers["negative_values"]:
-        told += f"; {numbers['negative_values']} negative values, where the reference has none"
-    return _tier("agree", told, numbers)
+        text += f"; {numbers['negative_values']} negative values, where the reference has none"
+    return _tier("agree", text, numbers)
 
 
 def _tier(status: Status, reason: str, numbers: dict[str, Any] | None = None) -> Tier:
@@ -96,12 +102,12 @@ def _of_sizes(a: FloatArray, b: FloatArray) -> str | None:
     (h, w), (y, x) = a.shape[-3:-1], b.shape[-3:-1]
     if (h, w) == (y, x):
         return None
-    told = f"the candidate is {w} x {h} pixels; expected {x} x {y}, as the reference"
+    text = f"the candidate is {w} x {h} pixels; expected {x} x {y}, as the reference"
     if (h, w) == (x, y):
-        return f"{told}; width and height are exchanged"
+        return f"{text}; width and height are exchanged"
     if w * y == x * h:
-        return f"{told}; it is the same view, {_times(w / x)} as large"
-    return told
+        return f"{text}; it is the same view, {_times(w / x)} as large"
+    return text
 
 
 def _times(factor: float) -> str:
@@ -109,7 +115,7 @@ def _times(factor: float) -> str:
 
 
 def _where(at: npt.NDArray[np.bool_]) -> str:
-    """The first place in (replicates, height, width)."""
+    """The first true pixel of (replicates, height, width), in words."""
     k, y, x = (int(i[0]) for i in np.nonzero(at))
     return f"column {x}, row {y}" + (f" of replicate {k}" if len(at) > 1 else "")
 
@@ -124,8 +130,8 @@ def _not_finite(whose: str, x: FloatArray) -> str | None:
         return None
     k, row, column = (int(i[0]) for i in np.nonzero(bad))
     value = next(v for v in x[k, row, column] if not np.isfinite(v))
-    told = f"{_counted(int(np.count_nonzero(bad)))} of {whose}"
-    return f"{told} not finite, the first {value} at {_where(bad)}; expected finite radiance"
+    text = f"{_counted(int(np.count_nonzero(bad)))} of {whose}"
+    return f"{text} not finite, the first {value} at {_where(bad)}; expected finite radiance"
 
 
 def _transparent(alpha: FloatArray, a: FloatArray, b: FloatArray) -> str | None:
@@ -180,7 +186,7 @@ def _same_pairs(x: FloatArray) -> list[tuple[int, int]]:
 
 
 def _repeated(a: FloatArray, b: FloatArray) -> str | None:
-    """Replicates that are the same, although the other side shows that there is noise."""
+    """Replicates that are identical, although the other side's differ: there is noise."""
     same = {"candidate": _same_pairs(a), "reference": _same_pairs(b)}
     if same["candidate"] and len(b) > 1 and same["reference"]:
         return None  # there is no noise, or so little that both repeat themselves
@@ -195,12 +201,12 @@ def _repeated(a: FloatArray, b: FloatArray) -> str | None:
 
 
 CORRELATED = 0.1
-"""Of the noise of two replicates: above it they are said to share noise.  Independent ones of
-1,000 pixels or more stay below 0.1 (measured: 0.04 of 64 x 64 pixels)."""
+"""Correlation of the noise of two replicates above which they are reported to share noise.
+Independent replicates of 1,000 pixels or more stay below it (measured: 0.04 of 64 x 64 pixels)."""
 
 COMMON = 0.05
-"""Of a replicate's variance: common noise above it is told.  At 16 replicates the mean's error is
-then underestimated by a third."""
+"""Variance of the noise common to all replicates, over a replicate's own, above which it is
+reported.  At 16 replicates the mean's error is then underestimated by a third."""
 
 
 def _sharing_noise(a: FloatArray, b: FloatArray) -> str | None:
@@ -226,7 +232,7 @@ def _sharing_noise(a: FloatArray, b: FloatArray) -> str | None:
 
 
 def _codes(x: FloatArray) -> dict[str, FloatArray]:
-    """Values in [0, 1] as codes of 8 bits, by encoding."""
+    """Values in [0, 1] as (fractional) 8-bit codes, by encoding."""
     srgb = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0) ** (1.0 / 2.4) - 0.055)
     return {
         "sRGB": CODES * srgb,
@@ -236,11 +242,11 @@ def _codes(x: FloatArray) -> dict[str, FloatArray]:
 
 
 def _encoding(x: FloatArray) -> str | None:
-    """The encoding on whose 8-bit grid all values of a picture are, None if they are on none."""
+    """The encoding in which all values of a picture are 8-bit codes; None if there is none."""
     if x.min() < 0.0 or x.max() > 1.0 + 1e-3:
         return None
     values = np.unique(x.astype(np.float32)).astype(np.float64)
-    # Half floats do not make more different values of a code.
+    # Rounding to half floats does not split a code into several values.
     if not FEWEST_CODES <= len(values) <= CODES + 1:
         return None
     for name, codes in _codes(values).items():
@@ -253,7 +259,7 @@ def _quantised(a: FloatArray, b: FloatArray) -> str | None:
     encoding = _encoding(a[0])
     if encoding is None or _encoding(b[0]) is not None:
         return None
-    # A reference of few values is one of flat colours, and so is the candidate then.
+    # A reference with few values has flat colours; the candidate's few values then prove nothing.
     values = [len(np.unique(x.astype(np.float32))) for x in (a[0], b[0])]
     if values[1] < 2 * values[0]:
         return None
@@ -271,7 +277,7 @@ def _clamped(a: FloatArray, b: FloatArray) -> str | None:
     if count < FEWEST_CLAMPED or not top > 0.0:
         return None
     above = there > CLAMPED * top
-    # The reference's must vary: a lamp that is dimmer is as flat, and is no clamped one.
+    # The reference must vary there: a flat lamp that is only dimmer is not clamped.
     if above.mean() < 0.9 or np.ptp(there) < 0.05 * top or not math.isfinite(top):
         return None
     return (

@@ -1,4 +1,4 @@
-"""Rungs of light that break because the reference cannot resolve the scene."""
+"""Rungs of light that differ because Mitsuba's precision does not resolve the scene."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,32 +11,31 @@ OF_LIGHT = ("direct", "whitted", "statistics", "images")
 
 
 def limited(rungs: Sequence[Tier]) -> list[Tier]:
-    """The rungs, of which those of light that differ are `reference-limited` where the scene is
-    beyond what Mitsuba resolves: what is seen from surfaces is its precision, and says nothing
-    about ours.
+    """The results, with `differ` of a rung of light changed to `reference-limited` where Mitsuba
+    does not resolve the scene: the difference then shows its precision, not a fault of ours.
 
-    It is where the rung of geometry holds, and a share of hits that is too large is foretold, and
-    found, to be left for something else than what is there (see `tiers.resolution`); and above a
-    rung in which the arbiter finds a share of rays that is too large to be unresolved.
+    Mitsuba does not resolve a scene if geometry agrees but, by prediction and by measurement, too
+    many secondary rays hit the wrong surface (see `rays.resolution`).  Nor does it above a rung in
+    which the arbiter finds too many rays that float32 cannot resolve.
     """
     found: list[Tier] = []
-    told = ""
+    limit = ""
     for tier in sorted(rungs, key=lambda tier: RUNGS.index(tier.name)):
-        if told and tier.name in OF_LIGHT and tier.status == "differ":
-            tier = replace(tier, status="reference-limited", reason=f"{told}; {tier.reason}")
-        told = told or _limit(tier)
+        if limit and tier.name in OF_LIGHT and tier.status == "differ":
+            tier = replace(tier, status="reference-limited", reason=f"{limit}; {tier.reason}")
+        limit = limit or _limit(tier)
         found.append(tier)
     return found
 
 
 def _limit(tier: Tier) -> str:
-    """What of the reference's precision a rung has shown; nothing where it is good enough."""
+    """Why Mitsuba's precision is too low, by the result of one rung; empty where it is not."""
     if tier.status not in ("agree", "reference-limited"):
         return ""
     if tier.name == "geometry" and "resolution" in tier.numbers:
         resolution = Resolution(**tier.numbers["resolution"])
         if resolution.is_limited:
-            return resolution.told
+            return resolution.description
     count = {"geometry": "rays", "direct": "rays", "whitted": "pixels"}.get(tier.name)
     if tier.status == "agree" or count is None:
         return ""

@@ -1,4 +1,4 @@
-"""The third rung: the Whitted tree, ray for ray."""
+"""The rung of Whitted ray tracing: the radiance of pixel centres, without noise."""
 
 from collections.abc import Callable
 from functools import partial
@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF, round32
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Twin
@@ -14,7 +16,6 @@ from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import ambient_of
 from comparisons.results.case import Tier
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.bounds import ROUNDINGS, UNIT_ROUNDOFF, ShapeSizes, round32
 from comparisons.rungs.rays.rays import Rays, pixel_rays
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from reference_rt.core.arrays import FloatArray
@@ -27,35 +28,35 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Box, Disk, Mesh, Rectangle, Sphere, Triangle
 
 PIXELS = 128 * 128
-"""Pixels that are compared at most, evenly strided."""
+"""Most pixels that are compared, evenly strided."""
 
 MOST_LIGHTS = 256
-"""Each light is a shadow ray at every surface: with more the rung would take minutes."""
+"""Most lights: each needs a shadow ray at every surface, and more would take minutes."""
 
 MOST_OUTLIERS = (200, 32)
-"""Pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 trees for each radius,
-which in scalar variants of Mitsuba are 30 ms.  The rest count against agreement."""
+"""Most pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 ray trees for each
+radius, 30 ms in scalar variants of Mitsuba.  The rest count as differing."""
 
 TOLERANCE = 1e-5
-"""Of a pixel, or of the picture's white (the 99th percentile of lit pixels) where it is darker.
-What a light sends to a point is off by 4 e / r at most (see `comparisons.rungs.direct`) with
-e = 8 * 2^-24 (|o| + |p| + reach): 1e-5 where these three are 1.7 times the light's distance each.
-What lies closer to a light, or is fanned out by curved mirrors, goes to the arbiter.  Measured on
-the project's scenes: 0.6e-5."""
+"""Relative to a pixel, or to the picture's white (the 99th percentile of lit pixels) if that is
+brighter.  What a light sends to a point is off by 4 e / r at most (see `comparisons.rungs.direct`),
+with e = 8 * 2^-24 (|o| + |p| + reach): 1e-5 where these three are 1.7 times the light's distance
+each. Points closer to a light, and rays that curved mirrors spread, are left to the arbiter.
+Measured on the project's scenes: 0.6e-5."""
 
 
 def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS) -> Tier:
     """Compare the radiance through pixel centres with that of our Whitted plugin in Mitsuba.
 
-    With the scene's own depth where its integrator is Whitted, else the default's.  Outliers are
-    put to the arbiter: both along rays moved by float32's bound, then by Mitsuba's epsilon.
+    The depth is the scene's if its integrator is Whitted, else the default.  Outliers go to the
+    arbiter: rays moved by float32's bound, then by Mitsuba's ray epsilon, in both renderers.
     """
     choice = tables.lights.choice
     if choice is None:
         return Tier("whitted", "not-applicable", "the scene has no light")
     lights = int(np.count_nonzero(choice.kind != ENVIRONMENT))
     if lights > MOST_LIGHTS:
-        reason = f"{lights} lights, each a shadow ray at every surface: more than {MOST_LIGHTS}"
+        reason = f"{lights} lights: with more than {MOST_LIGHTS} shadow rays take too long"
         return Tier("whitted", "not-applicable", reason)
     if twin.lacking:
         return Tier("whitted", "not-comparable", twin.lacking)
@@ -74,7 +75,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
     sizes = ShapeSizes(scene, twin.frame)
     if is_steep(scene):
         over = np.flatnonzero(~(error <= bound))
-        few = Rays(rays.o[over], rays.d[over])
+        few = rays.rows(over)
         others = [
             partial(query.radiance_without_noise, tables, setup, other.o, other.d)
             for other in moved(few, _radii(tables, sizes, few)[0])
@@ -88,7 +89,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
     def theirs_along(o: FloatArray, d: FloatArray) -> FloatArray:
         return theirs_at(Rays(twin.frame.rounded(o), round32(d)))
 
-    some = Rays(rays.o[outliers], rays.d[outliers])
+    some = rays.rows(outliers)
     settled = _explained(
         some,
         ((ours[outliers], ours_along), (theirs[outliers], theirs_along)),
@@ -109,39 +110,42 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
     if len(unexplained):
         k = int(unexplained[np.argmax(np.nan_to_num(error[unexplained], nan=np.inf))])
         reason = (
-            f"{len(unexplained)} of {len(rays.o)} pixels differ; the most, from "
-            f"{rays.o[k].tolist()} along {rays.d[k].tolist()}: ours {ours[k]}, "
-            f"Mitsuba's {theirs[k]}"
+            f"{len(unexplained)} of {len(rays.o)} pixels differ by more than float32 explains; the "
+            f"largest error, of the ray from {rays.o[k].tolist()} along {rays.d[k].tolist()}: "
+            f"ours {ours[k]}, Mitsuba's {theirs[k]}"
         )
         return Tier("whitted", "differ", reason, numbers)
-    edges = f"{numbers['explained']} of {len(rays.o)} lie on edges within float32 or its epsilons"
+    edges = (
+        f"{numbers['explained']} of {len(rays.o)} pixels lie at edges that Mitsuba does not "
+        "resolve (float32, its ray epsilon)"
+    )
     if arbiter.too_many(numbers["explained"], len(rays.o)):
         return Tier("whitted", "reference-limited", edges, numbers)
-    reason = f"pixels agree to {numbers['max_error']:.2g} W/sr/m²; {edges}"
+    reason = f"pixels agree within {numbers['max_error']:.2g} W/sr/m²; {edges}"
     return Tier("whitted", "agree", reason, numbers)
 
 
 def _radii(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> tuple[FloatArray, FloatArray]:
-    """How far rays are moved: float32's bound, then Mitsuba's epsilon."""
+    """How far the arbiter moves rays: float32's bound, then Mitsuba's ray epsilon."""
     p = query.intersect(tables, rays.o, rays.d).p
     reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
     return sizes.frame.delta(rays.o, p, reach), sizes.frame.epsilon(p)
 
 
 SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
-"""Shapes that are lights where they shine.  Others, and parts of groups, are seen to shine, but
-light nothing in Whitted's ray tracing."""
+"""Emissive shapes that are lights.  Other emissive shapes, and those in groups, are visible but
+light nothing in Whitted ray tracing."""
 
 
 def plugin_radiance(
     scene: Scene, tables: SceneTables, twin: Twin, integrator: Whitted
 ) -> Callable[[Rays], FloatArray]:
-    """Mitsuba's side of the tree: rays -> radiance (n, 3)."""
+    """Mitsuba's Whitted ray tracing: rays -> radiance (n, 3)."""
     mi = mitsuba()
     unlit = [
         name
-        for name, piece in twin.pieces.items()
-        if piece.instance >= 0 or not isinstance(piece.leaf, SAMPLED)
+        for name, mi_shape in twin.pieces.items()
+        if mi_shape.instance >= 0 or not isinstance(mi_shape.leaf, SAMPLED)
     ]
     ambient = dict(
         zip(("ambient_r", "ambient_g", "ambient_b"), ambient_of(scene.lights), strict=True)
@@ -149,13 +153,13 @@ def plugin_radiance(
     described = {
         **(translate_integrator(integrator) or {}),
         **ambient,
-        # Of a layer a mirrored and a refracted direction, or what is there of it.
+        # Of each layer at most a mirrored and a refracted direction.
         "components": 2 * most_branches(tables.materials),
         "unlit": " ".join(unlit),
     }
 
     def radiance(o: Any, d: Any) -> tuple[Any, ...]:
-        # Anew for each call: Dr.Jit makes the lights' numbers as wide as the first call's rays.
+        # Loaded for each call: Dr.Jit makes the lights' data as wide as the first call's rays.
         plugin = mi.load_dict(described)
         return (plugin.sample(twin.mi_scene, None, mi.Ray3f(mi.Point3f(o), d))[0],)
 
@@ -172,10 +176,11 @@ def _explained(
     radii: tuple[FloatArray, ...],
     bound: FloatArray,
 ) -> arbiter.BoolArray:
-    """Which of the outliers (m,) are rays next to which one side takes on the other's value.
+    """Which of the outliers (m,) have a neighbouring ray along which one renderer has the other's
+    value.
 
-    `sides` are ours and Mitsuba's: the value along each ray, and how to have others.  Where it is
-    Mitsuba's that changes within its own rounding, it is not sure of its value.
+    `sides` are ours and Mitsuba's: the value along each ray, and the function that computes it.
+    Where Mitsuba's own value changes that much within its rounding, it is not resolved.
     """
     settled = np.zeros(len(bound), bool)
     for radius in radii:

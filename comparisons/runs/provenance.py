@@ -1,4 +1,4 @@
-"""What a reader must know to repeat a run."""
+"""Provenance: versions, machine and date, which a reader needs to repeat a run."""
 
 import datetime
 import importlib.metadata
@@ -23,7 +23,7 @@ def provenance(**more: Any) -> dict[str, Any]:
 
 
 def ours() -> dict[str, Any]:
-    """The same without Mitsuba, where nothing was asked of it."""
+    """The same without Mitsuba, for runs that do not use it."""
     return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "reference_rt": importlib.metadata.version("reference-rt"),
@@ -36,7 +36,7 @@ def ours() -> dict[str, Any]:
 
 
 def _processor() -> str:
-    """The processor's name, where the system tells."""
+    """The processor's name, if the system reports it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

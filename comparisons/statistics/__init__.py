@@ -1,48 +1,55 @@
-"""Tests of means with independent replicates on both sides: the rung for random light transport.
+"""Statistical tests of noisy pictures: the means of independent replicates on both sides.
 
-Each side renders the scene R times with independent seeds. What is compared are the means, with the
-variance of either side (Welch 1947), at four scales; the level of each family is shared out over
-its tests (Šidák 1967), and the levels of all add up to one false alarm in a thousand cases.
+Each side renders the scene R times with independent seeds. The means are compared, with the
+variance of either side (Welch 1947), at four scales. Each scale is a family of tests that share one
+level (Šidák 1967); the levels of all families add up to one false alarm in a thousand cases.
 
-- *image*: the mean of each channel; *tiles*: of each channel of each tile; *pixels*: each of them.
-- *uniformity*: the ranks of the difference of small blocks among differences that hold only noise.
+- *image*: the mean of each channel; *tiles*: of each channel of each tile; *pixels*: of each pixel.
+- *uniformity*: the rank of the difference of small blocks among differences that hold only noise.
 
-Two standard errors stand behind each mean, and what is proven must be so with either. One is from
-the spread of the means themselves between replicates, whatever happens inside a picture (correlated
-pixels, stratification, a filter); it has about 2 (R - 1) degrees of freedom. The other is from
-the pixels inside the cell (of a pixel: from its neighbours), as if they were independent; it has
-thousands. Few replicates that happen to agree have a spread that is too small, which the latter is
-not deceived by.
+Each mean has two standard errors, and a bias is proven only if it is so with both. One comes from
+the spread of the means between replicates, whatever happens inside a picture (correlated pixels,
+stratification, a filter); it has about 2 (R - 1) degrees of freedom. The other comes from the
+pixels inside the cell (for a pixel: from its neighbours), as if they were independent; it has
+thousands. It protects against few replicates that agree by chance, whose spread is too small.
 
-The rule is one of equivalence: to see no difference is not yet to agree.
+The rule is one of equivalence: the absence of a proven difference is not yet agreement.
 
 - `differ`: a bias larger than the margin is proven, that is, a confidence interval lies wholly
   outside ± the margin of its scale (`Margins`); or the ranks are too low.
 - `invalid`: the ranks are too high: the two sides share their noise.
 - `agree`: nothing differs, each channel's interval of the image mean lies wholly inside ± the
-  limit, and the smallest bias that such a run finds at 99 % power is not larger than the limit.
-- `inconclusive`: none of these; the reason says how many times more samples it takes.
+  limit, and the smallest bias that such a run detects with 99 % power is at most the limit.
+- `inconclusive`: none of these; the reason says how many times more samples are needed.
 
-No pixel may fail for free, and no side may claim to be without noise: the least standard error is
-the rounding of float32. Pixels without noise may differ by `Margins.constant`.
+The least standard error is the rounding of float32: no side counts as free of noise. Pixels without
+noise may differ by `Margins.constant`.
 
-Heavy tails. Where noise is lognormal, or few fireflies carry much of the energy, replicates do not
-know their own variance, and Student's law fails. Four things keep the level:
-both standard errors are asked, so that a firefly in one pixel or one replicate widens the interval;
-the second one has the degrees of freedom of a variance whose kurtosis is that of the pixels (Box
-1953), which come down to about the number of fireflies seen; the side with fewer replicates is
-reckoned at least as noisy as the other, for it has met less of what is rare; and a pixel of two
-values, which may part without any spread, counts only in numbers that tosses of a coin do not make.
-With as many replicates on both sides and noise of one law the difference is symmetric, and
-heavy tails make the tests less sensitive, not less right. The ranks ask for no law at all.
+Heavy tails. If noise is lognormal, or few fireflies carry much of the energy, the sample variance
+of replicates is unreliable, and Student's t fails. Four rules keep the level:
+
+- Both standard errors are used: a firefly in one pixel or one replicate widens the interval.
+- The degrees of freedom of the second one follow from the kurtosis of the pixels (Box 1953); they
+  fall to about the number of fireflies seen.
+- The side with fewer replicates counts as at least as noisy as the other: it has seen fewer of the
+  rare paths.
+- A pixel with two possible values may differ without any spread by chance; such pixels count only
+  if
+  there are more than chance produces.
+
+With as many replicates on both sides and noise of one distribution the difference is symmetric, and
+heavy tails make the tests less sensitive, but not wrong. The ranks assume no distribution at all.
 False alarms per case, measured with 2,000 and more cases each: see the slow tests.
 
-Not handled: energy in paths so rare that no replicate of either side has met one, where the sides
-sample it differently. One of them may then be falsely proven different. No test can do without
-some such assumption (Bahadur and Savage 1956).
+Not handled: energy in paths so rare that no replicate of either side has sampled one, if the sides
+sample it differently. Such a side may falsely be proven different. Every test needs some such
+assumption (Bahadur and Savage 1956).
 
-A side of one picture has no replicates: see `single`. A reference of which mean and variance are
-known is `Known`.
+Contract: pictures are linear radiance, (R, height, width, 3) or (height, width, 3); biases, limits
+and margins are fractions of the reference's mean. `compare` returns the `statistics` rung. A side
+of a single picture is handled by `single`; a reference with known mean and variance is `Known`. To
+add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3), a test in
+`welch`, its numbers in `wording`, and its verdict in `decide`.
 """
 
 from comparisons.statistics.decide import compare

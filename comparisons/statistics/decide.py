@@ -1,4 +1,4 @@
-"""The verdict of the statistics, and the words and numbers that explain it."""
+"""The verdict of the statistics, with its reason and numbers."""
 
 import math
 from dataclasses import dataclass
@@ -28,11 +28,11 @@ from comparisons.statistics.wording import (
 
 ONE_PICTURE = (
     "with a single picture on a side the noise is estimated from the spread of the difference over "
-    "small blocks, presuming that of neighbouring blocks independent"
+    "small blocks, assuming that the noise of neighbouring blocks is independent"
 )
 
 TOP = ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value")
-"""Of the image's numbers, those that stand at the top as well."""
+"""Those of the image's numbers that are repeated at the top level."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ def compare(
 ) -> Tier:
     """Decide whether two sets of replicates have the same mean, by the rule of this package.
 
-    candidate, reference: linear radiance, (R, height, width, 3); R may differ, and is sharp from 16
-    on.  limit: the smallest bias of the image mean that must be visible, as a fraction;  tile: side
-    in pixels.  Pictures of unlike size and pixels that are not finite are `invalid`; two sides
-    that are black throughout are `not-applicable`, for they prove nothing.  Raises ValueError for
-    other shapes, and for a limit that is not beyond the margin of the image mean.
+    candidate, reference: linear radiance, (R, height, width, 3); R may differ between them, and
+    should be 16 or more.  limit: the smallest bias of the image mean that must be detectable, as a
+    fraction;  tile: side in pixels.  Pictures of different sizes and pixels that are not finite are
+    `invalid`; if both sides are black the rung is `not-applicable`.  Raises ValueError for other
+    shapes, and for a limit that is not larger than the margin of the image mean.
     """
     margins = margins or Margins()
     if not limit > margins.image:
@@ -85,7 +85,7 @@ def compare(
 
 
 def findings(a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins) -> Findings:
-    """All tests of pictures (R, h, w, 3) that are finite and of one size."""
+    """All tests, for pictures (R, h, w, 3) that are finite and of one size."""
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
         image, tiles, pixels, side = single_tests(a, b, tile, margins)
         return Findings(image, tiles, pixels, None, side, True)
@@ -103,8 +103,8 @@ def findings(a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins) 
 def read(
     candidate: npt.ArrayLike, reference: npt.ArrayLike | Known, *, finite: bool = True
 ) -> tuple[FloatArray, FloatArray | Known]:
-    """The pictures, if they can be compared. Raises ValueError. Pixels that are not
-    finite become black unless `finite`."""
+    """The pictures as float64 arrays. Raises ValueError if they cannot be compared. With `finite`
+    false, pixels that are not finite become black; otherwise they raise ValueError."""
     a = picture_array(candidate, "candidate", 4)
     b, variance = _reference(reference)
     if a.shape[1:] != b.shape[1:]:
@@ -165,10 +165,10 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Tie
 def _decide(found: Findings, limit: float) -> tuple[Status, str]:
     image, spread = found.image, found.uniformity
     if image.differs.any():
-        told = f"the image mean differs: {beyond(image, image.worst)}"
+        text = f"the image mean differs: {beyond(image, image.worst)}"
         if found.tiles.differs.any():
-            told += f"; {which(found.tiles, found.tile, 'tiles')}"
-        return "differ", told
+            text += f"; {which(found.tiles, found.tile, 'tiles')}"
+        return "differ", text
     if found.tiles.differs.any():
         return "differ", which(found.tiles, found.tile, "tiles", ", though not the image mean")
     if found.pixels.differs.any():
@@ -200,7 +200,7 @@ def _decide(found: Findings, limit: float) -> tuple[Status, str]:
 
 def _wanted(factor: float) -> str:
     if not math.isfinite(factor):
-        return "what it takes cannot be told from these pictures: give more replicates"
+        return "these pictures do not show how many samples are needed: give more replicates"
     times = f"{factor:.{0 if factor > 10 else 1}f}"
     return f"it takes about {times} times the samples: replicates x {times} or spp x {times}"
 

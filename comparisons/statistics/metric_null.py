@@ -1,10 +1,10 @@
-"""What the metrics of two noisy pictures are if only their noise differs.
+"""The null distribution of image metrics: their values if two pictures differ only by noise.
 
-It is drawn from the replicates: half of each side's, at random, and the other halves make two
-pictures that have the same mean whatever the sides' means are.  So their difference d* is noise as
-it is, with its tails, and however that of neighbouring pixels hangs together.  As the sides may
-have noise of different strength, d* is put upon the mean of both, weighted by the other's variance,
-in these strengths' proportion: for Gaussian noise that makes pairs distributed as the given one.
+It is resampled from the replicates: a random half of each side's against the other half.  Their
+difference d* has mean zero whatever the sides' means are, and has the tails of the noise and the
+correlation of neighbouring pixels.  The sides' noise may have different strength: d* is added to a
+weighted mean of both pictures, split in proportion to their variances.  For Gaussian noise these
+pairs are distributed as the given pair would be without bias.
 """
 
 import math
@@ -14,37 +14,36 @@ from scipy import stats
 
 from comparisons.results.case import FloatArray, Images
 from comparisons.statistics.metrics import LocalErrors, local_errors
+from comparisons.statistics.scales import TILE, tile_sums
 
 NOISE_LIMIT = 1.25
-"""How much more than their noise noisy pictures may differ, as a ratio of squares: Mitsuba's own
+"""Largest permitted squared difference of noisy pictures over that of their noise: Mitsuba's
 systematic error (float32, its ray epsilon) may reach half the standard deviation of a pixel."""
 
 FLOAT32 = 1e-5
-"""Of a pixel: what float32 may do to Mitsuba's where there is no noise, a background say; the bound
-that the Whitted rung holds pixels to."""
+"""Relative float32 error of Mitsuba's pixels without noise, such as a background; the bound of the
+Whitted rung."""
 
 LEVEL = 1e-5
-"""Chance of a false alarm of each threshold.  The seven of them make less than 1e-4 of a case."""
-
-TILE = 16
+"""Chance of a false alarm at each threshold.  The seven thresholds make less than 1e-4 a case."""
 
 TILES = 64
-"""So many tiles tell how a metric scatters: of small pictures more pairs are drawn."""
+"""Least number of tiles that estimate the scatter of a metric: for small pictures more pairs are
+drawn."""
 
 
 FEWEST = 4
-"""Replicates of a side from which noise is drawn: of fewer the halves are too few to have the tails
-of the whole."""
+"""Least number of replicates of a side for resampling: halves of fewer lack the tails."""
 
 MOST_NOISE = 0.5
-"""Of the pictures' difference, as a fraction of what is seen in the median tile: with more, skewed
-noise is far from normal even as a mean (measured with noise of gamma distributions, 100 runs each:
-no false alarm at 0.7, three at 1.0).  Then, or with FEWEST missing, the squared difference and the
-bias are judged alone."""
+"""Largest noise of the pictures' difference, as a fraction of the median tile's radiance: with
+more, the mean of skewed noise is far from normal (measured with gamma distributions, 100 runs each:
+no false alarm at 0.7, three at 1.0).  Then, or with fewer replicates than FEWEST, only the squared
+difference and the bias are judged."""
 
 
 def can_draw(replicates: tuple[FloatArray, FloatArray]) -> bool:
-    """Whether there are enough replicates, and little enough noise, to draw from."""
+    """Whether there are enough replicates, and little enough noise, for resampling."""
     if any(len(x) < FEWEST and not is_known(x) for x in replicates):
         return False
     noise = _tile_sums(np.asarray(sum(x.var(axis=0, ddof=1) / len(x) for x in replicates)))
@@ -56,14 +55,14 @@ def can_draw(replicates: tuple[FloatArray, FloatArray]) -> bool:
 def noise_alone(
     images: Images, replicates: tuple[FloatArray, FloatArray], seed: int = 0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The means of `LocalErrors` (5,): of the pictures, what noise alone gives, and the highest
-    that are borne, which are those of NOISE_LIMIT times the noise, and the scatter at LEVEL.
+    """Means of the `LocalErrors`, (5,) each: of the pictures, from noise alone, and the highest
+    that are permitted: those of NOISE_LIMIT times the noise, plus the scatter at LEVEL.
 
-    Exposed by the mean of both pictures, for what is not the same in all draws.
+    Exposure is set by the weighted mean of both pictures, which is the same in all draws.
     """
     rng = np.random.default_rng(seed)
     variances = [float((x.var(axis=0, ddof=1) / len(x)).mean()) for x in replicates]
-    # Of the candidate in the variance: where neither has any, nothing is drawn.
+    # The candidate's share of the variance.
     share = variances[0] / sum(variances) if sum(variances) else 0.5
     middle = (1.0 - share) * images.candidate + share * images.reference
     height, width = images.reference.shape[:2]
@@ -89,7 +88,7 @@ def noise_alone(
 
 
 def _contrast(rng: np.random.Generator, pictures: FloatArray) -> FloatArray:
-    """(replicates, height, width, 3) -> (height, width, 3): noise like that of their mean."""
+    """(replicates, height, width, 3) -> (height, width, 3): a draw of the noise of their mean."""
     count = len(pictures)
     if is_known(pictures):
         return np.asarray(
@@ -103,8 +102,8 @@ def _contrast(rng: np.random.Generator, pictures: FloatArray) -> FloatArray:
 
 
 def is_known(pictures: FloatArray) -> bool:
-    """Whether a side is no pair of replicates, but a mean with its standard error added to it and
-    taken from it: by chance no picture is below another everywhere."""
+    """Whether the two pictures of a side are not replicates, but a mean plus and minus its standard
+    error: by chance no picture is below another everywhere."""
     if len(pictures) != 2:
         return False
     difference = pictures[0] - pictures[1]
@@ -112,12 +111,12 @@ def is_known(pictures: FloatArray) -> bool:
 
 
 def _scatter(maps: FloatArray) -> float:
-    """How far the mean of such a map is above the mean of `maps` (draws, height, width), at LEVEL.
+    """How far the mean of one map exceeds the mean of `maps` (draws, height, width), at LEVEL.
 
-    From how tiles scatter from draw to draw; the degrees of freedom are the tiles that matter:
-    where one of them has all the scatter, the estimate is worth one draw.
+    Estimated from the variance of tiles between draws; the degrees of freedom are the effective
+    number of tiles: 1 if a single tile has all the variance.
     """
-    sums = np.stack([_tile_sums(m[..., None]) for m in maps]) / maps[0].size
+    sums = np.stack([tile_sums(m) for m in maps]) / maps[0].size
     variance = sums.var(axis=0, ddof=1)
     total = max(float(variance.sum()), float(sums.sum(axis=1).var(ddof=1)))
     if not total > 0.0:
@@ -128,18 +127,18 @@ def _scatter(maps: FloatArray) -> float:
 
 
 def noise_ratio(candidate: FloatArray, reference: FloatArray) -> tuple[float, float]:
-    """The squared difference of the mean pictures over its expectation from the replicates' own
-    variances, as the mean over tiles (1 where only noise differs), and its standard error.
+    """The squared difference of the mean pictures over its expectation from the replicates'
+    variances, averaged over tiles (1 if only noise differs), and its standard error.
 
-    (replicates, height, width, 3) on both sides.  Tiles count alike: the edge of a lamp has most
-    of a picture's variance, and would drown the rest.  0, 0 where nothing differs or is noisy.
+    (replicates, height, width, 3) on both sides.  Tiles have equal weight: the edge of a lamp has
+    most of a picture's variance, and would hide the rest.  0, 0 without noise and difference.
     """
     sides = (candidate, reference)
     difference2 = (candidate.mean(axis=0) - reference.mean(axis=0)) ** 2
     variance = sum(x.var(axis=0, ddof=1) / len(x) for x in sides)
     observed, noise = _tile_sums(difference2), _tile_sums(np.asarray(variance))
     rounding = _tile_sums((FLOAT32 * reference.mean(axis=0)) ** 2)
-    # A background has no noise to measure by: there the bound is float32's, twice over.
+    # Without noise, as in a background, the bound is twice float32's.
     noisy = noise > rounding
     if np.any(observed[~noisy] > 4.0 * (noise + rounding)[~noisy]):
         return np.inf, 0.0
@@ -150,6 +149,5 @@ def noise_ratio(candidate: FloatArray, reference: FloatArray) -> tuple[float, fl
 
 
 def _tile_sums(picture: FloatArray) -> FloatArray:
-    """Sums over TILE x TILE tiles; those at the right and the bottom may be smaller."""
-    rows = np.add.reduceat(picture.sum(axis=-1), np.arange(0, picture.shape[0], TILE), axis=0)
-    return np.asarray(np.add.reduceat(rows, np.arange(0, picture.shape[1], TILE), axis=1).ravel())
+    """Sums over channels and over tiles."""
+    return tile_sums(picture.sum(axis=-1))

@@ -1,7 +1,7 @@
-"""Image metrics of a candidate against its reference: what a reader expects.
+"""Image metrics of a candidate against its reference: SSIM, FLIP, PSNR, RMSE, relMSE, bias.
 
-Alone none of them is a gate: a picture 20 % too bright still has an SSIM of 0.995.  Which value is
-too bad, given the noise, is for `comparisons.rungs.images` to say.
+None of them alone is a test: a picture 20 % too bright still has an SSIM of 0.995.
+`comparisons.rungs.images` sets the thresholds, given the noise.
 """
 
 import functools
@@ -32,16 +32,18 @@ FLIP_DEGREE = 67.0
 """Pixels per degree of view: FLIP's default, a 0.7 m wide 4K display seen from 0.7 m."""
 
 FLIP_WHITE = 0.85
-"""What FLIP's first exposure maps the brightest radiance to, by its tone curve (Andersson et al.
-2021, "Visualizing and communicating errors in rendered images"); ours maps `white_level` to it."""
+"""The value to which FLIP's first exposure maps the brightest radiance, by its tone curve
+(Andersson et al. 2021, "Visualizing and communicating errors in rendered images"); here
+`white_level`."""
 
 FLIP_STOPS = 4.0
-"""At most so many stops lie between FLIP's first exposure and its last, which maps the median of
-the lit pixels to FLIP_WHITE.  The library's own choice is by the median of all pixels: against a
-black background it runs away, to 22 stops, and shows nothing but the rounding of black."""
+"""Most stops between FLIP's first exposure and its last, which maps the median of the lit pixels to
+FLIP_WHITE.  The library itself uses the median of all pixels: with a black background that grows to
+22 stops, and shows only the rounding of black."""
 
 FLIP_HIGHEST = 1e4
-"""Times white; above it a pixel is burnt out in all exposures, and float32 must not overflow."""
+"""Clipping level, times white: above it a pixel is saturated in all exposures, and float32 must not
+overflow."""
 
 
 def image_metrics(images: Images) -> Metrics:
@@ -116,8 +118,8 @@ def flip_map(images: Images) -> FloatArray:
     pictures look (Andersson et al. 2020, 2021).
 
     The exposures are fixed by the reference alone, so that a bad candidate cannot choose them.
-    NaN where a pixel of either picture is not finite, of which FLIP itself takes no notice: around
-    such a pixel both pictures count as black.
+    NaN where a pixel of either picture is not finite; for its neighbours the pixel counts as black,
+    as FLIP itself does not handle it.
     """
     a, b = _checked(images)
     bad = nonfinite_pixels(a, b)
@@ -129,7 +131,7 @@ def flip_map(images: Images) -> FloatArray:
 
 def flip_exposures(reference: FloatArray) -> tuple[float, float]:
     """FLIP's first and last exposure in stops, for a reference divided by `white_level`."""
-    # The tone curve is Narkowicz's (2015) fit to ACES, of 0.6 times the radiance, as FLIP has it:
+    # FLIP's tone curve is Narkowicz's (2015) fit to ACES, of 0.6 times the radiance:
     # v = (2.51 x² + 0.03 x) / (2.43 x² + 0.59 x + 0.14), solved for x.
     a, b, c = 2.51 - 2.43 * FLIP_WHITE, 0.03 - 0.59 * FLIP_WHITE, -0.14 * FLIP_WHITE
     first = math.log2((-b + math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a) / 0.6)
@@ -140,7 +142,7 @@ def flip_exposures(reference: FloatArray) -> tuple[float, float]:
 
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Of linear sRGB (IEC 61966-2-1)."""
+"""Luminance weights of linear sRGB (IEC 61966-2-1)."""
 
 
 def _checked(images: Images) -> tuple[FloatArray, FloatArray]:
@@ -156,7 +158,7 @@ def _checked(images: Images) -> tuple[FloatArray, FloatArray]:
 
 def _flip(a: FloatArray, b: FloatArray, white: float, stops: tuple[float, float]) -> FloatArray:
     first, last = stops
-    # FLIP takes no negative radiance; and the clipping before the division cannot overflow.
+    # FLIP needs radiance >= 0; clipping comes before the division, which cannot overflow then.
     a, b = (np.clip(image, 0.0, FLIP_HIGHEST * white) / white for image in (a, b))
     settings = {
         "ppd": FLIP_DEGREE,
@@ -190,7 +192,7 @@ def white_level(reference: FloatArray) -> float:
     """The radiance that is shown as white: the 99th percentile of the reference's positive values.
 
     Black is left out so that the exposure does not depend on how much of the frame is empty.
-    A reference without any light gives 1. Values that are not finite are passed over.
+    A black reference gives 1. Values that are not finite are ignored.
     """
     lit = reference[np.isfinite(reference) & (reference > 0.0)]
     return float(np.percentile(lit, WHITE_PERCENTILE)) if lit.size else 1.0
@@ -204,8 +206,8 @@ def encode(image: FloatArray, white: float) -> FloatArray:
 
 @functools.cache
 def _flip_evaluator() -> Any:
-    """The library, whose threads sleep when they wait: else on a busy machine, where each waits for
-    another by spinning, a small picture takes seconds rather than hundredths of one."""
+    """The FLIP library, with OpenMP threads that sleep while they wait: with spinning threads a
+    small picture takes seconds instead of hundredths of a second on a busy machine."""
     before = os.environ.get("OMP_WAIT_POLICY")
     os.environ["OMP_WAIT_POLICY"] = "passive"  # read when the library is loaded
     try:
@@ -244,8 +246,8 @@ def _mean_bias(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
 
 
 def ratio(x: FloatArray, y: FloatArray) -> FloatArray:
-    """x / y, where nothing of nothing is no error (0) and something of nothing is infinite."""
-    # Divides by one where y is zero, so that no warning has to be silenced.
+    """x / y, with 0 / 0 = 0 (no error) and x / 0 = ±inf."""
+    # Divides by one where y is zero, which avoids NumPy's warning.
     quotient = x / np.where(y == 0.0, 1.0, y)
     of_nothing = np.where(x == 0.0, 0.0, np.copysign(np.inf, x))
     return np.asarray(np.where(y == 0.0, of_nothing, quotient))

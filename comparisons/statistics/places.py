@@ -1,4 +1,4 @@
-"""Where the pictures differ beyond their noise: maps and crops."""
+"""Where the pictures differ beyond their noise: maps of the standard error, and the worst tiles."""
 
 import numpy as np
 import numpy.typing as npt
@@ -12,17 +12,17 @@ from comparisons.statistics.welch import BiasTest, pixel_test
 from comparisons.statistics.wording import percent
 
 NOTABLE = 0.5
-"""Of the strength of a proof: beyond it a tile is worth a look. It is about three standard errors,
-which one tile in three hundred has by chance."""
+"""Least strength (`BiasTest.strength`, 1 is a proof) of a tile that is listed. It is about three
+standard errors, which one tile in three hundred reaches by chance."""
 
 
 def standard_error(candidate: npt.ArrayLike, reference: npt.ArrayLike | Known) -> FloatArray:
     """The standard error of each pixel's difference of means, (height, width, 3), for maps of z.
 
-    Of the spread of a pixel's replicates and that around it the larger, and never less than the
-    rounding of float32; where a side is a single picture, of the difference around the pixel.
-    Pixels that are not finite count as black.  Arguments as for `compare`; raises ValueError for
-    pictures of unlike size.
+    The larger of the estimates from the pixel's replicates and from its neighbours, and never less
+    than the rounding of float32; if a side is a single picture, from the difference around the
+    pixel.  Pixels that are not finite count as black.  Arguments as for `compare`; raises
+    ValueError for pictures of different sizes.
     """
     a, b = read(candidate, reference, finite=False)
     if len(a) > 1 and isinstance(b, Known):
@@ -38,11 +38,11 @@ def standard_error(candidate: npt.ArrayLike, reference: npt.ArrayLike | Known) -
 def worst_places(
     candidate: npt.ArrayLike, reference: npt.ArrayLike | Known, *, tile: int = TILE, most: int = 6
 ) -> tuple[Place, ...]:
-    """The tiles that differ most beyond their noise, or hold the pixels that do, the worst first.
+    """The tiles that differ most beyond their noise, or hold pixels that do, the worst first.
 
-    What is less than half of a proof is left out.  Of two single pictures the tiles are those of
-    the largest squared difference.  Arguments as for `compare`; raises ValueError for pictures that
-    are not finite or of unlike size.
+    Tiles below NOTABLE are left out.  For two single pictures: the tiles with the largest squared
+    difference.  Arguments as for `compare`; raises ValueError for pictures that are not finite or
+    of different sizes.
     """
     a, b = read(candidate, reference)
     if not isinstance(b, Known) and len(a) == len(b) == 1:
@@ -89,7 +89,7 @@ def _words(test: BiasTest, at: tuple[int, ...]) -> str:
 
 
 def _first(values: FloatArray, most: int, least: float) -> list[tuple[int, int]]:
-    """The indices of the largest of (rows, columns), at most so many, none less than `least`."""
+    """The indices of the `most` largest of (rows, columns) that are at least `least`."""
     order = np.argsort(-values, axis=None, kind="stable")[:most]
     indices = [np.unravel_index(i, values.shape) for i in order]
     return [(int(row), int(column)) for row, column in indices if values[row, column] >= least]

@@ -1,34 +1,33 @@
-"""Whether replicates that should be independent have noise in common."""
+"""Tests whether replicates that should be independent share noise."""
 
 import math
 
 import numpy as np
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.scales import tile_sums
 
 FEWEST_PIXELS = 256
-"""Noisy pixels below which nothing is said."""
+"""Least number of noisy pixels for these tests."""
 
 WHITE = 0.15
-"""Largest correlation of neighbours that noise independent between pixels may have; what is wrong
-with a picture lies along edges or over surfaces, and its neighbours are alike."""
+"""Largest correlation of neighbouring pixels for noise that is independent between pixels; errors
+of a picture lie along edges or over surfaces, and are correlated."""
 
 LIKE_PICTURE = 0.1
-"""Largest share of common noise that the reference, its slopes and its curvature may explain: such
-is what a gain, a shift or a filter does to a picture with fine texture."""
+"""Largest fraction of common noise that the reference, its gradient and its curvature may explain:
+a gain, a shift or a filter causes such a difference in a picture with fine texture."""
 
 EVERYWHERE = 0.5
-"""Of the mean share: what the median tile must have.  Noise that is shared is so everywhere."""
-
-TILE = 16
+"""Least common noise of the median tile, as a fraction of the mean: shared noise is everywhere."""
 
 
 def largest_correlation(pictures: FloatArray) -> tuple[int, int, float] | None:
-    """The two replicates of (R, height, width, 3), R > 2, whose noise is correlated most, and how
-    much; None where there is too little noise.
+    """The two replicates of (R, height, width, 3), R > 2, with the most correlated noise, and the
+    correlation; None if there is too little noise.
 
-    Of independent ones the deviations from the common mean have a correlation of -1 / (R - 1),
-    which is taken off.
+    Deviations of independent replicates from the common mean have a correlation of -1 / (R - 1),
+    which is subtracted.
     """
     count = len(pictures)
     deviation = pictures - pictures.mean(axis=0)
@@ -44,11 +43,11 @@ def largest_correlation(pictures: FloatArray) -> tuple[int, int, float] | None:
 
 
 def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
-    """The variance of what all replicates of the candidate have in common beside the picture, over
-    a replicate's own; None where what is common does not look like noise.
+    """The variance of the error common to all replicates of the candidate, over the variance of one
+    replicate; None if that error does not look like noise.
 
-    Both (replicates, height, width, 3).  It is told from a wrong picture by being independent from
-    pixel to pixel, everywhere, and unlike the picture and its slopes.
+    Both (replicates, height, width, 3).  Unlike the error of a wrong picture, noise is independent
+    between pixels, present everywhere, and unlike the picture and its gradient.
     """
     sides = (candidate, reference)
     variances = [x.var(axis=0, ddof=1) for x in sides]
@@ -58,8 +57,8 @@ def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
     noisy = own > 1e-12 * float((reference**2).mean())
     if np.count_nonzero(noisy) < FEWEST_PIXELS:
         return None
-    total = _tiles(np.where(noisy, (difference**2).sum(axis=-1) - noise, 0.0))
-    of_own = _tiles(np.where(noisy, own, 0.0))
+    total = tile_sums(np.where(noisy, (difference**2).sum(axis=-1) - noise, 0.0))
+    of_own = tile_sums(np.where(noisy, own, 0.0))
     some = of_own > 0.0
     ratios = total[some] / of_own[some]
     share = float(total.sum() / of_own.sum())
@@ -84,7 +83,8 @@ def _neighbours(z: FloatArray) -> float:
 
 
 def _explained(z: FloatArray, picture: FloatArray, own: FloatArray, noisy: FloatArray) -> float:
-    """The share of z that the picture, its slopes and its curvature explain, fitted together."""
+    """The fraction of z that the picture, its gradient and its curvature explain, fitted
+    jointly."""
     if min(picture.shape) < 3:
         return 1.0
     dy, dx = (np.asarray(slope) for slope in np.gradient(picture))
@@ -94,8 +94,3 @@ def _explained(z: FloatArray, picture: FloatArray, own: FloatArray, noisy: Float
     wanted = z[noisy]
     fitted = basis @ np.linalg.lstsq(basis, wanted, rcond=None)[0]
     return float((fitted**2).sum() / (wanted**2).sum())
-
-
-def _tiles(x: FloatArray) -> FloatArray:
-    rows = np.add.reduceat(x, np.arange(0, x.shape[0], TILE), axis=0)
-    return np.asarray(np.add.reduceat(rows, np.arange(0, x.shape[1], TILE), axis=1).ravel())

@@ -1,4 +1,4 @@
-"""The two sides of a comparison, and what their replicates tell of their noise."""
+"""The two sides of a comparison, and the noise estimated from their replicates."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ from comparisons.results.case import FloatArray
 from comparisons.statistics.scales import cell_means, cell_pixels, cell_sums
 
 NEIGHBOURS = 5
-"""Side of the square of pixels that a pixel's noise is compared with."""
+"""Side in pixels of the square from which the noise of a pixel is estimated a second time."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """A reference of which the mean and the variance of that mean are known, (height, width, 3)."""
+    """A reference with known mean and known variance of that mean, (height, width, 3) each."""
 
     mean: FloatArray
     variance: FloatArray
@@ -25,8 +25,8 @@ class Known:
 class Noise:
     """Variances of means, and their degrees of freedom; all arrays of one shape (or scalars).
 
-    own: from the spread of the means between replicates, free of any model of a picture's inside;
-    pixels: as the sum of the variances of single pixels, as if these were independent.
+    own: from the spread of the means between replicates, without assumptions about pixels;
+    pixels: the sum of the variances of single pixels, as if these were independent.
     """
 
     own: FloatArray
@@ -70,8 +70,7 @@ class Side:
         return Noise(own, float(self.count - 1), summed, dof)
 
     def of_pixels(self) -> Noise:
-        """The noise of single pixels, (h, w, 3); what stands for their inside is that of their
-        neighbours."""
+        """The noise of single pixels, (h, w, 3); `Noise.pixels` comes from their neighbours."""
         around = neighbourhood(self.variance)
         n = float(NEIGHBOURS**2)
         dof = self._dof(n * around, n * neighbourhood(self.fourth), n)
@@ -83,14 +82,14 @@ class Side:
     ) -> FloatArray:
         """Degrees of freedom of a sum of `pixels` variances: 2 n / (kurtosis - 1) (Box 1953).
 
-        n for normal noise; about the number of fireflies where these have most of the variance. Of
-        known variances, as if each were known with one degree of freedom (Satterthwaite 1946).
+        n for normal noise; about the number of fireflies if these have most of the variance. Known
+        variances count as known with one degree of freedom each (Satterthwaite 1946).
         """
         positive = np.where(variance > 0.0, variance, 1.0)
         if self.pictures is None:
             return np.asarray(positive**2 / np.where(variance > 0.0, fourth, 1.0))
         excess = pixels * fourth / (positive * (1.0 - 1.0 / self.count)) ** 2 - 1.0
-        # The kurtosis is 1 at least, but for rounding; two parts are told apart below that.
+        # The kurtosis is at least 1, but for rounding.
         return np.asarray(2.0 * pixels * (self.count - 1) / np.maximum(excess, 1.0))
 
 
@@ -99,7 +98,7 @@ def side_of(images: FloatArray) -> Side:
     mean = images.mean(axis=0)
     squares = np.zeros_like(mean)
     fourth = np.zeros_like(mean)
-    for image in images:  # one at a time: what fits the cache is several times as fast
+    for image in images:  # one at a time: fits the cache, several times as fast
         square = (image - mean) ** 2
         squares += square
         fourth += square * square
@@ -113,7 +112,7 @@ def known_side(known: Known) -> Side:
 
 def neighbourhood(values: FloatArray) -> FloatArray:
     """The mean over the square of NEIGHBOURS around each pixel, (h, w, 3)."""
-    # Not by a running sum, which drags the rounding of a firefly along its row.
+    # Not by a running sum, which carries the rounding error of a firefly along its row.
     weights = np.full(NEIGHBOURS, 1.0 / NEIGHBOURS)
     rows = correlate1d(values, weights, axis=0, mode="reflect")
     return np.asarray(correlate1d(rows, weights, axis=1, mode="reflect"))

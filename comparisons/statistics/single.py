@@ -1,17 +1,17 @@
-"""A side of one picture, whose noise must be estimated from the difference itself.
+"""Tests for a side of a single picture, whose noise is estimated from the difference itself.
 
 The difference of the two pictures is noise about the bias. Its spread over small blocks within a
-tile gives the standard error of the tile's mean, and all of them that of the image mean, so that
-each part of the picture has a noise of its own (White 1980). This presumes that the noise of
-neighbouring blocks is independent. A bias that varies inside a tile counts as noise and errs to the
-safe side.
+tile gives the standard error of the tile's mean; all blocks together give that of the image mean,
+so that each part of the picture has its own noise level (White 1980). This assumes that the noise
+of neighbouring blocks is independent. A bias that varies inside a tile counts as noise, which errs
+on the safe side.
 
-One noisy pixel cannot be told from a firefly without replicates. Pixels are tested only where there
-is no noise, which is where the difference is the same all around.
+Without replicates a wrong pixel cannot be distinguished from a firefly. Pixels are tested only
+where there is no noise, that is, where the difference is constant in the neighbourhood.
 
-What the one picture has not met, a caustic's rare paths, its spread does not know of either; the
-replicates of the other side may. So the one picture's noise is taken to be at least the other's,
-times the ratio of the two in the typical tile (the median, which fireflies do not move).
+A single picture may have missed rare paths, such as those of a caustic, so that its spread is too
+small; the replicates of the other side may have sampled them. So the single picture's noise counts
+as at least the other side's, times the ratio of the two in the median tile.
 """
 
 from dataclasses import dataclass
@@ -33,25 +33,25 @@ from comparisons.statistics.sides import NEIGHBOURS, Known, known_side, neighbou
 from comparisons.statistics.welch import BiasTest, Error, bias_test
 
 BLOCK = 4
-"""Side of a block in pixels: larger than the reach of a usual reconstruction filter."""
+"""Side of a block in pixels: larger than the radius of a usual reconstruction filter."""
 
 COARSE = 2 * BLOCK
-"""The image's standard error is also taken from blocks of this side: noise that reaches from one
-small block into the next makes it the larger of the two."""
+"""The image's standard error is also estimated from blocks of this side, which is larger if the
+noise of neighbouring small blocks is correlated."""
 
 
 def single_tests(
     candidate: FloatArray, reference: FloatArray | Known, tile: int, margins: Margins
 ) -> tuple[BiasTest, BiasTest, BiasTest, int]:
-    """Image, tiles and pixels of pictures (R, h, w, 3) with R = 1 on a side; and the side of a
-    tile, which is made of whole blocks."""
+    """The tests of image, tiles and pixels for pictures (R, h, w, 3) with R = 1 on a side; and the
+    side of a tile, rounded to whole blocks."""
     mean = reference.mean if isinstance(reference, Known) else reference.mean(axis=0)
     difference = candidate.mean(axis=0) - mean
     tile = max(tile // COARSE, 1) * COARSE
     level = float(mean.mean())
     fine, coarse = (_Blocks.of(difference, tile, side) for side in (BLOCK, COARSE))
     of_image, of_tiles = fine.image(), fine.tiles()
-    # Too few coarse blocks are in a tile to measure its noise, but not in the image.
+    # A tile has too few coarse blocks to measure its noise, but the image has enough.
     known = np.isfinite(coarse.image().value) & (of_image.value > 0.0)
     wider = np.where(known, coarse.image().value, 1.0) / np.where(known, of_image.value, 1.0)
     of_tiles = Error(of_tiles.value * np.maximum(wider, 1.0), of_tiles.dof)
@@ -92,7 +92,7 @@ class _Blocks:
         per_tile = tile // side
         count = cell_pixels(sums, per_tile)
         means = cell_means(difference, tile)
-        # A tile of one block has no spread of its own: there it is that about the image's mean.
+        # A tile of one block has no spread of its own: use the spread about the image's mean.
         means = np.where(count > 1, means, difference.mean(axis=(0, 1)))
         spread = np.repeat(np.repeat(means, per_tile, axis=0), per_tile, axis=1)
         rest = (sums - pixels * spread[: sums.shape[0], : sums.shape[1]]) ** 2
@@ -124,7 +124,7 @@ class _Blocks:
 def _dof(
     squares: FloatArray, fourths: FloatArray, blocks: FloatArray, free: FloatArray
 ) -> FloatArray:
-    """As `Side` has them, and not more than there are free blocks."""
+    """As `Side._dof`, but not more than there are free blocks."""
     kurtosis = blocks * fourths / np.where(squares > 0.0, squares, 1.0) ** 2
     return np.asarray(np.minimum(free, 2.0 * free / np.maximum(kurtosis - 1.0, 1.0)))
 
@@ -132,9 +132,9 @@ def _dof(
 def _rare(
     candidate: FloatArray, reference: FloatArray | Known, difference: FloatArray, tile: int
 ) -> tuple[list[Error], list[Error]]:
-    """Standard errors of the image and of tiles from the noise that the other side has met; none
-    where that is one picture too."""
-    # Steps from pixel to pixel, in which there is next to nothing of a bias.
+    """Standard errors of the image and of tiles from the noise of the other side's replicates; none
+    if that is a single picture too."""
+    # Differences of neighbouring pixels, which hardly contain a bias.
     steps = np.diff(difference, axis=1) ** 2
     if isinstance(reference, Known):
         many = known_side(reference)
@@ -144,7 +144,7 @@ def _rare(
     else:
         many = side_of(candidate if len(candidate) > 1 else reference)
         assert many.pictures is not None
-        # As the single picture from the others' mean, so one of the replicates.
+        # One replicate minus the mean of the others, like the single picture minus their mean.
         left_out = (many.pictures[0] - many.mean) * many.count / (many.count - 1.0)
         of_one = np.diff(left_out, axis=1) ** 2
     if difference.shape[1] < 2:
@@ -160,7 +160,7 @@ def _rare(
 
 
 def _pixels(difference: FloatArray, reference: FloatArray, margins: Margins) -> BiasTest:
-    """Pixels without noise; the others have an interval without end."""
+    """The test of pixels without noise; all others get an infinite interval."""
     scale = np.maximum(np.abs(reference), DARK * abs(float(reference.mean())))
     around = neighbourhood(difference)
     variance = neighbourhood(difference**2) - around**2

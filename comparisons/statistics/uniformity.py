@@ -1,17 +1,16 @@
-"""Whether the p-values of small blocks are uniform: the spread of the difference as a whole.
+"""A rank test of all small blocks together: whether their p-values are uniform.
 
-The candidate's and the reference's G replicates are 2G pictures, and their difference is one of
-2G - 1 Walsh functions of them, all orthogonal: every other one takes as many pictures of a side
-with a plus as with a minus, so that it holds the same noise and no bias. Where the replicates of
-both sides are alike, the automorphisms of the Walsh functions make no difference between the
-first and the others, whatever the law of the noise; so the rank of its absolute value among
-them is uniform in each block, and the mean of the ranks over all blocks is one of 2G - 1
-exchangeable numbers. Blocks may depend on each other: then all these numbers scatter more, which
-is measured. (The p-values of Student's t would not be uniform with heavy tails.)
+The candidate's and the reference's G replicates are 2G pictures. Their difference is one of 2G - 1
+orthogonal Walsh functions of these pictures; every other one has as many pictures of a side with a
+plus as with a minus, so that it holds the same noise and no bias. If the replicates of both sides
+are identically distributed, the symmetries of the Walsh functions make the first one and the others
+exchangeable, whatever the distribution of the noise. So the rank of its absolute value among them
+is uniform in each block, and the mean of the ranks over all blocks is one of 2G - 1 exchangeable
+numbers. If blocks are correlated, all these numbers scatter more, which is measured. (The p-values
+of Student's t would not be uniform with heavy tails.)
 
-A mean p-value that is too small tells of blocks that differ systematically, or of replicates
-that are not independent of each other; one too large of a candidate and a reference that share
-their noise.
+Too small a mean p-value means that blocks differ systematically, or that replicates are not
+independent of each other; too large a one that candidate and reference share their noise.
 """
 
 import math
@@ -26,16 +25,18 @@ from comparisons.statistics.scales import DARK, UNIFORMITY_LEVEL, Margins, cell_
 from comparisons.statistics.sides import Side
 
 BLOCK = 4
-"""Side of a block in pixels: larger than a filter's reach, and many blocks even in small ones."""
+"""Side of a block in pixels: larger than a filter's radius, and many blocks even in small
+pictures."""
 
 LEAST = 4
-"""Replicates on each side without which there are too few Walsh functions to compare with."""
+"""Least number of replicates on each side: fewer give too few Walsh functions."""
 
 
 @dataclass(frozen=True)
 class Uniformity:
-    """The mean p-value of the blocks, expected to be near `expected`, by `error` (one standard
-    deviation); wide: that of differences beyond the margin.  p_wide, p_narrow: of either side."""
+    """mean: the mean p-value of the blocks;  expected, error: its expectation and standard
+    deviation;  mean_beyond_margin: the mean p-value of the differences minus the margin;  p_wide,
+    p_narrow: chance of a mean as small, or as large;  blocks, replicates: how many were used."""
 
     mean: float
     expected: float
@@ -58,7 +59,7 @@ class Uniformity:
 
 
 def uniformity(a: Side, b: Side, margins: Margins) -> Uniformity | None:
-    """None where there are too few replicates, or no block with noise."""
+    """The test; None if there are too few replicates, or no block with noise."""
     if a.pictures is None or b.pictures is None or min(a.count, b.count) < LEAST:
         return None
     half = 2 ** int(math.log2(min(a.count, b.count)))
@@ -71,24 +72,24 @@ def uniformity(a: Side, b: Side, margins: Margins) -> Uniformity | None:
     scale = np.maximum(np.abs(mean), DARK * abs(float(b.mean.mean())))
     size = np.abs(contrasts)
     size[size <= margins.constant * scale] = 0.0
-    # Of equal sides there is noise in half of the others only.
+    # If the sides are equal, only half of the other functions contain noise.
     noisy = np.count_nonzero(np.delete(size, difference, axis=0), axis=0) >= half - 1
     if not noisy.any():
         return None
     size = size[:, noisy]
-    # A bias has the noise's sign as often as not, and so adds to its square.
+    # Bias and noise have equal signs half of the time, so their squares add.
     permitted = margins.tile * scale[noisy]
     beyond = np.sqrt(np.maximum(size[difference] ** 2 - permitted**2, 0.0))
     means = _mean_p_values(size)
     others = np.delete(means, difference)
     expected, dof = float(others.mean()), len(others) - 2
-    # Where replicates of the two sides are alike in pairs, the functions that take both of a pair
-    # with one sign scatter about another mean than the others.
+    # If the two sides' replicates are correlated in pairs, the functions with equal signs within
+    # pairs have another mean than the rest.
     halves = others[: half - 1], others[half - 1 :]
     squares = sum(float(((part - part.mean()) ** 2).sum()) for part in halves)
     error = math.sqrt(squares / dof * (1.0 + 1.0 / len(others)))
     beyond_mean = float(_p_values(beyond, np.delete(size, difference, axis=0)).mean())
-    # No fewer than the scatter of so many uniform numbers if all were independent.
+    # At least the standard deviation of the mean of as many independent uniform numbers.
     error = max(error, math.sqrt(1.0 / 12.0 / size.shape[1]))
     return Uniformity(
         mean=float(means[difference]),

@@ -1,4 +1,4 @@
-"""Welch comparisons of the image mean, of tiles and of pixels, with the noise of both sides."""
+"""Welch's test of the image mean, of tiles and of pixels, with the noise of both sides."""
 
 import functools
 import math
@@ -23,12 +23,12 @@ from comparisons.statistics.scales import (
 from comparisons.statistics.sides import Noise, Side, neighbourhood
 
 MOST_DOF = 1000
-"""More degrees of freedom than these are not used: the quantile is the normal one within 1 %."""
+"""Cap on degrees of freedom: beyond it the quantile is the normal one within 1 %."""
 
 
 @dataclass(frozen=True)
 class Error:
-    """A standard error of differences and the degrees of freedom that it is known with."""
+    """A standard error of differences and its degrees of freedom."""
 
     value: FloatArray
     dof: FloatArray
@@ -36,25 +36,25 @@ class Error:
 
 @dataclass(frozen=True)
 class BiasTest:
-    """Welch comparisons, one per entry: arrays of one shape, radiance unless said otherwise."""
+    """Welch tests, one per entry: arrays of one shape, in units of radiance unless stated."""
 
     difference: FloatArray
     """mean(candidate) - mean(reference)"""
     scale: FloatArray
-    """What a bias is relative to: the reference's mean, at least DARK of its image mean."""
+    """The divisor of a relative bias: the reference's mean, at least DARK times its image mean."""
     errors: tuple[Error, ...]
-    """Standard errors by several reckonings: what is proven must be so with each of them."""
+    """Standard errors by several estimates: a bias is proven only if it is so with each."""
     margin: FloatArray
     """Permitted bias as a fraction of `scale`."""
     half_width: FloatArray
     """Of the confidence interval, at the family's level."""
     detectable: FloatArray
-    """The smallest true bias that such a run proves to exceed the margin with a chance of POWER,
-    if the estimated standard error is the true one."""
+    """The smallest true bias that such a run proves to exceed the margin, with a chance of POWER,
+    if the estimated standard error is correct."""
 
     @property
     def standard_error(self) -> FloatArray:
-        """Of the difference: the largest of the reckonings."""
+        """The largest of the estimates."""
         return np.asarray(np.max([error.value for error in self.errors], axis=0))
 
     @property
@@ -81,7 +81,8 @@ class BiasTest:
         return tuple(int(i) for i in index)
 
     def p_value(self, at: tuple[int, ...] | slice = slice(None)) -> FloatArray:
-        """Of the hypothesis |bias| <= margin, two-sided, not corrected for the number of tests."""
+        """p-value of the hypothesis |bias| <= margin, two-sided, not corrected for multiple
+        tests."""
         beyond = (np.abs(self.difference) - self.margin * self.scale)[at]
         each = [
             2.0 * stats.t.sf(ratio(beyond, error.value[at]), error.dof[at]) for error in self.errors
@@ -97,11 +98,11 @@ class BiasTest:
         return np.abs(self.difference) + self.half_width <= limit * self.scale
 
     def samples_factor(self, limit: float) -> float:
-        """How many times the samples bring the detectable bias down to `limit`, and each interval
-        inside ± limit or beyond the margin.
+        """The factor of samples at which the detectable bias falls to `limit`, and each interval
+        lies inside ± limit or beyond the margin.
 
         The latter with a chance of about POWER, if the present differences are the true ones. The
-        standard errors of either run scatter; the factor suffices in about 19 of 20 cases.
+        standard errors of both runs scatter; the factor suffices in about 19 of 20 cases.
         """
         dof = min(float(np.min(error.dof)) for error in self.errors)
         cushion = (1.0 + stats.norm.isf(0.05) / math.sqrt(dof)) ** 2
@@ -122,7 +123,7 @@ def image_test(a: Side, b: Side, margins: Margins) -> BiasTest:
 
 
 def tile_test(a: Side, b: Side, tile: int, margins: Margins) -> BiasTest:
-    """Each channel of each tile, (rows, columns, 3): an error of hue cancels in luminance."""
+    """Each channel of each tile, (rows, columns, 3): errors of hue would cancel in luminance."""
     reference = cell_means(b.mean, tile)
     difference = cell_means(a.mean, tile) - reference
     errors = welch_errors(a.of_tiles(tile), b.of_tiles(tile), a, b)
@@ -132,12 +133,12 @@ def tile_test(a: Side, b: Side, tile: int, margins: Margins) -> BiasTest:
 def pixel_test(a: Side, b: Side, margins: Margins) -> BiasTest:
     """Each channel of each pixel, (height, width, 3).
 
-    The margin is that of a pixel, but no more than half the standard deviation of one picture's
-    pixel: whatever a rounded ray could meet differently varies within the pixel, and so is noise.
+    The margin is that of a pixel, but at most half the standard deviation of one picture's pixel:
+    whatever a rounded ray could hit differently varies within the pixel, and so is noise.
 
-    A pixel of two values (a lamp's edge seen by one sample) may by chance have one in each picture
-    of the candidate and the other in each of the reference, without any spread. Few replicates can
-    prove such pixels only together: more of them than tosses of a coin would make.
+    A pixel with two possible values (a lamp's edge, one sample per pixel) may by chance have one
+    value in all pictures of the candidate and the other in all of the reference, without any
+    spread. With few replicates such pixels count only if there are more than chance produces.
     """
     noise_a, noise_b = a.of_pixels(), b.of_pixels()
     own, around = welch_errors(noise_a, noise_b, a, b)
@@ -148,20 +149,21 @@ def pixel_test(a: Side, b: Side, margins: Margins) -> BiasTest:
     parted = scale.size * (chance_of_parting(a.count, b.count) if b.pictures is not None else 0.0)
     still = spread <= margins.constant * scale
     noisy = neighbourhood(np.where(still, 0.0, 1.0)).max(axis=-1, keepdims=True) > 0.0
-    if parted < PIXEL_LEVEL / 2.0:  # so many replicates do not agree by chance
+    if parted < PIXEL_LEVEL / 2.0:  # enough replicates: chance does not separate the sides
         around = replace(around, value=np.where(still, own.value, around.value))
     test = bias_test(a.mean - b.mean, b.mean, (own, around), margin, PIXEL_LEVEL, mean)
 
     proven = test.differs & noisy
-    # Pixels are counted, whose channels may be tossed together, but as if each were alone.
+    # The channels of a pixel may depend on each other: pixels are counted, against the expected
+    # number of channels.
     if np.count_nonzero(proven.any(axis=-1)) > stats.poisson.isf(PIXEL_LEVEL, parted):
         return test
     return replace(test, half_width=np.where(proven, np.abs(test.difference), test.half_width))
 
 
 def chance_of_parting(count_a: int, count_b: int) -> float:
-    """The chance that of tosses of a coin all of a side show heads and all of the other tails, with
-    the coin for which it is largest."""
+    """The chance that all coin tosses of one side show heads and all of the other tails, for the
+    coin with the largest chance."""
     share = count_a / (count_a + count_b)
     return 2.0 * math.exp(count_a * math.log(share) + count_b * math.log1p(-share))
 
@@ -169,11 +171,11 @@ def chance_of_parting(count_a: int, count_b: int) -> float:
 def welch_errors(noise_a: Noise, noise_b: Noise, a: Side, b: Side) -> tuple[Error, Error]:
     """The standard errors of a difference of means, between replicates and from pixels.
 
-    The side with fewer replicates is at least as noisy as the other, for it has seen less of what
-    is rare; beside a known mean, that is as noisy as the typical pixel of both says. Degrees of
-    freedom are Welch and Satterthwaite's, in the ratio of the variances from pixels, which is known
-    well. The ratio of few replicates' own variances is not, and at the levels of one test among
-    many gave up to 95 times the false alarms promised (measured).
+    The side with fewer replicates counts as at least as noisy as the other, for it has seen fewer
+    rare paths; against a known mean the ratio of the noises is that of the median pixel. Degrees of
+    freedom are Welch and Satterthwaite's, with the ratio of the variances from pixels, which is
+    well known. The ratio of few replicates' own variances is not: at the level of one test among
+    many it gave up to 95 times the promised false alarms (measured).
     """
     own_a, own_b, pixels_a, pixels_b = noise_a.own, noise_b.own, noise_a.pixels, noise_b.pixels
     if b.pictures is None or a.count < b.count:
@@ -233,7 +235,7 @@ def bias_test(
     for error in errors:
         dof = np.clip(error.dof, 1.0, MOST_DOF)
         whole = dof.astype(np.int64)  # rounded down, to the safe side
-        # Rounding is a bound and no estimate: no quantile belongs to it.
+        # Rounding is a bound, not an estimate: it is added without a quantile.
         rounding = ROUNDING * scale
         half_width = np.maximum(half_width, critical_of[whole] * error.value + rounding)
         reach = np.maximum(reach, reach_of[whole] * error.value + rounding)
@@ -245,8 +247,8 @@ def bias_test(
 
 @functools.lru_cache(maxsize=64)
 def quantiles(level: float) -> tuple[FloatArray, FloatArray]:
-    """By whole degrees of freedom: Student's two-sided quantile, and the true bias in standard
-    errors that surpasses it with a chance of POWER.
+    """By whole degrees of freedom: Student's two-sided quantile, and the true bias, in standard
+    errors, that exceeds it with a chance of POWER.
 
     The latter is the quantile of the non-central t after Jennett and Welch (1939): the estimated
     standard error scatters about the true one by 1 / sqrt(2 dof). Within 3 % even for dof = 1.

@@ -1,4 +1,4 @@
-"""The words and the numbers (fit for JSON) that tell what the tests found."""
+"""The results of the tests in words, and as numbers for JSON."""
 
 import math
 from typing import Any
@@ -17,7 +17,7 @@ def channels(values: FloatArray) -> dict[str, float | None]:
 
 
 def finite(value: float | np.floating[Any]) -> float | None:
-    """None for what has no bound, or is relative to a black picture."""
+    """The value; None if it is not finite (unbounded, or relative to a black picture)."""
     return float(value) if math.isfinite(value) else None
 
 
@@ -26,7 +26,7 @@ def percent(fraction: float, *, sign: bool = False) -> str:
     if not math.isfinite(fraction):
         return "∞"
     number = 100.0 * fraction
-    # From a hundred on, two digits would be written with an exponent.
+    # From 100 on, two significant digits would be written with an exponent.
     digits = f"{number:+.2g}" if abs(number) < 99.5 else f"{number:+.0f}"
     return f"{digits if sign else digits.lstrip('+')} %"
 
@@ -41,7 +41,7 @@ def interval(test: BiasTest, at: tuple[int, ...]) -> str:
 
 
 def beyond(test: BiasTest, at: tuple[int, ...]) -> str:
-    """The interval, and the margin that it lies outside."""
+    """The interval, and the margin that it lies outside of."""
     return f"{interval(test, at)}, beyond ±{percent(float(test.margin[at]))}"
 
 
@@ -56,7 +56,7 @@ def which(test: BiasTest, side: int, what: str, though: str = "") -> str:
 
 
 def image_numbers(test: BiasTest) -> dict[str, Any]:
-    """By channel; what ends in `_of_bias` or `_bias` is a fraction of the mean."""
+    """Numbers by channel; names that end in `_of_bias` or `_bias` are fractions of the mean."""
     return {
         "relative_bias": channels(test.relative),
         "standard_error_of_bias": channels(test.over_scale(test.standard_error)),
@@ -70,7 +70,7 @@ def image_numbers(test: BiasTest) -> dict[str, Any]:
 
 
 def cell_numbers(test: BiasTest, side: int) -> dict[str, Any]:
-    """Of tiles, or of pixels where `side` is 1."""
+    """Numbers of tiles, or of pixels if `side` is 1."""
     row, column, channel = test.worst
     differ = test.differs.any(axis=-1)
     return {
@@ -88,7 +88,7 @@ def cell_numbers(test: BiasTest, side: int) -> dict[str, Any]:
 
 
 def uniformity_numbers(found: Uniformity | None) -> dict[str, Any] | None:
-    """None where it was not tested."""
+    """Numbers of the rank test; None if it was not run."""
     if found is None:
         return None
     return {
@@ -104,7 +104,7 @@ def uniformity_numbers(found: Uniformity | None) -> dict[str, Any] | None:
 
 
 def uniformity_words(found: Uniformity) -> str:
-    """The mean p-value and what was expected of it."""
+    """The mean p-value and its expectation."""
     return (
         f"mean p-value of the blocks {found.mean:.3f}, expected {found.expected:.3f} ± "
         f"{found.error:.2g}"

@@ -1,21 +1,22 @@
-"""Exact arithmetic as the judge: where rays meet primitives, certified.
+"""Ray-primitive intersections in exact arithmetic, which decide which tracer is right.
 
-The numbers of rays and of table rows are floats, and so are exact rationals.  For one row of a
-table of `reference_rt.shapes`, as a mapping of its columns (`table._asdict()`, of one row, or of as
-many as there are rays), and rays (n, 3), of any length:
+The numbers of rays and of table rows are floats, that is, exact rationals.  For one row of a table
+of `reference_rt.shapes`, as a mapping of its columns (`table._asdict()`, of one row, or of as many
+as there are rays), and rays (n, 3) with directions of any length:
 
     hits = first_hit("spheres", row, origins, directions)
     hits.t          # (n,) the float nearest to the exact smallest t > 0, inf for a miss
     hits.low, hits.high   # floats that enclose the exact t: its neighbours
-    hits.code       # (n,) the face, as `face_of` of the shape says it
-    hits.touching   # (n,) the line runs exactly through an edge, or touches: either answer is right
+    hits.code       # (n,) the face, as the shape's `face_of` numbers it
+    hits.touching   # (n,) the line passes exactly through an edge, or touches: hit or miss is right
 
     all_hits("tori", row, origins, directions)   # every crossing, of any sign of t: `Crossings`
 
-Kinds are the fields of `reference_rt.shapes.Shapes`.  What a row's numbers mean is what its kernels
-compute from them: t comes from center, normal, radius, vertices, or from to_local and, in local
-coordinates, the unit shape.  Everything is decided on Python's integers, which never overflow, a
-whole array at a time: some 5 µs a ray; the quartics of tori by FLINT, some 100 µs.
+Kinds are the fields of `reference_rt.shapes.Shapes`.  The surface is the one that the kernels
+compute from the row: from center, normal, radius, vertices, or from to_local and the unit shape.
+Python's integers, which never overflow, decide everything, a whole array at a time: about 5 µs a
+ray; FLINT solves the quartics of tori, about 100 µs a ray.  To add a shape: its function in `flat`
+or `curved` and its entry in `KINDS`.
 """
 
 from collections.abc import Callable
@@ -42,8 +43,8 @@ KINDS: dict[str, Callable[[Row, Dyadic, Dyadic], Crossings]] = {
 
 
 class FirstHit(NamedTuple):
-    """t, low, high (n,): see the module;  code (n,): -1 for a miss;  touching (n,);  fixed (n,): t
-    as a fixed-point number of `dyadic.FRACTION` bits."""
+    """t, low, high, touching (n,): see the module;  code (n,): -1 for a miss;  fixed (n,): t as a
+    fixed-point number with `dyadic.FRACTION` fractional bits."""
 
     t: FloatArray
     low: FloatArray

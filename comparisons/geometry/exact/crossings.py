@@ -1,4 +1,4 @@
-"""What the shapes' functions return, and what they share."""
+"""`Crossings`, the result of every shape's function, and helpers that these share."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -17,10 +17,10 @@ Row = Mapping[str, Any]
 class Crossings(NamedTuple):
     """Where n lines cross a surface, over all t, in order.
 
-    t (n, k): NEVER where there are fewer than k;  enters (n, k): whether from the front, or from
-    outside;  code (n, k): the number of the face;  touching (n,): whether a line runs exactly
-    through an edge, or touches the surface without crossing it, or runs in it: what it meets there
-    is a matter of convention.
+    t (n, k): NEVER beyond a line's last crossing;  enters (n, k): whether from the front, or from
+    outside;  code (n, k): the number of the face;  touching (n,): whether a line passes exactly
+    through an edge, touches the surface without crossing it, or lies in it: its hits are then a
+    matter of convention.
     """
 
     t: Fixed
@@ -43,7 +43,7 @@ def ordered(
 
 
 def where(hit: BoolArray, t: Fixed) -> Fixed:
-    """t, NEVER for what is not hit."""
+    """t where it is a hit, else NEVER."""
     return np.asarray(np.where(hit, t, NEVER), dtype=object)
 
 
@@ -53,6 +53,6 @@ def column(row: Row, name: str) -> Dyadic:
 
 
 def in_local(row: Row, o: Dyadic, d: Dyadic) -> tuple[Dyadic, Dyadic]:
-    """A placed shape's rays: M (o - center) and M d."""
+    """The rays in a placed shape's local coordinates: M (o - center) and M d."""
     m = column(row, "to_local")
     return apply(m, o - column(row, "center")), apply(m, d)

@@ -13,7 +13,6 @@ from comparisons.geometry.exact.dyadic import (
     NEVER,
     BoolArray,
     Dyadic,
-    Fixed,
     Integers,
     dot,
     quotient,
@@ -30,8 +29,11 @@ def spheres(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
 
 
 class Slabs:
-    """Where lines are between pairs of planes across the axes: from t_in, through the face
-    code_in, to t_out, code_out;  misses: nowhere;  touching: through an edge, or in a face."""
+    """The intervals of lines between three pairs of axis-aligned planes.
+
+    t_in, code_in: entry and its face;  t_out, code_out: exit;  misses: the interval is empty;
+    touching: the line passes through an edge, or lies in a face.
+    """
 
     def __init__(self, q: Dyadic, e: Dyadic, lower: Dyadic, upper: Dyadic, clipped: Any) -> None:
         n = len(q.n)
@@ -75,7 +77,7 @@ def boxes(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
 def quadrics(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
     """Codes: 0 for f's surface, else 1 + the face of the clip box.
 
-    Entering is, for what is not capped, coming from where f > 0.
+    An uncapped quadric is entered from the side f > 0.
     """
     q, e = in_local(row, o, d)
     k = column(row, "coefficients")
@@ -88,7 +90,7 @@ def quadrics(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
     touching = s.touching | (~s.misses & (sign == 0))
     for t in (near, far):
         touching |= real & ~s.misses & (tied(t, s.t_in) | tied(t, s.t_out))
-    # Where f <= 0, as two stretches; the line everywhere or nowhere where there are no roots.
+    # Where f <= 0, as two intervals; without roots the whole line or nothing.
     constant_in = ~real & (c.sign() <= 0)
     start = [
         np.where(real & between, near, np.where((real & ~between) | constant_in, -never, never)),
@@ -137,8 +139,8 @@ def _total(terms: list[Dyadic]) -> Dyadic:
 
 
 def torus_quartic(row: Row, o: Dyadic, d: Dyadic) -> Integers:
-    """Up to a factor, the coefficients (n, 5) of (|p|² + R² - r²)² - 4 R² (x² + y²) along the rays,
-    the constant term first."""
+    """The coefficients (n, 5), up to a factor and with the constant term first, of
+    (|p|² + R² - r²)² - 4 R² (x² + y²) along the rays."""
     q, e = in_local(row, o, d)
     major, minor = column(row, "major"), column(row, "minor")
     alpha, beta = dot(e, e), Dyadic.of(2.0) * dot(q, e)
@@ -165,7 +167,7 @@ def tori(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
     """Roots of the quartic, isolated and certified by FLINT (fmpz_poly_complex_roots)."""
     q, e = in_local(row, o, d)
     integers = torus_quartic(row, o, d)
-    # Rays that stay off the ball around the torus meet nothing.
+    # Rays that miss the bounding sphere miss the torus.
     size = column(row, "major") + column(row, "minor")
     ball, _, _ = roots(dot(e, e), dot(q, e), dot(q, q) - size * size)
     t = np.full((len(q.n), 4), NEVER, dtype=object)
@@ -180,7 +182,8 @@ def tori(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
 
 
 def _real_roots(coefficients: list[int]) -> list[tuple[int, int]]:
-    """(t as fixed-point number, multiplicity) of the real roots, the constant term first."""
+    """(t as fixed-point number, multiplicity) of the real roots;  coefficients: the constant term
+    first."""
     precision = flint.ctx.prec
     flint.ctx.prec = CERTAIN + 32
     try:
@@ -192,6 +195,4 @@ def _real_roots(coefficients: list[int]) -> list[tuple[int, int]]:
         flint.ctx.prec = precision
 
 
-EXACT: dict[str, Any] = {"spheres": spheres, "boxes": boxes, "quadrics": quadrics, "tori": tori}
-
-__all__ = ["EXACT", "Fixed", "boxes", "quadrics", "spheres", "tori", "torus_quartic"]
+__all__ = ["boxes", "quadrics", "spheres", "tori", "torus_quartic"]

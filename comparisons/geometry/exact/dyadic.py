@@ -1,4 +1,4 @@
-"""Exact arithmetic on whole arrays: floats are integers times powers of two."""
+"""Exact arithmetic on arrays of dyadic rationals: floats are integers times powers of two."""
 
 import math
 from typing import Any
@@ -16,7 +16,7 @@ _shifted = np.frompyfunc(lambda n, k: n << k if k >= 0 else n >> -k, 2, 1)
 
 
 class Dyadic:
-    """Numbers n 2^e: `n`, an array of Python's integers, which never overflow, and one `e` for all.
+    """Numbers n 2^e: an array `n` of Python's integers, which never overflow, and one common `e`.
 
     Sums, differences and products are exact.
     """
@@ -26,7 +26,7 @@ class Dyadic:
 
     @classmethod
     def of(cls, values: npt.ArrayLike) -> "Dyadic":
-        """The very numbers that floats are; they must be finite."""
+        """The exact values of floats, which must be finite."""
         array = np.asarray(values, dtype=np.float64)
         mantissa, exponent = np.frexp(array)
         exponent = np.where(array == 0.0, 0, exponent - 53)
@@ -65,7 +65,7 @@ class Dyadic:
         return np.asarray(self.n > 0, np.int64) - np.asarray(self.n < 0, np.int64)
 
     def where(self, condition: BoolArray, other: "Dyadic") -> "Dyadic":
-        """These where the condition holds, the others elsewhere."""
+        """These numbers where the condition holds, elsewhere the others."""
         e = min(self.e, other.e)
         return Dyadic(np.where(condition, self.to(e).n, other.to(e).n), e)
 
@@ -106,22 +106,22 @@ def apply(rows: Dyadic, vectors: Dyadic) -> Dyadic:
 # ---- roots and quotients, as fixed-point numbers ------------------------------------------------
 
 FRACTION = 384
-"""Bits behind the point of a `Fixed`."""
+"""Fractional bits of a `Fixed`."""
 
 DIGITS = 192
-"""Bits by which a square root is more precise than its argument."""
+"""Additional bits of a square root, compared with its argument."""
 
 CERTAIN = 96
-"""Bits of a `Fixed` that are certain, or all but the last few where it has less."""
+"""Relative precision of a `Fixed` in bits: its error is at most 2^-CERTAIN of itself, or SLACK
+units of the last bit if that is more."""
 
 SLACK = 16
-"""The last few, in units of the last."""
 
 NEVER: Any = np.array(1 << 4096, dtype=object)
-"""The t of what is not hit: larger than any."""
+"""The t of a miss: larger than any other."""
 
 Fixed = Integers
-"""t 2^FRACTION, rounded, and off by a few units, or by 2^-CERTAIN of itself if that is more."""
+"""t 2^FRACTION, rounded, with the error of CERTAIN and SLACK."""
 
 
 def quotient(a: Dyadic, b: Dyadic) -> Fixed:
@@ -134,7 +134,7 @@ def quotient(a: Dyadic, b: Dyadic) -> Fixed:
 
 
 def square_root(a: Dyadic) -> Dyadic:
-    """Of numbers >= 0, rounded down; negative ones count as 0."""
+    """Square roots, rounded down; those of negative numbers are 0."""
     shift = 2 * DIGITS + (a.e % 2)
     n = np.asarray(_root(np.where(a.n > 0, a.n, 0) << shift), dtype=object)
     return Dyadic(n, (a.e - shift) // 2)
@@ -143,8 +143,8 @@ def square_root(a: Dyadic) -> Dyadic:
 def roots(a: Dyadic, b: Dyadic, c: Dyadic) -> tuple[npt.NDArray[np.int64], Fixed, Fixed]:
     """(sign of the discriminant, both roots in order) of a t² + 2 b t + c.
 
-    Where a is 0 and b is not, the sign is 1, one root -c / 2b, the other ∓NEVER, as a line's far
-    end;  where both are 0, the sign is that of -c, and there are no roots: (-NEVER, NEVER).
+    If a is 0 and b is not: the sign is 1, one root is -c / 2b, the other is -NEVER or NEVER.  If
+    both are 0: the sign is that of -c, and there are no roots: (-NEVER, NEVER).
     """
     discriminant = b * b - a * c
     sign = discriminant.sign()
@@ -153,9 +153,9 @@ def roots(a: Dyadic, b: Dyadic, c: Dyadic) -> tuple[npt.NDArray[np.int64], Fixed
     q = -(b + root).where(positive, b - root)
     flat = a.n == 0
     first, second = quotient(q, a), quotient(c, q)
-    # Of a line only c / q is finite; the other root is at the end that q / 0 names.
+    # With a = 0 only c / q is finite; the other root is infinite, with the sign of q / 0.
     first = np.where(flat, np.where(q.n < 0, -NEVER, NEVER), first)
-    # q = 0: b and the discriminant are, a double root at 0, or nothing depends on t.
+    # q = 0 means that b and the discriminant are 0: a double root at 0, or a constant.
     second = np.where(q.n == 0, first, second)
     near, far = np.where(first < second, first, second), np.where(first < second, second, first)
     constant = flat & (b.n == 0)
@@ -164,7 +164,7 @@ def roots(a: Dyadic, b: Dyadic, c: Dyadic) -> tuple[npt.NDArray[np.int64], Fixed
 
 
 def tied(a: Fixed, b: Fixed) -> BoolArray:
-    """Whether two may be the same number: their own error decides which is larger."""
+    """Whether two numbers may be equal, within their errors."""
     slack = np.where(abs(a) > abs(b), abs(a), abs(b)) >> CERTAIN
     return np.asarray(abs(a - b) <= slack + SLACK, dtype=bool)
 

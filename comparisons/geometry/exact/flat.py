@@ -8,9 +8,12 @@ from comparisons.geometry.exact.crossings import Crossings, Row, column, ordered
 from comparisons.geometry.exact.dyadic import BoolArray, Dyadic, Fixed, cross, dot, quotient
 
 
-class Meeting(NamedTuple):
-    """Where lines meet a plane: t;  whether they do, and from the front;  x, y, and what both are
-    multiplied by: den > 0, as no quotient is exact;  in_plane: whether a line runs in the plane."""
+class PlaneCrossing(NamedTuple):
+    """Where lines cross a plane.
+
+    t;  meets: whether they cross it;  enters: from the front;  x, y: plane coordinates times den >
+    0, as quotients would not be exact;  in_plane: whether a line lies in the plane.
+    """
 
     t: Fixed
     meets: BoolArray
@@ -21,8 +24,8 @@ class Meeting(NamedTuple):
     in_plane: BoolArray
 
 
-def meeting(row: Row, o: Dyadic, d: Dyadic) -> Meeting:
-    """The plane of a row's center and normal, with the coordinates of its covectors."""
+def plane_crossing(row: Row, o: Dyadic, d: Dyadic) -> PlaneCrossing:
+    """The crossings with the plane of a row's center and normal; x and y by its covectors."""
     n, from_center = column(row, "normal"), o - column(row, "center")
     num, den = -dot(from_center, n), dot(d, n)
     enters = den.sign() < 0
@@ -32,36 +35,36 @@ def meeting(row: Row, o: Dyadic, d: Dyadic) -> Meeting:
         dot(from_center, column(row, name)) * den + dot(d, column(row, name)) * num
         for name in ("x_of", "y_of")
     ]
-    return Meeting(t, meets, enters, coordinates[0], coordinates[1], den, in_plane)
+    return PlaneCrossing(t, meets, enters, coordinates[0], coordinates[1], den, in_plane)
 
 
-def _single(m: Meeting, inside: BoolArray, edge: BoolArray) -> Crossings:
+def _single(m: PlaneCrossing, inside: BoolArray, edge: BoolArray) -> Crossings:
     return ordered([where(m.meets & inside, m.t)], [m.enters], [0], (m.meets & edge) | m.in_plane)
 
 
 def rectangles(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    m = meeting(row, o, d)
+    m = plane_crossing(row, o, d)
     sides = [(m.den - m.x), (m.den + m.x), (m.den - m.y), (m.den + m.y)]
     least = np.min([side.sign() for side in sides], axis=0)
     return _single(m, least >= 0, least == 0)
 
 
 def disks(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    m = meeting(row, o, d)
+    m = plane_crossing(row, o, d)
     sign = (m.den * m.den - m.x * m.x - m.y * m.y).sign()
     return _single(m, sign >= 0, sign == 0)
 
 
 def planes(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """As a solid, a plane is the space below it."""
-    m = meeting(row, o, d)
+    """An infinite plane; as a solid, the half-space below it."""
+    m = plane_crossing(row, o, d)
     everywhere = np.ones(len(m.meets), bool)
     return _single(m, everywhere, ~everywhere)
 
 
 def polygons(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """One polygon; by its winding number, of which the bits of `mask` count."""
-    m = meeting(row, o, d)
+    """One polygon: inside where its winding number has a bit of `mask` (the fill rule)."""
+    m = plane_crossing(row, o, d)
     winding = np.zeros(len(m.meets), np.int64)
     edge = np.zeros(len(m.meets), bool)
     first, size = int(row["first"][0]), int(row["size"][0])
@@ -77,7 +80,7 @@ def polygons(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
 
 
 def triangles(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """Edges and corners count as inside, and as touching."""
+    """Triangles; edges and corners count as inside, and as touching."""
     v = column(row, "vertices")
     corners = [v[..., 3 * k : 3 * k + 3] - o for k in range(3)]
     n = cross(corners[1] - corners[0], corners[2] - corners[0])

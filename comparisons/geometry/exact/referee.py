@@ -1,4 +1,4 @@
-"""Who is right about what a ray hits first in a scene: exact arithmetic says."""
+"""The exact first hit of rays in a whole scene, which decides which tracer is right."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ from comparisons.geometry.sizes import LeafSizes, ShapeSizes, corners_of
 from reference_rt.rendering.query import Intersections
 
 MARGIN = 1e-9
-"""Of a scene's size, by which boxes and triangles are made larger where floats choose what is worth
-asking: a thousand times what these round by, and more."""
+"""Enlargement of boxes and triangles, as a fraction of the scene's size, when floats cull
+candidates: more than a thousand times the rounding."""
 
 Identity = tuple[int, int, int, int]
 """(shape, instance, part, primitive)."""
 
 
 class Crossing(NamedTuple):
-    """One crossing of one ray: t as a fixed-point number, whose surface, whether it goes in."""
+    """One crossing of one ray: t as a fixed-point number, the surface, whether the ray enters."""
 
     t: int
     identity: Identity
@@ -40,15 +40,18 @@ class Crossing(NamedTuple):
 
 @dataclass
 class Truth:
-    """What a ray meets first: t as a fixed-point number, the surfaces there, more than one where
-    some are in one place;  touching: the ray runs exactly through an edge of something."""
+    """The exact first hit of a ray.
+
+    t: a fixed-point number, NEVER for a miss;  identities: the surfaces there, several if they
+    coincide, none for a miss;  touching: the ray passes exactly through an edge of some shape.
+    """
 
     t: int
     identities: list[Identity]
     touching: bool = False
 
     def agrees(self, hits: Intersections, k: int, slack: float) -> bool:
-        """Whether hit k of these is it, t to within `slack`."""
+        """Whether hit k is one of these surfaces, with t within `slack`."""
         if hits.shape[k] < 0:
             return not self.identities
         found = tuple(int(getattr(hits, n)[k]) for n in ("shape", "instance", "part", "primitive"))
@@ -57,7 +60,7 @@ class Truth:
 
 
 class Referee:
-    """Decides for rays of one scene, from its description alone."""
+    """Finds exact first hits in one scene, from its description alone."""
 
     def __init__(self, sizes: ShapeSizes) -> None:
         self.sizes = sizes
@@ -66,7 +69,7 @@ class Referee:
         self.lower, self.upper = (np.array(side) for side in zip(*boxes, strict=True))
 
     def decide(self, o: FloatArray, d: FloatArray) -> list[Truth]:
-        """What each ray meets first."""
+        """The exact first hit of each ray (n, 3)."""
         truths = [Truth(int(NEVER), []) for _ in o]
         reach = np.abs(o).max(axis=1, keepdims=True) * MARGIN + self.margin
         for number, copy in enumerate(self.sizes.copies):
@@ -81,7 +84,7 @@ class Referee:
     ) -> None:
         exact_o, exact_d = Dyadic.of(o), Dyadic.of(d)
         if copy.instance >= 0:
-            # The inverse as our tables have it: rounded once, and taken for exact from there on.
+            # The inverse matrix as in our tables: it is rounded, and exact by definition from here.
             m = Dyadic.of(np.linalg.inv(copy.outer[:, :3]).reshape(1, 9))
             exact_o = apply(m, exact_o - Dyadic.of(copy.outer[None, :, 3]))
             exact_d = apply(m, exact_d)
@@ -103,7 +106,7 @@ class Referee:
 
 
 def _box(copy: Copy, leaves: list[LeafSizes]) -> tuple[FloatArray, FloatArray]:
-    """A box around everything of a copy, infinite where something is."""
+    """The bounding box of a copy, infinite if any of its shapes is."""
     if not all(leaf.is_finite for leaf in leaves):
         return np.full(3, -np.inf), np.full(3, np.inf)
     corners = np.concatenate([corners_of(leaf.bounds, copy.outer) for leaf in leaves])
@@ -111,8 +114,8 @@ def _box(copy: Copy, leaves: list[LeafSizes]) -> tuple[FloatArray, FloatArray]:
 
 
 def _meets_box(o: FloatArray, d: FloatArray, lower: FloatArray, upper: FloatArray) -> BoolArray:
-    """Whether lines come near boxes: by floats, generously."""
-    # Rays along the planes, and infinite boxes.
+    """Whether lines pass near boxes: conservative, in floats."""
+    # Divisions by 0 (rays parallel to the planes), and infinite boxes.
     with np.errstate(all="ignore"):
         a, b = (lower - o) / d, (upper - o) / d
         low = np.nan_to_num(np.minimum(a, b), nan=-np.inf).max(axis=1)
@@ -121,7 +124,7 @@ def _meets_box(o: FloatArray, d: FloatArray, lower: FloatArray, upper: FloatArra
 
 
 Lists = tuple[list[list[tuple[int, int, bool]]], BoolArray]
-"""(t, code, enters) of each ray, and which touch."""
+"""(t, code, enters) of the crossings of each ray, and which rays touch."""
 
 
 def crossings_of(
@@ -136,7 +139,7 @@ def crossings_of(
         found = KINDS[leaf.field](row, *exact)
         for k, t, code, enters in _entries(found):
             lists[k].append((t, code, enters))
-        # A line along an infinite plane says nothing about its side.
+        # A line parallel to an infinite plane does not show on which side it is.
         along = [leaf.field == "planes" and not some for some in lists]
         return lists, found.touching | along
     for k in range(n):
@@ -156,7 +159,7 @@ def _entries(found: Crossings) -> Iterator[tuple[int, int, int, bool]]:
 
 
 def _near_triangles(vertices: FloatArray, o: FloatArray, d: FloatArray) -> IntArray:
-    """Triangles that a line may pass through: all but those that it is clearly beside."""
+    """Indices of the triangles that a line may pass through: conservative, in floats."""
     v = vertices.reshape(-1, 3, 3) - o
     size = np.linalg.norm(v, axis=2) + np.abs(o).max()
     volumes, slack = np.empty((2, 3, len(v)))
@@ -168,7 +171,7 @@ def _near_triangles(vertices: FloatArray, o: FloatArray, d: FloatArray) -> IntAr
 
 
 def _first(member: Member, found: list[list[Crossing]]) -> tuple[int, list[Identity]]:
-    """t and whose surfaces are met first beyond t = 0."""
+    """t and the surfaces of the first hit beyond t = 0."""
     if member.tree is None:
         ahead = [c for c in found[0] if c.t > 0]
         if not ahead:
@@ -192,7 +195,7 @@ def _first(member: Member, found: list[list[Crossing]]) -> tuple[int, list[Ident
 
 
 def _begins_inside(crossings: list[Crossing]) -> int:
-    """How many times an operand goes round t = 0, from what lies ahead."""
+    """How many times an operand encloses t = 0, from its crossings ahead."""
     ahead = [c for c in crossings if c.t > 0]
     if ahead:
         return (
@@ -204,6 +207,7 @@ def _begins_inside(crossings: list[Crossing]) -> int:
 
 
 def evaluated(tree: Tree | int, states: list[int]) -> bool:
+    """Whether a point is inside the solid: `states` counts how often each operand encloses it."""
     if isinstance(tree, int):
         return states[tree] != 0
     values = [evaluated(part, states) for part in tree.of]

@@ -1,6 +1,10 @@
-"""What Mitsuba lacks, written with its own parts.
+"""Plugins for Mitsuba: materials that it lacks or approximates, and Whitted's ray tracing.
 
-The classes derive from classes of a variant, so they are made and registered after `set_variant`.
+Each module has `register(mi)`, which defines a class and registers it with Mitsuba: the classes
+derive from classes of a variant, so this runs after every `set_variant`.  Plugins follow Mitsuba's
+interface (`sample`, `eval`, `pdf`; local directions, float32) and must work in scalar and in llvm
+variants.  To add one: a module with `register`, its name in `register` below, and a `translate_*`
+function that uses it.
 """
 
 from typing import Any
@@ -9,6 +13,6 @@ from comparisons.mitsuba.plugins import exact_beckmann, exact_coat, mixtures, ph
 
 
 def register(mi: Any) -> None:
-    """Make the plugins of this folder known to `mi.load_dict`, for the variant that is set."""
+    """Register the plugins of this folder for the current variant."""
     for plugin in (exact_beckmann, exact_coat, mixtures, phong, whitted):
         plugin.register(mi)

@@ -1,14 +1,13 @@
 """Beckmann microfacets with the exact masking function: `{"type": "exact_beckmann"}`.
 
-Mitsuba has Walter et al.'s rational approximation of Smith's G1 for Beckmann's distribution, which
-is up to 0.31 % off (`approximate_g1` over `exact_g1`), so that what is scattered, in which that of
-both directions stands, is up to 0.63 % off.  This wraps Mitsuba's rough conductor or
-dielectric, and multiplies what it scatters by the ratio of the two for both directions; everything
-else is Mitsuba's.
+Mitsuba uses Walter et al.'s rational approximation of Smith's G1 for Beckmann's distribution, which
+is up to 0.31 % off (`approximate_g1` over `exact_g1`); the BSDF contains G1 of both directions, and
+is up to 0.63 % off.  This plugin wraps Mitsuba's rough conductor or dielectric, and multiplies its
+BSDF by exact over approximate G1 for both directions; everything else is Mitsuba's.
 
-The nested material must draw normals from the whole distribution ("sample_visible" false): the
-density of visible ones contains G1 itself, so that what Mitsuba draws and the density that it
-reports differ by as much.
+The nested material must sample normals from the whole distribution ("sample_visible" false): the
+density of visible normals contains G1 itself, so that Mitsuba's samples and its pdf would differ by
+as much.
 """
 
 import math
@@ -21,13 +20,13 @@ from reference_rt.core.arrays import FloatArray
 
 
 def approximate_g1(a: FloatArray) -> FloatArray:
-    """Mitsuba's, for a = 1 / (alpha tan theta) (include/mitsuba/render/microfacet.h)."""
+    """Mitsuba's G1, for a = 1 / (alpha tan theta) (include/mitsuba/render/microfacet.h)."""
     rational = (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
     return np.where(a >= 1.6, 1.0, rational)
 
 
 def exact_g1(a: FloatArray) -> FloatArray:
-    """Smith's: 2 / (1 + erf a + exp(-a²) / (a sqrt pi)) (Walter et al. 2007, section 5.2)."""
+    """Smith's G1: 2 / (1 + erf a + exp(-a²) / (a sqrt pi)) (Walter et al. 2007, section 5.2)."""
     erf = np.vectorize(math.erf)(a)
     return np.asarray(2.0 / (1.0 + erf + np.exp(-a * a) / (a * math.sqrt(math.pi))))
 
@@ -40,7 +39,7 @@ def correction(mi: Any, alpha_u: Any, alpha_v: Any, v: Any) -> Any:
     slope = dr.sqrt(x * x + y * y)
     # Beyond 10 both are 1; at grazing angles the ratio of the two tends to a constant.
     a = dr.clip(dr.abs(v.z) / dr.maximum(slope, 1e-20), 1e-6, 10.0)
-    # Both over a.
+    # Both divided by a.
     rational = (3.535 + 2.181 * a) / (1.0 + 2.276 * a + 2.577 * a * a)
     approximate = dr.select(a >= 1.6, 1.0 / a, rational)
     exact = 2.0 / (a * (1.0 + dr.erf(a)) + dr.exp(-a * a) / math.sqrt(math.pi))
@@ -48,7 +47,7 @@ def correction(mi: Any, alpha_u: Any, alpha_v: Any, v: Any) -> Any:
 
 
 def register(mi: Any) -> None:
-    """Define the material for the variant that is set, and register it."""
+    """Define the material for the current variant, and register it."""
     import drjit as dr
 
     class ExactBeckmann(mi.BSDF):  # type: ignore[misc]

@@ -1,11 +1,11 @@
 """Plastic and rough plastic without Mitsuba's tables: `{"type": "exact_coat"}`.
 
-Mitsuba's diffuse base under a coat, rho / (1 - c R) T(wi) T(wo) / (eta² pi), has R, what the coat
-mirrors from within, from a fit for smooth plastic, made for indices up to 2, and for rough plastic
-as the mean over 64 cosines from 0 to 1, both ends included, in place of the integral, which is
-about R / 64 too little; T by linear interpolation between these 64.  Here both are integrals in
-float64: `comparisons.mitsuba.plastic_error` measures how much brighter or darker Mitsuba's base is.
- The mirrored part is Mitsuba's, with the exact masking of `exact_beckmann`.
+The diffuse base under a coat is rho / (1 - c R) T(wi) T(wo) / (eta² pi), with R the coat's internal
+reflectance and T its transmittance.  Mitsuba takes R of smooth plastic from a fit made for indices
+up to 2; of rough plastic as the mean over 64 cosines from 0 to 1, both ends included, which is
+about R / 64 below the integral; and T by linear interpolation between these 64 cosines.  Here both
+are integrals in float64: `comparisons.mitsuba.plastic_error` measures the error of Mitsuba's base.
+The specular reflection is Mitsuba's, with the exact masking of `exact_beckmann`.
 """
 
 import functools
@@ -19,15 +19,16 @@ from comparisons.mitsuba.plugins import exact_beckmann, parameters
 from reference_rt.core.arrays import FloatArray
 
 CELLS = 512
-"""Of T's table, evenly in the root of the cosine: linear between, to 1e-5."""
+"""Cells of T's table, evenly spaced in the square root of the cosine: linear interpolation is exact
+to 1e-5."""
 
 
 _legendre = functools.cache(special.roots_legendre)
-"""Without numpy's dense eigenvalues, which take several threads of a busy machine a second."""
+"""SciPy's: numpy's dense eigenvalues take a second with several threads on a busy machine."""
 
 
 def _rule(n: int, low: float = 0.0, high: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """Gauss and Legendre's nodes and weights for an interval."""
+    """Gauss-Legendre nodes and weights for an interval."""
     nodes, weights = _legendre(n)
     return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights
 
@@ -41,10 +42,10 @@ def fresnel(cosine: FloatArray, eta: float) -> FloatArray:
 
 
 def smooth_reflectance(eta: float) -> float:
-    """The integral of 2 F cos over the cosines, from within a medium of index eta > 1.
+    """R: the integral of 2 F cos over the cosines, inside a medium of index eta.
 
-    From outside by quadrature over the root of the cosine; from within by reciprocity, 1 / eta²
-    of what passes from outside.
+    By quadrature over the square root of the cosine.  For eta > 1 the integral is taken outside: by
+    reciprocity the transmittance from inside is 1 / eta² of that from outside.
     """
     if eta < 1.0:
         x, weight = _rule(400)
@@ -55,7 +56,7 @@ def smooth_reflectance(eta: float) -> float:
 
 
 class RoughCoat:
-    """T at CELLS + 1 cosines, and R, of a rough coat of index `eta`, by quadrature in float64."""
+    """T at CELLS + 1 cosines, and R, of a rough coat with index `eta`, by quadrature in float64."""
 
     def __init__(self, distribution: str, alpha: float, eta: float) -> None:
         self.is_beckmann, self.alpha = distribution == "beckmann", alpha
@@ -64,13 +65,13 @@ class RoughCoat:
         critical = math.sqrt(1.0 - 1.0 / (eta * eta)) if eta > 1.0 else 0.5
         parts = (_rule(64, 0.0, critical), _rule(64, critical, 1.0))
         nodes, weights = (np.concatenate(column) for column in zip(*parts, strict=True))
-        self.nodes = 192, 64  # total reflection begins with a root's slope
+        self.nodes = 192, 64  # near total reflection F behaves like a square root
         within = self.scattered(nodes, 1.0 / eta, False)
         self.reflectance = float(np.sum(2.0 * nodes * weights * within))
 
     def scattered(self, cosines: FloatArray, eta: float, through: bool) -> FloatArray:
-        """What microfacets let through, or mirror, of light at each cosine (n,): the mean over the
-        normals that are seen from there."""
+        """The fraction of light that microfacets transmit (`through`) or reflect, at each cosine
+        (n,): the mean over visible normals."""
         return np.array([self._scattered(max(float(c), 1e-6), eta, through) for c in cosines])
 
     def _scattered(self, cosine: float, eta: float, through: bool) -> float:
@@ -92,11 +93,11 @@ class RoughCoat:
         return float(np.sum(weight * np.where(up, share * g1, 0.0)))
 
     def _seen(self, cosine: float, sine: float) -> tuple[FloatArray, ...]:
-        """Of unit normals that are seen from (sine, 0, cosine): x, z, and weights of sum 1.
+        """Unit normals visible from (sine, 0, cosine): x, z, and weights that sum to 1.
 
-        Beckmann: slopes a and b over alpha, of density (cosine - alpha sine a) exp(-a² - b²).
-        GGX: of roughness 1 they mirror the stretched direction to an even cap (Dupuy & Benyoub
-        2023).
+        Beckmann: slopes over alpha, a and b, have the density (cosine - alpha sine a)
+        exp(-a² - b²).  GGX: with roughness 1 they reflect the stretched direction uniformly into a
+        spherical cap (Dupuy & Benyoub 2023).
         """
         if self.is_beckmann:
             last = min(6.0, cosine / max(self.alpha * sine, 1e-12))
@@ -108,7 +109,7 @@ class RoughCoat:
         else:
             stretched = np.array([self.alpha * sine, 0.0, cosine])
             stretched /= np.linalg.norm(stretched)
-            # Squared: the cap's rim is reached with a root's slope.
+            # v is squared, as the integrand behaves like a square root at the cap's rim.
             (v, of_v), (phi, of_phi) = _rule(self.nodes[0]), _rule(self.nodes[1], 0.0, math.pi)
             weight = np.outer(2.0 * of_v * v, of_phi).ravel()
             v, phi = (g.ravel() for g in np.meshgrid(v, phi, indexing="ij"))
@@ -124,20 +125,20 @@ rough_coat = functools.cache(RoughCoat)
 
 
 def _ggx_g1(a: FloatArray) -> FloatArray:
-    """Smith's for GGX, with a = 1 / (alpha tan theta) (Walter et al. 2007, eq. 34)."""
+    """Smith's G1 for GGX, with a = 1 / (alpha tan theta) (Walter et al. 2007, eq. 34)."""
     return np.asarray(2.0 / (1.0 + np.sqrt(1.0 + 1.0 / (a * a))))
 
 
 def register(mi: Any) -> None:
-    """Define the material for the variant that is set, and register it."""
+    """Define the material for the current variant, and register it."""
     import drjit as dr
 
     everything = 0xFFFFFFFF
     diffuse = int(mi.BSDFFlags.DiffuseReflection)
 
     class ExactCoat(mi.BSDF):  # type: ignore[misc]
-        """Parameters: nested, Mitsuba's own material; its reflectance, nonlinear, eta; where it is
-        rough its distribution and alpha."""
+        """Parameters: nested, Mitsuba's own material; its reflectance, nonlinear, eta; distribution
+        and alpha if it is rough."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
@@ -173,7 +174,7 @@ def register(mi: Any) -> None:
             return low + (x - mi.Float(k)) * (high - low)
 
         def scattered(self, si: Any, wo: Any, active: Any) -> Any:
-            """By the base."""
+            """BSDF times cosine of the base."""
             rho = self.base(si, active)
             value = rho / (1.0 - (rho if self.nonlinear else mi.Color3f(1.0)) * self.r)
             passing = self.passing(si.wi.z) * self.passing(wo.z)

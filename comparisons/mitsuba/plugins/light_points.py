@@ -1,8 +1,8 @@
-"""The one point that stands for each area light in Whitted's ray tracing.
+"""The one point that represents each area light in Whitted's ray tracing.
 
-Where these points lie is a convention, the same as in `reference_rt`: u0 = u1 = 1/2 in each shape's
-own way to pick a point.  Everything else, size, place and orientation, is read from Mitsuba's own
-shapes, in float64.
+The choice of the points is a convention, the same as in `reference_rt`: u0 = u1 = 1/2 in each
+shape's own sampling.  Size, position and orientation are read from Mitsuba's own shapes, in
+float64.
 """
 
 import math
@@ -17,8 +17,8 @@ _SMALLEST = float(np.finfo(np.float32).tiny)
 
 
 class FixedPoint(NamedTuple):
-    """A primitive that is seen as its point p, with unit normal n and an area: (3,), (3,), 1; shape
-    is Mitsuba's object.  Which side shines is the emitter's to say."""
+    """A primitive that is represented by its point p, with unit normal n and an area: (3,), (3,),
+    1; shape is Mitsuba's object.  The emitter determines which side shines."""
 
     p: Any
     n: Any
@@ -26,10 +26,10 @@ class FixedPoint(NamedTuple):
     shape: Any
 
     def seen_from(self, mi: Any, dr: Any, p: Any) -> tuple[Any, Any]:
-        """The point, and the solid angle that it stands for: area cos / distance²."""
+        """The point, and the solid angle that it represents: area cos / distance²."""
         w = p - self.p
         distance2 = dr.squared_norm(w)
-        # Seen from itself the point stands for nothing: 0 over the smallest float.
+        # From the point itself the solid angle is 0: 0 over the smallest float.
         distance3 = dr.maximum(distance2 * dr.sqrt(distance2), _SMALLEST)
         return self.p, self.area * dr.abs(dr.dot(w, self.n)) / distance3
 
@@ -42,11 +42,11 @@ class SphereLight(NamedTuple):
     shape: Any
 
     def seen_from(self, mi: Any, dr: Any, p: Any) -> tuple[Any, Any]:
-        """The point in the middle of the cone of sight's cosines, and the cone's solid angle.
+        """The point at the mean cosine of the subtended cone, and the cone's solid angle.
 
-        1 - cos = (1 - cos theta_max) / 2 and phi = pi, in the basis of Duff et al. (2017), which is
-        Mitsuba's too.  Nothing from inside, nor from the sphere's surface, where rounding decides
-        what is inside: what is nearer than Mitsuba starts its rays counts as on it.
+        1 - cos = (1 - cos theta_max) / 2 and phi = pi, in the basis of Duff et al. (2017), which
+        Mitsuba uses too.  0 from inside and from the surface, where rounding would decide: points
+        closer than Mitsuba's ray epsilon count as on the surface.
         """
         to_center = self.center - p
         distance2 = dr.squared_norm(to_center)
@@ -66,8 +66,8 @@ class SphereLight(NamedTuple):
 
 
 class BoxPoint(NamedTuple):
-    """The point of a box: on one of its faces, which is not seen from behind; a ray towards it from
-    there would end on another face, and near an edge as good as where it should."""
+    """The point of a box, on one of its faces.  From behind that face its solid angle is 0: a ray
+    towards it would hit another face, near an edge within the tolerance of the right distance."""
 
     face: FixedPoint
 
@@ -85,7 +85,7 @@ LightPoint = FixedPoint | BoxPoint | SphereLight
 
 
 def light_points(mi: Any, scene: Any, unlit: Collection[str] = ()) -> list[LightPoint]:
-    """The points of all area lights of a scene, but for shapes whose id is among `unlit`."""
+    """The points of all area lights of a scene, except shapes whose id is in `unlit`."""
     found: list[LightPoint] = []
     for emitter in scene.emitters():
         shape = emitter.get_shape()
@@ -95,7 +95,7 @@ def light_points(mi: Any, scene: Any, unlit: Collection[str] = ()) -> list[Light
 
 
 _FLAT = {"Rectangle": 4.0, "Disk": math.pi}
-"""The areas of plugins whose point is their middle, before their map."""
+"""Untransformed areas of the plugins whose point is their centre."""
 
 
 def _points_of(mi: Any, shape: Any) -> list[LightPoint]:
@@ -145,8 +145,8 @@ def _triangle_point(mi: Any, shape: Any, corners: FloatArray) -> FixedPoint:
 
 
 def _box_point(mi: Any, shape: Any, vertices: FloatArray) -> "BoxPoint":
-    """Half way through the list -x +x -y +y -z +z of faces, each as long as its area, begun half
-    of the first face's length before it."""
+    """The point at half of the cumulative area of the faces -x +x -y +y -z +z, starting half of the
+    first face before the list."""
     center = vertices.mean(axis=0)
     edges = _half_edges(vertices)
     normals = np.cross(edges[[1, 2, 0]], edges[[2, 0, 1]])
@@ -173,4 +173,5 @@ def _half_edges(vertices: FloatArray) -> FloatArray:
 
 
 _CUBE_FRONT, _CUBE_BACK = (2, 1, 3), (4, 0, 5)
-"""Which four vertices are the faces +x +y +z and -x -y -z (src/shapes/cube.cpp)."""
+"""Indices of the faces +x +y +z and -x -y -z among the groups of four vertices
+(src/shapes/cube.cpp)."""

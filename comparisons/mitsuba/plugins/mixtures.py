@@ -1,11 +1,10 @@
-"""Blends and masks whose parts can be asked one by one, and sampled where they are mirrors.
+"""Blends and masks whose components can be evaluated one by one, and that handle perfect mirrors.
 
-Mitsuba's own, as of 3.9.1: a blend joins the probability of a mirrored direction and the density of
-the other material there as if they were the same thing, which takes light away from mirrors: one
-with a share w has (w + (1 - w) f) / (w + (1 - w) p) of its light, with f the value of the other
-material in the mirrored direction (its cosine included) and p its density there; a
-mask that is asked for one of its components takes the wrong one.  Everything else here is
-Mitsuba's.
+Errors of Mitsuba 3.9.1 that these correct: a blend adds the probability of a mirrored direction and
+the other material's density there, so that a mirror with weight w reflects
+(w + (1 - w) f) / (w + (1 - w) p) of its light, with f the other material's BSDF times cosine in the
+mirrored direction and p its pdf there; a mask takes the wrong component if one is selected.
+Everything else here is Mitsuba's.
 """
 
 from typing import Any
@@ -14,7 +13,7 @@ from comparisons.mitsuba.plugins import parameters
 
 
 def register(mi: Any) -> None:
-    """Define the materials for the variant that is set, and register them."""
+    """Define the materials for the current variant, and register them."""
     import drjit as dr
 
     def share(value: Any) -> parameters.Parameter:
@@ -44,7 +43,7 @@ def register(mi: Any) -> None:
             return 1.0 - weight, weight
 
         def part(self, context: Any) -> tuple[int, Any]:
-            """Which of the two has the component asked for, and the context for it."""
+            """Which of the two has the context's component, and the context for it."""
             k = context.component
             which = 0 if k < self.first_count else 1
             return which, one_of(context, k - which * self.first_count)
@@ -97,7 +96,7 @@ def register(mi: Any) -> None:
             return f"MixtureBlend[{self.nested[0]}, {self.nested[1]}]"
 
     class MixtureMask(mi.BSDF):  # type: ignore[misc]
-        """Mitsuba's own mask, but for what it answers of single components."""
+        """Mitsuba's own mask, with the right single components."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)

@@ -1,15 +1,15 @@
-"""Parameters of materials written in Python: Mitsuba hands them textures as objects, colours and
-numbers as they are."""
+"""Parameters of material plugins: Mitsuba passes textures as objects, colours and numbers as plain
+values."""
 
 from collections.abc import Callable
 from typing import Any
 
 Parameter = Callable[[Any, Any], Any]
-"""(interaction, mask) -> its value there."""
+"""(interaction, mask) -> the parameter's value there."""
 
 
 def colour(mi: Any, value: Any) -> Parameter:
-    """A colour's value at an interaction."""
+    """A parameter that is a colour."""
     if hasattr(value, "eval"):
         return lambda si, active: value.eval(si, active)
     constant = mi.Color3f(value)
@@ -17,7 +17,7 @@ def colour(mi: Any, value: Any) -> Parameter:
 
 
 def number(mi: Any, value: Any) -> Parameter:
-    """A number's."""
+    """A parameter that is a number."""
     if hasattr(value, "eval_1"):
         return lambda si, active: value.eval_1(si, active)
     constant = mi.Float(float(value))
@@ -25,5 +25,5 @@ def number(mi: Any, value: Any) -> Parameter:
 
 
 def is_wide(mi: Any) -> bool:
-    """Whether the variant takes many rays at once."""
+    """Whether the current variant processes many rays at once."""
     return not str(mi.variant()).startswith("scalar")

@@ -1,8 +1,8 @@
-"""The text-book's local shading as a Mitsuba material: `{"type": "textbook_phong"}`.
+"""Phong and Blinn-Phong shading as a Mitsuba material: `{"type": "textbook_phong"}`.
 
-f cos = k_d cos + k_s max(0, e·r)^p, or (h·n)^p, on the front side; a mirror of colour k_r; and
-k_a, which is not scattered: it is what `eval` gives for a context of the type AMBIENT alone,
-through whatever the material is nested in.
+f cos = k_d cos + k_s max(0, e·r)^p, or (h·n)^p, on the front side; a mirror of colour k_r.  k_a,
+the ambient colour, is not part of the BSDF: `eval` returns it for a context of the type AMBIENT
+alone, also through materials that contain this one.
 """
 
 import math
@@ -14,13 +14,14 @@ AMBIENT = 0x80000000
 """A bit of `BSDFContext.type_mask` that Mitsuba does not use."""
 
 BLANK = 0x40000000
-"""Another: what a material answers to both alike has nothing to do with either."""
+"""Another unused bit: values that a material returns for AMBIENT and BLANK alike are not
+ambient."""
 
 _COLOURS = ("ambient", "diffuse", "specular", "mirror")
 
 
 def register(mi: Any) -> None:
-    """Define the material for the variant that is set, and register it."""
+    """Define the material for the current variant, and register it."""
     import drjit as dr
 
     flags = mi.BSDFFlags
@@ -35,7 +36,7 @@ def register(mi: Any) -> None:
             self.colours = {n: parameters.colour(mi, properties[n]) for n in _COLOURS}
             self.exponent = float(properties.get("exponent", 32.0))
             self.half_vector = bool(properties.get("half_vector", False))
-            # The smooth part is one component, drawn from two lobes.
+            # The smooth part is one component, sampled from two lobes.
             self.m_components = [
                 flags.DiffuseReflection | front,
                 flags.DeltaReflection | front,
@@ -64,7 +65,7 @@ def register(mi: Any) -> None:
                 return drawn, black
             seen = si.wi.z > 0.0
             k_r = self.colour("mirror", si, active)
-            # A mirror's share of the draws, a third where it is there at all.
+            # The mirror is sampled with probability 1/3, if it is not black.
             share: Any = dr.select(dr.max(k_r) > 0.0, 1.0 / 3.0, 0.0) if smooth else mi.Float(1.0)
             if not mirror:
                 share = mi.Float(0.0)
@@ -88,7 +89,7 @@ def register(mi: Any) -> None:
             return drawn, dr.select(seen, value, black)
 
         def draw(self, wi: Any, u: Any, sample2: Any) -> Any:
-            """Half of the time by the cosine, else by the lobe's power of one."""
+            """A direction: with probability 1/2 by the cosine, else by the power of the lobe."""
             p = self.exponent
             cosine = mi.warp.square_to_cosine_hemisphere(sample2)
             z = dr.power(dr.maximum(sample2.x, 1e-20), 1.0 / (p + 1.0))

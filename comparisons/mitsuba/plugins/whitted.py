@@ -1,16 +1,16 @@
 """Whitted's ray tracing as a Mitsuba integrator: `{"type": "whitted"}`.
 
-Twin of `reference_rt.integrators.whitted`: ambient light; direct light from every light that is a
-point or a direction, and from one point of every area light; every mirrored and refracted ray, and
-those that go straight on; the background.  Intersections, visibility, BSDFs, Fresnel terms and
-emission are Mitsuba's own.
+Counterpart of `reference_rt.integrators.whitted`: ambient light; direct light from every point,
+spot and directional light, and from one point of every area light; every mirrored, refracted and
+transmitted ray; the background.  Intersections, visibility, BSDFs, Fresnel terms and emission are
+Mitsuba's own.
 
-A BSDF is asked for each of its components alone, which leaves nothing to chance: what is a
-direction of its own is followed, the rest is the smooth part, which lights are multiplied with.
+Each component of a BSDF is sampled alone, which makes the result deterministic: delta components
+are followed, the smooth components are evaluated for the lights.
 
-Where a ray starts differs from Mitsuba's integrators.  They move it off the surface by 1e-4 of the
-scene's coordinates, which moves what it meets by as much or more: a hundred times float32's own
-error, and enough to hide a wrong direction.  Here it is moved by float32's error alone.
+Rays start closer to surfaces than in Mitsuba's integrators.  Those offset a ray by 1e-4 of the
+scene's coordinates, which moves its hit by as much or more: a hundred times float32's own error,
+and enough to hide a wrong direction.  Here the offset is float32's error.
 """
 
 from typing import Any
@@ -21,13 +21,13 @@ from comparisons.mitsuba.plugins import parameters, phong
 from comparisons.mitsuba.plugins.light_points import light_points
 
 _ROUNDINGS = 8.0 * 2.0**-24
-"""How far a point lies off its surface, over the scene's largest coordinate: as the bound in
-`comparisons.rungs.rays.bounds`, of which a third was measured."""
+"""How far a hit point lies off its surface, over the scene's largest coordinate: the bound
+`comparisons.geometry.float32.ROUNDINGS`, of which a third was measured."""
 
 
 def clearance(mi: Any, si: Any, reach: float, rough: Any) -> Any:
-    """How far off its surface a ray begins; `reach` is the scene's largest coordinate.  Never
-    farther than Mitsuba begins its own; and as far where `rough`."""
+    """How far off its surface a ray starts; `reach` is the scene's largest coordinate.  At most
+    Mitsuba's own ray epsilon, and as much where `rough`."""
     import drjit as dr
 
     own = (1.0 + dr.max(dr.abs(si.p))) * mi.math.RayEpsilon
@@ -35,10 +35,10 @@ def clearance(mi: Any, si: Any, reach: float, rough: Any) -> Any:
 
 
 def leave(mi: Any, si: Any, d: Any, height: Any) -> Any:
-    """A ray from a surface along the unit `d`, begun at `height` over it.
+    """A ray from a surface along the unit `d`, started at `height` above it.
 
-    It is moved along itself, which keeps it on its line; at grazing angles, where this would carry
-    it past what stands near, by ten heights at most, and for the rest along the normal.
+    The origin moves along `d`, which keeps the ray on its line, but at most ten heights: at grazing
+    angles it would skip nearby geometry.  The rest of the height is along the normal.
     """
     import drjit as dr
 
@@ -49,7 +49,7 @@ def leave(mi: Any, si: Any, d: Any, height: Any) -> Any:
 
 
 def emitted(mi: Any, scene: Any, si: Any, active: Any) -> Any:
-    """The radiance that arrives from what a ray hit, the environment where it hit nothing."""
+    """The emitted radiance at a ray's hit, or of the environment for a miss."""
     emitter = si.emitter(scene, active)
     if emitter is None:  # scalar variants
         return mi.Color3f(0.0)
@@ -57,21 +57,21 @@ def emitted(mi: Any, scene: Any, si: Any, active: Any) -> Any:
 
 
 def without(mask: Any, other: Any) -> Any:
-    """mask and not other; `~` would make numbers of the plain bools of scalar variants."""
+    """mask and not other; `~` would turn the plain bools of scalar variants into integers."""
     import drjit as dr
 
     return dr.select(other, False, mask)
 
 
 def register(mi: Any) -> None:
-    """Define the integrator for the variant that is set, and register it."""
+    """Define the integrator for the current variant, and register it."""
     import drjit as dr
 
     class Whitted(mi.SamplingIntegrator):  # type: ignore[misc]
-        """Parameters: max_depth, most mirrorings and refractions of a ray; min_contribution, the
-        fraction of the pixel below which a ray is not followed; components, at least as many as
-        any BSDF has; unlit, the ids, with spaces between, of shapes that are no lights although
-        they shine; ambient_r, ambient_g, ambient_b, the ambient light's radiance."""
+        """Parameters: max_depth, most reflections and refractions of a ray; min_contribution, the
+        throughput below which a ray is not followed; components, at least as many as any BSDF has;
+        unlit, the ids, separated by spaces, of emissive shapes that do not count as lights;
+        ambient_r, ambient_g, ambient_b, the ambient light's radiance."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
@@ -88,7 +88,7 @@ def register(mi: Any) -> None:
             self.reach = 0.0
 
         def prepare(self, scene: Any) -> None:
-            """Look the lights up once per scene."""
+            """Collect the lights, once per scene."""
             if self.scene is not scene:
                 self.scene, self.lights = scene, light_points(mi, scene, self.unlit)
                 delta = mi.EmitterFlags.Delta
@@ -103,16 +103,16 @@ def register(mi: Any) -> None:
         ) -> tuple[Any, Any, list[Any]]:
             """The radiance along `ray`, whether it hit anything, no further channels.
 
-            The tree is walked depth first with all rays at once, each level masked to those that
-            have it.
+            The ray tree is traversed depth first with all rays at once, masked to those that have
+            the branch.
             """
             self.prepare(scene)
             total, valid = mi.Color3f(0.0), None
             stack = [(mi.Ray3f(ray), mi.Color3f(1.0), mi.Mask(active), 0)]
             while stack:
                 ray, weight, active, depth = stack.pop()
-                # Opaque: otherwise the first level, whose weight is a constant, is a kernel of its
-                # own, and every level compiles again.
+                # Opaque: otherwise the constant weight of the first level makes another kernel, and
+                # every level compiles again.
                 dr.make_opaque(ray, weight, active)
                 si = scene.ray_intersect(ray, active)
                 total += weight * emitted(mi, scene, si, active)
@@ -133,7 +133,7 @@ def register(mi: Any) -> None:
 
         @staticmethod
         def has_perfect(scene: Any, k: int) -> bool:
-            """Whether component k of any BSDF may be a direction of its own."""
+            """Whether component k of any BSDF may be a delta component."""
             shapes = scene.shapes()
             if any(shape.class_name() == "Instance" for shape in shapes):
                 return True
@@ -144,7 +144,7 @@ def register(mi: Any) -> None:
             )
 
         def ambient_light(self, si: Any, active: Any) -> Any:
-            """What text-book materials send of the ambient light: see `phong`."""
+            """The ambient light that Phong materials reflect: see `phong`."""
             context, up = mi.BSDFContext(), mi.Vector3f(0.0, 0.0, 1.0)
             context.type_mask = phong.AMBIENT
             found = si.bsdf().eval(context, si, up, active)
@@ -155,14 +155,14 @@ def register(mi: Any) -> None:
         def branch(
             self, si: Any, weight: Any, active: Any, component: int, depth: int
         ) -> list[Any]:
-            """The rays of one component that are worth following: a stack's entry, or nothing."""
+            """The rays of one delta component with enough throughput: one stack entry, or none."""
             bsdf = si.bsdf()
             active = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta)
             if not dr.any(active):
                 return []
             context = mi.BSDFContext()
             context.component = component
-            # Of one component alone, if it is a direction, nothing is left to chance.
+            # A single delta component is sampled deterministically.
             sample, value = bsdf.sample(context, si, 0.5, mi.Point2f(0.5, 0.5), active)
             active &= mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
             weight = weight * value
@@ -175,15 +175,17 @@ def register(mi: Any) -> None:
             return [(ray, weight, active, depth + 1)]
 
         def clearance(self, si: Any) -> Any:
-            """See there: Mitsuba's llvm variants solve a cylinder's quadratic in float32, so that
-            it shades itself where rays begin any closer (measured: 247 of 16,000 pixels)."""
+            """`clearance` at the hits, with cylinders as rough: Mitsuba's llvm variants solve their
+            quadratic in float32, so that closer rays hit the cylinder itself again (measured: 247
+            of 16,000 pixels)."""
             rough = mi.Mask(False)
             for shape in self.cylinders:
                 rough |= self.is_shape(si, shape)
             return clearance(mi, si, self.reach, rough)
 
         def direct_light(self, scene: Any, si: Any, active: Any) -> Any:
-            """Every light that is a point or a direction, and one point of every area light."""
+            """Light from every point, spot and directional light, and from one point of every area
+            light."""
             total = mi.Color3f(0.0)
             context = mi.BSDFContext()
             bsdf = si.bsdf()
@@ -201,8 +203,8 @@ def register(mi: Any) -> None:
                 ray = leave(mi, si, dr.normalize(target - si.p), height)
                 value = bsdf.eval(context, si, si.to_local(ray.d), active)
                 found = scene.ray_intersect(ray, active)
-                # What the ray meets is the light itself if it is as far away, as Mitsuba sees it;
-                # begun off its line, the ray meets a surface seen edge-on somewhere else.
+                # The ray sees the light if it hits it at the right distance.  The ray starts off
+                # its line, so the tolerance is taken along the light's normal.
                 missing = dr.norm(target - si.p) * (1.0 - mi.math.ShadowEpsilon) - found.t
                 near = missing * dr.abs(dr.dot(ray.d, found.n)) <= 2.0 * height
                 visible = active & found.is_valid() & near & self.is_shape(found, light.shape)
@@ -213,8 +215,8 @@ def register(mi: Any) -> None:
 
         @staticmethod
         def is_shape(found: Any, shape: Any) -> Any:
-            """Whether a ray met this very shape: another may stand within the tolerance before it,
-            and shine too."""
+            """Whether a ray hit this very shape: another emitter may lie within the tolerance in
+            front of it."""
             if parameters.is_wide(mi):
                 return found.shape == mi.ShapePtr(shape)
             return found.shape is shape

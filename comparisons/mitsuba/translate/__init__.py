@@ -1,7 +1,10 @@
-"""Scene -> Mitsuba: one `singledispatch` function per public type.
+"""Scene -> Mitsuba: one `singledispatch` function per public type of `reference_rt`.
 
-To translate a new type: register a function for it in the file of its kind; until then it raises
-`UntranslatableError`, which makes a scene `not-comparable`.
+Contract: a function takes the description and, where it needs textures or other materials, the
+`TranslationContext`, and returns the dict of a Mitsuba plugin (shapes: a list of `Plugin`), with
+radiance and lengths unchanged.  None means that Mitsuba has no place for it.  To translate a new
+type: register a function in the file of its kind; until then it raises `UntranslatableError`, which
+makes a scene `not-comparable`.
 """
 
 from collections.abc import Mapping
@@ -12,10 +15,10 @@ import numpy as np
 from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
 from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.backend import mitsuba, scalar
-from comparisons.mitsuba.counterpart import Crowd, Twin
-from comparisons.mitsuba.csg import Operand, SolidTwin
+from comparisons.mitsuba.counterpart import InstancedGroup, Twin
+from comparisons.mitsuba.csg import Operand, SolidCounterpart
 from comparisons.mitsuba.scene import light_id, shape_id
-from comparisons.mitsuba.stand_ins import Piece, Plugin, same_uv
+from comparisons.mitsuba.stand_ins import MitsubaShape, Plugin, same_uv
 from comparisons.mitsuba.translate.cameras import translate_camera
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.film import translate_film, translate_sampler
@@ -27,47 +30,47 @@ from comparisons.mitsuba.translate.textures import Surroundings
 from comparisons.mitsuba.translate.wrappers import coloured_parts_of, is_textured, parts_of
 from reference_rt.rendering.scene import Scene
 
-# Without it Embree drops rays that meet a shared edge (Mitsuba issue 1149).
+# Without this Embree drops rays that hit a shared edge (Mitsuba issue 1149).
 ROBUST = {"embree_use_robust_intersections": True}
 
 
 class _Translated(NamedTuple):
     plain: dict[str, Any]
-    pieces: dict[str, Piece]
-    solids: list[SolidTwin]
+    pieces: dict[str, MitsubaShape]
+    solids: list[SolidCounterpart]
 
 
 def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
-    """The scene as a dict for `mitsuba.load_dict`, without its solids; shape i of ours has the id
-    "shape_<i>", or several such with suffixes.
+    """The scene as a dict for `mitsuba.load_dict`, without its solids; our shape i has the id
+    "shape_<i>", or several ids with suffixes.
 
-    Meshes are Mitsuba objects already, made of the very triangles of our tables.  There is no
-    integrator where ours is ray casting.  native: with Mitsuba's own materials also where ours are
-    more exact, whose speed would not be Mitsuba's.  Raises UntranslatableError, SceneError for a
-    file that cannot be used, ReferenceUnavailableError without Mitsuba.
+    Meshes are Mitsuba objects already, made of the triangles of our tables.  Ray casting has no
+    integrator in Mitsuba.  native: use Mitsuba's own materials even where our plugins are more
+    exact, to measure Mitsuba's speed.  Raises UntranslatableError, SceneError for a file that
+    cannot be used, ReferenceUnavailableError without Mitsuba.
     """
     found = _translated(scene, native)
     return {**_groups(found.pieces), **found.plain}
 
 
 def load(scene: Scene, frame: Frame | None = None) -> Twin:
-    """The scene in Mitsuba, its shapes not merged, in the coordinates of `Twin.frame`: those that
-    suit float32 best, or `frame`.  Raises as `to_mitsuba` does."""
+    """The scene's counterpart in Mitsuba, its shapes not merged, in the coordinates that suit
+    float32 best, or in `frame`.  Raises as `to_mitsuba` does."""
     frame = frame_of(scene) if frame is None else frame
     found = _translated(moved(scene, frame))
-    crowd = _crowd(found)
+    crowd = _instanced_group(found)
     plain = {**_groups(found.pieces), **found.plain}
     mi_scene = mitsuba().load_dict(plain, optimize=False)
     return Twin(mi_scene, found.pieces, tuple(found.solids), crowd, frame)
 
 
 FEW = 32
-"""Instances that a scene of Mitsuba's fast variants may have: see `Crowd`."""
+"""Most instances in a scene of Mitsuba's fast variants: see `InstancedGroup`."""
 
 
-def _crowd(found: _Translated) -> Crowd | None:
-    """Takes the instances out, where they are more than a few."""
-    names = [name for name, piece in found.pieces.items() if piece.plugin.within is not None]
+def _instanced_group(found: _Translated) -> InstancedGroup | None:
+    """Move the instances out of what is translated, if there are more than FEW."""
+    names = [name for name, mi_shape in found.pieces.items() if mi_shape.plugin.group is not None]
     if len(names) <= FEW:
         return None
     pieces = {name: found.pieces.pop(name) for name in names}
@@ -75,15 +78,15 @@ def _crowd(found: _Translated) -> Crowd | None:
     with scalar() as mi:
         groups = _groups(pieces)
         mi_scene = mi.load_dict({"type": "scene", **ROBUST, **groups, **instances}, optimize=False)
-    return Crowd(mi_scene, pieces)
+    return InstancedGroup(mi_scene, pieces)
 
 
-def _groups(pieces: Mapping[str, Piece]) -> dict[str, Any]:
-    """The groups that these are instances of, in the variant that is set."""
-    within = {p.plugin.within.name: p.plugin.within for p in pieces.values() if p.plugin.within}
+def _groups(pieces: Mapping[str, MitsubaShape]) -> dict[str, Any]:
+    """The shape groups of these instances, in the current variant."""
+    groups = {p.plugin.group.name: p.plugin.group for p in pieces.values() if p.plugin.group}
     return {
-        name: {"type": "shapegroup", "member": w.member() if callable(w.member) else w.member}
-        for name, w in within.items()
+        name: {"type": "shapegroup", "member": g.member() if callable(g.member) else g.member}
+        for name, g in groups.items()
     }
 
 
@@ -115,7 +118,7 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
 
 
 def _reach(scene: Scene, copies: list[Copy]) -> float:
-    """About the largest coordinate: of the eye, and of unit shapes where they stand."""
+    """About the largest coordinate: of the eye, and of the transformed unit shapes."""
     found = float(np.abs([scene.camera.eye, scene.camera.target]).max())
     for copy in copies:
         for leaf in (leaf for member in copy.members for leaf in member.leaves):
@@ -133,7 +136,7 @@ def _add(
     around: Surroundings,
     reach: float,
 ) -> None:
-    """Puts the shapes of one copy, of `count` of its group, into what is translated."""
+    """Add the shapes of one copy to the result;  count: how many copies its group has."""
     mirrored = bool(np.linalg.det(copy.outer[:, :3]) < 0.0)
     for number, member in enumerate(copy.members):
         name = shape_id(copy.shape)
@@ -170,17 +173,17 @@ def _add(
                 )
                 operands.append(Operand(mi_scene, pieces, leaf, place))
         if member.tree is not None:
-            result.solids.append(SolidTwin(tuple(operands), member.tree))
+            result.solids.append(SolidCounterpart(tuple(operands), member.tree))
 
 
 def _named(
     plugins: list[Plugin], name: str, copy: Copy, leaf: Leaf
-) -> tuple[dict[str, Any], dict[str, Piece]]:
+) -> tuple[dict[str, Any], dict[str, MitsubaShape]]:
     values, pieces = {}, {}
     for plugin in plugins:
         key = name + plugin.suffix
         values[key] = plugin.value
-        pieces[key] = Piece(
+        pieces[key] = MitsubaShape(
             copy.shape, leaf.part, copy.instance, leaf.shape, plugin._replace(value=None)
         )
     return values, pieces

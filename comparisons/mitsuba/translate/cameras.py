@@ -1,4 +1,4 @@
-"""Cameras: Mitsuba's look along local +z, with local +x to the *left* of the picture."""
+"""Cameras -> Mitsuba, whose cameras look along local +z, with local +x to the *left*."""
 
 import math
 from functools import singledispatch
@@ -15,12 +15,12 @@ from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.core.arrays import FloatArray
 
 NEAR, FAR = 1e-10, 1e10
-"""Mitsuba's rays begin at the near plane and end at the far one, ours do neither.  These are as
-good as 0 and infinity for scenes from 1e-3 to 1e8 across, and the directions that come out are as
-exact as with Mitsuba's own 1e-2 and 1e4 (measured: 1.5e-7 at 45 degrees for both)."""
+"""Clipping planes, which our cameras do not have.  These equal 0 and infinity for scenes from 1e-3
+to 1e8 across, and directions are as exact as with Mitsuba's defaults 1e-2 and 1e4 (measured: 1.5e-7
+at 45 degrees for both)."""
 
 UNIT_ROUNDOFF = 2.0**-24
-"""u of float32: pixels less oblong, and axes less off the middle, than this are so to Mitsuba."""
+"""u of float32: the tolerance for square pixels and for a centred axis."""
 
 
 @singledispatch
@@ -56,7 +56,7 @@ def _(camera: ThinLens, film: Film) -> dict[str, Any]:
 
 @translate_camera.register
 def _(camera: Pinhole, film: Film) -> dict[str, Any]:
-    """A perspective that stands on its head."""
+    """A perspective camera, upside down."""
     half = camera.film_width / camera.film_distance / 2.0
     return {"type": "perspective", **_spanning(half), **_place(camera, right=-1.0, up=-1.0)}
 
@@ -72,7 +72,7 @@ def _(camera: Orthographic, film: Film) -> dict[str, Any]:
 
 
 def _angle(camera: CentralCamera, film: Film) -> dict[str, Any]:
-    """The angle of view.  Raises UntranslatableError for pixels that are not square."""
+    """The field of view.  Raises UntranslatableError for pixels that are not square."""
     if camera.view is None:
         fov, axis = camera.angle
         return {"fov": fov, "fov_axis": axis}
@@ -87,13 +87,13 @@ def _angle(camera: CentralCamera, film: Film) -> dict[str, Any]:
 
 
 def _spanning(half: float) -> dict[str, Any]:
-    """The angle whose half has this tangent, along the picture's width."""
+    """The field of view along the picture's width; `half` is the tangent of half of it."""
     return {"fov": math.degrees(2.0 * math.atan(half)), "fov_axis": "x"}
 
 
 def _principal_point(camera: CentralCamera) -> tuple[float, float]:
-    """How far Mitsuba's film points are moved, in widths and heights, for the axis to pass where it
-    does: p + offset - 1/2 is 0 there."""
+    """Mitsuba's principal point offset, in picture widths and heights: the camera's axis passes
+    through the film point p with p + offset - 1/2 = 0."""
     if camera.view is None:
         return 0.0, 0.0
     l, r, b, t = camera.view
@@ -103,8 +103,8 @@ def _principal_point(camera: CentralCamera) -> tuple[float, float]:
 def _place(
     camera: Camera, right: float = 1.0, up: float = 1.0, shift: FloatArray | float = 0.0
 ) -> dict[str, Any]:
-    """to_world, whose columns are left, up, forward, eye: right and up scaled, the eye shifted; and
-    the clipping planes."""
+    """to_world, whose columns are left, up, forward, eye, with left and up scaled and the eye
+    shifted; and the clipping planes."""
     u, v, w = camera.basis
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([-right * u, up * v, -w, np.add(camera.eye, shift)])

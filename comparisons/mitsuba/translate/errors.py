@@ -1,4 +1,4 @@
-"""What has no twin in Mitsuba."""
+"""The error for parts of a scene that have no counterpart in Mitsuba."""
 
 from typing import Any
 
@@ -6,9 +6,9 @@ from reference_rt.util.errors import ReferenceRtError
 
 
 class UntranslatableError(ReferenceRtError):
-    """A part of a scene that Mitsuba has nothing for: the scene is `not-comparable`.
+    """A part of a scene has no counterpart in Mitsuba: the scene is `not-comparable`.
 
-    The exit code is that of a reference that could not run.
+    The exit code is the same as if the reference could not run.
     """
 
     exit_code = 4

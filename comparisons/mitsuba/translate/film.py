@@ -1,4 +1,4 @@
-"""Film, filters and samplers."""
+"""Film, filters and samplers -> Mitsuba."""
 
 from functools import singledispatch
 from typing import Any
@@ -25,8 +25,8 @@ def translate_film(film: Film) -> dict[str, Any]:
         "pixel_format": "rgb",
         "component_format": "float32",
         "rfilter": translate_filter(film.filter),
-        # Our pixels draw their points from the whole filter, also beyond the picture's edge;
-        # without a border Mitsuba's edge pixels would lack the half of theirs that lies outside.
+        # Our pixels sample the whole filter, also beyond the picture's edge; without a border
+        # Mitsuba's edge pixels would lack the samples outside.
         "sample_border": not isinstance(film.filter, BoxFilter),
     }
 

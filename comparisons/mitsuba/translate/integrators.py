@@ -1,4 +1,4 @@
-"""Integrators."""
+"""Integrators -> Mitsuba."""
 
 from functools import singledispatch
 from typing import Any
@@ -9,7 +9,7 @@ from reference_rt.integrators import Direct, Path, RayCast, Whitted
 
 @singledispatch
 def translate_integrator(integrator: Any) -> dict[str, Any] | None:
-    """An integrator's dict; None where there is no picture to compare.
+    """An integrator's dict; None if there is no picture to compare.
 
     Raises UntranslatableError.
     """
@@ -18,7 +18,7 @@ def translate_integrator(integrator: Any) -> dict[str, Any] | None:
 
 @translate_integrator.register
 def _(integrator: Path) -> dict[str, Any]:
-    """Which samples ours takes is no question of what the mean is."""
+    """The sampling strategy of ours does not change the mean."""
     return {
         "type": "path",
         "max_depth": -1 if integrator.max_depth is None else integrator.max_depth,
@@ -37,7 +37,7 @@ def _(integrator: Direct) -> dict[str, Any]:
 
 @translate_integrator.register
 def _(integrator: Whitted) -> dict[str, Any]:
-    """Our plugin: `comparisons.mitsuba.plugins.whitted`; its lights are told by the rung."""
+    """Our plugin `comparisons.mitsuba.plugins.whitted`; the rung adds the parameters of lights."""
     return {
         "type": "whitted",
         "max_depth": integrator.max_depth,
@@ -47,4 +47,4 @@ def _(integrator: Whitted) -> dict[str, Any]:
 
 @translate_integrator.register
 def _(integrator: RayCast) -> None:
-    """Everything that ray casting shows is compared ray by ray: the rung of geometry."""
+    """None: the rung of geometry compares ray casting ray by ray."""

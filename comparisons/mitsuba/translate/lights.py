@@ -1,4 +1,4 @@
-"""Lights that are not shapes."""
+"""Lights that are not shapes -> Mitsuba."""
 
 from functools import singledispatch
 from typing import Any
@@ -13,7 +13,7 @@ from reference_rt.lights import Ambient, Constant, Directional, EnvironmentMap, 
 
 @singledispatch
 def translate_light(light: Any, around: Surroundings) -> dict[str, Any] | None:
-    """An emitter's dict; None for what Mitsuba has no place for: see `ambient_of`.
+    """An emitter's dict; None for ambient light, see `ambient_of`.
 
     Raises UntranslatableError, ValueError for a file that cannot be used.
     """
@@ -33,7 +33,7 @@ def _(light: Point, around: Surroundings) -> dict[str, Any]:
 def _(light: Spot, around: Surroundings) -> dict[str, Any]:
     beam = 0.75 * light.cutoff_angle if light.beam_width is None else light.beam_width
     axis = np.subtract(light.target, light.origin)
-    # Any that is not along the axis: the light is the same all round.
+    # Any vector that is not parallel to the axis: the light is rotationally symmetric.
     up = np.eye(3)[int(np.argmin(np.abs(axis)))].tolist()
     return {
         "type": "spot",
@@ -62,7 +62,7 @@ def _(light: Constant, around: Surroundings) -> dict[str, Any]:
 
 @translate_light.register
 def _(light: EnvironmentMap, around: Surroundings) -> dict[str, Any]:
-    """From our own radiance, the scale included."""
+    """From the texels of our table, scale included."""
     table = light.tabulate(around.folder)
     to_world = np.eye(4)
     to_world[:3, :3] = table.to_map.reshape(3, 3).T
@@ -75,10 +75,10 @@ def _(light: EnvironmentMap, around: Surroundings) -> dict[str, Any]:
 
 @translate_light.register
 def _(light: Ambient, around: Surroundings) -> None:
-    """A parameter of our Whitted plugin: nothing else sees it."""
+    """None: only our Whitted plugin has ambient light, as a parameter."""
 
 
 def ambient_of(lights: tuple[Any, ...]) -> list[float]:
-    """The radiance of all ambient lights together."""
+    """The summed radiance (R, G, B) of all ambient lights."""
     found = [light.radiance for light in lights if isinstance(light, Ambient)]
     return [float(x) for x in np.sum(found, axis=0)] if found else [0.0, 0.0, 0.0]

@@ -1,4 +1,4 @@
-"""Materials that scatter by themselves: to BSDFs."""
+"""Materials that are not made of others -> Mitsuba's BSDFs."""
 
 from functools import singledispatch
 from typing import Any
@@ -81,7 +81,7 @@ def _glass(
 
 
 def _indices(material: Any) -> dict[str, Any]:
-    """Always said: Mitsuba's own are those of BK7 glass and of air."""
+    """Always given: Mitsuba's defaults are BK7 glass and air."""
     return {"int_ior": material.interior_ior, "ext_ior": material.exterior_ior}
 
 
@@ -97,7 +97,7 @@ def _rough(
     bsdf = {"type": plugin, "distribution": material.distribution, **alphas, **values}
     if material.distribution == "ggx" or around.native:
         return bsdf
-    # See the plugin for why the normals are not drawn from the visible ones.
+    # The plugin says why visible normals are not sampled.
     return {"type": "exact_beckmann", "nested": {**bsdf, "sample_visible": False}, **alphas}
 
 
@@ -115,7 +115,7 @@ def _(material: RoughPlastic, around: Surroundings) -> dict[str, Any]:
 def _coated(
     plugin: str, material: Plastic | RoughPlastic, around: Surroundings, rough: dict[str, Any]
 ) -> dict[str, Any]:
-    """Mitsuba's own material, and what `exact_coat` needs to put its tables right."""
+    """Mitsuba's own material, wrapped in `exact_coat`, which corrects its tables."""
     base = colour(material.reflectance, around)
     nested = {
         "type": plugin,
@@ -159,7 +159,7 @@ def _(material: Principled, around: Surroundings) -> dict[str, Any]:
 
 @translate_material.register
 def _(material: Phong, around: Surroundings) -> dict[str, Any]:
-    """Our plugin: `comparisons.mitsuba.plugins.phong`."""
+    """Our plugin `comparisons.mitsuba.plugins.phong`."""
     colours = ("ambient", "diffuse", "specular", "mirror")
     return {
         "type": "textbook_phong",

@@ -1,4 +1,4 @@
-"""A scene in its twin's coordinates: every length scaled, every radiance as it was."""
+"""A scene in its counterpart's frame: every length scaled, every radiance unchanged."""
 
 from functools import singledispatch
 from typing import Any
@@ -15,14 +15,14 @@ from reference_rt.rendering.scene import Scene
 
 
 def frame_of(scene: Scene) -> Frame:
-    """The coordinates that the scene's twin is best seen in."""
+    """The frame that suits a scene's counterpart best in float32."""
     sizes, eye = ShapeSizes(scene), np.array(scene.camera.eye)
     return frame_for(np.minimum(sizes.lower, eye), np.maximum(sizes.upper, eye))
 
 
 def moved(scene: Scene, frame: Frame) -> Scene:
-    """The scene as its twin sees it, the same picture: radiance does not depend on size.  The very
-    same scene where the frame is ours."""
+    """The scene in a frame, with the same picture: radiance does not depend on size.  Returns the
+    scene itself if the frame is ours."""
     if frame.is_ours:
         return scene
     x, y, z = frame.center
@@ -51,8 +51,8 @@ def _point(p: Any, frame: Frame) -> tuple[float, ...]:
 
 @singledispatch
 def lengths_of(camera: Any, scale: float) -> dict[str, Any]:
-    """A camera's lengths, scaled, but for those of which only the ratios count."""
-    raise TypeError(f"no lengths are known of a {type(camera).__name__}")
+    """A camera's lengths, scaled, except those of which only the ratio matters."""
+    raise TypeError(f"lengths_of does not support a {type(camera).__name__}")
 
 
 @lengths_of.register(Perspective)
@@ -77,7 +77,7 @@ def _(camera: ThinLens, scale: float) -> dict[str, Any]:
 
 
 def _light(light: Any, frame: Frame) -> Any:
-    """Irradiance falls with the square of a distance, which intensity makes up for."""
+    """A light, moved; intensity grows with scale², as irradiance falls with distance²."""
     if not isinstance(light, Point | Spot):
         return light
     brighter = tuple(x * frame.scale**2 for x in light.intensity)

@@ -1,10 +1,10 @@
-"""Textures, and the parameters of materials that may be any."""
+"""Textures -> Mitsuba, parameters that may be textures, and the `TranslationContext`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import singledispatch
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -18,15 +18,15 @@ from reference_rt.textures import Bitmap, Checker, Texture, VertexColours
 from reference_rt.textures.texture import UvMap
 
 VERTEX_COLOUR, VERTEX_LUMINANCE = "vertex_color", "vertex_luminance"
-"""Names of the attributes of meshes."""
+"""Names of mesh attributes."""
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What materials are translated with: those of the scene and its textures, by name; the folder
-    of its files;  has_colours: whether what wears them is a mesh with colours of its vertices;
-    native: Mitsuba's own materials, also where one written for it would be more exact;  images:
-    Mitsuba's, by texture so far."""
+    """The context of a translation: the scene's materials and textures, by name; the folder of its
+    files;  has_colours: whether the material belongs to a mesh with vertex colours;  native: use
+    Mitsuba's own materials even where our plugins are more exact;  images: cache of Mitsuba's
+    bitmaps."""
 
     materials: Mapping[str, Material]
     textures: Mapping[str, Texture]
@@ -35,28 +35,28 @@ class Surroundings:
     native: bool = False
     images: dict[Any, Any] = field(default_factory=dict)
 
-    @staticmethod
-    def of(scene: Scene, native: bool = False) -> "Surroundings":
-        return Surroundings(scene.materials, scene.textures, scene.folder, native=native)
+    @classmethod
+    def of(cls, scene: Scene, native: bool = False) -> Self:
+        return cls(scene.materials, scene.textures, scene.folder, native=native)
 
 
 def rgb(colour: tuple[float, float, float]) -> dict[str, Any]:
-    """Linear sRGB, which the rgb variants use as it is."""
+    """Linear sRGB, which rgb variants use unchanged."""
     return {"type": "rgb", "value": list(colour)}
 
 
 def colour(value: tuple[float, float, float] | str, around: Surroundings) -> dict[str, Any]:
-    """A colour or the texture of that name.  Raises UntranslatableError, ValueError for a file that
-    cannot be used."""
+    """A colour, or the texture with that name.  Raises UntranslatableError, ValueError for a file
+    that cannot be used."""
     if isinstance(value, str):
         return translate_texture(around.textures[value], value, around, False)
     return rgb(value)
 
 
 def number(value: float | str, around: Surroundings) -> float | dict[str, Any]:
-    """A number or the texture of that name, whose luminance it is.
+    """A number, or the luminance of the texture with that name.
 
-    Mitsuba gets one channel, our luminance: its own weights end after other digits (0.212671 for
+    Mitsuba gets one channel with our luminance: its own weights have other digits (0.212671 for
     0.2126).  Raises as `colour` does.
     """
     if isinstance(value, str):
@@ -76,12 +76,13 @@ def translate_texture(
 def _(texture: Checker, name: str, around: Surroundings, as_number: bool) -> dict[str, Any]:
     first, second = texture.first, texture.second
     if max(*first, *second) > 1.0:
-        # For Mitsuba's checkerboard these are reflectances.  Its image of four texels is the same.
+        # Mitsuba's checkerboard limits its colours to reflectances; an image of four texels is the
+        # same texture.
         rows = np.array([[second, first], [first, second]])
         return _lookup(_image(rows, as_number), "nearest", "repeat", texture.uv)
     places: tuple[Any, Any] = (rgb(first), rgb(second))
     if as_number:
-        # Mitsuba's `eval_1` has the two the other way round than its `eval` (3.9.1).
+        # Mitsuba's `eval_1` swaps the two colours of its `eval` (3.9.1).
         places = (float(luminance(Vec3(*second))), float(luminance(Vec3(*first))))
     return {
         "type": "checkerboard",
@@ -93,7 +94,7 @@ def _(texture: Checker, name: str, around: Surroundings, as_number: bool) -> dic
 
 @translate_texture.register
 def _(texture: Bitmap, name: str, around: Surroundings, as_number: bool) -> dict[str, Any]:
-    """From our own linear texels: decoding files is not what is compared."""
+    """From our own linear texels: the decoding of files is not compared."""
     key = (name, as_number)
     if key not in around.images:
         table = texture.tabulate(around.folder)
@@ -141,5 +142,5 @@ def _to_uv(matrix: FloatArray) -> Any:
 
 
 def depends_on_uv(texture: Texture) -> bool:
-    """Whether it needs a surface's coordinates."""
+    """Whether the texture depends on a surface's uv."""
     return not isinstance(texture, VertexColours)

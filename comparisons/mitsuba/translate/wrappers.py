@@ -1,4 +1,4 @@
-"""Materials made of others, and what a shape of some material carries."""
+"""Materials made of others -> Mitsuba, and the BSDF and emitter of a shape."""
 
 from dataclasses import replace
 from typing import Any
@@ -26,7 +26,7 @@ def _named(name: str, around: Surroundings) -> dict[str, Any]:
 
 @translate_material.register
 def _(material: Emissive, around: Surroundings) -> dict[str, Any]:
-    """What it emits is the shape's emitter: see `parts_of`."""
+    """Only the BSDF: the emission is the shape's emitter, see `parts_of`."""
     if material.base is None:
         return {"type": "diffuse", "reflectance": rgb((0.0, 0.0, 0.0))}
     return _named(material.base, around)
@@ -49,7 +49,7 @@ def _(material: Blend, around: Surroundings) -> dict[str, Any]:
 
 
 def has_delta(material: Material, around: Surroundings) -> bool:
-    """Whether it mirrors or refracts perfectly, or lets light pass."""
+    """Whether a material has a delta lobe: perfect reflection, refraction or transparency."""
     if isinstance(material, Mask):
         return True
     if isinstance(material, Wrapper):
@@ -70,8 +70,7 @@ def _(material: TwoSided, around: Surroundings) -> dict[str, Any]:
     return bsdf
 
 
-# Both maps, in Mitsuba, turn normals that face away to the other side and darken by a shadowing
-# term, unless told not to.
+# By default Mitsuba's bump and normal maps flip normals that face away, and apply a shadowing term.
 _PLAIN = {"flip_invalid_normals": False, "use_shadowing_function": False}
 
 
@@ -82,12 +81,13 @@ def _(material: Bump, around: Surroundings) -> dict[str, Any]:
     if not isinstance(texture, Bitmap) or texture.filter != "bilinear":
         return base  # no slopes
     if any(leaf.oriented for leaf in _leaves(material, around)):
-        # Its frame is made from a local normal and a tangent in the world (src/bsdfs/bumpmap.cpp).
+        # Mitsuba mixes a local normal with a world-space tangent (src/bsdfs/bumpmap.cpp).
         raise UntranslatableError("Bump over a material with a grain", "material")
     height = number(material.height, around)
     m = texture.uv.matrix()
     if (m[1] != 0.0 or m[3] != 0.0) and not _is_square(height):
-        # It multiplies by width and height after turning the gradient (src/textures/bitmap.cpp).
+        # Mitsuba rotates the gradient before it multiplies by width and height
+        # (src/textures/bitmap.cpp).
         raise UntranslatableError("Bump by a turned image that is not square", "material")
     return {"type": "bumpmap", "scale": material.scale, "height": height, "bsdf": base, **_PLAIN}
 
@@ -98,7 +98,7 @@ def _is_square(height: Any) -> bool:
 
 
 def _leaves(material: Material, around: Surroundings) -> list[Material]:
-    """The materials that it is made of in the end."""
+    """The BSDF leaves of a material."""
     if isinstance(material, Wrapper):
         return [leaf for base in _bases(material, around) for leaf in _leaves(base, around)]
     return [material]
@@ -115,7 +115,7 @@ def _(material: NormalMap, around: Surroundings) -> dict[str, Any]:
 
 
 def parts_of(name: str | None, around: Surroundings) -> dict[str, Any]:
-    """What a shape of material `name` carries: "bsdf" and, where it shines, "emitter".
+    """The parts of a shape with material `name`: "bsdf" and, if it is emissive, "emitter".
 
     Raises as `translate_material` does.
     """
@@ -128,14 +128,14 @@ def parts_of(name: str | None, around: Surroundings) -> dict[str, Any]:
 
 
 def coloured_parts_of(name: str | None, around: Surroundings) -> dict[str, Any] | None:
-    """The same for a mesh with colours of its vertices; None where these make no difference."""
+    """The same for a mesh with vertex colours; None if no texture uses them."""
     if not any(isinstance(texture, VertexColours) for texture in around.textures.values()):
         return None
     return parts_of(name, replace(around, has_colours=True))
 
 
 def is_textured(name: str | None, around: Surroundings) -> bool:
-    """Whether the look of material `name` depends on a surface's coordinates."""
+    """Whether material `name` depends on a surface's uv or tangents."""
     if name is None:
         return False
     material = around.materials[name]

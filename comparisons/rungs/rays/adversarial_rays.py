@@ -1,12 +1,12 @@
-"""Rays aimed at what is hard to hit right: edges, corners, silhouettes."""
+"""Rays aimed at edges, corners and silhouettes, where hits are hard to decide."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from comparisons.geometry.float32 import round32
-from comparisons.rungs.rays.bounds import LeafSizes, ShapeSizes
-from comparisons.rungs.rays.rays import Rays, random_rays
+from comparisons.geometry.sizes import LeafSizes, ShapeSizes
+from comparisons.rungs.rays.rays import Rays, joined, random_rays
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators.scene_tables import SceneTables
@@ -14,28 +14,27 @@ from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 
 EXPONENTS = (-7.0, -2.0)
-"""Of ten: how far beside its aim a ray goes, as a fraction of the distance."""
+"""Exponents of ten: how far a ray passes its target, as a fraction of the distance."""
 
 HALVINGS = 26
-"""Of the angle between two rays: what is left is below float32's own step."""
+"""Bisections of the angle between two rays, down to less than a step of float32."""
 
 MOST_SPOTS = 4096
-"""Corners that are aimed at, of a shape; copies that are."""
+"""Most target points of a shape, and most copies of shapes that rays are aimed at."""
 
 
 def aimed_rays(tables: SceneTables, sizes: ShapeSizes, n: int, seed: int) -> Rays:
-    """At most n rays: half at where two rays from one origin, that find different things, part;
-    half at corners and the middles of edges, a third of these exactly."""
+    """At most n rays.  Half pass a boundary between two primitives, found by bisection between two
+    rays of one origin; half pass corners and middles of edges, a third of these exactly."""
     rng = np.random.default_rng([seed, 1])
     spots = _spots(sizes, rng)
     at_spots = n // 2 if len(spots) else 0
-    parts = (_parting(tables, sizes, n - at_spots, rng), _at_spots(sizes, spots, at_spots, rng))
-    o, d = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Rays(o, d)
+    passing = _parting(tables, sizes, n - at_spots, rng)
+    return joined(passing, _at_spots(sizes, spots, at_spots, rng))
 
 
 def _parting(tables: SceneTables, sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
-    """Beside the directions in which what is hit changes, found by halving."""
+    """Rays next to directions in which the primitive that is hit changes, found by bisection."""
     tries = random_rays(sizes, 8 * n, rng)
     # The same origin for four rays, each of which is paired with the next.
     o = np.repeat(tries.o[::4], 4, axis=0)
@@ -56,14 +55,14 @@ def _parting(tables: SceneTables, sizes: ShapeSizes, n: int, rng: np.random.Gene
 
 
 def _identity(hits: Intersections) -> FloatArray:
-    """A number (n,) that is another where another thing is hit."""
+    """A number (n,) that differs wherever the shape, instance, part or primitive differs."""
     columns = np.column_stack([hits.shape, hits.instance, hits.part, hits.primitive])
     weights = np.array([1.0, np.pi, np.e, np.sqrt(2.0)])
     return np.asarray((columns * weights).sum(axis=1))
 
 
 def _beside(d: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Unit directions, turned by 10^U of EXPONENTS radians any way."""
+    """Unit directions, turned by 10^x radians in a random way, x uniform in EXPONENTS."""
     angle = 10.0 ** rng.uniform(*EXPONENTS, (len(d), 1))
     way = rng.normal(size=d.shape)
     way -= np.sum(way * d, axis=1)[:, None] * d

@@ -1,7 +1,8 @@
-"""The arbiter: what our float64 tracer says of rays next to one on which the two disagree.
+"""The arbiter: traces rays next to one on which the two renderers disagree.
 
-Mitsuba answers for a ray somewhere within its error bound of the one asked for.  If ours gives
-Mitsuba's answer there too, the ray is one that the reference cannot resolve: an edge, a silhouette.
+Mitsuba effectively traces a ray somewhere within its error bound of the requested one.  If our
+float64 tracer finds Mitsuba's hit for such a neighbouring ray, float32 cannot resolve the requested
+ray: it passes an edge or a silhouette.
 """
 
 from collections.abc import Callable
@@ -15,32 +16,32 @@ from reference_rt.core.arrays import FloatArray, IntArray
 BoolArray = npt.NDArray[np.bool_]
 
 NEIGHBOURS = 48
-"""Moved rays for each radius.  So many points on a sphere leave no cap empty that is higher than a
-twelfth of the radius: an edge that cuts off more than that has a moved ray beyond it."""
+"""Moved rays for each radius.  So many points leave no cap of the sphere empty that is higher than
+a twelfth of the radius: some moved ray lies beyond every edge that cuts off more than that."""
 
 MOST = 20_000
-"""Rays that are arbitrated; the rest count as they are, against agreement."""
+"""Most rays that are arbitrated; the rest count as differing."""
 
 RADII = (1.0, 0.5)
 
 SEARCHES = ((MOST, NEIGHBOURS, RADII), (500, 400, (1.0, 0.5, 0.2)))
-"""(at most so many rays, moves, radii): first as said, then finer for the few that are left, which
+"""(most rays, moves, radii) of each search: then a finer one for the few rays that are left, which
 pass through a corner, or a face seen edge-on."""
 
 LIMIT = 0.01
-"""The fraction of rays that may need the arbiter.  Edges and silhouettes, a float32 bound wide,
-take 1e-4 of a picture or less; past a hundredth the reference's precision is what is compared."""
+"""Largest fraction of rays that may need the arbiter.  Edges and silhouettes, a float32 bound wide,
+take 1e-4 of a picture or less; beyond 1 % the comparison measures Mitsuba's precision."""
 
 SURE = 1e-4
-"""The chance at which a fraction of rays is said to be beyond a limit that it does not exceed."""
+"""Chance of reporting, falsely, that a fraction of rays exceeds its limit."""
 
 AT_ONCE = 2000
-"""Moved rays that are asked for together, where fewer rays than these are left."""
+"""Moved rays that are traced in one call, when fewer rays than these are left."""
 
 
 def too_many(count: int, total: int, limit: float = LIMIT) -> bool:
-    """Whether `count` of `total` rays prove that more than the fraction `limit` are such: of few
-    rays one may be one too many by chance (binomial test)."""
+    """Whether `count` of `total` rays prove a fraction above `limit` (binomial test): of few rays
+    one may be too many by chance."""
     return bool(stats.binom.sf(count - 1, total, limit) < SURE)
 
 
@@ -56,9 +57,9 @@ def directions(n: int) -> FloatArray:
 def explained(
     rays: IntArray, radius: FloatArray, like_theirs: Callable[[IntArray, FloatArray], BoolArray]
 ) -> BoolArray:
-    """Which of `rays` (m,), numbers of rays, a move by up to `radius` (m,) explains.
+    """Which of the rays with the indices `rays` (m,) a move by up to `radius` (m,) explains.
 
-    `like_theirs(rays, offsets)` traces the rays (k,) moved by offsets (k, 3) and tells which now
+    `like_theirs(rays, offsets)` traces the rays (k,) moved by offsets (k, 3) and returns which now
     agree with Mitsuba.  False for all beyond the first MOST.
     """
     found = np.zeros(len(rays), bool)
@@ -84,10 +85,10 @@ def values_around(
     turn: float,
     value: Callable[[FloatArray, FloatArray], FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """The least and the greatest, (m, 3), of `value(origins, directions)` around m rays.
+    """The least and the greatest `value(origins, directions)`, (m, 3) each, next to m rays.
 
-    Origins move by up to `radius` (m,); unit directions turn by `turn`, the opposite way round the
-    sphere, or stay.  All moves of all rays are asked for at once.
+    Origins move by up to `radius` (m,); unit directions stay, or turn by `turn` radians, on the
+    opposite side of the sphere.  All moves of all rays are evaluated in one call.
     """
     moves = directions(NEIGHBOURS)
     ways = np.roll(moves, NEIGHBOURS // 2, axis=0)

@@ -1,13 +1,8 @@
-"""The error bounds of every rung.
-
-All follow from one length, `delta`: how far a surface that Mitsuba sees, in float32, may lie from
-where it is, as seen along a ray from `o` to `p`.
-"""
+"""The error bound of a hit point, which the bounds of all rungs follow from."""
 
 import numpy as np
 
-from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF, largest, round32
-from comparisons.geometry.sizes import LeafSizes, ShapeSizes
+from comparisons.geometry.sizes import ShapeSizes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.query import Intersections
 
@@ -19,20 +14,10 @@ def slide(
     hits: Intersections,
     sag: FloatArray | float = 0.0,
 ) -> FloatArray:
-    """(n,): how far the point that a ray finds may slide: delta, and how far the surface is from
-    the one it stands for, over the ray's cosine to n."""
+    """(n,): how far a hit may slide along its ray and its surface: `Frame.delta`, the distance by
+    which float32 moves the surface, plus `sag`, the error of a mesh that stands in for it, over
+    the ray's cosine to n."""
     cosine = np.abs(np.sum(d * hits.n, axis=1)) / np.linalg.norm(d, axis=1)
     with np.errstate(divide="ignore"):
         size = sizes.frame.delta(o, hits.p, sizes.reach_of(hits.shape)) + sag
         return np.asarray(size / cosine)
-
-
-__all__ = [
-    "ROUNDINGS",
-    "UNIT_ROUNDOFF",
-    "LeafSizes",
-    "ShapeSizes",
-    "largest",
-    "round32",
-    "slide",
-]

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Twin
 from comparisons.mitsuba.scene import for_rays
-from comparisons.rungs.rays.bounds import ROUNDINGS, UNIT_ROUNDOFF
 from reference_rt.cameras import LENS_CENTRE, ThinLens
 from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray
@@ -18,14 +18,14 @@ from reference_rt.rendering.scene import Scene
 
 @dataclass(frozen=True)
 class CameraComparison:
-    """What was measured, and one line on what is wrong, empty where nothing is."""
+    """The measured errors, and the problem in one line, empty if there is none."""
 
     numbers: dict[str, Any]
     problem: str
 
 
 def pixel_centres(film: Film, most: int) -> tuple[FloatArray, FloatArray]:
-    """x, y (n,) in pixels of the centres of at most `most` pixels, every k-th of each row and
+    """x, y (n,) in pixels: the centres of at most `most` pixels, every k-th of each row and
     column."""
     step = 1
     while -(-film.width // step) * -(-film.height // step) > most:
@@ -39,24 +39,24 @@ def pixel_centres(film: Film, most: int) -> tuple[FloatArray, FloatArray]:
 def camera_rays(
     scene: Scene, x: FloatArray, y: FloatArray, lens: Sequence[float] = LENS_CENTRE
 ) -> tuple[FloatArray, FloatArray]:
-    """Our camera's origins and unit directions (n, 3) of film points in pixels, through one point
-    of its lens: the centre, as deterministic integrators have it, or that of the sample `lens`."""
+    """Our camera's origins and unit directions (n, 3) for film points in pixels, through one point
+    of its lens: by default the centre, which deterministic integrators use."""
     return scene.camera_rays(np.column_stack([x, y]) - 0.5, lens=lens)
 
 
 LENS_SAMPLES = (LENS_CENTRE, (0.9, 0.6), (0.2, 0.3), (0.55, 0.99), (0.4, 0.02))
-"""Points of a lens that rays are compared through: the middle and one in each triangle of the
-map from square to disk."""
+"""Lens samples of the compared rays: the centre, and one in each triangle of the map from square to
+disk."""
 
 
 def sensor_rays(
     mi_scene: Any, x: FloatArray, y: FloatArray, lens: Sequence[float]
 ) -> tuple[FloatArray, FloatArray]:
-    """The same rays of Mitsuba's sensor; origins lie on the near plane."""
+    """The same rays from Mitsuba's sensor; their origins lie on the near plane."""
     mi = mitsuba()
     sensor = mi_scene.sensors()[0]
     width, height = (int(s) for s in sensor.film().crop_size())
-    # Its x is to the left on the lens too; the map from square to disk keeps mirror images.
+    # Mitsuba's x points left on the lens too, and the map from square to disk is symmetric.
     aperture = mi.Point2f(1.0 - lens[0], lens[1])
 
     def ray(u: Any, v: Any) -> tuple[Any, ...]:
@@ -68,11 +68,12 @@ def sensor_rays(
 
 
 def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
-    """Directions, and how far Mitsuba's origins lie off our rays, at pixel centres, for a lens
-    through several of its points.
+    """Compare ray directions, and the distances of Mitsuba's origins from our rays, at pixel
+    centres; for a lens through several of its points.
 
-    Bounds: a direction passes matrices whose entries reach the tan of the largest angle to the
-    axis, an origin one whose entries reach the eye's coordinates and half the picture's width.
+    Bounds: a direction is rounded in matrices whose entries reach the tangent of the largest angle
+    to the axis, an origin in one whose entries reach the eye's coordinates and half the picture's
+    width.
     """
     camera, film = scene.camera, scene.film
     x, y = pixel_centres(film, most)
@@ -81,9 +82,9 @@ def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
     their_o, their_d = _stacked(sensor_rays(twin, x, y, lens) for lens in samples)
     their_o = twin.frame.out(their_o)
     forward = -camera.basis[2]
-    # Before it is made unit a direction is 1 long along the axis and tan across: rounded numbers as
-    # large as in the picture's farthest corner, 1 / cos there, and then shortened by its own
-    # cosine. A lens takes the point on it, over the focus distance, from that.
+    # Before normalisation a direction is 1 along the axis and tan(angle) across: its rounding
+    # errors are as large as in the picture's farthest corner, 1 / cos there, and are then scaled by
+    # its own cosine.  A lens subtracts the lens point over the focus distance.
     corners = np.array([[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]])
     _, rim = camera_rays(scene, corners[0] * film.width, corners[1] * film.height)
     steepest = 1.0 / (rim @ forward).min()
@@ -91,11 +92,11 @@ def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
         steepest += camera.aperture_radius / camera.focus
     direction = np.linalg.norm(their_d - d, axis=1)
     direction_bound = ROUNDINGS * UNIT_ROUNDOFF * (1.0 + (d @ forward) * steepest)
-    apart = their_o - o
-    off_line = np.linalg.norm(apart - np.sum(apart * d, axis=1)[:, None] * d, axis=1)
+    shift = their_o - o
+    off_line = np.linalg.norm(shift - np.sum(shift * d, axis=1)[:, None] * d, axis=1)
     eye = np.array([camera.eye], dtype=np.float64)
     # Mitsuba's origin lies on the near plane, along its own direction.
-    near = np.linalg.norm(apart, axis=1) * direction_bound
+    near = np.linalg.norm(shift, axis=1) * direction_bound
     origin_bound = twin.frame.delta(o, eye, np.zeros(1)).max() + near
     numbers = {
         "max_camera_direction_error": float(direction.max()),
@@ -108,7 +109,7 @@ def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
     k = int(np.argmax(wrong))
     at = k % len(x)
     problem = (
-        f"the camera: {np.count_nonzero(wrong)} of {len(o)} rays differ; the first at film point "
+        f"the camera: {np.count_nonzero(wrong)} of {len(o)} rays differ; the first, at film point "
         f"({x[at]:g}, {y[at]:g}): ours from {o[k]} along {d[k]}, Mitsuba's from {their_o[k]} along "
         f"{their_d[k]}"
     )

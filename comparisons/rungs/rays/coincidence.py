@@ -1,4 +1,4 @@
-"""Rays that meet two surfaces in one place, of which each tracer takes its own."""
+"""Rays that hit coincident surfaces, of which each tracer may report either."""
 
 from typing import Any
 
@@ -17,29 +17,28 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 
 COINCIDENCES = 8
-"""Shapes that are looked behind: each costs building the tables again."""
+"""Most shapes that are moved away to trace what lies behind: each needs new tables."""
 
 
 def coincident(
-    scene: Scene, twin: Twin, comparer: Comparer, answered: Any, numbers: IntArray
+    scene: Scene, twin: Twin, comparer: Comparer, traced: Any, numbers: IntArray
 ) -> BoolArray:
-    """Which of the rays `numbers` (m,) meet two surfaces in one place, of which ours found one,
-    Mitsuba the other.
+    """Which of the rays with the indices `numbers` (m,) hit two coincident surfaces, of which we
+    report one and Mitsuba the other.
 
-    Two operands of a solid: where the solid's twin has our answer if it passes crossings at once
-    that float32 cannot tell apart, or none at once; or where t and the normals agree, as those of
-    the solid do whichever is taken.  Two shapes: where ours gives Mitsuba's answer once its own
-    shape is far away, at the same t.
+    Two operands of a solid: t and the normals agree, or Mitsuba's solid has our hit with another
+    tolerance for merging crossings that float32 cannot separate.  Two shapes: with our shape moved
+    far away, our tracer has Mitsuba's hit at the same t.
     """
     found = np.zeros(len(numbers), bool)
     if len(numbers) == 0:
         return found
-    rays, ours, theirs = answered.rays, answered.ours, answered.theirs
+    rays, ours, theirs = traced.rays, traced.ours, traced.theirs
     if twin.solids:
         for tolerance in (None, 0.0, 1.0):
             rest = np.flatnonzero(~found)
             k = numbers[rest]
-            some, mine = Rays(rays.o[k], rays.d[k]), rows_of(ours, k)
+            some, mine = rays.rows(k), rows_of(ours, k)
             again = rows_of(theirs, k)
             if tolerance is not None:
                 again = trace(twin, some.o, some.d, tolerance)
@@ -49,7 +48,7 @@ def coincident(
     for shape in np.unique(left[left >= 0])[:COINCIDENCES].tolist():
         rest = np.flatnonzero(~found & (ours.shape[numbers] == shape))
         k = numbers[rest]
-        some = Rays(rays.o[k], rays.d[k])
+        some = rays.rows(k)
         others = build_tables(_without(scene, shape, float(comparer.sizes.reach.max())))
         behind = query.intersect(others, some.o, some.d)
         agrees = (comparer.ratios(some, behind, rows_of(theirs, k)) <= 1.0).all(axis=1)
@@ -59,22 +58,22 @@ def coincident(
     return found
 
 
-def in_one_place(comparer: Comparer, answered: Any, numbers: IntArray) -> BoolArray:
-    """Which of the rays `numbers` (m,) meet two surfaces that touch along their whole: at the same
+def in_one_place(comparer: Comparer, traced: Any, numbers: IntArray) -> BoolArray:
+    """Which of the rays with the indices `numbers` (m,) hit two surfaces that coincide: at the same
     t, with the same normal or the opposite one."""
-    ours, theirs = rows_of(answered.ours, numbers), rows_of(answered.theirs, numbers)
-    rays = Rays(answered.rays.o[numbers], answered.rays.d[numbers])
+    ours, theirs = rows_of(traced.ours, numbers), rows_of(traced.theirs, numbers)
+    rays = traced.rays.rows(numbers)
     e = slide(comparer.sizes, rays.o, rays.d, ours, theirs.sag)
     length = np.linalg.norm(rays.d, axis=1)
     with np.errstate(invalid="ignore"):
         near = np.abs(theirs.t - ours.t) * length <= e
     parallel = np.abs(np.sum(ours.n * theirs.n, axis=1)) >= 1.0 - 1e-6
-    other = (answered.ratios[numbers, :DISCRETE] > 1.0).any(axis=1)
+    other = (traced.ratios[numbers, :DISCRETE] > 1.0).any(axis=1)
     return np.asarray(near & parallel & other & (ours.shape >= 0) & (theirs.shape >= 0))
 
 
 def _as_one_part(twin: Twin, rays: Rays, ours: Intersections, theirs: Answers) -> None:
-    """Puts the operand that ours found in place of Mitsuba's, where Mitsuba meets that too."""
+    """Replace Mitsuba's operand by ours where Mitsuba crosses our operand at the same t too."""
     for solid in twin.solids:
         shape, instance = solid.place
         rows = (theirs.shape == shape) & (theirs.instance == instance)
@@ -91,7 +90,7 @@ def _as_one_part(twin: Twin, rays: Rays, ours: Intersections, theirs: Answers) -
 
 
 def _without(scene: Scene, index: int, reach: float) -> Scene:
-    """The scene with one shape far away.  Left out, it would make kernels compile again."""
+    """The scene with one shape moved far away: removing it would compile the kernels again."""
     far = 1e6 * max(reach, 1.0)
     shapes = list(scene.shapes)
     steps = (*shapes[index].transform, Translate(translate=(far, far, far)))

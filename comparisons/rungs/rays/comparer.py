@@ -1,9 +1,10 @@
-"""One answer against the other: errors over their bounds."""
+"""Our hits against Mitsuba's: errors over their bounds."""
 
 import numpy as np
 
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.hits import Answers
-from comparisons.rungs.rays.bounds import ShapeSizes, slide
+from comparisons.rungs.rays.bounds import slide
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.query import Intersections
@@ -21,28 +22,28 @@ KINDS = (
     "uv",
 )
 DISCRETE = 5
-"""Of these, how many say which thing was hit: another one is an infinite error."""
+"""The first so many of KINDS identify the primitive: a different one is an infinite error."""
 
 
 class Comparer:
-    """Errors of Mitsuba's answers over their bounds."""
+    """Errors of Mitsuba's hits over their bounds, in one scene."""
 
     def __init__(self, sizes: ShapeSizes) -> None:
         self.sizes = sizes
         shapes = [leaf.shape for leaf in sizes.leaves]
-        # A hit without a leaf has number -1: the last of these.
+        # A miss has leaf -1: the last entry.
         shapes_and_none = [*shapes, None]
         self._round = np.array([isinstance(s, Sphere) for s in shapes_and_none])
         self._disk = np.array([isinstance(s, Disk) for s in shapes_and_none])
         self._tube = np.array([isinstance(s, Cylinder | Cone) for s in shapes_and_none])
 
     def ratios(self, rays: Rays, ours: Intersections, theirs: Answers) -> FloatArray:
-        """(n, len(KINDS)): error over bound, infinite for another hit, shape, part or face.
+        """(n, len(KINDS)): error over bound, infinite for a different shape, part or face.
 
-        With e = (delta + sag) / cos, how far the point may slide along the surface: |t| may be off
-        by e, uv and normals by e over the smallest length on which they change, shading normals,
-        which turn by up to two unit vectors on that length, by twice that.  Of a mesh that stands
-        in for a curved surface the shading normal is taken for both.
+        e = (delta + sag) / cos is how far the point may slide along the surface.  The bound of t is
+        e; of uv and normals e over the smallest length on which they change; of shading normals
+        twice that, as they turn by up to two unit vectors on that length.  Where a mesh stands in
+        for a curved surface, its shading normal is used as the geometric one too.
         """
         hit = (ours.shape >= 0) & (theirs.shape >= 0)
         different = [(ours.shape >= 0) != (theirs.shape >= 0)]
@@ -64,15 +65,15 @@ class Comparer:
             )
         error_uv[~theirs.has_uv] = 0.0
         errors = np.column_stack([error_t, error_n, error_ns, error_uv])
-        errors[~same] = 0.0  # of another surface they mean nothing
-        # A NaN is never within a bound.
+        errors[~same] = 0.0  # meaningless on a different surface
+        # A NaN counts as an infinite error.
         return np.hstack(
             [np.where(np.column_stack(different), np.inf, 0.0), np.nan_to_num(errors, nan=np.inf)]
         )
 
     def _spot(self, hits: Intersections, ours: Intersections) -> FloatArray:
-        """uv as coordinates (n, 3) without seam or pole: a sphere's as a unit vector, a disk's as x
-        and y, those of a tube around its axis."""
+        """uv as coordinates (n, 3) without seam or pole: of a sphere a unit vector, of a disk x and
+        y, of a cylinder or cone a point of the unit circle and v."""
         leaf = self.sizes.leaf_of(ours)
         u, v = hits.uv.T
         on_sphere = np.column_stack([_circle(u, np.sin(np.pi * v)), np.cos(np.pi * v)])

@@ -1,4 +1,4 @@
-"""Whose fault a mismatch is: exact arithmetic decides."""
+"""Which tracer's hit is wrong where they differ: exact arithmetic decides."""
 
 from typing import NamedTuple
 
@@ -11,22 +11,22 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.rendering.query import Intersections
 
 MOST_JUDGED = 400
-"""Mismatches that are judged: some 10 ms each."""
+"""Most mismatches that are judged: each takes about 10 ms."""
 
 FEW = 1e-4
-"""The fraction of rays, not aimed at edges, that Mitsuba may get wrong by itself.  More is no
-matter of rounding: its scene is another."""
+"""Largest fraction of rays, not aimed at edges, that Mitsuba may get wrong by rounding.  More means
+that its scene is a different one."""
 
 SHARE = 1e-6
-"""How far, as a fraction of the distance and over the cosine, our t may be from the exact one where
-only the question is which surface it belongs to: a thousandth of what float32 could tell."""
+"""Tolerance of Mitsuba's t, as a fraction of the distance and over the cosine: the question is only
+which surface was hit.  A thousandth of it is the tolerance of our t (`_slack`)."""
 
 
 class Judgement(NamedTuple):
-    """Rays on which the two disagree: whose answer is not the exact one (numbers of rays).
+    """Indices of the rays on which the tracers disagree, by whose hit is wrong.
 
-    ours: ours, whatever Mitsuba's is;  mitsuba: Mitsuba's alone;  undecided: neither, as what
-    differs is not which surface is met where, or all that do not fit MOST_JUDGED.
+    ours: our hit is wrong;  mitsuba: only Mitsuba's is;  undecided: both surfaces and t are right
+    (the difference is elsewhere), the ray touches an edge exactly, or it is beyond MOST_JUDGED.
     """
 
     ours: IntArray
@@ -37,7 +37,7 @@ class Judgement(NamedTuple):
 def judged(
     referee: Referee, rays: Rays, ours: Intersections, theirs: Answers, mismatches: IntArray
 ) -> Judgement:
-    """Decides on mismatches, in their order."""
+    """Judge the rays with the indices `mismatches`, in their order."""
     some = mismatches[:MOST_JUDGED]
     truths = referee.decide(rays.o[some], rays.d[some]) if len(some) else []
     verdicts = []

@@ -1,4 +1,4 @@
-"""Mitsuba's side of direct light: its value, and where its epsilons make it dark."""
+"""Direct light in Mitsuba: its value, and where its shadow-ray epsilons make it dark."""
 
 from typing import Any
 
@@ -9,8 +9,8 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.whitted import emitted, without
 from comparisons.mitsuba.scene import for_rays, light_id
 from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of, number_of
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.setting import POINT_LIKE, Setting, kind_of, number_of
 from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import DIRECTIONAL, ENVIRONMENT
 from reference_rt.rendering import query
@@ -18,13 +18,14 @@ from reference_rt.rendering.query import Intersections
 
 
 def mitsuba_direct(
-    setting: Setting, light: int, rays: Rays, target: FloatArray
+    context: LightContext, light: int, rays: Rays, target: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """f cos L (n, 3) and the cosine at the surface (n,): Mitsuba's hit, BSDF, visibility, light."""
+    """f cos L (n, 3) and the cosine at the surface (n,), by Mitsuba's own hit, BSDF, visibility and
+    emitter."""
     import drjit as dr
 
-    mi, scene, kind = mitsuba(), setting.twin.mi_scene, kind_of(setting, light)
-    emitter = _point_emitter(setting, light) if kind in POINT_LIKE else None
+    mi, scene, kind = mitsuba(), context.twin.mi_scene, kind_of(context, light)
+    emitter = _point_emitter(context, light) if kind in POINT_LIKE else None
     is_far = kind in (ENVIRONMENT, DIRECTIONAL)
 
     def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
@@ -40,45 +41,45 @@ def mitsuba_direct(
             wi = sample.d
         else:
             ray.maxt = dr.inf
-            # Behind the shadow test's end there must be the light itself, its front towards us.
+            # The first hit along the unshortened shadow ray must be the front of the light itself.
             found = scene.ray_intersect(ray, visible)
             radiance = emitted(mi, scene, found, visible)
         local = si.to_local(wi)
         f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
         return dr.select(visible, f_cos * radiance, 0.0), local.z
 
-    frame = setting.twin.frame
+    frame = context.twin.frame
     there = target if is_far else frame.into(target)
     contribution, cosine = for_rays(value, frame.into(rays.o), rays.d, there)
     return contribution, cosine
 
 
-def _point_emitter(setting: Setting, light: int) -> Any:
-    """Mitsuba's emitter of such a light."""
-    wanted = light_id(number_of(setting, light))
-    for emitter in setting.twin.mi_scene.emitters():
+def _point_emitter(context: LightContext, light: int) -> Any:
+    """Mitsuba's emitter of a point, spot or directional light."""
+    wanted = light_id(number_of(context, light))
+    for emitter in context.twin.mi_scene.emitters():
         if emitter.id() == wanted:
             return emitter
     raise LookupError(f"Mitsuba's scene has no emitter {wanted}")
 
 
 def is_dark(
-    setting: Setting, light: int, hits: Intersections, target: FloatArray, offsets: FloatArray
+    context: LightContext, light: int, hits: Intersections, target: FloatArray, offsets: FloatArray
 ) -> arbiter.BoolArray:
-    """Whether ours finds Mitsuba's shadow ray dark: begun and ended as Mitsuba does it."""
-    kind = kind_of(setting, light)
+    """(n,): whether Mitsuba's shadow ray, shortened by its epsilons, is blocked in our tracer."""
+    kind = kind_of(context, light)
     is_far = kind in (ENVIRONMENT, DIRECTIONAL)
     w = target if is_far else target - hits.p
     side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
-    height = side * setting.twin.frame.epsilon(hits.p)
+    height = side * context.twin.frame.epsilon(hits.p)
     o = hits.p + hits.n * height[:, None] + offsets
     if is_far:
-        return query.occluded(setting.tables, o, w)
+        return query.occluded(context.tables, o, w)
     if kind in POINT_LIKE:
-        return query.occluded(setting.tables, o, target - o, 1.0 - SHADOW_EPSILON)
-    # Seen from the moved origin a light may turn its back, or its rim be missed; float32 holds the
-    # point on it no better than the origin, so that a light smaller than that is passed by.
-    met = query.intersect(setting.tables, o, target - offsets - o)
+        return query.occluded(context.tables, o, target - o, 1.0 - SHADOW_EPSILON)
+    # From the moved origin the ray may see the light's back, or miss its rim; float32 moves the
+    # point on the light as much as the origin, so that the ray may miss a smaller light.
+    met = query.intersect(context.tables, o, target - offsets - o)
     facing = np.sum(met.n * (target - o), axis=1) < 0.0
     passed_by = met.t > 1.0 + SHADOW_EPSILON
     return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | passed_by | ~facing)

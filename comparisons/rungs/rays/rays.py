@@ -1,4 +1,4 @@
-"""The rays that the rungs compare: of the camera, at random, from what was hit."""
+"""The rays that the rungs compare: camera rays, random rays, and rays from hits."""
 
 from typing import NamedTuple
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from comparisons.geometry.float32 import round32
 from comparisons.geometry.frame import Frame
-from comparisons.rungs.rays.bounds import ShapeSizes
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.rungs.rays.camera import camera_rays, pixel_centres
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
@@ -20,41 +20,48 @@ class Rays(NamedTuple):
     o: FloatArray
     d: FloatArray
 
+    def rows(self, rows: IntArray) -> "Rays":
+        """The rays of some rows."""
+        return Rays(self.o[rows], self.d[rows])
+
+
+def joined(*parts: Rays) -> Rays:
+    """The rays of all parts, in order."""
+    return Rays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
 
 def pixel_rays(scene: Scene, frame: Frame, most: int) -> Rays:
-    """Camera rays through at most `most` pixel centres, as float32 holds them there."""
+    """Camera rays through at most `most` pixel centres, rounded to float32 in the frame."""
     o, d = camera_rays(scene, *pixel_centres(scene.film, most))
     return Rays(frame.rounded(o), round32(d))
 
 
 def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, seed: int) -> Rays:
-    """3 `most` rays: at most `most` of the camera, `most` in random directions from what these and
-    others hit, and for the rest random ones through the scene's bounds."""
+    """3 `most` rays: at most `most` camera rays, at most `most` in random directions from the hits
+    of these and others, and for the rest random rays through the scene's bounds."""
     camera = pixel_rays(scene, sizes.frame, most)
     if len(scene.shapes) == 0:
         return camera
     rng = np.random.default_rng(seed)
     through = random_rays(sizes, 3 * most - len(camera.o), rng)
-    first = Rays(*(np.concatenate(pair) for pair in zip(camera, through, strict=True)))
+    first = joined(camera, through)
     hits = query.intersect(tables, first.o, first.d)
     hit = np.flatnonzero(hits.shape >= 0)[:most]
     out = rng.normal(size=(len(hit), 3))
     out /= np.linalg.norm(out, axis=1)[:, None]
-    # Off the surface as far as Mitsuba's own rays: an origin within float32's error of a surface
-    # would be on no defined side of it.
+    # Offset from the surface by Mitsuba's own epsilon: an origin within float32's error of a
+    # surface would be on no defined side of it.
     side = np.sign(np.sum(out * hits.n[hit], axis=1))
     height = side * sizes.frame.epsilon(hits.p[hit])
     start = hits.p[hit] + hits.n[hit] * height[:, None]
     from_hits = Rays(sizes.frame.rounded(start), round32(out))
     rest = 3 * most - len(camera.o) - len(hit)
-    parts = (camera, Rays(through.o[:rest], through.d[:rest]), from_hits)
-    o, d = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Rays(o, d)
+    return joined(camera, Rays(through.o[:rest], through.d[:rest]), from_hits)
 
 
 def random_rays(sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
-    """From a point in the scene's bounds, or beside, towards another."""
-    margin = 0.1 * (sizes.upper - sizes.lower)  # so that some begin outside
+    """n rays from a random point in the scene's bounds, grown by a tenth, towards another."""
+    margin = 0.1 * (sizes.upper - sizes.lower)  # some start outside
     start, end = rng.uniform(sizes.lower - margin, sizes.upper + margin, (2, n, 3))
     d = end - start
     length = np.linalg.norm(d, axis=1)[:, None]

@@ -1,11 +1,12 @@
-"""What Mitsuba cannot resolve of a scene: foretold from its precision, and found.
+"""How many secondary rays hit the wrong surface in Mitsuba: predicted from its precision, and
+measured.
 
-A ray that leaves a surface at p begins h = (1 + max |p|) RAY_EPSILON off it, and float32 may put
-the surface e = `Frame.delta` to either side.  Between h - e and h + e anything may be where it
-begins: gaps and features thinner than that are jumped over, and where e exceeds h the ray begins
-behind its own surface and meets it again.  Our own tracer, begun there, foretells which departures
-meet something else than they should, or two surfaces in one place; Mitsuba's, begun as Mitsuba
-does, tells which do.
+Mitsuba starts a ray that leaves a surface at p at the height h = (1 + max |p|) RAY_EPSILON above
+it, and float32 may move the surface by e = `Frame.delta` to either side.  So the ray starts
+anywhere between h - e and h + e: it skips thinner gaps and features, and if e exceeds h it may
+start behind its own surface and hit it again.  Prediction: our own tracer, started at these
+heights, hits another surface than from the exact point, or two that coincide.  Measurement:
+Mitsuba's tracer, started as Mitsuba does, hits another surface.
 """
 
 from typing import NamedTuple
@@ -27,22 +28,25 @@ from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 
 RAYS = 2000
-"""A third of the rays whose hits are left again."""
+"""A third of the rays whose hits are the starting points."""
 
 STRAIGHT_ON = 4
-"""Surfaces that are looked through, where they are clear, for more hits to leave."""
+"""Most transparent surfaces that rays are followed through straight, for more starting points."""
 
 STEEPEST = 64.0
-"""Of one over the cosine under which what is met next is met, beside where it should be."""
+"""Cap of one over the cosine: how far the next hit may slide along its surface."""
 
 MOST_LIGHTS = 4
-"""Points and directions of light that every hit is left towards."""
+"""Most point, spot and directional lights that rays are sent towards from every hit."""
 
 
 class Resolution(NamedTuple):
-    """Of `hits` that were left: how many Mitsuba is foretold not to resolve, how many it did not,
-    and how many of the latter were not foretold;  epsilon, rounding: the medians of h and e, of
-    those foretold where there are any."""
+    """Counts of starting points.
+
+    hits: all;  foretold: those with a predicted wrong hit;  found: with a measured one;  missed:
+    measured but not predicted;  epsilon, rounding: the medians of h and e, of the predicted points
+    if there are any.
+    """
 
     hits: int
     foretold: int
@@ -53,30 +57,31 @@ class Resolution(NamedTuple):
 
     @property
     def is_limited(self) -> bool:
-        """Whether so many hits are foretold and found to be unresolved that what is seen from
-        surfaces is the reference's precision, not the scene."""
+        """Whether, by prediction and by measurement, too many points are unresolved: secondary rays
+        then show Mitsuba's precision instead of the scene."""
         return all(arbiter.too_many(count, self.hits) for count in (self.foretold, self.found))
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         return (
-            f"of {self.hits} hits {self.foretold} are foretold to be left for something else than "
-            f"what is there, {self.found} are: rays begin {self.epsilon:.2g} off surfaces, which "
-            f"float32 knows to {self.rounding:.2g}"
+            f"beyond Mitsuba's precision: rays that leave a surface hit a wrong one from "
+            f"{self.foretold} of {self.hits} points by prediction, and from {self.found} as "
+            f"measured; Mitsuba starts them {self.epsilon:.2g} off a surface whose position "
+            f"float32 resolves to {self.rounding:.2g}"
         )
 
 
 def resolution(scene: Scene, tables: SceneTables, twin: Twin, seed: int = 0) -> Resolution:
-    """Leaves what camera, random and secondary rays hit, and what stands behind clear surfaces:
-    towards lights, at random, and through glass."""
+    """Trace rays from the hits of camera, random and secondary rays, and from those behind
+    transparent surfaces: towards lights, at random, and straight through glass."""
     sizes = ShapeSizes(scene, twin.frame)
     rays = mixed_rays(scene, tables, sizes, RAYS, seed)
     d = rays.d
     ours, theirs = query.intersect(tables, rays.o, d), trace(twin, rays.o, d)
-    # Hits in other places, as of rays that begin behind what they should meet, are left from there.
+    # Only hits on which the tracers agree are starting points.
     slack = STEEPEST * twin.frame.delta(rays.o, ours.p, sizes.reach_of(ours.shape))
     same = np.flatnonzero((ours.shape >= 0) & ~_differs(ours, theirs, slack))
-    leavings = [_left_behind(tables, twin, sizes, Rays(rays.o[same], d[same]),
+    leavings = [_left_behind(tables, twin, sizes, rays.rows(same),
                              rows_of(ours, same), rows_of(theirs, same), seed, scene)]  # fmt: skip
     hits, d = rows_of(ours, same), d[same]
     for _ in range(STRAIGHT_ON):
@@ -107,8 +112,8 @@ def _left_behind(
     seed: int,
     scene: Scene,
 ) -> tuple[BoolArray, BoolArray, BoolArray, FloatArray, FloatArray]:
-    """For each hit: whether it is foretold to be left wrongly, whether it is, and was not foretold;
-    h and e."""
+    """For each hit (n,): whether a wrong next hit is predicted, measured, and measured but not
+    predicted;  h and e."""
     frame, count = sizes.frame, len(ours.t)
     height = frame.epsilon(ours.p)
     rounding = frame.delta(rays.o, ours.p, sizes.reach_of(ours.shape))
@@ -122,7 +127,7 @@ def _left_behind(
         e = frame.delta(hits.p, right.p, sizes.reach_of(right.shape))
         slack = STEEPEST * ((height + rounding)[leaves] + e)
         expected = _doubled(tables, sizes, right, w, e)
-        # What is met next may be put behind the ray's origin.
+        # float32 may move the next surface behind the ray's origin.
         there_is = right.shape >= 0
         height_there = np.where(there_is, right.t, 0.0) * np.abs(np.sum(right.n * w, axis=1))
         expected |= there_is & (height_there <= e)
@@ -140,8 +145,8 @@ def _left_behind(
 def _doubled(
     tables: SceneTables, sizes: ShapeSizes, right: Intersections, w: FloatArray, e: FloatArray
 ) -> BoolArray:
-    """(n,): whether rays along w meet two surfaces that float32 cannot tell apart: 2 e or less from
-    each other, seen along the normal."""
+    """(n,): whether rays along w hit two surfaces that float32 cannot separate: at most 2 e apart
+    along the normal."""
     met = np.flatnonzero(right.shape >= 0)
     found = np.zeros(len(w), bool)
     if len(met):
@@ -157,20 +162,19 @@ def _side(hits: Intersections, w: FloatArray) -> FloatArray:
 
 
 def _off(sizes: ShapeSizes, hits: Intersections, w: FloatArray) -> FloatArray:
-    """(n, 3): origins on w's side of what was hit, as near as float64 allows."""
+    """(n, 3): origins on w's side of the hit surface, as near as float64 allows."""
     return np.asarray(hits.p + _side(hits, w) * _own_error(sizes, hits)[:, None])
 
 
 def _own_error(sizes: ShapeSizes, hits: Intersections) -> FloatArray:
-    """(n,): as `reference_rt.core.ray.surface_error` has it, with the largest coordinates there
-    are."""
+    """(n,): `reference_rt.core.ray.surface_error` for the scene's largest coordinates."""
     reach = np.abs([sizes.lower, sizes.upper]).max()
     return np.asarray(16.0 * 3.0**0.5 * UNIT_ROUNDOFF * (np.abs(hits.p).max(axis=1) + 2.0 * reach))
 
 
 def _differs(a: Intersections, b: Intersections, slack: FloatArray | float) -> BoolArray:
-    """(n,): another shape is met, or none, or the same further than `slack` away.  Which operand of
-    a solid is met in one place says nothing: operands may share their faces."""
+    """(n,): whether the hits are on different shapes, or more than `slack` apart.  The operand of a
+    solid is not compared: operands may share faces."""
     other = (a.shape != b.shape) | (a.instance != b.instance)
     with np.errstate(invalid="ignore"):
         return np.asarray(other | (np.linalg.norm(a.p - b.p, axis=1) > slack))
@@ -179,7 +183,7 @@ def _differs(a: Intersections, b: Intersections, slack: FloatArray | float) -> B
 def _ways(
     scene: Scene, sizes: ShapeSizes, d: FloatArray, hits: Intersections, seed: int
 ) -> list[FloatArray]:
-    """Unit directions (n, 3) in which hits are left, 0 for those that are not."""
+    """Unit directions (n, 3) of rays from the hits, 0 for hits without such a ray."""
     rng = np.random.default_rng([seed, 2])
     front = hits.n * np.where(np.sum(d * hits.n, axis=1) > 0.0, -1.0, 1.0)[:, None]
     random = rng.normal(size=d.shape)
@@ -202,7 +206,7 @@ def _ways(
 
 
 def _is_clear(scene: Scene, sizes: ShapeSizes, hits: Intersections) -> BoolArray:
-    """(n,): whether light passes what was hit."""
+    """(n,): whether the hit surface is a transparent dielectric."""
     names = [leaf.material for leaf in sizes.leaves]
     clear = [
         name is not None

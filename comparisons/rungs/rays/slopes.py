@@ -1,30 +1,31 @@
-"""How steep what surfaces send is: highlights, textures and tilted normals turn float32's error of
-a point or of a direction into one of light, many times as large in parts.
+"""How much radiance changes within float32's error of a ray: highlights, textures and bent normals
+amplify the error of a point or a direction.
 
-It is measured, by asking our own tracer along rays that are moved by float32's bound.
+The change is measured with our own tracer, along rays moved by float32's bound.
 """
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.bounds import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray
 from reference_rt.materials import Diffuse, Emissive, Material, Wrapper
 from reference_rt.rendering.scene import Scene
 
 STEPS = 8
-"""Moved rays."""
+"""Number of moved rays."""
 
 STEEPEST = 1e-2
-"""Of the brightest value: what float32's bound moves by more is an edge, which is for the
-arbiter."""
+"""Fraction of the brightest value: a larger change within float32's bound is an edge, which is left
+to the arbiter."""
 
 
 def is_steep(scene: Scene) -> bool:
-    """Whether any surface sends anything but the same to all sides from everywhere, or mirrors."""
+    """Whether any material has a glossy lobe, a texture, or is made of others: untextured diffuse
+    materials, lamps and perfect mirrors are not steep."""
 
     def is_flat(material: Material) -> bool:
         if isinstance(material, Emissive):
@@ -38,8 +39,8 @@ def is_steep(scene: Scene) -> bool:
 
 
 def moved(rays: Rays, radius: FloatArray) -> list[Rays]:
-    """The rays, begun up to `radius` (n,) away and turned by float32's error, the opposite way
-    round the sphere."""
+    """STEPS versions of the rays: origins moved by `radius` (n,), directions turned by float32's
+    error, on the opposite side of the sphere."""
     moves = arbiter.directions(STEPS)
     found = []
     for move, way in zip(moves, np.roll(moves, STEPS // 2, axis=0), strict=True):
@@ -52,12 +53,12 @@ def moved(rays: Rays, radius: FloatArray) -> list[Rays]:
 def slopes(
     value: FloatArray, others: Sequence[Callable[[], FloatArray]], brightest: float
 ) -> FloatArray:
-    """(n,): how far `value` (n, 3) may move, from what `others` give for moved rays.
+    """(n,): how far `value` (n, 3) may change, from the values `others` of moved rays.
 
-    The moves leave gaps of a cosine of 0.7 between them: twice what was found is allowed.
+    Twice the largest change: the directions of the moves are up to a cosine of 0.7 apart.
     """
     found = np.zeros(len(value))
     for other in others:
-        apart = np.abs(other() - value).max(axis=1)
-        found = np.maximum(found, np.where(apart <= STEEPEST * brightest, apart, 0.0))
+        change = np.abs(other() - value).max(axis=1)
+        found = np.maximum(found, np.where(change <= STEEPEST * brightest, change, 0.0))
     return 2.0 * found

@@ -162,7 +162,7 @@ def test_pictures_that_differ_beyond_a_limit_are_limited_by_the_reference() -> N
     above = Tier("images", "differ", "other")
     statuses = [tier.status for tier in limited([above, below])]
     assert statuses == ["agree", "reference-limited"]
-    assert "50 are foretold" in limited([below, above])[1].reason
+    assert "from 50 of 1000 points by prediction" in limited([below, above])[1].reason
 
 
 @pytest.mark.parametrize(

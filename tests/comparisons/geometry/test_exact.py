@@ -7,7 +7,7 @@ import pytest
 
 from comparisons.geometry.exact import all_hits, first_hit
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, dot, nearest, quotient, roots, tied
-from comparisons.rungs.rays.bounds import LeafSizes, ShapeSizes
+from comparisons.geometry.sizes import LeafSizes, ShapeSizes
 from reference_rt.rendering.scene import Scene
 
 ODD = ["rotate: {axis: [1, 2, 3], degrees: 40}", "scale: [1, 0.7, 1.2]"]

@@ -143,7 +143,7 @@ def test_a_planted_fault_is_seen(
 
 def test_notes_tell_what_is_not_mitsubas(scene: Scene) -> None:
     notes = " ".join(notes_of(scene))
-    for told in ("coat mirrors", "no Phong", "blend is wrong", "masks for opaque", "normal maps"):
+    for told in ("of a coat's", "no Phong", "blend is wrong", "masks as opaque", "normal maps"):
         assert told in notes
 
 

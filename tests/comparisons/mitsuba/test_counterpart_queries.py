@@ -416,7 +416,8 @@ def test_lights_have_the_same_densities(scene: Scene, twin: Twin) -> None:
             it = reference_point(o)
             si = twin.mi_scene.ray_intersect(mi.Ray3f(it.p, w))
             ds = mi.DirectionSample3f(twin.mi_scene, si, it)
-            found = twin.mi_scene.pdf_emitter_direction(it, ds, si.emitter(twin.mi_scene) != None)  # noqa: E711
+            is_hit = si.emitter(twin.mi_scene) != None  # noqa: E711
+            found = twin.mi_scene.pdf_emitter_direction(it, ds, is_hit)
             return (found,)
 
         theirs = for_rays(density, np.tile(p, (len(d), 1)), d)[0] * emitters

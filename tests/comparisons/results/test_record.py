@@ -125,7 +125,7 @@ def test_pictures_of_another_record_are_refused(tmp_path):
     write_case(tmp_path / "a", case(Images(np.ones((2, 2, 3)), np.ones((2, 2, 3)))))
     write_case(tmp_path / "b", case(Images(np.ones((2, 2, 3)), np.zeros((2, 2, 3)))))
     (tmp_path / "b" / PICTURES).replace(tmp_path / "a" / PICTURES)
-    with pytest.raises(RecordError, match=r"pictures\.exr: is not the file"):
+    with pytest.raises(RecordError, match=r"pictures\.exr: does not have the checksum"):
         read_case(tmp_path / "a")
 
 

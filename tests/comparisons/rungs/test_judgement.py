@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from comparisons.geometry.exact.referee import Referee
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.translate import load
 from comparisons.rungs import geometry
 from comparisons.rungs.rays.adversarial_rays import aimed_rays
-from comparisons.rungs.rays.bounds import ShapeSizes
 from comparisons.rungs.rays.judgement import MOST_JUDGED, judged
 from comparisons.rungs.rays.rays import Rays, mixed_rays
 from reference_rt.rendering import query

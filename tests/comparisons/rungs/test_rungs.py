@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.translate import load
 from comparisons.results.case import Tier
 from comparisons.rungs import direct, whitted
 from comparisons.rungs import geometry as geometry_of_many
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.bounds import ShapeSizes
 from comparisons.rungs.rays.camera import pixel_centres
 from reference_rt.cameras.film import Film
 from reference_rt.integrators.scene_tables import SceneTables

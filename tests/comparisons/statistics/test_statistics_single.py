@@ -23,7 +23,7 @@ def test_a_single_picture_says_what_it_presumes():
     for tier in (compare(one, many), compare(many, one), compare(one, many[:1])):
         assert tier.status == "inconclusive"
         assert "with a single picture on a side the noise is estimated" in tier.reason
-        assert "presuming that of neighbouring blocks independent" in tier.reason
+        assert "assuming that the noise of neighbouring blocks is independent" in tier.reason
         assert "it takes about" in tier.reason
         json.dumps(tier.numbers, allow_nan=False)
     assert "single" not in compare(many, many).reason

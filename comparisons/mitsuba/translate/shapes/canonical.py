@@ -1,4 +1,4 @@
-"""Any quadric as patches of parameters: sums of squares along the axes of its own."""
+"""Any quadric as parametric patches, from its canonical form along its principal axes."""
 
 from collections.abc import Callable
 from functools import partial
@@ -10,17 +10,17 @@ from reference_rt.core.arrays import FloatArray, IntArray
 
 CURVED = (768, 384)
 STRAIGHT = (2048, 1)
-"""Cells of a patch that is curved both ways, and of one that is straight along v."""
+"""Cells of a patch that is curved along u and v, and of one that is straight along v."""
 
 ZERO = 1e-12
-"""Of the largest eigenvalue: below this, one is the rounding of a zero."""
+"""An eigenvalue below this fraction of the largest counts as 0."""
 
 Coordinates = tuple[FloatArray, FloatArray, FloatArray]
 Shape = Callable[[FloatArray, FloatArray], Coordinates]
 
 
 def patches_of(matrix: FloatArray, linear: FloatArray, constant: float, box: Box) -> list[Patch]:
-    """x^T M x + l x + c = 0 where it passes through a box: patches that may reach beyond."""
+    """Patches of x^T M x + l x + c = 0 that cover its part in a box; they may reach beyond it."""
     eigenvalues, axes = np.linalg.eigh(matrix)
     eigenvalues[np.abs(eigenvalues) <= ZERO * np.abs(eigenvalues).max(initial=0.0)] = 0.0
     slopes = axes.T @ linear
@@ -34,7 +34,7 @@ def patches_of(matrix: FloatArray, linear: FloatArray, constant: float, box: Box
     if slope <= ZERO * float(np.abs(linear).max(initial=0.0)):
         slope = 0.0
     if slope > 0.0:
-        # One axis along which f rises, across which it does not.
+        # Turn the axes of zero eigenvalues: f rises along one of them only.
         rising = axes @ slopes / slope
         others = axes[:, flat] - np.outer(rising, rising @ axes[:, flat])
         basis = np.linalg.svd(others)[0][:, : len(flat) - 1]
@@ -53,14 +53,14 @@ def patches_of(matrix: FloatArray, linear: FloatArray, constant: float, box: Box
 
 
 def narrowed(patch: Patch, box: Box) -> Patch | None:
-    """The patch with parameters only from where it comes near the box; None where it does not."""
+    """The patch, limited to parameters near the box; None if it does not come near."""
     low, high = np.zeros(2), np.ones(2)
     for _ in range(6):
         sides = [np.linspace(a, b, 65) for a, b in zip(low, high, strict=True)]
         p = patch.point(*np.meshgrid(*sides, indexing="ij"))
         corners = np.stack([p[:-1, :-1], p[1:, :-1], p[:-1, 1:], p[1:, 1:]])
         lower, upper = corners.min(axis=0), corners.max(axis=0)
-        # As far as a cell is wide: more than its surface bulges out.
+        # A cell's diagonal: more than its surface bulges out.
         margin = np.linalg.norm(upper - lower, axis=-1, keepdims=True)
         near = np.all((lower - margin <= box[1]) & (upper + margin >= box[0]), axis=-1)
         if not near.any():
@@ -82,7 +82,7 @@ def narrowed(patch: Patch, box: Box) -> Patch | None:
 def _shapes(
     eigenvalues: FloatArray, slope: float, flat: IntArray, constant: float, reach: float
 ) -> list[tuple[Shape, tuple[int, int]]]:
-    """Patches of sum e_k z_k² + slope z_flat[0] + constant = 0 as far as |z_k| <= reach."""
+    """Patches of sum e_k z_k² + slope z_flat[0] + constant = 0 for |z_k| <= reach."""
     square = np.flatnonzero(eigenvalues)
     if len(square) == 0:
         return [(_ordered((flat[0], flat[1], flat[2]), _plane(0.0, reach)), (1, 1))]
@@ -100,7 +100,7 @@ def _shapes(
 
 
 def _ordered(order: tuple[int, int, int], shape: Shape) -> Shape:
-    """A shape whose coordinates are those of the axes `order`."""
+    """A shape with its coordinates permuted to the axes `order`."""
 
     def placed(u: FloatArray, v: FloatArray) -> Coordinates:
         found = shape(u, v)
@@ -121,7 +121,7 @@ def _plane(height: float, reach: float) -> Shape:
 def _of_one(
     e: float, slope: float, square: int, flat: IntArray, constant: float, reach: float
 ) -> list[tuple[Shape, tuple[int, int]]]:
-    """e z² + slope x + constant = 0: a parabolic cylinder, or planes."""
+    """e z² + slope x + constant = 0: a parabolic cylinder, or parallel planes."""
     if slope != 0.0:
         order = (square, int(flat[0]), int(flat[1]))
 
@@ -167,7 +167,7 @@ def _cones(
         ratio = np.sqrt(-eigenvalues[i] / eigenvalues[j])
         order = (i, j, 3 - i - j)
         halves = []
-        # In halves: where they cross, f's gradient, and so the front, changes sides.
+        # In halves: where the planes cross, f's gradient, and so the front, changes sides.
         for side, sign in ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)):
 
             def half(

@@ -1,4 +1,4 @@
-"""The parts of a box's faces where a quadratic form is not above zero, as triangles."""
+"""The caps of a quadric: the parts of a box's faces where a quadratic is <= 0, as triangles."""
 
 from collections.abc import Callable
 
@@ -10,20 +10,19 @@ from comparisons.mitsuba.translate.shapes.stand_ins import Box
 from reference_rt.core.arrays import FloatArray, IntArray
 
 LEVELS = 10
-"""Halvings of a face's sides down to the squares that the outline passes through: chords that short
-are off by less than 1e-6 of the face, for an outline that bends as its inscribed circle."""
+"""Subdivisions of a face into the squares that the outline passes through: their chords are off by
+less than 1e-6 of the face, for an outline as curved as the inscribed circle."""
 
 OVERLAP = 1e-6
-"""Of a square, by which it reaches into its neighbours: larger squares have corners in the middle
-of smaller ones' sides, where rays would pass between."""
+"""Overlap of neighbouring squares, as a fraction of their side: rays would pass through T-junctions
+between larger and smaller squares."""
 
 Form = Callable[[FloatArray], FloatArray]
 
 
 def cap_faces(value: Form, box: Box) -> tuple[Soup, IntArray]:
-    """Triangles of all six faces that face outwards, with normals, uv from 0 to 1 across each, and
-    our numbers of
-    their faces: 1 + the axis, + 3 on the positive side."""
+    """Outward triangles of all six faces, with normals, and uv from 0 to 1 across each face; and
+    our face numbers: 1 + the axis, + 3 on the positive side."""
     positions, normals, uvs, numbers = [], [], [], []
     for axis in range(3):
         for side in (0, 1):
@@ -47,7 +46,7 @@ def _on_face(xy: FloatArray, box: Box, axis: int, side: int) -> FloatArray:
 
 
 def _cap(value: Form, box: Box, axis: int, side: int) -> FloatArray:
-    """Triangles (n, 3, 2) that face outwards, of what belongs to the solid of a face."""
+    """Outward triangles (n, 3, 2) of the solid's part of a face."""
 
     def on_face(xy: FloatArray) -> FloatArray:
         return value(_on_face(xy, box, axis, side))
@@ -59,9 +58,8 @@ def _cap(value: Form, box: Box, axis: int, side: int) -> FloatArray:
 
 
 def region(f: Form) -> FloatArray:
-    """Counter-clockwise triangles (n, 3, 2) of where a quadratic f of (..., 2) is at most 0 in the
-    unit square: squares, halved where the outline passes through, down to the smallest, which are
-    cut along it."""
+    """Counter-clockwise triangles (n, 3, 2) of the part of the unit square where a quadratic f of
+    (..., 2) is at most 0: squares, subdivided at the outline, and the smallest cut along it."""
     corners, size = np.zeros((1, 2)), 1.0
     triangles = []
     for level in range(LEVELS + 1):
@@ -85,7 +83,7 @@ def region(f: Form) -> FloatArray:
 
 
 def _second_differences(values: FloatArray) -> FloatArray:
-    """(n, 3) of values (n, 9) on a 3 x 3 grid: along both sides and across."""
+    """(n, 3): second differences of values (n, 9) on a 3 x 3 grid: xx, yy and xy."""
     v = values.reshape(-1, 3, 3)
     xx = v[:, 0, 1] - 2.0 * v[:, 1, 1] + v[:, 2, 1]
     yy = v[:, 1, 0] - 2.0 * v[:, 1, 1] + v[:, 1, 2]
@@ -94,7 +92,7 @@ def _second_differences(values: FloatArray) -> FloatArray:
 
 
 def _halves(corners: FloatArray, size: float) -> FloatArray:
-    """Two triangles (2 n, 3, 2) for each square; they overlap, and stay in the unit square."""
+    """Two triangles (2 n, 3, 2) for each square, enlarged by OVERLAP within the unit square."""
     grown = size * OVERLAP
     low, high = np.clip(corners - grown, 0.0, 1.0), np.clip(corners + size + grown, 0.0, 1.0)
     a, c = low, high

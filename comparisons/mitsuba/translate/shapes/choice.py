@@ -1,4 +1,4 @@
-"""The choice of a translation by the type of a shape."""
+"""`translate_shape`: the translation of a shape by its type."""
 
 from functools import singledispatch
 from typing import Any
@@ -10,7 +10,7 @@ from comparisons.mitsuba.translate.shapes.plugins import Site
 
 @singledispatch
 def translate_shape(shape: Any, site: Site) -> list[Plugin]:
-    """The Mitsuba shapes that stand for one of ours, in order.
+    """The Mitsuba shapes that represent one of ours, in order.
 
     Raises UntranslatableError, and ValueError for a file that cannot be used.
     """

@@ -1,4 +1,4 @@
-"""Infinite planes, of which Mitsuba gets the most; polygons, as triangles."""
+"""Infinite planes, as large finite meshes; polygons, as triangles."""
 
 import manifold3d
 import numpy as np
@@ -12,9 +12,9 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes import Plane, Polygon
 
 RINGS = (-14, 21)
-"""Powers of two: radii of the first ring of an infinite plane and of the last, in units of how far
-the plane is from the origin, or of 1 if that is more.  Each is twice the one before: float32 rounds
-the corners relative to how far out they are, and a ray meets a plane that is off by no more."""
+"""Exponents of two: radii of the first and the last ring of an infinite plane, in units of its
+distance from the origin, at least 1.  Each radius is twice the one before: float32 rounds corners
+relative to their distance, so that the error at a hit is relative to the hit's distance too."""
 
 SIDES = 16
 """Corners of a ring."""
@@ -24,7 +24,7 @@ SIDES = 16
 def _(shape: Plane, site: Site) -> list[Plugin]:
     m = shape.map_in(site.place)
     n = transform.apply_normals(m, np.array([[0.0, 0.0, 1.0]]))[0]
-    middle = (n @ m[:, 3]) * n  # the point next to the origin
+    middle = (n @ m[:, 3]) * n  # the point nearest to the origin
     unit = max(1.0, float(np.linalg.norm(middle)))
     across = np.linalg.svd(n[None])[2][1:]
     if np.linalg.det(np.vstack([across, n])) < 0.0:
@@ -42,8 +42,8 @@ def _(shape: Plane, site: Site) -> list[Plugin]:
 
 
 def _web(rings: int) -> IntArray:
-    """The triangles between a middle, vertex 0, and `rings` rings of SIDES vertices around it,
-    counter-clockwise."""
+    """The counter-clockwise triangles of a centre, vertex 0, and `rings` rings of SIDES vertices
+    around it."""
     k = np.arange(SIDES)
     following = (k + 1) % SIDES
     faces = [np.column_stack([np.zeros_like(k), 1 + k, 1 + following])]
@@ -55,7 +55,7 @@ def _web(rings: int) -> IntArray:
 
 @translate_shape.register
 def _(shape: Polygon, site: Site) -> list[Plugin]:
-    """The fill rule is applied by another program, Clipper2 as manifold3d has it."""
+    """The fill rule is applied by independent code, Clipper2 in manifold3d."""
     points = np.array([p for ring in shape.rings for p in ring])
     middle = points.mean(axis=0)
     # The normal is the direction in which the points spread least.
@@ -78,14 +78,14 @@ def _(shape: Polygon, site: Site) -> list[Plugin]:
 
 
 DIGITS = 2.0**20
-"""Clipper2 rounds coordinates to 1e-8: of numbers this large that is 1e-14."""
+"""Scale of the coordinates: Clipper2 rounds to 1e-8, which is 1e-14 of numbers this large."""
 
 
 def triangulated(rings: list[FloatArray], fill: str) -> tuple[FloatArray, IntArray]:
-    """Vertices (n, 2) and counter-clockwise triangles (m, 3) of what rings (k, 2) enclose, whose
-    coordinates are in [0, 1]; `fill` is "even_odd" or "nonzero"."""
+    """Vertices (n, 2) and counter-clockwise triangles (m, 3) of the area that rings (k, 2) enclose,
+    with coordinates in [0, 1]; `fill` is "even_odd" or "nonzero"."""
     rule = {"even_odd": manifold3d.FillRule.EvenOdd, "nonzero": manifold3d.FillRule.NonZero}[fill]
-    # The rule counts the rings' turns: mirrored coordinates would leave it as it is.
+    # The winding numbers change sign with mirrored coordinates, which the rules ignore.
     section = manifold3d.CrossSection([ring * DIGITS for ring in rings], rule)
     outlines = [np.asarray(ring, np.float64) for ring in section.to_polygons()]
     faces = np.asarray(manifold3d.triangulate(outlines), np.int64).reshape(-1, 3)
@@ -93,10 +93,10 @@ def triangulated(rings: list[FloatArray], fill: str) -> tuple[FloatArray, IntArr
 
 
 def _is_clockwise(rings: list[FloatArray]) -> bool:
-    """Whether rings go round more area clockwise; for none either way, whether the first turn is
+    """Whether rings enclose more area clockwise; if the areas cancel, whether the first turn is
     clockwise."""
     area = sum(_doubled_area(ring) for ring in rings)
-    # A figure eight's halves cancel to within the rounding of the sum.
+    # The halves of a figure eight cancel, but for rounding.
     if abs(area) > 1e-12:
         return bool(area < 0.0)
     steps = np.diff(np.vstack([rings[0], rings[0][:2]]), axis=0)

@@ -1,5 +1,6 @@
-"""Meshes: the very triangles of our tables, in our order, so that Mitsuba's prim_index counts the
-rows of our table.  These are numbered as in the file, of which they lack triangles without area."""
+"""Meshes -> Mitsuba: the triangles of our tables in our order, so that Mitsuba's prim_index is a
+row of our table.  The table lacks the file's triangles without area, but keeps the file's
+numbers."""
 
 from typing import Any
 
@@ -19,15 +20,18 @@ from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.shape import Place
 
 MOST_TRIANGLES = 4_000_000
-"""That all copies of a mesh may have together: 0.3 kB each.  Where there are more Mitsuba gets
-instances, which it traces less exactly: within groups it ignores the flag without which rays pass
-between triangles (of 100,000 rays at edges 7,226 did; without a group, 15)."""
+"""Most triangles of all copies of a mesh together, 0.3 kB each.  With more Mitsuba gets instances,
+which it traces less exactly: in groups it ignores the flag for watertight intersections (of 100,000
+rays at edges 7,226 passed between triangles; without a group, 15)."""
 
 
 class Soup:
-    """Triangles with corners of their own: positions (3 n, 3), and of the corners, None for none,
-    unit normals (3 n, 3), uv (3 n, 2), colours (3 n, 3);  numbers (n,): ours of the triangles, None
-    where they are counted."""
+    """A mesh: positions (v, 3) of its vertices, and of each vertex, or None, unit normals (v, 3),
+    uv (v, 2), colours (v, 3).
+
+    faces (n, 3): indices of vertices, None if every three vertices are a triangle;  numbers (n,):
+    our face numbers, None if they count from 0.
+    """
 
     def __init__(
         self,
@@ -43,23 +47,23 @@ class Soup:
         self.faces = np.arange(len(positions)).reshape(-1, 3) if faces is None else faces
 
     def moved(self, m: transform.Affine, mirrored: bool) -> "Soup":
-        """Under an affine map; `mirrored` turns the corners' order, and so the front, round."""
+        """The mesh under an affine map;  mirrored: reverse the corners, and so the front."""
         normals = None if self.normals is None else transform.apply_normals(m, self.normals)
         positions = transform.apply_points(m, self.positions)
         if not mirrored:
             return Soup(positions, normals, self.uvs, self.colours, self.faces)
         uvs = self.uvs
         if uvs is None and len(positions) == 3 * len(self.faces):
-            # Mitsuba's own are the barycentrics in its order of the corners.
+            # Mitsuba's default uv are the barycentrics in its order of the corners.
             uvs = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (len(self.faces), 1))
         return Soup(positions, normals, uvs, self.colours, self.faces[:, [0, 2, 1]])
 
     def all_of_face(self, number: int) -> IntArray:
-        """For triangles that are one face of ours: its number, by theirs."""
+        """`Plugin.faces` of a mesh whose triangles are all one face of ours."""
         return np.full(len(self.faces), number)
 
     def mesh(self, parts: dict[str, Any]) -> Any:
-        """As Mitsuba's object, of `parts`."""
+        """Mitsuba's mesh object;  parts: its BSDF and emitter."""
         mi = mitsuba()
         properties = mi.Properties()
         for name, part in parts.items():
@@ -99,11 +103,11 @@ def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
     if soup.colours is not None and (soup.colours < 0.0).any() and site.coloured is not site.parts:
         raise UntranslatableError("Mesh with colours of some of its vertices", "shape")
     if "emitter" in site.parts and soup.normals is not None:
-        # Which side shines: ours by the geometric normal, Mitsuba's by the shading normal.
+        # The shining side follows the geometric normal in ours, the shading normal in Mitsuba.
         raise UntranslatableError("Mesh that shines and has vertex normals", "shape")
     if "emitter" in site.parts and site.coloured["emitter"]["radiance"]["type"] != "rgb":
-        # It finds points of textured lights by their uv, which a mesh may use twice or never
-        # (measured with all at one uv: two thirds of the light were lost).
+        # Mitsuba samples textured lights by uv, which a mesh may use twice or never (measured with
+        # all vertices at one uv: two thirds of the light were lost).
         raise UntranslatableError("Mesh that shines by a texture", "shape")
     key = ("mesh", id(shape))
     plugin = placed(soup, key, site.place.outer, site.mirrored, site)
@@ -111,12 +115,12 @@ def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
 
 
 def placed(soup: Soup, key: Any, m: transform.Affine, mirrored: bool, site: Site) -> Plugin:
-    """Triangles where the map m takes them: a mesh, or an instance where there are many copies, of
-    the one mesh for `key`.  `mirrored`: see `Soup.moved`."""
+    """Triangles under the map m: a mesh, or, with many copies, an instance of the one mesh for
+    `key`.  `mirrored`: see `Soup.moved`."""
     parts = site.parts if soup.colours is None else site.coloured
     if site.copies == 1 or site.copies * len(soup.faces) <= MOST_TRIANGLES:
         return Plugin(soup.moved(m, mirrored).mesh(parts))
-    # Mitsuba maps normals as ours are mapped: the front stays the front.
+    # Mitsuba transforms normals of instances as we do: the front stays the front.
     return instance_of(str(key), lambda: soup.mesh(parts), m, site)
 
 

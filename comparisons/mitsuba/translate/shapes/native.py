@@ -1,9 +1,9 @@
-"""Shapes that Mitsuba has too, from the float64 numbers that our own tables hold.
+"""Shapes that Mitsuba has too, made from the float64 numbers of our own tables.
 
-Mitsuba's rectangles, cubes and spheres turn inside out, or disagree with themselves (a rectangle's
-geometric normal follows the winding, its shading normal the transform), where a transform mirrors
-space; ours keep their outward side.  So a mirroring transform is never passed on to these.  Its
-disks are right under every affine map; its spheres only under one that keeps them round.
+Under a mirroring transform Mitsuba's rectangles, cubes and spheres turn inside out, or are
+inconsistent (a rectangle's geometric normal follows the winding, its shading normal the transform);
+ours keep their outward side.  So these get no mirroring transform.  Mitsuba's disks are right under
+every affine map, its spheres only under similarities.
 """
 
 from typing import Any
@@ -32,7 +32,7 @@ CELLS = (384, 192)
 """Around a thin ellipsoid's axis and along it."""
 
 CUBE_FACES = (1, 4, 3, 5, 0, 2)
-"""Our numbers of the faces of Mitsuba's cube, which are -y +y +x +z -x -z, two triangles each
+"""Our face numbers of the faces of Mitsuba's cube, which are -y +y +x +z -x -z, two triangles each
 (src/shapes/cube.cpp)."""
 
 
@@ -43,7 +43,7 @@ def _(shape: Sphere, site: Site) -> list[Plugin]:
         m = m @ np.vstack([np.column_stack([shape.radius * np.eye(3), shape.center]), [0, 0, 0, 1]])
         least = float(np.linalg.svd(m[:, :3], compute_uv=False)[-1])
         if in_float32(least) > 0.0 and CURVED * UNIT_ROUNDOFF * site.reach**2 > least**2:
-            # Mitsuba's own would be off by more than it is thick.
+            # The error of Mitsuba's own sphere would exceed its thickness.
             return [_ellipsoid(shape, site)]
         return [curved_instance("sphere", m, site)._replace(uv=same_uv)]
     table: Any = shape.tabulate(site.place)
@@ -51,7 +51,7 @@ def _(shape: Sphere, site: Site) -> list[Plugin]:
     plugin = {
         "type": "sphere",
         "to_world": to_world(rotation * table.radius[0], table.center[0]),
-        # A mirrored sphere keeps its mirrored uv; turned over once more, its normals are outward.
+        # A mirrored sphere keeps its mirrored uv; flipping makes its normals point outwards.
         "flip_normals": bool(np.linalg.det(rotation) < 0.0),
         **site.parts,
     }
@@ -59,7 +59,7 @@ def _(shape: Sphere, site: Site) -> list[Plugin]:
 
 
 def _ellipsoid(shape: Sphere, site: Site) -> Plugin:
-    """As a mesh: of a thin one float32 holds the corners better than it solves the quadratic."""
+    """A thin ellipsoid as a mesh: float32 is more exact for its corners than for its quadratic."""
     center, radius = np.array(shape.center), shape.radius
 
     def point(u: FloatArray, v: FloatArray) -> FloatArray:
@@ -79,7 +79,7 @@ def _ellipsoid(shape: Sphere, site: Site) -> Plugin:
 def _(shape: Rectangle, site: Site) -> list[Plugin]:
     m = shape.map_in(site.place)
     mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
-    # The third column moves nothing: any that makes the map proper will do.
+    # The third column has no effect but on orientation.
     columns = np.column_stack([m[:, 0], m[:, 1], -m[:, 2] if mirrored else m[:, 2]])
     plugin = {
         "type": "rectangle",
@@ -106,8 +106,8 @@ def _(shape: Box, site: Site) -> list[Plugin]:
     edges = m[:, :3].copy()
     faces = np.array(CUBE_FACES)
     if np.linalg.det(edges) < 0.0:
-        # The same box.  Where it is a light of Whitted's, the point that stands for it lies in the
-        # middle along this axis, and stays (see comparisons.mitsuba.plugins.light_points).
+        # Mirror it along an axis: the same box.  As a Whitted light its point is in the middle of
+        # this axis, and does not move (see comparisons.mitsuba.plugins.light_points).
         turned = _middle_axis(edges)
         edges[:, turned] *= -1.0
         faces = np.where(faces % 3 == turned, (faces + 3) % 6, faces)
@@ -116,9 +116,10 @@ def _(shape: Box, site: Site) -> list[Plugin]:
 
 
 def _box_of_triangles(m: Affine, site: Site) -> Plugin:
-    """With our uv: of each face the two other coordinates in the order x, y, z, from 0 to 1."""
+    """A box with our uv: on each face the two other coordinates in the order x, y, z, from 0 to
+    1."""
     if "emitter" in site.parts:
-        # As a light of Whitted's a mesh is as many points as it has triangles.
+        # As a Whitted light a mesh has one point for each triangle.
         raise UntranslatableError("emissive material with a texture on a Box", "material")
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     positions, faces = np.empty((6, 4, 3)), []
@@ -128,7 +129,7 @@ def _box_of_triangles(m: Affine, site: Site) -> Plugin:
         positions[face][:, [a, b]] = 2.0 * square - 1.0
         positions[face][:, axis] = sign
         triangles = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * face
-        # a, b and the outward normal are right-handed for +x, -y, +z; a mirror turns all round.
+        # a, b and the outward normal are right-handed for +x, -y, +z; a mirroring map reverses all.
         outward = sign * (-1.0 if axis == 1 else 1.0) * np.linalg.det(m[:, :3])
         faces.append(triangles if outward > 0.0 else triangles[:, ::-1])
     uvs = np.tile(square, (6, 1))

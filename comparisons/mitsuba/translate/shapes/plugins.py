@@ -1,11 +1,11 @@
-"""Where a leaf stands, and Mitsuba's shapes under any affine map."""
+"""`Site`, the placement of a leaf, and Mitsuba's shapes under any affine map."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.stand_ins import Plugin, Within
+from comparisons.mitsuba.stand_ins import Plugin, ShapeGroup
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine
@@ -13,15 +13,14 @@ from reference_rt.shapes.shape import Place
 
 
 class Site(NamedTuple):
-    """Where a leaf stands, and of what.
+    """The placement and the material of a leaf.
 
-    place: where its own transform is followed by the maps of its solid and its instance;  mirrored:
-    whether that of its instance mirrors space, where triangles keep their front although their
-    corners then run the other way round;  parts: the BSDF and, where it shines, the emitter;
-    coloured: the same for a mesh with colours of its vertices;  textured: whether the look of the
-    material depends on the surface's coordinates;  material: its name;  copies: how many of the
-    leaf there are;  shared: what the leaves of one scene have in common, by key: a group, the
-    triangles of a file;  reach: about the largest coordinate of the scene.
+    place: the maps of its solid and its instance, applied after its own transform;  mirrored:
+    whether its instance mirrors space: triangles then keep their front, but reverse their corners;
+    parts: the BSDF and, if it is emissive, the emitter;  coloured: the same for a mesh with vertex
+    colours;  textured: whether the material depends on uv or tangents;  material: its name;
+    copies: the number of copies of the leaf;  shared: data shared by the leaves of one scene, by
+    key (a group, the triangles of a file);  reach: about the largest coordinate of the scene.
     """
 
     place: Place
@@ -43,26 +42,26 @@ def to_world(linear: FloatArray, offset: FloatArray) -> Any:
 
 
 def instance_of(name: str, member: Any, m: Affine, site: Site) -> Plugin:
-    """A Mitsuba shape, see `Within.member`, under any affine map: as an instance of a group of its
-    own, of which there is one for each `name` and material."""
+    """A Mitsuba shape (see `ShapeGroup.member`) under any affine map: an instance of a group of its
+    own, one for each `name` and material."""
     if "emitter" in site.parts:
         raise UntranslatableError("emissive material of an instance", "material")
     key = (name, site.material)
     if key not in site.shared:
         if isinstance(member, dict):
             member = {**member, **site.parts}
-        site.shared[key] = Within(f"group_{len(site.shared)}", member)
-    within: Within = site.shared[key]
-    reference = {"type": "ref", "id": within.name}
+        site.shared[key] = ShapeGroup(f"group_{len(site.shared)}", member)
+    group: ShapeGroup = site.shared[key]
+    reference = {"type": "ref", "id": group.name}
     value = {"type": "instance", "to_world": to_world(m[:, :3], m[:, 3]), "group": reference}
-    return Plugin(value, within=within)
+    return Plugin(value, group=group)
 
 
 def curved_instance(name: str, m: Affine, site: Site) -> Plugin:
-    """Mitsuba's unit shape of type `name`, whose equation is quadratic, under any affine map.
+    """Mitsuba's unit shape of type `name`, with a quadratic equation, under any affine map.
 
-    The group holds a scaled one: within it directions must not be longer than 1, or what llvm
-    variants find is far off (of a sphere a tenth as large as the group's: by 1e-2 at distance 10).
+    The group contains a scaled shape: ray directions in it must not be longer than 1, or hits in
+    llvm variants are inexact (for a sphere a tenth as large as the group's: 1e-2 at distance 10).
     """
     least = np.linalg.svd(m[:, :3], compute_uv=False)[-1]
     scale = 2.0 ** np.floor(np.log2(least))
@@ -72,13 +71,13 @@ def curved_instance(name: str, m: Affine, site: Site) -> Plugin:
 
 
 def in_float32(radius: float) -> float:
-    """`Plugin.curved` of a surface of this radius: scalar variants solve its equation in
-    float64."""
+    """`Plugin.curved` of a surface with this radius; 0 in scalar variants, which solve its equation
+    in float64."""
     return 0.0 if mitsuba().variant().startswith("scalar") else float(radius)
 
 
 def is_similarity(linear: FloatArray) -> bool:
-    """Whether a map (3, 3) keeps shapes, to within the rounding of its entries."""
+    """Whether a map (3, 3) is a similarity, to within the rounding of its entries."""
     scaled = linear / np.abs(linear).max()
     gram = scaled.T @ scaled
     factor = np.trace(gram) / 3.0

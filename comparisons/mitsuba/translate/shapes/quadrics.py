@@ -1,4 +1,4 @@
-"""Cylinders, which Mitsuba has; cones and other quadrics, as meshes."""
+"""Cylinders, which Mitsuba has; cones and other quadrics, for which meshes stand in."""
 
 from collections.abc import Callable
 
@@ -22,15 +22,15 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes import Cone, Cylinder, Quadric
 
 ANGLES = 4096
-"""Around a cone, which is straight the other way."""
+"""Cells around a cone, which is straight along its side."""
 
 THIN = 64.0
-"""Cylinders this many times smaller than the scene are meshes in llvm variants: Mitsuba's own,
-which it solves for in float32, are off by some u D² / r (see `answers.CURVED`), and with
-D / r = 1000 are missed by every other ray."""
+"""Cylinders this many times smaller than the scene are meshes in llvm variants: Mitsuba solves its
+own in float32 with an error of some u D² / r (see `hits.CURVED`), and with D / r = 1000 every other
+ray misses them."""
 
 BOTTOM, TOP = 3, 6
-"""Faces: 0 is the surface itself, of the others 1 + the axis, + 3 on the positive side."""
+"""Face numbers: 0 is the curved surface, the others are 1 + the axis, + 3 on the positive side."""
 
 
 @translate_shape.register
@@ -56,21 +56,21 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
 
 
 def _is_round(linear: FloatArray) -> bool:
-    """Whether a map takes a circular cylinder along z to one: its height may change by itself."""
+    """Whether a map takes circular cylinders along z to circular cylinders, of any height."""
     x, y, z = linear.T
     z = z * np.linalg.norm(x) / np.linalg.norm(z)
     return is_similarity(np.column_stack([x, y, z]))
 
 
 def _followed(m: transform.Affine, scale: FloatArray, z: float) -> transform.Affine:
-    """Scales, moves along z, then m."""
+    """The map that scales, moves along z, then applies m."""
     return transform.compose(transform.scale(tuple(scale)), transform.translate((0.0, 0.0, z)), m)
 
 
 def _disk(
     m: transform.Affine, radius: float, z: float, face: int, reach: float, site: Site
 ) -> Plugin:
-    """A cap across the axis, whose uv are x and y over a square of half side `reach`."""
+    """A cap across the axis; its uv are x and y over a square of half side `reach`."""
     place = _followed(m, np.array([radius, radius, radius]), z)
     plugin = {
         "type": "disk",
@@ -103,7 +103,7 @@ def _(shape: Cone, site: Site) -> list[Plugin]:
 def _side(
     bottom: float, top: float, z: float, height: float
 ) -> Callable[[FloatArray, FloatArray], FloatArray]:
-    """The side of a cone or a cylinder from z upwards."""
+    """The side of a cone or a cylinder that starts at z: (u, v) -> points."""
 
     def point(u: FloatArray, v: FloatArray) -> FloatArray:
         phi, r = 2.0 * np.pi * u, bottom + (top - bottom) * v
@@ -113,7 +113,7 @@ def _side(
 
 
 def _round(radius: float, slope: float) -> Implicit:
-    """The distance from the z axis is radius + slope z."""
+    """The surface whose distance from the z axis is radius + slope z."""
 
     def value(p: FloatArray) -> FloatArray:
         return np.asarray(np.hypot(p[..., 0], p[..., 1]) - (radius + slope * p[..., 2]))

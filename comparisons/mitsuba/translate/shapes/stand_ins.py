@@ -1,5 +1,5 @@
-"""Curved surfaces that Mitsuba does not have, as fine meshes with the surface's own normals; how
-far these are from the surface is measured, not assumed."""
+"""Fine meshes that stand in for curved surfaces that Mitsuba lacks, with the surface's normals;
+their distance from the surface is measured."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -19,9 +19,9 @@ Box = tuple[FloatArray, FloatArray]
 
 
 class Patch(NamedTuple):
-    """A piece of a surface, of parameters u, v in [0, 1].
+    """A parametric patch of a surface, with u, v in [0, 1].
 
-    point(u, v): arrays of one shape -> (..., 3);  cells: along u and v.
+    point(u, v): arrays of one shape -> (..., 3);  cells: their numbers along u and v.
     """
 
     point: Callable[[FloatArray, FloatArray], FloatArray]
@@ -36,7 +36,8 @@ class Implicit(NamedTuple):
 
 
 def meshed(patches: Sequence[Patch], surface: Implicit, box: Box | None, fineness: float) -> Soup:
-    """Patches as triangles that face where f grows, with f's normals, cut off at a box."""
+    """Patches as triangles that face where f grows, with f's normals, clipped to a box;  fineness:
+    factor on the numbers of cells."""
     positions, normals, faces = [], [], []
     count = 0
     for patch in patches:
@@ -64,19 +65,19 @@ def meshed(patches: Sequence[Patch], surface: Implicit, box: Box | None, finenes
 def stand_in(
     shape: Shape, patches: Sequence[Patch], surface: Implicit, box: Box | None, site: Site
 ) -> Plugin:
-    """The mesh, described in the shape's own coordinates, where it stands, and how well it stands
-    for the surface there."""
+    """The mesh that stands in for a shape, and its error in the scene; patches, surface and box are
+    in the shape's own coordinates."""
     own = transform.affine(shape.transform)
     key = ("stand-in", id(shape))
     if key not in site.shared:
         soup = meshed(patches, surface, box, 1.0)
-        sag, turn = apart(soup, surface, own)
-        coarse, _ = apart(meshed(patches, surface, box, 0.5), surface, own)
+        sag, turn = measured_error(soup, surface, own)
+        coarse, _ = measured_error(meshed(patches, surface, box, 0.5), surface, own)
         name, ratio = type(shape).__name__.lower(), coarse / sag if sag > 0.0 else 1.0
         site.shared[key] = soup, StandIn(name, len(soup.faces), sag, turn, ratio)
     soup, found = site.shared[key]
     m = transform.compose(own, site.place.outer)
-    # What is added to the shape's own map stretches distances, and turns angles, by this at most.
+    # The maps after the shape's own stretch distances, and turn angles, at most by these factors.
     stretch = np.linalg.svd(site.place.outer[:, :3], compute_uv=False)
     found = found._replace(
         sag=float(found.sag * stretch[0]), turn=float(found.turn * stretch[0] / stretch[-1])
@@ -87,18 +88,19 @@ def stand_in(
 
 
 MEASURED = 50_000
-"""Triangles that are measured at most, evenly strided: a surface that is smooth is as far from one
-as from its neighbours."""
+"""Most triangles that are measured, evenly strided: on a smooth surface neighbours have nearly the
+same error."""
 
 WEIGHTS = np.array([[1, 1, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], np.float64)
 WEIGHTS /= WEIGHTS.sum(axis=1, keepdims=True)
-"""Barycentrics of where a triangle is compared with its surface: the middle, and of its sides."""
+"""Barycentrics at which a triangle is compared with its surface: its centre and the middles of its
+sides."""
 
 
-def apart(soup: Soup, surface: Implicit, m: transform.Affine) -> tuple[float, float]:
+def measured_error(soup: Soup, surface: Implicit, m: transform.Affine) -> tuple[float, float]:
     """The largest distance and the largest angle, in radians, between a mesh and its surface.
 
-    A distance is f over its gradient in the scene: exact but for terms of the distance squared.
+    The distance is f over its gradient in the scene, exact but for terms of second order.
     """
     inverse = transform.invert(m)[:, :3]
     faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
@@ -119,8 +121,7 @@ def apart(soup: Soup, surface: Implicit, m: transform.Affine) -> tuple[float, fl
 
 
 def _grid_normals(gradient: FloatArray) -> FloatArray:
-    """Unit normals on a grid (a, b, 3); at a point where the gradient vanishes, an apex, that of
-    the grid's next point."""
+    """Unit normals on a grid (a, b, 3); where the gradient vanishes (an apex), a neighbour's."""
     length = np.linalg.norm(gradient, axis=2, keepdims=True)
     n = np.divide(gradient, length, out=np.zeros_like(gradient), where=length > 0.0)
     for axis in (1, 0):
@@ -141,7 +142,7 @@ def _grid_faces(a: int, b: int) -> IntArray:
 def clipped(
     positions: FloatArray, normals: FloatArray, faces: IntArray, box: Box
 ) -> tuple[FloatArray, FloatArray, IntArray]:
-    """What lies in a box of triangles, cut along its sides."""
+    """Triangles clipped to a box."""
     data = np.hstack([positions, normals])
     for axis in range(3):
         for sign, limit in ((-1.0, box[0][axis]), (1.0, box[1][axis])):

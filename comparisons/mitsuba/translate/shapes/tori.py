@@ -1,4 +1,4 @@
-"""Tori, as meshes."""
+"""Tori, for which meshes stand in."""
 
 import numpy as np
 
