@@ -1,16 +1,16 @@
 """Reciprocity: pairs of directions, both ways."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from comparisons.experiments.stability.bsdfs.bsdfs import (
+from comparisons.experiments.stability.harness.bsdfs import (
     EVEN,
     ROUGH,
     Bsdf,
     Ours,
-    Theirs,
+    contestants,
     index_of,
     towards,
 )
@@ -21,21 +21,16 @@ from comparisons.experiments.stability.harness.family import (
     FloatArray,
     Outcome,
     Series,
+    Sweep,
     decades,
 )
-from comparisons.experiments.stability.harness.outcomes import hexed, outcome, together, unit_of
+from comparisons.experiments.stability.harness.outcomes import of_errors, plain, together, unit_of
 from reference_rt.materials import Material, RoughDielectric
 
 ALLOWED = 9007.0
 """Units of roundoff: 1e-12 in float64."""
 
 LEAST = {OURS: 1e-290, MITSUBA: 1e-30}
-
-
-def contestants(material: Material, draw: Draw) -> Iterator[tuple[str, Bsdf]]:
-    yield OURS, Ours.of(material)
-    if draw.mitsuba:
-        yield MITSUBA, Theirs.of(material)
 
 
 def asymmetry(bsdf: Bsdf, n: float, wo: FloatArray, wi: FloatArray, least: float) -> FloatArray:
@@ -58,12 +53,8 @@ def _compared(
     found, n = {}, index_of(material)
     for who, bsdf in contestants(material, draw):
         errors = asymmetry(bsdf, n, wo, wi, LEAST[who])
-
-        def ask(i: int, errors: FloatArray = errors) -> Mapping[str, object]:
-            pair = {"wo": hexed(wo[i]), "wi": hexed(wi[i])}
-            return {"material": name, **pair, "asymmetry": float(errors[i])}
-
-        found[who] = outcome(errors, ALLOWED * unit_of(who), ask)
+        told = {"material": name, "wo": wo, "wi": wi, "asymmetry": plain(errors)}
+        found[who] = of_errors(errors, ALLOWED * unit_of(who), told)
     return found
 
 
@@ -120,14 +111,8 @@ def _roughness(draw: Draw, x: float) -> dict[str, Outcome]:
 
 
 def glass(index: float, alpha: float, distribution: str) -> Material:
-    return RoughDielectric.model_validate(
-        {
-            "type": "rough_dielectric",
-            "interior_ior": index,
-            "alpha": alpha,
-            "distribution": distribution,
-        }
-    )
+    described = {"interior_ior": index, "alpha": alpha, "distribution": distribution}
+    return RoughDielectric.model_validate({"type": "rough_dielectric", **described})
 
 
 def matched(x: float) -> tuple[float, ...]:
@@ -164,11 +149,8 @@ def _series(
 ) -> Series:
     return Series(
         name,
-        axis,
+        Sweep(axis, values, quick, 2_000, 100_000),
         about,
-        values,
-        quick,
-        {"quick": 2_000, "full": 100_000},
         measure,
         unit="of the value",
         explained=explained,

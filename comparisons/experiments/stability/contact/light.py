@@ -9,19 +9,17 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.contact.stacks import COUNT, THEIRS, bound, judged, rays_down
+from comparisons.experiments.stability.contact.stacks import COUNT, THEIRS, rays_down
 from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
     MITSUBA,
     OURS,
     Draw,
     Outcome,
     Shot,
 )
-from comparisons.experiments.stability.leaving.judge import CONTACT, hexed
-from comparisons.experiments.stability.leaving.shapes import matrix
-from comparisons.experiments.stability.leaving.shots import PIXELS, lit, picture
-from reference_rt.core.arrays import IntArray
+from comparisons.experiments.stability.harness.leaving import CONTACT, PIXELS, bound, lit, picture
+from comparisons.experiments.stability.harness.outcomes import outcome
+from comparisons.experiments.stability.harness.steps import matrix
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.query import radiance_without_noise
 
@@ -44,21 +42,16 @@ def shadow(draw: Draw, x: float) -> Mapping[str, Outcome]:
     d = np.tile([0.0, 0.0, 1.0], (n, 1))
     o, w = at - d, np.tile([slope, 0.0, slope], (n, 1))
     dark = (1.0 - at[:, 0] > gap).astype(np.int64)
-    sure = (np.abs(deep - gap) > CONTACT * bound(0.0)) & (deep < 1.5)
+    sure = (np.abs(deep - gap) > CONTACT * bound(0.0, 1.0)) & (deep < 1.5)
     scene = shadow_scene(gap)
     answers = {OURS: lit(OURS, scene, o, d, w)}
     if draw.mitsuba:
         answers[MITSUBA] = lit(MITSUBA, scene, *(a[: 4 * THEIRS] for a in (o, d, w)))
     outcomes = {}
     for name, answer in answers.items():
-        met = (1.0 - answer[:, 0]).astype(np.int64)
-        decided = np.flatnonzero(sure[: len(met)])
-
-        def note(i: int, decided: IntArray = decided) -> dict[str, Any]:
-            return {"gap": gap.hex(), "point": hexed(at[decided[i]])}
-
-        outcome = judged(dark[decided], met[decided], note)
-        outcomes[name] = outcome + Outcome(0, 0, open=len(met) - len(decided))
+        met, few = (1.0 - answer[:, 0]).astype(np.int64), slice(len(answer))
+        told = {"gap": gap.hex(), "point": at, "expected": dark, "found": met}
+        outcomes[name] = outcome(dark[few] != met, told, ~sure[few])
     return outcomes
 
 
@@ -105,13 +98,8 @@ def transmitted(draw: Draw, x: float) -> Mapping[str, Outcome]:
     found = radiance_without_noise(panes(1.0 / x), setup, o + np.array([0.0, 0.0, 0.5]), d)[:, 0]
     expected = fresnel(-d[:, 2]) ** COUNT
     error = np.abs(found - expected) / expected
-    bad = np.flatnonzero(~(error <= TRANSMITTED))
-    examples = tuple(
-        {"o": hexed(o[i]), "d": hexed(d[i]), "expected": expected[i].hex(), "found": found[i].hex()}
-        for i in bad[:EXAMPLES].tolist()
-    )
-    worst = float(error.max() / (COUNT * U))
-    return {OURS: Outcome(len(o), len(bad), worst, examples=examples)}
+    told = {"o": o, "d": d, "expected": expected, "found": found}
+    return {OURS: outcome(~(error <= TRANSMITTED), told, worst=float(error.max() / (COUNT * U)))}
 
 
 def shoot(contestant: str, x: float) -> Shot:

@@ -1,13 +1,12 @@
 """What F1 holds hits against: the exact answer, and bounds of the errors around it."""
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import FloatArray, Outcome
+from comparisons.experiments.stability.harness.outcomes import Columns, outcome, plain
+from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.geometry.exact import KINDS, first_of
-from comparisons.geometry.exact.crossings import Row
 from comparisons.geometry.exact.dyadic import (
     FRACTION,
     NEVER,
@@ -32,31 +31,6 @@ U_SINGLE = 2.0**-24
 ROUNDINGS = 16.0
 """u (|t| |d| + D) that t |d| may be off by besides: the issue's number.  c / q rounds by some 10 u
 of itself."""
-
-
-class Rays(NamedTuple):
-    """n rays and what each is put to: a row of a table of its own.
-
-    kind: a field of `reference_rt.shapes.Shapes`;  row: columns of n rows;  size (n,): the radius,
-    or half the diagonal;  o, d (n, 3).
-    """
-
-    kind: str
-    row: Row
-    size: FloatArray
-    o: FloatArray
-    d: FloatArray
-
-    def distance(self) -> FloatArray:
-        """D (n,): of the origins from the shapes' centres."""
-        return np.asarray(np.linalg.norm(self.o - self.row["center"], axis=1))
-
-    def speed(self) -> FloatArray:
-        return np.asarray(np.linalg.norm(self.d, axis=1))
-
-    def only(self, which: Any) -> "Rays":
-        row = {name: np.asarray(column)[which] for name, column in self.row.items()}
-        return Rays(self.kind, row, self.size[which], self.o[which], self.d[which])
 
 
 def apart(t: FloatArray, exact: Fixed) -> FloatArray:
@@ -110,33 +84,12 @@ def _outcome(
     both = np.isfinite(exact) & np.isfinite(t) & ~is_open
     share = np.zeros(len(t))
     share[both] = apart(t[both], fixed[both]) * rays.speed()[both] / bound[both]
-    wrong = ~is_open & ((np.isfinite(exact) != np.isfinite(t)) | (share > 1.0))
-    cases = int(np.sum(~is_open))
+    wrong = (np.isfinite(exact) != np.isfinite(t)) | (share > 1.0)
     worst = float(share[both].max()) if both.any() else None
-    shown = np.flatnonzero(wrong)[:EXAMPLES].tolist()
-    examples = tuple(
-        {
-            **_asked(rays, i),
-            "expected": float(exact[i]).hex(),
-            "t": float(t[i]).hex(),
-            **({} if gap is None else {"gap": float(gap[i])}),
-        }
-        for i in shown
-    )
-    return Outcome(cases, int(wrong.sum()), worst, int(is_open.sum()), examples)
-
-
-def _asked(rays: Rays, i: int) -> dict[str, Any]:
-    columns = ("center", "radius", "to_local", "coefficients", "lower", "upper", "major", "minor")
-    parts = {name: rays.row[name][i] for name in columns if name in rays.row}
-    return {
-        "kind": rays.kind,
-        **{name: _hex(value) for name, value in (parts | {"o": rays.o[i], "d": rays.d[i]}).items()},
-    }
-
-
-def _hex(values: Any) -> list[str]:
-    return [float(x).hex() for x in np.ravel(values)]
+    columns: Columns = {"kind": rays.kind, **rays.columns(), "expected": exact, "t": t}
+    if gap is not None:
+        columns["gap"] = plain(gap)
+    return outcome(wrong, columns, is_open, worst)
 
 
 DIRECTIONS = 8

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from comparisons.experiments.stability.far.law import Rays
-from comparisons.experiments.stability.far.spheres import answers, in_mitsuba, single
+from comparisons.experiments.stability.far.spheres import answers, in_mitsuba
 from comparisons.experiments.stability.harness.family import MITSUBA, FloatArray, Shot
+from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import scalar
 from reference_rt.shapes import Sphere
 
@@ -25,7 +26,7 @@ def _heights(contestant: str, x: float) -> FloatArray:
     d = target / x - view
     if contestant == MITSUBA:
         with scalar():
-            t = in_mitsuba(Sphere(), single(o), single(d))
+            t = in_mitsuba(Sphere(), round32(o), round32(d))
     else:
         n = len(o)
         columns = {"center": np.zeros((n, 3)), "radius": np.ones(n)}

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from comparisons.experiments.methods.setting import across, unit_vectors
-from comparisons.experiments.stability.far.law import U_SINGLE, Rays, Truth
+from comparisons.experiments.stability.far.law import U_SINGLE, Truth
 from comparisons.experiments.stability.harness.family import (
     MITSUBA,
     OURS,
@@ -13,8 +13,10 @@ from comparisons.experiments.stability.harness.family import (
     FloatArray,
     Outcome,
 )
+from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.geometry import frame
 from comparisons.geometry.exact.dyadic import Dyadic, dot
+from comparisons.geometry.float32 import round32
 from comparisons.mitsuba import counterpart, translate
 from comparisons.mitsuba.backend import scalar
 from reference_rt import textbook
@@ -116,12 +118,6 @@ def _answer(
             t[i] = robust(ray, c, r)
 
 
-def single(values: FloatArray) -> FloatArray:
-    """Rounded to float32."""
-    with np.errstate(over="ignore"):
-        return np.asarray(values, np.float32).astype(np.float64)
-
-
 def in_mitsuba(shape: Shape, o: FloatArray, d: FloatArray) -> FloatArray:
     """t (n,); in its scalar variant no mesh stands in for what is small."""
     return counterpart.trace(translate.load(Scene(shapes=(shape,)), frame.OURS), o, d).t
@@ -134,8 +130,10 @@ def for_mitsuba(rays: Rays) -> Rays:
     which = np.arange(len(few.o)) % SCENES
     center = few.row["center"][which]
     o, d = few.o - few.row["center"] + center, few.d / few.speed()[:, None]
-    size = single(few.size[which])
-    return Rays("spheres", {"center": single(center), "radius": size}, size, single(o), single(d))
+    size = round32(few.size[which])
+    return Rays(
+        "spheres", {"center": round32(center), "radius": size}, size, round32(o), round32(d)
+    )
 
 
 def mitsubas(rays: Rays) -> FloatArray:

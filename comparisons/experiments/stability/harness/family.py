@@ -79,18 +79,36 @@ class Shot(NamedTuple):
     caption: str
 
 
+class Sweep(NamedTuple):
+    """The points x of a series, ever more extreme.
+
+    axis: what x is, with its unit: "distance / radius"; "" where there is one point alone;
+    values: of x, increasing;  quick: those of them that the quick run takes;  few, many: cases of
+    a point in the quick and in the full run.
+    """
+
+    axis: str
+    values: tuple[float, ...]
+    quick: tuple[float, ...]
+    few: int
+    many: int
+
+
+def alone(few: int, many: int) -> Sweep:
+    """One point, of no extreme."""
+    return Sweep("", (1.0,), (1.0,), few, many)
+
+
 @dataclass(frozen=True)
 class Series:
-    """Settings that become more extreme with x.
+    """A sweep, and what is measured at each of its points.
 
-    name: "distance";  axis: what x is, with its unit: "distance / radius"; "" where there is one
-    setting alone;  about: one or two sentences: what is drawn, and what breaks the law;
-    values: of x, increasing;  quick: those of them that the quick run takes;
-    cases: of a setting, {"quick": n, "full": n};
+    name: "distance";  about: one or two sentences: what is drawn, and what breaks the law;
     measure(draw, x): an outcome for each contestant, OURS always among them;
     unit: of `Outcome.worst`: "u (|t| + D)"; "" where the law is yes or no;
-    holds_to: ours must not fail up to this x: what float64 itself can do;  law: why it ends there,
-    as a formula in u = 2^-53, distance, size; needed where holds_to is not the last value;
+    holds_to: ours must not fail up to this x: what float64 itself can do;  law: why the guaranteed
+    range ends there, as a formula in u = 2^-53, distance, size; needed where it ends before the
+    last value;
     explained: why ours does not reach 1e4 times further than Mitsuba, where it does not;
     shoot(contestant, x): a picture of what goes wrong at x, where there is something to see; the
     page shows it at the first x at which a contestant other than ours fails and its picture is
@@ -98,17 +116,30 @@ class Series:
     """
 
     name: str
-    axis: str
+    sweep: Sweep
     about: str
-    values: tuple[float, ...]
-    quick: tuple[float, ...]
-    cases: Mapping[Effort, int]
     measure: Callable[[Draw, float], Mapping[str, Outcome]]
     unit: str = ""
     holds_to: float = math.inf
     law: str = ""
     explained: str = ""
     shoot: Callable[[str, float], Shot] | None = None
+
+    @property
+    def axis(self) -> str:
+        return self.sweep.axis
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        return self.sweep.values
+
+    @property
+    def quick(self) -> tuple[float, ...]:
+        return self.sweep.quick
+
+    @property
+    def cases(self) -> Mapping[Effort, int]:
+        return {"quick": self.sweep.few, "full": self.sweep.many}
 
     def __post_init__(self) -> None:
         if list(self.values) != sorted(set(self.values)) or not set(self.quick) <= set(self.values):

@@ -19,21 +19,14 @@ from comparisons.experiments.stability.harness.family import (
     FloatArray,
     Outcome,
 )
+from comparisons.experiments.stability.harness.outcomes import one_case
+from comparisons.experiments.stability.harness.steps import at, scaled
 from comparisons.geometry import frame
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load
-from reference_rt.core import transform
 
-_TINY = transform.Scale(scale=(1e-30, 1e-30, 1e-30))
-
-
-def at(x: float, y: float, z: float) -> transform.Translate:
-    return transform.Translate(translate=(x, y, z))
-
-
-def facing(axis: tuple[float, float, float], degrees: float) -> transform.Rotate:
-    return transform.Rotate(rotate=transform.Turn(axis=axis, degrees=degrees))
+_TINY = scaled(1e-30)
 
 
 def grey(x: float) -> tuple[float, float, float]:
@@ -131,9 +124,7 @@ def judge(
         failed, (mean, error) = chance.fails(sample, expected, *limits)
         off = abs(mean - expected) / expected
         seen = {"expected": expected, "found": mean, "standard error": error, "seeds": seeds}
-        examples = ({**told, **seen},) if failed else ()
-        worst = off if math.isfinite(off) else math.inf
-        found[who] = Outcome(1, int(failed), worst, examples=examples)
+        found[who] = one_case(failed, off, {**told, **seen})
     return found
 
 

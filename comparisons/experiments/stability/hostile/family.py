@@ -1,26 +1,4 @@
-"""F6, hostile values: whatever a scene, a file or a ray holds, the answer is defined.
-
-Law: each hostile scene gives either one line of error (our classes; exit code 3; the file, the
-place in it and what was expected or is malformed), or a picture of which every pixel that is not
-finite is reported (exit code 3 too, with the places).  Never a crash, a traceback ("internal
-error"), a hang (5 s of computing; 120 s in plain Python) or a pixel that is not finite and not
-told.  Each hostile ray gives a miss or a hit that is finite throughout.
-
-Ranges: see `NUMBERS` and others in `hostile/damage.py`: NaN, infinities, zeros of both signs, the
-smallest and largest floats, what overflows when it is squared, integers beyond 64 bits, texts,
-names of files that are none, values of other types, sets of each other, cycles, anchors, tags.
-
-Counts: 11,000 scenes and files in the full run (values 4500, structure 1600, grammar 1600, text
-480, meshes 2400, images 600), rays 10^5 per magnitude.
-
-How: scenes go to child processes, which do as `reference-rt render` does (8 x 8 pixels, one
-sample), so that one that dies takes no other with it.  Values change in a few fixed scenes, whose
-compiled kernels stay the same; where they do not, and where the structure changes, plain Python
-runs the same text (NUMBA_DISABLE_JIT=1), bit-identical and without seconds of compiling.
-
-To reproduce a failure: its scene is in the examples as text, or else the file's bytes in base 64;
-`reference-rt render scene.json -o out.exr --size 8x8 --spp 1`.
-"""
+"""The series of F6; the folder's docstring states the law."""
 
 import base64
 import json
@@ -38,6 +16,7 @@ from comparisons.experiments.stability.harness.family import (
     Family,
     Outcome,
     Series,
+    Sweep,
 )
 from comparisons.experiments.stability.hostile import rays
 from comparisons.experiments.stability.hostile.bases import (
@@ -262,63 +241,45 @@ FAMILY = Family(
     (
         Series(
             "values",
-            "hostile numbers in a scene",
+            Sweep("hostile numbers in a scene", (*_COUNTS, 16.0), (1.0, 4.0), 60, 900),
             "Numbers of four sound scenes (every shape; materials and lights; recursive; layers) "
             "replaced by hostile ones.  A crash, a hang, a traceback, an unclear error or a pixel "
             "that is not finite and not reported breaks the law.",
-            (*_COUNTS, 16.0),
-            (1.0, 4.0),
-            {"quick": 60, "full": 900},
             values,
             explained="None of this hangs on precision: what is refused is refused by rules, and "
             "Mitsuba's range of float32 is left by a single hostile number already.",
         ),
         Series(
             "structure",
-            "changes of what is where",
+            Sweep("changes of what is where", _COUNTS, (2.0,), 50, 400),
             "Values of other types, keys that are missing, new or moved, long lists, deep trees.",
-            _COUNTS,
-            (2.0,),
-            {"quick": 50, "full": 400},
             structure,
         ),
         Series(
             "grammar",
-            "share of hostile values",
+            Sweep("share of hostile values", (0.001, 0.01, 0.03, 0.1), (0.01,), 30, 400),
             "Sentences of the scenes' JSON Schema, of which some values are hostile.",
-            (0.001, 0.01, 0.03, 0.1),
-            (0.01,),
-            {"quick": 30, "full": 400},
             grammar,
         ),
         Series(
             "text",
-            "damages of a scene's text",
+            Sweep("damages of a scene's text", _COUNTS, (1.0,), 16, 120),
             "Bytes of YAML that are flipped, cut or repeated; tags, anchors, other documents, and "
             "aliases of aliases that stand for up to 9^24 things.",
-            _COUNTS,
-            (1.0,),
-            {"quick": 16, "full": 120},
             text,
         ),
         Series(
             "meshes",
-            "damages of a mesh file",
+            Sweep("damages of a mesh file", _COUNTS, (2.0,), 60, 600),
             "Files of .obj, .ply (text and bytes), .stl, .off, .glb and .gltf with bytes flipped, "
             "cut out or off, repeated, or replaced by hostile numbers.",
-            _COUNTS,
-            (2.0,),
-            {"quick": 60, "full": 600},
             meshes,
         ),
         Series(
             "images",
-            "damages of an image file",
+            Sweep("damages of an image file", _COUNTS, (2.0,), 20, 150),
             "The same of .png, .exr, .hdr, .pfm, .npy, .tif and .jpg, as a texture and as the "
             "light around.",
-            _COUNTS,
-            (2.0,),
-            {"quick": 20, "full": 150},
             images,
         ),
         *rays.SERIES,

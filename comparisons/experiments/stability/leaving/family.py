@@ -1,34 +1,4 @@
-"""F2: rays that leave a surface.
-
-Law.  A ray meets a shape at p, with the outward normal n, and goes on from there towards any w.
-(1) It does not meet again what it leaves: towards the outer side of a convex shape, and to either
-side of a flat one, it meets nothing; what it meets else, exact arithmetic on the ray as it begins
-(o', w) meets too, within a factor of 2 in t, so that it is another place.
-(2) Nothing is lost: into a closed shape it meets the far wall, through its outer side, and
-
-    |o' - p| <= B = 17 sqrt(3) u (2 |c| + 6 s),  u = 2^-53,
-
-c being the middle of the shape (largest coordinate) and s its longest half axis, however thin.
-(3) The first ray, aimed at what is well inside, meets the shape wherever exact arithmetic says so.
-
-Where the shape is thinner than 4 B within B of p, along the normal or along w, its walls are one:
-next to an edge, p may lie beyond the neighbouring face, by its rounding.  Such cases are open,
-and so are first rays whose answer hangs on moving them by B.
-
-Range: 15 kinds of shapes, sizes 1e-8 to 1e8, axes up to 1e12 times as long as others, middles up to
-1e10 sizes from the origin and beyond, directions up to cos = 1e-15 to the surface.  Counts, full:
-10^6 departures of each kind in its own series, 1000 shapes by 1000 rays.  Passes: no failure.
-
-Every departure is traced; exact arithmetic is asked about those that do not look as they should, by
-the sign of w · n where they meet something again, and about a sample of all others.
-
-Mitsuba leaves by `si.spawn_ray(w)`: an offset of (1 + max |p|) RayEpsilon along the normal, and
-RayEpsilon is 8.9e-5 in its float32.  In place of B it is put the size: a ray that begins more than
-s / 100 off has lost neighbours that are as near, as predicted from |c| = 112 s on, and for shapes
-smaller than 8.9e-3.  While it takes part, all numbers of shapes and rays are rounded to float32
-first, for everyone.  So is the text-book's ray judged, which begins at o + t d, what is nearer than
-1e-4 not counting.
-"""
+"""The series of F2; the folder's docstring states the law."""
 
 import contextlib
 import math
@@ -46,13 +16,15 @@ from comparisons.experiments.stability.harness.family import (
     Outcome,
     Series,
     Shot,
+    Sweep,
     decades,
 )
+from comparisons.experiments.stability.harness.leaving import EPSILON
 from comparisons.experiments.stability.leaving import mitsuba as theirs
 from comparisons.experiments.stability.leaving.judge import Judge, Tally
 from comparisons.experiments.stability.leaving.shapes import KINDS, WHOLE, Extent, Rays, aim, place
 from comparisons.experiments.stability.leaving.shots import shoot
-from comparisons.experiments.stability.leaving.tracer import EPSILON, Ways, depart, subjects
+from comparisons.experiments.stability.leaving.tracer import Ways, depart, subjects
 from comparisons.mitsuba.backend import scalar
 
 FIXED = "fixed epsilon"
@@ -197,13 +169,10 @@ def _series(
             return shoot(contestant, kind, extent(draw, x)._replace(single=single), draw)
 
     return Series(
-        name=name,
-        axis=axis,
-        about=about,
-        values=values,
-        quick=quick,
-        cases={"quick": 500 * len(kinds), "full": cases or PER_KIND // len(values)},
-        measure=run,
+        name,
+        Sweep(axis, values, quick, 500 * len(kinds), cases or PER_KIND // len(values)),
+        about,
+        run,
         unit="B",
         holds_to=holds_to,
         law=law,

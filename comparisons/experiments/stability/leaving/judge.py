@@ -8,6 +8,8 @@ import numpy as np
 
 from comparisons.experiments.methods.setting import FloatArray
 from comparisons.experiments.stability.harness.family import EXAMPLES, Outcome
+from comparisons.experiments.stability.harness.leaving import CONTACT
+from comparisons.experiments.stability.harness.outcomes import hexed
 from comparisons.experiments.stability.leaving.shapes import KINDS, Placed, Rays
 from comparisons.experiments.stability.leaving.tracer import Departures, Subject, scene_of
 from comparisons.geometry.exact import all_hits, first_of
@@ -15,9 +17,6 @@ from comparisons.geometry.exact.dyadic import NEVER, BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.sizes import ShapeSizes
 from reference_rt.core.arrays import IntArray
-
-CONTACT = 4.0
-"""Bounds: what is thicker must not be lost, nor a neighbour that is farther away."""
 
 CLOSE = 0.01
 """Sizes: how near a neighbour is that others than ours must not lose."""
@@ -87,11 +86,6 @@ class Tally:
         return Outcome(
             self.cases, self.failures, self.worst, self.open, tuple(self.examples[:EXAMPLES])
         )
-
-
-def hexed(values: FloatArray) -> Any:
-    """Numbers to the last bit."""
-    return [x.hex() for x in np.asarray(values, float).ravel().tolist()]
 
 
 class Judge:

@@ -7,7 +7,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.leaving.shapes import GROUPS, KINDS, Placed, Rays
+from comparisons.experiments.stability.leaving.shapes import GROUPS, WHOLE, Placed, Rays
 from reference_rt import shapes as any_shape
 from reference_rt.accel.geometry import Geometry, closest_hit, surface
 from reference_rt.core.arrays import IntArray
@@ -51,9 +51,6 @@ class Departures(NamedTuple):
 
 
 COLUMNS = 15
-
-EPSILON = 1e-4
-"""Of the text-book's offset."""
 
 
 @kernel
@@ -144,8 +141,8 @@ class Subject(NamedTuple):
 
 def subjects(kind: str, placed: list[Placed]) -> list[Subject]:
     """Shapes of one kind."""
-    if kind in ("mesh", "solid", "instance"):
-        return [Subject(_scene(p).geometry, "", -1, 0) for p in placed]
+    if kind in WHOLE:
+        return [Subject(rt.build_tables(scene_of(p)).geometry, "", -1, 0) for p in placed]
     shapes = (*(p.shape for p in placed), *COMPANY)
     geometry = rt.build_tables(rt.Scene(shapes=shapes)).geometry
     found = []
@@ -163,10 +160,6 @@ def scene_of(placed: Placed) -> rt.Scene:
     return rt.Scene(shapes=(placed.shape,), groups=groups)
 
 
-def _scene(placed: Placed) -> Any:
-    return rt.build_tables(scene_of(placed))
-
-
 def depart(subject: Subject, rays: Rays, ways: Ways, epsilon: float = 0.0) -> Departures:
     """Rays meet the shape and leave it; with an epsilon above 0, as text-books do."""
     out = np.zeros((len(rays.o), COLUMNS))
@@ -174,6 +167,3 @@ def depart(subject: Subject, rays: Rays, ways: Ways, epsilon: float = 0.0) -> De
     with np.errstate(all="ignore"):
         _depart(subject.geometry, subject.kind, rows, rays.o, rays.d, ways.local, epsilon, out)
     return Departures.of(out)
-
-
-__all__ = ["EPSILON", "KINDS", "Departures", "Subject", "Ways", "depart", "scene_of", "subjects"]

@@ -9,8 +9,8 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
+from comparisons.experiments.stability.harness.bits import of_pixels
 from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
     MITSUBA,
     OURS,
     Draw,
@@ -162,31 +162,16 @@ def judged(contestant: str, scene: rt.Scene, motion: Motion, mirrored: bool = Fa
         wrong = wrong_pixels(found, base)
     off = np.abs(found - base.picture).max(axis=-1)
     off = np.where(np.isfinite(off), off, np.inf)
-    places = np.argwhere(wrong)[:EXAMPLES]
-    return Outcome(
-        wrong.size,
-        int(np.count_nonzero(wrong)),
+    return of_pixels(
+        wrong,
+        {"before": base.picture, "after": found, "bound": base.bound},
         float(off.max() / base.picture.mean()),
-        0,
-        tuple(_hexadecimal(base, found, int(y), int(x)) for y, x in places),
     )
 
 
 def _anywhere(rng: np.random.Generator, shift: float, part: object) -> FloatArray:
     v = rng.normal(size=3)
     return np.asarray(shift / np.linalg.norm(v) * v)
-
-
-def _hexadecimal(base: Before, found: FloatArray, y: int, x: int) -> dict[str, object]:
-    def told(values: FloatArray) -> list[str]:
-        return [value.hex() for value in values[y, x].tolist()]
-
-    return {
-        "pixel": [x, y],
-        "before": told(base.picture),
-        "after": told(found),
-        "bound": told(base.bound),
-    }
 
 
 def under(motion: Callable[[float], Motion], draw: Draw, x: float) -> dict[str, Outcome]:

@@ -1,17 +1,20 @@
 """What rays hit in a scene and in the same scene transformed."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.methods.setting import unit_rows
+from comparisons.experiments.stability.harness.family import MITSUBA, OURS, FloatArray, Outcome
+from comparisons.experiments.stability.harness.outcomes import Columns, hexed, outcome
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.metamorphic.motion import Motion
 from comparisons.experiments.stability.metamorphic.solids import Judge
 from comparisons.geometry import frame
+from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.translate import load
@@ -75,7 +78,7 @@ def aimed(tables: SceneTables, n: int, rng: np.random.Generator) -> Rays:
     """
     o = (1.0, 2.0, 7.0) + np.rint(rng.uniform(-1.0, 1.0, (n, 3)) * GRID) / GRID
     ends = rng.uniform(-3.0, 3.0, (2, n, 3)) - o
-    a, b = (round32(unit(end)) for end in ends)
+    a, b = (round32(unit_rows(end)) for end in ends)
     kind = np.arange(n) % 3
     pairs = np.flatnonzero((kind > 0) & differ(ours(tables, o, a), ours(tables, o, b)))
     low, high = np.zeros(len(pairs)), np.ones(len(pairs))
@@ -93,14 +96,6 @@ def aimed(tables: SceneTables, n: int, rng: np.random.Generator) -> Rays:
     coarse = np.ones(n, bool)
     coarse[pairs[~far]] = False
     return Rays(o, a, coarse)
-
-
-def unit(v: FloatArray) -> FloatArray:
-    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
-
-
-def round32(v: FloatArray) -> FloatArray:
-    return v.astype(np.float32).astype(np.float64)
 
 
 def differ(a: Found, b: Found) -> BoolArray:
@@ -150,29 +145,17 @@ def judged(
     exact arithmetic: where rounding the scene has really changed what is there, both are;
     unmoved: each must be right in the scene before.
     """
-    changed = _changed(before, after)
-    t0, t1 = before.found.t, after.found.t / factor
-    same = np.isfinite(t0) & ~changed
-    off = np.abs(t1[same] - t0[same]) / t0[same]
-    worst = float(off.max(initial=0.0))
-    open_ = np.zeros(len(t0), bool)
+    changed, moved, worst = _compared(before, after, factor)
+    open_ = np.zeros(len(changed), bool)
     if exact:
-        wrong = changed | (same & (t0 != t1))
+        wrong = changed | moved
     else:
         wrong = changed.copy()
         rows = np.flatnonzero(changed)
         judged_as = before._replace(found=after.found) if unmoved else after
         right, open_[rows] = _both_right(before, judged_as, rows)
         wrong[rows[right]] = False
-    wrong &= ~open_
-    rows = np.flatnonzero(wrong)[:EXAMPLES]
-    return Outcome(
-        int(len(t0) - np.count_nonzero(open_)),
-        int(np.count_nonzero(wrong)),
-        worst,
-        int(np.count_nonzero(open_)),
-        tuple(_example(before, after, int(k)) for k in rows),
-    )
+    return outcome(wrong, {"before": _told(before), "after": _told(after)}, open_, worst)
 
 
 def _both_right(
@@ -212,33 +195,23 @@ def _right(asked: Asked, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolAr
 def judged_mitsuba(before: Asked, after: Asked, factor: float) -> Outcome:
     """Its rays pass every edge at more than 1e-5 of the way: what float64's rounding of the scene
     moves, 1e-16 of its size, changes none of them."""
-    wrong = _changed(before, after)
+    wrong, _, worst = _compared(before, after, factor)
+    return outcome(wrong, {"before": _told(before), "after": _told(after)}, worst=worst)
+
+
+def _compared(before: Asked, after: Asked, factor: float) -> tuple[BoolArray, BoolArray, float]:
+    """Which rays hit something else; which hit the same at another t; by how much at most, of t."""
+    changed = _changed(before, after)
     t0, t1 = before.found.t, after.found.t / factor
-    same = np.isfinite(t0) & ~wrong
-    worst = float((np.abs(t1[same] - t0[same]) / t0[same]).max(initial=0.0))
-    rows = np.flatnonzero(wrong)[:EXAMPLES]
-    examples = tuple(_example(before, after, int(k)) for k in rows)
-    return Outcome(len(wrong), int(np.count_nonzero(wrong)), worst, 0, examples)
+    same = np.isfinite(t0) & ~changed
+    off = np.abs(t1[same] - t0[same]) / t0[same]
+    return changed, same & (t0 != t1), float(off.max(initial=0.0))
 
 
-def _example(before: Asked, after: Asked, k: int) -> dict[str, Any]:
-    def told(asked: Asked) -> dict[str, Any]:
-        return {
-            "o": [x.hex() for x in asked.o[k].tolist()],
-            "d": [x.hex() for x in asked.d[k].tolist()],
-            "t": float(asked.found.t[k]).hex(),
-            "shape, instance, part, primitive": asked.found.identities[k].tolist(),
-        }
-
-    return {"before": told(before), "after": told(after)}
-
-
-def added(one: Mapping[str, Outcome], other: Mapping[str, Outcome]) -> Outcomes:
-    """Contestant by contestant."""
-    found = dict(one)
-    for name, outcome in other.items():
-        found[name] = found[name] + outcome if name in found else outcome
-    return found
+def _told(asked: Asked) -> Callable[[int], dict[str, Any]]:
+    columns: Columns = {"o": asked.o, "d": asked.d, "t": asked.found.t}
+    columns["shape, instance, part, primitive"] = asked.found.identities
+    return lambda k: {name: hexed(column[k]) for name, column in columns.items()}
 
 
 class Bench:
@@ -255,3 +228,32 @@ class Bench:
         if mitsuba:
             o, d = o[coarse], d[coarse]
             self.mitsuba = Asked(scene, o, d, mitsubas(scene, o, d))
+
+    def compared(
+        self,
+        scene: rt.Scene,
+        o: FloatArray,
+        d: FloatArray,
+        names: Callable[[Identities], Identities] | None = None,
+        factor: float = 1.0,
+        exact: bool = False,
+        unmoved: bool = False,
+    ) -> Outcomes:
+        """The rays, as they are transformed, in the scene transformed.  names: identities in terms
+        of the scene before, of those after;  factor, exact, unmoved: see `judged`."""
+
+        def asked(o: FloatArray, d: FloatArray, found: Found) -> Asked:
+            return Asked(scene, o, d, found, names(found.identities) if names else None)
+
+        after = asked(o, d, self.found_after(scene, o, d))
+        outcomes = {OURS: judged(self.ours, after, factor, exact, unmoved)}
+        if self.mitsuba is not None:
+            o, d = o[self.rays.coarse], d[self.rays.coarse]
+            after = asked(o, d, mitsubas(scene, o, d))
+            outcomes[MITSUBA] = judged_mitsuba(self.mitsuba, after, factor)
+        return outcomes
+
+    @staticmethod
+    def found_after(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Found:
+        """By ours."""
+        return ours(rt.build_tables(scene), o, d)

@@ -1,13 +1,15 @@
 """What F8 holds roots against: certified ones, and the bound that their condition sets."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import flint
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.far.law import Rays
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import FloatArray, Outcome
+from comparisons.experiments.stability.harness.outcomes import outcome
+from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.geometry.exact.curved import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic
 
@@ -93,11 +95,11 @@ def judge(
     found: FloatArray,
     truth: Certified,
     slack: FloatArray | float,
-    asked: Any,
+    asked: Mapping[str, Any],
 ) -> Outcome:
     """Roots `found` (n, k) as `Certified.real` has them; `slack` (n, 1): besides the bound.
 
-    Wrong are a root too few or too many, and one off by more.  asked(i): the case, for examples.
+    Wrong are a root too few or too many, and one off by more.  asked: columns of the examples.
     """
     real, bound = truth.real()
     found = np.sort(np.where(np.isnan(found), np.inf, found), axis=1)
@@ -105,20 +107,8 @@ def judge(
     share = np.zeros(real.shape)
     off = np.abs(np.where(both, found, 0.0) - np.where(both, real, 0.0))
     share[both] = (off / (bound + slack))[both]
-    wrong = ~truth.open & np.any((np.isfinite(real) != np.isfinite(found)) | (share > 1.0), axis=1)
-    counted = (
-        both
-        & ~truth.open[:, None]
-        & np.all(np.isfinite(real) == np.isfinite(found), axis=1)[:, None]
-    )
+    as_many = np.all(np.isfinite(real) == np.isfinite(found), axis=1)
+    counted = both & (as_many & ~truth.open)[:, None]
     worst = float(share[counted].max()) if counted.any() else None
-    examples = tuple(
-        {
-            **asked(i),
-            "expected": [x.hex() for x in real[i].tolist()],
-            "found": [x.hex() for x in found[i].tolist()],
-        }
-        for i in np.flatnonzero(wrong)[:EXAMPLES].tolist()
-    )
-    cases = int(np.sum(~truth.open))
-    return Outcome(cases, int(wrong.sum()), worst, int(truth.open.sum()), examples)
+    told = {**asked, "expected": real, "found": found}
+    return outcome(~as_many | np.any(share > 1.0, axis=1), told, truth.open, worst)

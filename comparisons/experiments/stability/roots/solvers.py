@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.far.law import Rays
 from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.rays import Rays
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import entry_kernel

@@ -1,21 +1,6 @@
-"""F4, slivers: thin shapes, and rays that graze.
+"""The series of F4; the folder's docstring states the law."""
 
-Law: a hit is one.  Its t is in the exact hit interval, which is where rays moved by no more than
-rounding meet the shape (`f04_slivers_judge` has the bound, 144 u (|o| + size)); a miss is exact, or
-a ray so moved misses.  A hit may also be up to 1e-3 of the shape off the exact one, which is what
-lets float32 pass where it only rounds.  What float64 may not do, and what Embree was found to do
-(embree#387: t = 12291.2 on a triangle at 1), is to name a point where there is no shape.
-
-Range: triangles of aspect 1 to 1e12, aligned and turned; boxes of aspect 1 to 1e12; angles of
-1e-1 to 1e-15 between rays and triangles, rectangles, disks and faces of boxes.  8 shapes a setting,
-quick 2,000 rays, full 40,000.  Passes: no failure, up to the end of every range.
-
-Every other shape and its rays are rounded to float32, and Mitsuba gets the very same numbers as
-ours and the text-book's methods; the others are for these alone.  Mitsuba is judged by the same
-law: what its rounding turns into a miss or a hit is wrong.
-"""
-
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
 import numpy as np
@@ -25,14 +10,15 @@ from comparisons.experiments.stability.harness.family import (
     MITSUBA,
     OURS,
     Draw,
-    Effort,
     Family,
     FloatArray,
     Outcome,
     Series,
     Shot,
+    Sweep,
     decades,
 )
+from comparisons.experiments.stability.harness.outcomes import together
 from comparisons.experiments.stability.slivers import drawn, shots
 from comparisons.experiments.stability.slivers.drawn import SHAPES, Trial
 from comparisons.experiments.stability.slivers.judge import Judge, Question
@@ -41,7 +27,7 @@ from reference_rt.rendering import query
 
 Make = Callable[[np.random.Generator, float, int, bool], Trial]
 
-CASES: Mapping[Effort, int] = {"quick": 2_000, "full": 40_000}
+CASES = 2_000, 40_000
 
 
 def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray]]:
@@ -69,18 +55,14 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
 def measured(make: Make) -> Callable[[Draw, float], Mapping[str, Outcome]]:
     """A series' `measure`: SHAPES trials, each put to everybody who can take part."""
 
-    def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
-        total: dict[str, Outcome] = {}
+    def trials(draw: Draw, x: float) -> Iterator[dict[str, Outcome]]:
         for k in range(SHAPES):
             trial = make(draw.rng, x, draw.cases // SHAPES, k % 2 == 0)
             question, found = answers(trial, draw.mitsuba and trial.singles)
             judge = Judge(question)
-            for name, t in found.items():
-                outcome = judge.outcome(t)
-                total[name] = total[name] + outcome if name in total else outcome
-        return total
+            yield {name: judge.outcome(t) for name, t in found.items()}
 
-    return measure
+    return lambda draw, x: together(trials(draw, x))
 
 
 def map_of(make: Callable[..., Trial]) -> Callable[[str, float], Shot]:
@@ -108,13 +90,10 @@ def _series(
     shoot: Callable[[str, float], Shot] | None = None,
 ) -> Series:
     return Series(
-        name=name,
-        axis=axis,
-        about=about,
-        values=values,
-        quick=values[quick::4],
-        cases=CASES,
-        measure=measured(make),
+        name,
+        Sweep(axis, values, values[quick::4], *CASES),
+        about,
+        measured(make),
         unit="u (|o| + size)",
         explained=explained,
         shoot=shoot,

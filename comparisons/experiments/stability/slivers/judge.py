@@ -22,7 +22,8 @@ import numpy.typing as npt
 
 from comparisons.experiments.methods.errors import PIXEL, U
 from comparisons.experiments.methods.setting import unit_rows
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import FloatArray, Outcome
+from comparisons.experiments.stability.harness.outcomes import hexed, outcome
 from comparisons.geometry.exact import first_hit
 from comparisons.geometry.exact.dyadic import Dyadic, cross
 
@@ -78,18 +79,12 @@ class Judge:
         """Of answers t (n,), inf for a miss.  `worst`: how far from the shape hits are, in u D."""
         q, found = self.question, np.isfinite(t)
         off = self._distances(found, t)
-        wrong = self._wrong(t, off)
-        open_ = wrong & self.touching
-        wrong &= ~self.touching
         worst = float((off[found] / (U * q.reach)).max()) if found.any() else None
-        shown = np.flatnonzero(wrong)[:EXAMPLES]
-        return Outcome(
-            cases=len(t) - int(open_.sum()),
-            failures=int(wrong.sum()),
-            worst=worst,
-            open=int(open_.sum()),
-            examples=tuple(self._example(int(k), float(t[k])) for k in shown),
-        )
+        wrong = self._wrong(t, off)
+        shape = {name: np.ravel(v) for name, v in q.row.items() if name in _SHAPES[q.kind]}
+        told = {"shape": {name: hexed(v) for name, v in shape.items()}, "origin": q.o}
+        told |= {"direction": q.d, "expected": self.t, "found": t}
+        return outcome(wrong, told, wrong & self.touching, worst)
 
     def wrong(self, t: FloatArray) -> BoolArray:
         """Which of answers t (n,) are."""
@@ -123,19 +118,6 @@ class Judge:
         seen = first_hit(q.kind, q.row, o, d).t.reshape(-1, RING)
         slack = PIXEL * q.size / np.linalg.norm(q.d[which], axis=1)
         return np.asarray((seen < (t[which] - slack)[:, None]).all(axis=1))
-
-    def _example(self, k: int, t: float) -> Mapping[str, Any]:
-        q = self.question
-        row = {name: value for name, value in q.row.items() if name in _SHAPES[q.kind]}
-        return {
-            "shape": {
-                name: [x.hex() for x in np.ravel(value).tolist()] for name, value in row.items()
-            },
-            "origin": [x.hex() for x in q.o[k].tolist()],
-            "direction": [x.hex() for x in q.d[k].tolist()],
-            "expected": float(self.t[k]).hex(),
-            "found": t.hex(),
-        }
 
 
 _SHAPES = {

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.experiments.stability.harness.family import MITSUBA, FloatArray
-from comparisons.experiments.stability.harness.meshes import Closed
+from comparisons.experiments.stability.harness.meshes import Closed, mitsuba_mesh
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt import textbook
@@ -63,22 +63,16 @@ def mitsubas(mesh: Closed) -> dict[str, Tracer]:
         flags = {"type": "scene", "embree_use_robust_intersections": is_robust}
         return mi.load_dict({**flags, **shapes}, optimize=False)
 
-    group = {"type": "shapegroup", "member": _mesh(mi, mesh)}
+    def made() -> Any:
+        return mitsuba_mesh(mesh.vertices, mesh.faces)
+
+    group = {"type": "shapegroup", "member": made()}
     copy = {"type": "instance", "group": {"type": "ref", "id": "group"}}
     return {
-        MITSUBA: _tracer(mi, scene(True, mesh=_mesh(mi, mesh))),
-        NOT_ROBUST: _tracer(mi, scene(False, mesh=_mesh(mi, mesh))),
+        MITSUBA: _tracer(mi, scene(True, mesh=made())),
+        NOT_ROBUST: _tracer(mi, scene(False, mesh=made())),
         INSTANCED: _tracer(mi, scene(True, group=group, copy=copy)),
     }
-
-
-def _mesh(mi: Any, mesh: Closed) -> Any:
-    made = mi.Mesh("mesh", len(mesh.vertices), len(mesh.faces))
-    values = mi.traverse(made)
-    values["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
-    values["faces"] = mesh.faces.astype(np.uint32).ravel()
-    values.update()
-    return made
 
 
 def _tracer(mi: Any, scene: Any) -> Tracer:

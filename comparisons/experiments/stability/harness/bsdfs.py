@@ -4,15 +4,16 @@ Directions are local, unit, (n, 3); `wo` towards the viewer.  Mitsuba sees them 
 """
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw, FloatArray, Sweep
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.materials import translate_material
@@ -145,8 +146,7 @@ class Theirs:
 
     def evaluate(self, wo: FloatArray, wi: FloatArray) -> FloatArray:
         context = mitsuba().BSDFContext()
-        found = for_rays(lambda o, i: (self.bsdf.eval(context, self._seen(o), i),), wo, wi)
-        return found[0]
+        return for_rays(lambda o, i: (self.bsdf.eval(context, self._seen(o), i),), wo, wi)[0]
 
     def pdf(self, wo: FloatArray, wi: FloatArray) -> FloatArray:
         context = mitsuba().BSDFContext()
@@ -165,6 +165,12 @@ class Theirs:
         u = np.minimum(u, 1.0 - 2.0**-24)
         wi, weight, pdf, eta, is_delta = for_rays(draw, wo, u)
         return Samples(wi, weight, pdf, eta, is_delta != 0.0)
+
+
+def contestants(material: Material, draw: Draw) -> Iterator[tuple[str, Bsdf]]:
+    yield OURS, Ours.of(material)
+    if draw.mitsuba:
+        yield MITSUBA, Theirs.of(material)
 
 
 GOLD: dict[str, Any] = {"eta": (0.143, 0.375, 1.442), "k": (3.983, 2.386, 1.603)}
@@ -209,6 +215,12 @@ SMOOTH: dict[str, Material] = {
     "dielectric": Dielectric(),
     "thin dielectric": ThinDielectric(),
 }
+
+
+ALPHA = partial(
+    Sweep, "1 / alpha", (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4), (1.0, 1e2, 1e4)
+)
+"""Ever smoother; of so many cases."""
 
 
 def index_of(material: Material) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from comparisons.experiments.stability.bsdfs.bsdfs import Bsdf
+from comparisons.experiments.stability.harness.bsdfs import Bsdf
 from comparisons.experiments.stability.harness.family import FloatArray
 from comparisons.geometry.exact.crossings import IntArray
 

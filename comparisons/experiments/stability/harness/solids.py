@@ -1,5 +1,6 @@
 """Where rays go in and out of a solid: by ours, by the text-book's methods, and exactly."""
 
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -7,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray
-from comparisons.experiments.stability.solids.trees import MESH
+from comparisons.experiments.stability.harness.family import OURS, FloatArray
+from comparisons.experiments.stability.harness.meshes import BALL
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
 from comparisons.geometry.exact.referee import crossings_of, evaluated
 from comparisons.geometry.flatten import Tree, member_of
@@ -32,7 +33,7 @@ MOST = 256
 def scene_of(solid: Any, folder: Path) -> Scene:
     """The solid and, behind it, one of each kind of table: all scenes are traced by one set of
     kernels."""
-    others = (rt.Sphere(), rt.Box(), rt.Cylinder(capped=True), rt.Torus(), rt.Mesh(file=MESH))
+    others = (rt.Sphere(), rt.Box(), rt.Cylinder(capped=True), rt.Torus(), rt.Mesh(file=BALL))
     scene = rt.Scene(shapes=(solid, *others))
     scene._folder = folder
     return scene
@@ -67,6 +68,14 @@ def intervals(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> FloatAr
 def inside_tests(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> FloatArray:
     """The first crossing, all that they give: (n, 1)."""
     return textbook.intersect(INSIDE_TESTS, CsgParameters(solid, folder), o, d)[:, None]
+
+
+LISTS: Mapping[str, Callable[[Any, Path, FloatArray, FloatArray], FloatArray]] = {
+    OURS: lambda *arguments: ours(*arguments).t,
+    INTERVALS: intervals,
+    INSIDE_TESTS: inside_tests,
+}
+"""Crossings (n, k) of a solid, its folder and rays, by contestant."""
 
 
 def same(a: FloatArray, b: FloatArray) -> Any:
