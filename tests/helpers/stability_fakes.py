@@ -8,17 +8,8 @@ import time
 import numpy as np
 
 from comparisons.experiments.stability.harness import families, worker
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Family,
-    Outcome,
-    Series,
-    Shot,
-    Sweep,
-    alone,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Outcome, Shot
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, alone, decades
 
 METHOD = "sphere.algebraic"
 

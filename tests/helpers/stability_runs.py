@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from comparisons.experiments.stability.harness.core import Draw, Outcome, generator
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import Draw, Outcome, generator
 
 
 def measured(

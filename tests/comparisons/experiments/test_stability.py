@@ -17,14 +17,8 @@ from typer.testing import CliRunner
 
 from comparisons.commands import register
 from comparisons.experiments.stability.harness import families, run, table
-from comparisons.experiments.stability.harness.family import (
-    OURS,
-    Family,
-    Outcome,
-    Series,
-    Sweep,
-    generator,
-)
+from comparisons.experiments.stability.harness.core import OURS, Outcome, generator
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep
 from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import summarise

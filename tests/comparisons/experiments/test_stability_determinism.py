@@ -6,7 +6,7 @@ import stability_runs
 
 from comparisons.experiments.stability.determinism import parts
 from comparisons.experiments.stability.harness import bits
-from comparisons.experiments.stability.harness.family import OURS, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Outcome
 
 
 def measured(series, x, folder):

@@ -5,8 +5,8 @@ import importlib
 import pytest
 from stability_runs import measured
 
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS
 from comparisons.experiments.stability.harness.families import MODULES, family
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS
 from comparisons.experiments.stability.harness.run import Choice, mitsuba_is_there, run
 from comparisons.experiments.stability.harness.summary import FURTHER, SeriesSummary, summarise
 

@@ -15,7 +15,7 @@ from comparisons.experiments.stability.bsdfs import digits, pairs, samples
 from comparisons.experiments.stability.bsdfs.law import density_between, fresnel, masking
 from comparisons.experiments.stability.furnaces import family as f10_furnaces
 from comparisons.experiments.stability.harness.bsdfs import Bsdf, Ours, Samples, towards
-from comparisons.experiments.stability.harness.family import OURS, Draw, FloatArray
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray
 from comparisons.experiments.stability.harness.outcomes import of_errors, relative
 from comparisons.experiments.stability.radiometry import flat_lights, lights, solid_angles
 from reference_rt.lights.emitters import point

@@ -10,8 +10,8 @@ import pytest
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.metamorphic import family as f09_metamorphic
 from comparisons.experiments.stability.metamorphic import light, solids

@@ -10,7 +10,7 @@ import stability_runs
 import reference_rt as rt
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.stability.harness import meshes
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
 from comparisons.experiments.stability.hierarchy import every
 from comparisons.experiments.stability.slivers import family as f04
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question

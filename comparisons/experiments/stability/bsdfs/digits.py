@@ -14,16 +14,8 @@ from comparisons.experiments.stability.bsdfs.law import (
 )
 from comparisons.experiments.stability.bsdfs.pairs import in_float32, matched
 from comparisons.experiments.stability.harness.bsdfs import ALPHA, towards
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-    Sweep,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.outcomes import (
     hexed,
     of_errors,

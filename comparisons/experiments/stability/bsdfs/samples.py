@@ -15,13 +15,9 @@ from comparisons.experiments.stability.harness.bsdfs import (
     index_of,
     towards,
 )
+from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome
 from comparisons.experiments.stability.harness.densities import fit
-from comparisons.experiments.stability.harness.family import (
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-)
+from comparisons.experiments.stability.harness.family import Series
 from comparisons.experiments.stability.harness.outcomes import (
     hexed,
     of_errors,

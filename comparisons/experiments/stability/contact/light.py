@@ -10,13 +10,7 @@ import reference_rt as rt
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import FloatArray
 from comparisons.experiments.stability.contact.stacks import COUNT, THEIRS, rays_down
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    Outcome,
-    Shot,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome, Shot
 from comparisons.experiments.stability.harness.leaving import CONTACT, PIXELS, bound, lit, picture
 from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.harness.steps import matrix

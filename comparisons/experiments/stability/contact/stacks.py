@@ -8,7 +8,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome
 from comparisons.experiments.stability.harness.outcomes import outcome, together
 from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry import frame

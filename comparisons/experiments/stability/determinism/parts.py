@@ -12,7 +12,7 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import MAKES, over, same_bits
-from comparisons.experiments.stability.harness.family import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
 from reference_rt.rendering.tiles import render_band
 from reference_rt.util.child_processes import tied
 

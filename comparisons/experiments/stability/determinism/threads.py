@@ -6,7 +6,7 @@ from typing import Any
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import MAKES, over, same_bits
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome
 from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load

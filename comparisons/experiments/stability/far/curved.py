@@ -13,13 +13,7 @@ from comparisons.experiments.stability.far.spheres import (
     in_mitsuba,
     tangent_gaps,
 )
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
 from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry.exact.dyadic import Dyadic

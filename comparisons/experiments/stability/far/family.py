@@ -7,15 +7,8 @@ import numpy as np
 
 from comparisons.experiments.stability.far import curved, spheres
 from comparisons.experiments.stability.far.picture import shoot
-from comparisons.experiments.stability.harness.family import (
-    Draw,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-    Sweep,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.outcomes import together
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.harness.family import FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome
 from comparisons.experiments.stability.harness.outcomes import Columns, outcome, plain
 from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.geometry.exact import KINDS, first_of

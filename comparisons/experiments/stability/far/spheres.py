@@ -6,18 +6,11 @@ import numpy as np
 
 from comparisons.experiments.methods.setting import across, unit_vectors
 from comparisons.experiments.stability.far.law import U_SINGLE, Truth
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.mitsubas import traced
 from comparisons.experiments.stability.harness.rays import Rays
-from comparisons.geometry import frame
 from comparisons.geometry.exact.dyadic import Dyadic, dot
 from comparisons.geometry.float32 import round32
-from comparisons.mitsuba import counterpart, translate
 from comparisons.mitsuba.backend import scalar
 from reference_rt import textbook
 from reference_rt.core.vec3 import row
@@ -120,7 +113,7 @@ def _answer(
 
 def in_mitsuba(shape: Shape, o: FloatArray, d: FloatArray) -> FloatArray:
     """t (n,); in its scalar variant no mesh stands in for what is small."""
-    return counterpart.trace(translate.load(Scene(shapes=(shape,)), frame.OURS), o, d).t
+    return traced(Scene(shapes=(shape,)), o, d).t
 
 
 def for_mitsuba(rays: Rays) -> Rays:

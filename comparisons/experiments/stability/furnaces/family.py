@@ -15,16 +15,9 @@ from comparisons.experiments.stability.harness.bsdfs import (
     index_of,
     towards,
 )
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome
 from comparisons.experiments.stability.harness.densities import integral
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    Family,
-    Outcome,
-    Series,
-    Sweep,
-)
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep
 from comparisons.experiments.stability.harness.outcomes import (
     of_errors,
     one_case,

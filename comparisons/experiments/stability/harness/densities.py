@@ -19,7 +19,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from comparisons.experiments.stability.harness.bsdfs import Bsdf
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.geometry.exact.crossings import IntArray
 
 CELLS = 16

@@ -7,9 +7,8 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, FloatArray
-from comparisons.geometry import frame
-from comparisons.mitsuba import translate
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatArray
+from comparisons.experiments.stability.harness.mitsubas import loaded
 from comparisons.mitsuba.backend import scalar
 from reference_rt.accel.geometry import Geometry, closest_hit, occluded, surface
 from reference_rt.core.ray import Ray, at, ray_from
@@ -59,7 +58,7 @@ def lit(
     out = np.zeros((len(o), 2))
     if contestant == MITSUBA:
         with scalar() as mi:
-            mi_scene = translate.load(scene, frame.OURS).mi_scene
+            mi_scene = loaded(scene)
             for k, (begin, way, to) in enumerate(
                 zip(o.tolist(), d.tolist(), w.tolist(), strict=True)
             ):

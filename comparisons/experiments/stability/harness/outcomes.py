@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.harness.family import EXAMPLES, MITSUBA, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import EXAMPLES, MITSUBA, FloatArray, Outcome
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.float32 import UNIT_ROUNDOFF as U32
 

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.geometry.exact.crossings import Row
 
 _SHOWN = ("center", "radius", "to_local", "coefficients", "lower", "upper", "major", "minor")

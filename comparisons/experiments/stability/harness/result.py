@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from comparisons.experiments.stability.harness.family import OURS, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Outcome
 from reference_rt.util.files import read_text, replacing
 
 

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 from PIL import Image
 
+from comparisons.experiments.stability.harness.core import OURS, Effort
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import OURS, Effort, Family, Series
+from comparisons.experiments.stability.harness.family import Family, Series
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import contestants, summarise
 from comparisons.experiments.stability.harness.worker import Request

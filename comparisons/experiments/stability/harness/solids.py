@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import OURS, FloatArray
+from comparisons.experiments.stability.harness.core import OURS, FloatArray
 from comparisons.experiments.stability.harness.meshes import BALL
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
 from comparisons.geometry.exact.referee import crossings_of, evaluated

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate, Turn
 
 

@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Family, Outcome, Series
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series
 from comparisons.experiments.stability.harness.result import Found
 
 FURTHER = 1e4

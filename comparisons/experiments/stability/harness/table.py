@@ -7,8 +7,8 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Effort
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Effort
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import (
     SeriesSummary,

@@ -15,8 +15,8 @@ from pathlib import Path
 from PIL import Image
 from pydantic import BaseModel, ConfigDict
 
+from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, generator
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import OURS, Draw, Effort, generator
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.runs.processes.protocol import carry_out, private_stdout
 from reference_rt.util.errors import SceneWarning

@@ -12,19 +12,11 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import chance
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.mitsubas import rendered
 from comparisons.experiments.stability.harness.outcomes import one_case
 from comparisons.experiments.stability.harness.steps import at, scaled
-from comparisons.geometry import frame
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.scene import picture
-from comparisons.mitsuba.translate import load
 
 _TINY = scaled(1e-30)
 
@@ -87,8 +79,8 @@ def ours(world: World, pixels: int, spp: int, seed: int) -> FloatArray:
 
 def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> FloatArray:
     def render() -> FloatArray:
-        twin = load(scene_of(world, pixels, spp, seed, hidden=False), frame.OURS)
-        return picture(twin.mi_scene, spp, seed).reshape(-1, 3)
+        scene = scene_of(world, pixels, spp, seed, hidden=False)
+        return rendered(scene, spp, seed).reshape(-1, 3)
 
     if not in_scalar:
         return render()
@@ -104,7 +96,7 @@ Render = Callable[[int, int], FloatArray]
 
 
 def judge(
-    rendered: Mapping[str, Render],
+    renderers: Mapping[str, Render],
     seeds: tuple[int, int],
     spp: int,
     expected: float,
@@ -114,7 +106,7 @@ def judge(
     """One case: the mean is finite and, in two stages of `chance`, the expected one, to noise, of
     `MOST` at most, and rounding.  The worst is relative."""
     found = {}
-    for who, render in rendered.items():
+    for who, render in renderers.items():
 
         def sample(stage: int, render: Render = render) -> chance.Mean:
             one = render(seeds[stage], spp * (1, chance.AGAIN)[stage]).mean(axis=1)
@@ -144,7 +136,7 @@ def measure(
         with np.errstate(all="ignore"):
             return theirs(world, their_pixels, spp, seed, in_scalar)
 
-    rendered: dict[str, Render] = {OURS: lambda seed, spp: ours(world, pixels, spp, seed)}
+    renderers: dict[str, Render] = {OURS: lambda seed, spp: ours(world, pixels, spp, seed)}
     if draw.mitsuba:
-        rendered[MITSUBA] = mitsubas
-    return judge(rendered, (first, again), spp, world.expected, rounding, told)
+        renderers[MITSUBA] = mitsubas
+    return judge(renderers, (first, again), spp, world.expected, rounding, told)

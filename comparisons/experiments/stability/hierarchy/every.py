@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome
 from comparisons.experiments.stability.harness.outcomes import outcome
 from reference_rt import shapes as any_shape
 from reference_rt.accel import bvh

@@ -5,17 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import (
-    OURS,
-    Draw,
-    Effort,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-    Sweep,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.hierarchy import scenes
 from comparisons.experiments.stability.hierarchy.every import compare, compare_all
 

@@ -7,7 +7,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.experiments.stability.harness.meshes import cube, write
 from comparisons.experiments.stability.harness.steps import any_turn, at, scaled
 from reference_rt.core import transform

@@ -8,16 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
-    MITSUBA,
-    OURS,
-    Draw,
-    Family,
-    Outcome,
-    Series,
-    Sweep,
-)
+from comparisons.experiments.stability.harness.core import EXAMPLES, MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep
 from comparisons.experiments.stability.hostile import rays
 from comparisons.experiments.stability.hostile.bases import (
     BASES,

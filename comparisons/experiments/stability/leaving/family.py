@@ -5,20 +5,12 @@ import math
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    Family,
-    Outcome,
-    Series,
-    Shot,
-    Sweep,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome, Shot
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.leaving import EPSILON
 from comparisons.experiments.stability.leaving import mitsuba as theirs
 from comparisons.experiments.stability.leaving.judge import Judge, Tally
@@ -90,6 +82,7 @@ def measure(
 # ---- series --------------------------------------------------------------------------------------
 
 ALL = tuple(KINDS)
+STRETCHED = tuple(kind for kind in ALL if kind != "sphere")
 
 BOUND = (
     "B = 17 sqrt(3) u (2 |c| + 6 s) is s / 100 at |c| = 1.5e12 s, and s at 1.5e14 s: nothing is "
@@ -108,55 +101,53 @@ OFFSET_ALONG_NORMAL = (
 )
 
 
-def _single(draw: Draw, x: float) -> bool:
-    """Whether Mitsuba takes part: beyond, float32 cannot say where the shape is."""
-    return draw.mitsuba and x <= 1e6
+def _extent(
+    draw: Draw,
+    x: float,
+    size: tuple[float, float] = (0.0, 0.0),
+    ratio: tuple[float, float] = (1.0, 2.0),
+    distance: tuple[float, float] = (1.0, 1.0),
+    theirs_to: float = 1e6,
+) -> Extent:
+    """Half axes from 1/2 to 1, by default, as far away.  theirs_to: x up to which Mitsuba takes
+    part: beyond, float32 cannot say where the shape is."""
+    return Extent(size, ratio, distance, draw.mitsuba and x <= theirs_to)
 
 
 def _distance(draw: Draw, x: float) -> Extent:
-    """Half axes from 1/2 to 1, x away."""
-    return Extent((0.0, 0.0), (1.0, 2.0), (x, x), _single(draw, x))
+    return _extent(draw, x, distance=(x, x))
 
 
 def _large(draw: Draw, x: float) -> Extent:
-    size = math.log10(x)
-    return Extent((size, size), (1.0, 2.0), (1.0, 1.0), draw.mitsuba and x <= 1e8)
+    return _extent(draw, x, size=(math.log10(x), math.log10(x)), theirs_to=1e8)
 
 
 def _small(draw: Draw, x: float) -> Extent:
-    size = -math.log10(x)
-    return Extent((size, size), (1.0, 2.0), (1.0, 1.0), draw.mitsuba and x <= 1e8)
+    return _extent(draw, x, size=(-math.log10(x), -math.log10(x)), theirs_to=1e8)
 
 
 def _ratio(draw: Draw, x: float) -> Extent:
-    return Extent((0.0, 0.0), (x, x), (1.0, 1.0), _single(draw, x))
+    return _extent(draw, x, ratio=(x, x))
 
 
 def _plain(draw: Draw, _x: float) -> Extent:
-    return Extent((0.0, 0.0), (1.0, 2.0), (1.0, 1.0), _single(draw, 1.0))
+    return _extent(draw, 1.0)
 
 
 def _everything(draw: Draw, x: float) -> Extent:
     """Sizes, ratios and distances at once, all up to x in one."""
     power = math.log10(x)
-    return Extent(
-        (-0.8 * power, 0.8 * power), (1.0, 10.0 ** (0.6 * power)), (1.0, x), _single(draw, x)
-    )
+    return _extent(draw, x, (-0.8 * power, 0.8 * power), (1.0, 10.0 ** (0.6 * power)), (1.0, x))
 
 
 def _series(
     name: str,
     kinds: tuple[str, ...],
-    axis: str,
+    sweep: Sweep,
     about: str,
     extent: Callable[[Draw, float], Extent],
-    values: tuple[float, ...],
-    quick: tuple[float, ...],
-    holds_to: float = math.inf,
-    law: str = "",
     grazing: bool = False,
-    cases: int = 0,
-    explained: str = "",
+    **more: Any,
 ) -> Series:
     def run(draw: Draw, x: float) -> Mapping[str, Outcome]:
         return measure(draw, kinds, extent(draw, x), 1.0 / x if grazing else None)
@@ -165,25 +156,18 @@ def _series(
         with tempfile.TemporaryDirectory() as folder:
             draw = Draw(np.random.default_rng(2), 1, contestant == MITSUBA, Path(folder))
             single = contestant == MITSUBA
-            kind = kinds[0]
-            return shoot(contestant, kind, extent(draw, x)._replace(single=single), draw)
+            return shoot(contestant, kinds[0], extent(draw, x)._replace(single=single), draw)
 
-    return Series(
-        name,
-        Sweep(axis, values, quick, 500 * len(kinds), cases or PER_KIND // len(values)),
-        about,
-        run,
-        unit="B",
-        holds_to=holds_to,
-        law=law,
-        explained=explained,
-        shoot=picture,
-    )
+    return Series(name, sweep, about, run, unit="B", shoot=picture, **more)
 
-
-PER_KIND = 1_000_000
 
 DISTANCES = (1e0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14)
+SIZES = (1e0, 1e2, 1e4, 1e6, 1e8, 1e16, 1e32, 1e64)
+
+FAR = Sweep("distance / size", DISTANCES, (1e0, 1e4, 1e10), 500, 1_000_000 // len(DISTANCES))
+
+OF_ALL = 500 * len(ALL), 150_000
+"""Cases of a point."""
 
 FAMILY = Family(
     id="F2",
@@ -196,11 +180,9 @@ FAMILY = Family(
             _series(
                 kind,
                 (kind,),
-                "distance / size",
+                FAR,
                 f"Departures from one {kind} each, size 1, so far from the origin.",
                 _distance,
-                DISTANCES,
-                (1e0, 1e4, 1e10),
                 holds_to=1e12,
                 law=BOUND,
             )
@@ -210,12 +192,9 @@ FAMILY = Family(
             _series(
                 name,
                 ALL,
-                axis,
+                Sweep(axis, SIZES, (1e8, 1e64), *OF_ALL),
                 "All kinds, as far from the origin as they are large.",
                 extent,
-                (1e0, 1e2, 1e4, 1e6, 1e8, 1e16, 1e32, 1e64),
-                (1e8, 1e64),
-                cases=150_000,
                 explained=explained,
             )
             for name, axis, extent, explained in (
@@ -225,36 +204,30 @@ FAMILY = Family(
         ),
         _series(
             "anisotropy",
-            tuple(k for k in ALL if k != "sphere"),
-            "longest / shortest axis",
+            STRETCHED,
+            Sweep(
+                *("longest / shortest axis", decades(0, 12, 2), (1e6, 1e12)),
+                *(500 * len(STRETCHED), 140_000),
+            ),
             "All kinds but round spheres, stretched along their axes and turned.",
             _ratio,
-            (1e0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12),
-            (1e6, 1e12),
-            cases=140_000,
         ),
         _series(
             "grazing",
             ALL,
-            "1 / cosine of the departure",
+            Sweep("1 / cosine of the departure", decades(1, 15, 2), (1e5, 1e15), *OF_ALL),
             "All kinds, left at this cosine to the normal, to either side.",
             _plain,
-            decades(1, 15, 2),
-            (1e5, 1e15),
             grazing=True,
-            cases=150_000,
             explained=OFFSET_ALONG_NORMAL,
         ),
         _series(
             "everything",
             ALL,
-            "distance / size",
+            Sweep("distance / size", decades(0, 10, 2), (1e10,), *OF_ALL),
             "All kinds, with sizes from x^-0.8 to x^0.8, axes up to x^0.6 times as long as others, "
             "distances up to x: at 1e10 from 1e-8 to 1e8, 1e6 and 1e10.",
             _everything,
-            (1e0, 1e2, 1e4, 1e6, 1e8, 1e10),
-            (1e10,),
-            cases=150_000,
         ),
     ),
 )

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.harness.family import EXAMPLES, Outcome
+from comparisons.experiments.stability.harness.core import EXAMPLES, Outcome
 from comparisons.experiments.stability.harness.leaving import CONTACT
 from comparisons.experiments.stability.harness.outcomes import hexed
 from comparisons.experiments.stability.leaving.shapes import KINDS, Placed, Rays

@@ -4,11 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.experiments.stability.harness.mitsubas import loaded
 from comparisons.experiments.stability.leaving.shapes import Placed, Rays
 from comparisons.experiments.stability.leaving.tracer import COLUMNS, Departures, Ways, scene_of
-from comparisons.geometry import frame
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.mitsuba import translate
 from comparisons.mitsuba.backend import mitsuba
 
 KINDS = ("sphere", "rectangle", "disk", "triangle", "box", "cylinder", "mesh", "instance")
@@ -20,7 +19,7 @@ def depart(placed: Placed, rays: Rays, ways: Ways) -> Departures:
     out = np.zeros((len(rays.o), COLUMNS))
     out[:, 0] = out[:, 13] = np.inf
     mi = mitsuba()
-    mi_scene = translate.load(scene_of(placed), frame.OURS).mi_scene
+    mi_scene = loaded(scene_of(placed))
     for k, (o, d, way) in enumerate(zip(*(a.tolist() for a in (*rays, *ways)), strict=True)):
         _depart(mi, mi_scene, o, d, way, out[k])
     return Departures.of(out)

@@ -12,7 +12,7 @@ import trimesh
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import FloatArray, unit_vectors
-from comparisons.experiments.stability.harness.family import Draw
+from comparisons.experiments.stability.harness.core import Draw
 from comparisons.experiments.stability.harness.leaving import bound
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.harness.steps import matrix, vector

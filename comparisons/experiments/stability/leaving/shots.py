@@ -3,7 +3,7 @@
 import numpy as np
 
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.harness.family import Draw, Shot
+from comparisons.experiments.stability.harness.core import Draw, Shot, pixel_grid
 from comparisons.experiments.stability.harness.leaving import PIXELS, lit, picture
 from comparisons.experiments.stability.leaving.shapes import Extent, Placed, place
 from comparisons.experiments.stability.leaving.tracer import scene_of
@@ -32,8 +32,7 @@ def _frame(placed: Placed) -> FloatArray:
 
 def _view(placed: Placed) -> tuple[FloatArray, FloatArray]:
     """Parallel rays (n, 3) along the shape's own -z, in its own proportions."""
-    ticks = (np.arange(PIXELS) + 0.5) / PIXELS * 2.6 - 1.3
-    x, y = np.meshgrid(ticks, -ticks)
-    local = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 3.0)])
+    x, y = pixel_grid(PIXELS, 1.3)
+    local = np.column_stack([x, y, np.full(x.size, 3.0)])
     d = np.tile(-_frame(placed)[:, 2], (x.size, 1))
     return local @ placed.linear.T + placed.center, d

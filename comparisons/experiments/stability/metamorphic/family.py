@@ -10,14 +10,8 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import same_bits
-from comparisons.experiments.stability.harness.family import (
-    OURS,
-    Draw,
-    Family,
-    Series,
-    Sweep,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import OURS, Draw
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.outcomes import together
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.motion import (
@@ -102,6 +96,8 @@ def _turned(draw: Draw, x: float) -> Outcomes:
 
 # ---- the family ---------------------------------------------------------------------------------
 
+FACTORS = (*decades(0, 12), 1e20, 1e30, 1e50)
+
 _CASES = 600, 6_000
 
 _SCALE = (
@@ -161,7 +157,7 @@ FAMILY = Family(
         ),
         Series(
             "shrunk",
-            Sweep("1 / factor", (*decades(0, 12), 1e20, 1e30, 1e50), (1e9,), *_CASES),
+            Sweep("1 / factor", FACTORS, (1e9,), *_CASES),
             "Scenes of every primitive and of solids, and their rays, made smaller.",
             partial(_scaled, shrunk),
             unit=_CHANGE,
@@ -170,7 +166,7 @@ FAMILY = Family(
         ),
         Series(
             "grown",
-            Sweep("factor", (*decades(0, 12), 1e20, 1e30, 1e50), (1e9,), *_CASES),
+            Sweep("factor", FACTORS, (1e9,), *_CASES),
             "Scenes of every primitive and of solids, and their rays, made larger.",
             partial(_scaled, grown),
             unit=_CHANGE,
@@ -179,7 +175,7 @@ FAMILY = Family(
         ),
         Series(
             "shrunk light",
-            Sweep("1 / factor", (*decades(0, 12), 1e20, 1e30, 1e50), (1e1, 1e9), 1, 1),
+            Sweep("1 / factor", FACTORS, (1e1, 1e9), 1, 1),
             "Pictures of scenes made smaller, lights such that they look the same.",
             partial(light.under, shrunk),
             unit=_DIFFERENCE,
@@ -187,7 +183,7 @@ FAMILY = Family(
         ),
         Series(
             "grown light",
-            Sweep("factor", (*decades(0, 12), 1e20, 1e30, 1e50), (1e9,), 1, 1),
+            Sweep("factor", FACTORS, (1e9,), 1, 1),
             "Pictures of scenes made larger, lights such that they look the same.",
             partial(light.under, grown),
             unit=_DIFFERENCE,

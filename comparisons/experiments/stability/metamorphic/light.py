@@ -10,21 +10,13 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import of_pixels
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.mitsubas import rendered
 from comparisons.experiments.stability.harness.scenes import SIZE
 from comparisons.experiments.stability.metamorphic.motion import Motion, moved
 from comparisons.experiments.stability.metamorphic.rays import BoolArray
-from comparisons.geometry import frame
 from comparisons.geometry.float32 import UNIT_ROUNDOFF as U32
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.scene import picture
-from comparisons.mitsuba.translate import load
 from reference_rt.core.ray import UNIT_ROUNDOFF
 
 ROUNDOFF = {OURS: UNIT_ROUNDOFF, MITSUBA: U32}
@@ -55,7 +47,7 @@ def colours(contestant: str, scene: rt.Scene) -> FloatArray:
         if contestant == OURS:
             return rt.render(scene).colour
         with scalar(), np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite
-            return picture(load(scene, frame.OURS).mi_scene, scene.resolved_sampler.spp, seed=1)
+            return rendered(scene, scene.resolved_sampler.spp, seed=1)
     except (rt.SceneError, RuntimeError):
         return np.full((scene.film.height, scene.film.width, 3), np.nan)
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.experiments.stability.harness.scenes import SIZE
 from comparisons.experiments.stability.harness.steps import matrix, vector
 from reference_rt.core import transform

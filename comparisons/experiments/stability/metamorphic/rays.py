@@ -8,16 +8,14 @@ import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_rows
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatArray, Outcome
+from comparisons.experiments.stability.harness.mitsubas import traced
 from comparisons.experiments.stability.harness.outcomes import Columns, hexed, outcome
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.metamorphic.motion import Motion
 from comparisons.experiments.stability.metamorphic.solids import Judge
-from comparisons.geometry import frame
 from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.counterpart import trace
-from comparisons.mitsuba.translate import load
 from comparisons.rungs.rays.arbiter import directions
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.integrators.scene_tables import SceneTables
@@ -65,7 +63,7 @@ def mitsubas(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Found:
     try:
         with scalar(), np.errstate(over="ignore", invalid="ignore"):
             # What float32 cannot hold becomes infinite.
-            return found_of(trace(load(scene, frame.OURS), o, d))
+            return found_of(traced(scene, o, d))
     except RuntimeError:
         return Found(np.full(len(o), np.inf), np.full((len(o), 4), -2))
 

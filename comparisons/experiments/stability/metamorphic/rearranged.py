@@ -8,7 +8,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.family import OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Draw, Outcome
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.harness.outcomes import together
 from comparisons.experiments.stability.harness.steps import matrix

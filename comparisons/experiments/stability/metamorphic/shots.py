@@ -10,7 +10,7 @@ import numpy.typing as npt
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_rows
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.family import OURS, FloatArray, Shot
+from comparisons.experiments.stability.harness.core import OURS, FloatArray, Shot
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.motion import Motion, moved
 from comparisons.geometry.float32 import round32

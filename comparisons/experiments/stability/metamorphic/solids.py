@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.experiments.stability.harness.solids import Truth, truths
 from comparisons.geometry.exact.dyadic import nearest
 from comparisons.geometry.exact.referee import Referee

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import Draw, Outcome, Series, Sweep, decades
+from comparisons.experiments.stability.harness.core import Draw, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.outcomes import together, unit_of
 from comparisons.experiments.stability.harness.rooms import closed
 from comparisons.experiments.stability.harness.steps import at, scaled, turned

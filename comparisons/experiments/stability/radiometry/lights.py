@@ -7,16 +7,8 @@ import numpy as np
 from flint import arb, ctx
 
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-    Sweep,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.outcomes import hexed, of_errors, plain, unit_of
 from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import mitsuba

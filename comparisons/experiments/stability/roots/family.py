@@ -1,21 +1,14 @@
 """The series of F8; the folder's docstring states the law."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import across, unit_vectors
-from comparisons.experiments.stability.harness.family import (
-    OURS,
-    Draw,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-    Sweep,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.experiments.stability.roots.law import judge, of_quadratics, of_tori
 from comparisons.experiments.stability.roots.solvers import (
@@ -178,14 +171,15 @@ def _unlike(draw: Draw, x: float) -> Mapping[str, Outcome]:
 
 
 CLOSE, CLOSE_QUICK = decades(0, 16), (1.0, 1e4, 1e8, 1e12, 1e16)
-UNIT = "of the bound by condition"
+
+_series = partial(Series, unit="of the bound by condition")
 
 FAMILY = Family(
     "F8",
     "roots of polynomials",
     "No root missed, none too many, each within 16 u (sum of the terms' sizes) / |derivative|.",
     (
-        Series(
+        _series(
             "double",
             Sweep(
                 "1 / distance of the line from a double root, in tubes' radii",
@@ -197,9 +191,8 @@ FAMILY = Family(
             "Lines that pass a torus' surface at 1 / x to 0.1 / x, along it. Wrong is a root too"
             " few or too many, or off by more than its condition allows.",
             _double,
-            unit=UNIT,
         ),
-        Series(
+        _series(
             "several",
             Sweep(
                 "1 / distance of the line from a triple or quadruple root, in tubes' radii",
@@ -210,29 +203,25 @@ FAMILY = Family(
             ),
             "Lines near those along a torus' asymptotic directions, and along its top circle.",
             _several,
-            unit=UNIT,
         ),
-        Series(
+        _series(
             "far",
             Sweep("distance / size", decades(0, 12), (1.0, 1e4, 1e8, 1e12), 200, 2000),
             "Lines through a torus from 2 to 10 times this far away; the text-book's coefficients"
             " are those seen from the origin.",
             _far,
-            unit=UNIT,
         ),
-        Series(
+        _series(
             "near_double",
             Sweep("b² / |b² - 4 a c|", CLOSE, CLOSE_QUICK, 1000, 6000),
             "Quadratics with both roots, real or complex, about ±0.5 to ±2.",
             _near_double,
-            unit=UNIT,
         ),
-        Series(
+        _series(
             "unlike",
             Sweep("ratio of the roots", CLOSE, CLOSE_QUICK, 1000, 6000),
             "Quadratics with two real roots, one of them small: -b cancels sqrt(b² - 4 a c).",
             _unlike,
-            unit=UNIT,
         ),
     ),
     anchors="The text-book's closed forms and companion matrices are the anchors themselves; no"

@@ -7,7 +7,7 @@ import flint
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.harness.family import FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome
 from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.geometry.exact.curved import torus_quartic

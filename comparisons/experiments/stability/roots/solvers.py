@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.experiments.stability.harness.rays import Rays
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.experiments.stability.harness.steps import any_turn, scaled
 from comparisons.geometry.float32 import round32
 from reference_rt.core import transform

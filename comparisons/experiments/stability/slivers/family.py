@@ -6,18 +6,16 @@ from functools import partial
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import (
+from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
     Draw,
-    Family,
     FloatArray,
     Outcome,
-    Series,
     Shot,
-    Sweep,
-    decades,
 )
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
+from comparisons.experiments.stability.harness.mitsubas import traced
 from comparisons.experiments.stability.harness.outcomes import together
 from comparisons.experiments.stability.slivers import drawn, shots
 from comparisons.experiments.stability.slivers.drawn import SHAPES, Trial
@@ -26,6 +24,7 @@ from reference_rt import textbook
 from reference_rt.rendering import query
 
 Make = Callable[[np.random.Generator, float, int, bool], Trial]
+Shoot = Callable[[str, float], Shot]
 
 CASES = 2_000, 40_000
 
@@ -40,10 +39,7 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
     row = getattr(tables.geometry.shapes, trial.kind)._asdict()
     found = {OURS: query.first_hits(tables, trial.o, trial.d).t}
     if mitsuba:
-        from comparisons.geometry import frame
-        from comparisons.mitsuba import counterpart, translate
-
-        found[MITSUBA] = counterpart.trace(translate.load(scene, frame.OURS), trial.o, trial.d).t
+        found[MITSUBA] = traced(scene, trial.o, trial.d).t
     if trial.corners is not None:
         family = "triangle" if trial.kind == "triangles" else "box"
         of = textbook.TriangleParameters if family == "triangle" else textbook.BoxParameters
@@ -65,7 +61,7 @@ def measured(make: Make) -> Callable[[Draw, float], Mapping[str, Outcome]]:
     return lambda draw, x: together(trials(draw, x))
 
 
-def map_of(make: Callable[..., Trial]) -> Callable[[str, float], Shot]:
+def map_of(make: Callable[..., Trial]) -> Shoot:
     """A series' `shoot`: a triangle of float32 numbers, with a ray aimed at each point."""
 
     def shoot(contestant: str, x: float) -> Shot:
@@ -80,28 +76,14 @@ def map_of(make: Callable[..., Trial]) -> Callable[[str, float], Shot]:
 
 
 def _series(
-    name: str,
-    axis: str,
-    about: str,
-    make: Make,
-    values: tuple[float, ...],
-    quick: int,
-    explained: str = "",
-    shoot: Callable[[str, float], Shot] | None = None,
+    name: str, sweep: Sweep, about: str, make: Make, explained: str = "", shoot: Shoot | None = None
 ) -> Series:
-    return Series(
-        name,
-        Sweep(axis, values, values[quick::4], *CASES),
-        about,
-        measured(make),
-        unit="u (|o| + size)",
-        explained=explained,
-        shoot=shoot,
-    )
+    unit = "u (|o| + size)"
+    return Series(name, sweep, about, measured(make), unit, explained=explained, shoot=shoot)
 
 
-ASPECTS, ANGLES = decades(0, 12), decades(1, 15)
-ASPECT, ANGLE = "length / height", "1 / angle to the plane"
+ASPECT = Sweep("length / height", decades(0, 12), decades(0, 12, 4), *CASES)
+ANGLE = Sweep("1 / angle to the plane", decades(1, 15), decades(3, 15, 4), *CASES)
 EXACT = (
     "heights and angles are numbers of their own here, not differences of larger ones: float32 has"
     " them to 24 bits at any size, and nothing is lost that float64 would keep"
@@ -119,8 +101,6 @@ FAMILY = Family(
             "Ever thinner triangles, turned any way, met at up to 70° from the normal; three rays"
             " in four at points inside.",
             partial(drawn.thin_triangle, turned=True),
-            ASPECTS,
-            0,
             shoot=map_of(drawn.thin_triangle),
         ),
         _series(
@@ -128,8 +108,6 @@ FAMILY = Family(
             ASPECT,
             "The same in planes of the axes, whose heights float32 has exactly.",
             partial(drawn.thin_triangle, turned=False),
-            ASPECTS,
-            0,
             EXACT,
         ),
         _series(
@@ -137,8 +115,6 @@ FAMILY = Family(
             ANGLE,
             "Rays at a small angle to a triangle, turned any way, three in four at points inside.",
             partial(drawn.grazed_triangle, turned=True),
-            ANGLES,
-            2,
             shoot=map_of(drawn.grazed_triangle),
         ),
         _series(
@@ -146,8 +122,6 @@ FAMILY = Family(
             ANGLE,
             "The same in planes of the axes, where float32 has every angle exactly.",
             partial(drawn.grazed_triangle, turned=False),
-            ANGLES,
-            2,
             EXACT,
         ),
         _series(
@@ -155,8 +129,6 @@ FAMILY = Family(
             ANGLE,
             "Rays at a small angle to rectangles: half of these in the plane z = 0, half turned.",
             partial(drawn.grazed_flat, is_round=False),
-            ANGLES,
-            2,
             EXACT,
         ),
         _series(
@@ -164,8 +136,6 @@ FAMILY = Family(
             ANGLE,
             "Rays at a small angle to ellipses: half of these in the plane z = 0, half turned.",
             partial(drawn.grazed_flat, is_round=True),
-            ANGLES,
-            2,
             EXACT,
         ),
         _series(
@@ -173,16 +143,12 @@ FAMILY = Family(
             ANGLE,
             "Rays along a face of a cube, within twice the angle of it on either side.",
             drawn.grazed_box,
-            ANGLES,
-            2,
         ),
         _series(
             "needles",
-            "length / thickness",
+            ASPECT._replace(axis="length / thickness"),
             "Ever thinner boxes, met from the side.",
             drawn.needle,
-            ASPECTS,
-            0,
             EXACT,
         ),
     ),

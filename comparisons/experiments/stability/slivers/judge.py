@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from comparisons.experiments.methods.errors import PIXEL, U
 from comparisons.experiments.methods.setting import unit_rows
-from comparisons.experiments.stability.harness.family import FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome
 from comparisons.experiments.stability.harness.outcomes import hexed, outcome
 from comparisons.geometry.exact import first_hit
 from comparisons.geometry.exact.dyadic import Dyadic, cross

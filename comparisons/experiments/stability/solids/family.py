@@ -8,16 +8,8 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness import solids
-from comparisons.experiments.stability.harness.family import (
-    OURS,
-    Draw,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-    Sweep,
-    alone,
-)
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, alone
 from comparisons.experiments.stability.harness.meshes import write_smallest_ball
 from comparisons.experiments.stability.harness.outcomes import hexed, outcome, together
 from comparisons.experiments.stability.harness.solids import INSIDE_TESTS, INTERVALS, LISTS, Truth

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import solids
-from comparisons.experiments.stability.harness.family import OURS, FloatArray, Shot
+from comparisons.experiments.stability.harness.core import OURS, FloatArray, Shot, pixel_grid
 from comparisons.experiments.stability.harness.meshes import write_smallest_ball
 from comparisons.experiments.stability.harness.steps import at, scaled, turned
 from reference_rt.core import transform
@@ -26,10 +26,9 @@ def shoot(contestant: str, x: float) -> Shot:
     """Seen in parallel from the front, shaded by the face that the point found lies on."""
     half = (scaled(0.5, 1.0, 1.0), at(0.5 + 1.0 / x, 0.0, 0.0))
     solid = rt.Box(transform=(TURN,)) - rt.Box(transform=(*half, TURN))
-    grid = (np.arange(PIXELS) + 0.5) / PIXELS * 4.0 - 2.0
-    u, v = np.meshgrid(grid, -grid)
+    u, v = pixel_grid(PIXELS, 2.0)
     # Not along any of the box's axes, so that each pixel rounds in its own way.
-    o = np.column_stack([u.ravel(), v.ravel(), np.full(u.size, 5.0)])
+    o = np.column_stack([u, v, np.full(u.size, 5.0)])
     d = np.tile([0.01, -0.02, -1.0], (len(o), 1))
     with tempfile.TemporaryDirectory() as folder:
         write_smallest_ball(Path(folder))

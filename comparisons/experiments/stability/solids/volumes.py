@@ -7,7 +7,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import solids
-from comparisons.experiments.stability.harness.family import OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Draw, Outcome
 from comparisons.experiments.stability.harness.meshes import write_smallest_ball
 from comparisons.experiments.stability.solids.trees import Shapes, Tree, leaf, placed
 from reference_rt.core import transform

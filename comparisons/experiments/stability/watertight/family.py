@@ -7,16 +7,8 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import (
-    OURS,
-    Draw,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-    Sweep,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.meshes import (
     AWAY,
     Closed,

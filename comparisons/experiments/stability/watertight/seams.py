@@ -8,14 +8,9 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
 from comparisons.experiments.stability.harness.meshes import AWAY
+from comparisons.experiments.stability.harness.mitsubas import traced
 from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.harness.steps import any_turn, at
 from comparisons.experiments.stability.watertight.tracers import fits
@@ -157,13 +152,7 @@ def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
     tables = rt.build_tables(rt.Scene(shapes=asked.shapes, hierarchy="sah"))
     found = {OURS: judged(asked, query.intersect(tables, asked.o, asked.d))}
     if draw.mitsuba and fits(np.abs(asked.o)):
-        from comparisons.geometry import frame
-        from comparisons.mitsuba import counterpart, translate
-
         names = tuple(name for name in names if KINDS[name].translated)
         asked = drawn(draw.rng, names, x, draw.cases // len(names))
-        scene = rt.Scene(shapes=asked.shapes)
-        found[MITSUBA] = judged(
-            asked, counterpart.trace(translate.load(scene, frame.OURS), asked.o, asked.d)
-        )
+        found[MITSUBA] = judged(asked, traced(rt.Scene(shapes=asked.shapes), asked.o, asked.d))
     return found

@@ -3,7 +3,7 @@
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import OURS, FloatArray, Shot
+from comparisons.experiments.stability.harness.core import OURS, FloatArray, Shot
 from comparisons.experiments.stability.harness.meshes import Closed, cube
 from comparisons.experiments.stability.watertight.tracers import by_method, crossings, mitsubas
 

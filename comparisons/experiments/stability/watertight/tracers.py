@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.experiments.stability.harness.family import MITSUBA, FloatArray
+from comparisons.experiments.stability.harness.core import MITSUBA, FloatArray
 from comparisons.experiments.stability.harness.meshes import Closed, mitsuba_mesh
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
