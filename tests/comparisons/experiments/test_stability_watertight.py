@@ -101,10 +101,10 @@ def test_text_book_methods_leak():
 
 def test_seams_of_something_else_are_seen():
     """Rays that hit nothing, or another shape than they start in."""
-    asked = seams.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
-    shape = asked.whose.copy()
+    case = seams.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
+    shape = case.whose.copy()
     shape[3], shape[70] = -1, 0
-    found = seams.judged(asked, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
+    found = seams.judged(case, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
     assert (found.cases, found.failures) == (100, 2)
     assert found.examples[1]["found"] == "shape 0 at t = inf"
 

@@ -85,13 +85,13 @@ def _boundary(
     draw: Draw, cosines: FloatArray, n: FloatArray, mitsuba_too: bool
 ) -> dict[str, Outcome]:
     """R and T of floats that float32 holds, where it can: one case each."""
-    asked: dict[str, Callable[[FloatArray, FloatArray], FloatArray]]
-    asked = {OURS: _ours, TEXTBOOK: _textbook}
+    methods: dict[str, Callable[[FloatArray, FloatArray], FloatArray]]
+    methods = {OURS: _ours, TEXTBOOK: _textbook}
     if draw.mitsuba and mitsuba_too:
-        asked[MITSUBA] = _theirs
+        methods[MITSUBA] = _theirs
     exact = fresnel(cosines, n)
     found: dict[str, Outcome] = {}
-    for who, method in asked.items():
+    for who, method in methods.items():
         unit = unit_of(who)
         near = fresnel_near(cosines, n, 4.0 * unit, 0.0)
         values = method(cosines, n)
@@ -102,8 +102,13 @@ def _boundary(
             size = np.maximum(truth, 1e-36 if who == MITSUBA else 1e-290)
             allowed = SAFETY * unit + near[k] / size
             errors = np.abs(values[:, k] - truth) / size
-            told = {"cosine": cosines, "index": n, name: plain(truth), "found": plain(values[:, k])}
-            parts.append({who: of_errors(errors / allowed, 1.0, told)})
+            shown = {
+                "cosine": cosines,
+                "index": n,
+                name: plain(truth),
+                "found": plain(values[:, k]),
+            }
+            parts.append({who: of_errors(errors / allowed, 1.0, shown)})
         found |= together(parts)
     return found
 
@@ -184,9 +189,9 @@ def _densities(draw: Draw, x: float) -> dict[str, Outcome]:
             condition = 1.0 + (exact.slope2 if kind == "beckmann" else 0.0)
             seen = exact.density > (1e-19 if who == MITSUBA else 1e-280)
             errors = np.where(seen, relative(value, exact.density), 0.0) / condition
-            told = {"distribution": kind, "alpha": hexed(alpha), "wo": wo, "wi": wi}
-            told |= {"D": plain(exact.density), "found": plain(value)}
-            parts.append({who: of_errors(errors, SAFETY * unit_of(who), told)})
+            shown = {"distribution": kind, "alpha": hexed(alpha), "wo": wo, "wi": wi}
+            shown |= {"D": plain(exact.density), "found": plain(value)}
+            parts.append({who: of_errors(errors, SAFETY * unit_of(who), shown)})
     return together(parts)
 
 
@@ -206,10 +211,10 @@ def _masking(draw: Draw, x: float) -> dict[str, Outcome]:
                 up = np.tile([0.0, 0.0, 1.0], (n, 1))
                 values[MITSUBA] = for_rays(lambda o, h, d=d: (d.smith_g1(o, h),), v, up)[0]
             for who, value in values.items():
-                told = {"distribution": kind, "alpha": hexed(alpha), "direction": v}
-                told |= {"G1": plain(exact), "found": plain(value)}
+                shown = {"distribution": kind, "alpha": hexed(alpha), "direction": v}
+                shown |= {"G1": plain(exact), "found": plain(value)}
                 errors = relative(value, exact)
-                parts.append({who: of_errors(errors, SAFETY * unit_of(who), told)})
+                parts.append({who: of_errors(errors, SAFETY * unit_of(who), shown)})
     return together(parts)
 
 

@@ -48,8 +48,8 @@ def _compared(
     found, n = {}, index_of(material)
     for who, bsdf in contestants(material, draw):
         errors = asymmetry(bsdf, n, wo, wi, LEAST[who])
-        told = {"material": name, "wo": wo, "wi": wi, "asymmetry": plain(errors)}
-        found[who] = of_errors(errors, ALLOWED * unit_of(who), told)
+        shown = {"material": name, "wo": wo, "wi": wi, "asymmetry": plain(errors)}
+        found[who] = of_errors(errors, ALLOWED * unit_of(who), shown)
     return found
 
 

@@ -121,8 +121,8 @@ def _consistent(draw: Draw, x: float) -> dict[str, Outcome]:
         part = {}
         for who, bsdf in contestants(material, draw):
             errors = inconsistency(bsdf, material, who, alpha, wo, u)
-            told = {"material": name, "wo": wo, "u": u, "over what is allowed": plain(errors)}
-            part[who] = of_errors(errors, 1.0, told)
+            shown = {"material": name, "wo": wo, "u": u, "over what is allowed": plain(errors)}
+            part[who] = of_errors(errors, 1.0, shown)
         found.append(part)
     return together(found)
 
@@ -142,9 +142,9 @@ def _density(draw: Draw, x: float) -> dict[str, Outcome]:
                 # by a few u / alpha at this cosine.
                 over = f.integral - 1.0 - f.doubt - 16.0 * unit_of(who) * x / wo[2]
                 ok = f.p_value >= chance.LEVEL and over <= 0.0
-                told = {"material": name, "wo": hexed(wo), "alpha": 1.0 / x}
-                told |= {"p-value": f.p_value, "integral": f.integral}
-                part[who] = one_case(not ok, None, told)
+                shown = {"material": name, "wo": hexed(wo), "alpha": 1.0 / x}
+                shown |= {"p-value": f.p_value, "integral": f.integral}
+                part[who] = one_case(not ok, None, shown)
             found.append(part)
     return together(found)
 

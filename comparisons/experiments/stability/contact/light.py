@@ -44,8 +44,8 @@ def shadow(draw: Draw, x: float) -> Mapping[str, Outcome]:
     outcomes = {}
     for name, answer in answers.items():
         met, few = (1.0 - answer[:, 0]).astype(np.int64), slice(len(answer))
-        told = {"gap": gap.hex(), "point": at, "expected": dark, "found": met}
-        outcomes[name] = outcome(dark[few] != met, told, ~sure[few])
+        shown = {"gap": gap.hex(), "point": at, "expected": dark, "found": met}
+        outcomes[name] = outcome(dark[few] != met, shown, ~sure[few])
     return outcomes
 
 
@@ -92,8 +92,8 @@ def transmitted(draw: Draw, x: float) -> Mapping[str, Outcome]:
     found = radiance_without_noise(panes(1.0 / x), setup, o + np.array([0.0, 0.0, 0.5]), d)[:, 0]
     expected = fresnel(-d[:, 2]) ** COUNT
     error = np.abs(found - expected) / expected
-    told = {"o": o, "d": d, "expected": expected, "found": found}
-    return {OURS: outcome(~(error <= TRANSMITTED), told, worst=float(error.max() / (COUNT * U)))}
+    shown = {"o": o, "d": d, "expected": expected, "found": found}
+    return {OURS: outcome(~(error <= TRANSMITTED), shown, worst=float(error.max() / (COUNT * U)))}
 
 
 def shoot(contestant: str, x: float) -> Shot:

@@ -28,10 +28,10 @@ FAR = 1000.0
 """Scales between the origin and the scenes that are far away."""
 
 STACKS = 4
-"""Of a setting."""
+"""Drawn at each sweep point."""
 
 THEIRS = 40
-"""Rays of a setting that Mitsuba is asked about, in its scalar variant."""
+"""Rays of a stack that Mitsuba traces, in its scalar variant."""
 
 
 @entry_kernel
@@ -152,8 +152,8 @@ def _judged(stack: Stack, x: float, mitsuba: bool) -> dict[str, Outcome]:
     found = {OURS: follow(scene, o, d, expected.shape[1])}
     if mitsuba:
         found[MITSUBA] = follow_in_mitsuba(scene, o[:THEIRS], d[:THEIRS], expected.shape[1])
-    told = {"gap": (1.0 / x).hex(), "o": o, "d": d, "expected": expected}
+    shown = {"gap": (1.0 / x).hex(), "o": o, "d": d, "expected": expected}
     return {
-        name: outcome(differing(expected[: len(met)], met), told | {"found": met})
+        name: outcome(differing(expected[: len(met)], met), shown | {"found": met})
         for name, met in found.items()
     }

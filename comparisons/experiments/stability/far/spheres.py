@@ -23,13 +23,13 @@ from reference_rt.textbook.method import ray_of
 from reference_rt.textbook.sphere import algebraic, geometric, robust
 
 WHO = (OURS, *textbook.names("sphere"))
-"""Contestants beside Mitsuba: `_answer` knows them by number."""
+"""Contestants beside Mitsuba: `_answer` takes their index."""
 
 SCENES = 8
-"""Of Mitsuba in a setting, each of one shape."""
+"""Mitsuba's scenes at a sweep point, each of one shape."""
 
 RAYS = 2000
-"""That Mitsuba is asked about in a setting, one at a time, of which SCENES share a scene."""
+"""Rays that Mitsuba traces at a sweep point, spread over SCENES scenes."""
 
 
 def draw_rays(

@@ -35,9 +35,9 @@ def _closed(draw: Draw, x: float) -> dict[str, Outcome]:
     # Paths are some x long.
     least, most, edges = (2, 16, 2e3) if draw.effort == "quick" else (16, 256, 16e3)
     spp = int(min(max(edges / x, least), most))
-    told = {"albedo": albedo}
+    shown = {"albedo": albedo}
     return measure(
-        closed(albedo), draw, spp, lambda who: 256.0 * unit_of(who), told,
+        closed(albedo), draw, spp, lambda who: 256.0 * unit_of(who), shown,
         in_scalar=False, their_pixels=32,
     )  # fmt: skip
 
@@ -107,9 +107,9 @@ def _open(draw: Draw, x: float) -> dict[str, Outcome]:
                     )
                 if not math.isfinite(mean):
                     off = math.inf
-                told = {"material": name, "alpha": alpha, "cosine": cosine, "mean": mean}
-                told |= {"standard error": error, "integral": total}
-                found.append({who: one_case(off > 0.0, max(0.0, mean - 1.0), told)})
+                shown = {"material": name, "alpha": alpha, "cosine": cosine, "mean": mean}
+                shown |= {"standard error": error, "integral": total}
+                found.append({who: one_case(off > 0.0, max(0.0, mean - 1.0), shown)})
     return together(found)
 
 
@@ -122,9 +122,9 @@ def _lossless(draw: Draw, x: float) -> dict[str, Outcome]:
         pictures[MITSUBA] = theirs(world, side, spp, seed, in_scalar=True)
     found = {}
     for who, pixels in pictures.items():
-        told = {"spheres": int(x), "seed": seed, "pixel": lambda i: i, "found": plain(pixels)}
+        shown = {"spheres": int(x), "seed": seed, "pixel": lambda i: i, "found": plain(pixels)}
         off = np.abs(pixels - 1.0).max(axis=1)
-        found[who] = of_errors(off, 64.0 * 4.0 * x * unit_of(who), told)
+        found[who] = of_errors(off, 64.0 * 4.0 * x * unit_of(who), shown)
     return found
 
 

@@ -31,10 +31,12 @@ def of_pixels(wrong: BoolArray, pictures: Mapping[str, FloatArray], worst: float
 MAKES = (scenes.path, scenes.whitted)
 
 
-def over(draw: Draw, again: Callable[[rt.Scene], FloatArray]) -> Outcome:
-    """Both scenes on one thread, against what `again` renders of them."""
-    total = Outcome(0, 0)
-    for make in MAKES:
-        scene = make(draw.folder)
-        total += same_bits(rt.render(scene, threads=1).colour, again(scene))
-    return total
+def over(draw: Draw, pair: Callable[[rt.Scene, str], tuple[FloatArray, FloatArray]]) -> Outcome:
+    """Of both scenes;  pair(scene, its name): two pictures that must be the same."""
+    pairs = (pair(make(draw.folder), make.__name__) for make in MAKES)
+    return sum((same_bits(*pictures) for pictures in pairs), Outcome(0, 0))
+
+
+def on_threads(scene: rt.Scene, threads: int = 1) -> FloatArray:
+    """The picture."""
+    return rt.render(scene, threads=threads).colour

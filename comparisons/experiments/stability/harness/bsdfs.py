@@ -1,4 +1,4 @@
-"""Materials asked about arrays of directions: ours and Mitsuba's, by one interface.
+"""Materials evaluated and sampled for arrays of directions: ours and Mitsuba's, by one interface.
 
 Directions are local, unit, (n, 3); `wo` towards the viewer.  Mitsuba sees them rounded to float32.
 """
@@ -80,7 +80,7 @@ def _sample(table: Any, kind: int, wo: Any, u: Any, out: Any) -> None:
 
 @functools.cache
 def _plain() -> Leaves:
-    """A row of every material, so that all are asked by the same compiled kernels."""
+    """A row of every material, so that one compiled kernel serves them all."""
     some: Mapping[type[Material], Any] = {
         Conductor: {"eta": 1.5, "k": 1.0},
         RoughConductor: {"eta": 1.5, "k": 1.0},

@@ -16,17 +16,17 @@ OURS, MITSUBA = "ours", "mitsuba"
 """Names of contestants; text-book methods go by theirs: "sphere.algebraic"."""
 
 EXAMPLES = 3
-"""Failures of a contestant in a setting that are kept word for word."""
+"""Failures of a contestant at a sweep point that are kept word for word."""
 
 Effort = Literal["quick", "full"]
 
 
 class Draw(NamedTuple):
-    """What a setting is drawn with.
+    """The context that the cases of a sweep point are drawn in.
 
     rng: the same for the same seed, family, series and x, whatever else is measured;  cases: how
-    many to draw, as the series says for this effort;  mitsuba: whether Mitsuba is there to take
-    part;  folder: for files, empty, removed afterwards;  effort: for what `cases` does not say.
+    many to draw, the sweep's number for this effort;  mitsuba: whether Mitsuba takes part;
+    folder: for files, empty, removed afterwards;  effort: for what `cases` does not decide.
     """
 
     rng: np.random.Generator
@@ -38,13 +38,13 @@ class Draw(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a contestant fared in one setting.
+    """The result of a contestant at one sweep point.
 
-    cases: put to it and decided: those that the arbiter leaves open are not among them;  failures:
-    those that break the law;  worst: the largest error in the series' unit, of cases that have one,
-    failed or not (inf counts); None where none has, or the law is yes or no;  open: cases left
-    open, such as rays that touch exactly;  examples: failures, at most EXAMPLES, as JSON: what was
-    asked (floats as `float.hex`, so that nothing is rounded), what was expected and what came.
+    cases: those that were decided;  failures: those of them that break the law;  worst: the largest
+    error in the series' unit, of cases that have one, failed or not (inf counts); None where none
+    has, or the law is yes or no;  open: undecidable cases, such as rays that touch exactly;
+    examples: failures, at most EXAMPLES, as JSON: the input (floats as `float.hex`, so that nothing
+    is rounded), what was expected and what was found.
     """
 
     cases: int
@@ -60,7 +60,7 @@ class Outcome:
             raise ValueError("the worst error is NaN: a case that gives NaN has failed, with inf")
 
     def __add__(self, other: "Outcome") -> "Outcome":
-        """Both together."""
+        """The outcome of both sets of cases together."""
         known = [x.worst for x in (self, other) if x.worst is not None]
         return Outcome(
             self.cases + other.cases,
@@ -72,7 +72,7 @@ class Outcome:
 
 
 class Shot(NamedTuple):
-    """A picture of a failure: pixels (height, width, 3) uint8 sRGB, row 0 on top, and one sentence
+    """An image of a failure: pixels (height, width, 3) uint8 sRGB, row 0 on top, and one sentence
     that says what is to be seen."""
 
     pixels: npt.NDArray[np.uint8]
@@ -80,7 +80,7 @@ class Shot(NamedTuple):
 
 
 def generator(seed: int, family: str, series: str, x: float) -> np.random.Generator:
-    """Of one setting, independent of every other's."""
+    """The random numbers of one sweep point, independent of every other's."""
     return np.random.default_rng((seed, zlib.crc32(f"{family} {series} {x!r}".encode())))
 
 

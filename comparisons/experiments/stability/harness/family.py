@@ -1,4 +1,4 @@
-"""What a family of stability is made of: series, sweeps that become more extreme."""
+"""What a family of stability is made of: series, which measure along a sweep."""
 
 import math
 from collections.abc import Callable, Mapping

@@ -11,9 +11,9 @@ from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatA
 from comparisons.experiments.stability.harness.mitsubas import loaded
 from comparisons.mitsuba.backend import scalar
 from reference_rt.accel.geometry import Geometry, closest_hit, occluded, surface
-from reference_rt.core.ray import Ray, at, ray_from
-from reference_rt.core.vec3 import dot, row
-from reference_rt.jit.kernel import entry_kernel
+from reference_rt.core.ray import Ray, SurfacePoint, at, ray_from
+from reference_rt.core.vec3 import Vec3, dot, row
+from reference_rt.jit.kernel import entry_kernel, kernel
 
 PIXELS = 160
 """Across a picture."""
@@ -33,6 +33,15 @@ def bound(largest: float, size: float) -> float:
     return 17.0 * math.sqrt(3.0) * U * (2.0 * largest + 6.0 * size)
 
 
+@kernel
+def ray_leaving(ray: Ray, t: float, point: SurfacePoint, w: Vec3, epsilon: float) -> Ray:
+    """Ours, or for an epsilon above 0 the text-book's ray: it begins at o + t d, and what is nearer
+    than epsilon does not count, so that it might as well begin there."""
+    if epsilon > 0.0:
+        return Ray(at(ray, t) + w * epsilon, w, math.inf)
+    return ray_from(point, w)
+
+
 @entry_kernel
 def _lit(
     geometry: Geometry, o: FloatArray, d: FloatArray, w: FloatArray, epsilon: float, out: FloatArray
@@ -43,9 +52,7 @@ def _lit(
         out[i, 0] = -1.0
         if hit.kind >= 0:
             point, towards = surface(geometry, ray, hit), row(w, i)
-            leaving = ray_from(point, towards)
-            if epsilon > 0.0:
-                leaving = Ray(at(ray, hit.t) + towards * epsilon, towards, math.inf)
+            leaving = ray_leaving(ray, hit.t, point, towards, epsilon)
             out[i, 0] = 0.0 if occluded(geometry, leaving) else 1.0
             out[i, 1] = abs(dot(towards, point.n))
 

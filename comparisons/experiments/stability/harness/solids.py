@@ -174,7 +174,7 @@ def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists
 
 
 def _width(stated: Lists, t: float) -> float:
-    """Of the operand's crossing at t; none stated: they are too close to be told."""
+    """Of the operand's crossing at t; inf where none is stated, as two are too close together."""
     there = np.isfinite(stated.t)
     if not there.any():
         return np.inf

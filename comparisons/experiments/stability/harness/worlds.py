@@ -101,7 +101,7 @@ def judge(
     spp: int,
     expected: float,
     rounding: Callable[[str], float],
-    told: Mapping[str, Any],
+    shown: Mapping[str, Any],
 ) -> dict[str, Outcome]:
     """One case: the mean is finite and, in two stages of `chance`, the expected one, to noise, of
     `MOST` at most, and rounding.  The worst is relative."""
@@ -116,7 +116,7 @@ def judge(
         failed, (mean, error) = chance.fails(sample, expected, *limits)
         off = abs(mean - expected) / expected
         seen = {"expected": expected, "found": mean, "standard error": error, "seeds": seeds}
-        found[who] = one_case(failed, off, {**told, **seen})
+        found[who] = one_case(failed, off, {**shown, **seen})
     return found
 
 
@@ -125,7 +125,7 @@ def measure(
     draw: Draw,
     spp: int,
     rounding: Callable[[str], float],
-    told: Mapping[str, Any],
+    shown: Mapping[str, Any],
     pixels: int = 32,
     in_scalar: bool = True,
     their_pixels: int = 16,
@@ -139,4 +139,4 @@ def measure(
     renderers: dict[str, Render] = {OURS: lambda seed, spp: ours(world, pixels, spp, seed)}
     if draw.mitsuba:
         renderers[MITSUBA] = mitsubas
-    return judge(renderers, (first, again), spp, world.expected, rounding, told)
+    return judge(renderers, (first, again), spp, world.expected, rounding, shown)

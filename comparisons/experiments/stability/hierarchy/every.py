@@ -4,11 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness.core import FloatArray, Outcome
 from comparisons.experiments.stability.harness.outcomes import outcome
+from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt import shapes as any_shape
 from reference_rt.accel import bvh
 from reference_rt.core.arrays import IntArray
@@ -21,8 +21,6 @@ from reference_rt.rendering import query
 from reference_rt.rendering.query import Closest
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.meshes.watertight import shear_of
-
-BoolArray = npt.NDArray[np.bool_]
 
 METHODS: tuple[bvh.Method, ...] = ("sah", "median", "spatial", "none")
 
@@ -156,6 +154,6 @@ def _compared(
         if expected is None:
             expected = truth(tables) if truth else got
         wrong = differ(got, expected) | any_hit_differs(tables, o, d, expected[:, 0])
-        told = {"hierarchy": method, "origin": o, "direction": d}
-        total += outcome(wrong, told | {"expected": expected, "found": got})
+        shown = {"hierarchy": method, "origin": o, "direction": d}
+        total += outcome(wrong, shown | {"expected": expected, "found": got})
     return total

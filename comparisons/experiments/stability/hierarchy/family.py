@@ -14,11 +14,11 @@ SINGLY = 2_000
 """Primitives up to which each is tested by itself."""
 
 TESTS: Mapping[Effort, float] = {"quick": 2e6, "full": 2e7}
-"""Most single tests of a setting, some 15 ns each; eight at once ten times as many."""
+"""Most single tests of a sweep point, some 15 ns each; eight at once ten times as many."""
 
 
 def rays(draw: Draw, primitives: int) -> int:
-    """How many a setting can afford."""
+    """How many rays a sweep point can afford."""
     most = TESTS[draw.effort] * (1.0 if primitives <= SINGLY else 10.0) / primitives
     return int(min(draw.cases, max(most, 500.0)))
 

@@ -34,7 +34,7 @@ from comparisons.experiments.stability.hostile.mitsuba import judged as judged_o
 from comparisons.experiments.stability.hostile.pool import Answer, answers
 
 FOR_MITSUBA = {"quick": 8, "full": 60}
-"""Scenes of a setting that Mitsuba is given: each takes it some 0.1 s, after 2 s to start."""
+"""Scenes of a sweep point that Mitsuba gets: each takes it some 0.1 s, after 2 s to start."""
 
 LONGEST = 2000
 """Characters of a scene that an example quotes."""
@@ -91,10 +91,13 @@ def judged(
     return found + judged(left, True) if left else found
 
 
-Write = Callable[[Draw, float, str], str | bytes]
+Make = Callable[[Draw, float, str, int], tuple[str, str | bytes]]
+"""Suffix and content of a scene file, of x, the sound scene or file, and the case's number."""
+
+Measure = Callable[[Draw, float], dict[str, Outcome]]
 
 
-def _written(draw: Draw, x: float, names: Sequence[str], make: Any) -> list[tuple[Path, str]]:
+def _written(draw: Draw, x: float, names: Sequence[str], make: Make) -> list[tuple[Path, str]]:
     """Scene files beside the sound files, with the base that each was made from."""
     write_files(draw.folder)
     found = []
@@ -143,18 +146,8 @@ def _structure_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, str]:
         return (".json", as_text(data)) if k % 4 else (".yaml", as_yaml(data))
 
 
-def structure(draw: Draw, x: float) -> dict[str, Outcome]:
-    made = _written(draw, x, PLAIN, _structure_of)
-    return {OURS: judged([path for path, _ in made], True)}
-
-
 def _sentence_of(draw: Draw, x: float, _: str, __: int) -> tuple[str, str]:
     return ".json", as_text(sentence(draw.rng, x))
-
-
-def grammar(draw: Draw, x: float) -> dict[str, Outcome]:
-    made = _written(draw, x, ("",), _sentence_of)
-    return {OURS: judged([path for path, _ in made], True)}
 
 
 def _text_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, bytes]:
@@ -172,10 +165,16 @@ def bomb(rng: np.random.Generator, levels: int) -> str:
     return "\n".join([*lines, f"{key}: *a{3 * levels - 1}", ""])
 
 
-def text(draw: Draw, x: float) -> dict[str, Outcome]:
-    made = _written(draw, x, PLAIN, _text_of)
-    return {OURS: judged([path for path, _ in made], True)}
+def _in_plain_python(names: Sequence[str], make: Make) -> Measure:
+    def measure(draw: Draw, x: float) -> dict[str, Outcome]:
+        return {OURS: judged([path for path, _ in _written(draw, x, names, make)], True)}
 
+    return measure
+
+
+structure = _in_plain_python(PLAIN, _structure_of)
+grammar = _in_plain_python(("",), _sentence_of)
+text = _in_plain_python(PLAIN, _text_of)
 
 _EYE = {"type": "perspective", "eye": [0.0, 0.0, 4.0], "target": [0.0, 0.0, 0.0]}
 
@@ -200,28 +199,24 @@ def _image_scene(file: str) -> dict[str, Any]:
     }
 
 
-def _with_file(scene: Callable[[str], Any]) -> Any:
+def _of_files(names: Sequence[str], scene: Callable[[str], Any]) -> Measure:
+    """Scenes that name one damaged file each."""
+
     def make(draw: Draw, x: float, name: str, k: int) -> tuple[str, str]:
         file = f"case{k}_{name}"
         (draw.folder / file).write_bytes(damaged(draw.rng, files()[name], int(x)))
         return ".json", json.dumps(scene(file))
 
-    return make
+    def measure(draw: Draw, x: float) -> dict[str, Outcome]:
+        made = _written(draw, x, names, make)
+        known = _signatures(draw, {name: scene(name) for name in names})
+        return {OURS: judged([path for path, _ in made], False, [known[name] for _, name in made])}
+
+    return measure
 
 
-def _files(draw: Draw, x: float, names: Sequence[str], scene: Callable[[str], Any]) -> Outcome:
-    made = _written(draw, x, names, _with_file(scene))
-    known = _signatures(draw, {name: scene(name) for name in names})
-    return judged([path for path, _ in made], False, [known[name] for _, name in made])
-
-
-def meshes(draw: Draw, x: float) -> dict[str, Outcome]:
-    return {OURS: _files(draw, x, [*MESHES, "ball.gltf"], _mesh_scene)}
-
-
-def images(draw: Draw, x: float) -> dict[str, Outcome]:
-    return {OURS: _files(draw, x, IMAGES, _image_scene)}
-
+meshes = _of_files([*MESHES, "ball.gltf"], _mesh_scene)
+images = _of_files(IMAGES, _image_scene)
 
 _COUNTS = (1.0, 2.0, 4.0, 8.0)
 

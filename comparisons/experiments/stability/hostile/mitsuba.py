@@ -42,7 +42,7 @@ def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
     found: dict[str, Any] = {"exit": 0, "said": "", "nonfinite": 0, "rendered": False}
     try:
         scene = adjusted(Scene.load(path), SAMPLES, SIZE)
-        assert scene.tables is not None  # made now, so that what is wrong with it is told
+        assert scene.tables is not None  # built now, so that its errors are raised here
     except ReferenceRtError:
         return found
     with contextlib.redirect_stderr(io.StringIO()):

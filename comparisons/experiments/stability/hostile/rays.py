@@ -73,13 +73,13 @@ def undefined(hits: Intersections, o: FloatArray, d: FloatArray) -> BoolArray:
 
 
 def _judged(wrong: BoolArray, o: FloatArray, d: FloatArray, hits: Intersections) -> Outcome:
-    told = {
+    shown = {
         "o": o,
         "d": d,
         "came": lambda k: f"t {hits.t[k]!r} shape {hits.shape[k]} n {hits.n[k].tolist()}",
         "expected": "a miss or a hit that is finite throughout",
     }
-    return outcome(wrong, told)
+    return outcome(wrong, shown)
 
 
 def numbers(draw: Draw, x: float) -> Mapping[str, Outcome]:

@@ -26,16 +26,16 @@ RAYS = 1000
 """From one shape, in the full run."""
 
 FEW = 24
-"""Of those, the rays that the others are asked about: Mitsuba takes 20 µs for each in its scalar
-variant (in others as long as 2000 to compile for each shape), and exact arithmetic has to look into
-most of what they answer."""
+"""Of those, the rays that the other contestants get: Mitsuba takes 20 µs for each in its scalar
+variant (in others as long as 2000 to compile for each shape), and exact arithmetic has to check
+most of their answers."""
 
 FEW_SHAPES = {"quick": 1, "full": 8}
-"""Of a kind in a setting, those that they are asked about."""
+"""Shapes of a kind at a point that the other contestants get."""
 
 SAMPLE = 4
-"""Of the departures from a shape, those that exact arithmetic is asked about however they look; one
-of those where it answers ray by ray."""
+"""Departures from a shape that exact arithmetic checks even if nothing is suspicious; one where it
+works ray by ray."""
 
 FLATTEST = -15.0
 """The least cosine of departures to the normal, as a power of ten."""

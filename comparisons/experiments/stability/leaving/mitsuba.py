@@ -39,7 +39,7 @@ def _depart(mi: Any, mi_scene: Any, o: list[float], d: list[float], way: Any, ou
 
 
 def outer(ways: Ways, found: Departures) -> BoolArray:
-    """To which side rays were asked to leave; of those that float32 cannot tell, to which they
-    began: their cosines are below some hundred roundings of it."""
+    """Whether rays were to leave to the outer side; where float32 cannot decide (cosines below some
+    hundred roundings of it), whether they begin there."""
     begun = np.sum((found.start - found.p) * found.n, axis=1) > 0.0
     return np.asarray(np.where(np.abs(ways.local[:, 2]) < 1e-5, begun, ways.outer))

@@ -20,9 +20,9 @@ from comparisons.geometry.float32 import round32
 
 
 class Extent(NamedTuple):
-    """Of a setting's shapes: sizes are 10^size, one axis is `ratio` times as long as another, and
-    `distance` sizes lie between the origin and a shape.  single: whether every number of shapes and
-    rays is rounded to float32 first, so that Mitsuba gets the very same."""
+    """The shapes of a sweep point: sizes are 10^size, one axis is `ratio` times as long as another,
+    and `distance` sizes lie between the origin and a shape.  single: whether every number of shapes
+    and rays is rounded to float32 first, so that Mitsuba gets the very same."""
 
     size: tuple[float, float]
     ratio: tuple[float, float]

@@ -7,11 +7,12 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import FloatArray
+from comparisons.experiments.stability.harness.leaving import ray_leaving
 from comparisons.experiments.stability.leaving.shapes import GROUPS, WHOLE, Placed, Rays
 from reference_rt import shapes as any_shape
 from reference_rt.accel.geometry import Geometry, closest_hit, surface
 from reference_rt.core.arrays import IntArray
-from reference_rt.core.ray import Hit, Ray, SurfacePoint, at, ray_from
+from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, row, to_world
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.shapes.meshes.watertight import shear_of
@@ -51,15 +52,6 @@ class Departures(NamedTuple):
 
 
 COLUMNS = 15
-
-
-@kernel
-def _leaving(ray: Ray, t: float, point: SurfacePoint, w: Vec3, epsilon: float) -> Ray:
-    """Ours, or for an epsilon above 0 the text-book's ray: it begins at o + t d, and what is nearer
-    than epsilon does not count, so that it might as well begin there."""
-    if epsilon > 0.0:
-        return Ray(at(ray, t) + w * epsilon, w, math.inf)
-    return ray_from(point, w)
 
 
 @kernel
@@ -103,7 +95,7 @@ def _depart(
             continue
         point = surface(geometry, ray, hit)
         w = to_world(frame_from_normal(point.n), row(ways, i))
-        leaving = _leaving(ray, hit.t, point, w, epsilon)
+        leaving = ray_leaving(ray, hit.t, point, w, epsilon)
         met = _meet(geometry, kind, rows[i], leaving)
         n = Vec3(0.0, 0.0, 0.0)
         again = math.inf

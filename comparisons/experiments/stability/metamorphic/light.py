@@ -122,13 +122,13 @@ def wrong_pixels(found: FloatArray, base: Before) -> BoolArray:
 
 
 FEW = 0.01
-"""The part of a picture up to which pixels that are wrong are looked at again.  A sample's path and
+"""The part of a picture up to which wrong pixels are checked again.  A sample's path and
 its shadow rays, some 12 segments of a length of about SIZE, pass edges, about as long as the scene
 is large, within `shift` in less than 100 shift / SIZE of all cases: up to offsets of 1e10 sizes
-that is 1 %.  Of more, none is looked at again, and all have failed: this excuses nothing."""
+that is 1 %.  Of more, none is checked again, and all have failed: this excuses nothing."""
 
 AGAIN = 32
-"""Scenes that these are looked for in: everything in them is moved by itself, by `shift` in any
+"""Scenes that these are compared with: everything in them is moved by itself, by `shift` in any
 direction.  Along the normal of an edge each move is uniform in -shift..shift, and the difference of
 two exceeds 1/2 shift in 28 % and shift in 1/8 of all scenes: that no scene of 32 crosses an edge as
 far as rounding can has a chance of 3e-5 or 1.4 %.  A pixel that is wrong for another reason

@@ -14,6 +14,7 @@ from comparisons.experiments.stability.harness.outcomes import Columns, hexed, o
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.metamorphic.motion import Motion
 from comparisons.experiments.stability.metamorphic.solids import Judge
+from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import scalar
 from comparisons.rungs.rays.arbiter import directions
@@ -22,7 +23,6 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 
-BoolArray = npt.NDArray[np.bool_]
 Identities = npt.NDArray[np.int64]
 
 Outcomes = dict[str, Outcome]
@@ -108,7 +108,7 @@ def through(motion: Motion, rays: Rays) -> tuple[FloatArray, FloatArray]:
     return o, d
 
 
-class Asked(NamedTuple):
+class Traced(NamedTuple):
     """Rays, and what they found in a scene;  names: the identities in terms of the scene that this
     one is compared with, where shapes have other numbers there."""
 
@@ -119,7 +119,7 @@ class Asked(NamedTuple):
     names: Identities | None = None
 
 
-def _changed(before: Asked, after: Asked) -> BoolArray:
+def _changed(before: Traced, after: Traced) -> BoolArray:
     names = after.found.identities if after.names is None else after.names
     return differ(before.found, Found(after.found.t, names))
 
@@ -132,11 +132,11 @@ with unit rows and their sums by 3 u |o - anchor|.  No anchor is further than 12
 and L is 6 at least: 4 u 12 = 8 u 6.  What is then solved rounds more; to allow less is stricter."""
 
 AROUND = np.concatenate([directions(16), 0.3 * directions(8)])
-"""Moves, of that size, that a differing ray is asked with."""
+"""Moves, of that size, at which exact arithmetic repeats a differing ray."""
 
 
 def judged(
-    before: Asked, after: Asked, factor: float, exact: bool, unmoved: bool = False
+    before: Traced, after: Traced, factor: float, exact: bool, unmoved: bool = False
 ) -> Outcome:
     """Ours.  exact: the transformed numbers are the numbers meant, and the answers must be the
     same to the last bit of t;  else where answers differ each must be right in its own scene, by
@@ -153,28 +153,28 @@ def judged(
         judged_as = before._replace(found=after.found) if unmoved else after
         right, open_[rows] = _both_right(before, judged_as, rows)
         wrong[rows[right]] = False
-    return outcome(wrong, {"before": _told(before), "after": _told(after)}, open_, worst)
+    return outcome(wrong, {"before": _shown(before), "after": _shown(after)}, open_, worst)
 
 
 def _both_right(
-    before: Asked, after: Asked, rows: npt.NDArray[np.int64]
+    before: Traced, after: Traced, rows: npt.NDArray[np.int64]
 ) -> tuple[BoolArray, BoolArray]:
     """Of some rays: whether both answers are those of exact arithmetic for a ray within BAND, and
     whether the arbiter leaves one open."""
     right, touching = np.ones(len(rows), bool), np.zeros(len(rows), bool)
-    for asked in (before, after):
+    for case in (before, after):
         # What is wrong before is wrong.
         left = np.flatnonzero(right)
-        right[left], touching[left] = _right(asked, rows[left])
+        right[left], touching[left] = _right(case, rows[left])
     return right, touching
 
 
-def _right(asked: Asked, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolArray]:
-    """Most are right for the very ray: only others, some 3 ms each, are asked around it."""
+def _right(case: Traced, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolArray]:
+    """Most are right for the very ray: only the others, some 3 ms each, are repeated around it."""
     if len(rows) == 0:
         return np.ones(0, bool), np.zeros(0, bool)
-    judge, o, d = Judge(asked.scene), asked.o[rows], asked.d[rows]
-    names, t = asked.found.identities[rows], asked.found.t[rows]
+    judge, o, d = Judge(case.scene), case.o[rows], case.d[rows]
+    names, t = case.found.identities[rows], case.found.t[rows]
     met = judge.decide(o, d)
     right = np.array([m.allows(*answer) for m, *answer in zip(met, names, t, strict=True)])
     touching = np.array([m.touching for m in met])
@@ -190,14 +190,14 @@ def _right(asked: Asked, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolAr
     return right, touching
 
 
-def judged_mitsuba(before: Asked, after: Asked, factor: float) -> Outcome:
+def judged_mitsuba(before: Traced, after: Traced, factor: float) -> Outcome:
     """Its rays pass every edge at more than 1e-5 of the way: what float64's rounding of the scene
     moves, 1e-16 of its size, changes none of them."""
     wrong, _, worst = _compared(before, after, factor)
-    return outcome(wrong, {"before": _told(before), "after": _told(after)}, worst=worst)
+    return outcome(wrong, {"before": _shown(before), "after": _shown(after)}, worst=worst)
 
 
-def _compared(before: Asked, after: Asked, factor: float) -> tuple[BoolArray, BoolArray, float]:
+def _compared(before: Traced, after: Traced, factor: float) -> tuple[BoolArray, BoolArray, float]:
     """Which rays hit something else; which hit the same at another t; by how much at most, of t."""
     changed = _changed(before, after)
     t0, t1 = before.found.t, after.found.t / factor
@@ -206,9 +206,9 @@ def _compared(before: Asked, after: Asked, factor: float) -> tuple[BoolArray, Bo
     return changed, same & (t0 != t1), float(off.max(initial=0.0))
 
 
-def _told(asked: Asked) -> Callable[[int], dict[str, Any]]:
-    columns: Columns = {"o": asked.o, "d": asked.d, "t": asked.found.t}
-    columns["shape, instance, part, primitive"] = asked.found.identities
+def _shown(case: Traced) -> Callable[[int], dict[str, Any]]:
+    columns: Columns = {"o": case.o, "d": case.d, "t": case.found.t}
+    columns["shape, instance, part, primitive"] = case.found.identities
     return lambda k: {name: hexed(column[k]) for name, column in columns.items()}
 
 
@@ -221,11 +221,11 @@ class Bench:
         tables = rt.build_tables(scene)
         self.rays = aimed(tables, cases, rng)
         o, d, coarse = self.rays
-        self.ours = Asked(scene, o, d, ours(tables, o, d))
+        self.ours = Traced(scene, o, d, ours(tables, o, d))
         self.mitsuba = None
         if mitsuba:
             o, d = o[coarse], d[coarse]
-            self.mitsuba = Asked(scene, o, d, mitsubas(scene, o, d))
+            self.mitsuba = Traced(scene, o, d, mitsubas(scene, o, d))
 
     def compared(
         self,
@@ -240,14 +240,14 @@ class Bench:
         """The rays, as they are transformed, in the scene transformed.  names: identities in terms
         of the scene before, of those after;  factor, exact, unmoved: see `judged`."""
 
-        def asked(o: FloatArray, d: FloatArray, found: Found) -> Asked:
-            return Asked(scene, o, d, found, names(found.identities) if names else None)
+        def case(o: FloatArray, d: FloatArray, found: Found) -> Traced:
+            return Traced(scene, o, d, found, names(found.identities) if names else None)
 
-        after = asked(o, d, self.found_after(scene, o, d))
+        after = case(o, d, self.found_after(scene, o, d))
         outcomes = {OURS: judged(self.ours, after, factor, exact, unmoved)}
         if self.mitsuba is not None:
             o, d = o[self.rays.coarse], d[self.rays.coarse]
-            after = asked(o, d, mitsubas(scene, o, d))
+            after = case(o, d, mitsubas(scene, o, d))
             outcomes[MITSUBA] = judged_mitsuba(self.mitsuba, after, factor)
         return outcomes
 

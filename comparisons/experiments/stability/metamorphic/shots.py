@@ -1,4 +1,4 @@
-"""Pictures of what F9 finds, 192 pixels wide."""
+"""Images of F9's failures, 192 pixels wide."""
 
 import tempfile
 from collections.abc import Callable

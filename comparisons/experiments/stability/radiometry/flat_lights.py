@@ -139,16 +139,16 @@ def _mean(densities: Densities, p: FloatArray, nodes: int) -> FloatArray:
 
 
 def _compare(
-    name: str, corners: Any, p: FloatArray, asked: dict[str, Densities]
+    name: str, corners: Any, p: FloatArray, methods: dict[str, Densities]
 ) -> dict[str, Outcome]:
     truth, condition = _exact(corners, p)
     outcomes = {}
-    for who, densities in asked.items():
+    for who, densities in methods.items():
         mean, coarse = (_mean(densities, p, nodes) for nodes in RULES)
         doubt = relative(coarse, mean)
         allowed = 64.0 * unit_of(who) * condition + np.minimum(doubt, DOUBT)
-        told = {"shape": name, "point": p, "solid angle": plain(truth), "found": plain(mean)}
-        outcomes[who] = of_errors(relative(mean, truth), allowed, told)
+        shown = {"shape": name, "point": p, "solid angle": plain(truth), "found": plain(mean)}
+        outcomes[who] = of_errors(relative(mean, truth), allowed, shown)
     return outcomes
 
 
@@ -165,7 +165,7 @@ def _triangle_densities(p: FloatArray, u: FloatArray) -> FloatArray:
     return out
 
 
-def _asked(draw: Draw, ours: Densities, shape: Callable[[], Any]) -> dict[str, Densities]:
+def _methods(draw: Draw, ours: Densities, shape: Callable[[], Any]) -> dict[str, Densities]:
     if not draw.mitsuba:
         return {OURS: ours}
     loaded = shape()
@@ -177,14 +177,14 @@ def _asked(draw: Draw, ours: Densities, shape: Callable[[], Any]) -> dict[str, D
 
 
 def _square(draw: Draw, p: FloatArray) -> dict[str, Outcome]:
-    asked = _asked(draw, _rectangle_densities, lambda: {"type": "rectangle"})
-    return _compare("rectangle", SQUARE, p, asked)
+    methods = _methods(draw, _rectangle_densities, lambda: {"type": "rectangle"})
+    return _compare("rectangle", SQUARE, p, methods)
 
 
 def _flat(draw: Draw, x: float) -> dict[str, Outcome]:
     p = _points(draw.rng, draw.cases, x)
-    asked = _asked(draw, _triangle_densities, _mitsuba_triangle)
-    return together([_square(draw, p), _compare("triangle", CORNERS, p, asked)])
+    methods = _methods(draw, _triangle_densities, _mitsuba_triangle)
+    return together([_square(draw, p), _compare("triangle", CORNERS, p, methods)])
 
 
 def _sky(draw: Draw, x: float) -> dict[str, Outcome]:

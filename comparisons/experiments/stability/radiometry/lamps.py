@@ -70,8 +70,8 @@ def _area(draw: Draw, x: float) -> dict[str, Outcome]:
     found = []
     for size in {math.sqrt(x), 1.0 / math.sqrt(x)}:
         for kind in KINDS:
-            told = {"lamp": kind, "size": size}
-            found.append(measure(lit_floor(kind, size, 1.0), draw, 16, _rounding, told))
+            shown = {"lamp": kind, "size": size}
+            found.append(measure(lit_floor(kind, size, 1.0), draw, 16, _rounding, shown))
     return together(found)
 
 
@@ -79,8 +79,8 @@ def _radiance(draw: Draw, x: float) -> dict[str, Outcome]:
     found = []
     for radiance in {x, 1.0 / x}:
         for kind in ("sphere", "rectangle"):
-            told = {"lamp": kind, "radiance": radiance}
-            found.append(measure(lit_floor(kind, 1.0, radiance), draw, 16, _rounding, told))
+            shown = {"lamp": kind, "radiance": radiance}
+            found.append(measure(lit_floor(kind, 1.0, radiance), draw, 16, _rounding, shown))
     return together(found)
 
 
@@ -89,8 +89,8 @@ def _roulette(draw: Draw, x: float) -> dict[str, Outcome]:
     for albedo in (0.5, 0.9, 0.99):
         world = closed(albedo, int(x), rr_depth=1)
         spp = 16 if draw.effort == "quick" else 64
-        told = {"albedo": albedo, "edges": int(x)}
-        found.append(measure(world, draw, spp, _rounding, told, in_scalar=False, their_pixels=32))
+        shown = {"albedo": albedo, "edges": int(x)}
+        found.append(measure(world, draw, spp, _rounding, shown, in_scalar=False, their_pixels=32))
     return together(found)
 
 

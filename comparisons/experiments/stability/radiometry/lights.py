@@ -65,13 +65,13 @@ def _distance(draw: Draw, x: float) -> dict[str, Outcome]:
             errors = np.maximum(
                 np.abs(arriving - exact) / exact, np.linalg.norm(wi - towards, axis=1)
             )
-        told = {"light": "at the origin", "point": p, "irradiance": plain(exact)}
-        outcomes[who] = of_errors(errors, 8.0 * unit_of(who), told | {"found": plain(arriving)})
+        shown = {"light": "at the origin", "point": p, "irradiance": plain(exact)}
+        outcomes[who] = of_errors(errors, 8.0 * unit_of(who), shown | {"found": plain(arriving)})
     return outcomes
 
 
 def _spot(draw: Draw, x: float) -> dict[str, Outcome]:
-    """One cone per setting, points from its axis to a little beyond its rim."""
+    """One cone per sweep point, receivers from its axis to a little beyond its rim."""
     n, cutoff = draw.cases, 1.0 / x
     target = round32(unit_vectors(draw.rng, 1))[0]
     light = Spot(
@@ -110,9 +110,9 @@ def _spot(draw: Draw, x: float) -> dict[str, Outcome]:
     for who, value in found.items():
         unit = unit_of(who)
         allowed = min(VISIBLE, 16.0 * unit * (1.0 + 1.0 / math.radians(0.25 * cutoff)))
-        told = {"target": hexed(target), "cutoff in degrees": cutoff, "point": p}
-        told |= {"falloff": plain(exact), "found": plain(value)}
-        outcomes[who] = of_errors(np.abs(value - exact), allowed, told)
+        shown = {"target": hexed(target), "cutoff in degrees": cutoff, "point": p}
+        shown |= {"falloff": plain(exact), "found": plain(value)}
+        outcomes[who] = of_errors(np.abs(value - exact), allowed, shown)
     return outcomes
 
 

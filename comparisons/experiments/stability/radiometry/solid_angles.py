@@ -76,10 +76,10 @@ def _sphere(draw: Draw, gap: FloatArray, shared: bool) -> dict[str, Outcome]:
             found[MITSUBA] = 1.0 / theirs({"type": "sphere"}, p, u)[:, 0]
     outcomes = {}
     for who, value in found.items():
-        told: Columns = {"sphere": "of radius 1 at the origin", "point": p}
-        told |= {"solid angle": plain(truth), "found": plain(value)}
+        shown: Columns = {"sphere": "of radius 1 at the origin", "point": p}
+        shown |= {"solid angle": plain(truth), "found": plain(value)}
         allowed = 16.0 * unit_of(who) * (1.0 + 1.0 / np.maximum(cosine, 1e-300))
-        outcomes[who] = of_errors(relative(value, truth), allowed, told)
+        outcomes[who] = of_errors(relative(value, truth), allowed, shown)
     return outcomes
 
 

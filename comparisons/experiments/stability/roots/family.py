@@ -90,11 +90,11 @@ def _compete(rays: Rays, from_afar: bool) -> Mapping[str, Outcome]:
 
     parts = {name: rays.row[name] for name in ("center", "major", "minor")}
     named = {"o": rays.o, "d": rays.d, "begin": begin} | parts
-    asked = {name: np.reshape(column, (len(begin), -1)) for name, column in named.items()}
+    columns = {name: np.reshape(column, (len(begin), -1)) for name, column in named.items()}
     return {
-        OURS: judge((torus_kernel(rays) - begin[:, None]) * speed[:, None], truth, slack, asked),
-        "numpy.roots": judge(numpy_roots(polynomials) - shift, truth, slack, asked),
-        "ferrari": judge(ferrari(polynomials) - shift, truth, slack, asked),
+        OURS: judge((torus_kernel(rays) - begin[:, None]) * speed[:, None], truth, slack, columns),
+        "numpy.roots": judge(numpy_roots(polynomials) - shift, truth, slack, columns),
+        "ferrari": judge(ferrari(polynomials) - shift, truth, slack, columns),
     }
 
 
@@ -145,14 +145,14 @@ def _far(draw: Draw, x: float) -> Mapping[str, Outcome]:
 
 def _of_quadratics(coefficients: FloatArray) -> Mapping[str, Outcome]:
     truth = of_quadratics(coefficients)
-    asked = {"coefficients": coefficients}
+    columns = {"coefficients": coefficients}
     contestants = {
         OURS: quadric_kernel,
         "numpy.roots": numpy_roots,
         "quadratic.formula": formula,
     }
     return {
-        name: judge(solve(coefficients), truth, 0.0, asked) for name, solve in contestants.items()
+        name: judge(solve(coefficients), truth, 0.0, columns) for name, solve in contestants.items()
     }
 
 

@@ -95,7 +95,7 @@ def judge(
     found: FloatArray,
     truth: Certified,
     slack: FloatArray | float,
-    asked: Mapping[str, Any],
+    columns: Mapping[str, Any],
 ) -> Outcome:
     """Roots `found` (n, k) as `Certified.real` has them; `slack` (n, 1): besides the bound.
 
@@ -110,5 +110,5 @@ def judge(
     as_many = np.all(np.isfinite(real) == np.isfinite(found), axis=1)
     counted = both & (as_many & ~truth.open)[:, None]
     worst = float(share[counted].max()) if counted.any() else None
-    told = {**asked, "expected": real, "found": found}
-    return outcome(~as_many | np.any(share > 1.0, axis=1), told, truth.open, worst)
+    shown = {**columns, "expected": real, "found": found}
+    return outcome(~as_many | np.any(share > 1.0, axis=1), shown, truth.open, worst)

@@ -3,7 +3,7 @@
 "Aligned" shapes lie in a plane x = 0, y = 0 or z = 0: their heights and the rays' angles are
 numbers of their own, not differences of others, and so float32 has them as exactly as float64.
 "Turned" ones lie anywhere, and both are differences: the rounding of vertices and rays is part of
-what is asked.
+the question.
 
 `singles`: all numbers are rounded to float32, and Mitsuba gets what ours gets.
 """
@@ -20,7 +20,7 @@ from comparisons.geometry.float32 import round32
 from reference_rt.core import transform
 
 SHAPES = 8
-"""Drawn of each setting."""
+"""Drawn at each sweep point."""
 
 OUTSIDE = 0.25
 """The share of rays that are aimed beyond an edge."""

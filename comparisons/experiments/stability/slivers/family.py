@@ -30,8 +30,8 @@ CASES = 2_000, 40_000
 
 
 def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray]]:
-    """What is asked, and t (n,) of each contestant."""
-    # A triangle is led to through a hierarchy, whose leaves test eight at once; the others in turn.
+    """The question, and t (n,) of each contestant."""
+    # Triangles are traced through a hierarchy, whose leaves test eight at once; others in turn.
     scene = rt.Scene(
         shapes=(trial.shape,), hierarchy="sah" if trial.kind == "triangles" else "auto"
     )

@@ -25,7 +25,7 @@ from comparisons.experiments.methods.setting import unit_rows
 from comparisons.experiments.stability.harness.core import FloatArray, Outcome
 from comparisons.experiments.stability.harness.outcomes import hexed, outcome
 from comparisons.geometry.exact import first_hit
-from comparisons.geometry.exact.dyadic import Dyadic, cross
+from comparisons.geometry.exact.dyadic import BoolArray, Dyadic, cross
 
 BAND = 144.0 * U
 
@@ -33,7 +33,6 @@ RING = 16
 """Rays around one, moved across it."""
 
 Extended = npt.NDArray[np.longdouble]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class Question:
 
 
 class Judge:
-    """Knows the truth about one question, and judges answers to it."""
+    """Computes the truth about one question, and judges answers to it."""
 
     def __init__(self, question: Question) -> None:
         self.question = question
@@ -82,9 +81,9 @@ class Judge:
         worst = float((off[found] / (U * q.reach)).max()) if found.any() else None
         wrong = self._wrong(t, off)
         shape = {name: np.ravel(v) for name, v in q.row.items() if name in _SHAPES[q.kind]}
-        told = {"shape": {name: hexed(v) for name, v in shape.items()}, "origin": q.o}
-        told |= {"direction": q.d, "expected": self.t, "found": t}
-        return outcome(wrong, told, wrong & self.touching, worst)
+        shown = {"shape": {name: hexed(v) for name, v in shape.items()}, "origin": q.o}
+        shown |= {"direction": q.d, "expected": self.t, "found": t}
+        return outcome(wrong, shown, wrong & self.touching, worst)
 
     def wrong(self, t: FloatArray) -> BoolArray:
         """Which of answers t (n,) are."""
@@ -97,8 +96,8 @@ class Judge:
             apart = np.abs(t - self.t) * np.linalg.norm(q.d, axis=1)
         near = found & there & (apart <= PIXEL * q.size)
         wrong = found & ~near & (off > q.band)
-        asked = np.flatnonzero((found & ~near & ~wrong) | (~found & there))
-        wrong[asked] = self._is_certain(asked, t)
+        doubtful = np.flatnonzero((found & ~near & ~wrong) | (~found & there))
+        wrong[doubtful] = self._is_certain(doubtful, t)
         return np.asarray(wrong)
 
     def _distances(self, found: BoolArray, t: FloatArray) -> FloatArray:

@@ -68,17 +68,17 @@ def _laws_of(draw: Draw, depth: int) -> Iterator[dict[str, Outcome]]:
     o, d = rays_at(draw.rng, RAYS, np.zeros(3), 1.0)
     described = [s.model_dump_json(exclude_defaults=True) for s in shapes.leaves]
     for name, one, two in pairs(draw.rng, depth):
-        told = {"tree": repr(one)[:500], "other": repr(two)[:500], "shapes": described}
+        shown = {"tree": repr(one)[:500], "other": repr(two)[:500], "shapes": described}
         found = {}
         for contestant in (OURS, INTERVALS):
-            ask = LISTS[contestant]
-            a = ask(shapes.solid(one), draw.folder, o, d)
+            crossings_of = LISTS[contestant]
+            a = crossings_of(shapes.solid(one), draw.folder, o, d)
             b = np.empty((len(o), 0))
             if two is not None:
-                b = ask(shapes.solid(two), draw.folder, o, d)
+                b = crossings_of(shapes.solid(two), draw.folder, o, d)
             lists = {"expected": _finite(b), "came": _finite(a)}
             rays = {"law": name, "o": o, "d": d}
-            found[contestant] = outcome(~solids.same(a, b), rays | lists | told)
+            found[contestant] = outcome(~solids.same(a, b), rays | lists | shown)
         yield found
 
 
@@ -96,17 +96,17 @@ def judge(draw: Draw, solid: Any, o: FloatArray, d: FloatArray, size: float) -> 
     length = np.linalg.norm(d, axis=1) / size
     found = {}
     for contestant in (OURS, INTERVALS, INSIDE_TESTS):
-        look = _first if contestant == INSIDE_TESTS else solids.problem
+        problem_of = _first if contestant == INSIDE_TESTS else solids.problem
         t = LISTS[contestant](solid, draw.folder, o, d)
         problems = [
-            None if truth.touching else look(truth, row)
+            None if truth.touching else problem_of(truth, row)
             for truth, row in zip(truths, t, strict=True)
         ]
         wrong = np.array([problem is not None for problem in problems])
         stretches = [p[1] * float(n) for p, n in zip(problems, length, strict=True) if p]
-        told = {"o": o, "d": d, "came": _said(problems), "expected": "none"}
-        told |= {"solid": solid.model_dump_json(exclude_defaults=True)}
-        found[contestant] = outcome(wrong, told, undecided, max(stretches, default=0.0))
+        shown = {"o": o, "d": d, "came": _said(problems), "expected": "none"}
+        shown |= {"solid": solid.model_dump_json(exclude_defaults=True)}
+        found[contestant] = outcome(wrong, shown, undecided, max(stretches, default=0.0))
     return found
 
 

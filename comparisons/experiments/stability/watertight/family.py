@@ -43,8 +43,8 @@ MOST = 2_000
 
 def _judged(o: FloatArray, d: FloatArray, right: BoolArray, wanted: str, got: Any) -> Outcome:
     """Of rays (n, 3);  got (n,): what came, for the examples."""
-    told = {"origin": o, "direction": d, "expected": wanted, "found": lambda k: str(got[k])}
-    return outcome(~right, told)
+    shown = {"origin": o, "direction": d, "expected": wanted, "found": lambda k: str(got[k])}
+    return outcome(~right, shown)
 
 
 def _ours(draw: Draw, mesh: Closed, o: FloatArray, d: FloatArray, scale: float) -> Outcome:

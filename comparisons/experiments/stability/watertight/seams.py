@@ -105,7 +105,7 @@ KINDS: dict[str, Seamed] = {
 
 
 @dataclass(frozen=True)
-class Asked:
+class Case:
     """Shapes and rays (n, 3) that start in shape `whose` (n,)."""
 
     shapes: tuple[Any, ...]
@@ -114,7 +114,7 @@ class Asked:
     whose: IntArray
 
 
-def drawn(rng: np.random.Generator, names: tuple[str, ...], offset: float, n: int) -> Asked:
+def drawn(rng: np.random.Generator, names: tuple[str, ...], offset: float, n: int) -> Case:
     """n rays of each of these kinds: half in random directions, half at the seams."""
     shapes, origins, directions = [], [], []
     for k, name in enumerate(names):
@@ -131,28 +131,28 @@ def drawn(rng: np.random.Generator, names: tuple[str, ...], offset: float, n: in
         origins.append(o)
         directions.append(np.concatenate([aimed, unit_vectors(rng, n - half)]))
     whose = np.repeat(np.arange(len(names)), n)
-    return Asked(tuple(shapes), np.concatenate(origins), np.concatenate(directions), whose)
+    return Case(tuple(shapes), np.concatenate(origins), np.concatenate(directions), whose)
 
 
-def judged(asked: Asked, hits: Any) -> Outcome:
+def judged(case: Case, hits: Any) -> Outcome:
     """Whether each ray meets the shape that it starts in."""
-    told = {
-        "shape": lambda k: asked.shapes[asked.whose[k]].model_dump_json(exclude_defaults=True),
-        "origin": asked.o,
-        "direction": asked.d,
+    shown = {
+        "shape": lambda k: case.shapes[case.whose[k]].model_dump_json(exclude_defaults=True),
+        "origin": case.o,
+        "direction": case.d,
         "expected": "a hit of the shape",
         "found": lambda k: f"shape {hits.shape[k]} at t = {hits.t[k]}",
     }
-    return outcome(hits.shape != asked.whose, told)
+    return outcome(hits.shape != case.whose, shown)
 
 
 def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
     names = tuple(KINDS)
-    asked = drawn(draw.rng, names, x, draw.cases // len(names))
-    tables = rt.build_tables(rt.Scene(shapes=asked.shapes, hierarchy="sah"))
-    found = {OURS: judged(asked, query.intersect(tables, asked.o, asked.d))}
-    if draw.mitsuba and fits(np.abs(asked.o)):
+    case = drawn(draw.rng, names, x, draw.cases // len(names))
+    tables = rt.build_tables(rt.Scene(shapes=case.shapes, hierarchy="sah"))
+    found = {OURS: judged(case, query.intersect(tables, case.o, case.d))}
+    if draw.mitsuba and fits(np.abs(case.o)):
         names = tuple(name for name in names if KINDS[name].translated)
-        asked = drawn(draw.rng, names, x, draw.cases // len(names))
-        found[MITSUBA] = judged(asked, traced(rt.Scene(shapes=asked.shapes), asked.o, asked.d))
+        case = drawn(draw.rng, names, x, draw.cases // len(names))
+        found[MITSUBA] = judged(case, traced(rt.Scene(shapes=case.shapes), case.o, case.d))
     return found

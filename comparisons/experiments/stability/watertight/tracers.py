@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from comparisons.experiments.stability.harness.core import MITSUBA, FloatArray
 from comparisons.experiments.stability.harness.meshes import Closed, mitsuba_mesh
+from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt import textbook
@@ -19,7 +19,6 @@ from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.meshes.watertight import shear_of
 
-BoolArray = npt.NDArray[np.bool_]
 Tracer = Callable[[FloatArray, FloatArray], BoolArray]
 
 NOT_ROBUST, INSTANCED = "mitsuba, not robust", "mitsuba, instanced"
@@ -50,7 +49,7 @@ def crossings(tables: Any, o: FloatArray, d: FloatArray) -> tuple[IntArray, IntA
 
 
 def fits(coordinates: FloatArray) -> bool:
-    """Whether float32 knows coordinates of this size to COARSEST."""
+    """Whether float32 resolves coordinates of this size to COARSEST."""
     return bool(np.spacing(np.float32(np.abs(coordinates).max())) < COARSEST)
 
 
