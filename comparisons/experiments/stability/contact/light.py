@@ -30,12 +30,12 @@ def shadow(draw: Draw, x: float) -> Mapping[str, Outcome]:
     that comes in under the edge, deep < gap.  The floor is seen from below."""
     gap, n, rng = 1.0 / x, draw.cases, draw.rng
     deep = gap * 2.0 ** rng.uniform(-4.0, 4.0, n)
-    # Near the edge of the shadow: what the law leaves to either answer.
     slope = np.sqrt(0.5)
     at = np.column_stack([1.0 - deep, rng.uniform(-0.5, 0.5, n), np.zeros(n)])
     d = np.tile([0.0, 0.0, 1.0], (n, 1))
     o, w = at - d, np.tile([slope, 0.0, slope], (n, 1))
     dark = (1.0 - at[:, 0] > gap).astype(np.int64)
+    # Near the edge of the shadow either answer is right.
     sure = (np.abs(deep - gap) > CONTACT * bound(0.0, 1.0)) & (deep < 1.5)
     scene = shadow_scene(gap)
     answers = {OURS: lit(OURS, scene, o, d, w)}

@@ -177,7 +177,7 @@ def _columns(shapes: list[Shape], which: IntArray) -> dict[str, Any]:
 
 
 def answer(rays: Rays) -> FloatArray:
-    """What our kernel finds."""
+    """t (n,) by our kernel, inf for a miss."""
     t = np.empty(len(rays.o))
     of = Quadrics if rays.kind == "quadrics" else Tori
     table = of(**{name: np.ascontiguousarray(column) for name, column in rays.row.items()})

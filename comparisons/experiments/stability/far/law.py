@@ -1,4 +1,4 @@
-"""What F1 holds hits against: the exact answer, and bounds of the errors around it."""
+"""Exact answers and error bounds: what F1 judges hits by."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from comparisons.geometry.exact.dyadic import (
 )
 
 BAND = 5.0
-"""u r by which a sphere's line may pass the rim for its answer to be open.
+"""u r: a line that passes the rim of a sphere by less is undecidable.
 
 The closest approach p rounds twice in each coordinate, |p|² and r² as numbers of their own size:
 r² - |p|² + (p·d)²/a is off by 2·2 u r² + 3 u r² + u r² + 2 u r², and r - |p| by half of that over
@@ -26,7 +26,7 @@ r.  Nothing here grows with the distance, nor with the offset.
 """
 
 U_SINGLE = 2.0**-24
-"""u of float32: what answers in float32 is held to the same law with this."""
+"""u of float32: Mitsuba is judged by the same law with this."""
 
 ROUNDINGS = 16.0
 """u (|t| |d| + D) that t |d| may be off by besides: the issue's number.  c / q rounds by some 10 u
@@ -49,9 +49,9 @@ def gaps(rays: Rays) -> FloatArray:
 
 
 class Truth:
-    """Of the rays of spheres, found once for all who answer.
+    """The truth about rays at spheres, computed once for all contestants.
 
-    u: the unit roundoff of who answers.  Within BAND u of the rim either answer is right, unless
+    u: the contestant's unit roundoff.  Within BAND u of the rim either answer is right, unless
     `strict`; t |d| may be off by ROUNDINGS u (|t| |d| + D) and by what the band makes of half the
     chord h: BAND u r² / h.
     """

@@ -1,4 +1,4 @@
-"""F1's rays at spheres, and who answers."""
+"""F1's rays at spheres, and the contestants' answers."""
 
 from collections.abc import Mapping
 
@@ -80,7 +80,7 @@ def tangent_gaps(rng: np.random.Generator, n: int) -> FloatArray:
 
 
 def answers(rays: Rays) -> dict[str, FloatArray]:
-    """What our kernel and the text-book's methods find."""
+    """t (n,) by our kernel and by the text-book's methods, inf for a miss."""
     found = {}
     with np.errstate(all="ignore"):
         for number, name in enumerate(WHO):
@@ -117,8 +117,8 @@ def in_mitsuba(shape: Shape, o: FloatArray, d: FloatArray) -> FloatArray:
 
 
 def for_mitsuba(rays: Rays) -> Rays:
-    """As many as it takes, SCENES different spheres among them, in numbers that float32 has;
-    directions are of unit length, as Mitsuba's own are."""
+    """The first RAYS rays at SCENES different spheres, rounded to float32; directions are of unit
+    length, as Mitsuba's own are."""
     few = rays.only(np.arange(min(RAYS, len(rays.o))))
     which = np.arange(len(few.o)) % SCENES
     center = few.row["center"][which]

@@ -7,7 +7,6 @@ import functools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -231,11 +230,6 @@ def index_of(material: Material) -> float:
     if isinstance(material, Principled) and material.transmits:
         return material.relative_ior
     return 1.0
-
-
-def kernels_of(material: Material) -> Any:
-    """The module of its kernels."""
-    return import_module(type(material).__module__)
 
 
 def towards(cosine: FloatArray, phi: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Whether samples of rough surfaces have the density that is said, at any roughness.
+"""Chi-square tests of samples of rough surfaces against their stated density, at any roughness.
 
 The chart is that of half vectors: with t = 1 - 1 / sqrt(1 + s²), s the slope over alpha, and phi,
 the lobes of all roughnesses look alike, and fixed cells hold them; visible normals of GGX, of
@@ -33,7 +33,7 @@ Density = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 class Fit(NamedTuple):
-    """p_value: that of samples with the density said;  integral: of the density over what is
+    """p_value: of the samples, given the stated density;  integral: of the density over what is
     mirrored and what is refracted;  doubt: what two rules differ by in it."""
 
     p_value: float

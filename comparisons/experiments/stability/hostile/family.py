@@ -41,7 +41,7 @@ LONGEST = 2000
 
 
 def problem(answer: Answer, scene: Path) -> str | None:
-    """What is wrong with how a case ended, None for nothing."""
+    """How a case breaks the law; None where it does not."""
     if answer.exit is None:
         return answer.said
     if answer.exit not in (0, 3):
@@ -59,7 +59,7 @@ def problem(answer: Answer, scene: Path) -> str | None:
 
 
 def example(scene: Path, what: str) -> Mapping[str, Any]:
-    """The case word for word, and what came of it."""
+    """The input word for word, and what came of it."""
     content = scene.read_bytes()
     found = {"suffix": scene.suffix, "came": what, "expected": "one line of error or a picture"}
     try:
@@ -75,7 +75,7 @@ def example(scene: Path, what: str) -> Mapping[str, Any]:
 def judged(
     scenes: Sequence[Path], plain: bool, signatures: Sequence[str | None] | None = None
 ) -> Outcome:
-    """Of all of them; those whose kernels are others than `signatures` says, by plain Python."""
+    """The outcome of scenes; those whose kernels differ from `signatures` run in plain Python."""
     failures, examples, left = 0, [], []
     for scene, answer in zip(
         scenes, answers(scenes, plain=plain, signatures=signatures), strict=True

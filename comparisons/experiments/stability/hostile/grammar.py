@@ -1,4 +1,4 @@
-"""Scenes that nobody wrote: sentences of the JSON Schema of scenes."""
+"""Random scenes, generated from the JSON Schema of scenes."""
 
 from functools import cache
 from typing import Any

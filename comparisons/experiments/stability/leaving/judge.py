@@ -1,4 +1,4 @@
-"""Which departures break the law: exact arithmetic on the rays as they begin."""
+"""Which departures break the law, by exact arithmetic on the rays as they begin."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ which is to begin inside of a closed shape)."""
 
 
 def exact_of(placed: Placed, subject: Subject) -> Exact:
-    """Exact arithmetic about one shape, as our tables have it."""
+    """The exact answers for one shape, as our tables hold it."""
     if subject.kind < 0:
         referee = Referee(ShapeSizes(scene_of(placed)))
 
@@ -63,7 +63,7 @@ def row_of(subject: Subject) -> dict[str, Any]:
 
 @dataclass
 class Tally:
-    """An `Outcome` as it grows."""
+    """Counts and examples that become an `Outcome`."""
 
     cases: int = 0
     open: int = 0

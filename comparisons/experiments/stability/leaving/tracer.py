@@ -1,4 +1,4 @@
-"""Rays that meet a shape, leave it, and are followed: the compiled loops."""
+"""Compiled loops: rays meet a shape, leave it, and are traced again."""
 
 import math
 from typing import Any, NamedTuple
@@ -20,8 +20,7 @@ from reference_rt.shapes.tables import TABLES
 
 
 class Ways(NamedTuple):
-    """Where rays leave to, seen from the surface: local (n, 3), unit vectors with +z along the
-    outward normal."""
+    """Directions that rays leave to: local (n, 3), unit, +z along the outward normal."""
 
     local: FloatArray
 
@@ -119,7 +118,7 @@ COMPANY = (
 
 
 class Subject(NamedTuple):
-    """A shape to be left: its geometry, and where it stands in it; kind -1: alone in a scene."""
+    """A shape that rays leave: a row of a table of a geometry, or with kind -1 the whole scene."""
 
     geometry: Geometry
     field: str

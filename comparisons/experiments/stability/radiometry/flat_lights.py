@@ -1,4 +1,4 @@
-"""Solid angles of rectangles and triangles, as the densities of light samples say them.
+"""Solid angles of rectangles and triangles, implied by the densities of light samples.
 
 Nothing is left to chance: a light sample is a function of two random numbers, and the mean of
 1 / pdf over all of them, an integral over the unit square, is the light's solid angle whatever the

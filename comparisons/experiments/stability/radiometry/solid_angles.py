@@ -1,4 +1,4 @@
-"""Solid angles of spheres, as the densities of light samples say them."""
+"""Solid angles of spheres, implied by the densities of light samples."""
 
 import math
 from typing import Any

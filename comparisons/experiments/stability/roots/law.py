@@ -1,4 +1,4 @@
-"""What F8 holds roots against: certified ones, and the bound that their condition sets."""
+"""Certified roots, and the bound that their condition sets: what F8 judges roots by."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple

@@ -1,6 +1,6 @@
-"""Who solves F8's polynomials: the text-book's ways beside the renderer's own.
+"""Solvers of F8's polynomials: the renderer's and the text-book's.
 
-Roots come as (n, 4) or (n, 2), real ones in order, inf for what there is not.
+Roots come as (n, 4) or (n, 2), real ones in order, inf for missing ones.
 """
 
 from typing import Any

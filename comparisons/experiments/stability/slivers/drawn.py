@@ -1,4 +1,4 @@
-"""Slivers, and rays that graze: what is drawn.
+"""Random slivers, and rays that graze.
 
 "Aligned" shapes lie in a plane x = 0, y = 0 or z = 0: their heights and the rays' angles are
 numbers of their own, not differences of others, and so float32 has them as exactly as float64.

@@ -1,4 +1,4 @@
-"""Who traces rays in a closed mesh: ours, Mitsuba three ways, methods a triangle at a time."""
+"""Rays in a closed mesh: ours counted by triangles, Mitsuba in three ways, text-book methods."""
 
 from collections.abc import Callable
 from typing import Any
