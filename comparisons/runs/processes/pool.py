@@ -64,9 +64,9 @@ def run(
     """Have requests carried out by as many processes at once, and yield outcomes as they come.
 
     seconds: time limit of a request;  progress: called with a request and what is being done for
-    it, "" when it begins;  module: of a worker that keeps to `protocol`, and options of its command line.  Closing
-    the iterator ends the processes.  Raises ReferenceUnavailableError where none can be carried
-    out.
+    it, "" when it begins;  module: of a worker that keeps to `protocol`, and options of its command
+    line.  Closing the iterator ends the processes.  Raises ReferenceUnavailableError where none can
+    be carried out.
     """
     command = [sys.executable, "-m", *module]
     left = list(reversed(requests))
