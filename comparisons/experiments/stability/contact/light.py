@@ -1,4 +1,4 @@
-"""Light in gaps: the contact shadow under a cube, and what slabs of glass let through."""
+"""Light in gaps: the contact shadow under a cube, and the transmittance of slabs of glass."""
 
 import math
 from collections.abc import Mapping

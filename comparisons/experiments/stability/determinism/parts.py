@@ -68,7 +68,7 @@ carry_on(Path(sys.argv[1]), float.fromhex(sys.argv[2]), float.fromhex(sys.argv[3
 
 
 def carry_on(folder: Path, first: float, last: float) -> None:
-    """These shares of the pixels of each scene, added to those that are kept in a file."""
+    """Render the pixels from share `first` to `last` of each scene, added to those in its file."""
     for make in MAKES:
         file = folder / f"{make.__name__}.npy"
         scene = make(folder)
@@ -82,8 +82,8 @@ def carry_on(folder: Path, first: float, last: float) -> None:
 
 
 def interrupted(draw: Draw, x: float) -> Outcomes:
-    """The first part by this process, the others by one of their own each, from what the one before
-    has left."""
+    """The first part is rendered by this process, each other one by a new process that reads the
+    file of the one before."""
     cuts = [0.0, *np.sort(draw.rng.uniform(0.0, 1.0, int(x))).tolist(), 1.0]
     carry_on(draw.folder, *cuts[:2])
     for first, last in pairwise(cuts[1:]):

@@ -224,7 +224,7 @@ ALPHA = partial(
 
 
 def index_of(material: Material) -> float:
-    """Of what is inside over what is outside; 1 for what light does not enter."""
+    """Index of refraction inside over outside; 1 for opaque materials."""
     if isinstance(material, RoughDielectric | Dielectric):
         return material.interior_ior / material.exterior_ior
     if isinstance(material, Principled) and material.transmits:

@@ -1,4 +1,4 @@
-"""Who is measured, what with, and how it fared: the words that all families share."""
+"""The vocabulary of all families: contestants, the context of a sweep point, and its outcome."""
 
 import math
 import zlib

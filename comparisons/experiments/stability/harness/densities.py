@@ -33,8 +33,8 @@ Density = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 class Fit(NamedTuple):
-    """p_value: of the samples, given the stated density;  integral: of the density over what is
-    mirrored and what is refracted;  doubt: what two rules differ by in it."""
+    """p_value: of the samples, given the stated density;  integral: of the density over
+    reflected and refracted directions;  doubt: by how much two rules differ in it."""
 
     p_value: float
     integral: float
@@ -113,7 +113,7 @@ def _chart(wo: tuple[float, ...], alpha: float, eta: float, through: bool, rule:
 def _cells(
     function: Density, wo: FloatArray, alpha: float, eta: float, through: bool, rule: int
 ) -> FloatArray:
-    """What a function of directions, of one side, integrates to in each cell, (CELLS²,)."""
+    """The integral of a function of directions, of one side, in each cell: (CELLS²,)."""
     chart = _chart(tuple(wo.tolist()), alpha, eta, through, rule)
     values = np.zeros(len(chart.there))
     if len(chart.wi):
@@ -122,8 +122,8 @@ def _cells(
 
 
 def integral(bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float) -> tuple[float, float]:
-    """What comes back of a white sky, in power and in the brightest channel, by f cos alone, and
-    how far two rules differ."""
+    """Share of a white sky that is scattered, in power and in the brightest channel, by f cos
+    alone, and how far two rules differ."""
     total, doubt = 0.0, 0.0
     for through in (False, True) if eta != 1.0 else (False,):
         scale = eta * eta if through else 1.0

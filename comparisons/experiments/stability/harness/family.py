@@ -1,4 +1,4 @@
-"""What a family of stability is made of: series, which measure along a sweep."""
+"""Families of stability, their series, and the sweeps that series measure along."""
 
 import math
 from collections.abc import Callable, Mapping

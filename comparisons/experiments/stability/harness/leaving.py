@@ -1,4 +1,4 @@
-"""Rays that leave surfaces: how far off they may begin, and sunlight on what is met."""
+"""Rays that leave surfaces: how far off they may begin, and sunlight on the surfaces they meet."""
 
 import math
 from typing import Any
@@ -22,7 +22,7 @@ EPSILON = 1e-4
 """Of the text-book's offset."""
 
 CONTACT = 4.0
-"""Bounds: what is thicker must not be lost, nor a neighbour that is farther away."""
+"""Bounds B: a shape that is thicker must not be lost, nor a neighbour that is farther away."""
 
 
 def bound(largest: float, size: float) -> float:
@@ -60,8 +60,8 @@ def _lit(
 def lit(
     contestant: str, scene: rt.Scene, o: FloatArray, d: FloatArray, w: FloatArray
 ) -> FloatArray:
-    """Of what rays meet, (n, 2): 1 where nothing lies towards w, 0 in shadow, -1 for a miss; the
-    cosine of w to the surface."""
+    """(n, 2) of rays: 1 where the surface that they meet is lit from w, 0 in shadow, -1 for a miss;
+    the cosine of w to the surface."""
     out = np.zeros((len(o), 2))
     if contestant == MITSUBA:
         with scalar() as mi:
@@ -81,7 +81,7 @@ def lit(
 
 
 def picture(found: FloatArray) -> Any:
-    """(PIXELS, PIXELS, 3): what was met in grey by its cosine, black in shadow, the rest blue."""
+    """(PIXELS, PIXELS, 3): surfaces in grey by their cosine, black in shadow; misses are blue."""
     grey = np.where(found[:, 0] > 0.0, 60.0 + 180.0 * found[:, 1], 12.0)
     rgb = np.repeat(grey[:, None], 3, axis=1)
     rgb[found[:, 0] < 0.0] = (40.0, 60.0, 90.0)

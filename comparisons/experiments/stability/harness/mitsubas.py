@@ -1,4 +1,4 @@
-"""Scenes and rays in Mitsuba, where they are: not moved to where float32 is at its best."""
+"""Scenes and rays in Mitsuba as they are: not moved to where float32 is most precise."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ def loaded(scene: rt.Scene) -> Any:
 
 
 def traced(scene: rt.Scene, o: FloatArray, d: FloatArray) -> counterpart.Answers:
-    """What rays (n, 3) hit in it."""
+    """The closest hits of rays (n, 3) in it."""
     return counterpart.trace(translate.load(scene, frame.OURS), o, d)
 
 

@@ -11,7 +11,7 @@ from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.float32 import UNIT_ROUNDOFF as U32
 
 Columns = dict[str, Any]
-"""What the examples of failures show: see `outcome`."""
+"""The keys and values of the examples of failures: see `outcome`."""
 
 
 def unit_of(contestant: str) -> float:

@@ -11,7 +11,7 @@ _SHOWN = ("center", "radius", "to_local", "coefficients", "lower", "upper", "maj
 
 
 class Rays(NamedTuple):
-    """n rays and what each is put to: a row of a table of its own.
+    """n rays, each with the table row of the shape that it is tested against.
 
     kind: a field of `reference_rt.shapes.Shapes`;  row: columns of n rows;  size (n,): the radius,
     or half the diagonal;  o, d (n, 3).

@@ -1,4 +1,4 @@
-"""What was found, for machines: `results.json` and `results.csv`."""
+"""The results for machines: `results.json` and `results.csv`."""
 
 import csv
 import json

@@ -57,7 +57,7 @@ def in_folder(folder: Path, **parts: Any) -> rt.Scene:
 
 
 def things(folder: Path) -> rt.Scene:
-    """What Mitsuba has too: balls, boxes, flat shapes, a mesh, a cylinder, instances."""
+    """Shapes that Mitsuba has too: balls, boxes, flat shapes, a mesh, a cylinder, instances."""
     return in_folder(
         folder,
         integrator=rt.RayCast(),
@@ -85,7 +85,7 @@ def things(folder: Path) -> rt.Scene:
 
 
 def curves(folder: Path) -> rt.Scene:
-    """What Mitsuba has not: cones, quadrics, tori, ellipsoids, planes without end, polygons."""
+    """Shapes that Mitsuba has not: cones, quadrics, tori, ellipsoids, endless planes, polygons."""
     saddle = (1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
     bowl = (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0)
     star = ((0, 1, 0), (0.625, -0.75, 0), (-1, 0.25, 0), (1, 0.25, 0), (-0.625, -0.75, 0))

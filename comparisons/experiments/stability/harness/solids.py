@@ -66,7 +66,7 @@ def intervals(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> FloatAr
 
 
 def inside_tests(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> FloatArray:
-    """The first crossing, all that they give: (n, 1)."""
+    """The first crossing alone: (n, 1)."""
     return textbook.intersect(INSIDE_TESTS, CsgParameters(solid, folder), o, d)[:, None]
 
 
@@ -95,9 +95,9 @@ class Stretch(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """Of one ray.  stretches: in order, those between crossings that rounding can tell apart;
-    touching: it runs exactly through an edge;  crossings, widths, operands: t of each crossing of
-    an operand, how far rounding may have moved it, and the operand's number."""
+    """The truth about one ray.  stretches: in order, those between crossings that rounding can tell
+    apart;  touching: it runs exactly through an edge;  crossings, widths, operands: t of each
+    crossing of an operand, how far rounding may have moved it, and the operand's number."""
 
     stretches: list[Stretch]
     touching: bool
@@ -133,8 +133,8 @@ def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth
 
 
 def _alone(tables: SceneTables, k: int, o: FloatArray, d: FloatArray) -> Lists:
-    """What ours states of operand k alone, where it stands in the solid 0: by itself it would count
-    its coordinates from an anchor of its own, and round otherwise."""
+    """The crossings of operand k as ours states them within solid 0: as a shape of its own it would
+    have another local origin, and round otherwise."""
     solids = tables.geometry.solids
     assert solids is not None
     one, zero = np.ones(1, np.int64), np.zeros(1, np.int64)
@@ -184,7 +184,7 @@ def _width(stated: Lists, t: float) -> float:
 
 
 def problem(truth: Truth, t: FloatArray) -> tuple[str, float] | None:
-    """What is wrong with crossings (k,), and how long the stretch is; None for nothing."""
+    """How crossings (k,) break the law, and the length of the wrong stretch; else None."""
     t = t[np.isfinite(t)]
     for x in t.tolist():
         if not np.any(np.abs(truth.crossings - x) <= 2.0 * truth.widths):

@@ -44,8 +44,8 @@ _MATERIALS: Mapping[str, Any] = {
 
 
 class World(NamedTuple):
-    """shapes, materials: what counts;  sky: radiance from all sides;  expected: what every pixel
-    sees;  path: fields of the integrator;  rounding: of what is expected, relatively, per u."""
+    """shapes, materials: the visible ones;  sky: radiance from all sides;  expected: radiance of
+    every pixel;  path: fields of the integrator;  rounding: its relative error, per u."""
 
     shapes: tuple[Any, ...]
     materials: Mapping[str, Any]
@@ -89,7 +89,7 @@ def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> F
 
 
 MOST = 0.1
-"""What a picture's mean may be off by, relatively, whatever its noise."""
+"""Largest relative error of a picture's mean, whatever its noise."""
 
 Render = Callable[[int, int], FloatArray]
 """Pixels (n, 3) of a picture by its seed and its samples per pixel."""

@@ -1,4 +1,4 @@
-"""Every primitive of a scene for every ray: what hierarchies must agree with, bit for bit."""
+"""Tests every primitive for every ray; hierarchies must agree with that bit for bit."""
 
 from collections.abc import Callable
 from typing import Any
@@ -139,7 +139,7 @@ def compare_all(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Outcome:
 
 
 Find = Callable[[SceneTables], FloatArray]
-"""What rays find in a scene: (n, k), t first."""
+"""The hits of rays in a scene as rows (n, k), t first."""
 
 
 def _compared(

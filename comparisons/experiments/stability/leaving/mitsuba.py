@@ -11,7 +11,7 @@ from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.mitsuba.backend import mitsuba
 
 KINDS = ("sphere", "rectangle", "disk", "triangle", "box", "cylinder", "mesh", "instance")
-"""What it has itself, without stand-ins."""
+"""Kinds that it has itself, without proxy geometry."""
 
 
 def depart(placed: Placed, rays: Rays, ways: Ways) -> Departures:

@@ -34,7 +34,7 @@ class Certified(NamedTuple):
     open: BoolArray
 
     def real(self) -> tuple[FloatArray, FloatArray]:
-        """Real roots in order, inf for what there is not, and their bounds (n, k)."""
+        """Real roots in order, inf for missing ones, and their bounds (n, k)."""
         s = np.where(self.z.imag == 0.0, self.z.real, np.inf)
         order = np.argsort(s, axis=1)
         return np.take_along_axis(s, order, 1), np.take_along_axis(self.bound, order, 1)

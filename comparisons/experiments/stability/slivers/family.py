@@ -49,7 +49,7 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
 
 
 def measured(make: Make) -> Callable[[Draw, float], Mapping[str, Outcome]]:
-    """A series' `measure`: SHAPES trials, each put to everybody who can take part."""
+    """A series' `measure`: SHAPES trials, each for all contestants that can take part."""
 
     def trials(draw: Draw, x: float) -> Iterator[dict[str, Outcome]]:
         for k in range(SHAPES):

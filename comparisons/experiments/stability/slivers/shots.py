@@ -1,4 +1,4 @@
-"""Maps of a triangle: what is found where rays are aimed at its points."""
+"""Maps of a triangle: the outcome of the ray that is aimed at each of its points."""
 
 import numpy as np
 

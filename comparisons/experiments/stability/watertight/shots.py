@@ -1,4 +1,4 @@
-"""A closed mesh from inside, under a bright sky: what leaks is white."""
+"""A closed mesh from inside, under a bright sky: leaks are white."""
 
 import numpy as np
 

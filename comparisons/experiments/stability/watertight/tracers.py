@@ -24,7 +24,7 @@ Tracer = Callable[[FloatArray, FloatArray], BoolArray]
 NOT_ROBUST, INSTANCED = "mitsuba, not robust", "mitsuba, instanced"
 
 COARSEST = 0.1
-"""The spacing of float32 at which a mesh of radius 1 to 6 is no longer what is meant."""
+"""The spacing of float32 beyond which a mesh of radius 1 to 6 is deformed too much."""
 
 
 @entry_kernel
