@@ -13,6 +13,7 @@ from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.core import OURS, FloatArray, Shot
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.motion import Motion, moved
+from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.float32 import round32
 
 WIDTH, HEIGHT = 192, 144
@@ -71,7 +72,7 @@ def _directions(scene: rt.Scene) -> FloatArray:
     )
 
 
-def _percent(some: rays.BoolArray) -> str:
+def _percent(some: BoolArray) -> str:
     return f"{100.0 * np.mean(some):.2g} %"
 
 

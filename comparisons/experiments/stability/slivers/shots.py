@@ -3,7 +3,7 @@
 import numpy as np
 
 from comparisons.experiments.stability.harness.core import FloatArray, Shot, pixel_grid
-from comparisons.experiments.stability.slivers.judge import BoolArray
+from comparisons.geometry.exact.dyadic import BoolArray
 
 PIXELS = 192
 

@@ -23,12 +23,12 @@ from comparisons.experiments.stability.harness.outcomes import outcome, together
 from comparisons.experiments.stability.watertight import seams
 from comparisons.experiments.stability.watertight.shots import shot
 from comparisons.experiments.stability.watertight.tracers import (
-    BoolArray,
     by_method,
     crossings,
     fits,
     mitsubas,
 )
+from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt import textbook
 from reference_rt.rendering import query
 
