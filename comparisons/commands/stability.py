@@ -50,10 +50,10 @@ def stability(
         from rich.console import Console
 
         from comparisons.experiments.stability.harness import table
+        from comparisons.experiments.stability.harness.core import Effort
         from comparisons.experiments.stability.harness.display import Display
         from comparisons.experiments.stability.harness.families import MODULES
         from comparisons.experiments.stability.harness.families import family as family_of
-        from comparisons.experiments.stability.harness.family import Effort
         from comparisons.experiments.stability.harness.page import write_page
         from comparisons.experiments.stability.harness.results_json import again, write
         from comparisons.experiments.stability.harness.run import (

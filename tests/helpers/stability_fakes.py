@@ -8,15 +8,8 @@ import time
 import numpy as np
 
 from comparisons.experiments.stability.harness import families, worker
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Family,
-    Outcome,
-    Series,
-    Shot,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Outcome, Shot
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, alone, decades
 
 METHOD = "sphere.algebraic"
 
@@ -51,45 +44,38 @@ def _shoot(contestant, x):
     return Shot(np.full((8, 8, 3), shade, np.uint8), f"{contestant} at {x:g}: <grey>")
 
 
-CASES = {"quick": 20, "full": 2000}
+CASES = 20, 2000
 
-GROWS = Family(
-    "T1",
-    "growing <errors>",
-    "Errors grow as x.",
-    (
-        Series("far", "distance / radius", "It is far.", decades(0, 12), (1.0, 1e4, 1e8), CASES,
-               _grows, "u", 1e8, "eight decades and no more", shoot=_shoot),
-        Series("alone", "", "One setting.", (1.0,), (1.0,), CASES, _grows),
+
+def _of(name: str, called: str, law: str, *series: Series) -> Family:
+    return Family(name, called, law, series)
+
+
+FAR = Sweep("distance / radius", decades(0, 12), (1.0, 1e4, 1e8), *CASES)
+END = {"unit": "u", "holds_to": 1e8, "law": "eight decades and no more"}
+CRASH = Sweep("x", decades(0, 2), decades(0, 2), *CASES)
+NEAR = Sweep("x", decades(8, 10), decades(8, 10), *CASES)
+SLEEP = Sweep("s", (0.25, 60.0), (0.25, 60.0), *CASES)
+
+ALL = (
+    _of(
+        *("T1", "growing <errors>", "Errors grow as x."),
+        Series("far", FAR, "It is far.", _grows, **END, shoot=_shoot),
+        Series("alone", alone(*CASES), "One setting.", _grows),
     ),
-)  # fmt: skip
-BREAKS = Family(
-    "T2",
-    "what breaks",
-    "Nothing.",
-    (Series("crash", "x", "Dies at 10.", decades(0, 2), decades(0, 2), CASES, _crashes),),
-)
-FAILS = Family(
-    "T3",
-    "failing",
-    "Ours must hold.",
-    (Series("near", "x", "It fails.", decades(8, 10), decades(8, 10), CASES, _grows),),
-)
-SLOW = Family(
-    "T4",
-    "slow",
-    "Takes x seconds.",
-    (Series("slow", "s", "Sleeps.", (0.25, 60.0), (0.25, 60.0), CASES, _slow),),
+    _of("T2", "what breaks", "Nothing.", Series("crash", CRASH, "Dies at 10.", _crashes)),
+    _of("T3", "failing", "Ours must hold.", Series("near", NEAR, "It fails.", _grows)),
+    _of("T4", "slow", "Takes x seconds.", Series("slow", SLEEP, "Sleeps.", _slow)),
 )
 
-FAMILIES = {one.id: one for one in (GROWS, BREAKS, FAILS, SLOW)}
+FAMILIES = {one.id: one for one in ALL}
 
 
 def install():
     """Let the fakes stand for the families."""
     module = sys.modules[__name__]
     for name, one in FAMILIES.items():
-        fake = type(module)(f"comparisons.experiments.stability.{name}")
+        fake = type(module)(f"comparisons.experiments.stability.{name}.family")
         fake.FAMILY = one
         sys.modules[fake.__name__] = fake
     families.MODULES.clear()

@@ -1,4 +1,6 @@
-"""Work in processes of their own: a fault of a native library ends only the one it is in.
+"""Work in child processes: a crash of a native library ends only the process that it is in.
 
-`pool` is the side that asks, `protocol` the side that answers.
+`pool` is the parent's side: it sends requests, enforces time limits, replaces workers that die and
+reports why.  `protocol` is the worker's side: JSON lines on standard input and output.  A worker is
+a module that calls `private_stdout` once and `carry_out` for each request.
 """

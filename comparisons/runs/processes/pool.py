@@ -19,14 +19,14 @@ from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceUnavailableError
 
 MOST_CASES = 40
-"""After which a worker is replaced by a fresh one: what libraries keep of each scene adds up, and a
-start costs no more than a small case."""
+"""A worker is replaced after so many: what libraries keep of each scene adds up, and a start costs
+no more than a small case."""
 
-_TOLD = 200
-"""Characters of what a process said last that a reason quotes."""
+_QUOTED = 200
+"""Characters of a process's last message that a failure quotes."""
 
 _MOST_LOG = 1 << 20
-"""Bytes of what a process says in a case that are kept."""
+"""Bytes of a case's log that are kept."""
 
 _PATIENCE = 5.0
 """Seconds in which a process that has closed its pipe should have ended."""
@@ -43,7 +43,7 @@ R = TypeVar("R", bound=Request)
 
 @dataclass(frozen=True)
 class Outcome(Generic[R]):
-    """How a request ended.  failure: why nothing came of it, None if something did;  log: what its
+    """How a request ended.  failure: why there is no result, None if there is one;  log: what its
     process wrote to standard error meanwhile;  wall: seconds;  invalid: whether the failure is that
     a scene, or a file that it names, is invalid."""
 
@@ -61,12 +61,12 @@ def run(
     progress: Callable[[R, str], None],
     module: Sequence[str],
 ) -> Generator[Outcome[R], None, None]:
-    """Have requests carried out by as many processes at once, and give outcomes as they come.
+    """Have requests carried out by as many processes at once, and yield outcomes as they come.
 
-    seconds: how long a request may take;  progress: is told what is being done for one, "" when it
-    begins;  module: of a worker that keeps to `protocol`, and options of its command line.  Closing
-    the iterator ends the processes.  Raises ReferenceUnavailableError where none can be carried
-    out.
+    seconds: time limit of a request;  progress: called with a request and what is being done for
+    it, "" when it begins;  module: of a worker that keeps to `protocol`, and options of its command
+    line.  Closing the iterator ends the processes.  Raises ReferenceUnavailableError where none can
+    be carried out.
     """
     command = [sys.executable, "-m", *module]
     left = list(reversed(requests))
@@ -90,7 +90,7 @@ def run(
         while busy:
             worker, message = _next(inbox, busy)
             if worker not in busy:
-                continue  # its last words, after it was ended
+                continue  # sent before it was killed
             failure: str | None
             invalid = message is not None and "invalid" in message
             if message is None:
@@ -118,7 +118,7 @@ def run(
 def _next(
     inbox: "queue.Queue[tuple[_Worker[R], bytes]]", busy: "list[_Worker[R]]"
 ) -> "tuple[_Worker[R], dict[str, Any] | None]":
-    """What a worker says, nothing if it has died, None if its time is up."""
+    """A worker and its message: {} if it has died, None if its time is up."""
     late = min(busy, key=lambda worker: worker.deadline)
     try:
         worker, line = inbox.get(timeout=max(late.deadline - time.monotonic(), 0.0))
@@ -154,7 +154,7 @@ class _Worker(Generic[R]):
         self._start, self._log_start = time.perf_counter(), os.fstat(self._log.fileno()).st_size
         self._cases += 1
         assert self._process.stdin is not None
-        # One that is dead already is found by its silence.
+        # That it is dead already shows at the end of its output.
         with contextlib.suppress(BrokenPipeError):
             self._process.stdin.write(request.model_dump_json().encode() + b"\n")
             self._process.stdin.flush()
@@ -169,20 +169,20 @@ class _Worker(Generic[R]):
         return self._process.poll() is None and self._cases < MOST_CASES
 
     def cause_of_death(self) -> str:
-        """Why it fell silent, when it has."""
+        """Why its output ended."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_PATIENCE)
         self.end()
         code = self._process.returncode
         if code < 0:
-            told = f"the process died by signal {-code} ({_signal_name(-code)})"
+            cause = f"the process died by signal {-code} ({_signal_name(-code)})"
             if code == -signal.SIGKILL:
-                told += ", perhaps for lack of memory"
+                cause += ", perhaps for lack of memory"
         else:
-            told = f"the process ended with code {code} in the midst of the case"
+            cause = f"the process ended with code {code} in the midst of the case"
         said = self._log_of_case().partition("Fatal Python error")[0].split("\n")
         last = next((line.strip() for line in reversed(said) if line.strip()), "")
-        return f"{told}; it said: {last[:_TOLD]}" if last else told
+        return f"{cause}; it said: {last[:_QUOTED]}" if last else cause
 
     def end(self) -> None:
         """End the process and those that it started."""
@@ -192,7 +192,7 @@ class _Worker(Generic[R]):
         self._process.wait()
 
     def close(self) -> None:
-        """The same, for good."""
+        """The same, and release its pipes and its log."""
         self.end()
         if self._process.stdin is not None:
             with contextlib.suppress(BrokenPipeError):

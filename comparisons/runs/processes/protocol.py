@@ -1,7 +1,7 @@
-"""What a worker says to its pool.
+"""The messages of a worker to its pool.
 
-Each line of its standard input is a JSON object that asks for something; each line of its standard
-output one that answers:
+Each line of its standard input is a JSON object, a request; each line of its standard output
+is a message about it:
 
     {"say": text}          any number of times, what is being done
     {"done": true}         what was asked for is where it was to be put
@@ -20,8 +20,8 @@ from reference_rt.util.errors import ReferenceRtError, ReferenceUnavailableError
 
 
 def private_stdout() -> TextIO:
-    """Standard output, of which nobody else knows from now on: what anyone prints, in Python or
-    not, goes to standard error."""
+    """Standard output for this caller alone: from now on whatever else prints, in Python or not,
+    goes to standard error."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     return answers
@@ -33,7 +33,7 @@ def tell(answers: TextIO, **message: Any) -> None:
 
 
 def carry_out(task: Callable[[], None], answers: TextIO) -> None:
-    """Do it, and say how it went."""
+    """Run the task, and send how it ended."""
     try:
         task()
     except BrokenPipeError:  # nobody listens any more

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 import stability_fakes
 import typer
@@ -16,7 +17,9 @@ from typer.testing import CliRunner
 
 from comparisons.commands import register
 from comparisons.experiments.stability.harness import families, run, table
-from comparisons.experiments.stability.harness.family import OURS, Outcome, Series, generator
+from comparisons.experiments.stability.harness.core import OURS, Outcome, generator
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep
+from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import summarise
 
@@ -124,7 +127,8 @@ def test_an_end_of_the_run_keeps_what_was_found(fakes, tmp_path):
     """SIGTERM in the midst: the first setting is kept, and no process stays behind."""
     script = (
         "import stability_fakes, signal, sys; stability_fakes.install();"
-        "from comparisons.experiments.stability import run; run.WORKER = ('stability_fakes',);"
+        "from comparisons.experiments.stability.harness import run;"
+        "run.WORKER = ('stability_fakes',);"
         "signal.signal(signal.SIGTERM, lambda *_: sys.exit(3));"
         "from reference_rt.cli.main import main; main()"
     )
@@ -155,9 +159,23 @@ def test_outcomes_add_up_and_refuse_nonsense():
 
 def test_series_refuse_an_end_without_a_law():
     with pytest.raises(ValueError, match="law"):
-        Series("s", "x", "", (1.0, 2.0), (1.0,), {}, lambda *_: {}, holds_to=1.0)
+        Series("s", Sweep("x", (1.0, 2.0), (1.0,), 1, 1), "", lambda *_: {}, holds_to=1.0)
     with pytest.raises(ValueError, match="increase"):
-        Series("s", "x", "", (2.0, 1.0), (), {}, lambda *_: {})
+        Series("s", Sweep("x", (2.0, 1.0), (), 1, 1), "", lambda *_: {})
+
+
+def test_rows_of_the_first_failures_are_shown():
+    wrong, undecided = np.array([False, True, True, True, True, True]), np.arange(6) == 2
+    found = outcome(
+        wrong,
+        {"t": np.arange(6.0), "o": np.ones((6, 3)), "number": lambda k: k, "law": "none"},
+        undecided,
+        worst=2.0,
+    )
+    assert (found.cases, found.failures, found.open, found.worst) == (5, 4, 1, 2.0)
+    one = (1.0).hex()
+    assert found.examples[0] == {"t": one, "o": [one] * 3, "number": 1, "law": "none"}
+    assert [example["number"] for example in found.examples] == [1, 3, 4]
 
 
 def test_settings_are_drawn_apart():
@@ -173,22 +191,15 @@ def test_a_lead_that_is_too_small_must_be_explained():
         for x in (1.0, 2.0, 4.0, 8.0)
     ]
     for explained in ("", "since it is so"):
-        series = Series(
-            "far", "x", "", (1.0, 2.0, 4.0, 8.0), (), {}, lambda *_: {},
-            holds_to=4.0, law="four", explained=explained,
-        )  # fmt: skip
-        (one,) = summarise(families_of("T", series), found)
+        sweep = Sweep("x", (1.0, 2.0, 4.0, 8.0), (), 1, 1)
+        end = {"holds_to": 4.0, "law": "four", "explained": explained}
+        series = Series("far", sweep, "", lambda *_: {}, **end)
+        (one,) = summarise(Family("T", "", "", (series,)), found)
         assert one.further == 2.0
         assert one.holds
         assert one.unexplained == (not explained)
         assert table.where(one, OURS) == "holds to float64's end, 4"
         assert table.where(one, "mitsuba") == "fails from 4 on"
-
-
-def families_of(name, *series):
-    from comparisons.experiments.stability.harness.family import Family
-
-    return Family(name, "", "", series)
 
 
 def test_found_is_read_with_its_key_alone(tmp_path):

@@ -13,14 +13,14 @@ from comparisons.experiments.stability.furnaces import family as f10_furnaces
 from comparisons.experiments.stability.furnaces.family import COSINES
 from comparisons.experiments.stability.harness import chance, worlds
 from comparisons.experiments.stability.harness.chance import Mean
-from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import (
+from comparisons.experiments.stability.harness.core import (
     OURS,
     Draw,
     FloatArray,
     Outcome,
     generator,
 )
+from comparisons.experiments.stability.harness.families import family
 from comparisons.experiments.stability.harness.worlds import judge
 from comparisons.experiments.stability.radiometry import lamps as f12_lamps
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
+from comparisons.experiments.stability.harness.solids import Stretch, Truth
+from comparisons.experiments.stability.harness.solids import problem as list_problem
 from comparisons.experiments.stability.hostile import pool, rays
 from comparisons.experiments.stability.hostile.bases import BASES, files, write_files
 from comparisons.experiments.stability.hostile.damage import (
@@ -20,8 +22,6 @@ from comparisons.experiments.stability.hostile.damage import (
 from comparisons.experiments.stability.hostile.family import bomb, example, problem
 from comparisons.experiments.stability.hostile.grammar import sentence
 from comparisons.experiments.stability.hostile.pool import Answer, answers
-from comparisons.experiments.stability.solids.lists import Stretch, Truth
-from comparisons.experiments.stability.solids.lists import problem as list_problem
 from comparisons.experiments.stability.solids.trees import Tree, chain, rewritten
 from reference_rt.rendering.query import Intersections
 from reference_rt.util.errors import ImageError, SceneError

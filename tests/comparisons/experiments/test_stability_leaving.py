@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from comparisons.experiments.stability.contact import family as contact
-from comparisons.experiments.stability.contact.light import fresnel, lit, shadow_scene
-from comparisons.experiments.stability.contact.stacks import bound, plates
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw
+from comparisons.experiments.stability.contact.light import fresnel, shadow_scene
+from comparisons.experiments.stability.contact.stacks import plates
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
+from comparisons.experiments.stability.harness.leaving import bound, lit
 from comparisons.experiments.stability.leaving import family as leaving
-from comparisons.experiments.stability.leaving.judge import Judge, Tally
+from comparisons.experiments.stability.leaving.judge import Judge, Tally, row_of
 from comparisons.experiments.stability.leaving.shapes import KINDS, Extent, aim, place
 from comparisons.experiments.stability.leaving.tracer import depart, subjects
 from comparisons.geometry.exact import first_hit
@@ -20,16 +21,6 @@ PLAIN = Extent.of(1.0, 2.0, 1.0, False)
 
 def draw_of(folder, cases=300, seed=5):
     return Draw(np.random.default_rng(seed), cases, False, folder)
-
-
-@pytest.mark.parametrize("name", ["sphere", "triangle", "torus", "anisotropy", "everything"])
-def test_ours_leaves_every_shape_at_its_most_extreme(name, tmp_path):
-    series = leaving.FAMILY.by_name[name]
-    x = max(x for x in series.quick if x <= series.holds_to)
-    found = series.measure(draw_of(tmp_path), x)[OURS]
-    assert found.cases > 0
-    assert found.failures == 0, found.examples
-    assert found.worst <= 1.0
 
 
 def test_the_text_books_epsilon_fails_far_away_and_on_small_shapes(tmp_path):
@@ -108,29 +99,16 @@ def test_aimed_rays_meet_the_shape(kind, tmp_path):
     placed = place(kind, PLAIN, draw)
     (subject,) = subjects(kind, [placed])
     rays = aim(placed, 50, False, draw.rng)
-    row = {
-        name: column if name == "outline" else column[[subject.row]]
-        for name, column in subject.table._asdict().items()
-        if column is not None
-    }
-    assert np.isfinite(first_hit(subject.field, row, rays.o, rays.d).t).all()
+    assert np.isfinite(first_hit(subject.field, row_of(subject), rays.o, rays.d).t).all()
 
 
 # ---- F13 ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["plates", "shells", "plates, far away", "shadow", "glass"])
-def test_ours_keeps_gaps_apart_up_to_the_law(name, tmp_path):
-    series = contact.FAMILY.by_name[name]
-    found = series.measure(draw_of(tmp_path, 80), max(series.quick))[OURS]
-    assert found.cases > 0
-    assert found.failures == 0, found.examples
-
-
 def test_gaps_below_the_law_are_lost_at_last(tmp_path):
     """Plates a thousand scales away, closer than floats there are: the family is not blind."""
     far = contact.FAMILY.by_name["plates, far away"]
-    assert far.holds_to * 4.0 * bound(contact.FAR) < 1.0
+    assert far.holds_to * 4.0 * bound(contact.FAR, 1.0) < 1.0
     assert far.measure(draw_of(tmp_path, 80), 1e15)[OURS].failures > 0
 
 

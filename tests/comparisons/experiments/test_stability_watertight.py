@@ -5,15 +5,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import stability_runs
 
 import reference_rt as rt
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.stability.harness import meshes
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw, generator
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
 from comparisons.experiments.stability.hierarchy import every
-from comparisons.experiments.stability.hierarchy import family as f05
 from comparisons.experiments.stability.slivers import family as f04
-from comparisons.experiments.stability.slivers.judge import RING, Judge, Question
+from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
 from comparisons.experiments.stability.watertight import family as f03
 from comparisons.experiments.stability.watertight import seams
 from comparisons.experiments.stability.watertight.tracers import by_method, crossings
@@ -22,55 +22,9 @@ from reference_rt import textbook
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")
 
-FAMILIES = {family.id: family for family in (f03.FAMILY, f04.FAMILY, f05.FAMILY)}
-
-
-def draw(folder, family, series, x, cases, mitsuba=False):
-    return Draw(generator(1, family, series, x), cases, mitsuba, folder)
-
 
 def measured(folder, family, series, x, cases, mitsuba=False):
-    made = draw(folder, family, series, x, cases, mitsuba)
-    return FAMILIES[family].by_name[series].measure(made, x)
-
-
-ONE_EACH = [
-    ("F3", "offset", 1e9),
-    ("F3", "triangles", 320.0),
-    ("F3", "smallness", 1e70),
-    ("F3", "size", 1e150),
-    ("F4", "aspect", 1e12),
-    ("F4", "aspect, aligned", 1e12),
-    ("F4", "grazing", 1e15),
-    ("F4", "grazing, aligned", 1e15),
-    ("F5", "primitives", 1.0),
-    ("F5", "primitives", 100.0),
-    ("F5", "copies", 100.0),
-    ("F5", "slivers", 1e15),
-    ("F5", "size", 1e100),
-]
-
-
-@pytest.mark.parametrize(("family", "series", "x"), ONE_EACH)
-def test_ours_passes(family, series, x, tmp_path):
-    ours = measured(tmp_path, family, series, x, 1000)[OURS]
-    assert ours.failures == 0
-    assert ours.cases >= 1000
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("family", "series", "x"),
-    [
-        (family.id, series.name, x)
-        for family in FAMILIES.values()
-        for series in family.series
-        for x in series.values
-        if x <= series.holds_to
-    ],
-)
-def test_ours_passes_everywhere(family, series, x, tmp_path):
-    assert measured(tmp_path, family, series, x, 5000)[OURS].failures == 0
+    return stability_runs.measured(family, series, x, folder, cases, mitsuba=mitsuba)
 
 
 def test_float64_ends_where_the_law_says(tmp_path):
@@ -92,13 +46,19 @@ def test_meshes_are_closed(mesh):
     assert len(np.unique(mesh.vertices, axis=0)) == len(mesh.vertices)
 
 
+def _faces_in_place_of(folder, faces):
+    """What is found of a ball with other faces."""
+    whole = meshes.ball(2)
+    mesh = meshes.Closed("ball", whole.vertices, faces(whole.faces), whole.insides)
+    made = Draw(np.random.default_rng(1), 0, False, folder)
+    return f03._measure(made, mesh, 4000, 1.0, others=False)[OURS]
+
+
 def test_a_hole_is_seen(tmp_path):
     """Of a mesh that lacks a triangle: rays leak, and their crossings do not add up."""
-    whole = meshes.ball(2)
-    torn = meshes.Closed("ball", whole.vertices, whole.faces[1:], whole.insides)
-    found = f03._measure(draw(tmp_path, "F3", "offset", 1.0, 0), torn, 4000, 1.0, others=False)
-    assert found[OURS].failures > 10
-    assert {e["expected"] for e in found[OURS].examples} <= {
+    found = _faces_in_place_of(tmp_path, lambda faces: faces[1:])
+    assert found.failures > 10
+    assert {e["expected"] for e in found.examples} <= {
         "a hit",
         "crossings, one more out than in",
         "crossings, as many in as out",
@@ -106,12 +66,10 @@ def test_a_hole_is_seen(tmp_path):
 
 
 def test_an_inside_out_triangle_is_seen(tmp_path):
-    whole = meshes.ball(2)
-    faces = whole.faces.copy()
-    faces[7] = faces[7, ::-1]
-    turned = meshes.Closed("ball", whole.vertices, faces, whole.insides)
-    found = f03._measure(draw(tmp_path, "F3", "offset", 1.0, 0), turned, 4000, 1.0, others=False)
-    assert found[OURS].failures > 0
+    def turned(faces):
+        return np.concatenate([faces[:7], faces[7:8, ::-1], faces[8:]])
+
+    assert _faces_in_place_of(tmp_path, turned).failures > 0
 
 
 def test_crossings_of_a_cube(tmp_path):
@@ -143,10 +101,10 @@ def test_text_book_methods_leak():
 
 def test_seams_of_something_else_are_seen():
     """Rays that hit nothing, or another shape than they start in."""
-    asked = seams.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
-    shape = asked.whose.copy()
+    case = seams.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
+    shape = case.whose.copy()
     shape[3], shape[70] = -1, 0
-    found = seams.judged(asked, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
+    found = seams.judged(case, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
     assert (found.cases, found.failures) == (100, 2)
     assert found.examples[1]["found"] == "shape 0 at t = inf"
 
@@ -203,8 +161,6 @@ def test_distances_of_other_shapes(kind):
     """From a unit shape: a point 0.25 beside it, one 0.25 off it, one on it."""
     shape = {"rectangles": rt.Rectangle(), "disks": rt.Disk(), "boxes": rt.Box()}[kind]
     row = getattr(rt.build_tables(rt.Scene(shapes=(shape,))).geometry.shapes, kind)._asdict()
-    from comparisons.experiments.stability.slivers.judge import DISTANCES
-
     top = 1.0 if kind == "boxes" else 0.0
     p = np.array([[1.25, 0.0, 0.0], [0.5, 0.0, top + 0.25], [1.0, 0.0, top]], np.longdouble)
     assert DISTANCES[kind](row, p).tolist() == [0.25, 0.25, 0.0]

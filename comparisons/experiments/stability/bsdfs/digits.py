@@ -1,12 +1,11 @@
 """The digits of Fresnel's equations, of the distribution of normals and of masking."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.bsdfs.bsdfs import towards
 from comparisons.experiments.stability.bsdfs.law import (
     density_between,
     fresnel,
@@ -14,18 +13,13 @@ from comparisons.experiments.stability.bsdfs.law import (
     masking,
 )
 from comparisons.experiments.stability.bsdfs.pairs import in_float32, matched
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-    decades,
-)
+from comparisons.experiments.stability.harness.bsdfs import ALPHA, towards
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.outcomes import (
     hexed,
-    outcome,
+    of_errors,
+    plain,
     relative,
     together,
     unit_of,
@@ -91,13 +85,13 @@ def _boundary(
     draw: Draw, cosines: FloatArray, n: FloatArray, mitsuba_too: bool
 ) -> dict[str, Outcome]:
     """R and T of floats that float32 holds, where it can: one case each."""
-    asked: dict[str, Callable[[FloatArray, FloatArray], FloatArray]]
-    asked = {OURS: _ours, TEXTBOOK: _textbook}
+    methods: dict[str, Callable[[FloatArray, FloatArray], FloatArray]]
+    methods = {OURS: _ours, TEXTBOOK: _textbook}
     if draw.mitsuba and mitsuba_too:
-        asked[MITSUBA] = _theirs
+        methods[MITSUBA] = _theirs
     exact = fresnel(cosines, n)
     found: dict[str, Outcome] = {}
-    for who, method in asked.items():
+    for who, method in methods.items():
         unit = unit_of(who)
         near = fresnel_near(cosines, n, 4.0 * unit, 0.0)
         values = method(cosines, n)
@@ -108,12 +102,13 @@ def _boundary(
             size = np.maximum(truth, 1e-36 if who == MITSUBA else 1e-290)
             allowed = SAFETY * unit + near[k] / size
             errors = np.abs(values[:, k] - truth) / size
-
-            def ask(i: int, name: str = name, k: int = k, values: FloatArray = values) -> Any:
-                told = {"cosine": hexed(cosines[i]), "index": hexed(n[i])}
-                return {**told, name: float(exact[k][i]), "found": float(values[i, k])}
-
-            parts.append({who: outcome(errors / allowed, 1.0, ask)})
+            shown = {
+                "cosine": cosines,
+                "index": n,
+                name: plain(truth),
+                "found": plain(values[:, k]),
+            }
+            parts.append({who: of_errors(errors / allowed, 1.0, shown)})
         found |= together(parts)
     return found
 
@@ -194,16 +189,9 @@ def _densities(draw: Draw, x: float) -> dict[str, Outcome]:
             condition = 1.0 + (exact.slope2 if kind == "beckmann" else 0.0)
             seen = exact.density > (1e-19 if who == MITSUBA else 1e-280)
             errors = np.where(seen, relative(value, exact.density), 0.0) / condition
-
-            def ask(
-                i: int, kind: str = kind, value: FloatArray = value, e: Any = exact,
-                wo: FloatArray = wo, wi: FloatArray = wi,
-            ) -> Any:  # fmt: skip
-                told = {"distribution": kind, "alpha": hexed(alpha), "wo": hexed(wo[i])}
-                told |= {"wi": hexed(wi[i]), "D": float(e.density[i])}
-                return {**told, "found": float(value[i])}
-
-            parts.append({who: outcome(errors, SAFETY * unit_of(who), ask)})
+            shown = {"distribution": kind, "alpha": hexed(alpha), "wo": wo, "wi": wi}
+            shown |= {"D": plain(exact.density), "found": plain(value)}
+            parts.append({who: of_errors(errors, SAFETY * unit_of(who), shown)})
     return together(parts)
 
 
@@ -223,48 +211,39 @@ def _masking(draw: Draw, x: float) -> dict[str, Outcome]:
                 up = np.tile([0.0, 0.0, 1.0], (n, 1))
                 values[MITSUBA] = for_rays(lambda o, h, d=d: (d.smith_g1(o, h),), v, up)[0]
             for who, value in values.items():
+                shown = {"distribution": kind, "alpha": hexed(alpha), "direction": v}
+                shown |= {"G1": plain(exact), "found": plain(value)}
                 errors = relative(value, exact)
-
-                def ask(
-                    i: int, kind: str = kind, value: FloatArray = value, alpha: float = alpha,
-                    v: FloatArray = v, exact: FloatArray = exact,
-                ) -> Mapping[str, object]:  # fmt: skip
-                    told = {"distribution": kind, "alpha": hexed(alpha), "direction": hexed(v[i])}
-                    return {**told, "G1": float(exact[i]), "found": float(value[i])}
-
-                parts.append({who: outcome(errors, SAFETY * unit_of(who), ask)})
+                parts.append({who: of_errors(errors, SAFETY * unit_of(who), shown)})
     return together(parts)
 
 
 INDEX = Series(
     "fresnel, matched indices",
-    "1 / |index - 1|",
+    Sweep(
+        "1 / |index - 1|",
+        (1.0 / 3.0, 2.0, *decades(1, 12)),
+        (1.0 / 3.0, 1e2, 1e5, 1e8),
+        1_000,
+        20_000,
+    ),
     "R and T of a boundary from both sides, cosines down to 1e-12, against 300 bits.",
-    (1.0 / 3.0, 2.0, *decades(1, 12)),
-    (1.0 / 3.0, 1e2, 1e5, 1e8),
-    {"quick": 1_000, "full": 20_000},
     _index,
     unit="of what is allowed",
 )
 EDGE = Series(
     "fresnel, critical angle",
-    "1 / relative distance from it",
+    Sweep("1 / relative distance from it", decades(0, 15), (1e1, 1e5, 1e10, 1e15), 1_000, 20_000),
     "R and T beside the critical angle of indices from 1.01 to 4 and their inverses, against 300 "
     "bits.",
-    decades(0, 15),
-    (1e1, 1e5, 1e10, 1e15),
-    {"quick": 1_000, "full": 20_000},
     _edge,
     unit="of what is allowed",
 )
 NORMALS = Series(
     "distribution of normals",
-    "1 / alpha",
+    ALPHA(1_000, 20_000),
     "D between two directions that a facet of slope within some alpha mirrors, cosines down to "
     "1e-6, against 300 bits.",
-    (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
-    (1.0, 1e2, 1e4),
-    {"quick": 1_000, "full": 20_000},
     _densities,
     unit="of the value",
     explained="64 u of the value are allowed, in each one's own u: 3.8e-6 for Mitsuba, which is "
@@ -272,11 +251,8 @@ NORMALS = Series(
 )
 MASKING = Series(
     "masking",
-    "1 / cosine",
+    Sweep("1 / cosine", decades(0, 12), (1.0, 1e3, 1e6, 1e12), 300, 5_000),
     "G1 of GGX and Beckmann, alpha 1e-4, 0.1 and 1, against 300 bits.",
-    decades(0, 12),
-    (1.0, 1e3, 1e6, 1e12),
-    {"quick": 300, "full": 5_000},
     _masking,
     unit="of the value",
 )

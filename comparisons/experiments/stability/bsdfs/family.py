@@ -1,25 +1,4 @@
-"""F11: reciprocity, sampling and the digits of materials at their extremes.
-
-Laws:
-- reciprocity: |f(a, b) - f(b, a)| <= 1e-12 of the larger; through a boundary of what carries power,
-  f(a, b) eta_b² = f(b, a) eta_a², eta the index on a direction's side.  1e-12 is 9007 u, u = 2^-53;
-  Mitsuba, in float32, is given 9007 of its own u = 2^-24 (5.4e-4).  Values below 1e-290 (1e-30)
-  count as 0: they have lost digits to the end of the exponent.
-- consistency: the weight that `sample` says times its density is `evaluate` at the direction drawn,
-  and the density is `pdf`, to 32 u times the condition 14 / (|h| min(alpha, cos, g)) of a half
-  vector h: what rounding a direction to floats changes D, the cosines and Fresnel's root by.
-- bounds: everything is finite; no sample of a metal or a glass weighs more than 1 in power.
-- densities: samples have the density that is said (chi-square, at the level of `chance`), and it
-  integrates to at most 1, up to what two rules of quadrature differ by;
-- digits: Fresnel's R and T, the distribution D and the masking G1 are the exact formulae of the
-  very floats, evaluated in 300 bits, to 64 u of their value, plus what moving the cosine by 4 u
-  moves them (as at the critical angle); of Beckmann's D times 1 + slope², as its exponent is
-  rounded.  Mitsuba gets the same in its own u, and numbers that float32 holds.
-
-Ranges: cosines to 1e-12, alpha 1e-4 to 1, indices 1 ± 1e-8 to 4, the critical angle to 1e-15 of it;
-1e5 pairs of directions a material and setting in full.  Mitsuba takes no part where its float32
-cannot tell the index from 1.
-"""
+"""The series of F11; the folder's docstring states the law."""
 
 from comparisons.experiments.stability.bsdfs.digits import EDGE, INDEX, MASKING, NORMALS
 from comparisons.experiments.stability.bsdfs.pairs import GRAZING, MATCHED, ROUGHNESS

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from flint import arb, ctx
 
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 
 BITS = 300
 """Squares of slopes at an alpha of 1e-4 and of cosines of 1e-12 leave 190 of them."""

@@ -1,41 +1,31 @@
 """Reciprocity: pairs of directions, both ways."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 
 import numpy as np
 
-from comparisons.experiments.stability.bsdfs.bsdfs import (
+from comparisons.experiments.stability.harness.bsdfs import (
+    ALPHA,
     EVEN,
     ROUGH,
     Bsdf,
     Ours,
-    Theirs,
+    contestants,
     index_of,
     towards,
 )
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-    decades,
-)
-from comparisons.experiments.stability.harness.outcomes import hexed, outcome, together, unit_of
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
+from comparisons.experiments.stability.harness.outcomes import of_errors, plain, together, unit_of
 from reference_rt.materials import Material, RoughDielectric
 
 ALLOWED = 9007.0
 """Units of roundoff: 1e-12 in float64."""
 
+CASES = 2_000, 100_000
+
 LEAST = {OURS: 1e-290, MITSUBA: 1e-30}
-
-
-def contestants(material: Material, draw: Draw) -> Iterator[tuple[str, Bsdf]]:
-    yield OURS, Ours.of(material)
-    if draw.mitsuba:
-        yield MITSUBA, Theirs.of(material)
 
 
 def asymmetry(bsdf: Bsdf, n: float, wo: FloatArray, wi: FloatArray, least: float) -> FloatArray:
@@ -58,12 +48,8 @@ def _compared(
     found, n = {}, index_of(material)
     for who, bsdf in contestants(material, draw):
         errors = asymmetry(bsdf, n, wo, wi, LEAST[who])
-
-        def ask(i: int, errors: FloatArray = errors) -> Mapping[str, object]:
-            pair = {"wo": hexed(wo[i]), "wi": hexed(wi[i])}
-            return {"material": name, **pair, "asymmetry": float(errors[i])}
-
-        found[who] = outcome(errors, ALLOWED * unit_of(who), ask)
+        shown = {"material": name, "wo": wo, "wi": wi, "asymmetry": plain(errors)}
+        found[who] = of_errors(errors, ALLOWED * unit_of(who), shown)
     return found
 
 
@@ -120,14 +106,8 @@ def _roughness(draw: Draw, x: float) -> dict[str, Outcome]:
 
 
 def glass(index: float, alpha: float, distribution: str) -> Material:
-    return RoughDielectric.model_validate(
-        {
-            "type": "rough_dielectric",
-            "interior_ior": index,
-            "alpha": alpha,
-            "distribution": distribution,
-        }
-    )
+    described = {"interior_ior": index, "alpha": alpha, "distribution": distribution}
+    return RoughDielectric.model_validate({"type": "rough_dielectric", **described})
 
 
 def matched(x: float) -> tuple[float, ...]:
@@ -153,52 +133,26 @@ def _matched(draw: Draw, x: float) -> dict[str, Outcome]:
     return together(found)
 
 
-def _series(
-    name: str,
-    axis: str,
-    about: str,
-    values: tuple[float, ...],
-    quick: tuple[float, ...],
-    measure: Callable[[Draw, float], Mapping[str, Outcome]],
-    explained: str = "",
-) -> Series:
-    return Series(
-        name,
-        axis,
-        about,
-        values,
-        quick,
-        {"quick": 2_000, "full": 100_000},
-        measure,
-        unit="of the value",
-        explained=explained,
-    )
-
+_series = partial(Series, unit="of the value")
 
 GRAZING = _series(
     "grazing",
-    "1 / cosine",
+    Sweep("1 / cosine", decades(0, 12), (1.0, 1e3, 1e6, 1e12), *CASES),
     "f(a, b) against f(b, a) of a dozen materials, one direction at this cosine, the other "
     "anywhere down to it, opposite and alongside too.",
-    decades(0, 12),
-    (1.0, 1e3, 1e6, 1e12),
     _grazing,
 )
 ROUGHNESS = _series(
     "roughness",
-    "1 / alpha",
+    ALPHA(*CASES),
     "f(a, b) against f(b, a) of rough materials, b drawn by the material for a.",
-    (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
-    (1.0, 1e2, 1e4),
     _roughness,
     explained="the range ends at alpha 1e-4, and Mitsuba fails within it: in 8 of 19,784 pairs at "
     "alpha 1/30, 1,079 of 19,862 at 1e-4, where one is all of the value off",
 )
 MATCHED = _series(
     "matched indices",
-    "1 / |index - 1|",
+    Sweep("1 / |index - 1|", (1.0 / 3.0, 2.0, *decades(1, 8)), (1.0 / 3.0, 1e2, 1e5, 1e8), *CASES),
     "f(a, b) against f(b, a) of rough glass of alpha 0.1 whose index is nearly that outside.",
-    (1.0 / 3.0, 2.0, *decades(1, 8)),
-    (1.0 / 3.0, 1e2, 1e5, 1e8),
     _matched,
 )

@@ -1,23 +1,31 @@
 """Samples: weights against values, and directions against densities."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
-from comparisons.experiments.stability.bsdfs.bsdfs import (
+from comparisons.experiments.stability.harness import chance
+from comparisons.experiments.stability.harness.bsdfs import (
+    ALPHA,
     EVEN,
     ROUGH,
     SMOOTH,
     Bsdf,
+    contestants,
     index_of,
     towards,
 )
-from comparisons.experiments.stability.bsdfs.density import fit
-from comparisons.experiments.stability.bsdfs.pairs import contestants
-from comparisons.experiments.stability.harness import chance
-from comparisons.experiments.stability.harness.family import Draw, FloatArray, Outcome, Series
-from comparisons.experiments.stability.harness.outcomes import hexed, outcome, together, unit_of
+from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.densities import fit
+from comparisons.experiments.stability.harness.family import Series
+from comparisons.experiments.stability.harness.outcomes import (
+    hexed,
+    of_errors,
+    one_case,
+    plain,
+    together,
+    unit_of,
+)
 from reference_rt.materials import (
     Conductor,
     Dielectric,
@@ -113,15 +121,8 @@ def _consistent(draw: Draw, x: float) -> dict[str, Outcome]:
         part = {}
         for who, bsdf in contestants(material, draw):
             errors = inconsistency(bsdf, material, who, alpha, wo, u)
-
-            def ask(
-                i: int, name: str = name, errors: FloatArray = errors, wo: FloatArray = wo,
-                u: FloatArray = u,
-            ) -> Mapping[str, object]:  # fmt: skip
-                asked = {"material": name, "wo": hexed(wo[i]), "u": hexed(u[i])}
-                return {**asked, "over what is allowed": float(errors[i])}
-
-            part[who] = outcome(errors, 1.0, ask)
+            shown = {"material": name, "wo": wo, "u": u, "over what is allowed": plain(errors)}
+            part[who] = of_errors(errors, 1.0, shown)
         found.append(part)
     return together(found)
 
@@ -141,33 +142,27 @@ def _density(draw: Draw, x: float) -> dict[str, Outcome]:
                 # by a few u / alpha at this cosine.
                 over = f.integral - 1.0 - f.doubt - 16.0 * unit_of(who) * x / wo[2]
                 ok = f.p_value >= chance.LEVEL and over <= 0.0
-                told = {"material": name, "wo": hexed(wo), "alpha": 1.0 / x}
-                told |= {"p-value": f.p_value, "integral": f.integral}
-                part[who] = Outcome(1, int(not ok), examples=() if ok else (told,))
+                shown = {"material": name, "wo": hexed(wo), "alpha": 1.0 / x}
+                shown |= {"p-value": f.p_value, "integral": f.integral}
+                part[who] = one_case(not ok, None, shown)
             found.append(part)
     return together(found)
 
 
 CONSISTENCY = Series(
     "weights",
-    "1 / alpha",
+    ALPHA(2_000, 100_000),
     "Samples of all materials for directions down to a cosine of 1e-6: weight times density "
     "against evaluate(), density against pdf(), nothing infinite, no weight above 1 "
     "where power is only divided.",
-    (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
-    (1.0, 1e2, 1e4),
-    {"quick": 2_000, "full": 100_000},
     _consistent,
     unit="of what is allowed",
 )
 DENSITY = Series(
     "densities",
-    "1 / alpha",
+    ALPHA(20_000, 100_000),
     "Samples of metals and glasses from three directions, chi-square against their density over "
     "cells of half vectors.",
-    (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
-    (1.0, 1e2, 1e4),
-    {"quick": 20_000, "full": 100_000},
     _density,
     explained="the range ends at alpha 1e-4, and Mitsuba fails within it, at 1/3: two of its "
     "densities integrate to 1.0008, without any chance.  It evaluates Beckmann's masking by a fit, "

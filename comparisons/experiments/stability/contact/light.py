@@ -1,4 +1,4 @@
-"""Light in gaps: the contact shadow under a cube, and what slabs of glass let through."""
+"""Light in gaps: the contact shadow under a cube, and the transmittance of slabs of glass."""
 
 import math
 from collections.abc import Mapping
@@ -9,19 +9,11 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.contact.stacks import COUNT, THEIRS, bound, judged, rays_down
-from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
-    MITSUBA,
-    OURS,
-    Draw,
-    Outcome,
-    Shot,
-)
-from comparisons.experiments.stability.leaving.judge import CONTACT, hexed
-from comparisons.experiments.stability.leaving.shapes import matrix
-from comparisons.experiments.stability.leaving.shots import PIXELS, lit, picture
-from reference_rt.core.arrays import IntArray
+from comparisons.experiments.stability.contact.stacks import COUNT, THEIRS, rays_down
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome, Shot
+from comparisons.experiments.stability.harness.leaving import CONTACT, PIXELS, bound, lit, picture
+from comparisons.experiments.stability.harness.outcomes import outcome
+from comparisons.experiments.stability.harness.steps import matrix
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.query import radiance_without_noise
 
@@ -38,27 +30,22 @@ def shadow(draw: Draw, x: float) -> Mapping[str, Outcome]:
     that comes in under the edge, deep < gap.  The floor is seen from below."""
     gap, n, rng = 1.0 / x, draw.cases, draw.rng
     deep = gap * 2.0 ** rng.uniform(-4.0, 4.0, n)
-    # Near the edge of the shadow: what the law leaves to either answer.
     slope = np.sqrt(0.5)
     at = np.column_stack([1.0 - deep, rng.uniform(-0.5, 0.5, n), np.zeros(n)])
     d = np.tile([0.0, 0.0, 1.0], (n, 1))
     o, w = at - d, np.tile([slope, 0.0, slope], (n, 1))
     dark = (1.0 - at[:, 0] > gap).astype(np.int64)
-    sure = (np.abs(deep - gap) > CONTACT * bound(0.0)) & (deep < 1.5)
+    # Near the edge of the shadow either answer is right.
+    sure = (np.abs(deep - gap) > CONTACT * bound(0.0, 1.0)) & (deep < 1.5)
     scene = shadow_scene(gap)
     answers = {OURS: lit(OURS, scene, o, d, w)}
     if draw.mitsuba:
         answers[MITSUBA] = lit(MITSUBA, scene, *(a[: 4 * THEIRS] for a in (o, d, w)))
     outcomes = {}
     for name, answer in answers.items():
-        met = (1.0 - answer[:, 0]).astype(np.int64)
-        decided = np.flatnonzero(sure[: len(met)])
-
-        def note(i: int, decided: IntArray = decided) -> dict[str, Any]:
-            return {"gap": gap.hex(), "point": hexed(at[decided[i]])}
-
-        outcome = judged(dark[decided], met[decided], note)
-        outcomes[name] = outcome + Outcome(0, 0, open=len(met) - len(decided))
+        met, few = (1.0 - answer[:, 0]).astype(np.int64), slice(len(answer))
+        shown = {"gap": gap.hex(), "point": at, "expected": dark, "found": met}
+        outcomes[name] = outcome(dark[few] != met, shown, ~sure[few])
     return outcomes
 
 
@@ -105,13 +92,8 @@ def transmitted(draw: Draw, x: float) -> Mapping[str, Outcome]:
     found = radiance_without_noise(panes(1.0 / x), setup, o + np.array([0.0, 0.0, 0.5]), d)[:, 0]
     expected = fresnel(-d[:, 2]) ** COUNT
     error = np.abs(found - expected) / expected
-    bad = np.flatnonzero(~(error <= TRANSMITTED))
-    examples = tuple(
-        {"o": hexed(o[i]), "d": hexed(d[i]), "expected": expected[i].hex(), "found": found[i].hex()}
-        for i in bad[:EXAMPLES].tolist()
-    )
-    worst = float(error.max() / (COUNT * U))
-    return {OURS: Outcome(len(o), len(bad), worst, examples=examples)}
+    shown = {"o": o, "d": d, "expected": expected, "found": found}
+    return {OURS: outcome(~(error <= TRANSMITTED), shown, worst=float(error.max() / (COUNT * U)))}
 
 
 def shoot(contestant: str, x: float) -> Shot:

@@ -2,17 +2,17 @@
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.harness.family import EXAMPLES, MITSUBA, OURS, Draw, Outcome
-from comparisons.experiments.stability.leaving.judge import hexed
-from comparisons.experiments.stability.leaving.shapes import matrix
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.outcomes import outcome, together
+from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry import frame
+from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.mitsuba import translate
 from comparisons.mitsuba.backend import scalar
 from reference_rt.accel.geometry import Geometry, closest_hit, owner, surface
@@ -27,8 +27,11 @@ COUNT = 8
 FAR = 1000.0
 """Scales between the origin and the scenes that are far away."""
 
+STACKS = 4
+"""Drawn at each sweep point."""
+
 THEIRS = 40
-"""Rays of a setting that Mitsuba is asked about, in its scalar variant."""
+"""Rays of a stack that Mitsuba traces, in its scalar variant."""
 
 
 @entry_kernel
@@ -51,11 +54,6 @@ class Stack(NamedTuple):
     o: FloatArray
     d: FloatArray
     expected: IntArray
-
-
-def bound(distance: float) -> float:
-    """B of scenes of half width 1."""
-    return 17.0 * math.sqrt(3.0) * U * (2.0 * distance + 6.0)
 
 
 def follow(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int) -> IntArray:
@@ -132,14 +130,9 @@ def slots(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -
     return Stack(rt.Scene(shapes=(cube, square)), o, d, expected)
 
 
-def judged(expected: IntArray, found: IntArray, note: Callable[[int], dict[str, Any]]) -> Outcome:
-    """Each ray is a case."""
-    bad = np.flatnonzero((expected != found).reshape(len(expected), -1).any(axis=1))
-    examples = tuple(
-        note(i) | {"expected": expected[i].tolist(), "found": found[i].tolist()}
-        for i in bad[:EXAMPLES].tolist()
-    )
-    return Outcome(len(expected), len(bad), examples=examples)
+def differing(expected: IntArray, found: IntArray) -> BoolArray:
+    """Which rows (n,) are not the same."""
+    return np.asarray((expected != found).any(axis=1))
 
 
 def ordered(
@@ -148,23 +141,19 @@ def ordered(
     """Rays straight through a stack with gaps of 1 / x."""
 
     def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
-        stacks = 4
-        outcomes: dict[str, Outcome] = {}
-        for _ in range(stacks):
-            stack = make(draw.rng, draw.cases // stacks, 1.0 / x, distance)
-            found = {OURS: follow(stack.scene, stack.o, stack.d, stack.expected.shape[1])}
-            if draw.mitsuba and theirs:
-                few = slice(0, THEIRS)
-                found[MITSUBA] = follow_in_mitsuba(
-                    stack.scene, stack.o[few], stack.d[few], stack.expected.shape[1]
-                )
-            for name, met in found.items():
-                outcome = judged(stack.expected[: len(met)], met, _ofrays_down(stack, x))
-                outcomes[name] = outcomes[name] + outcome if name in outcomes else outcome
-        return outcomes
+        stacks = (make(draw.rng, draw.cases // STACKS, 1.0 / x, distance) for _ in range(STACKS))
+        return together(_judged(stack, x, draw.mitsuba and theirs) for stack in stacks)
 
     return measure
 
 
-def _ofrays_down(stack: Stack, x: float) -> Callable[[int], dict[str, Any]]:
-    return lambda i: {"gap": (1.0 / x).hex(), "o": hexed(stack.o[i]), "d": hexed(stack.d[i])}
+def _judged(stack: Stack, x: float, mitsuba: bool) -> dict[str, Outcome]:
+    scene, o, d, expected = stack
+    found = {OURS: follow(scene, o, d, expected.shape[1])}
+    if mitsuba:
+        found[MITSUBA] = follow_in_mitsuba(scene, o[:THEIRS], d[:THEIRS], expected.shape[1])
+    shown = {"gap": (1.0 / x).hex(), "o": o, "d": d, "expected": expected}
+    return {
+        name: outcome(differing(expected[: len(met)], met), shown | {"found": met})
+        for name, met in found.items()
+    }

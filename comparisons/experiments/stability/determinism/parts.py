@@ -11,8 +11,8 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.bits import MAKES, over, same_bits
-from comparisons.experiments.stability.harness.family import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.bits import MAKES, on_threads, over
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
 from reference_rt.rendering.tiles import render_band
 from reference_rt.util.child_processes import tied
 
@@ -56,7 +56,7 @@ def in_bands(scene: rt.Scene, size: int, rng: np.random.Generator) -> FloatArray
 
 
 def bands(draw: Draw, x: float) -> Outcomes:
-    return {OURS: over(draw, lambda scene: in_bands(scene, int(x), draw.rng))}
+    return {OURS: over(draw, lambda s, _: (on_threads(s), in_bands(s, int(x), draw.rng)))}
 
 
 CARRY_ON = """
@@ -68,7 +68,7 @@ carry_on(Path(sys.argv[1]), float.fromhex(sys.argv[2]), float.fromhex(sys.argv[3
 
 
 def carry_on(folder: Path, first: float, last: float) -> None:
-    """These shares of the pixels of each scene, added to those that are kept in a file."""
+    """Render the pixels from share `first` to `last` of each scene, added to those in its file."""
     for make in MAKES:
         file = folder / f"{make.__name__}.npy"
         scene = make(folder)
@@ -82,8 +82,8 @@ def carry_on(folder: Path, first: float, last: float) -> None:
 
 
 def interrupted(draw: Draw, x: float) -> Outcomes:
-    """The first part by this process, the others by one of their own each, from what the one before
-    has left."""
+    """The first part is rendered by this process, each other one by a new process that reads the
+    file of the one before."""
     cuts = [0.0, *np.sort(draw.rng.uniform(0.0, 1.0, int(x))).tolist(), 1.0]
     carry_on(draw.folder, *cuts[:2])
     for first, last in pairwise(cuts[1:]):
@@ -91,12 +91,12 @@ def interrupted(draw: Draw, x: float) -> Outcomes:
         subprocess.run(
             [*command, first.hex(), last.hex()], check=True, capture_output=True, **tied()
         )
-    total = Outcome(0, 0)
-    for make in MAKES:
-        scene = make(draw.folder)
-        found = np.load(draw.folder / f"{make.__name__}.npy").reshape(scene.film.height, -1, 3)
-        total += same_bits(rt.render(scene).colour, found)
-    return {OURS: total}
+
+    def pictures(scene: rt.Scene, name: str) -> tuple[FloatArray, FloatArray]:
+        found = np.load(draw.folder / f"{name}.npy").reshape(scene.film.height, -1, 3)
+        return rt.render(scene).colour, found
+
+    return {OURS: over(draw, pictures)}
 
 
 # ---- other code ---------------------------------------------------------------------------------
@@ -116,7 +116,7 @@ TINY = rt.Film(width=8, height=6)
 
 def plainly(folder: Path, block: int) -> None:
     """Pictures with so many rays side by side, for a process without compiled kernels: there the
-    number is looked up when it is needed."""
+    number is read when it is needed."""
     from reference_rt.core import ray
 
     usual = ray.BLOCK
@@ -139,8 +139,9 @@ def blocks(draw: Draw, x: float) -> Outcomes:
     scenes.write_ball(draw.folder)
     command = [sys.executable, "-c", PLAIN, str(draw.folder), str(block)]
     subprocess.run(command, check=True, capture_output=True, env=environment, **tied())
-    total = Outcome(0, 0)
-    for make in MAKES:
-        compiled = rt.render(make(draw.folder).changed(film=TINY)).colour
-        total += same_bits(compiled, np.load(draw.folder / f"{make.__name__}_{block}.npy"))
-    return {OURS: total}
+
+    def pictures(scene: rt.Scene, name: str) -> tuple[FloatArray, FloatArray]:
+        compiled = rt.render(scene.changed(film=TINY)).colour
+        return compiled, np.load(draw.folder / f"{name}_{block}.npy")
+
+    return {OURS: over(draw, pictures)}

@@ -5,8 +5,8 @@ from typing import Any
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.bits import MAKES, over, same_bits
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.bits import on_threads, over, same_bits
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
 from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load
@@ -24,7 +24,7 @@ def threads(draw: Draw, x: float) -> Outcomes:
     previous = _module.SAMPLES_PER_TILE
     _module.SAMPLES_PER_TILE = SMALL_BAND
     try:
-        found = {OURS: over(draw, lambda scene: rt.render(scene, threads=int(x)).colour)}
+        found = {OURS: over(draw, lambda s, _: (on_threads(s), on_threads(s, int(x))))}
     finally:
         _module.SAMPLES_PER_TILE = previous
     if draw.mitsuba:
@@ -35,28 +35,27 @@ def threads(draw: Draw, x: float) -> Outcomes:
 def wide_filter(variant_name: str, draw: Draw, x: float) -> Outcomes:
     """Ours has no samples that pixels share: each pixel's filter draws its own."""
 
-    def wide(scene: rt.Scene) -> rt.Scene:
-        return scene.changed(film=scene.film.model_copy(update={"filter": rt.GaussianFilter()}))
+    def pictures(scene: rt.Scene, _: str) -> tuple[FloatArray, FloatArray]:
+        wide = _filtered(scene, rt.GaussianFilter())
+        return on_threads(wide), on_threads(wide, int(x))
 
-    total = Outcome(0, 0)
-    for make in MAKES:
-        scene = wide(make(draw.folder))
-        first, again = (rt.render(scene, threads=n).colour for n in (1, int(x)))
-        total += same_bits(first, again)
-    found = {OURS: total}
+    found = {OURS: over(draw, pictures)}
     if draw.mitsuba and (variant_name == SCALAR or backend().variant == LLVM):
         found[MITSUBA] = _mitsuba_threads(draw, variant_name, rt.GaussianFilter(), int(x))
     return found
+
+
+def _filtered(scene: rt.Scene, film_filter: Any, **size: int) -> rt.Scene:
+    return scene.changed(film=scene.film.model_copy(update={"filter": film_filter, **size}))
 
 
 def _mitsuba_threads(draw: Draw, name: str, film_filter: Any, count: int) -> Outcome:
     """The path-traced scene, one seed: one thread, then others, each count three times."""
     import drjit as dr
 
-    scene = scenes.path(draw.folder)
-    film = scene.film.model_copy(update={"filter": film_filter, "width": 96, "height": 72})
+    scene = _filtered(scenes.path(draw.folder), film_filter, width=96, height=72)
     with variant(name):
-        mi_scene = load(scene.changed(film=film)).mi_scene
+        mi_scene = load(scene).mi_scene
         before = dr.thread_count()
         try:
             dr.set_thread_count(1)

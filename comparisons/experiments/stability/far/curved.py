@@ -6,24 +6,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.experiments.methods.setting import across, unit_vectors
-from comparisons.experiments.stability.far.law import U_SINGLE, Rays, judge_by_moving
+from comparisons.experiments.stability.far.law import U_SINGLE, judge_by_moving
 from comparisons.experiments.stability.far.spheres import (
     RAYS,
     SCENES,
     in_mitsuba,
-    single,
     tangent_gaps,
 )
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry.exact.dyadic import Dyadic
+from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import scalar
-from reference_rt.core.transform import Matrix, Transform, rotate
+from reference_rt.core.arrays import IntArray
+from reference_rt.core.transform import Transform, rotate
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes import Cone, Cylinder, Quadric, Sphere, Torus
 from reference_rt.shapes.brute_force import intersect_row
@@ -131,12 +128,11 @@ def _map(rng: np.random.Generator, name: str, size: float) -> FloatArray:
     """A linear map (3, 3) in numbers that float32 has."""
     turn = rotate(tuple(unit_vectors(rng, 1)[0].tolist()), float(rng.uniform(0.0, 360.0)))[:, :3]
     stretch = np.ones(3) if name == "cylinder" else rng.uniform(*STRETCH, 3)
-    return single(size * turn * stretch)
+    return round32(size * turn * stretch)
 
 
 def _shape(kind: Kind, linear: FloatArray, center: FloatArray) -> Shape:
-    rows = tuple((*r, c) for r, c in zip(linear.tolist(), center.tolist(), strict=True))
-    return kind.make((Matrix(matrix=rows),))  # type: ignore[arg-type]
+    return kind.make(matrix(linear, center))
 
 
 def draw_rays(
@@ -168,20 +164,20 @@ def draw_rays(
     at = far / np.linalg.norm(d, axis=1)
     foot = Dyadic.of(o) + Dyadic.of(d) * Dyadic.of(at[:, None])
     center = foot.floats() - passed
-    rows = [_columns(_shape(kind, m, np.zeros(3))) for m in maps]
-    columns = {key: np.concatenate([r[key] for r in rows])[which] for key in rows[0]}
+    columns = _columns([_shape(kind, m, np.zeros(3)) for m in maps], which)
     # Where the table has its origin is not where the shape has its own: a bowl's, a frustum's.
     moved = center + columns["center"]
     return Rays(kind.table, columns | {"center": moved}, np.full(n, REACH * size), o, d), maps
 
 
-def _columns(shape: Shape) -> dict[str, Any]:
-    row: dict[str, Any] = shape.tabulate(Place())._asdict()
-    return row
+def _columns(shapes: list[Shape], which: IntArray) -> dict[str, Any]:
+    """The columns of a table, of whose row i shape number which[i] is."""
+    rows = [shape.tabulate(Place())._asdict() for shape in shapes]
+    return {key: np.concatenate([row[key] for row in rows])[which] for key in rows[0]}
 
 
 def answer(rays: Rays) -> FloatArray:
-    """What our kernel finds."""
+    """t (n,) by our kernel, inf for a miss."""
     t = np.empty(len(rays.o))
     of = Quadrics if rays.kind == "quadrics" else Tori
     table = of(**{name: np.ascontiguousarray(column) for name, column in rays.row.items()})
@@ -220,9 +216,9 @@ def compete(
 def _for_mitsuba(name: str, rays: Rays, maps: list[FloatArray]) -> tuple[Rays, list[Shape]]:
     few = rays.only(np.arange(min(RAYS, len(rays.o))))
     which = np.arange(len(few.o)) % SCENES
-    centers = single(few.row["center"][:SCENES])
-    o = single(few.o - few.row["center"] + few.row["center"][which])
+    centers = round32(few.row["center"][:SCENES])
+    o = round32(few.o - few.row["center"] + few.row["center"][which])
     shapes = [_shape(KINDS[name], m, c) for m, c in zip(maps, centers, strict=True)]
-    rows = [_columns(shape) for shape in shapes]
-    columns = {key: np.concatenate([r[key] for r in rows])[which] for key in rows[0]}
-    return Rays(rays.kind, columns, few.size, o, single(few.d / few.speed()[:, None])), shapes
+    return Rays(
+        rays.kind, _columns(shapes, which), few.size, o, round32(few.d / few.speed()[:, None])
+    ), shapes

@@ -1,47 +1,15 @@
-"""F1: far and small quadrics, spheres and tori.
+"""The series of F1; the folder's docstring states the law."""
 
-Law.  A ray hits a sphere where the exact discriminant says so, wherever it passes the rim by more
-than 5 u of the radius (u = 2^-53; `f01_far_law.BAND` derives it), at any distance D, offset and
-size; then |t - exact| |d| <= 16 u (|t| |d| + D) + 5 u r² / h, h half the chord, the last term being
-what the band makes of the root.  Of the other kinds the answer is the exact one of a ray that
-passes at most 64 u sizes beside (`f01_far_law.MOVED`), t to within 16 u (|t| |d| + D).  A hit is
-within this of the surface, and so within the bounding box.
-
-Ranges.  Distance / radius 1e0 to 1e12 (each times 2 to 10; of other kinds 1 to 10, so that rays
-begin within their boxes too), the centre's offset 1e0 to 1e12 radii, radius 1e-9 to 1e9, |d| 1e-3
-to 1e3 times the distance; half of the rays within 2^-1 to 2^-40 radii of tangency, in `rim` to
-2^-53.  Spheres, ellipsoids, open cylinders, cones, paraboloids, capped
-hyperboloids of one sheet, tori.
-
-Counts.  1e5 rays a decade for spheres, 2e4 for quadrics, 2e3 for tori, whose arbiter takes 100 µs.
-
-Passes.  No ray outside of the bands breaks the law.  The arbiter is exact: integers times powers of
-two, for tori FLINT's certified roots.  The issue's band, 1e-10 radii at a distance of 1e6, is the
-first of the powers of ten above u D / r: this holds with 5 u at every distance.
-
-Mitsuba takes part with its scalar variant's spheres, cylinders and instances of spheres, in numbers
-that float32 has, judged by the exact answer for these and by the same law in float32's u = 2^-24;
-the other kinds are meshes there.
-"""
-
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from comparisons.experiments.stability.far import curved, spheres
 from comparisons.experiments.stability.far.picture import shoot
-from comparisons.experiments.stability.harness.family import (
-    Draw,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-    decades,
-)
-
-Measure = Callable[[Draw, float], Mapping[str, Outcome]]
-
-OF_BOUND = "of the law's bound"
+from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
+from comparisons.experiments.stability.harness.outcomes import together
 
 
 def _from(draw: Draw, x: float, most: float = 1.0, least: float = 2.0) -> FloatArray:
@@ -77,21 +45,16 @@ def _size(draw: Draw, x: float) -> Mapping[str, Outcome]:
     return spheres.compete(draw, rays)
 
 
-def _of(name: str) -> Measure:
-    def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
-        return curved.compete(draw, name, _from(draw, x, least=1.0))
-
-    return measure
+def _kind(name: str, draw: Draw, x: float) -> Mapping[str, Outcome]:
+    return curved.compete(draw, name, _from(draw, x, least=1.0))
 
 
 def _kinds_at(draw: Draw, x: float) -> Mapping[str, Outcome]:
-    found: dict[str, Outcome] = {}
     share = draw._replace(cases=draw.cases // len(curved.KINDS))
-    for name in curved.KINDS:
-        outcomes = curved.compete(share, name, _from(share, 1.0, 1e2, least=1.0), offset=x)
-        for who, outcome in outcomes.items():
-            found[who] = found[who] + outcome if who in found else outcome
-    return found
+    return together(
+        curved.compete(share, name, _from(share, 1.0, 1e2, least=1.0), offset=x)
+        for name in curved.KINDS
+    )
 
 
 SINGLE = (
@@ -102,6 +65,7 @@ SINGLE = (
 
 FAR, FAR_QUICK = decades(0, 12), (1.0, 1e3, 1e6, 1e9, 1e12)
 RIMS = tuple(2.0**k for k in (1, 5, 10, 15, 20, 25, 30, 35, 40, 45, 48, 49, 50, 51, 52))
+_series = partial(Series, unit="of the law's bound", explained=SINGLE)
 
 FAMILY = Family(
     "F1",
@@ -109,97 +73,72 @@ FAMILY = Family(
     "A hit or a miss has the sign of the exact discriminant beyond 5 u of the radius, and |t -"
     " exact| |d| <= 16 u (|t| |d| + D) + 5 u r² / h, at any distance, offset and size.",
     (
-        Series(
+        _series(
             "distance",
-            "distance / radius",
+            Sweep("distance / radius", FAR, FAR_QUICK, 3000, 100_000),
             "Spheres from 2 to 10 times this far away; half of the rays pass the rim at 2^-1 to"
             " 2^-40 radii. Wrong is a hit for a miss and the reverse, but within 5 u of the rim,"
             " and t beyond its bound.",
-            FAR,
-            FAR_QUICK,
-            {"quick": 3000, "full": 100_000},
             _distance,
-            unit=OF_BOUND,
-            explained=SINGLE,
         ),
-        Series(
+        _series(
             "body",
-            "distance / radius",
+            Sweep("distance / radius", FAR, FAR_QUICK, 3000, 30_000),
             "Spheres from 2 to 10 times this far away; no ray passes within 0.05 radii of the rim.",
-            FAR,
-            FAR_QUICK,
-            {"quick": 3000, "full": 30_000},
             _body,
-            unit=OF_BOUND,
-            explained=SINGLE,
             shoot=shoot,
         ),
-        Series(
+        _series(
             "rim",
-            "radius / distance of the ray from the rim",
+            Sweep(
+                "radius / distance of the ray from the rim",
+                RIMS,
+                (2.0, 2.0**20, 2.0**40, 2.0**50),
+                3000,
+                50_000,
+            ),
             "Spheres from 2 to 1e6 radii away; half of the rays pass just within the rim, half"
             " just beyond, by once to twice this. No band is left open: this measures it.",
-            RIMS,
-            (2.0, 2.0**20, 2.0**40, 2.0**50),
-            {"quick": 3000, "full": 50_000},
             _rim,
-            unit=OF_BOUND,
-            explained=SINGLE,
             holds_to=2.0**50,
             law="a gap of 5 u r = 5 · 2^-53 r: the closest approach rounds twice and its square"
             " and r² once each, whatever the distance",
         ),
-        Series(
+        _series(
             "offset",
-            "distance of the centre from the origin / radius",
+            Sweep("distance of the centre from the origin / radius", FAR, FAR_QUICK, 3000, 50_000),
             "Spheres that far out, seen from 2 to 1e3 radii; half of the rays near the rim.",
-            FAR,
-            FAR_QUICK,
-            {"quick": 3000, "full": 50_000},
             _offset,
-            unit=OF_BOUND,
-            explained=SINGLE,
         ),
-        Series(
+        _series(
             "size",
-            "radius",
+            Sweep("radius", decades(-9, 9, 3), (1e-9, 1.0, 1e9), 3000, 50_000),
             "Spheres of this radius, seen from 2 to 1e3 radii; half of the rays near the rim.",
-            decades(-9, 9, 3),
-            (1e-9, 1.0, 1e9),
-            {"quick": 3000, "full": 50_000},
             _size,
-            unit=OF_BOUND,
-            explained=SINGLE,
         ),
         *(
-            Series(
+            _series(
                 name,
-                "distance / size",
+                Sweep(
+                    "distance / size",
+                    FAR,
+                    (1.0, 1e6, 1e12),
+                    160 if name == "torus" else 800,
+                    2000 if name == "torus" else 20_000,
+                ),
                 f"The {name} from 1 to 10 times this far away; half of the rays aim along the"
                 " surface, 2^-1 to 2^-40 sizes above or below it. Wrong is what is right for no ray"
                 " that passes within 64 u sizes of this one.",
-                FAR,
-                (1.0, 1e6, 1e12),
-                {
-                    "quick": 160 if name == "torus" else 800,
-                    "full": 2000 if name == "torus" else 20_000,
-                },
-                _of(name),
-                unit=OF_BOUND,
+                partial(_kind, name),
                 explained=SINGLE if name in curved.IN_MITSUBA else "",
             )
             for name in curved.KINDS
         ),
-        Series(
+        _series(
             "kinds_offset",
-            "distance of the centre from the origin / size",
+            Sweep("distance of the centre from the origin / size", FAR, (1e6, 1e12), 900, 12_000),
             "All of these kinds that far out, seen from 1 to 1e3 sizes.",
-            FAR,
-            (1e6, 1e12),
-            {"quick": 900, "full": 12_000},
             _kinds_at,
-            unit=OF_BOUND,
-            explained=SINGLE,
         ),
     ),
     anchors="pbrt and Mitsuba test no such range; measured, the text-book's quadratic in float64"

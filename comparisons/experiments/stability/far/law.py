@@ -1,13 +1,12 @@
-"""What F1 holds hits against: the exact answer, and bounds of the errors around it."""
-
-from typing import Any, NamedTuple
+"""Exact answers and error bounds: what F1 judges hits by."""
 
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome
+from comparisons.experiments.stability.harness.outcomes import Columns, outcome, plain
+from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.geometry.exact import KINDS, first_of
-from comparisons.geometry.exact.crossings import Row
 from comparisons.geometry.exact.dyadic import (
     FRACTION,
     NEVER,
@@ -19,7 +18,7 @@ from comparisons.geometry.exact.dyadic import (
 )
 
 BAND = 5.0
-"""u r by which a sphere's line may pass the rim for its answer to be open.
+"""u r: a line that passes the rim of a sphere by less is undecidable.
 
 The closest approach p rounds twice in each coordinate, |p|² and r² as numbers of their own size:
 r² - |p|² + (p·d)²/a is off by 2·2 u r² + 3 u r² + u r² + 2 u r², and r - |p| by half of that over
@@ -27,36 +26,11 @@ r.  Nothing here grows with the distance, nor with the offset.
 """
 
 U_SINGLE = 2.0**-24
-"""u of float32: what answers in float32 is held to the same law with this."""
+"""u of float32: Mitsuba is judged by the same law with this."""
 
 ROUNDINGS = 16.0
 """u (|t| |d| + D) that t |d| may be off by besides: the issue's number.  c / q rounds by some 10 u
 of itself."""
-
-
-class Rays(NamedTuple):
-    """n rays and what each is put to: a row of a table of its own.
-
-    kind: a field of `reference_rt.shapes.Shapes`;  row: columns of n rows;  size (n,): the radius,
-    or half the diagonal;  o, d (n, 3).
-    """
-
-    kind: str
-    row: Row
-    size: FloatArray
-    o: FloatArray
-    d: FloatArray
-
-    def distance(self) -> FloatArray:
-        """D (n,): of the origins from the shapes' centres."""
-        return np.asarray(np.linalg.norm(self.o - self.row["center"], axis=1))
-
-    def speed(self) -> FloatArray:
-        return np.asarray(np.linalg.norm(self.d, axis=1))
-
-    def only(self, which: Any) -> "Rays":
-        row = {name: np.asarray(column)[which] for name, column in self.row.items()}
-        return Rays(self.kind, row, self.size[which], self.o[which], self.d[which])
 
 
 def apart(t: FloatArray, exact: Fixed) -> FloatArray:
@@ -75,9 +49,9 @@ def gaps(rays: Rays) -> FloatArray:
 
 
 class Truth:
-    """Of the rays of spheres, found once for all who answer.
+    """The truth about rays at spheres, computed once for all contestants.
 
-    u: the unit roundoff of who answers.  Within BAND u of the rim either answer is right, unless
+    u: the contestant's unit roundoff.  Within BAND u of the rim either answer is right, unless
     `strict`; t |d| may be off by ROUNDINGS u (|t| |d| + D) and by what the band makes of half the
     chord h: BAND u r² / h.
     """
@@ -110,33 +84,12 @@ def _outcome(
     both = np.isfinite(exact) & np.isfinite(t) & ~is_open
     share = np.zeros(len(t))
     share[both] = apart(t[both], fixed[both]) * rays.speed()[both] / bound[both]
-    wrong = ~is_open & ((np.isfinite(exact) != np.isfinite(t)) | (share > 1.0))
-    cases = int(np.sum(~is_open))
+    wrong = (np.isfinite(exact) != np.isfinite(t)) | (share > 1.0)
     worst = float(share[both].max()) if both.any() else None
-    shown = np.flatnonzero(wrong)[:EXAMPLES].tolist()
-    examples = tuple(
-        {
-            **_asked(rays, i),
-            "expected": float(exact[i]).hex(),
-            "t": float(t[i]).hex(),
-            **({} if gap is None else {"gap": float(gap[i])}),
-        }
-        for i in shown
-    )
-    return Outcome(cases, int(wrong.sum()), worst, int(is_open.sum()), examples)
-
-
-def _asked(rays: Rays, i: int) -> dict[str, Any]:
-    columns = ("center", "radius", "to_local", "coefficients", "lower", "upper", "major", "minor")
-    parts = {name: rays.row[name][i] for name in columns if name in rays.row}
-    return {
-        "kind": rays.kind,
-        **{name: _hex(value) for name, value in (parts | {"o": rays.o[i], "d": rays.d[i]}).items()},
-    }
-
-
-def _hex(values: Any) -> list[str]:
-    return [float(x).hex() for x in np.ravel(values)]
+    columns: Columns = {"kind": rays.kind, **rays.columns(), "expected": exact, "t": t}
+    if gap is not None:
+        columns["gap"] = plain(gap)
+    return outcome(wrong, columns, is_open, worst)
 
 
 DIRECTIONS = 8

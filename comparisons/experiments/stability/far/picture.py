@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from comparisons.experiments.stability.far.law import Rays
-from comparisons.experiments.stability.far.spheres import answers, in_mitsuba, single
-from comparisons.experiments.stability.harness.family import MITSUBA, FloatArray, Shot
+from comparisons.experiments.stability.far.spheres import answers, in_mitsuba
+from comparisons.experiments.stability.harness.core import MITSUBA, FloatArray, Shot, pixel_grid
+from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import scalar
 from reference_rt.shapes import Sphere
 
@@ -18,14 +19,13 @@ def _heights(contestant: str, x: float) -> FloatArray:
     right = np.cross([0.0, 0.0, 1.0], view)
     right /= np.linalg.norm(right)
     up = np.cross(view, right)
-    across = (np.arange(PIXELS) + 0.5) / PIXELS * 2.4 - 1.2
-    u, v = np.meshgrid(across, -across)
-    target = u.reshape(-1, 1) * right + v.reshape(-1, 1) * up
+    u, v = pixel_grid(PIXELS, 1.2)
+    target = u[:, None] * right + v[:, None] * up
     o = np.broadcast_to(view * x, target.shape).copy()
     d = target / x - view
     if contestant == MITSUBA:
         with scalar():
-            t = in_mitsuba(Sphere(), single(o), single(d))
+            t = in_mitsuba(Sphere(), round32(o), round32(d))
     else:
         n = len(o)
         columns = {"center": np.zeros((n, 3)), "radius": np.ones(n)}
@@ -39,9 +39,8 @@ def shoot(contestant: str, x: float) -> Shot:
     level = np.clip(0.55 + 0.4 * z, 0.0, 1.0)
     pixels = np.repeat((255.0 * np.nan_to_num(level))[:, None], 3, axis=1)
     pixels[np.isnan(z)] = 40.0
-    across = (np.arange(PIXELS) + 0.5) / PIXELS * 2.4 - 1.2
-    u, v = np.meshgrid(across, -across)
-    exact = np.sqrt(np.maximum(1.0 - (u**2 + v**2).ravel(), 0.0))
+    u, v = pixel_grid(PIXELS, 1.2)
+    exact = np.sqrt(np.maximum(1.0 - (u**2 + v**2), 0.0))
     pixels[np.abs(z - exact) > 0.1] = (200.0, 30.0, 30.0)
     caption = (
         f"A sphere from {x:g} radii away: brighter is nearer, red is off by more than a tenth of"

@@ -1,21 +1,16 @@
-"""F1's rays at spheres, and who answers."""
+"""F1's rays at spheres, and the contestants' answers."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 from comparisons.experiments.methods.setting import across, unit_vectors
-from comparisons.experiments.stability.far.law import U_SINGLE, Rays, Truth
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
-from comparisons.geometry import frame
+from comparisons.experiments.stability.far.law import U_SINGLE, Truth
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.mitsubas import traced
+from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.geometry.exact.dyadic import Dyadic, dot
-from comparisons.mitsuba import counterpart, translate
+from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import scalar
 from reference_rt import textbook
 from reference_rt.core.vec3 import row
@@ -28,13 +23,13 @@ from reference_rt.textbook.method import ray_of
 from reference_rt.textbook.sphere import algebraic, geometric, robust
 
 WHO = (OURS, *textbook.names("sphere"))
-"""Contestants beside Mitsuba: `_answer` knows them by number."""
+"""Contestants beside Mitsuba: `_answer` takes their index."""
 
 SCENES = 8
-"""Of Mitsuba in a setting, each of one shape."""
+"""Mitsuba's scenes at a sweep point, each of one shape."""
 
 RAYS = 2000
-"""That Mitsuba is asked about in a setting, one at a time, of which SCENES share a scene."""
+"""Rays that Mitsuba traces at a sweep point, spread over SCENES scenes."""
 
 
 def draw_rays(
@@ -85,7 +80,7 @@ def tangent_gaps(rng: np.random.Generator, n: int) -> FloatArray:
 
 
 def answers(rays: Rays) -> dict[str, FloatArray]:
-    """What our kernel and the text-book's methods find."""
+    """t (n,) by our kernel and by the text-book's methods, inf for a miss."""
     found = {}
     with np.errstate(all="ignore"):
         for number, name in enumerate(WHO):
@@ -116,26 +111,22 @@ def _answer(
             t[i] = robust(ray, c, r)
 
 
-def single(values: FloatArray) -> FloatArray:
-    """Rounded to float32."""
-    with np.errstate(over="ignore"):
-        return np.asarray(values, np.float32).astype(np.float64)
-
-
 def in_mitsuba(shape: Shape, o: FloatArray, d: FloatArray) -> FloatArray:
     """t (n,); in its scalar variant no mesh stands in for what is small."""
-    return counterpart.trace(translate.load(Scene(shapes=(shape,)), frame.OURS), o, d).t
+    return traced(Scene(shapes=(shape,)), o, d).t
 
 
 def for_mitsuba(rays: Rays) -> Rays:
-    """As many as it takes, SCENES different spheres among them, in numbers that float32 has;
-    directions are of unit length, as Mitsuba's own are."""
+    """The first RAYS rays at SCENES different spheres, rounded to float32; directions are of unit
+    length, as Mitsuba's own are."""
     few = rays.only(np.arange(min(RAYS, len(rays.o))))
     which = np.arange(len(few.o)) % SCENES
     center = few.row["center"][which]
     o, d = few.o - few.row["center"] + center, few.d / few.speed()[:, None]
-    size = single(few.size[which])
-    return Rays("spheres", {"center": single(center), "radius": size}, size, single(o), single(d))
+    size = round32(few.size[which])
+    return Rays(
+        "spheres", {"center": round32(center), "radius": size}, size, round32(o), round32(d)
+    )
 
 
 def mitsubas(rays: Rays) -> FloatArray:

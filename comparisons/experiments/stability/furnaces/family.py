@@ -1,41 +1,31 @@
-"""F10: furnaces: where everything shines equally, every radiance is known.
-
-Laws:
-- closed: in a room whose walls emit 1 and reflect a, 1 / (1 - a) arrives from everywhere: the mean
-  of 1024 pixels, to its noise (see `chance`) and to a tenth.  Both trace with Russian roulette from
-  the fifth edge on.  Ours goes on with a chance of up to 0.999, Mitsuba of up to 0.95: beyond an
-  albedo of 0.975 the variance of its weights is infinite.
-- open: a surface under a white sky sends back, in power, no more than arrives: the mean of weights
-  of samples is at most 1, to its noise, and is the integral of evaluate() over a chart of half
-  vectors, which no sample has a part in.
-  Principled materials with a diffuse part are not among these: by their law (README) a white base
-  returns up to 1.6 times the light; metals and glass of it are.
-- lossless: n spheres of glass within each other are invisible under a white sky: every pixel is 1,
-  not only in the mean, to 64 u for each edge of the mean path, 4 n; a path through all of them is
-  2 n edges long, and mirrored ones are longer.
-
-Ranges: a from 0 to 0.999;  alpha 1e-4 to 1;  n to 100.  u = 2^-53; Mitsuba's is 2^-24.
-"""
+"""The series of F10; the folder's docstring states the law."""
 
 import math
 
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.bsdfs.bsdfs import LOSSLESS, WHITE, Bsdf, index_of, towards
-from comparisons.experiments.stability.bsdfs.density import integral
-from comparisons.experiments.stability.bsdfs.pairs import contestants
-from comparisons.experiments.stability.furnaces.closed import closed, shells
 from comparisons.experiments.stability.harness import chance
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    Family,
-    Outcome,
-    Series,
+from comparisons.experiments.stability.harness.bsdfs import (
+    ALPHA,
+    LOSSLESS,
+    WHITE,
+    Bsdf,
+    contestants,
+    index_of,
+    towards,
 )
-from comparisons.experiments.stability.harness.outcomes import outcome, together, unit_of
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.densities import integral
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep
+from comparisons.experiments.stability.harness.outcomes import (
+    of_errors,
+    one_case,
+    plain,
+    together,
+    unit_of,
+)
+from comparisons.experiments.stability.harness.rooms import closed, shells
 from comparisons.experiments.stability.harness.worlds import measure, ours, theirs
 from reference_rt.materials import Material
 
@@ -45,9 +35,9 @@ def _closed(draw: Draw, x: float) -> dict[str, Outcome]:
     # Paths are some x long.
     least, most, edges = (2, 16, 2e3) if draw.effort == "quick" else (16, 256, 16e3)
     spp = int(min(max(edges / x, least), most))
-    told = {"albedo": albedo}
+    shown = {"albedo": albedo}
     return measure(
-        closed(albedo), draw, spp, lambda who: 256.0 * unit_of(who), told,
+        closed(albedo), draw, spp, lambda who: 256.0 * unit_of(who), shown,
         in_scalar=False, their_pixels=32,
     )  # fmt: skip
 
@@ -117,11 +107,9 @@ def _open(draw: Draw, x: float) -> dict[str, Outcome]:
                     )
                 if not math.isfinite(mean):
                     off = math.inf
-                told = {"material": name, "alpha": alpha, "cosine": cosine, "mean": mean}
-                told |= {"standard error": error, "integral": total}
-                example = () if off <= 0.0 else (told,)
-                one = Outcome(1, int(off > 0.0), max(0.0, mean - 1.0), examples=example)
-                found.append({who: one})
+                shown = {"material": name, "alpha": alpha, "cosine": cosine, "mean": mean}
+                shown |= {"standard error": error, "integral": total}
+                found.append({who: one_case(off > 0.0, max(0.0, mean - 1.0), shown)})
     return together(found)
 
 
@@ -134,23 +122,17 @@ def _lossless(draw: Draw, x: float) -> dict[str, Outcome]:
         pictures[MITSUBA] = theirs(world, side, spp, seed, in_scalar=True)
     found = {}
     for who, pixels in pictures.items():
+        shown = {"spheres": int(x), "seed": seed, "pixel": lambda i: i, "found": plain(pixels)}
         off = np.abs(pixels - 1.0).max(axis=1)
-
-        def ask(i: int, pixels: np.ndarray = pixels) -> dict[str, object]:
-            return {"spheres": int(x), "seed": seed, "pixel": i, "found": pixels[i].tolist()}
-
-        found[who] = outcome(off, 64.0 * 4.0 * x * unit_of(who), ask)
+        found[who] = of_errors(off, 64.0 * 4.0 * x * unit_of(who), shown)
     return found
 
 
 CLOSED = Series(
     "closed furnace",
-    "1 / (1 - albedo)",
+    Sweep("1 / (1 - albedo)", (1.0, 2.0, 5.0, 10.0, 30.0, 1e2, 3e2, 1e3), (1.0, 10.0, 1e3), 1, 1),
     "A room whose walls emit 1: the mean of its pixels against 1 / (1 - albedo).  A case is a "
     "picture.",
-    (1.0, 2.0, 5.0, 10.0, 30.0, 1e2, 3e2, 1e3),
-    (1.0, 10.0, 1e3),
-    {"quick": 1, "full": 1},
     _closed,
     unit="of the value",
     explained="the range ends at an albedo of 0.999, where Mitsuba fails, 0.86 of the value off.  "
@@ -159,13 +141,10 @@ CLOSED = Series(
 )
 OPEN = Series(
     "open furnace",
-    "1 / alpha",
+    ALPHA(10_000, 200_000),
     "White metals, glasses, plastics and principled materials under a white sky, seen at cosines "
     "of 1 to 1e-3: no more comes back than arrives, and what evaluate() says.  A case is a "
     "material seen from a direction.",
-    (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4),
-    (1.0, 1e2, 1e4),
-    {"quick": 10_000, "full": 200_000},
     _open,
     unit="of the light, above all",
     explained="the range ends at alpha 1e-4, and Mitsuba fails within it.  It evaluates Beckmann's "
@@ -176,11 +155,10 @@ OPEN = Series(
 )
 SHELLS = Series(
     "lossless",
-    "surfaces on the way in",
+    Sweep(
+        "surfaces on the way in", (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0), (1.0, 10.0, 50.0), 1, 1
+    ),
     "Spheres of glass within each other under a white sky: every pixel is 1.  A case is a pixel.",
-    (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0),
-    (1.0, 10.0, 50.0),
-    {"quick": 1, "full": 1},
     _lossless,
     unit="of the value",
     explained="the range ends at 100 surfaces.  A path's weight is a product of ones, and the law "

@@ -1,4 +1,4 @@
-"""How seldom a right renderer fails by chance, where a family judges means of random numbers.
+"""Two-stage tests of means of random numbers: how seldom a right renderer fails by chance.
 
 All that is statistical is in F10, F11 and F12.  A full run asks, of either contestant,
 

@@ -9,12 +9,12 @@ SIZE = (4.8, 3.7)
 """Inches."""
 
 LEAST, MOST = 1e-2, 1e30
-"""Of worst errors, of the series' unit: an axis knows no zero, and where a text-book's 1 - R says
-1e-16 in place of 0, the error is some 1e297."""
+"""Limits of the axis of worst errors, in the series' unit: a logarithmic axis has no zero, and
+where a text-book's 1 - R gives 1e-16 in place of 0, the error is some 1e297."""
 
 
 def of_series(one: SeriesSummary) -> list[str]:
-    """None where there is one setting alone, or nothing went wrong and there is no error."""
+    """SVG plots; none where there is one point alone, or no failure and no error."""
     if not one.series.axis or len(one.found) < 2:
         return []
     names = contestants(one.found)
@@ -42,7 +42,7 @@ def _rates(one: SeriesSummary, name: str, colour: int) -> Curve:
 
 
 def _least(one: SeriesSummary) -> float:
-    """Where none is drawn: at half a case of the most that were asked."""
+    """The rate at which no failure is drawn: half a case of the most cases of any point."""
     return 0.5 / max(1, *(some.cases for f in one.found for some in f.outcomes.values()))
 
 

@@ -1,21 +1,21 @@
-"""Progress for people: a bar on a terminal, a line a setting without one."""
+"""Progress for people: a bar on a terminal, else a line for each sweep point."""
 
 from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS
 from comparisons.experiments.stability.harness.result import Found
 from reference_rt.util.console import Bar
 
 
 class Display(Bar):
-    """Told of each setting as it is known."""
+    """The bar."""
 
     def __init__(self, settings: int) -> None:
         super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
         self._task = self._bar.add_task("", total=settings)
 
     def done(self, found: Found, remark: str) -> None:
-        """A setting is known."""
+        """Count a point; failures of ours are printed, and without a terminal everything."""
         self._bar.update(self._task, advance=1, description=f"{found.family} {found.series}")
         bad = found.broken or (found.ours is not None and found.ours.failures)
         if not self._console.is_terminal or bad:
@@ -23,12 +23,12 @@ class Display(Bar):
 
 
 def said(found: Found) -> str:
-    """The outcomes of a setting in a line."""
+    """The outcomes of a point in a line."""
     if found.broken:
         return f"not measured: {found.broken}"
-    told = []
+    shown = []
     for name in sorted(found.outcomes, key=lambda n: (n != OURS, n != MITSUBA, n)):
         some = found.outcomes[name]
         worst = "" if some.worst is None else f", worst {some.worst:.2g}"
-        told.append(f"{name} {some.failures:,} of {some.cases:,}{worst}")
-    return "; ".join(told)
+        shown.append(f"{name} {some.failures:,} of {some.cases:,}{worst}")
+    return "; ".join(shown)

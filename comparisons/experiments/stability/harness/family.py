@@ -1,96 +1,43 @@
-"""What a family of stability is made of: series of settings that become more extreme."""
+"""Families of stability, their series, and the sweeps that series measure along."""
 
 import math
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]
-
-OURS, MITSUBA = "ours", "mitsuba"
-"""Names of contestants; text-book methods go by theirs: "sphere.algebraic"."""
-
-EXAMPLES = 3
-"""Failures of a contestant in a setting that are kept word for word."""
-
-Effort = Literal["quick", "full"]
+from comparisons.experiments.stability.harness.core import Draw, Effort, Outcome, Shot
 
 
-class Draw(NamedTuple):
-    """What a setting is drawn with.
+class Sweep(NamedTuple):
+    """The points x of a series, ever more extreme.
 
-    rng: the same for the same seed, family, series and x, whatever else is measured;  cases: how
-    many to draw, as the series says for this effort;  mitsuba: whether Mitsuba is there to take
-    part;  folder: for files, empty, removed afterwards;  effort: for what `cases` does not say.
+    axis: what x is, with its unit: "distance / radius"; "" where there is one point alone;
+    values: of x, increasing;  quick: those of them that the quick run takes;  few, many: cases of
+    a point in the quick and in the full run.
     """
 
-    rng: np.random.Generator
-    cases: int
-    mitsuba: bool
-    folder: Path
-    effort: Effort = "quick"
+    axis: str
+    values: tuple[float, ...]
+    quick: tuple[float, ...]
+    few: int
+    many: int
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """How a contestant fared in one setting.
-
-    cases: put to it and decided: those that the arbiter leaves open are not among them;  failures:
-    those that break the law;  worst: the largest error in the series' unit, of cases that have one,
-    failed or not (inf counts); None where none has, or the law is yes or no;  open: cases left
-    open, such as rays that touch exactly;  examples: failures, at most EXAMPLES, as JSON: what was
-    asked (floats as `float.hex`, so that nothing is rounded), what was expected and what came.
-    """
-
-    cases: int
-    failures: int
-    worst: float | None = None
-    open: int = 0
-    examples: tuple[Mapping[str, Any], ...] = ()
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.failures <= self.cases:
-            raise ValueError(f"{self.failures} failures of {self.cases} cases")
-        if self.worst is not None and math.isnan(self.worst):
-            raise ValueError("the worst error is NaN: a case that gives NaN has failed, with inf")
-
-    def __add__(self, other: "Outcome") -> "Outcome":
-        """Both together."""
-        known = [x.worst for x in (self, other) if x.worst is not None]
-        return Outcome(
-            self.cases + other.cases,
-            self.failures + other.failures,
-            max(known, default=None),
-            self.open + other.open,
-            (self.examples + other.examples)[:EXAMPLES],
-        )
-
-
-class Shot(NamedTuple):
-    """A picture of a failure: pixels (height, width, 3) uint8 sRGB, row 0 on top, and one sentence
-    that says what is to be seen."""
-
-    pixels: npt.NDArray[np.uint8]
-    caption: str
+def alone(few: int, many: int) -> Sweep:
+    """One point, of no extreme."""
+    return Sweep("", (1.0,), (1.0,), few, many)
 
 
 @dataclass(frozen=True)
 class Series:
-    """Settings that become more extreme with x.
+    """A sweep, and what is measured at each of its points.
 
-    name: "distance";  axis: what x is, with its unit: "distance / radius"; "" where there is one
-    setting alone;  about: one or two sentences: what is drawn, and what breaks the law;
-    values: of x, increasing;  quick: those of them that the quick run takes;
-    cases: of a setting, {"quick": n, "full": n};
+    name: "distance";  about: one or two sentences: what is drawn, and what breaks the law;
     measure(draw, x): an outcome for each contestant, OURS always among them;
     unit: of `Outcome.worst`: "u (|t| + D)"; "" where the law is yes or no;
-    holds_to: ours must not fail up to this x: what float64 itself can do;  law: why it ends there,
-    as a formula in u = 2^-53, distance, size; needed where holds_to is not the last value;
+    holds_to: ours must not fail up to this x: what float64 itself can do;  law: why the guaranteed
+    range ends there, as a formula in u = 2^-53, distance, size; needed where it ends before the
+    last value;
     explained: why ours does not reach 1e4 times further than Mitsuba, where it does not;
     shoot(contestant, x): a picture of what goes wrong at x, where there is something to see; the
     page shows it at the first x at which a contestant other than ours fails and its picture is
@@ -98,17 +45,30 @@ class Series:
     """
 
     name: str
-    axis: str
+    sweep: Sweep
     about: str
-    values: tuple[float, ...]
-    quick: tuple[float, ...]
-    cases: Mapping[Effort, int]
     measure: Callable[[Draw, float], Mapping[str, Outcome]]
     unit: str = ""
     holds_to: float = math.inf
     law: str = ""
     explained: str = ""
     shoot: Callable[[str, float], Shot] | None = None
+
+    @property
+    def axis(self) -> str:
+        return self.sweep.axis
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        return self.sweep.values
+
+    @property
+    def quick(self) -> tuple[float, ...]:
+        return self.sweep.quick
+
+    @property
+    def cases(self) -> Mapping[Effort, int]:
+        return {"quick": self.sweep.few, "full": self.sweep.many}
 
     def __post_init__(self) -> None:
         if list(self.values) != sorted(set(self.values)) or not set(self.quick) <= set(self.values):
@@ -136,11 +96,6 @@ class Family:
         object.__setattr__(self, "by_name", {s.name: s for s in self.series})
         if len(self.by_name) != len(self.series):
             raise ValueError(f"{self.id}: two series of one name")
-
-
-def generator(seed: int, family: str, series: str, x: float) -> np.random.Generator:
-    """Of one setting, independent of every other's."""
-    return np.random.default_rng((seed, zlib.crc32(f"{family} {series} {x!r}".encode())))
 
 
 def decades(first: int, last: int, step: int = 1) -> tuple[float, ...]:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
+from comparisons.mitsuba.backend import mitsuba
 from reference_rt.core.arrays import IntArray
 
 AWAY = np.array([148376.0, 1234.0, -223423.0]) / 148376.0
@@ -165,3 +166,33 @@ def write(vertices: FloatArray, faces: IntArray, file: Path) -> Path:
     body = np.ascontiguousarray(vertices, "<f8").tobytes() + rows.tobytes()
     file.write_bytes(header.encode("ascii") + body)
     return file
+
+
+def write_obj(file: Path, vertices: FloatArray, faces: Any) -> None:
+    """The same as .obj."""
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, np.float64).tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces) + 1).tolist()]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def mitsuba_mesh(vertices: FloatArray, faces: IntArray) -> Any:
+    """Of Mitsuba, vertices rounded to float32."""
+    mi = mitsuba()
+    mesh = mi.Mesh("mesh", len(vertices), len(faces))
+    values = mi.traverse(mesh)
+    values["vertex_positions"] = vertices.astype(np.float32).ravel()
+    values["faces"] = faces.astype(np.uint32).ravel()
+    values.update()
+    return mesh
+
+
+BALL = "ball.obj"
+"""The mesh file of scenes with solids: each has one of this name."""
+
+
+def write_smallest_ball(folder: Path) -> None:
+    """BALL of twenty triangles."""
+    from trimesh.creation import icosphere
+
+    text = icosphere(subdivisions=0).export(file_type="obj")
+    (folder / BALL).write_text(text, encoding="utf-8")

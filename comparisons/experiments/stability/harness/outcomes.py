@@ -1,17 +1,17 @@
-"""Outcomes out of arrays of errors."""
+"""Outcomes out of arrays: which cases failed, and the first failures word for word."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.harness.family import EXAMPLES, MITSUBA, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import EXAMPLES, MITSUBA, FloatArray, Outcome
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.float32 import UNIT_ROUNDOFF as U32
 
-Ask = Callable[[int], Mapping[str, Any]]
-"""A case by its number, as an example of a failure."""
+Columns = dict[str, Any]
+"""The keys and values of the examples of failures: see `outcome`."""
 
 
 def unit_of(contestant: str) -> float:
@@ -19,17 +19,56 @@ def unit_of(contestant: str) -> float:
     return U32 if contestant == MITSUBA else U
 
 
-def outcome(errors: FloatArray, allowed: FloatArray | float, ask: Ask) -> Outcome:
+def outcome(
+    wrong: BoolArray,
+    columns: Columns,
+    undecided: BoolArray | None = None,
+    worst: float | None = None,
+) -> Outcome:
+    """wrong (n,): which cases fail;  undecided (n,): which are left open, wrong or not.
+
+    columns: what the examples show, by key: of an array its row, floats as hex; of a function what
+    it returns for the number of the case; anything else as it is.
+    """
+    count = len(wrong)
+    if undecided is not None:
+        wrong, count = wrong & ~undecided, count - int(np.count_nonzero(undecided))
+    which = np.flatnonzero(wrong)
+    examples = tuple(
+        {key: _shown(column, k) for key, column in columns.items()}
+        for k in which[:EXAMPLES].tolist()
+    )
+    return Outcome(count, len(which), worst, len(wrong) - count, examples)
+
+
+def _shown(column: Any, k: int) -> Any:
+    if isinstance(column, np.ndarray):
+        return hexed(column[k])
+    return column(k) if callable(column) else column
+
+
+def of_errors(errors: FloatArray, allowed: FloatArray | float, columns: Columns) -> Outcome:
     """errors (n,): above `allowed` is a failure, and so is NaN, which counts as inf."""
     errors = np.where(np.isnan(errors), np.inf, errors)
-    failed: BoolArray = errors > allowed
-    which = np.flatnonzero(failed)[:EXAMPLES]
-    return Outcome(
-        len(errors),
-        int(failed.sum()),
-        float(errors.max(initial=0.0)),
-        examples=tuple(ask(int(i)) for i in which),
-    )
+    return outcome(errors > allowed, columns, worst=float(errors.max(initial=0.0)))
+
+
+def one_case(failed: bool, error: float | None, example: Mapping[str, Any]) -> Outcome:
+    """A single case;  error: of `Outcome.worst`, where NaN counts as inf."""
+    worst = np.inf if error is not None and np.isnan(error) else error
+    return Outcome(1, int(failed), worst, examples=(example,) if failed else ())
+
+
+def hexed(values: Any) -> Any:
+    """Floats as `float.hex`, which rounds nothing; whole numbers and texts as they are."""
+    array = np.asarray(values)
+    show = float.hex if array.dtype.kind == "f" else lambda x: x
+    return [show(x) for x in array.ravel().tolist()] if array.ndim else show(array.item())
+
+
+def plain(values: Any) -> Callable[[int], Any]:
+    """A column of numbers that are rounded for people, as JSON has them."""
+    return lambda k: values[k].tolist()
 
 
 def relative(value: FloatArray, exact: FloatArray) -> FloatArray:
@@ -39,14 +78,8 @@ def relative(value: FloatArray, exact: FloatArray) -> FloatArray:
         return np.where(off == 0.0, 0.0, off / np.abs(exact))
 
 
-def hexed(values: Sequence[float] | FloatArray | float) -> Any:
-    """Floats as `float.hex`, which rounds nothing."""
-    array = np.asarray(values, np.float64)
-    return [float(x).hex() for x in array.ravel()] if array.ndim else float(array).hex()
-
-
-def together(found: Sequence[Mapping[str, Outcome]]) -> dict[str, Outcome]:
-    """Of several materials, one."""
+def together(found: Iterable[Mapping[str, Outcome]]) -> dict[str, Outcome]:
+    """Outcomes added up, contestant by contestant."""
     total: dict[str, Outcome] = {}
     for part in found:
         for name, one in part.items():

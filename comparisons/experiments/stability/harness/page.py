@@ -8,8 +8,8 @@ from typing import Any
 from markupsafe import Markup
 
 from comparisons.experiments.stability.harness import charts, table
+from comparisons.experiments.stability.harness.core import OURS, Effort
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import OURS, Effort
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.results_json import again
 from comparisons.experiments.stability.harness.run import Picture

@@ -1,4 +1,4 @@
-"""What was found in one setting, in a file of its own: what is found is not measured again."""
+"""The result of one sweep point, stored in a file of its own, so that it is not measured again."""
 
 import dataclasses
 import json
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from comparisons.experiments.stability.harness.family import OURS, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Outcome
 from reference_rt.util.files import read_text, replacing
 
 
@@ -27,17 +27,17 @@ class Found:
         return self.outcomes.get(OURS)
 
     def write(self, path: Path, key: str) -> None:
-        """At once or not at all."""
+        """Store it, atomically."""
         document = dataclasses.asdict(self) | {"key": key}
         with replacing(path) as temporary:
-            # Infinity, which is no JSON, is for our own eyes; `results.json` has none.  NumPy's
+            # Infinity is no JSON: only this file, which nobody else reads, has it.  NumPy's
             # numbers become Python's.
             text = json.dumps(document, indent=1, default=lambda value: value.item())
             temporary.write_text(text, encoding="utf-8")
 
     @classmethod
     def read(cls, path: Path, key: str) -> "Found | None":
-        """What was found with this key, if anything."""
+        """The stored result, None where there is none of this key."""
         try:
             document: dict[str, Any] = json.loads(read_text(path))
             if document.pop("key") != key:

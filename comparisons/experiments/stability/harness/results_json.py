@@ -1,4 +1,4 @@
-"""What was found, for machines: `results.json` and `results.csv`."""
+"""The results for machines: `results.json` and `results.csv`."""
 
 import csv
 import json
@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Effort, Outcome
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Effort, Outcome
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import (
     SeriesSummary,

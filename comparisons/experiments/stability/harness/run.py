@@ -1,4 +1,4 @@
-"""All settings of families, measured in processes; what is measured already is read."""
+"""Measures the sweep points of families in worker processes; reads those that are stored."""
 
 import hashlib
 import importlib.metadata
@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 from PIL import Image
 
+from comparisons.experiments.stability.harness.core import OURS, Effort
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import OURS, Effort, Family, Series
+from comparisons.experiments.stability.harness.family import Family, Series
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import contestants, summarise
 from comparisons.experiments.stability.harness.worker import Request
@@ -24,7 +25,7 @@ from reference_rt.util.errors import ReferenceUnavailableError
 WORKER = ("comparisons.experiments.stability.harness.worker",)
 
 SECONDS = {"quick": 300.0, "full": 1200.0}
-"""A setting that takes longer hangs: many times what the slowest takes with cold kernels."""
+"""Time limit of a point: many times what the slowest takes with cold kernels."""
 
 _PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit", "python-flint")
 
@@ -44,7 +45,7 @@ class Choice:
     mitsuba: bool = True
 
     def settings(self) -> list[tuple[Family, Series, float]]:
-        """In the order in which they are told."""
+        """The sweep points, in the order of the report."""
         return [
             (one, series, x)
             for one in map(family, self.families)
@@ -55,7 +56,7 @@ class Choice:
 
 
 class Picture(NamedTuple):
-    """Of what goes wrong: whose, at which x, the file, and what is to be seen."""
+    """A stored image of a failure: whose, at which x, the file, and its caption."""
 
     family: str
     series: str
@@ -67,14 +68,14 @@ class Picture(NamedTuple):
 
 @dataclass
 class Run:
-    """What came of it: in the order of the settings."""
+    """The results, in the order of the sweep points."""
 
     found: list[Found] = field(default_factory=list)
     pictures: list[Picture] = field(default_factory=list)
 
 
-Tell = Callable[[Found, str], None]
-"""Is told each setting as it is known, and a remark."""
+Report = Callable[[Found, str], None]
+"""Called with each result as soon as there is one, and a remark."""
 
 
 def mitsuba_is_there() -> str:
@@ -87,7 +88,7 @@ def mitsuba_is_there() -> str:
 
 
 def key_of(effort: Effort, seed: int) -> str:
-    """What is found with: it is read again only where all of this is the same."""
+    """Fingerprint: a stored result is valid where sources, versions, effort and seed are these."""
     versions = {}
     for name in _PACKAGES:
         try:
@@ -98,8 +99,8 @@ def key_of(effort: Effort, seed: int) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def run(choice: Choice, out: Path, jobs: int, tell: Tell, fresh: bool = False) -> Run:
-    """Measure what is not known yet; each setting is kept in `out`/settings as soon as it is."""
+def run(choice: Choice, out: Path, jobs: int, report: Report, fresh: bool = False) -> Run:
+    """Measure what is not stored yet; each result is stored in `out`/settings at once."""
     key = f"{key_of(choice.effort, choice.seed)} {choice.mitsuba}"
     settings = choice.settings()
     known: dict[tuple[str, str, float], Found] = {}
@@ -111,16 +112,16 @@ def run(choice: Choice, out: Path, jobs: int, tell: Tell, fresh: bool = False) -
             requests.append(request)
         else:
             known[one.id, series.name, x] = done
-            tell(done, "measured before")
+            report(done, "measured before")
     for found in _measured(requests, jobs, choice.effort):
         known[found.family, found.series, found.x] = found
-        tell(found, f"{found.seconds:.1f} s")
+        report(found, f"{found.seconds:.1f} s")
     return Run([known[one.id, series.name, x] for one, series, x in settings])
 
 
 def shoot(choice: Choice, found: Sequence[Found], out: Path, jobs: int) -> list[Picture]:
-    """Pictures of each series at the first x where the first other than ours fails and it can be
-    seen: its picture there and ours, which is another."""
+    """Images of each series at the first x at which the first contestant other than ours fails and
+    its image differs from ours: both."""
     key = f"{key_of(choice.effort, choice.seed)} {choice.mitsuba}"
     left = _failing(choice, found)
     seen: list[Picture] = []
@@ -170,7 +171,7 @@ def _differ(a: Path, b: Path) -> bool:
 
 
 def _caption(path: Path, key: str) -> str | None:
-    """Of a picture that was made with this key."""
+    """The caption of a stored image; None where there is none of this key."""
     try:
         with Image.open(path) as picture:
             facts = dict(picture.info)

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray
-from comparisons.experiments.stability.solids.trees import MESH
-from reference_rt.core import transform
+from comparisons.experiments.stability.harness.meshes import BALL, write_obj
+from comparisons.experiments.stability.harness.steps import at, scaled, turned
 from reference_rt.textures.texture import UvMap
 
 if TYPE_CHECKING:
@@ -28,26 +27,10 @@ FILM = rt.Film(width=48, height=36)
 
 CAMERA = rt.Perspective(eye=(1, 2, 7), target=(0, 0, 0), fov=48)
 
-UP = (1.0, 0.0, 0.0)
-
-
 # ---- the scenes ---------------------------------------------------------------------------------
 
 
-def _at(x: float, y: float, z: float) -> transform.Translate:
-    return transform.Translate(translate=(x, y, z))
-
-
-def _turned(degrees: float, axis: tuple[float, float, float] = UP) -> transform.Rotate:
-    return transform.Rotate(rotate=transform.Turn(axis=axis, degrees=degrees))
-
-
-def _scaled(*factors: float) -> transform.Scale:
-    x, y, z = factors * 3 if len(factors) == 1 else factors
-    return transform.Scale(scale=(x, y, z))
-
-
-FLOOR = (_scaled(4.0, 4.0, 1.0), _turned(-90.0), _at(0.0, -1.0, 0.0))
+FLOOR = (scaled(4.0, 4.0, 1.0), turned(-90.0), at(0.0, -1.0, 0.0))
 
 
 def ball(subdivisions: int = 2) -> "trimesh.Trimesh":
@@ -59,21 +42,10 @@ def ball(subdivisions: int = 2) -> "trimesh.Trimesh":
     return trimesh.Trimesh(vertices, mesh.faces, process=False)
 
 
-def write_mesh(path: Path, vertices: FloatArray, faces: Any) -> None:
-    """An .obj file with every bit of the vertices."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, np.float64).tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces) + 1).tolist()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-BALL = MESH
-"""F7, which judges solids, has a mesh of this name in each of its scenes."""
-
-
 def write_ball(folder: Path) -> None:
     """The file that the scenes name, in its place."""
     mesh = ball()
-    write_mesh(folder / BALL, mesh.vertices, mesh.faces)
+    write_obj(folder / BALL, mesh.vertices, mesh.faces)
 
 
 def in_folder(folder: Path, **parts: Any) -> rt.Scene:
@@ -85,7 +57,7 @@ def in_folder(folder: Path, **parts: Any) -> rt.Scene:
 
 
 def things(folder: Path) -> rt.Scene:
-    """What Mitsuba has too: balls, boxes, flat shapes, a mesh, a cylinder, instances."""
+    """Shapes that Mitsuba has too: balls, boxes, flat shapes, a mesh, a cylinder, instances."""
     return in_folder(
         folder,
         integrator=rt.RayCast(),
@@ -93,27 +65,27 @@ def things(folder: Path) -> rt.Scene:
         groups={
             "pair": (
                 rt.Sphere(radius=0.375, center=(-0.25, 0, 0)),
-                rt.Mesh(file=BALL, transform=(_scaled(0.25), _at(0.25, 0.25, 0))),
+                rt.Mesh(file=BALL, transform=(scaled(0.25), at(0.25, 0.25, 0))),
             )
         },
         shapes=(
             rt.Rectangle(transform=FLOOR),
             rt.Sphere(center=(-1.5, 0, 0), radius=0.75),
             rt.Sphere(center=(-0.75, 0.5, -1), radius=1.0),
-            rt.Box(transform=(_scaled(0.5), _turned(33.0, (1, 2, 3)), _at(1.5, -0.25, 1))),
-            rt.Box(transform=(_scaled(0.5, 0.75, 0.25), _at(2.5, 0, -0.5))),
-            rt.Mesh(file=BALL, transform=(_scaled(0.75), _at(0.5, 0.25, 1.5))),
+            rt.Box(transform=(scaled(0.5), turned(33.0, (1, 2, 3)), at(1.5, -0.25, 1))),
+            rt.Box(transform=(scaled(0.5, 0.75, 0.25), at(2.5, 0, -0.5))),
+            rt.Mesh(file=BALL, transform=(scaled(0.75), at(0.5, 0.25, 1.5))),
             rt.Triangle(v0=(-3, -1, -2), v1=(3, -1, -2.5), v2=(0.25, 3, -2.25)),
-            rt.Disk(transform=(_turned(50.0, (2, 1, 0)), _at(-2.5, 1.5, 0.5))),
-            rt.Cylinder(radius=0.25, transform=(_turned(70.0), _at(0.75, 1.25, 0.5))),
-            rt.Instance(group="pair", transform=(_turned(40.0), _at(1.5, 1.5, 0))),
-            rt.Instance(group="pair", transform=(_scaled(1, 2, 1), _at(-2.5, -0.25, 1.5))),
+            rt.Disk(transform=(turned(50.0, (2, 1, 0)), at(-2.5, 1.5, 0.5))),
+            rt.Cylinder(radius=0.25, transform=(turned(70.0), at(0.75, 1.25, 0.5))),
+            rt.Instance(group="pair", transform=(turned(40.0), at(1.5, 1.5, 0))),
+            rt.Instance(group="pair", transform=(scaled(1, 2, 1), at(-2.5, -0.25, 1.5))),
         ),
     )
 
 
 def curves(folder: Path) -> rt.Scene:
-    """What Mitsuba has not: cones, quadrics, tori, ellipsoids, planes without end, polygons."""
+    """Shapes that Mitsuba has not: cones, quadrics, tori, ellipsoids, endless planes, polygons."""
     saddle = (1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
     bowl = (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0)
     star = ((0, 1, 0), (0.625, -0.75, 0), (-1, 0.25, 0), (1, 0.25, 0), (-0.625, -0.75, 0))
@@ -122,29 +94,29 @@ def curves(folder: Path) -> rt.Scene:
         integrator=rt.RayCast(),
         hierarchy="sah",
         shapes=(
-            rt.Plane(transform=(_turned(-90.0), _at(0.0, -1.0, 0.0))),
-            rt.Cone(transform=(_turned(-90.0), _at(-2, -0.5, 0))),
+            rt.Plane(transform=(turned(-90.0), at(0.0, -1.0, 0.0))),
+            rt.Cone(transform=(turned(-90.0), at(-2, -0.5, 0))),
             rt.Torus(
                 major_radius=0.75,
                 minor_radius=0.25,
-                transform=(_turned(50.0, (1, 1, 0)), _at(0, 0.25, 1)),
+                transform=(turned(50.0, (1, 1, 0)), at(0, 0.25, 1)),
             ),
             rt.Quadric(
                 coefficients=saddle,
                 lower=(-1, -1, -1),
                 upper=(1, 1, 1),
-                transform=(_turned(25.0, (1, 3, 2)), _at(2, 0.5, -0.5)),
+                transform=(turned(25.0, (1, 3, 2)), at(2, 0.5, -0.5)),
             ),
             rt.Quadric(
                 coefficients=bowl,
                 lower=(-1, -1, 0),
                 upper=(1, 1, 0.75),
                 capped=True,
-                transform=(_turned(-60.0), _at(-0.5, 0.75, -1.5)),
+                transform=(turned(-60.0), at(-0.5, 0.75, -1.5)),
             ),
-            rt.Sphere(transform=(_scaled(0.25, 0.5, 1.0), _turned(60.0), _at(1.5, -0.5, 1.5))),
-            rt.Polygon(rings=(star,), fill="even_odd", transform=(_turned(15.0), _at(-2, 1.5, 1))),
-            rt.Cylinder(radius=0.25, transform=(_turned(70.0), _at(0.75, 1.25, 0.5))),
+            rt.Sphere(transform=(scaled(0.25, 0.5, 1.0), turned(60.0), at(1.5, -0.5, 1.5))),
+            rt.Polygon(rings=(star,), fill="even_odd", transform=(turned(15.0), at(-2, 1.5, 1))),
+            rt.Cylinder(radius=0.25, transform=(turned(70.0), at(0.75, 1.25, 0.5))),
         ),
     )
 
@@ -153,26 +125,26 @@ def solids(folder: Path) -> rt.Scene:
     """Set operations: a hollow box, a ring cut by a box, a bite out of a mesh."""
     dice = rt.Difference(
         of=(
-            rt.Box(transform=(_scaled(0.5),)),
+            rt.Box(transform=(scaled(0.5),)),
             rt.Sphere(radius=0.625),
             rt.Sphere(radius=0.25, center=(0.5, 0.5, 0.5)),
         ),
-        transform=(_scaled(2.0), _turned(90.0), _at(-1, 0, 1.5)),
+        transform=(scaled(2.0), turned(90.0), at(-1, 0, 1.5)),
     )
     ring = rt.Intersection(
         of=(
             rt.Torus(major_radius=0.5, minor_radius=0.25),
-            rt.Box(transform=(_scaled(0.5, 0.75, 0.75), _turned(30.0))),
+            rt.Box(transform=(scaled(0.5, 0.75, 0.75), turned(30.0))),
         ),
-        transform=(_scaled(1.5), _turned(45.0), _at(1.5, 0, 1)),
+        transform=(scaled(1.5), turned(45.0), at(1.5, 0, 1)),
     )
     apple = rt.Difference(
         of=(
             rt.Mesh(file=BALL),
             rt.Sphere(center=(0.75, 0.5, 0.75), radius=0.75),
-            rt.Cylinder(radius=0.25, capped=True, transform=(_scaled(1, 1, 4), _at(0, 0, -2))),
+            rt.Cylinder(radius=0.25, capped=True, transform=(scaled(1, 1, 4), at(0, 0, -2))),
         ),
-        transform=(_at(0.5, 1, -1.5),),
+        transform=(at(0.5, 1, -1.5),),
     )
     return in_folder(
         folder,
@@ -182,7 +154,7 @@ def solids(folder: Path) -> rt.Scene:
     )
 
 
-_LAMP = (_scaled(0.75, 0.75, 1.0), _turned(90.0), _at(0.5, 3.0, 0.5))
+_LAMP = (scaled(0.75, 0.75, 1.0), turned(90.0), at(0.5, 3.0, 0.5))
 
 _TEXTURES = {
     "squares": rt.Checker(first=(0.8, 0.7, 0.2), second=(0.2, 0.3, 0.5), uv=UvMap(scale=(8, 8)))
@@ -236,10 +208,8 @@ def _lit_shapes(lamp: bool) -> tuple[Any, ...]:
         rt.Sphere(material="silver", center=(-1.5, 0, -0.5), radius=1.0),
         rt.Sphere(material="glass", center=(0.5, -0.25, 1.5), radius=0.75),
         rt.Sphere(material="gold", center=(2.25, -0.25, 0.25), radius=0.75),
-        rt.Box(
-            material="clay", transform=(_scaled(0.5), _turned(30.0, (0, 1, 0)), _at(-1, -0.5, 2))
-        ),
-        rt.Mesh(material="clay", file=BALL, transform=(_scaled(0.75), _at(0.5, 0.75, -1.5))),
+        rt.Box(material="clay", transform=(scaled(0.5), turned(30.0, (0, 1, 0)), at(-1, -0.5, 2))),
+        rt.Mesh(material="clay", file=BALL, transform=(scaled(0.75), at(0.5, 0.75, -1.5))),
     )
     if not lamp:
         return shapes

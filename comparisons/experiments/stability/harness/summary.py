@@ -1,9 +1,10 @@
-"""Settings added up: how far each contestant holds, and whether ours holds as far as it must."""
+"""Sweep points added up: how far each contestant holds, and whether ours holds its range."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Family, Outcome, Series
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series
 from comparisons.experiments.stability.harness.result import Found
 
 FURTHER = 1e4
@@ -21,7 +22,7 @@ def contestants(found: Sequence[Found]) -> list[str]:
 
 
 def named(contestant: str) -> str:
-    """For people."""
+    """The name that tables and charts show."""
     return "Mitsuba" if contestant == MITSUBA else contestant.replace("_", " ")
 
 
@@ -34,7 +35,7 @@ def first_failure(found: Iterable[Found], contestant: str) -> float | None:
 
 
 def total(found: Iterable[Found], contestant: str) -> Outcome | None:
-    """All settings together; None where the contestant did not take part."""
+    """All points together; None where the contestant did not take part."""
     some = [f.outcomes[contestant] for f in found if contestant in f.outcomes]
     return sum(some[1:], some[0]) if some else None
 
@@ -42,8 +43,8 @@ def total(found: Iterable[Found], contestant: str) -> Outcome | None:
 @dataclass(frozen=True)
 class SeriesSummary:
     """ours, mitsuba: where each starts to fail, None where it does not, up to `last`, or does not
-    take part;  last: the largest x;  broken: why settings were not measured;  failed: x within what
-    must hold at which ours failed."""
+    take part;  last: the largest x;  broken: why points were not measured;  failed: x within the
+    guaranteed range at which ours failed."""
 
     series: Series
     found: tuple[Found, ...]

@@ -7,8 +7,8 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Effort
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Effort
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import (
     SeriesSummary,
@@ -34,7 +34,7 @@ def cells(name: str, one: SeriesSummary) -> list[str]:
     """Of one series, as text."""
     ours = total(one.found, OURS)
     others = [c for c in contestants(one.found) if c not in (OURS, MITSUBA)]
-    told = [f"{named(c)} {where(one, c)}" for c in others]
+    shown = [f"{named(c)} {where(one, c)}" for c in others]
     return [
         f"{name} {family(name).name}",
         one.series.name,
@@ -44,7 +44,7 @@ def cells(name: str, one: SeriesSummary) -> list[str]:
         worst(one, OURS),
         where(one, OURS),
         where(one, MITSUBA),
-        ", ".join(told),
+        ", ".join(shown),
     ]
 
 
@@ -84,7 +84,7 @@ def terminal(found: Sequence[Found]) -> Table:
     """For people at a terminal."""
     table = Table(show_edge=False, pad_edge=False)
     for name in COLUMNS:
-        if name != "failures":  # where each fails is told
+        if name != "failures":  # the other columns say where each fails
             table.add_column(name, overflow="fold", justify="right" if name == "cases" else "left")
     for name, series in summaries(found).items():
         for one in series:
@@ -99,7 +99,7 @@ def markdown(
     found: Sequence[Found], effort: Effort, seed: int, provenance: Mapping[str, Any]
 ) -> str:
     """The table with its date and machine, for a README."""
-    told = [
+    shown = [
         f"`reference-rt stability --{effort} --seed {seed}`",
         str(provenance["date"])[:10],
         str(provenance["machine"]),
@@ -107,7 +107,7 @@ def markdown(
         f"Mitsuba {provenance.get('mitsuba', 'absent')}".partition(":")[0],
         f"{sum(f.seconds for f in found) / 60.0:.0f} minutes of one process",
     ]
-    lines = ["Measured: " + ", ".join(told) + ".", ""]
+    lines = ["Measured: " + ", ".join(shown) + ".", ""]
     lines += ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
     for name, series in summaries(found).items():
         for one in series:

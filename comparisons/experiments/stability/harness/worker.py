@@ -1,8 +1,8 @@
-"""`python -m comparisons.experiments.stability.harness.worker`: measures one setting after another,
-as a pool asks.
+"""`python -m comparisons.experiments.stability.harness.worker`: measures one sweep point after
+another, as `comparisons.runs.processes.pool` requests.
 
-It keeps to `comparisons.runs.processes.protocol`.  A process, since extreme numbers are what brings
-native libraries down.
+It speaks `comparisons.runs.processes.protocol`.  A process of its own, because extreme numbers
+crash native libraries.
 """
 
 import faulthandler
@@ -15,8 +15,8 @@ from pathlib import Path
 from PIL import Image
 from pydantic import BaseModel, ConfigDict
 
+from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, generator
 from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import OURS, Draw, Effort, generator
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.runs.processes.protocol import carry_out, private_stdout
 from reference_rt.util.errors import SceneWarning
@@ -24,10 +24,10 @@ from reference_rt.util.files import replacing
 
 
 class Request(BaseModel):
-    """A setting to measure, or, where `shoot` names a contestant, a picture of it to make.
+    """A sweep point to measure, or, where `shoot` names a contestant, to make an image of.
 
-    out: the file of what is found, or of the picture, a .png that holds its caption;  key: what the
-    file says it was made with.
+    out: the file of the result, or of the image, a .png that holds its caption;  key: fingerprint
+    that is stored with it.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -44,7 +44,7 @@ class Request(BaseModel):
 
 
 def measure(request: Request) -> None:
-    """Measure a setting and write what was found."""
+    """Measure a sweep point and store the result."""
     series = family(request.family).by_name[request.series]
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="reference_rt_stability_") as folder:
@@ -65,7 +65,7 @@ def measure(request: Request) -> None:
 
 
 def shoot(request: Request) -> None:
-    """Make a picture and write it."""
+    """Make an image of a failure and store it."""
     series = family(request.family).by_name[request.series]
     assert series.shoot is not None
     shot = series.shoot(request.shoot, request.x)
@@ -79,7 +79,7 @@ def shoot(request: Request) -> None:
 
 
 def main() -> None:
-    """Answer until standard input ends."""
+    """Serve requests until standard input ends."""
     faulthandler.enable()
     # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
     warnings.simplefilter("ignore", SceneWarning)

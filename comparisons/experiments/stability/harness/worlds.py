@@ -12,28 +12,13 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import chance
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
-from comparisons.geometry import frame
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.mitsubas import rendered
+from comparisons.experiments.stability.harness.outcomes import one_case
+from comparisons.experiments.stability.harness.steps import at, scaled
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.scene import picture
-from comparisons.mitsuba.translate import load
-from reference_rt.core import transform
 
-_TINY = transform.Scale(scale=(1e-30, 1e-30, 1e-30))
-
-
-def at(x: float, y: float, z: float) -> transform.Translate:
-    return transform.Translate(translate=(x, y, z))
-
-
-def facing(axis: tuple[float, float, float], degrees: float) -> transform.Rotate:
-    return transform.Rotate(rotate=transform.Turn(axis=axis, degrees=degrees))
+_TINY = scaled(1e-30)
 
 
 def grey(x: float) -> tuple[float, float, float]:
@@ -59,8 +44,8 @@ _MATERIALS: Mapping[str, Any] = {
 
 
 class World(NamedTuple):
-    """shapes, materials: what counts;  sky: radiance from all sides;  expected: what every pixel
-    sees;  path: fields of the integrator;  rounding: of what is expected, relatively, per u."""
+    """shapes, materials: the visible ones;  sky: radiance from all sides;  expected: radiance of
+    every pixel;  path: fields of the integrator;  rounding: its relative error, per u."""
 
     shapes: tuple[Any, ...]
     materials: Mapping[str, Any]
@@ -94,8 +79,8 @@ def ours(world: World, pixels: int, spp: int, seed: int) -> FloatArray:
 
 def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> FloatArray:
     def render() -> FloatArray:
-        twin = load(scene_of(world, pixels, spp, seed, hidden=False), frame.OURS)
-        return picture(twin.mi_scene, spp, seed).reshape(-1, 3)
+        scene = scene_of(world, pixels, spp, seed, hidden=False)
+        return rendered(scene, spp, seed).reshape(-1, 3)
 
     if not in_scalar:
         return render()
@@ -104,24 +89,24 @@ def theirs(world: World, pixels: int, spp: int, seed: int, in_scalar: bool) -> F
 
 
 MOST = 0.1
-"""What a picture's mean may be off by, relatively, whatever its noise."""
+"""Largest relative error of a picture's mean, whatever its noise."""
 
 Render = Callable[[int, int], FloatArray]
 """Pixels (n, 3) of a picture by its seed and its samples per pixel."""
 
 
 def judge(
-    rendered: Mapping[str, Render],
+    renderers: Mapping[str, Render],
     seeds: tuple[int, int],
     spp: int,
     expected: float,
     rounding: Callable[[str], float],
-    told: Mapping[str, Any],
+    shown: Mapping[str, Any],
 ) -> dict[str, Outcome]:
     """One case: the mean is finite and, in two stages of `chance`, the expected one, to noise, of
     `MOST` at most, and rounding.  The worst is relative."""
     found = {}
-    for who, render in rendered.items():
+    for who, render in renderers.items():
 
         def sample(stage: int, render: Render = render) -> chance.Mean:
             one = render(seeds[stage], spp * (1, chance.AGAIN)[stage]).mean(axis=1)
@@ -131,9 +116,7 @@ def judge(
         failed, (mean, error) = chance.fails(sample, expected, *limits)
         off = abs(mean - expected) / expected
         seen = {"expected": expected, "found": mean, "standard error": error, "seeds": seeds}
-        examples = ({**told, **seen},) if failed else ()
-        worst = off if math.isfinite(off) else math.inf
-        found[who] = Outcome(1, int(failed), worst, examples=examples)
+        found[who] = one_case(failed, off, {**shown, **seen})
     return found
 
 
@@ -142,7 +125,7 @@ def measure(
     draw: Draw,
     spp: int,
     rounding: Callable[[str], float],
-    told: Mapping[str, Any],
+    shown: Mapping[str, Any],
     pixels: int = 32,
     in_scalar: bool = True,
     their_pixels: int = 16,
@@ -153,7 +136,7 @@ def measure(
         with np.errstate(all="ignore"):
             return theirs(world, their_pixels, spp, seed, in_scalar)
 
-    rendered: dict[str, Render] = {OURS: lambda seed, spp: ours(world, pixels, spp, seed)}
+    renderers: dict[str, Render] = {OURS: lambda seed, spp: ours(world, pixels, spp, seed)}
     if draw.mitsuba:
-        rendered[MITSUBA] = mitsubas
-    return judge(rendered, (first, again), spp, world.expected, rounding, told)
+        renderers[MITSUBA] = mitsubas
+    return judge(renderers, (first, again), spp, world.expected, rounding, shown)

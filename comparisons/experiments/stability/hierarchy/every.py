@@ -1,13 +1,14 @@
-"""Every primitive of a scene for every ray: what hierarchies must agree with, bit for bit."""
+"""Tests every primitive for every ray; hierarchies must agree with that bit for bit."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome
+from comparisons.experiments.stability.harness.outcomes import outcome
+from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt import shapes as any_shape
 from reference_rt.accel import bvh
 from reference_rt.core.arrays import IntArray
@@ -20,8 +21,6 @@ from reference_rt.rendering import query
 from reference_rt.rendering.query import Closest
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.meshes.watertight import shear_of
-
-BoolArray = npt.NDArray[np.bool_]
 
 METHODS: tuple[bvh.Method, ...] = ("sah", "median", "spatial", "none")
 
@@ -119,55 +118,42 @@ def any_hit_differs(tables: SceneTables, o: FloatArray, d: FloatArray, t: FloatA
 def compare(scene: rt.Scene, o: FloatArray, d: FloatArray, singly: bool) -> Outcome:
     """All four hierarchies of a scene;  singly: against every primitive by itself, else against
     "none", one leaf with everything, which tests eight triangles at once."""
-    total = Outcome(0, 0)
-    expected = None
-    for method in reversed(METHODS):
-        tables = rt.build_tables(scene.changed(hierarchy=method))
-        found = query.closest_primitives(tables, o, d)
-        got = named(tables, found)
-        if expected is None:
-            expected = named(tables, every(tables, o, d)) if singly else got
-        wrong = differ(got, expected) | any_hit_differs(tables, o, d, expected[:, 0])
-        total += outcome(method, o, d, wrong, got, expected)
-    return total
+
+    def found(tables: SceneTables) -> FloatArray:
+        return named(tables, query.closest_primitives(tables, o, d))
+
+    def truth(tables: SceneTables) -> FloatArray:
+        return named(tables, every(tables, o, d))
+
+    return _compared(scene, o, d, found, truth if singly else None)
 
 
 def compare_all(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Outcome:
     """The same of any scene, against "none": everything that is known of a hit."""
+
+    def found(tables: SceneTables) -> FloatArray:
+        hits = vars(query.intersect(tables, o, d))
+        return np.column_stack([np.asarray(a, np.float64) for a in hits.values()])
+
+    return _compared(scene, o, d, found, None)
+
+
+Find = Callable[[SceneTables], FloatArray]
+"""The hits of rays in a scene as rows (n, k), t first."""
+
+
+def _compared(
+    scene: rt.Scene, o: FloatArray, d: FloatArray, find: Find, truth: Find | None
+) -> Outcome:
+    """Each ray is a case for each hierarchy.  truth: by default what "none" finds."""
     total = Outcome(0, 0)
-    expected: Any = None
+    expected = None
     for method in reversed(METHODS):
         tables = rt.build_tables(scene.changed(hierarchy=method))
-        hits = vars(query.intersect(tables, o, d))
-        got = np.column_stack([np.asarray(a, np.float64) for a in hits.values()])
-        expected = got if expected is None else expected
+        got = find(tables)
+        if expected is None:
+            expected = truth(tables) if truth else got
         wrong = differ(got, expected) | any_hit_differs(tables, o, d, expected[:, 0])
-        total += outcome(method, o, d, wrong, got, expected)
+        shown = {"hierarchy": method, "origin": o, "direction": d}
+        total += outcome(wrong, shown | {"expected": expected, "found": got})
     return total
-
-
-def outcome(
-    method: str,
-    o: FloatArray,
-    d: FloatArray,
-    wrong: BoolArray,
-    got: FloatArray,
-    expected: FloatArray,
-) -> Outcome:
-    """Of rays, each of which is a case for each hierarchy."""
-
-    def example(k: int) -> Mapping[str, Any]:
-        return {
-            "hierarchy": method,
-            "origin": [x.hex() for x in o[k].tolist()],
-            "direction": [x.hex() for x in d[k].tolist()],
-            "expected": [x.hex() for x in expected[k].tolist()],
-            "found": [x.hex() for x in got[k].tolist()],
-        }
-
-    which = np.flatnonzero(wrong)
-    return Outcome(
-        cases=len(o),
-        failures=len(which),
-        examples=tuple(example(k) for k in which[:EXAMPLES].tolist()),
-    )

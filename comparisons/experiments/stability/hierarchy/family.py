@@ -1,38 +1,12 @@
-"""F5, hierarchies: what rays find through one is what testing every primitive finds.
-
-Law: the same shape, the same face, the same bits of t and of the coordinates there, whichever of
-the four hierarchies (sah, median, spatial, none) leads to it; and the any-hit query says that
-something is there before infinity and just beyond t, and nothing before t.
-
-Range: 1 to 1e6 triangles, a third of them on a lattice; 1 to 1e4 copies in one place; slivers of
-aspect 1 to 1e15, with rays in their planes; assorted shapes at offsets of 1 to 1e15 and of sizes of
-1e-70 to 1e300 (spheres and triangles alone from 1e80 on, where the others are refused; from 1e160
-on nothing is hit); and a scene with everything, which the quick run leaves out, as its kernels take
-half a minute to compile.  Rays: anywhere, through vertices, along axes and diagonals with both
-zeros in the planes of boxes, from vertices.  Counts: quick 4,000 rays, full 1,000,000, fewer where
-rays times primitives exceed 2e7, eight at once 2e8.  Each ray is a case for each hierarchy.
-Passes: no difference.
-
-Above 2,000 primitives "none" stands for all of them: it tests every triangle, eight at once, and is
-itself compared with single tests below that.  Mitsuba does not take part: it cannot trace without
-Embree's hierarchy.
-"""
+"""The series of F5; the folder's docstring states the law."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import (
-    OURS,
-    Draw,
-    Effort,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.hierarchy import scenes
 from comparisons.experiments.stability.hierarchy.every import compare, compare_all
 
@@ -40,11 +14,11 @@ SINGLY = 2_000
 """Primitives up to which each is tested by itself."""
 
 TESTS: Mapping[Effort, float] = {"quick": 2e6, "full": 2e7}
-"""Most single tests of a setting, some 15 ns each; eight at once ten times as many."""
+"""Most single tests of a sweep point, some 15 ns each; eight at once ten times as many."""
 
 
 def rays(draw: Draw, primitives: int) -> int:
-    """How many a setting can afford."""
+    """How many rays a sweep point can afford."""
     most = TESTS[draw.effort] * (1.0 if primitives <= SINGLY else 10.0) / primitives
     return int(min(draw.cases, max(most, 500.0)))
 
@@ -106,7 +80,7 @@ def measure_everything(draw: Draw, _x: float) -> Mapping[str, Outcome]:
     return {OURS: compare_all(scene, *scenes.lattice_rays(draw.rng, draw.cases))}
 
 
-CASES: Mapping[Effort, int] = {"quick": 4_000, "full": 1_000_000}
+CASES = 4_000, 1_000_000
 
 FAMILY = Family(
     id="F5",
@@ -115,70 +89,54 @@ FAMILY = Family(
     anchors="Embree's verify builds hierarchies of degenerate input, and does not compare hits",
     series=(
         Series(
-            name="primitives",
-            axis="triangles",
-            about="Triangles strewn in a cube, some on a lattice; rays also in the planes of boxes"
+            "primitives",
+            Sweep("triangles", decades(0, 6), (1.0, 100.0, 1e4), *CASES),
+            "Triangles strewn in a cube, some on a lattice; rays also in the planes of boxes"
             " and from vertices.",
-            values=decades(0, 6),
-            quick=(1.0, 100.0, 1e4),
-            cases=CASES,
-            measure=measure_primitives,
+            measure_primitives,
         ),
         Series(
-            name="copies",
-            axis="copies of each of three triangles",
-            about="All in one place, two of the three in one plane.",
-            values=decades(0, 4),
-            quick=(1.0, 100.0),
-            cases=CASES,
-            measure=measure_copies,
+            "copies",
+            Sweep("copies of each of three triangles", decades(0, 4), (1.0, 100.0), *CASES),
+            "All in one place, two of the three in one plane.",
+            measure_copies,
         ),
         Series(
-            name="slivers",
-            axis="length / height",
-            about="A bundle of slivers along one line and strips of one plane; rays in their"
+            "slivers",
+            Sweep("length / height", decades(0, 15, 3), (1.0, 1e9, 1e15), *CASES),
+            "A bundle of slivers along one line and strips of one plane; rays in their"
             " planes, and up to 1e-8 out of them.",
-            values=decades(0, 15, 3),
-            quick=(1.0, 1e9, 1e15),
-            cases=CASES,
-            measure=measure_slivers,
+            measure_slivers,
         ),
         Series(
-            name="offset",
-            axis="offset from the origin, of shapes of size 1",
-            about="Assorted shapes within 10 of a point far away.",
-            values=decades(0, 15, 3),
-            quick=(1.0, 1e12),
-            cases=CASES,
-            measure=measure_offset,
+            "offset",
+            Sweep(
+                "offset from the origin, of shapes of size 1",
+                decades(0, 15, 3),
+                (1.0, 1e12),
+                *CASES,
+            ),
+            "Assorted shapes within 10 of a point far away.",
+            measure_offset,
         ),
         Series(
-            name="size",
-            axis="size",
-            about="Assorted shapes, ever larger.",
-            values=decades(0, 300, 50),
-            quick=(1.0, 1e50, 1e300),
-            cases=CASES,
-            measure=measure_size,
+            "size",
+            Sweep("size", decades(0, 300, 50), (1.0, 1e50, 1e300), *CASES),
+            "Assorted shapes, ever larger.",
+            measure_size,
         ),
         Series(
-            name="smallness",
-            axis="1 / size",
-            about="Assorted shapes, ever smaller.",
-            values=decades(0, 70, 35),
-            quick=(1.0, 1e70),
-            cases=CASES,
-            measure=measure_smallness,
+            "smallness",
+            Sweep("1 / size", decades(0, 70, 35), (1.0, 1e70), *CASES),
+            "Assorted shapes, ever smaller.",
+            measure_smallness,
         ),
         Series(
-            name="everything",
-            axis="",
-            about="Shapes of every kind, groups and solids, a third of them on a lattice; half of"
+            "everything",
+            Sweep("", (1.0,), (), *CASES),
+            "Shapes of every kind, groups and solids, a third of them on a lattice; half of"
             " the rays at lattice points, along axes and diagonals.",
-            values=(1.0,),
-            quick=(),
-            cases=CASES,
-            measure=measure_everything,
+            measure_everything,
         ),
     ),
 )

@@ -7,8 +7,9 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.experiments.stability.harness.meshes import cube, write
+from comparisons.experiments.stability.harness.steps import any_turn, at, scaled
 from reference_rt.core import transform
 
 
@@ -66,20 +67,19 @@ MOST_FLAT = 1e70
 """Larger rectangles, disks and boxes are refused: the squares of their areas are no floats."""
 
 
-def assorted(rng: np.random.Generator, n: int, scale: float, at: FloatArray) -> tuple[Any, ...]:
+def assorted(rng: np.random.Generator, n: int, scale: float, middle: FloatArray) -> tuple[Any, ...]:
     """n spheres, triangles, boxes, rectangles and disks, as long as these are accepted, within 10
     of a point, all times scale."""
     shapes: list[Any] = []
     for k in range(n):
-        x, y, z = (at + scale * rng.uniform(-10.0, 10.0, 3)).tolist()
+        x, y, z = (middle + scale * rng.uniform(-10.0, 10.0, 3)).tolist()
         size = scale * float(rng.uniform(0.3, 1.5))
-        axis = unit_vectors(rng, 1)[0].tolist()
-        turn = transform.Turn(axis=(axis[0], axis[1], axis[2]), degrees=float(rng.uniform(0, 360)))
+        turn = any_turn(rng)
         # Some stay along the axes, where boxes are flat.
         steps: tuple[transform.Step, ...] = (
-            transform.Scale(scale=(size, size, size)),
-            *(() if k % 3 == 0 else (transform.Rotate(rotate=turn),)),
-            transform.Translate(translate=(x, y, z)),
+            scaled(size),
+            *(() if k % 3 == 0 else (turn,)),
+            at(x, y, z),
         )
         corners = np.array([x, y, z]) + size * rng.uniform(-1.0, 1.0, (3, 3))
         a, b, c = (tuple(v) for v in corners.tolist())
@@ -149,18 +149,10 @@ def everything(rng: np.random.Generator, folder: Path) -> rt.Scene:
         make = made[k % (len(made) if k < 2 * len(made) else len(made) - 1)]
         a, b, c = (0.25 * rng.uniform(0.5, 2.0, 3)).tolist()
         x, y, z = rng.uniform(-3.0, 3.0, 3).tolist()
-        axis = unit_vectors(rng, 1)[0].tolist()
-        turn = transform.Turn(axis=(axis[0], axis[1], axis[2]), degrees=float(rng.uniform(0, 360)))
-        steps: tuple[transform.Step, ...] = (
-            transform.Scale(scale=(a, b, c)),
-            transform.Rotate(rotate=turn),
-            transform.Translate(translate=(x, y, z)),
-        )
+        turn = any_turn(rng)
+        steps: tuple[transform.Step, ...] = (scaled(a, b, c), turn, at(x, y, z))
         if k % 3 == 0:
-            steps = (
-                transform.Scale(scale=(0.5, 0.5, 0.5)),
-                transform.Translate(translate=(round(x), round(y), round(z))),
-            )
+            steps = (scaled(0.5), at(round(x), round(y), round(z)))
         shapes += [make(steps)] * (2 if k % 20 == 0 else 1)
     groups: dict[str, Any] = {"pair": (rt.Box(), rt.Sphere(center=(0.0, 0.0, 1.5), radius=0.5))}
     return rt.Scene(shapes=tuple(shapes), groups=groups)

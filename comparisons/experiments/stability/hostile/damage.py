@@ -1,4 +1,4 @@
-"""Hostile values and damages: numbers, data, text and bytes that nobody expects."""
+"""Hostile numbers and values, and ways to damage data, text and bytes."""
 
 import copy
 import json

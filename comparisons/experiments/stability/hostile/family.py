@@ -1,26 +1,4 @@
-"""F6, hostile values: whatever a scene, a file or a ray holds, the answer is defined.
-
-Law: each hostile scene gives either one line of error (our classes; exit code 3; the file, the
-place in it and what was expected or is malformed), or a picture of which every pixel that is not
-finite is reported (exit code 3 too, with the places).  Never a crash, a traceback ("internal
-error"), a hang (5 s of computing; 120 s in plain Python) or a pixel that is not finite and not
-told.  Each hostile ray gives a miss or a hit that is finite throughout.
-
-Ranges: see `NUMBERS` and others in `hostile/damage.py`: NaN, infinities, zeros of both signs, the
-smallest and largest floats, what overflows when it is squared, integers beyond 64 bits, texts,
-names of files that are none, values of other types, sets of each other, cycles, anchors, tags.
-
-Counts: 11,000 scenes and files in the full run (values 4500, structure 1600, grammar 1600, text
-480, meshes 2400, images 600), rays 10^5 per magnitude.
-
-How: scenes go to child processes, which do as `reference-rt render` does (8 x 8 pixels, one
-sample), so that one that dies takes no other with it.  Values change in a few fixed scenes, whose
-compiled kernels stay the same; where they do not, and where the structure changes, plain Python
-runs the same text (NUMBA_DISABLE_JIT=1), bit-identical and without seconds of compiling.
-
-To reproduce a failure: its scene is in the examples as text, or else the file's bytes in base 64;
-`reference-rt render scene.json -o out.exr --size 8x8 --spp 1`.
-"""
+"""The series of F6; the folder's docstring states the law."""
 
 import base64
 import json
@@ -30,15 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
-    MITSUBA,
-    OURS,
-    Draw,
-    Family,
-    Outcome,
-    Series,
-)
+from comparisons.experiments.stability.harness.core import EXAMPLES, MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep
 from comparisons.experiments.stability.hostile import rays
 from comparisons.experiments.stability.hostile.bases import (
     BASES,
@@ -63,14 +34,14 @@ from comparisons.experiments.stability.hostile.mitsuba import judged as judged_o
 from comparisons.experiments.stability.hostile.pool import Answer, answers
 
 FOR_MITSUBA = {"quick": 8, "full": 60}
-"""Scenes of a setting that Mitsuba is given: each takes it some 0.1 s, after 2 s to start."""
+"""Scenes of a sweep point that Mitsuba gets: each takes it some 0.1 s, after 2 s to start."""
 
 LONGEST = 2000
 """Characters of a scene that an example quotes."""
 
 
 def problem(answer: Answer, scene: Path) -> str | None:
-    """What is wrong with how a case ended, None for nothing."""
+    """How a case breaks the law; None where it does not."""
     if answer.exit is None:
         return answer.said
     if answer.exit not in (0, 3):
@@ -88,7 +59,7 @@ def problem(answer: Answer, scene: Path) -> str | None:
 
 
 def example(scene: Path, what: str) -> Mapping[str, Any]:
-    """The case word for word, and what came of it."""
+    """The input word for word, and what came of it."""
     content = scene.read_bytes()
     found = {"suffix": scene.suffix, "came": what, "expected": "one line of error or a picture"}
     try:
@@ -104,7 +75,7 @@ def example(scene: Path, what: str) -> Mapping[str, Any]:
 def judged(
     scenes: Sequence[Path], plain: bool, signatures: Sequence[str | None] | None = None
 ) -> Outcome:
-    """Of all of them; those whose kernels are others than `signatures` says, by plain Python."""
+    """The outcome of scenes; those whose kernels differ from `signatures` run in plain Python."""
     failures, examples, left = 0, [], []
     for scene, answer in zip(
         scenes, answers(scenes, plain=plain, signatures=signatures), strict=True
@@ -120,10 +91,13 @@ def judged(
     return found + judged(left, True) if left else found
 
 
-Write = Callable[[Draw, float, str], str | bytes]
+Make = Callable[[Draw, float, str, int], tuple[str, str | bytes]]
+"""Suffix and content of a scene file, of x, the sound scene or file, and the case's number."""
+
+Measure = Callable[[Draw, float], dict[str, Outcome]]
 
 
-def _written(draw: Draw, x: float, names: Sequence[str], make: Any) -> list[tuple[Path, str]]:
+def _written(draw: Draw, x: float, names: Sequence[str], make: Make) -> list[tuple[Path, str]]:
     """Scene files beside the sound files, with the base that each was made from."""
     write_files(draw.folder)
     found = []
@@ -172,18 +146,8 @@ def _structure_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, str]:
         return (".json", as_text(data)) if k % 4 else (".yaml", as_yaml(data))
 
 
-def structure(draw: Draw, x: float) -> dict[str, Outcome]:
-    made = _written(draw, x, PLAIN, _structure_of)
-    return {OURS: judged([path for path, _ in made], True)}
-
-
 def _sentence_of(draw: Draw, x: float, _: str, __: int) -> tuple[str, str]:
     return ".json", as_text(sentence(draw.rng, x))
-
-
-def grammar(draw: Draw, x: float) -> dict[str, Outcome]:
-    made = _written(draw, x, ("",), _sentence_of)
-    return {OURS: judged([path for path, _ in made], True)}
 
 
 def _text_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, bytes]:
@@ -201,10 +165,16 @@ def bomb(rng: np.random.Generator, levels: int) -> str:
     return "\n".join([*lines, f"{key}: *a{3 * levels - 1}", ""])
 
 
-def text(draw: Draw, x: float) -> dict[str, Outcome]:
-    made = _written(draw, x, PLAIN, _text_of)
-    return {OURS: judged([path for path, _ in made], True)}
+def _in_plain_python(names: Sequence[str], make: Make) -> Measure:
+    def measure(draw: Draw, x: float) -> dict[str, Outcome]:
+        return {OURS: judged([path for path, _ in _written(draw, x, names, make)], True)}
 
+    return measure
+
+
+structure = _in_plain_python(PLAIN, _structure_of)
+grammar = _in_plain_python(("",), _sentence_of)
+text = _in_plain_python(PLAIN, _text_of)
 
 _EYE = {"type": "perspective", "eye": [0.0, 0.0, 4.0], "target": [0.0, 0.0, 0.0]}
 
@@ -229,28 +199,24 @@ def _image_scene(file: str) -> dict[str, Any]:
     }
 
 
-def _with_file(scene: Callable[[str], Any]) -> Any:
+def _of_files(names: Sequence[str], scene: Callable[[str], Any]) -> Measure:
+    """Scenes that name one damaged file each."""
+
     def make(draw: Draw, x: float, name: str, k: int) -> tuple[str, str]:
         file = f"case{k}_{name}"
         (draw.folder / file).write_bytes(damaged(draw.rng, files()[name], int(x)))
         return ".json", json.dumps(scene(file))
 
-    return make
+    def measure(draw: Draw, x: float) -> dict[str, Outcome]:
+        made = _written(draw, x, names, make)
+        known = _signatures(draw, {name: scene(name) for name in names})
+        return {OURS: judged([path for path, _ in made], False, [known[name] for _, name in made])}
+
+    return measure
 
 
-def _files(draw: Draw, x: float, names: Sequence[str], scene: Callable[[str], Any]) -> Outcome:
-    made = _written(draw, x, names, _with_file(scene))
-    known = _signatures(draw, {name: scene(name) for name in names})
-    return judged([path for path, _ in made], False, [known[name] for _, name in made])
-
-
-def meshes(draw: Draw, x: float) -> dict[str, Outcome]:
-    return {OURS: _files(draw, x, [*MESHES, "ball.gltf"], _mesh_scene)}
-
-
-def images(draw: Draw, x: float) -> dict[str, Outcome]:
-    return {OURS: _files(draw, x, IMAGES, _image_scene)}
-
+meshes = _of_files([*MESHES, "ball.gltf"], _mesh_scene)
+images = _of_files(IMAGES, _image_scene)
 
 _COUNTS = (1.0, 2.0, 4.0, 8.0)
 
@@ -262,63 +228,45 @@ FAMILY = Family(
     (
         Series(
             "values",
-            "hostile numbers in a scene",
+            Sweep("hostile numbers in a scene", (*_COUNTS, 16.0), (1.0, 4.0), 60, 900),
             "Numbers of four sound scenes (every shape; materials and lights; recursive; layers) "
             "replaced by hostile ones.  A crash, a hang, a traceback, an unclear error or a pixel "
             "that is not finite and not reported breaks the law.",
-            (*_COUNTS, 16.0),
-            (1.0, 4.0),
-            {"quick": 60, "full": 900},
             values,
             explained="None of this hangs on precision: what is refused is refused by rules, and "
             "Mitsuba's range of float32 is left by a single hostile number already.",
         ),
         Series(
             "structure",
-            "changes of what is where",
+            Sweep("changes of what is where", _COUNTS, (2.0,), 50, 400),
             "Values of other types, keys that are missing, new or moved, long lists, deep trees.",
-            _COUNTS,
-            (2.0,),
-            {"quick": 50, "full": 400},
             structure,
         ),
         Series(
             "grammar",
-            "share of hostile values",
+            Sweep("share of hostile values", (0.001, 0.01, 0.03, 0.1), (0.01,), 30, 400),
             "Sentences of the scenes' JSON Schema, of which some values are hostile.",
-            (0.001, 0.01, 0.03, 0.1),
-            (0.01,),
-            {"quick": 30, "full": 400},
             grammar,
         ),
         Series(
             "text",
-            "damages of a scene's text",
+            Sweep("damages of a scene's text", _COUNTS, (1.0,), 16, 120),
             "Bytes of YAML that are flipped, cut or repeated; tags, anchors, other documents, and "
             "aliases of aliases that stand for up to 9^24 things.",
-            _COUNTS,
-            (1.0,),
-            {"quick": 16, "full": 120},
             text,
         ),
         Series(
             "meshes",
-            "damages of a mesh file",
+            Sweep("damages of a mesh file", _COUNTS, (2.0,), 60, 600),
             "Files of .obj, .ply (text and bytes), .stl, .off, .glb and .gltf with bytes flipped, "
             "cut out or off, repeated, or replaced by hostile numbers.",
-            _COUNTS,
-            (2.0,),
-            {"quick": 60, "full": 600},
             meshes,
         ),
         Series(
             "images",
-            "damages of an image file",
+            Sweep("damages of an image file", _COUNTS, (2.0,), 20, 150),
             "The same of .png, .exr, .hdr, .pfm, .npy, .tif and .jpg, as a texture and as the "
             "light around.",
-            _COUNTS,
-            (2.0,),
-            {"quick": 20, "full": 150},
             images,
         ),
         *rays.SERIES,

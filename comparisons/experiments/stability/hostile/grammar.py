@@ -1,4 +1,4 @@
-"""Scenes that nobody wrote: sentences of the JSON Schema of scenes."""
+"""Random scenes, generated from the JSON Schema of scenes."""
 
 from functools import cache
 from typing import Any
@@ -76,7 +76,7 @@ class _Writer:
 
     def _chosen(self, choices: list[dict[str, Any]], depth: int) -> dict[str, Any]:
         """One of them; far down, none that goes further down.  Never rough plastic: plain Python
-        takes 10 s to make its tables; `f06_bases.LAYERS` has it."""
+        takes 10 s to make its tables; `bases.LAYERS` has it."""
         flat = [c for c in choices if not str(c.get("$ref", "")).endswith("/RoughPlastic")]
         if depth > DEEPEST - 3:
             shallow = [c for c in flat if not str(c.get("$ref", "")).endswith(_DEEP)]

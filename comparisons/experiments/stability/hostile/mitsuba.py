@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import EXAMPLES, Outcome
+from comparisons.experiments.stability.harness.core import Outcome
+from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.hostile.pool import answers
 from comparisons.experiments.stability.hostile.worker import SAMPLES, SIZE, serve
 
@@ -16,16 +17,18 @@ from comparisons.experiments.stability.hostile.worker import SAMPLES, SIZE, serv
 def judged(scenes: Sequence[Path]) -> Outcome:
     """Of the scenes that ours accepts and that have a twin: a process that ends, a hang and pixels
     that are not finite are failures; an exception is a defined error."""
-    cases, failures, examples = 0, 0, []
-    for scene, answer in zip(scenes, answers(scenes, module=__name__), strict=True):
-        if answer.exit == 0 and not answer.rendered:
-            continue
-        cases += 1
-        if answer.exit is None or answer.nonfinite:
-            failures += 1
-            came = answer.said or f"{answer.nonfinite} pixels not finite"
-            examples.append({"scene": scene.read_text()[:2000], "came": came})
-    return Outcome(cases, failures, None, 0, tuple(examples[:EXAMPLES]))
+    rendered = [
+        (scene, answer)
+        for scene, answer in zip(scenes, answers(scenes, module=__name__), strict=True)
+        if answer.exit != 0 or answer.rendered
+    ]
+    wrong = np.array([answer.exit is None or answer.nonfinite > 0 for _, answer in rendered], bool)
+
+    def came(k: int) -> str:
+        answer = rendered[k][1]
+        return answer.said or f"{answer.nonfinite} pixels not finite"
+
+    return outcome(wrong, {"scene": lambda k: rendered[k][0].read_text()[:2000], "came": came})
 
 
 def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
@@ -39,7 +42,7 @@ def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
     found: dict[str, Any] = {"exit": 0, "said": "", "nonfinite": 0, "rendered": False}
     try:
         scene = adjusted(Scene.load(path), SAMPLES, SIZE)
-        assert scene.tables is not None  # made now, so that what is wrong with it is told
+        assert scene.tables is not None  # built now, so that its errors are raised here
     except ReferenceRtError:
         return found
     with contextlib.redirect_stderr(io.StringIO()):

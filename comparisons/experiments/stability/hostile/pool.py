@@ -1,6 +1,6 @@
 """Hostile cases in processes of their own: one that dies is replaced, and the others go on.
 
-A process goes on from setting to setting: to start one takes as long as fifty cases.
+A process serves one sweep point after another: to start one takes as long as fifty cases.
 """
 
 import atexit
@@ -55,7 +55,7 @@ def answers(
         worker = _workers.get((module, plain))
         if worker is None:
             worker = _workers[module, plain] = _Worker(module, plain)
-        answer = worker.ask({"scene": str(scene), "signature": signature})
+        answer = worker.run({"scene": str(scene), "signature": signature})
         if answer.exit is None:
             _workers.pop((module, plain)).close()
         yield answer
@@ -92,7 +92,7 @@ class _Worker:
         self.process.stdin.write(json.dumps(message) + "\n")
         self.process.stdin.flush()
 
-    def ask(self, case: dict[str, Any]) -> Answer:
+    def run(self, case: dict[str, Any]) -> Answer:
         assert self.process.stdout is not None
         try:
             self._send(case)

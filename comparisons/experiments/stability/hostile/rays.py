@@ -8,25 +8,18 @@ times as long gives 2^-k times t, bit for bit, and the rest as it was.
 import time
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-)
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, alone
+from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.hostile.bases import BASES, write_files
 from comparisons.experiments.stability.hostile.damage import NUMBERS, as_text
+from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
-
-BoolArray = Any
 
 UNIT = 1e-12
 """How far the length of a unit normal may be from 1: some thousand roundings, of shapes that are
@@ -79,23 +72,20 @@ def undefined(hits: Intersections, o: FloatArray, d: FloatArray) -> BoolArray:
     return wrong
 
 
-def _examples(wrong: BoolArray, o: FloatArray, d: FloatArray, hits: Intersections) -> Any:
-    return tuple(
-        {
-            "o": [x.hex() for x in o[k].tolist()],
-            "d": [x.hex() for x in d[k].tolist()],
-            "came": f"t {hits.t[k]!r} shape {hits.shape[k]} n {hits.n[k].tolist()}",
-            "expected": "a miss or a hit that is finite throughout",
-        }
-        for k in np.flatnonzero(wrong)[:EXAMPLES].tolist()
-    )
+def _judged(wrong: BoolArray, o: FloatArray, d: FloatArray, hits: Intersections) -> Outcome:
+    shown = {
+        "o": o,
+        "d": d,
+        "came": lambda k: f"t {hits.t[k]!r} shape {hits.shape[k]} n {hits.n[k].tolist()}",
+        "expected": "a miss or a hit that is finite throughout",
+    }
+    return outcome(wrong, shown)
 
 
 def numbers(draw: Draw, x: float) -> Mapping[str, Outcome]:
     o, d = hostile(draw.rng, draw.cases, x)
     hits = query.intersect(_scene().tables, o, d)
-    wrong = undefined(hits, o, d)
-    return {OURS: Outcome(len(o), int(wrong.sum()), None, 0, _examples(wrong, o, d, hits))}
+    return {OURS: _judged(undefined(hits, o, d), o, d, hits)}
 
 
 def lengths(draw: Draw, x: float) -> Mapping[str, Outcome]:
@@ -110,7 +100,7 @@ def lengths(draw: Draw, x: float) -> Mapping[str, Outcome]:
         for name in ("shape", "primitive", "part", "instance", "n", "ns", "uv"):
             same = getattr(once, name) == getattr(again, name)
             wrong |= ~(same.all(axis=1) if same.ndim == 2 else same)
-    return {OURS: Outcome(len(o), int(wrong.sum()), None, 0, _examples(wrong, o, scaled, again))}
+    return {OURS: _judged(wrong, o, scaled, again)}
 
 
 MOST_TIME = 2.0
@@ -142,33 +132,36 @@ def seconds(draw: Draw, _: float) -> Mapping[str, Outcome]:
 SERIES = (
     Series(
         "rays",
-        "magnitude of numbers",
+        Sweep(
+            "magnitude of numbers",
+            (1e0, 1e9, 1e50, 1e100, 1e150, 1e200, 1e250, 1e300),
+            (1e9, 1e150, 1e300),
+            20_000,
+            100_000,
+        ),
         "Rays in a scene of all shapes, of which one to six numbers are x, 1/x or from the list of "
         "hostile ones, NaN and infinity among them.  A hit that is not finite throughout breaks "
         "the law, and one of a ray that is none.",
-        (1e0, 1e9, 1e50, 1e100, 1e150, 1e200, 1e250, 1e300),
-        (1e9, 1e150, 1e300),
-        {"quick": 20_000, "full": 100_000},
         numbers,
     ),
     Series(
         "lengths",
-        "log2 of a direction's length",
+        Sweep(
+            "log2 of a direction's length",
+            (8.0, 32.0, 64.0, 128.0, 256.0, 500.0, 900.0, 1000.0),
+            (64.0, 500.0, 900.0),
+            10_000,
+            50_000,
+        ),
         "Directions 2^x and 2^-x times as long: t must be 2^-x and 2^x times what it was, bit for "
         "bit, and all else the same.",
-        (8.0, 32.0, 64.0, 128.0, 256.0, 500.0, 900.0, 1000.0),
-        (64.0, 500.0, 900.0),
-        {"quick": 10_000, "full": 50_000},
         lengths,
     ),
     Series(
         "time",
-        "",
+        alone(20_000, 100_000),
         "Hostile rays in comparison with ordinary ones through the same scene: no more than twice "
         "as long.",
-        (1.0,),
-        (1.0,),
-        {"quick": 20_000, "full": 100_000},
         seconds,
         unit="times the time of ordinary rays",
     ),

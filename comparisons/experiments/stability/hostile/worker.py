@@ -34,7 +34,7 @@ from reference_rt.util.errors import ImageError
 SIZE, SAMPLES = "8x8", 1
 
 MOST_MEMORY = 12 << 30
-"""Bytes of address space: what asks for more raises instead of taking the machine's."""
+"""Bytes of address space: an allocation beyond raises instead of taking the machine's memory."""
 
 WAITING = 40.0
 """Times as long a case may take when it does not compute, on a machine that is busy."""

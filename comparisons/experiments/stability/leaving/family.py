@@ -1,58 +1,22 @@
-"""F2: rays that leave a surface.
-
-Law.  A ray meets a shape at p, with the outward normal n, and goes on from there towards any w.
-(1) It does not meet again what it leaves: towards the outer side of a convex shape, and to either
-side of a flat one, it meets nothing; what it meets else, exact arithmetic on the ray as it begins
-(o', w) meets too, within a factor of 2 in t, so that it is another place.
-(2) Nothing is lost: into a closed shape it meets the far wall, through its outer side, and
-
-    |o' - p| <= B = 17 sqrt(3) u (2 |c| + 6 s),  u = 2^-53,
-
-c being the middle of the shape (largest coordinate) and s its longest half axis, however thin.
-(3) The first ray, aimed at what is well inside, meets the shape wherever exact arithmetic says so.
-
-Where the shape is thinner than 4 B within B of p, along the normal or along w, its walls are one:
-next to an edge, p may lie beyond the neighbouring face, by its rounding.  Such cases are open,
-and so are first rays whose answer hangs on moving them by B.
-
-Range: 15 kinds of shapes, sizes 1e-8 to 1e8, axes up to 1e12 times as long as others, middles up to
-1e10 sizes from the origin and beyond, directions up to cos = 1e-15 to the surface.  Counts, full:
-10^6 departures of each kind in its own series, 1000 shapes by 1000 rays.  Passes: no failure.
-
-Every departure is traced; exact arithmetic is asked about those that do not look as they should, by
-the sign of w · n where they meet something again, and about a sample of all others.
-
-Mitsuba leaves by `si.spawn_ray(w)`: an offset of (1 + max |p|) RayEpsilon along the normal, and
-RayEpsilon is 8.9e-5 in its float32.  In place of B it is put the size: a ray that begins more than
-s / 100 off has lost neighbours that are as near, as predicted from |c| = 112 s on, and for shapes
-smaller than 8.9e-3.  While it takes part, all numbers of shapes and rays are rounded to float32
-first, for everyone.  So is the text-book's ray judged, which begins at o + t d, what is nearer than
-1e-4 not counting.
-"""
+"""The series of F2; the folder's docstring states the law."""
 
 import contextlib
 import math
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    Family,
-    Outcome,
-    Series,
-    Shot,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome, Shot
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
+from comparisons.experiments.stability.harness.leaving import EPSILON
 from comparisons.experiments.stability.leaving import mitsuba as theirs
 from comparisons.experiments.stability.leaving.judge import Judge, Tally
 from comparisons.experiments.stability.leaving.shapes import KINDS, WHOLE, Extent, Rays, aim, place
 from comparisons.experiments.stability.leaving.shots import shoot
-from comparisons.experiments.stability.leaving.tracer import EPSILON, Ways, depart, subjects
+from comparisons.experiments.stability.leaving.tracer import Ways, depart, subjects
 from comparisons.mitsuba.backend import scalar
 
 FIXED = "fixed epsilon"
@@ -62,16 +26,16 @@ RAYS = 1000
 """From one shape, in the full run."""
 
 FEW = 24
-"""Of those, the rays that the others are asked about: Mitsuba takes 20 µs for each in its scalar
-variant (in others as long as 2000 to compile for each shape), and exact arithmetic has to look into
-most of what they answer."""
+"""Of those, the rays that the other contestants get: Mitsuba takes 20 µs for each in its scalar
+variant (in others as long as 2000 to compile for each shape), and exact arithmetic has to check
+most of their answers."""
 
 FEW_SHAPES = {"quick": 1, "full": 8}
-"""Of a kind in a setting, those that they are asked about."""
+"""Shapes of a kind at a point that the other contestants get."""
 
 SAMPLE = 4
-"""Of the departures from a shape, those that exact arithmetic is asked about however they look; one
-of those where it answers ray by ray."""
+"""Departures from a shape that exact arithmetic checks even if nothing is suspicious; one where it
+works ray by ray."""
 
 FLATTEST = -15.0
 """The least cosine of departures to the normal, as a power of ten."""
@@ -118,6 +82,7 @@ def measure(
 # ---- series --------------------------------------------------------------------------------------
 
 ALL = tuple(KINDS)
+STRETCHED = tuple(kind for kind in ALL if kind != "sphere")
 
 BOUND = (
     "B = 17 sqrt(3) u (2 |c| + 6 s) is s / 100 at |c| = 1.5e12 s, and s at 1.5e14 s: nothing is "
@@ -136,55 +101,53 @@ OFFSET_ALONG_NORMAL = (
 )
 
 
-def _single(draw: Draw, x: float) -> bool:
-    """Whether Mitsuba takes part: beyond, float32 cannot say where the shape is."""
-    return draw.mitsuba and x <= 1e6
+def _extent(
+    draw: Draw,
+    x: float,
+    size: tuple[float, float] = (0.0, 0.0),
+    ratio: tuple[float, float] = (1.0, 2.0),
+    distance: tuple[float, float] = (1.0, 1.0),
+    theirs_to: float = 1e6,
+) -> Extent:
+    """Half axes from 1/2 to 1, by default, as far away.  theirs_to: x up to which Mitsuba takes
+    part: beyond, float32 cannot say where the shape is."""
+    return Extent(size, ratio, distance, draw.mitsuba and x <= theirs_to)
 
 
 def _distance(draw: Draw, x: float) -> Extent:
-    """Half axes from 1/2 to 1, x away."""
-    return Extent((0.0, 0.0), (1.0, 2.0), (x, x), _single(draw, x))
+    return _extent(draw, x, distance=(x, x))
 
 
 def _large(draw: Draw, x: float) -> Extent:
-    size = math.log10(x)
-    return Extent((size, size), (1.0, 2.0), (1.0, 1.0), draw.mitsuba and x <= 1e8)
+    return _extent(draw, x, size=(math.log10(x), math.log10(x)), theirs_to=1e8)
 
 
 def _small(draw: Draw, x: float) -> Extent:
-    size = -math.log10(x)
-    return Extent((size, size), (1.0, 2.0), (1.0, 1.0), draw.mitsuba and x <= 1e8)
+    return _extent(draw, x, size=(-math.log10(x), -math.log10(x)), theirs_to=1e8)
 
 
 def _ratio(draw: Draw, x: float) -> Extent:
-    return Extent((0.0, 0.0), (x, x), (1.0, 1.0), _single(draw, x))
+    return _extent(draw, x, ratio=(x, x))
 
 
 def _plain(draw: Draw, _x: float) -> Extent:
-    return Extent((0.0, 0.0), (1.0, 2.0), (1.0, 1.0), _single(draw, 1.0))
+    return _extent(draw, 1.0)
 
 
 def _everything(draw: Draw, x: float) -> Extent:
     """Sizes, ratios and distances at once, all up to x in one."""
     power = math.log10(x)
-    return Extent(
-        (-0.8 * power, 0.8 * power), (1.0, 10.0 ** (0.6 * power)), (1.0, x), _single(draw, x)
-    )
+    return _extent(draw, x, (-0.8 * power, 0.8 * power), (1.0, 10.0 ** (0.6 * power)), (1.0, x))
 
 
 def _series(
     name: str,
     kinds: tuple[str, ...],
-    axis: str,
+    sweep: Sweep,
     about: str,
     extent: Callable[[Draw, float], Extent],
-    values: tuple[float, ...],
-    quick: tuple[float, ...],
-    holds_to: float = math.inf,
-    law: str = "",
     grazing: bool = False,
-    cases: int = 0,
-    explained: str = "",
+    **more: Any,
 ) -> Series:
     def run(draw: Draw, x: float) -> Mapping[str, Outcome]:
         return measure(draw, kinds, extent(draw, x), 1.0 / x if grazing else None)
@@ -193,28 +156,18 @@ def _series(
         with tempfile.TemporaryDirectory() as folder:
             draw = Draw(np.random.default_rng(2), 1, contestant == MITSUBA, Path(folder))
             single = contestant == MITSUBA
-            kind = kinds[0]
-            return shoot(contestant, kind, extent(draw, x)._replace(single=single), draw)
+            return shoot(contestant, kinds[0], extent(draw, x)._replace(single=single), draw)
 
-    return Series(
-        name=name,
-        axis=axis,
-        about=about,
-        values=values,
-        quick=quick,
-        cases={"quick": 500 * len(kinds), "full": cases or PER_KIND // len(values)},
-        measure=run,
-        unit="B",
-        holds_to=holds_to,
-        law=law,
-        explained=explained,
-        shoot=picture,
-    )
+    return Series(name, sweep, about, run, unit="B", shoot=picture, **more)
 
-
-PER_KIND = 1_000_000
 
 DISTANCES = (1e0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14)
+SIZES = (1e0, 1e2, 1e4, 1e6, 1e8, 1e16, 1e32, 1e64)
+
+FAR = Sweep("distance / size", DISTANCES, (1e0, 1e4, 1e10), 500, 1_000_000 // len(DISTANCES))
+
+OF_ALL = 500 * len(ALL), 150_000
+"""Cases of a point."""
 
 FAMILY = Family(
     id="F2",
@@ -227,11 +180,9 @@ FAMILY = Family(
             _series(
                 kind,
                 (kind,),
-                "distance / size",
+                FAR,
                 f"Departures from one {kind} each, size 1, so far from the origin.",
                 _distance,
-                DISTANCES,
-                (1e0, 1e4, 1e10),
                 holds_to=1e12,
                 law=BOUND,
             )
@@ -241,12 +192,9 @@ FAMILY = Family(
             _series(
                 name,
                 ALL,
-                axis,
+                Sweep(axis, SIZES, (1e8, 1e64), *OF_ALL),
                 "All kinds, as far from the origin as they are large.",
                 extent,
-                (1e0, 1e2, 1e4, 1e6, 1e8, 1e16, 1e32, 1e64),
-                (1e8, 1e64),
-                cases=150_000,
                 explained=explained,
             )
             for name, axis, extent, explained in (
@@ -256,36 +204,30 @@ FAMILY = Family(
         ),
         _series(
             "anisotropy",
-            tuple(k for k in ALL if k != "sphere"),
-            "longest / shortest axis",
+            STRETCHED,
+            Sweep(
+                *("longest / shortest axis", decades(0, 12, 2), (1e6, 1e12)),
+                *(500 * len(STRETCHED), 140_000),
+            ),
             "All kinds but round spheres, stretched along their axes and turned.",
             _ratio,
-            (1e0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12),
-            (1e6, 1e12),
-            cases=140_000,
         ),
         _series(
             "grazing",
             ALL,
-            "1 / cosine of the departure",
+            Sweep("1 / cosine of the departure", decades(1, 15, 2), (1e5, 1e15), *OF_ALL),
             "All kinds, left at this cosine to the normal, to either side.",
             _plain,
-            decades(1, 15, 2),
-            (1e5, 1e15),
             grazing=True,
-            cases=150_000,
             explained=OFFSET_ALONG_NORMAL,
         ),
         _series(
             "everything",
             ALL,
-            "distance / size",
+            Sweep("distance / size", decades(0, 10, 2), (1e10,), *OF_ALL),
             "All kinds, with sizes from x^-0.8 to x^0.8, axes up to x^0.6 times as long as others, "
             "distances up to x: at 1e10 from 1e-8 to 1e8, 1e6 and 1e10.",
             _everything,
-            (1e0, 1e2, 1e4, 1e6, 1e8, 1e10),
-            (1e10,),
-            cases=150_000,
         ),
     ),
 )

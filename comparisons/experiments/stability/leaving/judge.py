@@ -1,4 +1,4 @@
-"""Which departures break the law: exact arithmetic on the rays as they begin."""
+"""Which departures break the law, by exact arithmetic on the rays as they begin."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.harness.family import EXAMPLES, Outcome
+from comparisons.experiments.stability.harness.core import EXAMPLES, Outcome
+from comparisons.experiments.stability.harness.leaving import CONTACT
+from comparisons.experiments.stability.harness.outcomes import hexed
 from comparisons.experiments.stability.leaving.shapes import KINDS, Placed, Rays
 from comparisons.experiments.stability.leaving.tracer import Departures, Subject, scene_of
 from comparisons.geometry.exact import all_hits, first_of
@@ -16,14 +18,11 @@ from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.sizes import ShapeSizes
 from reference_rt.core.arrays import IntArray
 
-CONTACT = 4.0
-"""Bounds: what is thicker must not be lost, nor a neighbour that is farther away."""
-
 CLOSE = 0.01
 """Sizes: how near a neighbour is that others than ours must not lose."""
 
 NEAR = 100.0
-"""Bounds: a closed shape that is met again within these is looked into, whatever it is."""
+"""Bounds: a closed shape that is met again within these is checked, on whichever side."""
 
 Exact = Callable[[FloatArray, FloatArray], tuple[FloatArray, BoolArray]]
 """Of rays: (t of the first crossing, inf for none; whether an odd number of crossings is ahead,
@@ -31,14 +30,14 @@ which is to begin inside of a closed shape)."""
 
 
 def exact_of(placed: Placed, subject: Subject) -> Exact:
-    """Exact arithmetic about one shape, as our tables have it."""
+    """The exact answers for one shape, as our tables hold it."""
     if subject.kind < 0:
         referee = Referee(ShapeSizes(scene_of(placed)))
 
         def of_scene(o: FloatArray, d: FloatArray) -> tuple[FloatArray, BoolArray]:
             truths = np.array([truth.t for truth in referee.decide(o, d)], dtype=object)
             back = np.array([truth.t for truth in referee.decide(o, -d)], dtype=object)
-            # Of a convex shape; nothing is asked about the others.
+            # Of a convex shape; for the others this is not used.
             return nearest(truths), np.asarray((truths != NEVER) & (back != NEVER))
 
         return of_scene
@@ -64,7 +63,7 @@ def row_of(subject: Subject) -> dict[str, Any]:
 
 @dataclass
 class Tally:
-    """An `Outcome` as it grows."""
+    """Counts and examples that become an `Outcome`."""
 
     cases: int = 0
     open: int = 0
@@ -89,16 +88,11 @@ class Tally:
         )
 
 
-def hexed(values: FloatArray) -> Any:
-    """Numbers to the last bit."""
-    return [x.hex() for x in np.asarray(values, float).ravel().tolist()]
-
-
 class Judge:
     """Of departures from one shape.
 
-    outer (n,): to which side rays leave, as they were asked to;  sample: how many of those that
-    look right are asked about all the same.
+    outer (n,): whether rays were to leave to the outer side;  sample: how many of those that are
+    not suspicious are checked all the same.
     """
 
     def __init__(self, placed: Placed, subject: Subject, sample: int) -> None:
@@ -123,9 +117,9 @@ class Judge:
         tally.worst = max(tally.worst, float(moved.max(initial=0.0)) / self.placed.bound)
         failed = moved > allowed
         tally.fail("begins too far off", np.flatnonzero(failed), note)
-        asked = left & ~failed & (self._doubtful(outer, found) | self._sampled(left))
+        checked = left & ~failed & (self._doubtful(outer, found) | self._sampled(left))
         for leaves, decide in ((True, self._outside), (False, self._inside)):
-            which = np.flatnonzero(asked & (outer == leaves))
+            which = np.flatnonzero(checked & (outer == leaves))
             if len(which):
                 decide(tally, which, found, note)
 
@@ -135,8 +129,8 @@ class Judge:
         return chosen
 
     def _doubtful(self, outer: BoolArray, found: Departures) -> BoolArray:
-        """What does not look as it ought to: nothing that is met again, or, of a ray that goes into
-        a closed shape, a far wall, left through its outer side."""
+        """Suspicious departures.  Expected is that nothing is met again, or, of a ray that goes
+        into a closed shape, a far wall, left through its outer side."""
         hit = np.isfinite(found.again)
         near = hit & (found.again < NEAR * self.placed.bound)
         into = ~hit | (found.cosine <= 0.0) | near
@@ -205,9 +199,9 @@ class Judge:
     def _nothing(self, tally: Tally, which: IntArray, found: Departures, note: Any) -> None:
         """Nothing must be met, neither by the tracer nor by the exact ray."""
         bad = np.isfinite(found.again[which])
-        asked = np.ones(len(which), bool) if self.placed.kind == "plane" else ~bad
+        checked = np.ones(len(which), bool) if self.placed.kind == "plane" else ~bad
         t = np.full(len(which), np.inf)
-        t[asked] = self.exact(found.start[which[asked]], found.w[which[asked]])[0]
+        t[checked] = self.exact(found.start[which[checked]], found.w[which[checked]])[0]
         bad |= np.isfinite(t)
         if self.placed.kind == "plane":
             # Without end, it is met far away by rays that rounding turned towards it.

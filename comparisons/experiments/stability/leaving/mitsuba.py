@@ -4,15 +4,14 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.experiments.stability.harness.mitsubas import loaded
 from comparisons.experiments.stability.leaving.shapes import Placed, Rays
 from comparisons.experiments.stability.leaving.tracer import COLUMNS, Departures, Ways, scene_of
-from comparisons.geometry import frame
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.mitsuba import translate
 from comparisons.mitsuba.backend import mitsuba
 
 KINDS = ("sphere", "rectangle", "disk", "triangle", "box", "cylinder", "mesh", "instance")
-"""What it has itself, without stand-ins."""
+"""Kinds that it has itself, without proxy geometry."""
 
 
 def depart(placed: Placed, rays: Rays, ways: Ways) -> Departures:
@@ -20,7 +19,7 @@ def depart(placed: Placed, rays: Rays, ways: Ways) -> Departures:
     out = np.zeros((len(rays.o), COLUMNS))
     out[:, 0] = out[:, 13] = np.inf
     mi = mitsuba()
-    mi_scene = translate.load(scene_of(placed), frame.OURS).mi_scene
+    mi_scene = loaded(scene_of(placed))
     for k, (o, d, way) in enumerate(zip(*(a.tolist() for a in (*rays, *ways)), strict=True)):
         _depart(mi, mi_scene, o, d, way, out[k])
     return Departures.of(out)
@@ -40,7 +39,7 @@ def _depart(mi: Any, mi_scene: Any, o: list[float], d: list[float], way: Any, ou
 
 
 def outer(ways: Ways, found: Departures) -> BoolArray:
-    """To which side rays were asked to leave; of those that float32 cannot tell, to which they
-    began: their cosines are below some hundred roundings of it."""
+    """Whether rays were to leave to the outer side; where float32 cannot decide (cosines below some
+    hundred roundings of it), whether they begin there."""
     begun = np.sum((found.start - found.p) * found.n, axis=1) > 0.0
     return np.asarray(np.where(np.abs(ways.local[:, 2]) < 1e-5, begun, ways.outer))

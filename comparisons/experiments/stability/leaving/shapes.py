@@ -11,16 +11,18 @@ import numpy as np
 import trimesh
 
 import reference_rt as rt
-from comparisons.experiments.methods.errors import U
-from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.harness.family import Draw
-from reference_rt.core import transform
+from comparisons.experiments.methods.setting import FloatArray, unit_vectors
+from comparisons.experiments.stability.harness.core import Draw
+from comparisons.experiments.stability.harness.leaving import bound
+from comparisons.experiments.stability.harness.meshes import write_obj
+from comparisons.experiments.stability.harness.steps import matrix, vector
+from comparisons.geometry.float32 import round32
 
 
 class Extent(NamedTuple):
-    """Of a setting's shapes: sizes are 10^size, one axis is `ratio` times as long as another, and
-    `distance` sizes lie between the origin and a shape.  single: whether every number of shapes and
-    rays is rounded to float32 first, so that Mitsuba gets the very same."""
+    """The shapes of a sweep point: sizes are 10^size, one axis is `ratio` times as long as another,
+    and `distance` sizes lie between the origin and a shape.  single: whether every number of shapes
+    and rays is rounded to float32 first, so that Mitsuba gets the very same."""
 
     size: tuple[float, float]
     ratio: tuple[float, float]
@@ -49,12 +51,8 @@ class Placed:
 
     @property
     def bound(self) -> float:
-        """How far a ray may begin off the surface, whatever the shape is: `surface_error`'s
-        16 sqrt(3) u (|anchor| + |p| + extent), where anchors and points have coordinates below
-        |center| + sqrt(3) size, and extents about the anchor are below 3 size; and the rounding of
-        the sum, another sqrt(3) u of a part of that."""
-        largest = float(np.abs(self.center).max())
-        return 17.0 * math.sqrt(3.0) * U * (2.0 * largest + 6.0 * self.size)
+        """B: how far a ray may begin off the surface."""
+        return bound(float(np.abs(self.center).max()), self.size)
 
 
 class Kind(NamedTuple):
@@ -67,12 +65,6 @@ class Kind(NamedTuple):
     inside: Callable[[np.random.Generator, int], FloatArray]
     closed: bool
     convex: bool
-
-
-def matrix(linear: FloatArray, center: FloatArray) -> tuple[transform.Matrix]:
-    """The one step of a transform."""
-    x, y, z = (tuple(row) for row in np.column_stack([linear, center]).tolist())
-    return (transform.Matrix(matrix=(x, y, z)),)
 
 
 def _placed(shape: Any, **fields: Any) -> Callable[..., Any]:
@@ -103,9 +95,7 @@ def _ball() -> Any:
 def _mesh(linear: FloatArray, center: FloatArray, folder: Path, _rng: Any) -> Any:
     file = folder / "ball.obj"
     if not file.exists():
-        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in _ball().vertices.tolist()]
-        lines += [f"f {a} {b} {c}" for a, b, c in (_ball().faces + 1).tolist()]
-        file.write_text("\n".join(lines) + "\n")
+        write_obj(file, _ball().vertices, _ball().faces)
     return rt.Mesh(file=str(file), transform=matrix(linear, center))
 
 
@@ -157,7 +147,7 @@ def _in_ring(rng: np.random.Generator, n: int) -> FloatArray:
 
 def _in_ball(rng: np.random.Generator, n: int) -> FloatArray:
     # The ball of triangles holds one of 0.9.
-    return np.asarray(directions(rng, n) * (0.85 * np.cbrt(rng.random((n, 1)))))
+    return np.asarray(unit_vectors(rng, n) * (0.85 * np.cbrt(rng.random((n, 1)))))
 
 
 def _below_the_hollow(rng: np.random.Generator, n: int) -> FloatArray:
@@ -216,12 +206,6 @@ WHOLE = ("mesh", "solid", "instance")
 """Kinds that are more than a row of a table: each of them is a scene of its own."""
 
 
-def directions(rng: np.random.Generator, n: int) -> FloatArray:
-    """(n, 3), unit, uniform."""
-    v = rng.normal(size=(n, 3))
-    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
-
-
 def _rotation(rng: np.random.Generator) -> FloatArray:
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q = q * np.sign(np.diag(r))
@@ -239,17 +223,14 @@ def place(kind: str, extent: Extent, draw: Draw) -> Placed:
     stretch = size * 10.0 ** rng.permutation(powers)
     linear = _rotation(rng) * stretch
     far = 10.0 ** rng.uniform(*np.log10(extent.distance)) if extent.distance[1] > 0.0 else 0.0
-    center = directions(rng, 1)[0] * (far * size)
+    center = unit_vectors(rng, 1)[0] * (far * size)
     if extent.single:
-        linear, center = (x.astype(np.float32).astype(np.float64) for x in (linear, center))
+        linear, center = round32(linear), round32(center)
     shape = KINDS[kind].make(linear, center, draw.folder, rng)
     if extent.single and kind == "triangle":
-        shape = rt.Triangle(**{k: _single(getattr(shape, k)) for k in ("v0", "v1", "v2")})
+        corners: Any = {k: vector(round32(np.array(getattr(shape, k)))) for k in ("v0", "v1", "v2")}
+        shape = rt.Triangle(**corners)
     return Placed(kind, shape, linear, center, float(np.linalg.norm(linear, axis=0).max()))
-
-
-def _single(point: Any) -> Any:
-    return tuple(np.asarray(point, np.float32).astype(np.float64).tolist())
 
 
 class Rays(NamedTuple):
@@ -261,14 +242,14 @@ class Rays(NamedTuple):
 
 def aim(placed: Placed, n: int, single: bool, rng: np.random.Generator) -> Rays:
     """Rays from some sizes away, as the shape's own coordinates see it."""
-    begin = directions(rng, n) * rng.uniform(2.0, 8.0, (n, 1))
+    begin = unit_vectors(rng, n) * rng.uniform(2.0, 8.0, (n, 1))
     begin[np.abs(begin[:, 2]) < 0.1, 2] = 0.5  # flat shapes are not to be seen edge-on
     target = KINDS[placed.kind].inside(rng, n)
     o = begin @ placed.linear.T + placed.center
     if single:
-        o = o.astype(np.float32).astype(np.float64)
+        o = round32(o)
     d = (target @ placed.linear.T + placed.center) - o
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     if single:
-        d = d.astype(np.float32).astype(np.float64)
+        d = round32(d)
     return Rays(np.ascontiguousarray(o), np.ascontiguousarray(d))

@@ -1,4 +1,4 @@
-"""Rays that meet a shape, leave it, and are followed: the compiled loops."""
+"""Compiled loops: rays meet a shape, leave it, and are traced again."""
 
 import math
 from typing import Any, NamedTuple
@@ -7,11 +7,12 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.leaving.shapes import GROUPS, KINDS, Placed, Rays
+from comparisons.experiments.stability.harness.leaving import ray_leaving
+from comparisons.experiments.stability.leaving.shapes import GROUPS, WHOLE, Placed, Rays
 from reference_rt import shapes as any_shape
 from reference_rt.accel.geometry import Geometry, closest_hit, surface
 from reference_rt.core.arrays import IntArray
-from reference_rt.core.ray import Hit, Ray, SurfacePoint, at, ray_from
+from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, row, to_world
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.shapes.meshes.watertight import shear_of
@@ -19,8 +20,7 @@ from reference_rt.shapes.tables import TABLES
 
 
 class Ways(NamedTuple):
-    """Where rays leave to, seen from the surface: local (n, 3), unit vectors with +z along the
-    outward normal."""
+    """Directions that rays leave to: local (n, 3), unit, +z along the outward normal."""
 
     local: FloatArray
 
@@ -51,18 +51,6 @@ class Departures(NamedTuple):
 
 
 COLUMNS = 15
-
-EPSILON = 1e-4
-"""Of the text-book's offset."""
-
-
-@kernel
-def _leaving(ray: Ray, t: float, point: SurfacePoint, w: Vec3, epsilon: float) -> Ray:
-    """Ours, or for an epsilon above 0 the text-book's ray: it begins at o + t d, and what is nearer
-    than epsilon does not count, so that it might as well begin there."""
-    if epsilon > 0.0:
-        return Ray(at(ray, t) + w * epsilon, w, math.inf)
-    return ray_from(point, w)
 
 
 @kernel
@@ -106,7 +94,7 @@ def _depart(
             continue
         point = surface(geometry, ray, hit)
         w = to_world(frame_from_normal(point.n), row(ways, i))
-        leaving = _leaving(ray, hit.t, point, w, epsilon)
+        leaving = ray_leaving(ray, hit.t, point, w, epsilon)
         met = _meet(geometry, kind, rows[i], leaving)
         n = Vec3(0.0, 0.0, 0.0)
         again = math.inf
@@ -130,7 +118,7 @@ COMPANY = (
 
 
 class Subject(NamedTuple):
-    """A shape to be left: its geometry, and where it stands in it; kind -1: alone in a scene."""
+    """A shape that rays leave: a row of a table of a geometry, or with kind -1 the whole scene."""
 
     geometry: Geometry
     field: str
@@ -144,8 +132,8 @@ class Subject(NamedTuple):
 
 def subjects(kind: str, placed: list[Placed]) -> list[Subject]:
     """Shapes of one kind."""
-    if kind in ("mesh", "solid", "instance"):
-        return [Subject(_scene(p).geometry, "", -1, 0) for p in placed]
+    if kind in WHOLE:
+        return [Subject(rt.build_tables(scene_of(p)).geometry, "", -1, 0) for p in placed]
     shapes = (*(p.shape for p in placed), *COMPANY)
     geometry = rt.build_tables(rt.Scene(shapes=shapes)).geometry
     found = []
@@ -163,10 +151,6 @@ def scene_of(placed: Placed) -> rt.Scene:
     return rt.Scene(shapes=(placed.shape,), groups=groups)
 
 
-def _scene(placed: Placed) -> Any:
-    return rt.build_tables(scene_of(placed))
-
-
 def depart(subject: Subject, rays: Rays, ways: Ways, epsilon: float = 0.0) -> Departures:
     """Rays meet the shape and leave it; with an epsilon above 0, as text-books do."""
     out = np.zeros((len(rays.o), COLUMNS))
@@ -174,6 +158,3 @@ def depart(subject: Subject, rays: Rays, ways: Ways, epsilon: float = 0.0) -> De
     with np.errstate(all="ignore"):
         _depart(subject.geometry, subject.kind, rows, rays.o, rays.d, ways.local, epsilon, out)
     return Departures.of(out)
-
-
-__all__ = ["EPSILON", "KINDS", "Departures", "Subject", "Ways", "depart", "scene_of", "subjects"]

@@ -9,22 +9,14 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
+from comparisons.experiments.stability.harness.bits import of_pixels
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.mitsubas import rendered
 from comparisons.experiments.stability.harness.scenes import SIZE
 from comparisons.experiments.stability.metamorphic.motion import Motion, moved
-from comparisons.experiments.stability.metamorphic.rays import BoolArray
-from comparisons.geometry import frame
+from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.float32 import UNIT_ROUNDOFF as U32
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.scene import picture
-from comparisons.mitsuba.translate import load
 from reference_rt.core.ray import UNIT_ROUNDOFF
 
 ROUNDOFF = {OURS: UNIT_ROUNDOFF, MITSUBA: U32}
@@ -55,7 +47,7 @@ def colours(contestant: str, scene: rt.Scene) -> FloatArray:
         if contestant == OURS:
             return rt.render(scene).colour
         with scalar(), np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite
-            return picture(load(scene, frame.OURS).mi_scene, scene.resolved_sampler.spp, seed=1)
+            return rendered(scene, scene.resolved_sampler.spp, seed=1)
     except (rt.SceneError, RuntimeError):
         return np.full((scene.film.height, scene.film.width, 3), np.nan)
 
@@ -130,13 +122,13 @@ def wrong_pixels(found: FloatArray, base: Before) -> BoolArray:
 
 
 FEW = 0.01
-"""The part of a picture up to which pixels that are wrong are looked at again.  A sample's path and
+"""The part of a picture up to which wrong pixels are checked again.  A sample's path and
 its shadow rays, some 12 segments of a length of about SIZE, pass edges, about as long as the scene
 is large, within `shift` in less than 100 shift / SIZE of all cases: up to offsets of 1e10 sizes
-that is 1 %.  Of more, none is looked at again, and all have failed: this excuses nothing."""
+that is 1 %.  Of more, none is checked again, and all have failed: this excuses nothing."""
 
 AGAIN = 32
-"""Scenes that these are looked for in: everything in them is moved by itself, by `shift` in any
+"""Scenes that these are compared with: everything in them is moved by itself, by `shift` in any
 direction.  Along the normal of an edge each move is uniform in -shift..shift, and the difference of
 two exceeds 1/2 shift in 28 % and shift in 1/8 of all scenes: that no scene of 32 crosses an edge as
 far as rounding can has a chance of 3e-5 or 1.4 %.  A pixel that is wrong for another reason
@@ -162,31 +154,16 @@ def judged(contestant: str, scene: rt.Scene, motion: Motion, mirrored: bool = Fa
         wrong = wrong_pixels(found, base)
     off = np.abs(found - base.picture).max(axis=-1)
     off = np.where(np.isfinite(off), off, np.inf)
-    places = np.argwhere(wrong)[:EXAMPLES]
-    return Outcome(
-        wrong.size,
-        int(np.count_nonzero(wrong)),
+    return of_pixels(
+        wrong,
+        {"before": base.picture, "after": found, "bound": base.bound},
         float(off.max() / base.picture.mean()),
-        0,
-        tuple(_hexadecimal(base, found, int(y), int(x)) for y, x in places),
     )
 
 
 def _anywhere(rng: np.random.Generator, shift: float, part: object) -> FloatArray:
     v = rng.normal(size=3)
     return np.asarray(shift / np.linalg.norm(v) * v)
-
-
-def _hexadecimal(base: Before, found: FloatArray, y: int, x: int) -> dict[str, object]:
-    def told(values: FloatArray) -> list[str]:
-        return [value.hex() for value in values[y, x].tolist()]
-
-    return {
-        "pixel": [x, y],
-        "before": told(base.picture),
-        "after": told(found),
-        "bound": told(base.bound),
-    }
 
 
 def under(motion: Callable[[float], Motion], draw: Draw, x: float) -> dict[str, Outcome]:

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.experiments.stability.harness.scenes import SIZE
+from comparisons.experiments.stability.harness.steps import matrix, vector
 from reference_rt.core import transform
 from reference_rt.shapes.shape import Shape
 
@@ -25,22 +26,16 @@ class Motion(NamedTuple):
         return np.column_stack([self.factor * self.turn, self.offset])
 
     def point(self, p: Sequence[float]) -> tuple[float, float, float]:
-        x, y, z = transform.apply_points(self.affine, np.array([p], np.float64))[0].tolist()
-        return x, y, z
+        return vector(transform.apply_points(self.affine, np.array([p], np.float64))[0])
 
     def vector(self, v: Sequence[float]) -> tuple[float, float, float]:
         """Turned alone."""
-        x, y, z = transform.apply_points(_linear(self.turn), np.array([v], np.float64))[0].tolist()
-        return x, y, z
+        turn = np.column_stack([self.turn, np.zeros(3)])
+        return vector(transform.apply_points(turn, np.array([v], np.float64))[0])
 
     @property
     def step(self) -> transform.Matrix:
-        rows = tuple(tuple(row) for row in self.affine.tolist())
-        return transform.Matrix(matrix=rows)  # type: ignore[arg-type]
-
-
-def _linear(turn: FloatArray) -> transform.Affine:
-    return np.column_stack([turn, np.zeros(3)])
+        return matrix(self.factor * self.turn, np.array(self.offset))[0]
 
 
 def moved(scene: rt.Scene, motion: Motion) -> rt.Scene:

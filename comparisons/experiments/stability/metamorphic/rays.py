@@ -1,27 +1,28 @@
 """What rays hit in a scene and in the same scene transformed."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.methods.setting import unit_rows
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatArray, Outcome
+from comparisons.experiments.stability.harness.mitsubas import traced
+from comparisons.experiments.stability.harness.outcomes import Columns, hexed, outcome
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.metamorphic.motion import Motion
 from comparisons.experiments.stability.metamorphic.solids import Judge
-from comparisons.geometry import frame
+from comparisons.geometry.exact.dyadic import BoolArray
+from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.counterpart import trace
-from comparisons.mitsuba.translate import load
 from comparisons.rungs.rays.arbiter import directions
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 
-BoolArray = npt.NDArray[np.bool_]
 Identities = npt.NDArray[np.int64]
 
 Outcomes = dict[str, Outcome]
@@ -62,7 +63,7 @@ def mitsubas(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Found:
     try:
         with scalar(), np.errstate(over="ignore", invalid="ignore"):
             # What float32 cannot hold becomes infinite.
-            return found_of(trace(load(scene, frame.OURS), o, d))
+            return found_of(traced(scene, o, d))
     except RuntimeError:
         return Found(np.full(len(o), np.inf), np.full((len(o), 4), -2))
 
@@ -75,7 +76,7 @@ def aimed(tables: SceneTables, n: int, rng: np.random.Generator) -> Rays:
     """
     o = (1.0, 2.0, 7.0) + np.rint(rng.uniform(-1.0, 1.0, (n, 3)) * GRID) / GRID
     ends = rng.uniform(-3.0, 3.0, (2, n, 3)) - o
-    a, b = (round32(unit(end)) for end in ends)
+    a, b = (round32(unit_rows(end)) for end in ends)
     kind = np.arange(n) % 3
     pairs = np.flatnonzero((kind > 0) & differ(ours(tables, o, a), ours(tables, o, b)))
     low, high = np.zeros(len(pairs)), np.ones(len(pairs))
@@ -95,14 +96,6 @@ def aimed(tables: SceneTables, n: int, rng: np.random.Generator) -> Rays:
     return Rays(o, a, coarse)
 
 
-def unit(v: FloatArray) -> FloatArray:
-    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
-
-
-def round32(v: FloatArray) -> FloatArray:
-    return v.astype(np.float32).astype(np.float64)
-
-
 def differ(a: Found, b: Found) -> BoolArray:
     """Which rays do not hit the same thing."""
     return np.asarray((a.identities != b.identities).any(axis=1))
@@ -115,7 +108,7 @@ def through(motion: Motion, rays: Rays) -> tuple[FloatArray, FloatArray]:
     return o, d
 
 
-class Asked(NamedTuple):
+class Traced(NamedTuple):
     """Rays, and what they found in a scene;  names: the identities in terms of the scene that this
     one is compared with, where shapes have other numbers there."""
 
@@ -126,7 +119,7 @@ class Asked(NamedTuple):
     names: Identities | None = None
 
 
-def _changed(before: Asked, after: Asked) -> BoolArray:
+def _changed(before: Traced, after: Traced) -> BoolArray:
     names = after.found.identities if after.names is None else after.names
     return differ(before.found, Found(after.found.t, names))
 
@@ -139,61 +132,49 @@ with unit rows and their sums by 3 u |o - anchor|.  No anchor is further than 12
 and L is 6 at least: 4 u 12 = 8 u 6.  What is then solved rounds more; to allow less is stricter."""
 
 AROUND = np.concatenate([directions(16), 0.3 * directions(8)])
-"""Moves, of that size, that a differing ray is asked with."""
+"""Moves, of that size, at which exact arithmetic repeats a differing ray."""
 
 
 def judged(
-    before: Asked, after: Asked, factor: float, exact: bool, unmoved: bool = False
+    before: Traced, after: Traced, factor: float, exact: bool, unmoved: bool = False
 ) -> Outcome:
     """Ours.  exact: the transformed numbers are the numbers meant, and the answers must be the
     same to the last bit of t;  else where answers differ each must be right in its own scene, by
     exact arithmetic: where rounding the scene has really changed what is there, both are;
     unmoved: each must be right in the scene before.
     """
-    changed = _changed(before, after)
-    t0, t1 = before.found.t, after.found.t / factor
-    same = np.isfinite(t0) & ~changed
-    off = np.abs(t1[same] - t0[same]) / t0[same]
-    worst = float(off.max(initial=0.0))
-    open_ = np.zeros(len(t0), bool)
+    changed, moved, worst = _compared(before, after, factor)
+    open_ = np.zeros(len(changed), bool)
     if exact:
-        wrong = changed | (same & (t0 != t1))
+        wrong = changed | moved
     else:
         wrong = changed.copy()
         rows = np.flatnonzero(changed)
         judged_as = before._replace(found=after.found) if unmoved else after
         right, open_[rows] = _both_right(before, judged_as, rows)
         wrong[rows[right]] = False
-    wrong &= ~open_
-    rows = np.flatnonzero(wrong)[:EXAMPLES]
-    return Outcome(
-        int(len(t0) - np.count_nonzero(open_)),
-        int(np.count_nonzero(wrong)),
-        worst,
-        int(np.count_nonzero(open_)),
-        tuple(_example(before, after, int(k)) for k in rows),
-    )
+    return outcome(wrong, {"before": _shown(before), "after": _shown(after)}, open_, worst)
 
 
 def _both_right(
-    before: Asked, after: Asked, rows: npt.NDArray[np.int64]
+    before: Traced, after: Traced, rows: npt.NDArray[np.int64]
 ) -> tuple[BoolArray, BoolArray]:
     """Of some rays: whether both answers are those of exact arithmetic for a ray within BAND, and
     whether the arbiter leaves one open."""
     right, touching = np.ones(len(rows), bool), np.zeros(len(rows), bool)
-    for asked in (before, after):
+    for case in (before, after):
         # What is wrong before is wrong.
         left = np.flatnonzero(right)
-        right[left], touching[left] = _right(asked, rows[left])
+        right[left], touching[left] = _right(case, rows[left])
     return right, touching
 
 
-def _right(asked: Asked, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolArray]:
-    """Most are right for the very ray: only others, some 3 ms each, are asked around it."""
+def _right(case: Traced, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolArray]:
+    """Most are right for the very ray: only the others, some 3 ms each, are repeated around it."""
     if len(rows) == 0:
         return np.ones(0, bool), np.zeros(0, bool)
-    judge, o, d = Judge(asked.scene), asked.o[rows], asked.d[rows]
-    names, t = asked.found.identities[rows], asked.found.t[rows]
+    judge, o, d = Judge(case.scene), case.o[rows], case.d[rows]
+    names, t = case.found.identities[rows], case.found.t[rows]
     met = judge.decide(o, d)
     right = np.array([m.allows(*answer) for m, *answer in zip(met, names, t, strict=True)])
     touching = np.array([m.touching for m in met])
@@ -209,36 +190,26 @@ def _right(asked: Asked, rows: npt.NDArray[np.int64]) -> tuple[BoolArray, BoolAr
     return right, touching
 
 
-def judged_mitsuba(before: Asked, after: Asked, factor: float) -> Outcome:
+def judged_mitsuba(before: Traced, after: Traced, factor: float) -> Outcome:
     """Its rays pass every edge at more than 1e-5 of the way: what float64's rounding of the scene
     moves, 1e-16 of its size, changes none of them."""
-    wrong = _changed(before, after)
+    wrong, _, worst = _compared(before, after, factor)
+    return outcome(wrong, {"before": _shown(before), "after": _shown(after)}, worst=worst)
+
+
+def _compared(before: Traced, after: Traced, factor: float) -> tuple[BoolArray, BoolArray, float]:
+    """Which rays hit something else; which hit the same at another t; by how much at most, of t."""
+    changed = _changed(before, after)
     t0, t1 = before.found.t, after.found.t / factor
-    same = np.isfinite(t0) & ~wrong
-    worst = float((np.abs(t1[same] - t0[same]) / t0[same]).max(initial=0.0))
-    rows = np.flatnonzero(wrong)[:EXAMPLES]
-    examples = tuple(_example(before, after, int(k)) for k in rows)
-    return Outcome(len(wrong), int(np.count_nonzero(wrong)), worst, 0, examples)
+    same = np.isfinite(t0) & ~changed
+    off = np.abs(t1[same] - t0[same]) / t0[same]
+    return changed, same & (t0 != t1), float(off.max(initial=0.0))
 
 
-def _example(before: Asked, after: Asked, k: int) -> dict[str, Any]:
-    def told(asked: Asked) -> dict[str, Any]:
-        return {
-            "o": [x.hex() for x in asked.o[k].tolist()],
-            "d": [x.hex() for x in asked.d[k].tolist()],
-            "t": float(asked.found.t[k]).hex(),
-            "shape, instance, part, primitive": asked.found.identities[k].tolist(),
-        }
-
-    return {"before": told(before), "after": told(after)}
-
-
-def added(one: Mapping[str, Outcome], other: Mapping[str, Outcome]) -> Outcomes:
-    """Contestant by contestant."""
-    found = dict(one)
-    for name, outcome in other.items():
-        found[name] = found[name] + outcome if name in found else outcome
-    return found
+def _shown(case: Traced) -> Callable[[int], dict[str, Any]]:
+    columns: Columns = {"o": case.o, "d": case.d, "t": case.found.t}
+    columns["shape, instance, part, primitive"] = case.found.identities
+    return lambda k: {name: hexed(column[k]) for name, column in columns.items()}
 
 
 class Bench:
@@ -250,8 +221,37 @@ class Bench:
         tables = rt.build_tables(scene)
         self.rays = aimed(tables, cases, rng)
         o, d, coarse = self.rays
-        self.ours = Asked(scene, o, d, ours(tables, o, d))
+        self.ours = Traced(scene, o, d, ours(tables, o, d))
         self.mitsuba = None
         if mitsuba:
             o, d = o[coarse], d[coarse]
-            self.mitsuba = Asked(scene, o, d, mitsubas(scene, o, d))
+            self.mitsuba = Traced(scene, o, d, mitsubas(scene, o, d))
+
+    def compared(
+        self,
+        scene: rt.Scene,
+        o: FloatArray,
+        d: FloatArray,
+        names: Callable[[Identities], Identities] | None = None,
+        factor: float = 1.0,
+        exact: bool = False,
+        unmoved: bool = False,
+    ) -> Outcomes:
+        """The rays, as they are transformed, in the scene transformed.  names: identities in terms
+        of the scene before, of those after;  factor, exact, unmoved: see `judged`."""
+
+        def case(o: FloatArray, d: FloatArray, found: Found) -> Traced:
+            return Traced(scene, o, d, found, names(found.identities) if names else None)
+
+        after = case(o, d, self.found_after(scene, o, d))
+        outcomes = {OURS: judged(self.ours, after, factor, exact, unmoved)}
+        if self.mitsuba is not None:
+            o, d = o[self.rays.coarse], d[self.rays.coarse]
+            after = case(o, d, mitsubas(scene, o, d))
+            outcomes[MITSUBA] = judged_mitsuba(self.mitsuba, after, factor)
+        return outcomes
+
+    @staticmethod
+    def found_after(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Found:
+        """By ours."""
+        return ours(rt.build_tables(scene), o, d)

@@ -1,13 +1,17 @@
 """The same shapes in another order, in other meshes, in groups."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.family import MITSUBA, OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.meshes import write_obj
+from comparisons.experiments.stability.harness.outcomes import together
+from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.rays import Identities
 from reference_rt.core import transform
@@ -17,28 +21,21 @@ REVERSED, SHUFFLED, TRIANGLES, SPLIT = 0.0, 1.0, 2.0, 3.0
 
 def rearranged(draw: Draw, x: float) -> dict[str, Outcome]:
     """Rays and pictures, bit for bit."""
+    return together(_rearranged(draw, x))
+
+
+def _rearranged(draw: Draw, x: float) -> Iterator[dict[str, Outcome]]:
     change = _reordered if x in (REVERSED, SHUFFLED) else _remeshed
-    total: dict[str, Outcome] = {}
     for make in (scenes.things, scenes.curves, scenes.solids):
         scene = make(draw.folder)
         bench = rays.Bench(scene, draw.cases, draw.rng, draw.mitsuba and make is scenes.things)
         other, old_names = change(scene, draw, x)
-        o, d, coarse = bench.rays
-        found = rays.ours(rt.build_tables(other), o, d)
-        after = rays.Asked(other, o, d, found, old_names(found.identities))
-        outcomes = {OURS: rays.judged(bench.ours, after, 1.0, exact=True)}
-        if bench.mitsuba is not None:
-            o, d = o[coarse], d[coarse]
-            found = rays.mitsubas(other, o, d)
-            after = rays.Asked(other, o, d, found, old_names(found.identities))
-            outcomes[MITSUBA] = rays.judged_mitsuba(bench.mitsuba, after, 1.0)
-        total = rays.added(total, outcomes)
+        yield bench.compared(other, bench.rays.o, bench.rays.d, old_names, exact=True)
     for make in (scenes.path, scenes.whitted):
         scene = make(draw.folder)
         other, _ = change(scene, draw, x)
         wrong = (light.colours(OURS, scene) != light.colours(OURS, other)).any(axis=-1)
-        total[OURS] += Outcome(wrong.size, int(np.count_nonzero(wrong)))
-    return total
+        yield {OURS: Outcome(wrong.size, int(np.count_nonzero(wrong)))}
 
 
 def _reordered(scene: rt.Scene, draw: Draw, x: float) -> tuple[rt.Scene, Any]:
@@ -65,7 +62,7 @@ def _remeshed(scene: rt.Scene, draw: Draw, x: float) -> tuple[rt.Scene, Any]:
     parts = [order] if x == TRIANGLES else [order[: count // 3], order[count // 3 :]]
     files = [f"part_{k}.obj" for k in range(len(parts))]
     for file, part in zip(files, parts, strict=True):
-        scenes.write_mesh(draw.folder / file, ball.vertices, ball.faces[part])
+        write_obj(draw.folder / file, ball.vertices, ball.faces[part])
     shapes: list[Any] = []
     owner: list[int] = []
     primitive: list[Any] = []
@@ -96,39 +93,26 @@ def _remeshed(scene: rt.Scene, draw: Draw, x: float) -> tuple[rt.Scene, Any]:
 
 def nested(draw: Draw, x: float) -> dict[str, Outcome]:
     """Shapes under one map, against instances of groups whose maps compose to it."""
-    total: dict[str, Outcome] = {}
-    for make in (scenes.things, scenes.curves):
-        scene = make(draw.folder)
-        shapes = [s for s in scene.shapes if not isinstance(s, rt.Instance | rt.Plane)]
-        steps = _steps(draw.rng, int(x))
-        baked = tuple(s.model_copy(update={"transform": (*s.transform, *steps)}) for s in shapes)
-        bench = rays.Bench(
-            scene.changed(shapes=baked, groups={}),
-            draw.cases,
-            draw.rng,
-            draw.mitsuba and make is scenes.things,
-        )
-        grouped = scene.changed(shapes=(), groups={}).changed(**_groups(shapes, steps))
-        o, d, coarse = bench.rays
-        found = rays.ours(rt.build_tables(grouped), o, d)
-        after = rays.Asked(grouped, o, d, found, _baked_names(found.identities))
-        outcomes = {OURS: rays.judged(bench.ours, after, 1.0, exact=False)}
-        if bench.mitsuba is not None:
-            o, d = o[coarse], d[coarse]
-            found = rays.mitsubas(grouped, o, d)
-            after = rays.Asked(grouped, o, d, found, _baked_names(found.identities))
-            outcomes[MITSUBA] = rays.judged_mitsuba(bench.mitsuba, after, 1.0)
-        total = rays.added(total, outcomes)
-    return total
+    return together(_nested(draw, x, make) for make in (scenes.things, scenes.curves))
+
+
+def _nested(draw: Draw, x: float, make: Callable[[Path], rt.Scene]) -> dict[str, Outcome]:
+    scene = make(draw.folder)
+    shapes = [s for s in scene.shapes if not isinstance(s, rt.Instance | rt.Plane)]
+    steps = _steps(draw.rng, int(x))
+    baked = tuple(s.model_copy(update={"transform": (*s.transform, *steps)}) for s in shapes)
+    bare, takes_part = scene.changed(shapes=baked, groups={}), make is scenes.things
+    bench = rays.Bench(bare, draw.cases, draw.rng, draw.mitsuba and takes_part)
+    grouped = scene.changed(shapes=(), groups={}).changed(**_groups(shapes, steps))
+    return bench.compared(grouped, bench.rays.o, bench.rays.d, _baked_names)
 
 
 def _steps(rng: np.random.Generator, depth: int) -> list[transform.Matrix]:
     """Maps near the identity, no two alike."""
-    found = []
+    found: list[transform.Matrix] = []
     for _ in range(depth):
         linear = np.eye(3) + 0.3 / depth * rng.normal(size=(3, 3))
-        rows = np.column_stack([linear, 0.3 / depth * rng.normal(size=3)])
-        found.append(transform.Matrix(matrix=tuple(map(tuple, rows.tolist()))))  # type: ignore[arg-type]
+        found += matrix(linear, 0.3 / depth * rng.normal(size=3))
     return found
 
 

@@ -1,4 +1,4 @@
-"""Pictures of what F9 finds, 192 pixels wide."""
+"""Images of F9's failures, 192 pixels wide."""
 
 import tempfile
 from collections.abc import Callable
@@ -8,10 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
+from comparisons.experiments.methods.setting import unit_rows
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.family import OURS, FloatArray, Shot
+from comparisons.experiments.stability.harness.core import OURS, FloatArray, Shot
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.motion import Motion, moved
+from comparisons.geometry.exact.dyadic import BoolArray
+from comparisons.geometry.float32 import round32
 
 WIDTH, HEIGHT = 192, 144
 
@@ -39,7 +42,7 @@ def shoot_rays(motion: Callable[[float], Motion], contestant: str, x: float) -> 
     with tempfile.TemporaryDirectory() as folder:
         scene = scenes.things(Path(folder))
         o = np.tile(scene.camera.eye, (WIDTH * HEIGHT, 1))
-        d = rays.round32(_directions(scene))
+        d = round32(_directions(scene))
         pixels = rays.Rays(o, d, np.ones(len(o), bool))
         answers = []
         for one in (Motion(), motion(x)):
@@ -64,12 +67,12 @@ def _directions(scene: rt.Scene) -> FloatArray:
     x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
     view = scene.camera.setup(WIDTH, HEIGHT)
     across, down = x.reshape(-1, 1) / WIDTH, y.reshape(-1, 1) / HEIGHT
-    return rays.unit(
+    return unit_rows(
         np.array(view.corner) + np.array(view.right) * across + np.array(view.down) * down
     )
 
 
-def _percent(some: rays.BoolArray) -> str:
+def _percent(some: BoolArray) -> str:
     return f"{100.0 * np.mean(some):.2g} %"
 
 

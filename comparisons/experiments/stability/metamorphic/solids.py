@@ -1,7 +1,8 @@
 """What rays may hit in a scene with solids: exact arithmetic, and F7's law on what is resolved.
 
-Crossings of operands further apart than twice the sum of the widths which ours states are told
-apart (`f07_lists.truths`); what lies between others may show or not.  No number is chosen here.
+Crossings of operands further apart than twice the sum of the widths which ours states can be told
+apart (`harness.solids.truths`); what lies between others may show or not.  No number is chosen
+here.
 """
 
 from typing import NamedTuple
@@ -9,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray
-from comparisons.experiments.stability.solids.lists import Truth, truths
+from comparisons.experiments.stability.harness.core import FloatArray
+from comparisons.experiments.stability.harness.solids import Truth, truths
 from comparisons.geometry.exact.dyadic import nearest
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.exact.referee import Truth as First

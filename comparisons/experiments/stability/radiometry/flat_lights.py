@@ -1,4 +1,4 @@
-"""Solid angles of rectangles and triangles, as the densities of light samples say them.
+"""Solid angles of rectangles and triangles, implied by the densities of light samples.
 
 Nothing is left to chance: a light sample is a function of two random numbers, and the mean of
 1 / pdf over all of them, an integral over the unit square, is the light's solid angle whatever the
@@ -13,25 +13,19 @@ from typing import Any
 import numpy as np
 from flint import arb, ctx
 
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-    decades,
-)
+from comparisons.experiments.methods.setting import unit_vectors
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
+from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
 from comparisons.experiments.stability.harness.outcomes import (
-    hexed,
-    outcome,
+    of_errors,
+    plain,
     relative,
     together,
     unit_of,
 )
 from comparisons.experiments.stability.radiometry.solid_angles import theirs
 from comparisons.geometry.float32 import round32
-from comparisons.mitsuba.backend import mitsuba
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes.flat import rectangle
@@ -116,9 +110,8 @@ def _exact(corners: Any, p: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _points(rng: np.random.Generator, n: int, x: float) -> FloatArray:
     """Above the plane, of solid angles near 1 / x: in turn at least 3 away in all directions,
     and beside the shape at a grazing angle."""
-    v = rng.normal(size=(n, 3))
+    v = unit_vectors(rng, n)
     v[:, 2] = np.abs(v[:, 2])
-    v /= np.linalg.norm(v, axis=1, keepdims=True)
     far = v * np.maximum(3.0, np.sqrt(4.0 * np.maximum(v[:, 2:], 1e-3) * x))
     phi = rng.uniform(0.0, 2.0 * math.pi, n)
     r = rng.uniform(4.0, 12.0, n)
@@ -146,20 +139,16 @@ def _mean(densities: Densities, p: FloatArray, nodes: int) -> FloatArray:
 
 
 def _compare(
-    name: str, corners: Any, p: FloatArray, asked: dict[str, Densities]
+    name: str, corners: Any, p: FloatArray, methods: dict[str, Densities]
 ) -> dict[str, Outcome]:
     truth, condition = _exact(corners, p)
     outcomes = {}
-    for who, densities in asked.items():
+    for who, densities in methods.items():
         mean, coarse = (_mean(densities, p, nodes) for nodes in RULES)
         doubt = relative(coarse, mean)
         allowed = 64.0 * unit_of(who) * condition + np.minimum(doubt, DOUBT)
-
-        def ask(i: int, mean: FloatArray = mean) -> Any:
-            told = {"shape": name, "point": hexed(p[i]), "solid angle": float(truth[i])}
-            return {**told, "found": float(mean[i])}
-
-        outcomes[who] = outcome(relative(mean, truth), allowed, ask)
+        shown = {"shape": name, "point": p, "solid angle": plain(truth), "found": plain(mean)}
+        outcomes[who] = of_errors(relative(mean, truth), allowed, shown)
     return outcomes
 
 
@@ -176,7 +165,7 @@ def _triangle_densities(p: FloatArray, u: FloatArray) -> FloatArray:
     return out
 
 
-def _asked(draw: Draw, ours: Densities, shape: Callable[[], Any]) -> dict[str, Densities]:
+def _methods(draw: Draw, ours: Densities, shape: Callable[[], Any]) -> dict[str, Densities]:
     if not draw.mitsuba:
         return {OURS: ours}
     loaded = shape()
@@ -188,14 +177,14 @@ def _asked(draw: Draw, ours: Densities, shape: Callable[[], Any]) -> dict[str, D
 
 
 def _square(draw: Draw, p: FloatArray) -> dict[str, Outcome]:
-    asked = _asked(draw, _rectangle_densities, lambda: {"type": "rectangle"})
-    return _compare("rectangle", SQUARE, p, asked)
+    methods = _methods(draw, _rectangle_densities, lambda: {"type": "rectangle"})
+    return _compare("rectangle", SQUARE, p, methods)
 
 
 def _flat(draw: Draw, x: float) -> dict[str, Outcome]:
     p = _points(draw.rng, draw.cases, x)
-    asked = _asked(draw, _triangle_densities, _mitsuba_triangle)
-    return together([_square(draw, p), _compare("triangle", CORNERS, p, asked)])
+    methods = _methods(draw, _triangle_densities, _mitsuba_triangle)
+    return together([_square(draw, p), _compare("triangle", CORNERS, p, methods)])
 
 
 def _sky(draw: Draw, x: float) -> dict[str, Outcome]:
@@ -203,23 +192,20 @@ def _sky(draw: Draw, x: float) -> dict[str, Outcome]:
 
 
 def _mitsuba_triangle() -> Any:
-    mi = mitsuba()
-    mesh = mi.Mesh("triangle", 3, 1)
-    values = mi.traverse(mesh)
-    values["vertex_positions"] = np.array(CORNERS, np.float32).ravel()
-    values["faces"] = np.array([0, 1, 2], np.uint32)
-    values.update()
-    return mesh
+    return mitsuba_mesh(np.array(CORNERS), np.array([[0, 1, 2]]))
 
 
 FLAT = Series(
     "flat lights",
-    "1 / solid angle",
+    Sweep(
+        "1 / solid angle",
+        (1.0, 1e1, 1e2, 1e3, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14, 1e16, 1e18, 1e20),
+        (1.0, 1e3, 1e6, 1e12, 1e20),
+        200,
+        2_000,
+    ),
     "The mean of 1 / pdf over the random numbers of a sample of a rectangle and of a triangle, "
     "three half edges away or more, or beside them at a grazing angle.",
-    (1.0, 1e1, 1e2, 1e3, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14, 1e16, 1e18, 1e20),
-    (1.0, 1e3, 1e6, 1e12, 1e20),
-    {"quick": 200, "full": 2_000},
     _flat,
     unit="of the value",
     explained="both draw points of the area, whose densities hold no difference of numbers that "
@@ -227,13 +213,10 @@ FLAT = Series(
 )
 SKY = Series(
     "lights that fill the sky",
-    "half edge / height",
+    Sweep("half edge / height", decades(0, 12), (1.0, 1e3, 1e12), 200, 2_000),
     "The mean of 1 / pdf over the random numbers of a sample of a rectangle right above.  Samples "
     "uniform over its area miss the part that counts: right in the mean of very many, but 400, "
     "as well placed as 400 can be, say another solid angle.",
-    decades(0, 12),
-    (1.0, 1e3, 1e12),
-    {"quick": 200, "full": 2_000},
     _sky,
     unit="of the value",
 )

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.furnaces.closed import closed
-from comparisons.experiments.stability.harness.family import Draw, Outcome, Series, decades
+from comparisons.experiments.stability.harness.core import Draw, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.outcomes import together, unit_of
-from comparisons.experiments.stability.harness.worlds import World, at, facing, grey, measure
-from reference_rt.core import transform
+from comparisons.experiments.stability.harness.rooms import closed
+from comparisons.experiments.stability.harness.steps import at, scaled, turned
+from comparisons.experiments.stability.harness.worlds import World, grey, measure
 
 RHO = 0.5
 KINDS = ("disk", "sphere", "rectangle", "triangle")
@@ -23,8 +24,8 @@ def _rounding(who: str) -> float:
 
 def _lamp(kind: str, size: float, height: float) -> tuple[Any, float]:
     """A lamp right above the origin that shines down, and its irradiance there per radiance."""
-    scale = transform.Scale(scale=(size, size, 1.0))
-    place = (scale, facing((1, 0, 0), 90), at(0, height, 0))
+    scale = scaled(size, size, 1.0)
+    place = (scale, turned(90), at(0, height, 0))
     ratio = (size / height) ** 2
     if kind == "disk":
         return rt.Disk(transform=place, material="lamp"), math.pi * ratio / (1.0 + ratio)
@@ -50,8 +51,8 @@ def _lamp(kind: str, size: float, height: float) -> tuple[Any, float]:
 def lit_floor(kind: str, size: float, radiance: float) -> World:
     """The floor right under a lamp that is as far above as two of its sizes."""
     lamp, irradiance = _lamp(kind, size, 2.0 * size)
-    wide = transform.Scale(scale=(30.0 * size,) * 3)
-    floor = rt.Rectangle(material="floor", transform=(wide, facing((1, 0, 0), -90)))
+    wide = scaled(30.0 * size)
+    floor = rt.Rectangle(material="floor", transform=(wide, turned(-90)))
     camera = rt.Orthographic(
         eye=(0, 0.5 * size, 0), target=(0, 0, 0), up=(0, 0, -1), width=1e-9 * size
     )
@@ -69,8 +70,8 @@ def _area(draw: Draw, x: float) -> dict[str, Outcome]:
     found = []
     for size in {math.sqrt(x), 1.0 / math.sqrt(x)}:
         for kind in KINDS:
-            told = {"lamp": kind, "size": size}
-            found.append(measure(lit_floor(kind, size, 1.0), draw, 16, _rounding, told))
+            shown = {"lamp": kind, "size": size}
+            found.append(measure(lit_floor(kind, size, 1.0), draw, 16, _rounding, shown))
     return together(found)
 
 
@@ -78,8 +79,8 @@ def _radiance(draw: Draw, x: float) -> dict[str, Outcome]:
     found = []
     for radiance in {x, 1.0 / x}:
         for kind in ("sphere", "rectangle"):
-            told = {"lamp": kind, "radiance": radiance}
-            found.append(measure(lit_floor(kind, 1.0, radiance), draw, 16, _rounding, told))
+            shown = {"lamp": kind, "radiance": radiance}
+            found.append(measure(lit_floor(kind, 1.0, radiance), draw, 16, _rounding, shown))
     return together(found)
 
 
@@ -88,29 +89,23 @@ def _roulette(draw: Draw, x: float) -> dict[str, Outcome]:
     for albedo in (0.5, 0.9, 0.99):
         world = closed(albedo, int(x), rr_depth=1)
         spp = 16 if draw.effort == "quick" else 64
-        told = {"albedo": albedo, "edges": int(x)}
-        found.append(measure(world, draw, spp, _rounding, told, in_scalar=False, their_pixels=32))
+        shown = {"albedo": albedo, "edges": int(x)}
+        found.append(measure(world, draw, spp, _rounding, shown, in_scalar=False, their_pixels=32))
     return together(found)
 
 
 AREA = Series(
     "light area",
-    "area, or 1 / area",
+    Sweep("area, or 1 / area", decades(0, 12, 2), (1.0, 1e8, 1e12), 8, 8),
     "Disks, spheres, rectangles and triangles of areas x and 1 / x light a floor two of their "
     "sizes below; all is scaled with them.  A case is a picture whose pixels see one point.",
-    decades(0, 12, 2),
-    (1.0, 1e8, 1e12),
-    {"quick": 8, "full": 8},
     _area,
     unit="of the value",
 )
 RADIANCE = Series(
     "radiance",
-    "radiance, or 1 / radiance",
+    Sweep("radiance, or 1 / radiance", (1.0, 1e5, 1e10, 1e15, 1e20, 1e25, 1e30), (1.0, 1e30), 4, 4),
     "A sphere and a rectangle of radiance x and 1 / x light a floor.  A case is a picture.",
-    (1.0, 1e5, 1e10, 1e15, 1e20, 1e25, 1e30),
-    (1.0, 1e30),
-    {"quick": 4, "full": 4},
     _radiance,
     unit="of the value",
     explained="1e-30 to 1e30 lie within float32's range, and radiance is a factor of all light: "
@@ -118,12 +113,9 @@ RADIANCE = Series(
 )
 ROULETTE = Series(
     "roulette",
-    "edges of a path",
+    Sweep("edges of a path", (1.0, 2.0, 5.0, 10.0, 30.0, 1e2, 3e2, 1e3), (2.0, 30.0, 1e3), 3, 3),
     "A closed furnace of albedo 0.5, 0.9 and 0.99, paths of up to x edges, Russian roulette at "
     "each of them.  A case is a picture.",
-    (1.0, 2.0, 5.0, 10.0, 30.0, 1e2, 3e2, 1e3),
-    (2.0, 30.0, 1e3),
-    {"quick": 3, "full": 3},
     _roulette,
     unit="of the value",
     explained="no number grows with depth.  What Mitsuba's cap of 0.95 on survival costs at an "

@@ -6,16 +6,10 @@ from typing import Any
 import numpy as np
 from flint import arb, ctx
 
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-    decades,
-)
-from comparisons.experiments.stability.harness.outcomes import hexed, outcome, unit_of
+from comparisons.experiments.methods.setting import unit_vectors
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
+from comparisons.experiments.stability.harness.outcomes import hexed, of_errors, plain, unit_of
 from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
@@ -26,11 +20,6 @@ from reference_rt.lights.emitters.spot import Spot
 
 VISIBLE = 1e-3
 """Of the full intensity: what may be off by rounding where the cone is as thin as float32."""
-
-
-def _unit(rng: np.random.Generator, n: int) -> FloatArray:
-    v = rng.normal(size=(n, 3))
-    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
 
 
 def _theirs(light: dict[str, Any], p: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -54,7 +43,7 @@ def _distance(draw: Draw, x: float) -> dict[str, Outcome]:
     """At the distances x and 1 / x, in all directions."""
     n = draw.cases
     far = np.where(np.arange(n) % 2 == 0, x, 1.0 / x) * draw.rng.uniform(1.0, 2.0, n)
-    p = round32(_unit(draw.rng, n) * far[:, None])
+    p = round32(unit_vectors(draw.rng, n) * far[:, None])
     light = Point(position=(0.0, 0.0, 0.0), intensity=(1.0, 1.0, 1.0))
     table = light.tabulate()
     sampled = [point.sample(table, 0, Vec3(*at)) for at in p.tolist()]
@@ -76,19 +65,15 @@ def _distance(draw: Draw, x: float) -> dict[str, Outcome]:
             errors = np.maximum(
                 np.abs(arriving - exact) / exact, np.linalg.norm(wi - towards, axis=1)
             )
-
-        def ask(i: int, arriving: FloatArray = arriving) -> Any:
-            told = {"light": "at the origin", "point": hexed(p[i]), "irradiance": exact[i]}
-            return {**told, "found": float(arriving[i])}
-
-        outcomes[who] = outcome(errors, 8.0 * unit_of(who), ask)
+        shown = {"light": "at the origin", "point": p, "irradiance": plain(exact)}
+        outcomes[who] = of_errors(errors, 8.0 * unit_of(who), shown | {"found": plain(arriving)})
     return outcomes
 
 
 def _spot(draw: Draw, x: float) -> dict[str, Outcome]:
-    """One cone per setting, points from its axis to a little beyond its rim."""
+    """One cone per sweep point, receivers from its axis to a little beyond its rim."""
     n, cutoff = draw.cases, 1.0 / x
-    target = round32(_unit(draw.rng, 1))[0]
+    target = round32(unit_vectors(draw.rng, 1))[0]
     light = Spot(
         origin=(0.0, 0.0, 0.0),
         target=tuple(target.tolist()),
@@ -97,7 +82,7 @@ def _spot(draw: Draw, x: float) -> dict[str, Outcome]:
     )
     table = light.tabulate()
     axis = target / np.linalg.norm(target)
-    across = np.cross(axis, _unit(draw.rng, n))
+    across = np.cross(axis, unit_vectors(draw.rng, n))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     angle = math.radians(cutoff) * draw.rng.uniform(0.0, 1.2, (n, 1))
     far = 10.0 ** draw.rng.uniform(-3.0, 3.0, (n, 1))
@@ -125,12 +110,9 @@ def _spot(draw: Draw, x: float) -> dict[str, Outcome]:
     for who, value in found.items():
         unit = unit_of(who)
         allowed = min(VISIBLE, 16.0 * unit * (1.0 + 1.0 / math.radians(0.25 * cutoff)))
-
-        def ask(i: int, value: FloatArray = value) -> Any:
-            told = {"target": hexed(target), "cutoff in degrees": cutoff, "point": hexed(p[i])}
-            return {**told, "falloff": float(exact[i]), "found": float(value[i])}
-
-        outcomes[who] = outcome(np.abs(value - exact), allowed, ask)
+        shown = {"target": hexed(target), "cutoff in degrees": cutoff, "point": p}
+        shown |= {"falloff": plain(exact), "found": plain(value)}
+        outcomes[who] = of_errors(np.abs(value - exact), allowed, shown)
     return outcomes
 
 
@@ -150,12 +132,9 @@ def _falloffs(target: FloatArray, cutoff: float, p: FloatArray) -> FloatArray:
 
 DISTANCE = Series(
     "point light",
-    "distance, or 1 / distance",
+    Sweep("distance, or 1 / distance", decades(0, 9), (1.0, 1e3, 1e9), 2_000, 20_000),
     "A point light of intensity 1 at the origin, receivers at x and at 1 / x: irradiance and "
     "direction.",
-    decades(0, 9),
-    (1.0, 1e3, 1e9),
-    {"quick": 2_000, "full": 20_000},
     _distance,
     unit="of the value",
     explained="1 / d² of 1e-9 to 1e9 is a float of 32 bits as well, and a root, squares and a "
@@ -163,12 +142,11 @@ DISTANCE = Series(
 )
 SPOT = Series(
     "spot",
-    "1 / cutoff in degrees",
+    Sweep(
+        "1 / cutoff in degrees", (0.05, 0.1, *decades(0, 6)), (0.05, 1.0, 1e3, 1e6), 2_000, 20_000
+    ),
     "Points from a spot's axis to beyond its rim, at distances from 1e-3 to 1e3; the beam is three "
     "quarters of the cone.",
-    (0.05, 0.1, *decades(0, 6)),
-    (0.05, 1.0, 1e3, 1e6),
-    {"quick": 2_000, "full": 20_000},
     _spot,
     unit="of the intensity",
 )

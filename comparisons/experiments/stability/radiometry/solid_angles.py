@@ -1,4 +1,4 @@
-"""Solid angles of spheres, as the densities of light samples say them."""
+"""Solid angles of spheres, implied by the densities of light samples."""
 
 import math
 from typing import Any
@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 from flint import arb, ctx
 
-from comparisons.experiments.stability.harness.family import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Series,
-    decades,
+from comparisons.experiments.methods.setting import unit_vectors
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
+from comparisons.experiments.stability.harness.outcomes import (
+    Columns,
+    of_errors,
+    plain,
+    relative,
+    unit_of,
 )
-from comparisons.experiments.stability.harness.outcomes import hexed, outcome, relative, unit_of
 from comparisons.geometry.float32 import round32
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
@@ -55,9 +55,7 @@ def theirs(shape: dict[str, Any] | Any, p: FloatArray, u: FloatArray) -> FloatAr
 
 def _sphere(draw: Draw, gap: FloatArray, shared: bool) -> dict[str, Outcome]:
     """The unit sphere from 1 + gap."""
-    v = draw.rng.normal(size=(len(gap), 3))
-    v /= np.linalg.norm(v, axis=1, keepdims=True)
-    p = np.ascontiguousarray(v * (1.0 + gap)[:, None])
+    p = np.ascontiguousarray(unit_vectors(draw.rng, len(gap)) * (1.0 + gap)[:, None])
     p = round32(p) if shared else p
     exact, cosines = [], []
     with ctx.workprec(300):
@@ -78,13 +76,10 @@ def _sphere(draw: Draw, gap: FloatArray, shared: bool) -> dict[str, Outcome]:
             found[MITSUBA] = 1.0 / theirs({"type": "sphere"}, p, u)[:, 0]
     outcomes = {}
     for who, value in found.items():
-
-        def ask(i: int, value: FloatArray = value) -> Any:
-            told = {"sphere": "of radius 1 at the origin", "point": hexed(p[i])}
-            return {**told, "solid angle": float(truth[i]), "found": float(value[i])}
-
+        shown: Columns = {"sphere": "of radius 1 at the origin", "point": p}
+        shown |= {"solid angle": plain(truth), "found": plain(value)}
         allowed = 16.0 * unit_of(who) * (1.0 + 1.0 / np.maximum(cosine, 1e-300))
-        outcomes[who] = outcome(relative(value, truth), allowed, ask)
+        outcomes[who] = of_errors(relative(value, truth), allowed, shown)
     return outcomes
 
 
@@ -100,21 +95,17 @@ def _close(draw: Draw, x: float) -> dict[str, Outcome]:
 
 SMALL_SPHERE = Series(
     "small spheres",
-    "1 / solid angle",
+    Sweep("1 / solid angle", decades(0, 12), (1.0, 1e6, 1e12), 1_000, 20_000),
     "The solid angle that light samples of a sphere stand for, seen from afar.",
-    decades(0, 12),
-    (1.0, 1e6, 1e12),
-    {"quick": 1_000, "full": 20_000},
     _small,
     unit="of the value",
 )
 CLOSE_SPHERE = Series(
     "close spheres",
-    "radius / distance from the surface",
+    Sweep(
+        "radius / distance from the surface", decades(0, 12), (1.0, 1e3, 1e6, 1e12), 1_000, 20_000
+    ),
     "The solid angle that light samples of a sphere stand for, seen from just off it.",
-    decades(0, 12),
-    (1.0, 1e3, 1e6, 1e12),
-    {"quick": 1_000, "full": 20_000},
     _close,
     unit="of the value",
     explained="the law allows for the condition, 1 / cos, so that both may lose digits alike: "

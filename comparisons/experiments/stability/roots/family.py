@@ -1,44 +1,15 @@
-"""F8: roots of polynomials: the quartic of tori, the quadratics of quadrics.
-
-Law.  As many real roots as there are, each off by at most 16 u (sum of the terms' sizes) /
-|derivative| there, what rounding the coefficients and evaluating makes of it, beside 16 u (|t| |d|
-+ D) of a ray's own t.  Open are cases with two roots, real or complex, less than four such bounds
-apart: rounded coefficients may join or part them.
-
-Ranges.  Lines 1 to 1e-16 sizes from a double root; from one where three or four roots come
-together (along an asymptotic direction of a torus; along its top circle, in that plane); tori 1e0
-to 1e12 sizes away; quadratics 1 to 1e-16 of b² from a double root; quadratics whose roots' ratio is
-1e0 to 1e16.  Tubes from 0.05 to 0.95 of the ring's radius.
-
-Counts.  1e5 in `double`, 3e4 in `several` and `far`, 1e5 a series of quadratics.
-
-Passes.  No root missed, none too many, none off by more.  FLINT certifies all four complex roots
-of quartics in exact integers; the discriminant of quadratics is exact.
-
-Contestants.  Ours is what the renderer has: for tori Newton's steps and halving on the distance
-between the quartic's turning points, for quadrics q / a and c / q of q = -(b ± sqrt(D)).
-"numpy.roots" is the companion matrix, "ferrari" the closed form, "quadratic.formula" (-b ± sqrt(D))
-/ 2 a.  They get the coefficients in floats, of a line that begins next to the torus, but in
-`far`, where it begins at the ray's origin.  Mitsuba has no torus and no quartic.
-"""
+"""The series of F8; the folder's docstring states the law."""
 
 from collections.abc import Mapping
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import across, unit_vectors
-from comparisons.experiments.stability.far.law import Rays
-from comparisons.experiments.stability.harness.family import (
-    OURS,
-    Draw,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-    decades,
-)
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
+from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.experiments.stability.roots.law import judge, of_quadratics, of_tori
 from comparisons.experiments.stability.roots.solvers import (
     ferrari,
@@ -117,16 +88,13 @@ def _compete(rays: Rays, from_afar: bool) -> Mapping[str, Outcome]:
     polynomials = _coefficients(rays, 0.0 * begin if from_afar else begin)
     shift = (begin * speed if from_afar else 0.0 * begin)[:, None]
 
-    def asked(i: int) -> dict[str, Any]:
-        named = {"o": rays.o[i], "d": rays.d[i], "begin": begin[i : i + 1]} | {
-            name: np.ravel(rays.row[name][i]) for name in ("center", "major", "minor")
-        }
-        return {name: [float(x).hex() for x in values] for name, values in named.items()}
-
+    parts = {name: rays.row[name] for name in ("center", "major", "minor")}
+    named = {"o": rays.o, "d": rays.d, "begin": begin} | parts
+    columns = {name: np.reshape(column, (len(begin), -1)) for name, column in named.items()}
     return {
-        OURS: judge((torus_kernel(rays) - begin[:, None]) * speed[:, None], truth, slack, asked),
-        "numpy.roots": judge(numpy_roots(polynomials) - shift, truth, slack, asked),
-        "ferrari": judge(ferrari(polynomials) - shift, truth, slack, asked),
+        OURS: judge((torus_kernel(rays) - begin[:, None]) * speed[:, None], truth, slack, columns),
+        "numpy.roots": judge(numpy_roots(polynomials) - shift, truth, slack, columns),
+        "ferrari": judge(ferrari(polynomials) - shift, truth, slack, columns),
     }
 
 
@@ -177,17 +145,14 @@ def _far(draw: Draw, x: float) -> Mapping[str, Outcome]:
 
 def _of_quadratics(coefficients: FloatArray) -> Mapping[str, Outcome]:
     truth = of_quadratics(coefficients)
-
-    def asked(i: int) -> dict[str, Any]:
-        return {"coefficients": [x.hex() for x in coefficients[i].tolist()]}
-
+    columns = {"coefficients": coefficients}
     contestants = {
         OURS: quadric_kernel,
         "numpy.roots": numpy_roots,
         "quadratic.formula": formula,
     }
     return {
-        name: judge(solve(coefficients), truth, 0.0, asked) for name, solve in contestants.items()
+        name: judge(solve(coefficients), truth, 0.0, columns) for name, solve in contestants.items()
     }
 
 
@@ -206,64 +171,57 @@ def _unlike(draw: Draw, x: float) -> Mapping[str, Outcome]:
 
 
 CLOSE, CLOSE_QUICK = decades(0, 16), (1.0, 1e4, 1e8, 1e12, 1e16)
-UNIT = "of the bound by condition"
+
+_series = partial(Series, unit="of the bound by condition")
 
 FAMILY = Family(
     "F8",
     "roots of polynomials",
     "No root missed, none too many, each within 16 u (sum of the terms' sizes) / |derivative|.",
     (
-        Series(
+        _series(
             "double",
-            "1 / distance of the line from a double root, in tubes' radii",
+            Sweep(
+                "1 / distance of the line from a double root, in tubes' radii",
+                CLOSE,
+                CLOSE_QUICK,
+                300,
+                6000,
+            ),
             "Lines that pass a torus' surface at 1 / x to 0.1 / x, along it. Wrong is a root too"
             " few or too many, or off by more than its condition allows.",
-            CLOSE,
-            CLOSE_QUICK,
-            {"quick": 300, "full": 6000},
             _double,
-            unit=UNIT,
         ),
-        Series(
+        _series(
             "several",
-            "1 / distance of the line from a triple or quadruple root, in tubes' radii",
+            Sweep(
+                "1 / distance of the line from a triple or quadruple root, in tubes' radii",
+                CLOSE,
+                CLOSE_QUICK,
+                200,
+                2000,
+            ),
             "Lines near those along a torus' asymptotic directions, and along its top circle.",
-            CLOSE,
-            CLOSE_QUICK,
-            {"quick": 200, "full": 2000},
             _several,
-            unit=UNIT,
         ),
-        Series(
+        _series(
             "far",
-            "distance / size",
+            Sweep("distance / size", decades(0, 12), (1.0, 1e4, 1e8, 1e12), 200, 2000),
             "Lines through a torus from 2 to 10 times this far away; the text-book's coefficients"
             " are those seen from the origin.",
-            decades(0, 12),
-            (1.0, 1e4, 1e8, 1e12),
-            {"quick": 200, "full": 2000},
             _far,
-            unit=UNIT,
         ),
-        Series(
+        _series(
             "near_double",
-            "b² / |b² - 4 a c|",
+            Sweep("b² / |b² - 4 a c|", CLOSE, CLOSE_QUICK, 1000, 6000),
             "Quadratics with both roots, real or complex, about ±0.5 to ±2.",
-            CLOSE,
-            CLOSE_QUICK,
-            {"quick": 1000, "full": 6000},
             _near_double,
-            unit=UNIT,
         ),
-        Series(
+        _series(
             "unlike",
-            "ratio of the roots",
+            Sweep("ratio of the roots", CLOSE, CLOSE_QUICK, 1000, 6000),
             "Quadratics with two real roots, one of them small: -b cancels sqrt(b² - 4 a c).",
-            CLOSE,
-            CLOSE_QUICK,
-            {"quick": 1000, "full": 6000},
             _unlike,
-            unit=UNIT,
         ),
     ),
     anchors="The text-book's closed forms and companion matrices are the anchors themselves; no"

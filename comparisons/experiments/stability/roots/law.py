@@ -1,13 +1,15 @@
-"""What F8 holds roots against: certified ones, and the bound that their condition sets."""
+"""Certified roots, and the bound that their condition sets: what F8 judges roots by."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import flint
 import numpy as np
 
 from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.far.law import Rays
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome
+from comparisons.experiments.stability.harness.outcomes import outcome
+from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.geometry.exact.curved import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic
 
@@ -32,7 +34,7 @@ class Certified(NamedTuple):
     open: BoolArray
 
     def real(self) -> tuple[FloatArray, FloatArray]:
-        """Real roots in order, inf for what there is not, and their bounds (n, k)."""
+        """Real roots in order, inf for missing ones, and their bounds (n, k)."""
         s = np.where(self.z.imag == 0.0, self.z.real, np.inf)
         order = np.argsort(s, axis=1)
         return np.take_along_axis(s, order, 1), np.take_along_axis(self.bound, order, 1)
@@ -93,11 +95,11 @@ def judge(
     found: FloatArray,
     truth: Certified,
     slack: FloatArray | float,
-    asked: Any,
+    columns: Mapping[str, Any],
 ) -> Outcome:
     """Roots `found` (n, k) as `Certified.real` has them; `slack` (n, 1): besides the bound.
 
-    Wrong are a root too few or too many, and one off by more.  asked(i): the case, for examples.
+    Wrong are a root too few or too many, and one off by more.  asked: columns of the examples.
     """
     real, bound = truth.real()
     found = np.sort(np.where(np.isnan(found), np.inf, found), axis=1)
@@ -105,20 +107,8 @@ def judge(
     share = np.zeros(real.shape)
     off = np.abs(np.where(both, found, 0.0) - np.where(both, real, 0.0))
     share[both] = (off / (bound + slack))[both]
-    wrong = ~truth.open & np.any((np.isfinite(real) != np.isfinite(found)) | (share > 1.0), axis=1)
-    counted = (
-        both
-        & ~truth.open[:, None]
-        & np.all(np.isfinite(real) == np.isfinite(found), axis=1)[:, None]
-    )
+    as_many = np.all(np.isfinite(real) == np.isfinite(found), axis=1)
+    counted = both & (as_many & ~truth.open)[:, None]
     worst = float(share[counted].max()) if counted.any() else None
-    examples = tuple(
-        {
-            **asked(i),
-            "expected": [x.hex() for x in real[i].tolist()],
-            "found": [x.hex() for x in found[i].tolist()],
-        }
-        for i in np.flatnonzero(wrong)[:EXAMPLES].tolist()
-    )
-    cases = int(np.sum(~truth.open))
-    return Outcome(cases, int(wrong.sum()), worst, int(truth.open.sum()), examples)
+    shown = {**columns, "expected": real, "found": found}
+    return outcome(~as_many | np.any(share > 1.0, axis=1), shown, truth.open, worst)

@@ -1,14 +1,14 @@
-"""Who solves F8's polynomials: the text-book's ways beside the renderer's own.
+"""Solvers of F8's polynomials: the renderer's and the text-book's.
 
-Roots come as (n, 4) or (n, 2), real ones in order, inf for what there is not.
+Roots come as (n, 4) or (n, 2), real ones in order, inf for missing ones.
 """
 
 from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.far.law import Rays
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
+from comparisons.experiments.stability.harness.rays import Rays
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import entry_kernel
@@ -46,11 +46,9 @@ def ferrari(coefficients: FloatArray) -> FloatArray:
         w2 = np.where(q == 0.0, 0.0, _largest_root(2.0 * p, p * p - 4.0 * r, -q * q))
         w = np.sqrt(np.maximum(w2, 0.0))
         odd = np.where(w > 0.0, q / w, np.sqrt(p * p - 4.0 * r))
-        halves = [
-            _quadratic(w, 0.5 * (p + w2 - odd)),
-            _quadratic(-w, 0.5 * (p + w2 + odd)),
-        ]
-        y = np.concatenate(halves, axis=1)
+        one = np.ones(len(w))
+        halves = (w, 0.5 * (p + w2 - odd)), (-w, 0.5 * (p + w2 + odd))
+        y = np.concatenate([formula(np.column_stack([one, *half])) for half in halves], axis=1)
         return np.sort(np.where(np.isfinite(y), y - b[:, None] / 4.0, np.inf), axis=1)
 
 
@@ -64,13 +62,6 @@ def _largest_root(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     one = -np.sign(big_r) * np.cbrt(np.abs(big_r) + np.sqrt(np.maximum(big_r**2 - q3, 0.0)))
     by_root = one + np.where(one != 0.0, big_q / one, 0.0)
     return np.asarray(np.where(big_r**2 < q3, by_cosine, by_root) - a / 3.0)
-
-
-def _quadratic(b: FloatArray, c: FloatArray) -> FloatArray:
-    """Of y² + b y + c, (n, 2), inf where they are not real."""
-    discriminant = b * b - 4.0 * c
-    root = np.where(discriminant >= 0.0, np.sqrt(np.maximum(discriminant, 0.0)), np.inf)
-    return np.column_stack([0.5 * (-b - root), 0.5 * (-b + root)])
 
 
 def formula(coefficients: FloatArray) -> FloatArray:

@@ -1,9 +1,9 @@
-"""Slivers, and rays that graze: what is drawn.
+"""Random slivers, and rays that graze.
 
 "Aligned" shapes lie in a plane x = 0, y = 0 or z = 0: their heights and the rays' angles are
 numbers of their own, not differences of others, and so float32 has them as exactly as float64.
 "Turned" ones lie anywhere, and both are differences: the rounding of vertices and rays is part of
-what is asked.
+the question.
 
 `singles`: all numbers are rounded to float32, and Mitsuba gets what ours gets.
 """
@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import FloatArray
+from comparisons.experiments.stability.harness.steps import any_turn, scaled
+from comparisons.geometry.float32 import round32
 from reference_rt.core import transform
 
 SHAPES = 8
-"""Drawn of each setting."""
+"""Drawn at each sweep point."""
 
 OUTSIDE = 0.25
 """The share of rays that are aimed beyond an edge."""
@@ -38,11 +39,6 @@ class Trial:
     size: float
     singles: bool
     corners: FloatArray | None = None
-
-
-def single(a: FloatArray) -> FloatArray:
-    """Rounded to float32."""
-    return np.asarray(a, np.float32).astype(np.float64)
 
 
 def _turn(rng: np.random.Generator, turned: bool) -> FloatArray:
@@ -65,7 +61,7 @@ def barycentrics(rng: np.random.Generator, n: int) -> FloatArray:
 
 def _triangle(v: FloatArray, o: FloatArray, d: FloatArray, singles: bool) -> Trial:
     if singles:
-        v, o, d = single(v), single(o), single(d)
+        v, o, d = round32(v), round32(o), round32(d)
     a, b, c = (tuple(x) for x in v.tolist())
     size = float(np.linalg.norm(v - np.roll(v, 1, axis=0), axis=1).max())
     return Trial("triangles", rt.Triangle(v0=a, v1=b, v2=c), o, d, size, singles, v)
@@ -89,11 +85,8 @@ def thin_triangle(
     turn = _turn(rng, turned)
     targets = (barycentrics(rng, n) if aim is None else aim) @ v
     sideways = np.array([1.0, 1.0 if turned else 1.0 / aspect, 0.0])
-    slant = 2.0 * rng.uniform(-1.0, 1.0, (n, 3)) * sideways + rng.choice([-1, 1], (n, 1)) * [
-        0,
-        0,
-        1,
-    ]
+    slant = 2.0 * rng.uniform(-1.0, 1.0, (n, 3)) * sideways
+    slant += rng.choice([-1, 1], (n, 1)) * [0, 0, 1]
     d = slant * rng.uniform(1.0, 4.0, (n, 1))
     return _triangle(v @ turn.T, (targets - d) @ turn.T, d @ turn.T, singles)
 
@@ -130,13 +123,11 @@ def grazed_flat(
     x, y = rng.uniform(-1.0, 1.0, (2, n)) * np.where(rng.uniform(size=n) < OUTSIDE, 1.5, 0.7)
     d = _grazing(rng, inverse_angle, n)
     o = np.stack([x, 0.5 * y, np.zeros(n)], axis=1) - d
-    steps: tuple[transform.Step, ...] = (transform.Scale(scale=(1.0, 0.5, 1.0)),)
+    steps: tuple[transform.Step, ...] = (scaled(1.0, 0.5, 1.0),)
     if singles:
-        o, d = single(o), single(d)
+        o, d = round32(o), round32(d)
     else:
-        x_, y_, z_ = unit_vectors(rng, 1)[0].tolist()
-        turn = transform.Turn(axis=(x_, y_, z_), degrees=float(rng.uniform(0.0, 360.0)))
-        steps += (transform.Rotate(rotate=turn),)
+        steps += (any_turn(rng),)
         m = transform.affine(steps[1:])[:, :3]
         o, d = o @ m.T, d @ m.T
     if is_round:
@@ -152,7 +143,7 @@ def grazed_box(rng: np.random.Generator, inverse_angle: float, n: int, singles: 
     turn, side = np.eye(3)[rng.permutation(3)], rng.choice([-1.0, 1.0])
     o, d = side * (target - 2.0 * d) @ turn.T, side * d @ turn.T
     if singles:
-        o, d = single(o), single(d)
+        o, d = round32(o), round32(d)
     one = np.ones(3)
     return Trial("boxes", rt.Box(), o, d, 2.0, singles, np.array([-one, one]))
 
@@ -170,7 +161,6 @@ def needle(rng: np.random.Generator, aspect: float, n: int, singles: bool) -> Tr
     d = (d * rng.uniform(1.0, 4.0, (n, 1))) @ turn.T
     o = target @ turn.T - d
     if singles:
-        scale, o, d = single(scale), single(o), single(d)
-    x, y, z = scale.tolist()
-    shape = rt.Box(transform=(transform.Scale(scale=(x, y, z)),))
+        scale, o, d = round32(scale), round32(o), round32(d)
+    shape = rt.Box(transform=(scaled(*scale.tolist()),))
     return Trial("boxes", shape, o, d, 2.0, singles, np.array([-scale, scale]))

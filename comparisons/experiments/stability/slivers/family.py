@@ -1,38 +1,22 @@
-"""F4, slivers: thin shapes, and rays that graze.
+"""The series of F4; the folder's docstring states the law."""
 
-Law: a hit is one.  Its t is in the exact hit interval, which is where rays moved by no more than
-rounding meet the shape (`f04_slivers_judge` has the bound, 144 u (|o| + size)); a miss is exact, or
-a ray so moved misses.  A hit may also be up to 1e-3 of the shape off the exact one, which is what
-lets float32 pass where it only rounds.  What float64 may not do, and what Embree was found to do
-(embree#387: t = 12291.2 on a triangle at 1), is to name a point where there is no shape.
-
-Range: triangles of aspect 1 to 1e12, aligned and turned; boxes of aspect 1 to 1e12; angles of
-1e-1 to 1e-15 between rays and triangles, rectangles, disks and faces of boxes.  8 shapes a setting,
-quick 2,000 rays, full 40,000.  Passes: no failure, up to the end of every range.
-
-Every other shape and its rays are rounded to float32, and Mitsuba gets the very same numbers as
-ours and the text-book's methods; the others are for these alone.  Mitsuba is judged by the same
-law: what its rounding turns into a miss or a hit is wrong.
-"""
-
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import (
+from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
     Draw,
-    Effort,
-    Family,
     FloatArray,
     Outcome,
-    Series,
     Shot,
-    decades,
 )
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
+from comparisons.experiments.stability.harness.mitsubas import traced
+from comparisons.experiments.stability.harness.outcomes import together
 from comparisons.experiments.stability.slivers import drawn, shots
 from comparisons.experiments.stability.slivers.drawn import SHAPES, Trial
 from comparisons.experiments.stability.slivers.judge import Judge, Question
@@ -40,13 +24,14 @@ from reference_rt import textbook
 from reference_rt.rendering import query
 
 Make = Callable[[np.random.Generator, float, int, bool], Trial]
+Shoot = Callable[[str, float], Shot]
 
-CASES: Mapping[Effort, int] = {"quick": 2_000, "full": 40_000}
+CASES = 2_000, 40_000
 
 
 def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray]]:
-    """What is asked, and t (n,) of each contestant."""
-    # A triangle is led to through a hierarchy, whose leaves test eight at once; the others in turn.
+    """The question, and t (n,) of each contestant."""
+    # Triangles are traced through a hierarchy, whose leaves test eight at once; others in turn.
     scene = rt.Scene(
         shapes=(trial.shape,), hierarchy="sah" if trial.kind == "triangles" else "auto"
     )
@@ -54,10 +39,7 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
     row = getattr(tables.geometry.shapes, trial.kind)._asdict()
     found = {OURS: query.first_hits(tables, trial.o, trial.d).t}
     if mitsuba:
-        from comparisons.geometry import frame
-        from comparisons.mitsuba import counterpart, translate
-
-        found[MITSUBA] = counterpart.trace(translate.load(scene, frame.OURS), trial.o, trial.d).t
+        found[MITSUBA] = traced(scene, trial.o, trial.d).t
     if trial.corners is not None:
         family = "triangle" if trial.kind == "triangles" else "box"
         of = textbook.TriangleParameters if family == "triangle" else textbook.BoxParameters
@@ -67,23 +49,19 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
 
 
 def measured(make: Make) -> Callable[[Draw, float], Mapping[str, Outcome]]:
-    """A series' `measure`: SHAPES trials, each put to everybody who can take part."""
+    """A series' `measure`: SHAPES trials, each for all contestants that can take part."""
 
-    def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
-        total: dict[str, Outcome] = {}
+    def trials(draw: Draw, x: float) -> Iterator[dict[str, Outcome]]:
         for k in range(SHAPES):
             trial = make(draw.rng, x, draw.cases // SHAPES, k % 2 == 0)
             question, found = answers(trial, draw.mitsuba and trial.singles)
             judge = Judge(question)
-            for name, t in found.items():
-                outcome = judge.outcome(t)
-                total[name] = total[name] + outcome if name in total else outcome
-        return total
+            yield {name: judge.outcome(t) for name, t in found.items()}
 
-    return measure
+    return lambda draw, x: together(trials(draw, x))
 
 
-def map_of(make: Callable[..., Trial]) -> Callable[[str, float], Shot]:
+def map_of(make: Callable[..., Trial]) -> Shoot:
     """A series' `shoot`: a triangle of float32 numbers, with a ray aimed at each point."""
 
     def shoot(contestant: str, x: float) -> Shot:
@@ -98,31 +76,14 @@ def map_of(make: Callable[..., Trial]) -> Callable[[str, float], Shot]:
 
 
 def _series(
-    name: str,
-    axis: str,
-    about: str,
-    make: Make,
-    values: tuple[float, ...],
-    quick: int,
-    explained: str = "",
-    shoot: Callable[[str, float], Shot] | None = None,
+    name: str, sweep: Sweep, about: str, make: Make, explained: str = "", shoot: Shoot | None = None
 ) -> Series:
-    return Series(
-        name=name,
-        axis=axis,
-        about=about,
-        values=values,
-        quick=values[quick::4],
-        cases=CASES,
-        measure=measured(make),
-        unit="u (|o| + size)",
-        explained=explained,
-        shoot=shoot,
-    )
+    unit = "u (|o| + size)"
+    return Series(name, sweep, about, measured(make), unit, explained=explained, shoot=shoot)
 
 
-ASPECTS, ANGLES = decades(0, 12), decades(1, 15)
-ASPECT, ANGLE = "length / height", "1 / angle to the plane"
+ASPECT = Sweep("length / height", decades(0, 12), decades(0, 12, 4), *CASES)
+ANGLE = Sweep("1 / angle to the plane", decades(1, 15), decades(3, 15, 4), *CASES)
 EXACT = (
     "heights and angles are numbers of their own here, not differences of larger ones: float32 has"
     " them to 24 bits at any size, and nothing is lost that float64 would keep"
@@ -140,8 +101,6 @@ FAMILY = Family(
             "Ever thinner triangles, turned any way, met at up to 70° from the normal; three rays"
             " in four at points inside.",
             partial(drawn.thin_triangle, turned=True),
-            ASPECTS,
-            0,
             shoot=map_of(drawn.thin_triangle),
         ),
         _series(
@@ -149,8 +108,6 @@ FAMILY = Family(
             ASPECT,
             "The same in planes of the axes, whose heights float32 has exactly.",
             partial(drawn.thin_triangle, turned=False),
-            ASPECTS,
-            0,
             EXACT,
         ),
         _series(
@@ -158,8 +115,6 @@ FAMILY = Family(
             ANGLE,
             "Rays at a small angle to a triangle, turned any way, three in four at points inside.",
             partial(drawn.grazed_triangle, turned=True),
-            ANGLES,
-            2,
             shoot=map_of(drawn.grazed_triangle),
         ),
         _series(
@@ -167,8 +122,6 @@ FAMILY = Family(
             ANGLE,
             "The same in planes of the axes, where float32 has every angle exactly.",
             partial(drawn.grazed_triangle, turned=False),
-            ANGLES,
-            2,
             EXACT,
         ),
         _series(
@@ -176,8 +129,6 @@ FAMILY = Family(
             ANGLE,
             "Rays at a small angle to rectangles: half of these in the plane z = 0, half turned.",
             partial(drawn.grazed_flat, is_round=False),
-            ANGLES,
-            2,
             EXACT,
         ),
         _series(
@@ -185,8 +136,6 @@ FAMILY = Family(
             ANGLE,
             "Rays at a small angle to ellipses: half of these in the plane z = 0, half turned.",
             partial(drawn.grazed_flat, is_round=True),
-            ANGLES,
-            2,
             EXACT,
         ),
         _series(
@@ -194,16 +143,12 @@ FAMILY = Family(
             ANGLE,
             "Rays along a face of a cube, within twice the angle of it on either side.",
             drawn.grazed_box,
-            ANGLES,
-            2,
         ),
         _series(
             "needles",
-            "length / thickness",
+            ASPECT._replace(axis="length / thickness"),
             "Ever thinner boxes, met from the side.",
             drawn.needle,
-            ASPECTS,
-            0,
             EXACT,
         ),
     ),

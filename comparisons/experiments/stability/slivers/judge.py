@@ -22,9 +22,10 @@ import numpy.typing as npt
 
 from comparisons.experiments.methods.errors import PIXEL, U
 from comparisons.experiments.methods.setting import unit_rows
-from comparisons.experiments.stability.harness.family import EXAMPLES, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome
+from comparisons.experiments.stability.harness.outcomes import hexed, outcome
 from comparisons.geometry.exact import first_hit
-from comparisons.geometry.exact.dyadic import Dyadic, cross
+from comparisons.geometry.exact.dyadic import BoolArray, Dyadic, cross
 
 BAND = 144.0 * U
 
@@ -32,7 +33,6 @@ RING = 16
 """Rays around one, moved across it."""
 
 Extended = npt.NDArray[np.longdouble]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Question:
 
 
 class Judge:
-    """Knows the truth about one question, and judges answers to it."""
+    """Computes the truth about one question, and judges answers to it."""
 
     def __init__(self, question: Question) -> None:
         self.question = question
@@ -78,18 +78,12 @@ class Judge:
         """Of answers t (n,), inf for a miss.  `worst`: how far from the shape hits are, in u D."""
         q, found = self.question, np.isfinite(t)
         off = self._distances(found, t)
-        wrong = self._wrong(t, off)
-        open_ = wrong & self.touching
-        wrong &= ~self.touching
         worst = float((off[found] / (U * q.reach)).max()) if found.any() else None
-        shown = np.flatnonzero(wrong)[:EXAMPLES]
-        return Outcome(
-            cases=len(t) - int(open_.sum()),
-            failures=int(wrong.sum()),
-            worst=worst,
-            open=int(open_.sum()),
-            examples=tuple(self._example(int(k), float(t[k])) for k in shown),
-        )
+        wrong = self._wrong(t, off)
+        shape = {name: np.ravel(v) for name, v in q.row.items() if name in _SHAPES[q.kind]}
+        shown = {"shape": {name: hexed(v) for name, v in shape.items()}, "origin": q.o}
+        shown |= {"direction": q.d, "expected": self.t, "found": t}
+        return outcome(wrong, shown, wrong & self.touching, worst)
 
     def wrong(self, t: FloatArray) -> BoolArray:
         """Which of answers t (n,) are."""
@@ -102,8 +96,8 @@ class Judge:
             apart = np.abs(t - self.t) * np.linalg.norm(q.d, axis=1)
         near = found & there & (apart <= PIXEL * q.size)
         wrong = found & ~near & (off > q.band)
-        asked = np.flatnonzero((found & ~near & ~wrong) | (~found & there))
-        wrong[asked] = self._is_certain(asked, t)
+        doubtful = np.flatnonzero((found & ~near & ~wrong) | (~found & there))
+        wrong[doubtful] = self._is_certain(doubtful, t)
         return np.asarray(wrong)
 
     def _distances(self, found: BoolArray, t: FloatArray) -> FloatArray:
@@ -123,19 +117,6 @@ class Judge:
         seen = first_hit(q.kind, q.row, o, d).t.reshape(-1, RING)
         slack = PIXEL * q.size / np.linalg.norm(q.d[which], axis=1)
         return np.asarray((seen < (t[which] - slack)[:, None]).all(axis=1))
-
-    def _example(self, k: int, t: float) -> Mapping[str, Any]:
-        q = self.question
-        row = {name: value for name, value in q.row.items() if name in _SHAPES[q.kind]}
-        return {
-            "shape": {
-                name: [x.hex() for x in np.ravel(value).tolist()] for name, value in row.items()
-            },
-            "origin": [x.hex() for x in q.o[k].tolist()],
-            "direction": [x.hex() for x in q.d[k].tolist()],
-            "expected": float(self.t[k]).hex(),
-            "found": t.hex(),
-        }
 
 
 _SHAPES = {

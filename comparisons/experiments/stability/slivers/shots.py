@@ -1,9 +1,9 @@
-"""Maps of a triangle: what is found where rays are aimed at its points."""
+"""Maps of a triangle: the outcome of the ray that is aimed at each of its points."""
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import FloatArray, Shot
-from comparisons.experiments.stability.slivers.judge import BoolArray
+from comparisons.experiments.stability.harness.core import FloatArray, Shot, pixel_grid
+from comparisons.geometry.exact.dyadic import BoolArray
 
 PIXELS = 192
 
@@ -13,11 +13,10 @@ RIGHT, LOST, FALSE, OFF = (70, 110, 150), (250, 250, 250), (240, 160, 40), (200,
 def targets() -> FloatArray:
     """Barycentrics (PIXELS², 3) of a picture in which any triangle has its vertices near the lower
     corners and the middle of the upper edge."""
-    at = (np.arange(PIXELS) + 0.5) / PIXELS * 2.4 - 1.2
-    y, x = np.meshgrid(-at, at, indexing="ij")
+    x, y = pixel_grid(PIXELS, 1.2)
     top = 0.5 * (y + 1.0)
     right = 0.5 * (x + 1.0 - top)
-    return np.stack([1.0 - top - right, right, top], axis=-1).reshape(-1, 3)
+    return np.stack([1.0 - top - right, right, top], axis=-1)
 
 
 def picture(expected: FloatArray, found: FloatArray, wrong: BoolArray, caption: str) -> Shot:

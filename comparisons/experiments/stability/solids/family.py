@@ -1,43 +1,19 @@
-"""F7, set operations: the laws of sets hold for solids, and coincident faces leave no film.
+"""The series of F7; the folder's docstring states the law."""
 
-Laws, along each ray:
-- a tree of set operations and any other that is the same set (idempotence, absorption,
-  commutativity, associativity, distribution, De Morgan, complements) have the same list of
-  crossings, bit for bit: the operands' crossings are the same numbers.  A - A, A - (A | B) and
-  (A & B) - A have none;
-- crossings of operands further apart than the sum of the widths that `csg.all_crossings` states
-  (the error of the surface and of the ray's arithmetic, over the cosine) are told apart: between
-  them the list says inside where exact arithmetic on the tables does.  Nothing narrower is told;
-- the mean of chord lengths is the volume over the area of the beam: within 4 standard errors of
-  manifold3d's.
-
-Ranges: depth 1 to 64, of spheres, ellipsoids, boxes, cylinders, cones, quadrics, tori and closed
-meshes; faces shifted by 1e-3 to 2^-53 of the size, and by nothing; offsets to 1e9 sizes; 2 to 64
-operands.  Counts: 2 x 10^4 rays a depth, 3000 a shift and an offset, with the exact arbiter.
-
-Ours: `csg.all_crossings`; the text-book's: interval lists (Roth 1982), inside tests (Tilove 1980),
-which give the first crossing alone.  Mitsuba has no solids, so that it stays out: what stands in
-for it elsewhere (`comparisons/mitsuba/csg.py`) is a program of this project on Mitsuba's hits.
-"""
-
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
-    OURS,
-    Draw,
-    Family,
-    FloatArray,
-    Outcome,
-    Series,
-)
-from comparisons.experiments.stability.solids import lists
-from comparisons.experiments.stability.solids.lists import INSIDE_TESTS, INTERVALS, Truth
+from comparisons.experiments.stability.harness import solids
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, alone
+from comparisons.experiments.stability.harness.meshes import write_smallest_ball
+from comparisons.experiments.stability.harness.outcomes import hexed, outcome, together
+from comparisons.experiments.stability.harness.solids import INSIDE_TESTS, INTERVALS, LISTS, Truth
+from comparisons.experiments.stability.harness.steps import at, scaled, vector
 from comparisons.experiments.stability.solids.pictures import shoot
 from comparisons.experiments.stability.solids.trees import (
     KINDS,
@@ -47,8 +23,6 @@ from comparisons.experiments.stability.solids.trees import (
     leaf,
     placed,
     rewritten,
-    vector,
-    write_mesh,
 )
 from comparisons.experiments.stability.solids.volumes import volumes
 from reference_rt.core import transform
@@ -71,10 +45,6 @@ def rays_at(
     return o, middle + size * rng.uniform(-1.0, 1.0, (n, 3)) - o
 
 
-def _hex(o: FloatArray, d: FloatArray) -> dict[str, Any]:
-    return {"o": [x.hex() for x in o.tolist()], "d": [x.hex() for x in d.tolist()]}
-
-
 def pairs(rng: np.random.Generator, depth: int) -> Iterator[tuple[str, Tree, Tree | None]]:
     """Trees that are the same set; None for the empty one."""
     a, b = chain(rng, depth, LEAVES), int(rng.integers(LEAVES))
@@ -87,38 +57,33 @@ def pairs(rng: np.random.Generator, depth: int) -> Iterator[tuple[str, Tree, Tre
 
 
 def laws(draw: Draw, x: float) -> Mapping[str, Outcome]:
-    write_mesh(draw.folder)
-    found: dict[str, Outcome] = {}
-    for _ in range(max(1, draw.cases // (6 * RAYS))):
-        kinds = draw.rng.choice(KINDS, LEAVES, replace=False)
-        shapes = Shapes([leaf(draw.rng, str(k), placed(draw.rng, 0.6, 0.7)) for k in kinds])
-        o, d = rays_at(draw.rng, RAYS, np.zeros(3), 1.0)
-        for name, one, two in pairs(draw.rng, int(x)):
-            for contestant, ask in _ASK.items():
-                a = ask(shapes.solid(one), draw.folder, o, d)
-                b = np.empty((len(o), 0)) if two is None else (
-                    ask(shapes.solid(two), draw.folder, o, d)
-                )  # fmt: skip
-                wrong = ~lists.same(a, b)
-                examples = tuple(
-                    {"law": name, **_hex(o[k], d[k]), "expected": _finite(b[k]),
-                     "came": _finite(a[k]), "tree": repr(one)[:500], "other": repr(two)[:500],
-                     "shapes": [s.model_dump_json(exclude_defaults=True) for s in shapes.leaves]}
-                    for k in np.flatnonzero(wrong)[:EXAMPLES].tolist()
-                )  # fmt: skip
-                new = Outcome(len(o), int(wrong.sum()), None, 0, examples)
-                found[contestant] = found[contestant] + new if contestant in found else new
-    return found
+    write_smallest_ball(draw.folder)
+    trees = max(1, draw.cases // (6 * RAYS))
+    return together(part for _ in range(trees) for part in _laws_of(draw, int(x)))
 
 
-def _finite(t: FloatArray) -> list[str]:
-    return [float(x).hex() for x in t[np.isfinite(t)]]
+def _laws_of(draw: Draw, depth: int) -> Iterator[dict[str, Outcome]]:
+    kinds = draw.rng.choice(KINDS, LEAVES, replace=False)
+    shapes = Shapes([leaf(draw.rng, str(k), placed(draw.rng, 0.6, 0.7)) for k in kinds])
+    o, d = rays_at(draw.rng, RAYS, np.zeros(3), 1.0)
+    described = [s.model_dump_json(exclude_defaults=True) for s in shapes.leaves]
+    for name, one, two in pairs(draw.rng, depth):
+        shown = {"tree": repr(one)[:500], "other": repr(two)[:500], "shapes": described}
+        found = {}
+        for contestant in (OURS, INTERVALS):
+            crossings_of = LISTS[contestant]
+            a = crossings_of(shapes.solid(one), draw.folder, o, d)
+            b = np.empty((len(o), 0))
+            if two is not None:
+                b = crossings_of(shapes.solid(two), draw.folder, o, d)
+            lists = {"expected": _finite(b), "came": _finite(a)}
+            rays = {"law": name, "o": o, "d": d}
+            found[contestant] = outcome(~solids.same(a, b), rays | lists | shown)
+        yield found
 
 
-_ASK: dict[str, Callable[..., FloatArray]] = {
-    OURS: lambda *arguments: lists.ours(*arguments).t,
-    INTERVALS: lists.intervals,
-}
+def _finite(t: FloatArray) -> Callable[[int], list[str]]:
+    return lambda k: hexed(t[k][np.isfinite(t[k])])
 
 
 # ---- faces that coincide, or nearly -------------------------------------------------------------
@@ -126,53 +91,49 @@ _ASK: dict[str, Callable[..., FloatArray]] = {
 
 def judge(draw: Draw, solid: Any, o: FloatArray, d: FloatArray, size: float) -> dict[str, Outcome]:
     """All contestants on one solid; worst: the longest stretch that is wrong, of the size."""
-    truths = lists.truths(solid, draw.folder, o, d)
+    truths = solids.truths(solid, draw.folder, o, d)
+    undecided = np.array([truth.touching for truth in truths])
     length = np.linalg.norm(d, axis=1) / size
     found = {}
-    for contestant, ask, look in (
-        (OURS, _ASK[OURS], lists.problem),
-        (INTERVALS, lists.intervals, lists.problem),
-        (INSIDE_TESTS, lists.inside_tests, _first),
-    ):
-        t = ask(solid, draw.folder, o, d)
-        failures, worst, opened = 0, 0.0, 0
-        examples: list[Mapping[str, Any]] = []
-        for k, truth in enumerate(truths):
-            if truth.touching:
-                opened += 1
-                continue
-            wrong = look(truth, t[k])
-            if wrong is None:
-                continue
-            failures += 1
-            worst = max(worst, wrong[1] * float(length[k]))
-            if len(examples) < EXAMPLES:
-                scene = solid.model_dump_json(exclude_defaults=True)
-                examples.append(
-                    {**_hex(o[k], d[k]), "came": wrong[0], "expected": "none", "solid": scene}
-                )
-        cases = len(o) - opened
-        found[contestant] = Outcome(cases, failures, worst, opened, tuple(examples))
+    for contestant in (OURS, INTERVALS, INSIDE_TESTS):
+        problem_of = _first if contestant == INSIDE_TESTS else solids.problem
+        t = LISTS[contestant](solid, draw.folder, o, d)
+        problems = [
+            None if truth.touching else problem_of(truth, row)
+            for truth, row in zip(truths, t, strict=True)
+        ]
+        wrong = np.array([problem is not None for problem in problems])
+        stretches = [p[1] * float(n) for p, n in zip(problems, length, strict=True) if p]
+        shown = {"o": o, "d": d, "came": _said(problems), "expected": "none"}
+        shown |= {"solid": solid.model_dump_json(exclude_defaults=True)}
+        found[contestant] = outcome(wrong, shown, undecided, max(stretches, default=0.0))
     return found
 
 
-def _first(truth: Truth, t: FloatArray) -> tuple[str, float] | None:
-    return lists.first_problem(truth, float(t[0]))
+Problem = tuple[str, float] | None
+"""What is wrong with a ray's crossings, and how long the stretch is."""
+
+
+def _said(problems: Sequence[Problem]) -> Callable[[int], str]:
+    return lambda k: problems[k][0]  # type: ignore[index]
+
+
+def _first(truth: Truth, t: FloatArray) -> Problem:
+    return solids.first_problem(truth, float(t[0]))
 
 
 def coincident(rng: np.random.Generator, kind: str, shift: float, offset: float) -> Any:
     """A solid without the same one moved by `shift`, or, of a box, two that share a face but for
     `shift`: a gap, or an overlap where it is negative."""
     steps = placed(rng, 1.0, 0.0)
-    away = transform.Translate(translate=vector(offset * unit_vectors(rng, 1)[0]))
+    away = at(*vector(offset * unit_vectors(rng, 1)[0]))
     if kind == "touching":
-        beside = transform.Translate(translate=(2.0 + shift, 0.0, 0.0))
+        beside = at(2.0 + shift, 0.0, 0.0)
         return rt.Box(transform=(*steps, away)) | rt.Box(transform=(beside, *steps, away))
     if kind == "cut":
-        half = transform.Scale(scale=(0.5, 1.0, 1.0))
-        aside = transform.Translate(translate=(0.5 + shift, 0.0, 0.0))
-        return rt.Box(transform=(*steps, away)) - rt.Box(transform=(half, aside, *steps, away))
-    moved = transform.Translate(translate=vector(shift * unit_vectors(rng, 1)[0]))
+        half = (scaled(0.5, 1.0, 1.0), at(0.5 + shift, 0.0, 0.0))
+        return rt.Box(transform=(*steps, away)) - rt.Box(transform=(*half, *steps, away))
+    moved = at(*vector(shift * unit_vectors(rng, 1)[0]))
     a = leaf(rng, kind, (*steps, away))
     return a - a.model_copy(update={"transform": (*a.transform[:-1], moved, away)})
 
@@ -181,20 +142,18 @@ SETTINGS = ("touching", "cut", *KINDS)
 
 
 def _judged(draw: Draw, shift: float, offset: float, size: float) -> Mapping[str, Outcome]:
-    write_mesh(draw.folder)
-    found: dict[str, Outcome] = {}
-    n = max(1, draw.cases // len(SETTINGS))
-    for kind in SETTINGS:
-        sign = float(draw.rng.choice([-1.0, 1.0]))
-        solid = coincident(draw.rng, kind, sign * shift, offset)
-        scale = transform.Scale(scale=vector([size] * 3))
-        solid = solid.model_copy(update={"transform": (scale,)})
-        middle = np.mean([_middle(part, scale) for part in solid.of], axis=0)
-        o, d = rays_at(draw.rng, n, middle, size)
-        for contestant, outcome in judge(draw, solid, o, d, size).items():
-            old = found.get(contestant)
-            found[contestant] = outcome if old is None else old + outcome
-    return found
+    write_smallest_ball(draw.folder)
+    return together(_one(draw, kind, shift, offset, size) for kind in SETTINGS)
+
+
+def _one(draw: Draw, kind: str, shift: float, offset: float, size: float) -> Mapping[str, Outcome]:
+    sign = float(draw.rng.choice([-1.0, 1.0]))
+    solid = coincident(draw.rng, kind, sign * shift, offset)
+    scale = scaled(size)
+    solid = solid.model_copy(update={"transform": (scale,)})
+    middle = np.mean([_middle(part, scale) for part in solid.of], axis=0)
+    o, d = rays_at(draw.rng, max(1, draw.cases // len(SETTINGS)), middle, size)
+    return judge(draw, solid, o, d, size)
 
 
 def _middle(part: Any, scale: Any) -> FloatArray:
@@ -225,58 +184,55 @@ FAMILY = Family(
     (
         Series(
             "shift",
-            "size / shift",
+            Sweep("size / shift", tuple(sorted(SHIFTS)), (1e6, 1e12, 1e15), 200, 3000),
             "A solid of each kind without the same one moved by a little, two boxes that nearly "
             "touch, a box without a half of it.  What exact arithmetic tells apart must be told, "
             "and no film between crossings that rounding cannot tell apart.",
-            tuple(sorted(SHIFTS)),
-            (1e6, 1e12, 1e15),
-            {"quick": 200, "full": 3000},
             shifted,
             unit="of the size",
             shoot=shoot,
         ),
         Series(
             "laws",
-            "operations in each other",
+            Sweep(
+                "operations in each other",
+                (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
+                (4.0, 64.0),
+                1500,
+                21_000,
+            ),
             "Random trees of five shapes, each there many times, and others that laws of sets make "
             "of them: the lists of crossings must be the same bit for bit, and those of A - A, "
             "A - (A | B) and (A & B) - A empty.",
-            (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
-            (4.0, 64.0),
-            {"quick": 1500, "full": 21_000},
             laws,
         ),
         Series(
             "coincident",
-            "",
+            alone(200, 3000),
             "As `shift`, of nothing: the faces are parted by the rounding of the tables, or not.",
-            (1.0,),
-            (1.0,),
-            {"quick": 200, "full": 3000},
             unshifted,
             unit="of the size",
         ),
         Series(
             "offset",
-            "offset / size",
+            Sweep(
+                "offset / size",
+                (1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9),
+                (1e3, 1e9),
+                200,
+                3000,
+            ),
             "The same, of any size from 1e-8 to 1e8, away from the origin, shifted by no more than "
             "four units in the last place there.",
-            (1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9),
-            (1e3, 1e9),
-            {"quick": 200, "full": 3000},
             far,
             unit="of the size",
         ),
         Series(
             "volume",
-            "operands",
+            Sweep("operands", (2.0, 4.0, 8.0, 16.0, 32.0, 64.0), (4.0,), 2, 8),
             "Boxes and closed meshes together and without each other: the mean length of parallel "
             "chords against the volume that manifold3d finds; more than 4 standard errors off "
             "breaks the law.",
-            (2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
-            (4.0,),
-            {"quick": 2, "full": 8},
             volumes,
             unit="standard errors",
         ),

@@ -7,13 +7,15 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import OURS, FloatArray, Shot
-from comparisons.experiments.stability.solids import lists
+from comparisons.experiments.stability.harness import solids
+from comparisons.experiments.stability.harness.core import OURS, FloatArray, Shot, pixel_grid
+from comparisons.experiments.stability.harness.meshes import write_smallest_ball
+from comparisons.experiments.stability.harness.steps import at, scaled, turned
 from reference_rt.core import transform
 
 PIXELS = 192
 
-TURN = transform.Rotate(rotate=transform.Turn(axis=(0.4, 1.0, 0.2), degrees=-38.0))
+TURN = turned(-38.0, (0.4, 1.0, 0.2))
 
 LIGHT = np.array([0.3, 0.8, 0.52])
 COLOURS = np.array([[0.85, 0.45, 0.3], [0.4, 0.65, 0.85], [0.75, 0.75, 0.45]])
@@ -22,24 +24,15 @@ COLOURS = np.array([[0.85, 0.45, 0.3], [0.4, 0.65, 0.85], [0.75, 0.75, 0.45]])
 
 def shoot(contestant: str, x: float) -> Shot:
     """Seen in parallel from the front, shaded by the face that the point found lies on."""
-    half = transform.Scale(scale=(0.5, 1.0, 1.0))
-    aside = transform.Translate(translate=(0.5 + 1.0 / x, 0.0, 0.0))
-    solid = rt.Box(transform=(TURN,)) - rt.Box(transform=(half, aside, TURN))
-    grid = (np.arange(PIXELS) + 0.5) / PIXELS * 4.0 - 2.0
-    u, v = np.meshgrid(grid, -grid)
+    half = (scaled(0.5, 1.0, 1.0), at(0.5 + 1.0 / x, 0.0, 0.0))
+    solid = rt.Box(transform=(TURN,)) - rt.Box(transform=(*half, TURN))
+    u, v = pixel_grid(PIXELS, 2.0)
     # Not along any of the box's axes, so that each pixel rounds in its own way.
-    o = np.column_stack([u.ravel(), v.ravel(), np.full(u.size, 5.0)])
+    o = np.column_stack([u, v, np.full(u.size, 5.0)])
     d = np.tile([0.01, -0.02, -1.0], (len(o), 1))
-    ask = {
-        OURS: lambda *a: lists.ours(*a).t,
-        lists.INTERVALS: lists.intervals,
-        lists.INSIDE_TESTS: lists.inside_tests,
-    }[contestant]
     with tempfile.TemporaryDirectory() as folder:
-        from comparisons.experiments.stability.solids.trees import write_mesh
-
-        write_mesh(Path(folder))
-        t = ask(solid, Path(folder), o, d)
+        write_smallest_ball(Path(folder))
+        t = solids.LISTS[contestant](solid, Path(folder), o, d)
     first = t[:, 0] if t.shape[1] else np.full(len(o), np.inf)
     pixels = _shaded(o, d, first).reshape(PIXELS, PIXELS, 3)
     caption = (

@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.hostile.bases import files
-from reference_rt.core import transform
+from comparisons.experiments.stability.harness.meshes import BALL
+from comparisons.experiments.stability.harness.steps import at, scaled, turned, vector
 
 Tree = int | tuple[str, "Tree", "Tree"]
 """The number of a shape, or ("|", "&" or "-", a, b)."""
@@ -19,31 +17,15 @@ Tree = int | tuple[str, "Tree", "Tree"]
 MOST_LEAVES = 200
 """Of a tree that laws make longer."""
 
-MESH = "ball.obj"
-"""Twenty triangles."""
-
 KINDS = ("sphere", "ellipsoid", "box", "cylinder", "cone", "quadric", "torus", "mesh")
-
-
-def write_mesh(folder: Path) -> None:
-    (folder / MESH).write_bytes(files()[MESH])
-
-
-def vector(a: Any) -> tuple[float, float, float]:
-    x, y, z = np.asarray(a, np.float64).tolist()
-    return x, y, z
 
 
 def placed(rng: np.random.Generator, size: float, offset: float) -> tuple[Any, ...]:
     """Any rotation, a size and a translation."""
     axis, middle = (vector(v) for v in unit_vectors(rng, 2))
-    turn = transform.Turn(axis=axis, degrees=float(rng.uniform(0.0, 360.0)))
+    turn = turned(float(rng.uniform(0.0, 360.0)), axis)
     middle = vector(np.array(middle) * rng.uniform(0.0, offset))
-    return (
-        transform.Scale(scale=vector([size] * 3)),
-        transform.Rotate(rotate=turn),
-        transform.Translate(translate=middle),
-    )
+    return scaled(size), turn, at(*middle)
 
 
 def leaf(rng: np.random.Generator, kind: str, steps: tuple[Any, ...]) -> Any:
@@ -51,7 +33,7 @@ def leaf(rng: np.random.Generator, kind: str, steps: tuple[Any, ...]) -> Any:
     if kind == "sphere":
         return rt.Sphere(radius=float(rng.uniform(0.7, 1.2)), transform=steps)
     if kind == "ellipsoid":
-        stretch = transform.Scale(scale=vector(rng.uniform(0.4, 1.2, 3)))
+        stretch = scaled(*rng.uniform(0.4, 1.2, 3).tolist())
         return rt.Sphere(transform=(stretch, *steps))
     if kind == "box":
         return rt.Box(transform=steps)
@@ -67,7 +49,7 @@ def leaf(rng: np.random.Generator, kind: str, steps: tuple[Any, ...]) -> Any:
         )
     if kind == "torus":
         return rt.Torus(major_radius=0.9, minor_radius=0.4, transform=steps)
-    return rt.Mesh(file=MESH, transform=steps)
+    return rt.Mesh(file=BALL, transform=steps)
 
 
 @dataclass(frozen=True)
@@ -167,7 +149,3 @@ def _shapes_of(operation: str, p: Tree, q: Tree) -> list[Tree]:
     if not isinstance(p, int) and p[0] == "-":
         found.append(("-", p[1], ("|", p[2], q)))
     return found
-
-
-def union(trees: Sequence[Tree]) -> Tree:
-    return reduce(lambda a, b: ("|", a, b), trees)

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import OURS, Draw, Outcome
-from comparisons.experiments.stability.solids import lists
-from comparisons.experiments.stability.solids.trees import Shapes, Tree, leaf, placed, write_mesh
+from comparisons.experiments.stability.harness import solids
+from comparisons.experiments.stability.harness.core import OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.meshes import write_smallest_ball
+from comparisons.experiments.stability.solids.trees import Shapes, Tree, leaf, placed
 from reference_rt.core import transform
 from reference_rt.shapes.meshes.files import read_mesh
 
@@ -21,17 +22,15 @@ SIGMAS = 4.0
 
 
 def volumes(draw: Draw, x: float) -> Mapping[str, Outcome]:
-    write_mesh(draw.folder)
-    off: dict[str, list[float]] = {OURS: [], lists.INTERVALS: []}
+    write_smallest_ball(draw.folder)
+    off: dict[str, list[float]] = {OURS: [], solids.INTERVALS: []}
     for _ in range(draw.cases):
         shapes, tree, volume = _solid(draw, int(x))
         o = np.column_stack([draw.rng.uniform(-HALF, HALF, (RAYS, 2)), np.full(RAYS, -10.0)])
         d = np.tile([0.0, 0.0, 1.0], (RAYS, 1))
         solid = shapes.solid(tree)
-        for name, t in (
-            (OURS, lists.ours(solid, draw.folder, o, d).t),
-            (lists.INTERVALS, lists.intervals(solid, draw.folder, o, d)),
-        ):
+        for name in off:
+            t = solids.LISTS[name](solid, draw.folder, o, d)
             even = t[:, : t.shape[1] // 2 * 2]
             chords = np.where(np.isfinite(even), even, 0.0)
             length = (chords[:, 1::2] - chords[:, 0::2]).sum(axis=1) * (2.0 * HALF) ** 2
@@ -47,19 +46,19 @@ def _solid(draw: Draw, operands: int) -> tuple[Shapes, Tree, float]:
     """Shapes, a tree of all, and its volume."""
     import manifold3d
 
-    leaves, solids = [], []
+    leaves, parts = [], []
     size = 1.2 * operands ** (-1.0 / 3.0)
     for k in range(operands):
         kind = ("box", "mesh")[k % 2]
         shape = leaf(draw.rng, kind, placed(draw.rng, size * (0.7 if kind == "box" else 1.0), 0.7))
         leaves.append(shape)
-        solids.append(_manifold(manifold3d, draw, shape))
+        parts.append(_manifold(manifold3d, draw, shape))
     tree: Tree = 0
-    whole = solids[0]
+    whole = parts[0]
     for k in range(1, operands):
         operation = str(draw.rng.choice(["|", "|", "-", "|"])) if k > 1 else "|"
         tree = (operation, tree, k)
-        whole = whole + solids[k] if operation == "|" else whole - solids[k]
+        whole = whole + parts[k] if operation == "|" else whole - parts[k]
     return Shapes(leaves), tree, float(whole.volume())
 
 

@@ -8,15 +8,11 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.family import (
-    EXAMPLES,
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-)
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
 from comparisons.experiments.stability.harness.meshes import AWAY
+from comparisons.experiments.stability.harness.mitsubas import traced
+from comparisons.experiments.stability.harness.outcomes import outcome
+from comparisons.experiments.stability.harness.steps import any_turn, at
 from comparisons.experiments.stability.watertight.tracers import fits
 from reference_rt.core import transform
 from reference_rt.core.arrays import IntArray
@@ -109,7 +105,7 @@ KINDS: dict[str, Seamed] = {
 
 
 @dataclass(frozen=True)
-class Asked:
+class Case:
     """Shapes and rays (n, 3) that start in shape `whose` (n,)."""
 
     shapes: tuple[Any, ...]
@@ -118,61 +114,45 @@ class Asked:
     whose: IntArray
 
 
-def drawn(rng: np.random.Generator, names: tuple[str, ...], offset: float, n: int) -> Asked:
+def drawn(rng: np.random.Generator, names: tuple[str, ...], offset: float, n: int) -> Case:
     """n rays of each of these kinds: half in random directions, half at the seams."""
     shapes, origins, directions = [], [], []
     for k, name in enumerate(names):
         kind = KINDS[name]
-        x, y, z = unit_vectors(rng, 1)[0].tolist()
-        turn = transform.Turn(axis=(x, y, z), degrees=float(rng.uniform(0.0, 360.0)))
-        at = offset * AWAY + [APART * k, 0.0, 0.0]
-        a, b, c = at.tolist()
-        steps = (transform.Rotate(rotate=turn), transform.Translate(translate=(a, b, c)))
+        middle = offset * AWAY + [APART * k, 0.0, 0.0]
+        steps = (any_turn(rng), at(*middle.tolist()))
         shapes.append(kind.make(steps))
         m = transform.affine(steps[:1])[:, :3]
         stray = rng.uniform(-1.0, 1.0, (n, 3)) * 0.05 / np.sqrt(3.0)
         inside = kind.insides[rng.integers(0, len(kind.insides), n)] + stray
-        o = inside @ m.T + at
+        o = inside @ m.T + middle
         half = n // 2
-        aimed = kind.seams(rng, half) @ m.T + at - o[:half]
+        aimed = kind.seams(rng, half) @ m.T + middle - o[:half]
         origins.append(o)
         directions.append(np.concatenate([aimed, unit_vectors(rng, n - half)]))
     whose = np.repeat(np.arange(len(names)), n)
-    return Asked(tuple(shapes), np.concatenate(origins), np.concatenate(directions), whose)
+    return Case(tuple(shapes), np.concatenate(origins), np.concatenate(directions), whose)
 
 
-def judged(asked: Asked, hits: Any) -> Outcome:
+def judged(case: Case, hits: Any) -> Outcome:
     """Whether each ray meets the shape that it starts in."""
-    wrong = np.flatnonzero(hits.shape != asked.whose)
-    return Outcome(
-        cases=len(asked.o),
-        failures=len(wrong),
-        examples=tuple(
-            {
-                "shape": asked.shapes[asked.whose[k]].model_dump_json(exclude_defaults=True),
-                "origin": [x.hex() for x in asked.o[k].tolist()],
-                "direction": [x.hex() for x in asked.d[k].tolist()],
-                "expected": "a hit of the shape",
-                "found": f"shape {hits.shape[k]} at t = {hits.t[k]}",
-            }
-            for k in wrong[:EXAMPLES].tolist()
-        ),
-    )
+    shown = {
+        "shape": lambda k: case.shapes[case.whose[k]].model_dump_json(exclude_defaults=True),
+        "origin": case.o,
+        "direction": case.d,
+        "expected": "a hit of the shape",
+        "found": lambda k: f"shape {hits.shape[k]} at t = {hits.t[k]}",
+    }
+    return outcome(hits.shape != case.whose, shown)
 
 
 def measure(draw: Draw, x: float) -> Mapping[str, Outcome]:
     names = tuple(KINDS)
-    asked = drawn(draw.rng, names, x, draw.cases // len(names))
-    tables = rt.build_tables(rt.Scene(shapes=asked.shapes, hierarchy="sah"))
-    found = {OURS: judged(asked, query.intersect(tables, asked.o, asked.d))}
-    if draw.mitsuba and fits(np.abs(asked.o)):
-        from comparisons.geometry import frame
-        from comparisons.mitsuba import counterpart, translate
-
+    case = drawn(draw.rng, names, x, draw.cases // len(names))
+    tables = rt.build_tables(rt.Scene(shapes=case.shapes, hierarchy="sah"))
+    found = {OURS: judged(case, query.intersect(tables, case.o, case.d))}
+    if draw.mitsuba and fits(np.abs(case.o)):
         names = tuple(name for name in names if KINDS[name].translated)
-        asked = drawn(draw.rng, names, x, draw.cases // len(names))
-        scene = rt.Scene(shapes=asked.shapes)
-        found[MITSUBA] = judged(
-            asked, counterpart.trace(translate.load(scene, frame.OURS), asked.o, asked.d)
-        )
+        case = drawn(draw.rng, names, x, draw.cases // len(names))
+        found[MITSUBA] = judged(case, traced(rt.Scene(shapes=case.shapes), case.o, case.d))
     return found

@@ -1,9 +1,9 @@
-"""A closed mesh from inside, under a bright sky: what leaks is white."""
+"""A closed mesh from inside, under a bright sky: leaks are white."""
 
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import OURS, FloatArray, Shot
+from comparisons.experiments.stability.harness.core import OURS, FloatArray, Shot
 from comparisons.experiments.stability.harness.meshes import Closed, cube
 from comparisons.experiments.stability.watertight.tracers import by_method, crossings, mitsubas
 

@@ -1,13 +1,13 @@
-"""Who traces rays in a closed mesh: ours, Mitsuba three ways, methods a triangle at a time."""
+"""Rays in a closed mesh: ours counted by triangles, Mitsuba in three ways, text-book methods."""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from comparisons.experiments.stability.harness.family import MITSUBA, FloatArray
-from comparisons.experiments.stability.harness.meshes import Closed
+from comparisons.experiments.stability.harness.core import MITSUBA, FloatArray
+from comparisons.experiments.stability.harness.meshes import Closed, mitsuba_mesh
+from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt import textbook
@@ -19,13 +19,12 @@ from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.meshes.watertight import shear_of
 
-BoolArray = npt.NDArray[np.bool_]
 Tracer = Callable[[FloatArray, FloatArray], BoolArray]
 
 NOT_ROBUST, INSTANCED = "mitsuba, not robust", "mitsuba, instanced"
 
 COARSEST = 0.1
-"""The spacing of float32 at which a mesh of radius 1 to 6 is no longer what is meant."""
+"""The spacing of float32 beyond which a mesh of radius 1 to 6 is deformed too much."""
 
 
 @entry_kernel
@@ -50,7 +49,7 @@ def crossings(tables: Any, o: FloatArray, d: FloatArray) -> tuple[IntArray, IntA
 
 
 def fits(coordinates: FloatArray) -> bool:
-    """Whether float32 knows coordinates of this size to COARSEST."""
+    """Whether float32 resolves coordinates of this size to COARSEST."""
     return bool(np.spacing(np.float32(np.abs(coordinates).max())) < COARSEST)
 
 
@@ -63,22 +62,16 @@ def mitsubas(mesh: Closed) -> dict[str, Tracer]:
         flags = {"type": "scene", "embree_use_robust_intersections": is_robust}
         return mi.load_dict({**flags, **shapes}, optimize=False)
 
-    group = {"type": "shapegroup", "member": _mesh(mi, mesh)}
+    def made() -> Any:
+        return mitsuba_mesh(mesh.vertices, mesh.faces)
+
+    group = {"type": "shapegroup", "member": made()}
     copy = {"type": "instance", "group": {"type": "ref", "id": "group"}}
     return {
-        MITSUBA: _tracer(mi, scene(True, mesh=_mesh(mi, mesh))),
-        NOT_ROBUST: _tracer(mi, scene(False, mesh=_mesh(mi, mesh))),
+        MITSUBA: _tracer(mi, scene(True, mesh=made())),
+        NOT_ROBUST: _tracer(mi, scene(False, mesh=made())),
         INSTANCED: _tracer(mi, scene(True, group=group, copy=copy)),
     }
-
-
-def _mesh(mi: Any, mesh: Closed) -> Any:
-    made = mi.Mesh("mesh", len(mesh.vertices), len(mesh.faces))
-    values = mi.traverse(made)
-    values["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
-    values["faces"] = mesh.faces.astype(np.uint32).ravel()
-    values.update()
-    return made
 
 
 def _tracer(mi: Any, scene: Any) -> Tracer:

@@ -1,18 +1,19 @@
-"""Materials asked about arrays of directions: ours and Mitsuba's, by one interface.
+"""Materials evaluated and sampled for arrays of directions: ours and Mitsuba's, by one interface.
 
 Directions are local, unit, (n, 3); `wo` towards the viewer.  Mitsuba sees them rounded to float32.
 """
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from importlib import import_module
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray
+from comparisons.experiments.stability.harness.family import Sweep
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.materials import translate_material
@@ -78,7 +79,7 @@ def _sample(table: Any, kind: int, wo: Any, u: Any, out: Any) -> None:
 
 @functools.cache
 def _plain() -> Leaves:
-    """A row of every material, so that all are asked by the same compiled kernels."""
+    """A row of every material, so that one compiled kernel serves them all."""
     some: Mapping[type[Material], Any] = {
         Conductor: {"eta": 1.5, "k": 1.0},
         RoughConductor: {"eta": 1.5, "k": 1.0},
@@ -145,8 +146,7 @@ class Theirs:
 
     def evaluate(self, wo: FloatArray, wi: FloatArray) -> FloatArray:
         context = mitsuba().BSDFContext()
-        found = for_rays(lambda o, i: (self.bsdf.eval(context, self._seen(o), i),), wo, wi)
-        return found[0]
+        return for_rays(lambda o, i: (self.bsdf.eval(context, self._seen(o), i),), wo, wi)[0]
 
     def pdf(self, wo: FloatArray, wi: FloatArray) -> FloatArray:
         context = mitsuba().BSDFContext()
@@ -165,6 +165,12 @@ class Theirs:
         u = np.minimum(u, 1.0 - 2.0**-24)
         wi, weight, pdf, eta, is_delta = for_rays(draw, wo, u)
         return Samples(wi, weight, pdf, eta, is_delta != 0.0)
+
+
+def contestants(material: Material, draw: Draw) -> Iterator[tuple[str, Bsdf]]:
+    yield OURS, Ours.of(material)
+    if draw.mitsuba:
+        yield MITSUBA, Theirs.of(material)
 
 
 GOLD: dict[str, Any] = {"eta": (0.143, 0.375, 1.442), "k": (3.983, 2.386, 1.603)}
@@ -211,18 +217,19 @@ SMOOTH: dict[str, Material] = {
 }
 
 
+ALPHA = partial(
+    Sweep, "1 / alpha", (1.0, 3.0, 10.0, 30.0, 1e2, 3e2, 1e3, 3e3, 1e4), (1.0, 1e2, 1e4)
+)
+"""Ever smoother; of so many cases."""
+
+
 def index_of(material: Material) -> float:
-    """Of what is inside over what is outside; 1 for what light does not enter."""
+    """Index of refraction inside over outside; 1 for opaque materials."""
     if isinstance(material, RoughDielectric | Dielectric):
         return material.interior_ior / material.exterior_ior
     if isinstance(material, Principled) and material.transmits:
         return material.relative_ior
     return 1.0
-
-
-def kernels_of(material: Material) -> Any:
-    """The module of its kernels."""
-    return import_module(type(material).__module__)
 
 
 def towards(cosine: FloatArray, phi: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """Where rays go in and out of a solid: by ours, by the text-book's methods, and exactly."""
 
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -7,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.family import FloatArray
-from comparisons.experiments.stability.solids.trees import MESH
+from comparisons.experiments.stability.harness.core import OURS, FloatArray
+from comparisons.experiments.stability.harness.meshes import BALL
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
 from comparisons.geometry.exact.referee import crossings_of, evaluated
 from comparisons.geometry.flatten import Tree, member_of
@@ -32,7 +33,7 @@ MOST = 256
 def scene_of(solid: Any, folder: Path) -> Scene:
     """The solid and, behind it, one of each kind of table: all scenes are traced by one set of
     kernels."""
-    others = (rt.Sphere(), rt.Box(), rt.Cylinder(capped=True), rt.Torus(), rt.Mesh(file=MESH))
+    others = (rt.Sphere(), rt.Box(), rt.Cylinder(capped=True), rt.Torus(), rt.Mesh(file=BALL))
     scene = rt.Scene(shapes=(solid, *others))
     scene._folder = folder
     return scene
@@ -65,8 +66,16 @@ def intervals(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> FloatAr
 
 
 def inside_tests(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> FloatArray:
-    """The first crossing, all that they give: (n, 1)."""
+    """The first crossing alone: (n, 1)."""
     return textbook.intersect(INSIDE_TESTS, CsgParameters(solid, folder), o, d)[:, None]
+
+
+LISTS: Mapping[str, Callable[[Any, Path, FloatArray, FloatArray], FloatArray]] = {
+    OURS: lambda *arguments: ours(*arguments).t,
+    INTERVALS: intervals,
+    INSIDE_TESTS: inside_tests,
+}
+"""Crossings (n, k) of a solid, its folder and rays, by contestant."""
 
 
 def same(a: FloatArray, b: FloatArray) -> Any:
@@ -86,9 +95,9 @@ class Stretch(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """Of one ray.  stretches: in order, those between crossings that rounding can tell apart;
-    touching: it runs exactly through an edge;  crossings, widths, operands: t of each crossing of
-    an operand, how far rounding may have moved it, and the operand's number."""
+    """The truth about one ray.  stretches: in order, those between crossings that rounding can tell
+    apart;  touching: it runs exactly through an edge;  crossings, widths, operands: t of each
+    crossing of an operand, how far rounding may have moved it, and the operand's number."""
 
     stretches: list[Stretch]
     touching: bool
@@ -124,8 +133,8 @@ def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth
 
 
 def _alone(tables: SceneTables, k: int, o: FloatArray, d: FloatArray) -> Lists:
-    """What ours states of operand k alone, where it stands in the solid 0: by itself it would count
-    its coordinates from an anchor of its own, and round otherwise."""
+    """The crossings of operand k as ours states them within solid 0: as a shape of its own it would
+    have another local origin, and round otherwise."""
     solids = tables.geometry.solids
     assert solids is not None
     one, zero = np.ones(1, np.int64), np.zeros(1, np.int64)
@@ -165,7 +174,7 @@ def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists
 
 
 def _width(stated: Lists, t: float) -> float:
-    """Of the operand's crossing at t; none stated: they are too close to be told."""
+    """Of the operand's crossing at t; inf where none is stated, as two are too close together."""
     there = np.isfinite(stated.t)
     if not there.any():
         return np.inf
@@ -175,7 +184,7 @@ def _width(stated: Lists, t: float) -> float:
 
 
 def problem(truth: Truth, t: FloatArray) -> tuple[str, float] | None:
-    """What is wrong with crossings (k,), and how long the stretch is; None for nothing."""
+    """How crossings (k,) break the law, and the length of the wrong stretch; else None."""
     t = t[np.isfinite(t)]
     for x in t.tolist():
         if not np.any(np.abs(truth.crossings - x) <= 2.0 * truth.widths):

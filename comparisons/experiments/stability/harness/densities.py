@@ -1,4 +1,4 @@
-"""Whether samples of rough surfaces have the density that is said, at any roughness.
+"""Chi-square tests of samples of rough surfaces against their stated density, at any roughness.
 
 The chart is that of half vectors: with t = 1 - 1 / sqrt(1 + s²), s the slope over alpha, and phi,
 the lobes of all roughnesses look alike, and fixed cells hold them; visible normals of GGX, of
@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from comparisons.experiments.stability.bsdfs.bsdfs import Bsdf
-from comparisons.experiments.stability.harness.family import FloatArray
+from comparisons.experiments.stability.harness.bsdfs import Bsdf
+from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.geometry.exact.crossings import IntArray
 
 CELLS = 16
@@ -33,8 +33,8 @@ Density = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 class Fit(NamedTuple):
-    """p_value: that of samples with the density said;  integral: of the density over what is
-    mirrored and what is refracted;  doubt: what two rules differ by in it."""
+    """p_value: of the samples, given the stated density;  integral: of the density over
+    reflected and refracted directions;  doubt: by how much two rules differ in it."""
 
     p_value: float
     integral: float
@@ -113,7 +113,7 @@ def _chart(wo: tuple[float, ...], alpha: float, eta: float, through: bool, rule:
 def _cells(
     function: Density, wo: FloatArray, alpha: float, eta: float, through: bool, rule: int
 ) -> FloatArray:
-    """What a function of directions, of one side, integrates to in each cell, (CELLS²,)."""
+    """The integral of a function of directions, of one side, in each cell: (CELLS²,)."""
     chart = _chart(tuple(wo.tolist()), alpha, eta, through, rule)
     values = np.zeros(len(chart.there))
     if len(chart.wi):
@@ -122,8 +122,8 @@ def _cells(
 
 
 def integral(bsdf: Bsdf, wo: FloatArray, alpha: float, eta: float) -> tuple[float, float]:
-    """What comes back of a white sky, in power and in the brightest channel, by f cos alone, and
-    how far two rules differ."""
+    """Share of a white sky that is scattered, in power and in the brightest channel, by f cos
+    alone, and how far two rules differ."""
     total, doubt = 0.0, 0.0
     for through in (False, True) if eta != 1.0 else (False,):
         scale = eta * eta if through else 1.0

@@ -1,12 +1,13 @@
-"""Rooms and bodies in light that is the same everywhere."""
+"""Rooms and bodies in light that is the same everywhere, for furnaces."""
 
 from typing import Any
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.worlds import World, at, facing, grey
+from comparisons.experiments.stability.harness.steps import at, turned
+from comparisons.experiments.stability.harness.worlds import World, grey
 
 WALLS = tuple(
-    rt.Rectangle(material="wall", transform=(at(0, 0, -1), facing(axis, degrees)))
+    rt.Rectangle(material="wall", transform=(at(0, 0, -1), turned(degrees, axis)))
     for axis, degrees in (
         ((1, 0, 0), 0), ((1, 0, 0), 90), ((1, 0, 0), 180),
         ((1, 0, 0), 270), ((0, 1, 0), 90), ((0, 1, 0), 270),
