@@ -1,7 +1,5 @@
 """One HTML page about error against time: offline, a single file, no script."""
 
-import base64
-import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
-from PIL import Image
 
 from comparisons.experiments.convergence.crops import Crops
 from comparisons.experiments.convergence.curves import Curves
@@ -20,6 +17,7 @@ from comparisons.experiments.convergence.fits import Line
 from comparisons.experiments.convergence.starts import STAGES
 from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template, write
+from comparisons.report.thumbnails import png_url
 from comparisons.report.values import percent, shown
 from comparisons.statistics.metrics import encode, white_level
 from reference_rt.core.arrays import FloatArray
@@ -43,7 +41,7 @@ def write_page(
     path: Path, curves: Sequence[Curves], settings: Settings, provenance: Mapping[str, Any]
 ) -> None:
     """Write the page about `curves`, at once or not at all; all text is escaped."""
-    page = template("convergence.html.jinja").render(
+    page = template("convergence.html.jinja", "experiments/convergence").render(
         provenance=provenance,
         settings=settings,
         targets=[percent(target) for target in settings.targets],
@@ -284,10 +282,7 @@ def _crops(one: Curves, crops: Crops, white: float) -> dict[str, Any]:
 
 def _png(picture: FloatArray, white: float) -> str:
     """The data: URL of a picture, exposed for `white`."""
-    pixels = np.rint(255.0 * encode(np.nan_to_num(picture), white)).astype(np.uint8)
-    stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, "PNG", optimize=True)
-    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
+    return png_url(255.0 * encode(np.nan_to_num(picture), white))
 
 
 __all__ = ["write_page"]

@@ -31,7 +31,7 @@ def write_page(
     pictures = failures(rows)
     page = template(
         "methods.html.jinja",
-        "methods",
+        "experiments/methods",
         short=short,
         ns=nanoseconds,
         units=units,
