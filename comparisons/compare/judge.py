@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from comparisons import statistics
-from comparisons.compare import causes
+from comparisons.compare import diagnosis
 from comparisons.results.case import RUNGS, Case, Cause, FloatArray, Images, Place, Tier
 from comparisons.results.verdict import decide
 from comparisons.rungs.images import images_tier
@@ -75,7 +75,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
     cause: Cause | None = None
     worst: tuple[Place, ...] = ()
     if verdict == "differ":
-        cause = causes.of_rungs(rungs)
+        cause = diagnosis.of_rungs(rungs)
         if rendered is not None and metrics is not None:
             cause = cause or _cause_of(rendered.images, evidence.lights)
             worst = _places(rendered)
@@ -108,10 +108,10 @@ def picture_rungs(rendered: Rendered, limit: float) -> list[Tier]:
 
 
 def _cause_of(images: Images, lights: Lights | None) -> Cause | None:
-    plain = causes.likeliest(images)
+    plain = diagnosis.likeliest(images)
     if lights is None or (plain is not None and plain.explained > SURE):
         return plain
-    return causes.likeliest(images, lights())
+    return diagnosis.likeliest(images, lights())
 
 
 SURE = 0.98

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from comparisons import statistics
-from comparisons.compare import causes
+from comparisons.compare import diagnosis
 from comparisons.compare.judge import SURE, Lights
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
@@ -65,7 +65,7 @@ def gate_pictures(
     cause: Cause | None = None
     worst: tuple[Place, ...] = ()
     if verdict == "differ":
-        cause = causes.of_rungs(rungs) or _cause(images, lights)
+        cause = diagnosis.of_rungs(rungs) or _cause(images, lights)
         worst = statistics.worst_places(pictures, _judged_by(reference))
     return Case(
         scene=name,
@@ -148,10 +148,10 @@ def _replicates(reference: Reference) -> FloatArray | None:
 
 
 def _cause(images: Images, lights: Lights | None) -> Cause | None:
-    found = causes.likeliest(images)
+    found = diagnosis.likeliest(images)
     if lights is None or (found is not None and found.explained > SURE):
         return found
-    return causes.likeliest(images, lights())
+    return diagnosis.likeliest(images, lights())
 
 
 def _displayed(pictures: FloatArray) -> FloatArray:

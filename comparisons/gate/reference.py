@@ -15,7 +15,7 @@ from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.results.sealed import read_arrays, write_arrays
 from reference_rt.core.arrays import FloatArray
-from reference_rt.rendering.render import render
+from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import build_tables
@@ -45,9 +45,6 @@ _MOST_NUMBERS = 1 << 28
 _KEPT = 2 << 30
 """Bytes of references in the cache; the one unused for longest goes first."""
 
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
-
 
 @dataclass(frozen=True)
 class Reference:
@@ -72,7 +69,7 @@ def of_scene(
     limit: float,
     *,
     threads: int | None = None,
-    say: Say = lambda what, fraction: None,
+    say: Progress = lambda what, fraction: None,
 ) -> Reference:
     """Our own pictures of a scene, so many that their noise is small beside `limit`.
 
@@ -183,7 +180,7 @@ def _cached(
     count: int,
     enough: Callable[[FloatArray, int], bool],
     threads: int | None,
-    say: Say,
+    say: Progress,
     target: float = 0.0,
 ) -> tuple[FloatArray, int]:
     """`count` pictures of the scene, each the mean of some rounds, and the number of rounds."""

@@ -10,8 +10,9 @@ from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture
-from comparisons.gate.reference import Reference, Say, check_sizes
+from comparisons.gate.reference import Reference, check_sizes
 from comparisons.results.case import Case
+from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
 
@@ -55,7 +56,7 @@ class Request:
 def gated(
     request: Request,
     candidates: Sequence[Picture],
-    say: Say = lambda what, fraction: None,
+    say: Progress = lambda what, fraction: None,
 ) -> Case:
     """The verdict.  Raises ImageError, SceneError, UsageError, BaselineMissingError,
     BaselineEditedError."""
@@ -77,7 +78,7 @@ def gated(
 
 
 def _judge(
-    request: Request, scene: Scene | None, files: Sequence[str], say: Say
+    request: Request, scene: Scene | None, files: Sequence[str], say: Progress
 ) -> tuple[Reference, Scene | None]:
     """What the candidates are judged by, and the scene, as far as it is known."""
     noise_free = request.noise_free or (scene is not None and reference.is_noise_free(scene))

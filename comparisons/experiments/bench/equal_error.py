@@ -16,7 +16,7 @@ TARGET = 0.01
 """Relative error: the root of relMSE."""
 
 SECONDS = 15.0
-"""Budget of a scene, all contestants together."""
+"""Budget of a scene, all methods together."""
 
 QUICK = ("cornell_box", "many_lights", "mesh_knot", "textured_room")
 
@@ -72,7 +72,7 @@ def rows(
     left_out: dict[str, str],
     extrapolated: Mapping[str, Sequence[str]] | None = None,
 ) -> list[Row]:
-    """The rows of times by scene and contestant; `left_out` says why other scenes have none,
+    """The rows of times by scene and method; `left_out` says why other scenes have none,
     `extrapolated` which times of a scene lie beyond what was measured."""
     guessed = extrapolated or {}
     against_default = _ratios(found, DEFAULT)

@@ -1,15 +1,12 @@
 """What every group of rows is told."""
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
-
-Say = Callable[[str, float], None]
-"""Told what is being measured, and which fraction of it is done."""
 
 
 def _silent(what: str, fraction: float) -> None:
@@ -25,7 +22,7 @@ class Setting:
     mesh: Path | None = None
     quick: bool = False
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
-    say: Say = _silent
+    say: Progress = _silent
 
     def file(self, name: str) -> Path:
         """The file of a scene.  Raises UsageError."""
@@ -46,4 +43,4 @@ class Setting:
         return found
 
 
-__all__ = ["Say", "Setting"]
+__all__ = ["Setting"]

@@ -1,4 +1,4 @@
-"""What the contestants' pictures look like after equal times, and at equal errors."""
+"""What the methods' pictures look like after equal times, and at equal errors."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from comparisons.experiments.convergence.contestants import Renderer
 from comparisons.experiments.convergence.data import Reference, Rung, weights
 from comparisons.experiments.convergence.estimates import errors
 from comparisons.experiments.convergence.findings import points_of
 from comparisons.experiments.convergence.fits import linear_time, time_to
+from comparisons.experiments.convergence.methods import Renderer
 from comparisons.experiments.convergence.store import Store
 from reference_rt.core.arrays import FloatArray
 
@@ -26,7 +26,7 @@ Kind = Literal["time", "error"]
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture (height, width, 3) of a contestant: its samples a pixel, its seconds, its relative
+    """A picture (height, width, 3) of a method: its samples a pixel, its seconds, its relative
     error, the root of relMSE."""
 
     picture: FloatArray
@@ -37,7 +37,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Crops:
-    """Pictures of all contestants, by name, at about the same time or the same error.
+    """Pictures of all methods, by name, at about the same time or the same error.
 
     level: the seconds, or the relative error, that was aimed at;  corner, size: left and upper
     edge, width and height of the part where the errors are largest.
@@ -56,7 +56,7 @@ def crops_of(
     reference: Reference,
     store: Store,
 ) -> tuple[Crops, ...]:
-    """At the longest time that all contestants have rungs for, and at the least error that all
+    """At the longest time that all methods have rungs for, and at the least error that all
     reach."""
     if not rungs:
         return ()
@@ -121,7 +121,7 @@ def worst_part(
     rungs: Mapping[str, list[Rung]], reference: Reference
 ) -> tuple[tuple[int, int], tuple[int, int]]:
     """Left and upper edge, width and height of the part where the relative variance of the last
-    rungs is largest, each contestant's relative to its own mean."""
+    rungs is largest, each method's relative to its own mean."""
     weight = weights(reference.mean)
     height, width = reference.mean.shape[:2]
     total = np.zeros((height, width))

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from comparisons.experiments.convergence.contestants import Contestant
 from comparisons.experiments.convergence.crops import Crops
 from comparisons.experiments.convergence.data import Reference
 from comparisons.experiments.convergence.findings import Findings, Ratio, compared
+from comparisons.experiments.convergence.methods import Method
 from reference_rt.core.arrays import FloatArray
 
 Starts = Mapping[str, Mapping[str, Mapping[str, float]]]
@@ -52,8 +52,8 @@ class Grids:
 class Curves:
     """Error against time of one scene.
 
-    scene: its name;  size: width and height in pixels;  contestants, findings: by name;  absent:
-    why there are no findings of other contestants, by name;  grids: of a deterministic scene, which
+    scene: its name;  size: width and height in pixels;  methods, findings: by name;  absent:
+    why there are no findings of other methods, by name;  grids: of a deterministic scene, which
     has no reference and no findings;  starts: of processes;  crops: pictures at equal time and at
     equal error;  left_out: what else was not done, and why;  notes: what a reader should know;
     again: the command that repeats it;  problem: why there is nothing at all, because the scene is
@@ -62,7 +62,7 @@ class Curves:
 
     scene: str
     size: tuple[int, int] = (0, 0)
-    contestants: Mapping[str, Contestant] = field(default_factory=dict)
+    methods: Mapping[str, Method] = field(default_factory=dict)
     findings: Mapping[str, Findings] = field(default_factory=dict)
     reference: Reference | None = None
     grids: Grids | None = None
@@ -76,11 +76,11 @@ class Curves:
 
     @property
     def missing(self) -> list[str]:
-        """A line for each contestant without findings: who, and why."""
-        return [f"{self.contestants[name].title}: {why}" for name, why in self.absent.items()]
+        """A line for each method without findings: who, and why."""
+        return [f"{self.methods[name].title}: {why}" for name, why in self.absent.items()]
 
     def ratios(self, name: str = "ours") -> dict[str, list[Ratio]]:
-        """Times to the targets of contestant `name` over those of each other, with bands."""
+        """Times to the targets of method `name` over those of each other, with bands."""
         if name not in self.findings:
             return {}
         mine = self.findings[name].targets

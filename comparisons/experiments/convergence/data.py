@@ -21,10 +21,10 @@ class Settings:
     """What is asked of a run.
 
     time_limit: seconds for the ladder and the reference of one scene, shared equally by the
-    contestants and the reference; starts of processes, compiling and trials (of costs, of Mitsuba's
+    methods and the reference; starts of processes, compiling and trials (of costs, of Mitsuba's
     samplers) come in addition;  size: width and height, none for the scene's, at most WIDEST pixels
     across;  max_spp: no rung has more samples a pixel;  replicates: independent pictures at each
-    rung;  targets: relative errors, the time to which is asked for;  only: names of contestants,
+    rung;  targets: relative errors, the time to which is asked for;  only: names of methods,
     all if none;  starts: whether to time the start of processes, with caches empty and full;
     crops: whether to render pictures to show.
     """
@@ -55,7 +55,7 @@ def weights(reference: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Reference:
-    """What errors are measured against: our own picture, with other seeds than any contestant's.
+    """What errors are measured against: our own picture, with other seeds than any method's.
 
     mean (height, width, 3): of independent pictures;  variance (height, width, 3): of that mean,
     estimated from their scatter;  count: of the pictures;  spp: samples a pixel of each;  seconds:
@@ -76,7 +76,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Rung:
-    """The replicates of a contestant at one number of samples.
+    """The replicates of a method at one number of samples.
 
     asked, spp: samples a pixel that were asked for and that were taken;  seconds (replicates,): of
     each, by the clock on the wall;  mse, relmse (replicates,): see `estimates.errors`;  mean,

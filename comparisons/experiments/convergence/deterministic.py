@@ -1,26 +1,22 @@
 """Scenes without chance: how much finer grids of samples help, and how far Mitsuba's picture is."""
 
 import time
-from collections.abc import Callable
 
 import numpy as np
 
 from comparisons.compare import pictures
-from comparisons.experiments.convergence.contestants import AbsentError, failing
 from comparisons.experiments.convergence.curves import GridPoint, Grids, GridStep
 from comparisons.experiments.convergence.data import Settings, weights
+from comparisons.experiments.convergence.methods import AbsentError, failing
 from comparisons.experiments.convergence.store import Store
 from comparisons.mitsuba.backend import backend
 from comparisons.mitsuba.translate import UntranslatableError, load
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast
 from reference_rt.rendering.image import display
-from reference_rt.rendering.render import render
+from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
-
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
 
 REPEATS = 3
 """Of the same picture, of whose seconds the median is told."""
@@ -42,7 +38,9 @@ WHOSE = {
 """What a reader should know of Mitsuba's side, by integrator."""
 
 
-def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[Grids, list[str]]:
+def grids_of(
+    scene: Scene, settings: Settings, store: Store, say: Progress
+) -> tuple[Grids, list[str]]:
     """Our pictures on grids of 1, 4, 9, ... samples a pixel against the finest, and Mitsuba's.
 
     The finest grid takes at most half of the time limit.  Of ray casting, which sees the pixels'
@@ -63,7 +61,7 @@ def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[
     return grids, left_out
 
 
-def _made(scene: Scene, settings: Settings, say: Say) -> tuple[Grids, list[str]]:
+def _made(scene: Scene, settings: Settings, say: Progress) -> tuple[Grids, list[str]]:
     left_out: list[str] = []
     say("finest grid", 0.0)
     timed(scene, 2)  # compiles

@@ -26,7 +26,7 @@ BIAS_LEVEL = 0.99
 
 SEEN_LEVEL = 0.9999
 """Confidence of the lower bound, above which a bias is said to be seen: that is asked of each
-contestant of each scene."""
+method of each scene."""
 
 
 class Estimate(NamedTuple):

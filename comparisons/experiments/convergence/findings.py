@@ -1,4 +1,4 @@
-"""What the rungs of a contestant say: curves, slopes, bias, efficiency, times to targets."""
+"""What the rungs of a method say: curves, slopes, bias, efficiency, times to targets."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -82,7 +82,7 @@ class Ratio(NamedTuple):
 
 @dataclass(frozen=True)
 class Findings:
-    """What is known of a contestant.
+    """What is known of a method.
 
     slopes: of "mse" and "relmse" over "spp" and "seconds", None where there are too few rungs;
     bias, relative_bias: from the last rung, the latter weighted as relMSE is.
@@ -98,7 +98,7 @@ class Findings:
 def findings_of(
     rungs: Sequence[Rung], reference: Reference, targets: Sequence[float], independent: bool
 ) -> Findings:
-    """Everything about a contestant that has at least one rung; independent: whether its samples
+    """Everything about a method that has at least one rung; independent: whether its samples
     are."""
     weight = weights(reference.mean)
     steps = tuple(_step(rung, reference, weight) for rung in rungs)

@@ -34,7 +34,7 @@ class Line(NamedTuple):
 
 
 class Points(NamedTuple):
-    """A contestant's curve, of n rungs: samples, seconds and errors, with the standard errors of
+    """A method's curve, of n rungs: samples, seconds and errors, with the standard errors of
     the logarithms of the latter two and the degrees of freedom that those of the errors have; (n,)
     each but the last.  All errors are positive."""
 

@@ -1,4 +1,4 @@
-"""The ladder: replicates at each rung, contestants in turn, and what is stored of them."""
+"""The ladder: replicates at each rung, methods in turn, and what is stored of them."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -7,24 +7,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from comparisons.experiments.convergence.contestants import AbsentError, Renderer
 from comparisons.experiments.convergence.data import Reference, Rung
 from comparisons.experiments.convergence.estimates import Accumulator, against
+from comparisons.experiments.convergence.methods import AbsentError, Renderer
 from comparisons.experiments.convergence.store import Store
+from reference_rt.rendering.render import Progress
 
 PATIENCE = 1.5
-"""Times its share of the time that a contestant may take, where a trial promised too much."""
+"""Times its share of the time that a method may take, where a trial promised too much."""
 
 STORED_EVERY = 15.0
 """Seconds: what a kill can lose.  Ctrl-C loses no picture that is finished."""
 
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
-
 
 @dataclass
 class Climb:
-    """One contestant on the ladder.
+    """One method on the ladder.
 
     renderer: makes it ready, when first needed;  planned: its rungs;  share: its seconds;  apart:
     whether its turn comes when the others are through with their rungs, since changing to it takes
@@ -46,7 +44,7 @@ class Climb:
         return [self.gathered[spp].rung() for spp in self.planned if self.gathered[spp].count]
 
     def add(self, spp: int, replicate: int) -> None:
-        """Render one more picture.  A contestant that cannot, or whose picture is not finite, gives
+        """Render one more picture.  A method that cannot, or whose picture is not finite, gives
         up all of its rungs."""
         try:
             shot = self.renderer()(spp, replicate)
@@ -82,13 +80,13 @@ def climb(
     reference: Reference,
     replicates: int,
     store: Store,
-    say: Say = lambda what, fraction: None,
+    say: Progress = lambda what, fraction: None,
 ) -> None:
-    """Do what is planned and not stored, in sweeps: one picture of every rung of every contestant,
+    """Do what is planned and not stored, in sweeps: one picture of every rung of every method,
     then the next of each.
 
     So each rung's pictures are spread over the whole run, and what disturbs the machine for a while
-    disturbs all contestants, and no rung's median.  What is done is stored, also when interrupted.
+    disturbs all methods, and no rung's median.  What is done is stored, also when interrupted.
     """
     for name, one in climbs.items():
         for spp in one.planned:
@@ -130,7 +128,7 @@ def climb(
 
 
 def _sweep(climbs: Mapping[str, Climb]) -> list[tuple[str, int]]:
-    """(contestant, samples): rung by rung, contestants in turn."""
+    """(method, samples): rung by rung, methods in turn."""
     pairs = [(name, spp) for name, one in climbs.items() for spp in one.planned]
     return sorted(pairs, key=lambda pair: (climbs[pair[0]].apart, pair[1]))
 

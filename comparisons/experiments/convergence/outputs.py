@@ -26,7 +26,7 @@ COLUMNS = (
     "seconds", "seconds_min", "seconds_max", "mse", "mse_low", "mse_high",
     "relmse", "relmse_low", "relmse_high", "relative_variance", "efficiency",
 )  # fmt: skip
-"""Of results.csv: one row for each contestant and rung.  A grid of a deterministic scene is a rung
+"""Of results.csv: one row for each method and rung.  A grid of a deterministic scene is a rung
 of ours with one replicate and neither bands nor variance."""
 
 
@@ -48,7 +48,7 @@ def write_results(
                          "bias" and "relative_bias": {"squared", "low", "high", "seen"},
                          "targets": [{"error", "how", "spp",
                                       "seconds": {"value", "low", "high"}}]}},
-                     "absent": {name of another contestant: why it has no findings},
+                     "absent": {name of another method: why it has no findings},
                      "ratios": {name: [{"error", "value", "low", "high", "extrapolated": whether a
                                         time lies beyond the measured rungs, "bound": "at most" or
                                         "at least" or "neither" where times of first rungs are
@@ -61,7 +61,7 @@ def write_results(
                      "problem": why there is nothing about the scene, "" for most}]}
 
     Bands hold the value with a confidence of 95 %; a squared bias lies above "low" with 99.99 % and
-    below "high" with 99 %.  "ratios" are ours over the contestant's.  Strict JSON (RFC 8259): NaN
+    below "high" with 99 %.  "ratios" are ours over the method's.  Strict JSON (RFC 8259): NaN
     and the infinities become null, so a null number says "undefined or unbounded".
     """
     document = {
@@ -114,7 +114,7 @@ def _scene(one: Curves) -> dict[str, Any]:
             "relmse": reference.relmse,
             "seconds": reference.seconds,
         },
-        "contestants": {name: _contestant(one, name) for name in one.findings},
+        "contestants": {name: _method(one, name) for name in one.findings},
         "absent": one.absent,
         "ratios": _ratios(one),
         "grids": None
@@ -144,12 +144,12 @@ def _scene(one: Curves) -> dict[str, Any]:
     }
 
 
-def _contestant(one: Curves, name: str) -> dict[str, Any]:
-    contestant, found = one.contestants[name], one.findings[name]
+def _method(one: Curves, name: str) -> dict[str, Any]:
+    method, found = one.methods[name], one.findings[name]
     return {
-        "title": contestant.title,
-        "sampler": contestant.sampler,
-        "side": contestant.side,
+        "title": method.title,
+        "sampler": method.sampler,
+        "side": method.side,
         "rungs": [
             {
                 "asked_spp": step.asked,
@@ -208,7 +208,7 @@ def _rows(one: Curves) -> Iterator[list[Any]]:
     for name, found in one.findings.items():
         for step in found.steps:
             yield [
-                one.scene, *one.size, name, one.contestants[name].sampler, step.asked, step.spp,
+                one.scene, *one.size, name, one.methods[name].sampler, step.asked, step.spp,
                 step.replicates, *step.seconds, *step.mse, *step.relmse, step.variance,
                 step.efficiency,
             ]  # fmt: skip

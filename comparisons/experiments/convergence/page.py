@@ -53,12 +53,12 @@ def write_page(
 
 
 def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
-    """Ours against each other contestant at one target, scene by scene, and the medians."""
+    """Ours against each other method at one target, scene by scene, and the medians."""
     targets = list(settings.targets)
     if not targets:
         return {"target": "", "columns": [], "rows": [], "medians": [], "absent": []}
     place = targets.index(0.01) if 0.01 in targets else len(targets) - 1
-    titles = {name: c.title for one in curves for name, c in one.contestants.items()}
+    titles = {name: c.title for one in curves for name, c in one.methods.items()}
     names = [name for name in titles if name != "ours"]
     rows = []
     known: dict[str, list[Ratio]] = {name: [] for name in names}
@@ -87,7 +87,7 @@ def _instead(one: Curves) -> str:
 
 
 def _without_ratio(one: Curves, name: str) -> Cell:
-    """Of a scene and a contestant one of which was not asked for, or has no data."""
+    """Of a scene and a method one of which was not asked for, or has no data."""
     who = next((n for n in ("ours", name) if n in one.absent), None)
     if who is None:
         return Cell("–", "ours is not there" if name in one.findings else "not asked for")
@@ -126,7 +126,7 @@ def _view(one: Curves) -> dict[str, Any]:
     ratios = one.ratios()
     view["targets"] = [
         (
-            one.contestants[name].title,
+            one.methods[name].title,
             [_reached(target) for target in found.targets],
             [_ratio(ratio) for ratio in ratios[name]] if name in ratios else None,
         )
@@ -134,7 +134,7 @@ def _view(one: Curves) -> dict[str, Any]:
     ]
     view["laws"] = [
         (
-            one.contestants[name].title,
+            one.methods[name].title,
             [
                 _slope(found.slopes["relmse"]["spp"]),
                 _slope(found.slopes["relmse"]["seconds"]),
@@ -160,12 +160,12 @@ def _ladder_plots(one: Curves) -> list[Markup]:
     for name, text, marks in (("relmse", "E[relMSE]", levels), ("mse", "E[MSE]", {})):
         for over, x_label in (("seconds", SECONDS), ("spp", SAMPLES)):
             curves = []
-            for number, (contestant, found) in enumerate(one.findings.items()):
+            for number, (method, found) in enumerate(one.findings.items()):
                 bands = [getattr(step, name) for step in found.steps]
                 x = [s.seconds.value if over == "seconds" else s.spp for s in found.steps]
                 curves.append(
                     Curve(
-                        one.contestants[contestant].title,
+                        one.methods[method].title,
                         x,
                         [band.value for band in bands],
                         [band.low for band in bands],
@@ -267,7 +267,7 @@ def _crops(one: Curves, crops: Crops, white: float) -> dict[str, Any]:
     figures = [("the reference", "", one.reference.mean)]
     for name, found in crops.shown.items():
         caption = f"{found.spp:,} samples, {_seconds(found.seconds)}, {percent(found.error)}"
-        figures.append((one.contestants[name].title, caption, found.picture))
+        figures.append((one.methods[name].title, caption, found.picture))
     return {
         "title": f"About {_seconds(crops.level)} each"
         if crops.kind == "time"

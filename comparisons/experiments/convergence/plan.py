@@ -1,10 +1,10 @@
-"""How far each contestant climbs within the time, from what a few pictures of it take."""
+"""How far each method climbs within the time, from what a few pictures of it take."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from comparisons.experiments.convergence.contestants import Renderer
 from comparisons.experiments.convergence.data import FIRST, Settings
+from comparisons.experiments.convergence.methods import Renderer
 
 TRIALS = (FIRST, 4 * FIRST)
 """Samples a pixel of the pictures that costs are estimated from."""

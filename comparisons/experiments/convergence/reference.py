@@ -2,7 +2,6 @@
 
 import hashlib
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.reference import cache_folder
 from comparisons.results.sealed import read_arrays, write_arrays
 from reference_rt.core.arrays import FloatArray
-from reference_rt.rendering.render import render
+from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Sobol
 from reference_rt.util.errors import ImageError
@@ -22,9 +21,6 @@ COUNT = 16
 """Independent pictures: the variance of their mean is then known pixel by pixel to one part in
 three, and over thousands of pixels far better."""
 
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
-
 
 def key_of(scene: Scene) -> str:
     """Of the scene, its size and filter included, and of our source."""
@@ -32,10 +28,10 @@ def key_of(scene: Scene) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def reference_of(scene: Scene, spp: int, say: Say = lambda what, fraction: None) -> Reference:
+def reference_of(scene: Scene, spp: int, say: Progress = lambda what, fraction: None) -> Reference:
     """COUNT pictures of at least `spp` Sobol' samples a pixel.
 
-    What the cache has is taken, and added to where it is less.  Seeds are none of a contestant's.
+    What the cache has is taken, and added to where it is less.  Seeds are none of a method's.
     """
     key = key_of(scene)
     path = cache_folder() / f"{key[:40]}.npz"

@@ -6,14 +6,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import platformdirs
 
-from comparisons.experiments.convergence.contestants import Contestant
+from comparisons.experiments.convergence.methods import Method
 from comparisons.experiments.convergence.store import Store
 from comparisons.mitsuba.backend import LIBRARY, LLVM, backend
+from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.child_processes import tied
 
@@ -28,18 +29,15 @@ SPP = 16
 TIMEOUT = 300.0
 """Seconds: compiling takes ten, on a machine that others keep busy a few times that."""
 
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
-
 
 def starts_of(
-    scene: Scene, contestants: Iterable[Contestant], store: Store, say: Say
+    scene: Scene, methods: Iterable[Method], store: Store, say: Progress
 ) -> dict[str, dict[str, dict[str, float]]]:
     """Seconds by side, "cold" or "warm", and stage; nothing of a side whose processes failed.
 
     Cold are the caches of compiled kernels alone: the system has the programs' files in memory.
     """
-    sides = list(dict.fromkeys(contestant.side for contestant in contestants))
+    sides = list(dict.fromkeys(method.side for method in methods))
     found: dict[str, dict[str, dict[str, float]]] = {}
     for number, side in enumerate(sides):
         say("starts of processes", number / len(sides))

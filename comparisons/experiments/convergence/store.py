@@ -61,17 +61,17 @@ class Store:
 
     # ---- rungs ----------------------------------------------------------------------------------
 
-    def rung(self, contestant: str, asked: int) -> Rung | None:
+    def rung(self, method: str, asked: int) -> Rung | None:
         """The stored one; None where there is none, or none that can be read."""
         if self._folder is None:
             return None
-        kept = read_arrays(self._rung_path(contestant, asked))
+        kept = read_arrays(self._rung_path(method, asked))
         with suppress(KeyError):
             arrays = [np.asarray(kept[name], np.float64) for name in _ARRAYS]
             return Rung(int(kept["asked"]), int(kept["spp"]), *arrays)
         return None
 
-    def keep(self, contestant: str, rung: Rung) -> None:
+    def keep(self, method: str, rung: Rung) -> None:
         """Store a rung, whole or not at all; its pictures as float32, whose rounding is far below
         their noise.  Raises ImageError where the folder cannot be written."""
         if self._folder is None:
@@ -79,12 +79,12 @@ class Store:
         arrays: dict[str, Any] = {name: getattr(rung, name) for name in _ARRAYS}
         for name in ("mean", "variance"):
             arrays[name] = arrays[name].astype(np.float32)
-        path = self._rung_path(contestant, rung.asked)
+        path = self._rung_path(method, rung.asked)
         write_arrays(path, asked=rung.asked, spp=rung.spp, **arrays)
 
-    def _rung_path(self, contestant: str, asked: int) -> Path:
+    def _rung_path(self, method: str, asked: int) -> Path:
         assert self._folder is not None
-        return self._folder / f"{contestant}-{asked}.npz"
+        return self._folder / f"{method}-{asked}.npz"
 
     # ---- pictures -------------------------------------------------------------------------------
 

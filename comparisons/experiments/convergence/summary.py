@@ -10,7 +10,7 @@ from comparisons.report.values import percent
 
 
 def lines_of(curves: Curves) -> list[str]:
-    """A line for each contestant, or grid of samples, and for what was left out."""
+    """A line for each method, or grid of samples, and for what was left out."""
     if curves.problem:
         return [f"{curves.scene}: {curves.problem}"]
     lines = []

@@ -17,7 +17,7 @@ import reference_rt as rt
 from comparisons.gate.baselines import used_in
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.pictures_in import read_candidate, variance_of
-from comparisons.report.marked import around
+from comparisons.report.marker_block import around
 from comparisons.results.record import CASE, read_record
 from comparisons.suites.archive import read_archive
 from comparisons.suites.keys import files_digest
@@ -230,7 +230,7 @@ def test_a_picture_of_any_name(tmp_path, name):
     for suffix in (".exr", ".png"):
         out = tmp_path / f"{NAMES[name]}{suffix}"
         done = subprocess.run(
-            [sys.executable, "-m", "reference_rt.cli.main", "render", str(scene), "-o", str(out)],
+            [sys.executable, "-m", "reference_rt.cli", "render", str(scene), "-o", str(out)],
             capture_output=True,
             env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
             check=False,

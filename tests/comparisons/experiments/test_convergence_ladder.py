@@ -1,16 +1,16 @@
-"""The ladder: contestants take turns, and what is done is not done again."""
+"""The ladder: methods take turns, and what is done is not done again."""
 
 import numpy as np
 import pytest
 from convergence_fakes import EXACT, Fake, climbs
 
 from comparisons.experiments.convergence import ladder
-from comparisons.experiments.convergence.contestants import Shot
 from comparisons.experiments.convergence.ladder import Climb, climb
+from comparisons.experiments.convergence.methods import Shot
 from comparisons.experiments.convergence.store import Store
 
 
-def test_contestants_take_turns_and_numbers_are_used_once():
+def test_methods_take_turns_and_numbers_are_used_once():
     asked = []
 
     class Told(Fake):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.compare.causes.misfit import Misfit
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import Cause, FloatArray
 
 SHARE = 0.9

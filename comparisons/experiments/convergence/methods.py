@@ -30,7 +30,7 @@ class Shot(NamedTuple):
 
 
 class Renderer(Protocol):
-    """A contestant that is ready to render."""
+    """A method that is ready to render."""
 
     def __call__(self, spp: int, replicate: int) -> Shot:
         """A picture of about `spp` samples a pixel; another `replicate` is independent of it."""
@@ -44,9 +44,9 @@ BEST = "best"
 
 
 @dataclass(frozen=True)
-class Contestant:
+class Method:
     """name: for files and options;  title: for people;  sampler: its name, or BEST;  side: "ours"
-    or the Mitsuba variant, contestants of which share what is loaded."""
+    or the Mitsuba variant, methods of which share what is loaded."""
 
     name: str
     title: str
@@ -68,38 +68,38 @@ class Contestant:
         return 4 if self.sampler in ("multijitter", "ldsampler") else 2
 
 
-def with_sampler(contestant: Contestant, sampler: str) -> Contestant:
+def with_sampler(method: Method, sampler: str) -> Method:
     """The same side of Mitsuba with its best sampler, which is this one."""
-    title = contestant.title.partition(",")[0]
-    return replace(contestant, sampler=sampler, title=f"{title}, {sampler} (best)")
+    title = method.title.partition(",")[0]
+    return replace(method, sampler=sampler, title=f"{title}, {sampler} (best)")
 
 
-CONTESTANTS = (
-    Contestant("ours", "ours, Sobol' (default and best)", "sobol", "ours"),
-    Contestant("ours_independent", "ours, independent", "independent", "ours"),
-    Contestant("mitsuba_llvm", "Mitsuba llvm, independent (default)", "independent", LLVM),
-    Contestant("mitsuba_llvm_best", "Mitsuba llvm, its best sampler", BEST, LLVM),
-    Contestant("mitsuba_scalar", "Mitsuba scalar, independent (default)", "independent", SCALAR),
-    Contestant("mitsuba_scalar_best", "Mitsuba scalar, its best sampler", BEST, SCALAR),
+METHODS = (
+    Method("ours", "ours, Sobol' (default and best)", "sobol", "ours"),
+    Method("ours_independent", "ours, independent", "independent", "ours"),
+    Method("mitsuba_llvm", "Mitsuba llvm, independent (default)", "independent", LLVM),
+    Method("mitsuba_llvm_best", "Mitsuba llvm, its best sampler", BEST, LLVM),
+    Method("mitsuba_scalar", "Mitsuba scalar, independent (default)", "independent", SCALAR),
+    Method("mitsuba_scalar_best", "Mitsuba scalar, its best sampler", BEST, SCALAR),
 )
 
-NAMES = tuple(contestant.name for contestant in CONTESTANTS)
+NAMES = tuple(method.name for method in METHODS)
 
 
-def chosen(only: tuple[str, ...]) -> tuple[Contestant, ...]:
+def chosen(only: tuple[str, ...]) -> tuple[Method, ...]:
     """Those of these names, all if none is given.  Raises UsageError for a name that is none."""
     if unknown := [name for name in only if name not in NAMES]:
         raise UsageError(f"--only: expected some of {', '.join(NAMES)}, got '{unknown[0]}'")
-    return tuple(c for c in CONTESTANTS if not only or c.name in only)
+    return tuple(c for c in METHODS if not only or c.name in only)
 
 
 class AbsentError(Exception):
-    """A contestant cannot render the scene; the message says why."""
+    """A method cannot render the scene; the message says why."""
 
 
 @contextmanager
 def failing(what: str) -> Iterator[None]:
-    """Turn the exceptions of Mitsuba and Dr.Jit into AbsentError: one contestant that fails must
+    """Turn the exceptions of Mitsuba and Dr.Jit into AbsentError: one method that fails must
     not cost the curves of the others."""
     try:
         yield
@@ -119,7 +119,7 @@ def remarks(scene: Scene) -> list[str]:
 
 
 class Stable:
-    """Makes contestants ready, and keeps what several of them share; a context, which leaves
+    """Makes methods ready, and keeps what several of them share; a context, which leaves
     Mitsuba in the variant that it was in."""
 
     def __init__(self, scene: Scene) -> None:
@@ -142,27 +142,27 @@ class Stable:
                 self._entered.enter_context(variant(side))
         return mi
 
-    def ready(self, contestant: Contestant, progress: Progress | None = None) -> Renderer:
+    def ready(self, method: Method, progress: Progress | None = None) -> Renderer:
         """Load and compile.  Raises SceneError, ReferenceUnavailableError, AbsentError."""
-        if contestant.side == "ours":
-            return self._ours(contestant, progress)
-        if contestant.side == LLVM and backend().variant != LLVM:
+        if method.side == "ours":
+            return self._ours(method, progress)
+        if method.side == LLVM and backend().variant != LLVM:
             raise AbsentError(f"Mitsuba's variant {LLVM} does not run here: {backend().reason}")
         copies = copies_of(self._scene)
         if any(member.tree is not None for copy in copies for member in copy.members):
             raise AbsentError("Mitsuba has no set operations")
         try:
-            return self._mitsubas(contestant)
+            return self._mitsubas(method)
         except UntranslatableError as error:
             raise AbsentError(str(error)) from None
 
-    def _ours(self, contestant: Contestant, progress: Progress | None) -> Renderer:
+    def _ours(self, method: Method, progress: Progress | None) -> Renderer:
         scene = self._scene
         make: Callable[..., Sobol | Independent]
-        make = Sobol if contestant.sampler == "sobol" else Independent
+        make = Sobol if method.sampler == "sobol" else Independent
         tables = scene.tables
         # Far from the seeds that people choose, and from those of the reference.
-        first = FIRST_SEED if contestant.sampler == "sobol" else 2 * FIRST_SEED
+        first = FIRST_SEED if method.sampler == "sobol" else 2 * FIRST_SEED
 
         def shot(spp: int, replicate: int) -> Shot:
             seeded = scene.changed(sampler=make(spp=spp, seed=first + replicate))
@@ -175,13 +175,13 @@ class Stable:
         render(small, tables=tables, progress=progress)
         return shot
 
-    def _mitsubas(self, contestant: Contestant) -> Renderer:
-        mi = self._in(contestant.side)
+    def _mitsubas(self, method: Method) -> Renderer:
+        mi = self._in(method.side)
         description = to_mitsuba(self._scene, native=True)
-        description["sensor"]["sampler"] = {"type": contestant.sampler}
+        description["sensor"]["sampler"] = {"type": method.sampler}
         parts = [part for part in description.values() if isinstance(part, dict)]
         instances = sum(part.get("type") == "instance" for part in parts)
-        if contestant.side == LLVM and instances > FEW:
+        if method.side == LLVM and instances > FEW:
             raise AbsentError(
                 f"{instances} instances, for which Mitsuba's llvm variant takes minutes to compile"
             )
@@ -190,7 +190,7 @@ class Stable:
         sampler = mi_scene.sensors()[0].sampler()
 
         def shot(spp: int, replicate: int) -> Shot:
-            mi = self._in(contestant.side)
+            mi = self._in(method.side)
             settle()
             start = time.perf_counter()
             with failing(f"Mitsuba cannot render {spp} samples a pixel"):
@@ -217,10 +217,10 @@ def _three(picture: Any) -> FloatArray:
 
 __all__ = [
     "BEST",
-    "CONTESTANTS",
+    "METHODS",
     "NAMES",
     "AbsentError",
-    "Contestant",
+    "Method",
     "Renderer",
     "Shot",
     "Stable",

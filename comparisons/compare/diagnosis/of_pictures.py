@@ -4,10 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from comparisons.compare.causes import brightness, place
-from comparisons.compare.causes.hypothesis import Hypothesis
-from comparisons.compare.causes.misfit import Misfit
-from comparisons.compare.causes.spots import one_place
+from comparisons.compare.diagnosis import brightness, place
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.spots import one_place
 from comparisons.results.case import Cause, FloatArray, Images
 from comparisons.statistics.metrics import count_nonfinite
 

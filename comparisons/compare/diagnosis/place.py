@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import ndimage, optimize
 
-from comparisons.compare.causes.hypothesis import Hypothesis
-from comparisons.compare.causes.misfit import Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 
 FARTHEST = 3
