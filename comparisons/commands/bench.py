@@ -22,7 +22,7 @@ def bench(
     ] = None,
     mesh: Annotated[
         Path | None,
-        typer.Option(help="An .obj or .ply file to trace rays in.  [default: a generated mesh]"),
+        typer.Option(help="An .obj or .ply file to trace rays in. (default: a generated mesh)"),
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Smaller pictures and fewer scenes.")

@@ -23,10 +23,10 @@ def compare(
     ] = Path("out"),
     spp: Annotated[
         int | None,
-        typer.Option(help="Samples per pixel of each replicate.  [default: the scene's]"),
+        typer.Option(help="Samples per pixel of each replicate. (default: the scene's)"),
     ] = None,
     size: Annotated[
-        str | None, typer.Option(help="WIDTHxHEIGHT in pixels.  [default: the scene's]")
+        str | None, typer.Option(help="WIDTHxHEIGHT in pixels. (default: the scene's)")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first replicate.")] = None,
     replicates: Annotated[

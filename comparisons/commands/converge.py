@@ -34,7 +34,7 @@ def converge(
     size: Annotated[
         str | None,
         typer.Option(
-            metavar="WIDTHxHEIGHT", help="In pixels.  [default: the scene's, at most 128 wide]"
+            metavar="WIDTHxHEIGHT", help="In pixels. (default: the scene's, at most 128 wide)"
         ),
     ] = None,
     max_spp: Annotated[

@@ -31,4 +31,4 @@ NoiseFree = Annotated[
 
 Scenes = Annotated[Path, typer.Option(metavar="DIR", help="The folder of scene files.")]
 
-Threads = Annotated[int | None, typer.Option(min=1, help="Threads.  [default: all cores]")]
+Threads = Annotated[int | None, typer.Option(min=1, help="Threads. (default: all cores)")]

@@ -16,7 +16,7 @@ def report(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The page to write.  [default: DIR/report.html]"),
+        typer.Option(metavar="FILE", help="The page to write. (default: DIR/report.html)"),
     ] = None,
 ) -> None:
     """Write results.json and the page again, from the stored results of `suite` or `compare`.

@@ -32,7 +32,7 @@ def stability(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random scenes and rays.")] = 1,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Parallel processes.  [default: all cores]")
+        int | None, typer.Option(min=1, help="Parallel processes. (default: all cores)")
     ] = None,
     mitsuba: Annotated[
         bool, typer.Option("--mitsuba/--no-mitsuba", help="Measure Mitsuba too.")

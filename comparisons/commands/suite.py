@@ -24,7 +24,7 @@ def suite(
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Folder for results and the page.  [default: out/NAME]"),
+        typer.Option("--out", "-o", help="Folder for results and the page. (default: out/NAME)"),
     ] = None,
     only: Annotated[
         list[str] | None,
@@ -36,7 +36,7 @@ def suite(
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(min=1, help=f"Parallel processes.  [default: all cores, at most {MOST_JOBS}]"),
+        typer.Option(min=1, help=f"Parallel processes. (default: all cores, at most {MOST_JOBS})"),
     ] = None,
     fresh: Fresh = False,
     junit: JUnit = None,

@@ -25,10 +25,10 @@ REMARKABLE = {
     4.0: "four times",
     0.25: "a quarter of",
 }
-"""Factors that hint at their origin."""
+"""Factors with a likely origin, and their names."""
 
 NEAR = 0.01
-"""How near a fitted factor must be to one that is remarkable."""
+"""Relative difference up to which a fitted factor counts as a remarkable one."""
 
 
 def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
@@ -54,9 +54,7 @@ def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
         alone[..., k] = r[..., k]
         amount = misfit.amount(alone)
         gains[k] += amount
-        told = (
-            f"{channel} is {1.0 + amount:.4g} times the reference's, the other channels are right"
-        )
+        told = f"{channel} is {1.0 + amount:.4g} times the reference's; the other channels agree"
         yield Hypothesis(
             "gain of a channel",
             f"gain of {channel} of {1 + amount:.4g}",
@@ -68,7 +66,7 @@ def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
     told = f"red, green and blue are {each} times the reference's"
     yield Hypothesis("gains", "another gain of each channel", told, gains * r, 3)
     amount = misfit.amount(np.ones_like(r))
-    told = f"every pixel of the candidate has {amount:+.3g} W/sr/m² more than the reference"
+    told = f"every pixel of the candidate is the reference's {amount:+.3g} W/sr/m²"
     yield Hypothesis("offset", f"constant offset of {amount:+.3g}", told, r + amount, 1)
 
 
@@ -137,7 +135,7 @@ def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
 
 
 ONE = 0.1
-"""How near to once a light must be missing or there in excess, to be told lost or counted twice."""
+"""How close to -1 or +1 the excess of a light must be for it to be called lost or doubled."""
 
 
 def _lights(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:

@@ -1,4 +1,4 @@
-"""What may be wrong with a picture."""
+"""A hypothesis about what is wrong with a picture."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,8 @@ from comparisons.results.case import FloatArray
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """family: hypotheses of one do not compete;  name, evidence: as in `Cause`;  picture: what the
-    candidate would be;  parameters: how many were fitted to make it so."""
+    """family: hypotheses of the same family do not compete;  name, evidence: as in `Cause`;
+    picture: the candidate that the hypothesis predicts;  parameters: how many were fitted."""
 
     family: str
     name: str

@@ -1,4 +1,4 @@
-"""What every group of rows is told."""
+"""The options of a benchmark, common to all groups of rows."""
 
 import os
 from dataclasses import dataclass, field
@@ -15,8 +15,9 @@ def _silent(what: str, fraction: float) -> None:
 
 @dataclass(frozen=True)
 class Setting:
-    """scenes: folder of the suite's scenes;  mesh: file that rays are traced in, None for one made
-    here;  quick: fewer scenes and smaller pictures;  threads: of ours;  say: progress."""
+    """scenes: folder of the suite's scenes;  mesh: file that rays are traced against, None for a
+    generated mesh;  quick: fewer scenes and smaller pictures;  threads: of our renderer;  say:
+    called with the progress."""
 
     scenes: Path = Path("scenes")
     mesh: Path | None = None

@@ -107,7 +107,7 @@ def test_wrong_usage(right: FloatArray) -> None:
         ([candidate, "--scene", "ball.yaml", "--spp", "3"], "--spp: only applies to --command"),
         ([candidate, "--scene", "ball.yaml", "--variance", "v.exr"], "variance without a referen"),
         ([candidate, "--reference", candidate, "--baseline", "b"], "a reference and a baseline"),
-        ([candidate, "--baseline", "../b"], "'../b' is no name of a baseline"),
+        ([candidate, "--baseline", "../b"], "'../b' is not a valid name of a baseline"),
         (["--command", "x {outptu}", "--scene", "ball.yaml"], "there is no {outptu}"),
         (["--command", "x {scene}", "--scene", "ball.yaml"], "has no {output}"),
     ):
