@@ -51,8 +51,10 @@ def likeliest(images: Images, lights: Mapping[str, FloatArray] | None = None) ->
     if best is not None:
         hypothesis, unexplained = best
         explained = 1.0 - unexplained
-        told = f"{hypothesis.evidence}: that explains {100.0 * explained:.4g} % of the difference"
-        return Cause(hypothesis.name, told, explained)
+        evidence = (
+            f"{hypothesis.evidence}: that explains {100.0 * explained:.4g} % of the difference"
+        )
+        return Cause(hypothesis.name, evidence, explained)
     if left.min() < 1.0 - MOST:
         return None  # several hypotheses explain it, none clearly better than the others
     return one_place(misfit)

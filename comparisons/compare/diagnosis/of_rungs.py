@@ -32,8 +32,8 @@ def of_rungs(tiers: Sequence[Tier]) -> Cause | None:
     if broken is None:
         return None
     if broken.name == "film":
-        told = broken.reason
-        return Cause("wrong filter or filter width", told, 1.0)
+        evidence = broken.reason
+        return Cause("wrong filter or filter width", evidence, 1.0)
     if broken.name == "geometry":
         if broken.reason.startswith("the camera"):
             return None  # the pictures show in which way the camera differs
@@ -52,8 +52,8 @@ def _of_geometry(numbers: dict[str, Any]) -> Cause | None:
     for kind, (name, what) in OF_KIND.items():
         count = kinds.get(kind, 0)
         if count > ALMOST_ALL * total:
-            told = f"{count} of {total} rays that differ {what}"
-            return Cause(name, told, count / total)
+            evidence = f"{count} of {total} rays that differ {what}"
+            return Cause(name, evidence, count / total)
     return None
 
 
@@ -65,9 +65,9 @@ def _of_direct(numbers: dict[str, Any]) -> Cause | None:
     if ratio is None or spread is None:
         return None
     if with_cosine is not None and with_cosine < CONSTANT and with_cosine < 0.5 * spread:
-        told = "the candidate's direct light over the reference's is proportional to 1 / cosine"
-        return Cause("missing cosine", told, 1.0 - with_cosine)
+        evidence = "the candidate's direct light over the reference's is proportional to 1 / cosine"
+        return Cause("missing cosine", evidence, 1.0 - with_cosine)
     if spread < CONSTANT:
-        told = f"the candidate's direct light is {ratio:.4g} times the reference's at every hit"
-        return Cause(f"direct light times {ratio:.4g}", told, 1.0 - spread)
+        evidence = f"the candidate's direct light is {ratio:.4g} times the reference's at every hit"
+        return Cause(f"direct light times {ratio:.4g}", evidence, 1.0 - spread)
     return None

@@ -95,8 +95,8 @@ def _shifts(misfit: Misfit) -> Iterator[Hypothesis]:
         x, y = (float(v) for v in fit.x)
         if max(abs(x), abs(y)) > FARTHEST + 1:
             continue  # the search diverged: only the repeated edge is left of the picture
-        told = f"the candidate is the reference moved by {x:+.3g}, {y:+.3g} pixels (right, down)"
-        yield Hypothesis("shift", _name(x, y), told, _shifted(channels, x, y, order), 2)
+        evidence = f"the candidate is the reference shifted {x:+.3g}, {y:+.3g} pixels (right, down)"
+        yield Hypothesis("shift", _name(x, y), evidence, _shifted(channels, x, y, order), 2)
 
 
 def _name(x: float, y: float) -> str:
@@ -122,13 +122,13 @@ def _filters(misfit: Misfit) -> Iterator[Hypothesis]:
         options={"xatol": 0.01, "maxiter": 25},
     )
     sigma = float(fit.x)
-    told = f"the candidate is the reference through a Gaussian of sigma {sigma:.2g} pixels"
-    yield Hypothesis("filter", f"blurred by {sigma:.2g} pixels", told, blurred(sigma), 1)
+    evidence = f"the candidate is the reference through a Gaussian of sigma {sigma:.2g} pixels"
+    yield Hypothesis("filter", f"blurred by {sigma:.2g} pixels", evidence, blurred(sigma), 1)
     detail = r - blurred(0.7)
     amount = misfit.amount(detail)
     if amount > 0.0:
-        told = (
+        evidence = (
             f"details of the size of a pixel are {1.0 + amount:.3g} times as strong as the "
             "reference's"
         )
-        yield Hypothesis("filter", "sharpened", told, r + amount * detail, 1)
+        yield Hypothesis("filter", "sharpened", evidence, r + amount * detail, 1)

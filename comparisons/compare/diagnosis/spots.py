@@ -35,8 +35,8 @@ def _line(excess: FloatArray, total: float) -> Cause | None:
         along = excess[k] if axis == 1 else excess[:, k]
         # The whole line must be wrong, not only a pixel or two in it.
         if share > SHARE and np.median(along) > EVEN * along.mean():
-            told = f"{_percent(share)} of the difference are in {name} {k}"
-            return Cause(f"one bad {name}", told, min(share, 1.0))
+            evidence = f"{_percent(share)} of the difference are in {name} {k}"
+            return Cause(f"one bad {name}", evidence, min(share, 1.0))
     return None
 
 
@@ -58,8 +58,8 @@ def _pixels(excess: FloatArray, total: float) -> Cause | None:
     y, x = (int(i) for i in np.unravel_index(int(order[0]), excess.shape))
     share = min(float(shares[-1]), 1.0)
     many = "one pixel" if needed == 1 else f"{needed} pixels"
-    told = f"{_percent(share)} of the difference are in {many}, the worst at x {x}, y {y}"
-    return Cause("a single wrong pixel" if needed == 1 else "a few wrong pixels", told, share)
+    evidence = f"{_percent(share)} of the difference are in {many}, the worst at x {x}, y {y}"
+    return Cause("a single wrong pixel" if needed == 1 else "a few wrong pixels", evidence, share)
 
 
 def _rectangle(excess: FloatArray, total: float, block: int) -> Cause | None:
@@ -74,10 +74,10 @@ def _rectangle(excess: FloatArray, total: float, block: int) -> Cause | None:
     width, height = right - left, bottom - top
     if not (inside > SHARE and 0.0 < width * height < SMALL * excess.size):
         return None
-    told = (
+    evidence = (
         f"{_percent(inside)} of the difference are in the {width * block} x {height * block} "
         f"pixels at x {left * block}, y {top * block}"
     )
     thin = block == 1 and 1 in (width, height) and max(width, height) > 8
     name = ("one bad row" if height == 1 else "one bad column") if thin else "one bad tile"
-    return Cause(name, told, min(inside, 1.0))
+    return Cause(name, evidence, min(inside, 1.0))

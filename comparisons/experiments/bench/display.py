@@ -15,11 +15,11 @@ class Display(Bar):
         super().__init__(TimeElapsedColumn(), console=console)
         self._task = self._bar.add_task("", total=1.0)
         self._group = ""
-        self._told: set[str] = set()
+        self._shown: set[str] = set()
 
     def begin(self, group: str) -> None:
         """A group of rows begins."""
-        self._group, self._told = group, set()
+        self._group, self._shown = group, set()
         self._bar.reset(self._task, description=group)
         if not self._console.is_terminal:
             self.line(f"{group} ...")
@@ -27,8 +27,8 @@ class Display(Bar):
     def say(self, what: str, fraction: float) -> None:
         """Show what is being measured, and the fraction of the group that is done."""
         self._bar.update(self._task, description=f"{self._group}: {what}", completed=fraction)
-        if not self._console.is_terminal and what not in self._told:
-            self._told.add(what)
+        if not self._console.is_terminal and what not in self._shown:
+            self._shown.add(what)
             self.line(f"  {what}")
 
     def done(self, rows: list[Row], note: str = "") -> None:

@@ -32,7 +32,7 @@ QUICK = ("cornell_box", "mesh_knot", "textured_room")
 
 _TIMEOUT = 600.0
 
-_TOLD = re.compile(r"([\d.]+) s to build, ([\d.]+) s to compile.*?, ([\d.]+) s to render")
+_PRINTED = re.compile(r"([\d.]+) s to build, ([\d.]+) s to compile.*?, ([\d.]+) s to render")
 
 
 class Program:
@@ -58,9 +58,9 @@ class Program:
         picture = self.folder / "picture.png"
         start = time.perf_counter()
         options = ["--size", SIZE, "--spp", str(SPP), "-o", str(picture)]
-        told = self._run(["render", str(scene), *options], cache)
+        printed = self._run(["render", str(scene), *options], cache)
         found = {"wall": time.perf_counter() - start}
-        if match := _TOLD.search(told):
+        if match := _PRINTED.search(printed):
             names = ("build", "compile", "render")
             found |= dict(zip(names, map(float, match.groups()), strict=True))
         return found

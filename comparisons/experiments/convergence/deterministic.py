@@ -1,4 +1,4 @@
-"""Scenes without chance: how much finer grids of samples help, and how far Mitsuba's picture is."""
+"""Deterministic scenes: errors of sample grids against the finest one, and Mitsuba against ours."""
 
 import time
 
@@ -19,33 +19,33 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 
 REPEATS = 3
-"""Of the same picture, of whose seconds the median is told."""
+"""Renders of each picture; the median of their seconds is reported."""
 
 FINER = 4
-"""The finest grid has this many times the samples along each axis of the finest that is judged by
-it: the error of its own is then a few percent of that one's."""
+"""The finest grid has this many times more samples along each axis than the finest grid that is
+compared with it: its own error is then a few percent of that one's."""
 
 MOST_ACROSS = 64
-"""Samples along each axis of a pixel in the finest grid: its steps are then below the 8 bits in
-which pictures are looked at."""
+"""Samples along each axis of a pixel in the finest grid: its error is then below the 8 bits of a
+display."""
 
 
 WHOSE = {
-    "ray_cast": "Mitsuba's picture is made of its hits of the rays through the pixels' middles",
-    "whitted": "Mitsuba's picture is made by our plugin, which it traces in Python: its time says "
-    "little of Mitsuba",
+    "ray_cast": "Mitsuba's picture is made from its hits of the rays through the pixel centres",
+    "whitted": "Mitsuba's picture is rendered by our plugin, traced in Python: its time says "
+    "little about Mitsuba",
 }
-"""What a reader should know of Mitsuba's side, by integrator."""
+"""Notes about Mitsuba's pictures, by integrator."""
 
 
 def grids_of(
     scene: Scene, settings: Settings, store: Store, say: Progress
 ) -> tuple[Grids, list[str]]:
-    """Our pictures on grids of 1, 4, 9, ... samples a pixel against the finest, and Mitsuba's.
+    """Our pictures on grids of 1, 4, 9, ... samples per pixel against the finest, and Mitsuba's.
 
-    The finest grid takes at most half of the time limit.  Of ray casting, which sees the pixels'
-    middles alone, a grid is a larger picture, averaged as displayed.  Returns also what was left
-    out and why.  Raises SceneError, ReferenceUnavailableError.
+    The finest grid takes at most half of the time limit.  Ray casting has one ray per pixel: its
+    grid is a larger picture, averaged in display values.  Also returns what was not measured, and
+    why.  Raises SceneError, ReferenceUnavailableError.
     """
     question = [settings.time_limit, settings.max_spp]
     stored, finest = store.fact("grids", question), store.picture("grid")
@@ -74,8 +74,8 @@ def _made(scene: Scene, settings: Settings, say: Progress) -> tuple[Grids, list[
     most = max(1, across // FINER)
     if across < min(MOST_ACROSS, most_asked):
         left_out.append(
-            f"grids of more than {most * most} samples a pixel: the one to judge them by, "
-            f"{FINER} times finer, would take more than half of {settings.time_limit:g} s"
+            f"grids of more than {most * most} samples per pixel: their reference, {FINER} times "
+            f"finer along each axis, would take more than half of {settings.time_limit:g} s"
         )
     steps = []
     say("grids", 0.0)
@@ -94,7 +94,7 @@ def _made(scene: Scene, settings: Settings, say: Progress) -> tuple[Grids, list[
 
 
 def timed(scene: Scene, n: int) -> tuple[FloatArray, float]:
-    """The picture with n x n samples a pixel, displayed if it shows no light, and its seconds."""
+    """The picture with n x n samples per pixel (ray casting: in display values) and its seconds."""
     start = time.perf_counter()
     if isinstance(scene.integrator, RayCast):
         film = scene.film

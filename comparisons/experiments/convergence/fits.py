@@ -11,17 +11,17 @@ from comparisons.experiments.convergence.estimates import LEVEL, Estimate
 from reference_rt.core.arrays import FloatArray
 
 DRAWS = 1000
-"""Of a curve within its scatter: the ends of a 95 % band are then known to a tenth of its width."""
+"""Resampled curves: the ends of a 95 % band are then known to a tenth of its width."""
 
 LAST = 6
-"""Rungs that a curve is continued by, at most: the lowest of many say nothing about its end."""
+"""The last rungs, at most, from which a curve is extrapolated."""
 
 SEED = 20260101
-"""Of the draws: the same measurements give the same bands."""
+"""Seed of the resampling: the same measurements give the same bands."""
 
 How = Literal["interpolated", "extrapolated", "below", "bias", "unknown"]
-"""Between rungs; beyond the last; reached by the first rung already; never, for a bias; the rungs
-are too few to tell."""
+"""The target lies between rungs; beyond the last; the first rung is below it already; it is never
+reached because of a bias; there are too few rungs."""
 
 
 class Line(NamedTuple):
@@ -86,10 +86,10 @@ def drawn(points: Points) -> tuple[FloatArray, FloatArray]:
 
 
 class Reached(NamedTuple):
-    """When a curve has come down to an error.
+    """Where a curve falls to an error.
 
-    log_seconds (DRAWS,): for each drawn curve, the measured one first;  how: for that one;  spp:
-    samples a pixel there.
+    log_seconds (DRAWS,): of each resampled curve, the measured one first;  how, spp (samples per
+    pixel): of the measured one.
     """
 
     log_seconds: FloatArray

@@ -1,4 +1,4 @@
-"""Who is timed: ours and Mitsuba's variants, each with its default sampler and its best one."""
+"""The methods under test: our renderer and Mitsuba's variants, each with one sampler."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -21,8 +21,8 @@ from reference_rt.util.errors import UsageError
 
 
 class Shot(NamedTuple):
-    """A picture (height, width, 3), the samples a pixel that were taken, and the seconds between
-    asking for it and having it as an array."""
+    """A picture (height, width, 3), its actual samples per pixel, and the seconds from the call to
+    the array."""
 
     picture: FloatArray
     spp: int
@@ -33,14 +33,14 @@ class Renderer(Protocol):
     """A method that is ready to render."""
 
     def __call__(self, spp: int, replicate: int) -> Shot:
-        """A picture of about `spp` samples a pixel; another `replicate` is independent of it."""
+        """A picture of about `spp` samples per pixel; different replicates are independent."""
 
 
 MOST_TOLD = 200
 """Characters of a renderer's message that a reason quotes."""
 
 BEST = "best"
-"""Stands for the sampler that a trial is to find."""
+"""Placeholder for the best sampler, which a trial determines."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +55,15 @@ class Method:
 
     @property
     def is_independent(self) -> bool:
-        """Whether samples are independent of each other: squared errors fall as 1 / n."""
+        """Whether samples are independent of each other; squared errors then fall as 1 / n."""
         return self.sampler == "independent"
 
     @property
     def factor(self) -> int:
-        """Between the samples of one rung and the next.
+        """The ratio of samples between one rung and the next.
 
-        Powers of four alone where Mitsuba would take other numbers: multijitter takes 35 for 32,
-        which is no power of two, and a third longer for each (measured); ldsampler takes 64.
+        4 for samplers that round other numbers up: multijitter takes 35 for 32, which is not a
+        power of two, and a third longer per sample (measured); ldsampler takes 64.
         """
         return 4 if self.sampler in ("multijitter", "ldsampler") else 2
 
@@ -87,7 +87,7 @@ NAMES = tuple(method.name for method in METHODS)
 
 
 def chosen(only: tuple[str, ...]) -> tuple[Method, ...]:
-    """Those of these names, all if none is given.  Raises UsageError for a name that is none."""
+    """The methods with these names, all if there are none.  Raises UsageError for unknown names."""
     if unknown := [name for name in only if name not in NAMES]:
         raise UsageError(f"--only: expected some of {', '.join(NAMES)}, got '{unknown[0]}'")
     return tuple(c for c in METHODS if not only or c.name in only)
@@ -99,8 +99,8 @@ class AbsentError(Exception):
 
 @contextmanager
 def failing(what: str) -> Iterator[None]:
-    """Turn the exceptions of Mitsuba and Dr.Jit into AbsentError: one method that fails must
-    not cost the curves of the others."""
+    """Turn exceptions of Mitsuba and Dr.Jit into AbsentError: a method that fails must not stop the
+    others."""
     try:
         yield
     except (RuntimeError, MemoryError) as error:
@@ -108,19 +108,19 @@ def failing(what: str) -> Iterator[None]:
 
 
 def remarks(scene: Scene) -> list[str]:
-    """What a reader should know of Mitsuba's pictures of the scene."""
-    told = ["Mitsuba traces with Embree's robust flag, without which rays pass between triangles"]
+    """Notes about Mitsuba's pictures of the scene, for the reader."""
+    notes = ["Mitsuba traces with Embree's robust flag, without which rays leak between triangles"]
     if notes_of(scene):
-        told.append(
+        notes.append(
             "Mitsuba renders with its own materials and their approximations, which `compare` "
-            "replaces: they are part of its bias"
+            "replaces: they contribute to its bias"
         )
-    return told
+    return notes
 
 
 class Stable:
-    """Makes methods ready, and keeps what several of them share; a context, which leaves
-    Mitsuba in the variant that it was in."""
+    """Prepares methods and keeps what they share.  A context manager: it restores Mitsuba's variant
+    at its end."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -133,8 +133,7 @@ class Stable:
         self._entered.close()
 
     def _in(self, side: str) -> Any:
-        """Mitsuba in this variant, until another is asked for: switching makes it define all of its
-        own plugins again."""
+        """Mitsuba in this variant, until another is needed: a switch defines its plugins again."""
         mi = mitsuba()
         if mi.variant() != side:
             self._entered.close()
@@ -161,7 +160,7 @@ class Stable:
         make: Callable[..., Sobol | Independent]
         make = Sobol if method.sampler == "sobol" else Independent
         tables = scene.tables
-        # Far from the seeds that people choose, and from those of the reference.
+        # Far from the seeds that users choose, and from those of the reference.
         first = FIRST_SEED if method.sampler == "sobol" else 2 * FIRST_SEED
 
         def shot(spp: int, replicate: int) -> Shot:
@@ -193,7 +192,7 @@ class Stable:
             mi = self._in(method.side)
             settle()
             start = time.perf_counter()
-            with failing(f"Mitsuba cannot render {spp} samples a pixel"):
+            with failing(f"Mitsuba cannot render {spp} samples per pixel"):
                 # The array is what forces the lazy rendering to happen.
                 found = np.array(mi.render(mi_scene, spp=spp, seed=seed_of(replicate)))
             seconds = time.perf_counter() - start
@@ -206,8 +205,8 @@ FIRST_SEED = 1 << 40
 
 
 def seed_of(replicate: int) -> int:
-    """Mitsuba's 32-bit seeds, far apart (multiples of the golden ratio modulo 1): it numbers the
-    pixels from a seed on, so that near ones may give one picture's numbers to another's pixels."""
+    """Mitsuba's 32-bit seeds, spread as multiples of the golden ratio: it adds the pixel index to
+    the seed, so that close seeds would give different pixels the same random numbers."""
     return (1 + replicate) * 0x9E3779B1 % (1 << 32)
 
 

@@ -17,7 +17,7 @@ from comparisons.experiments.convergence.fits import Line
 from reference_rt.util.files import replacing
 
 SCHEMA = 1
-"""Raised whenever a reader of the former layout would misread the new one."""
+"""Increased whenever a reader of the former layout would misread the new one."""
 
 KIND = "convergence"
 
@@ -171,11 +171,11 @@ def _method(one: Curves, name: str) -> dict[str, Any]:
 
 
 def _slopes(found: Findings) -> dict[str, Any]:
-    def told(line: Line | None) -> Any:
+    def interval(line: Line | None) -> Any:
         return line and {"value": line.slope, "low": line.low, "high": line.high}
 
     return {
-        error: {over: told(line) for over, line in lines.items()}
+        error: {over: interval(line) for over, line in lines.items()}
         for error, lines in found.slopes.items()
     }
 

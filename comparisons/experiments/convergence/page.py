@@ -23,14 +23,14 @@ from comparisons.statistics.metrics import encode, white_level
 from reference_rt.core.arrays import FloatArray
 
 SECONDS = "render time of a picture, s"
-SAMPLES = "samples a pixel"
+SAMPLES = "samples per pixel"
 
 LOWEST = 1e-3
-"""Of the lowest point of a curve: what lies further below would leave no room for the curve."""
+"""Points below this fraction of a curve's lowest point are not drawn, to leave it room."""
 
 
 class Cell(NamedTuple):
-    """Of a table: what is said, what in small type beside it, and a class for its look."""
+    """A table cell: its text, text in small type, and a CSS class."""
 
     text: str
     small: str = ""
@@ -78,20 +78,20 @@ def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
 
 
 def _instead(one: Curves) -> str:
-    """What is said of a scene that has no ladder."""
+    """The text in place of the ratios of a scene that has no ladder."""
     if one.problem:
         return one.problem
     if one.grids is None:
         return ""
-    return "; ".join(["deterministic: a grid of samples, no ladder", *one.left_out])
+    return "; ".join(["deterministic: grids of samples instead of rungs", *one.left_out])
 
 
 def _without_ratio(one: Curves, name: str) -> Cell:
-    """Of a scene and a method one of which was not asked for, or has no data."""
+    """The cell of a scene in which the method, or ours, was not requested or has no data."""
     who = next((n for n in ("ours", name) if n in one.absent), None)
     if who is None:
-        return Cell("–", "ours is not there" if name in one.findings else "not asked for")
-    return Cell("no data", "of ours" if who == "ours" else "see below", "bad")
+        return Cell("–", "ours not measured" if name in one.findings else "not requested")
+    return Cell("no data", "for ours" if who == "ours" else "see below", "bad")
 
 
 def _median(ratios: Sequence[Ratio]) -> Cell:
@@ -101,10 +101,10 @@ def _median(ratios: Sequence[Ratio]) -> Cell:
         return Cell("–")
     extrapolated = sum(ratio.extrapolated for ratio in ratios if ratio.times is not None)
     scenes = f"of {len(values)} scene{'s' if len(values) != 1 else ''}"
-    told = [scenes, *([f"{extrapolated} extrapolated"] if extrapolated else [])]
+    parts = [scenes, *([f"{extrapolated} extrapolated"] if extrapolated else [])]
     median = float(np.median(values))
     look = "extrapolated" if extrapolated else ""
-    return Cell(f"{median:.2f}" if math.isfinite(median) else "∞", ", ".join(told), look)
+    return Cell(f"{median:.2f}" if math.isfinite(median) else "∞", ", ".join(parts), look)
 
 
 def _view(one: Curves) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def _view(one: Curves) -> dict[str, Any]:
         view["plots"] = _ladder_plots(one)
         view["crops"] = [_crops(one, crops, white) for crops in one.crops]
         view["reference"] = (
-            f"{one.reference.count} pictures of {one.reference.spp:,} samples a pixel; its own "
+            f"{one.reference.count} pictures of {one.reference.spp:,} samples per pixel; its own "
             f"noise, relative error {percent(math.sqrt(max(one.reference.relmse, 0.0)))}, "
             "is subtracted"
         )
@@ -221,7 +221,7 @@ def _seconds(value: float) -> str:
 
 
 def _ratio(found: Ratio) -> Cell:
-    """Green or red only where what was measured says so."""
+    """A ratio; green or red only if the measured band excludes 1."""
     times = found.times
     if times is None:
         return Cell("–", found.why)
@@ -229,13 +229,13 @@ def _ratio(found: Ratio) -> Cell:
     if times.low == times.high:
         return Cell("0" if times.value == 0.0 else "∞", "bias", look)
     sign = {"at most": "≤ ", "at least": "≥ ", "neither": "≈ ", "": ""}[found.bound]
-    told = [f"{times.low:.2f} to {times.high:.2f}"]
+    parts = [f"{times.low:.2f} to {times.high:.2f}"]
     if found.bound:
-        told.insert(0, "first rungs" if found.bound == "neither" else "first rung")
+        parts.insert(0, "first rungs" if found.bound == "neither" else "first rung")
     if found.extrapolated:
         sign, look = sign or "≈ ", "extrapolated"
-        told.insert(0, "extrapolated")
-    return Cell(f"{sign}{times.value:.2f}", ", ".join(told), look)
+        parts.insert(0, "extrapolated")
+    return Cell(f"{sign}{times.value:.2f}", ", ".join(parts), look)
 
 
 def _slope(line: Line | None) -> Cell:
@@ -251,10 +251,10 @@ def _bias(bias: Bias) -> Cell:
     if bias.is_seen:
         return Cell(
             percent(math.sqrt(bias.squared)),
-            f"seen; {percent(math.sqrt(bias.low))} to {most}",
+            f"significant; {percent(math.sqrt(bias.low))} to {most}",
             "bad",
         )
-    return Cell(f"< {most}", "not seen")
+    return Cell(f"< {most}", "not significant")
 
 
 # ---- pictures -----------------------------------------------------------------------------------

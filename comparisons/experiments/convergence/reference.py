@@ -1,4 +1,4 @@
-"""What errors are measured against: our own rendering of the scene, kept in the user's cache."""
+"""The reference of errors: our own rendering of the scene, kept in the user's cache."""
 
 import hashlib
 import time
@@ -23,15 +23,15 @@ three, and over thousands of pixels far better."""
 
 
 def key_of(scene: Scene) -> str:
-    """Of the scene, its size and filter included, and of our source."""
+    """The cache key: a hash of the scene, including size and filter, and of our sources."""
     text = f"convergence 1 {scene_digest(scene)} {source_digest()} {COUNT}"
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def reference_of(scene: Scene, spp: int, say: Progress = lambda what, fraction: None) -> Reference:
-    """COUNT pictures of at least `spp` Sobol' samples a pixel.
+    """COUNT pictures of at least `spp` Sobol' samples per pixel, with seeds that no method uses.
 
-    What the cache has is taken, and added to where it is less.  Seeds are none of a method's.
+    Cached pictures are used, and samples are added to them if they have fewer.
     """
     key = key_of(scene)
     path = cache_folder() / f"{key[:40]}.npz"
@@ -56,8 +56,7 @@ def reference_of(scene: Scene, spp: int, say: Progress = lambda what, fraction: 
 
 
 def _load(path: Path, size: tuple[int, ...]) -> tuple[FloatArray, int, int]:
-    """Pictures, their samples a pixel and in how many rounds; zeros where there is nothing that can
-    be used."""
+    """Cached pictures, their samples per pixel and number of rounds; zeros if none can be used."""
     with suppress(KeyError):
         kept = read_arrays(path)
         pictures, spp, rounds = kept["pictures"], int(kept["spp"]), int(kept["rounds"])

@@ -1,4 +1,4 @@
-"""The convergence of one scene, from its files to its curves."""
+"""The convergence of one scene, from the scene to its curves."""
 
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
@@ -41,8 +41,8 @@ def silent(what: str, fraction: float) -> None:
 
 
 def prepared(scene: Scene, settings: Settings) -> Scene:
-    """The scene as it is rendered: through a box filter, whose pixels are independent, and at most
-    WIDEST pixels across where no size is asked for."""
+    """The scene as it is rendered: with a box filter, whose pixels are independent, and at most
+    WIDEST pixels wide unless a size is requested."""
     return budgeted(scene, Budget(size=settings.size or size_within(scene.film, WIDEST)))
 
 
@@ -52,7 +52,7 @@ def converge(
     store: Store = NOWHERE,
     say: Progress = silent,
 ) -> Curves:
-    """Error against time of ours and of Mitsuba's variants for one scene.
+    """Measure error against time of our renderer and Mitsuba's variants for one scene.
 
     Finished rungs are taken from `store` and kept there.  Raises SceneError, UsageError for a name
     in `settings.only` that is no method's, ReferenceUnavailableError without Mitsuba,
@@ -62,10 +62,10 @@ def converge(
     asked, scene = scene, prepared(scene, settings)
     notes = []
     if not isinstance(asked.film.filter, BoxFilter):
-        notes.append("rendered through a box filter")
+        notes.append("rendered with a box filter")
     if (asked.film.width, asked.film.height) != (scene.film.width, scene.film.height):
         notes.append(
-            f"rendered at {scene.film.width} x {scene.film.height} pixels, where the scene has "
+            f"rendered at {scene.film.width} x {scene.film.height} pixels instead of the scene's "
             f"{asked.film.width} x {asked.film.height}"
         )
     size = (scene.film.width, scene.film.height)
@@ -79,7 +79,7 @@ def converge(
 
 @dataclass(frozen=True)
 class Plan:
-    """rungs: by method;  reference_spp: samples a pixel of each picture of the reference;
+    """rungs: by method;  reference_spp: samples per pixel of each picture of the reference;
     merits: of Mitsuba's samplers, by the variant that was tried;  left_out: which rungs of a
     method, and why;  absent: why methods have no rungs at all, by name."""
 
@@ -139,7 +139,7 @@ class _Run:
         left_out += [f"starts of {side}: a process failed" for side, t in starts.items() if not t]
         if any(c.side != "ours" for c in by_name.values()):
             notes += tuple(remarks(scene))
-        notes += tuple(_told(side, found) for side, found in plan.merits.items())
+        notes += tuple(_sampler_note(side, found) for side, found in plan.merits.items())
         return Curves(
             scene.name,
             (scene.film.width, scene.film.height),
@@ -185,8 +185,8 @@ class _Run:
         return plan
 
     def _costs(self, methods: tuple[Method, ...], plan: Plan) -> dict[Method, Cost]:
-        """Of those that can render the scene, their best samplers chosen; the plan is told why
-        others cannot, and how the samplers did."""
+        """Costs of the methods that can render the scene, with their best samplers.  The plan
+        records why others cannot, and the merits of the samplers."""
         found = {}
         for number, method in enumerate(methods):
             self.say("trial pictures", number / len(methods))
@@ -202,17 +202,16 @@ class _Run:
         return found
 
 
-def _told(side: str, found: dict[str, float]) -> str:
-    """How Mitsuba's samplers did."""
+def _sampler_note(side: str, found: dict[str, float]) -> str:
+    """A note about the trial of Mitsuba's samplers."""
     unit = found["independent"]
-    told = ", ".join(f"{name} {merit / unit:.2f}" for name, merit in found.items())
-    return (
-        f"Mitsuba's best sampler, by variance times time of {SPP} samples a pixel ({side}): {told}"
-    )
+    listed = ", ".join(f"{name} {merit / unit:.2f}" for name, merit in found.items())
+    trial = f"variance times time at {SPP} samples per pixel ({side})"
+    return f"Mitsuba's best sampler, by {trial}: {listed}"
 
 
 def _reference_spp(cost: Cost, share: float, max_spp: int) -> int:
-    """The most samples a pixel, a power of two, that the share of the time allows COUNT pictures;
+    """The most samples per pixel, a power of two, that the share of the time allows COUNT pictures;
     no fewer than four times those of the first rung."""
     spp = 4 * FIRST
     while spp < 4 * max_spp and COUNT * cost.picture(2 * spp) <= share:

@@ -1,4 +1,4 @@
-"""Which of Mitsuba's samplers is the best for a scene: the least variance times time."""
+"""Finds Mitsuba's best sampler for a scene: the one with the least variance times time."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Finished rungs in a folder: what is done is not done again."""
+"""Stores finished rungs in a folder, so that they are not rendered again."""
 
 import hashlib
 import importlib.metadata
@@ -21,17 +21,17 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_text, replacing
 
 SCHEMA = 2
-"""Raised whenever what is stored, or what it means, changes."""
+"""Increased whenever what is stored, or its meaning, changes."""
 
 _ARRAYS = ("seconds", "mse", "relmse", "mean", "variance")
-"""Of a rung, in the order of its fields, after the two numbers."""
+"""The array fields of a rung, in order, after the two numbers."""
 
 _PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
 
 
 def run_key(scene: Scene, replicates: int) -> str:
-    """SHA-256 of all that rungs depend on: the scene as it is rendered and its files, our sources,
-    the versions of what computes, the machine, and how many replicates there are."""
+    """SHA-256 of all that rungs depend on: the scene as rendered and its files, our sources, the
+    versions of packages that compute, the machine, and the number of replicates."""
     chosen = backend()
     parts = {
         "schema": SCHEMA,
@@ -48,9 +48,9 @@ def run_key(scene: Scene, replicates: int) -> str:
 
 
 class Store:
-    """Rungs, and small facts by name, of one scene; everything of another key is deleted.
+    """Rungs, and small facts by name, of one scene.  Contents with another key are deleted.
 
-    folder: None keeps nothing.
+    folder: None stores nothing.
     """
 
     def __init__(self, folder: Path | None, key: str, *, fresh: bool = False) -> None:

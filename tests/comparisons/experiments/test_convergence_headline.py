@@ -97,8 +97,8 @@ class Failing(Fake):
 
 SAID = {
     "raises": "Mitsuba cannot render: no memory",
-    "nan": "1 pixels of a picture of 4 samples a pixel are not finite",
-    "inf": "1 pixels of a picture of 4 samples a pixel are not finite",
+    "nan": "1 pixels of a picture of 4 samples per pixel are not finite",
+    "inf": "1 pixels of a picture of 4 samples per pixel are not finite",
 }
 
 
@@ -139,7 +139,9 @@ def curves_of(scene, *, absent=None, **noises):
 def told(tmp_path_factory):
     """The headline, the whole page and the JSON of four scenes."""
     folder = tmp_path_factory.mktemp("page")
-    why = "two rungs at least make a curve; rungs from 8 samples a pixel: 8 pictures would take 9 s"
+    why = (
+        "two rungs at least make a curve; rungs from 8 samples per pixel: 8 pictures would take 9 s"
+    )
     curves = [
         curves_of("all", ours=1.0, mitsuba_llvm=1.3),
         curves_of("lonely", ours=1.0, absent={"mitsuba_llvm": why}),
@@ -187,7 +189,7 @@ def test_the_headline_names_who_is_missing_and_why(told):
     assert "without: ours, Sobol&#39; (default and best): &lt;failed&gt;" in headline
     assert "<failed>" not in page
     assert ("bad", "no data see below") in cells(headline)
-    assert ("bad", "no data of ours") in cells(headline)
+    assert ("bad", "no data for ours") in cells(headline)
     assert "invalid: bad.yaml:3: shapes[1].file: cannot be read" in headline
 
 
@@ -207,7 +209,7 @@ def test_json_and_terminal_say_the_same(told):
         r"ours: 55 % in [\d.e-]+ s, 0.1 % in about [\d.e+]+ s \(extrapolated\)$", lines[0][5:]
     )
     assert re.search(r"; ours / this: 0.\d\d, 0.\d\d \(extrapolated\)$", lines[1])
-    assert lines_of(curves[1])[1].startswith("lonely: no data of Mitsuba llvm, independent (def")
+    assert lines_of(curves[1])[1].startswith("lonely: no data for Mitsuba llvm, independent (def")
     assert lines_of(curves[3]) == ["bad: invalid: bad.yaml:3: shapes[1].file: cannot be read"]
 
 

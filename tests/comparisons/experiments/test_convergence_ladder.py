@@ -73,7 +73,7 @@ def test_slower_than_promised_climbs_less():
     climb({"a": one}, EXACT, 8, Store(None, ""))
     # 8 pictures of 4 and 8 samples take 96 s; those of 16, another 128 s.
     assert [rung.asked for rung in one.rungs] == [4, 8]
-    assert "rungs from 16 samples a pixel" in one.stopped
+    assert "rungs from 16 samples per pixel" in one.stopped
 
 
 def test_long_runs_are_stored_on_the_way(tmp_path, monkeypatch):

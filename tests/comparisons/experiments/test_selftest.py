@@ -36,7 +36,7 @@ def test_source_fault_fits_the_source_and_is_still_python(fault: SourceFault) ->
 
 def test_source_fault_whose_text_is_gone_is_told() -> None:
     with pytest.raises(StaleFaultError, match=r"occurs 0 times in core/ray.py"):
-        patched_text(SourceFault("gone", "cornell_box", "ray.py", "no such text", ""))
+        patched_text(SourceFault("gone", "cornell_box", "core/ray.py", "no such text", ""))
 
 
 @pytest.mark.parametrize("fault", of(SceneFault))
