@@ -125,14 +125,3 @@ def _places(rendered: Rendered) -> tuple[Place, ...]:
         return statistics.worst_places(*rendered.replicates)
     images = rendered.images
     return statistics.worst_places(images.candidate[np.newaxis], images.reference[np.newaxis])
-
-
-__all__ = [
-    "Evidence",
-    "Lights",
-    "Rendered",
-    "judge",
-    "likeliest_cause",
-    "of_replicates",
-    "picture_rungs",
-]

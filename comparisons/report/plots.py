@@ -201,6 +201,3 @@ def _inline(svg: str, title: str) -> str:
     style = "max-width: 100%; height: auto; stroke-linejoin: round; stroke-linecap: butt"
     attributes = f'role="img" aria-label="{escape(title)}" style="{style}"'
     return svg.replace("<svg ", f"<svg {attributes} ", 1)
-
-
-__all__ = ["PALETTE", "Curve", "log_log"]

@@ -49,7 +49,7 @@ def write_results(
     document = {
         "schema": SCHEMA,
         "suite": suite,
-        "provenance": _plain(provenance),
+        "provenance": plain(provenance),
         "asked": len(cases) + len(missing),
         "missing": list(missing),
         "not_run": dict(not_run or {}),
@@ -73,10 +73,10 @@ def _case(case: Case) -> dict[str, Any]:
         "reason": case.reason,
         "sides": dict(zip(("candidate", "reference"), case.sides, strict=True)),
         "tiers": tiers,
-        "metrics": _plain(asdict(case.metrics)) if case.metrics else None,
-        "cause": _plain(asdict(case.cause)) if case.cause else None,
-        "worst": [_plain(asdict(place)) for place in case.worst],
-        "seconds": _plain(case.seconds),
+        "metrics": plain(asdict(case.metrics)) if case.metrics else None,
+        "cause": plain(asdict(case.cause)) if case.cause else None,
+        "worst": [plain(asdict(place)) for place in case.worst],
+        "seconds": plain(case.seconds),
         "notes": list(case.notes),
         "left_out": list(case.left_out),
         "again": case.again,
@@ -84,20 +84,20 @@ def _case(case: Case) -> dict[str, Any]:
 
 
 def _tier(tier: Tier) -> dict[str, Any]:
-    numbers: dict[str, Any] = _plain(tier.numbers)
+    numbers: dict[str, Any] = plain(tier.numbers)
     if clash := {"status", "reason"} & numbers.keys():
         raise ValueError(f"{tier.name}: a number may not be called {', '.join(sorted(clash))}")
     return {"status": tier.status, "reason": tier.reason, **numbers}
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """`value` in JSON's types: NumPy types become Python's, numbers that are not finite None."""
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

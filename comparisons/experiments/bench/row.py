@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from comparisons.experiments.bench.timing import Spread, ratios, spread
+from comparisons.report.results_json import plain
 
 Better = Literal["lower", "higher"]
 
@@ -38,7 +39,7 @@ class Row:
 
     def as_json(self) -> dict[str, Any]:
         """Strict JSON: numbers that are not finite are null."""
-        document: dict[str, Any] = _finite(asdict(self) | {"met": self.met})
+        document: dict[str, Any] = plain(asdict(self) | {"met": self.met})
         return document
 
 
@@ -102,16 +103,3 @@ def row_from(document: dict[str, Any]) -> Row:
 
 def _around(found: Spread) -> list[float]:
     return [found.low, found.high]
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-__all__ = ["LIMIT", "Better", "Row", "against", "row_from", "within"]

@@ -42,6 +42,3 @@ class Setting:
         if not found:
             raise UsageError(f"--scenes: '{self.scenes}' holds no scene; expected .yaml files")
         return found
-
-
-__all__ = ["Setting"]

@@ -59,6 +59,3 @@ def alternate(
             found[name].append(measures[name]())
             done += 1
     return found
-
-
-__all__ = ["ROUNDS", "Spread", "alternate", "ratios", "seconds", "spread"]

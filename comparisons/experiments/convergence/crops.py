@@ -133,6 +133,3 @@ def worst_part(
     boxes = sums[h:, w:] - sums[:-h, w:] - sums[h:, :-w] + sums[:-h, :-w]
     y, x = divmod(int(boxes.argmax()), boxes.shape[1])
     return (x, y), size
-
-
-__all__ = ["Crops", "Shown", "crops_of", "worst_part"]

@@ -89,6 +89,3 @@ class Curves:
             for other, found in self.findings.items()
             if other != name
         }
-
-
-__all__ = ["Curves", "GridPoint", "GridStep", "Grids", "Starts"]

@@ -100,6 +100,3 @@ class Rung:
         """The seconds of all but the first picture, which may compile: the kernels of Mitsuba's
         stratified samplers have the number of samples as a constant."""
         return self.seconds[1:] if len(self.seconds) > 1 else self.seconds
-
-
-__all__ = ["FIRST", "WIDEST", "Reference", "Rung", "Settings", "size_within", "weights"]

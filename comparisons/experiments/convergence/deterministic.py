@@ -134,6 +134,3 @@ def _mitsubas(scene: Scene) -> GridPoint:
     mse, relmse = differences(picture, display(ours) if casts else ours.colour)
     warm = float(np.median(seconds[1:]))
     return GridPoint(backend().variant, int(getattr(sampler, "spp", 1)), warm, mse, relmse)
-
-
-__all__ = ["WHOSE", "grids_of"]

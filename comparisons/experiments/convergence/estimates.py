@@ -170,19 +170,3 @@ class Accumulator:
         seconds, mse, relmse = np.array(self._rows).T
         variance = self._squares / max(self.count - 1, 1)
         return Rung(self.asked, self.spp, seconds, mse, relmse, self._mean.copy(), variance)
-
-
-__all__ = [
-    "BIAS_LEVEL",
-    "LEVEL",
-    "SEEN_LEVEL",
-    "Accumulator",
-    "Bias",
-    "Estimate",
-    "against",
-    "bias_of",
-    "common_error",
-    "errors",
-    "mean_of",
-    "standard_error",
-]

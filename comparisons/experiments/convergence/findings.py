@@ -200,6 +200,3 @@ def compared(mine: Target, theirs: Target) -> Ratio:
         "neither" if all(first) else "at most" if first[0] else "at least" if first[1] else "",
         why,
     )
-
-
-__all__ = ["Findings", "Ratio", "Step", "Target", "compared", "findings_of", "points_of", "ratio"]

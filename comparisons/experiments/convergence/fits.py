@@ -199,17 +199,3 @@ def band(values: FloatArray) -> Estimate:
     # Quantiles that exist: infinities are not to be interpolated with.
     low, high = np.quantile(values, [tail, 1.0 - tail], method="inverted_cdf")
     return Estimate(float(values[0]), float(low), float(high))
-
-
-__all__ = [
-    "DRAWS",
-    "How",
-    "Line",
-    "Points",
-    "Reached",
-    "band",
-    "drawn",
-    "linear_time",
-    "log_line",
-    "time_to",
-]

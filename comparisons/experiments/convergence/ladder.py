@@ -131,6 +131,3 @@ def _sweep(climbs: Mapping[str, Climb]) -> list[tuple[str, int]]:
     """(method, samples): rung by rung, methods in turn."""
     pairs = [(name, spp) for name, one in climbs.items() for spp in one.planned]
     return sorted(pairs, key=lambda pair: (climbs[pair[0]].apart, pair[1]))
-
-
-__all__ = ["Climb", "climb"]

@@ -212,18 +212,3 @@ def seed_of(replicate: int) -> int:
 
 def _three(picture: Any) -> FloatArray:
     return np.asarray(picture, dtype=np.float64)[..., :3]
-
-
-__all__ = [
-    "BEST",
-    "METHODS",
-    "NAMES",
-    "AbsentError",
-    "Method",
-    "Renderer",
-    "Shot",
-    "Stable",
-    "chosen",
-    "remarks",
-    "with_sampler",
-]

@@ -8,12 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.findings import Findings, Target
 from comparisons.experiments.convergence.fits import Line
+from comparisons.report.results_json import plain
 from reference_rt.util.files import replacing
 
 SCHEMA = 1
@@ -83,21 +82,6 @@ def write_table(path: Path, curves: Sequence[Curves]) -> None:
         writer.writerow(COLUMNS)
         for one in curves:
             writer.writerows([_cell(value) for value in row] for row in _rows(one))
-
-
-def plain(value: Any) -> Any:
-    """What JSON can hold: lists, dicts, strings, finite numbers and None for others."""
-    match value:
-        case float() | np.floating():
-            return float(value) if math.isfinite(value) else None
-        case np.integer():
-            return int(value)
-        case Mapping():
-            return {str(key): plain(item) for key, item in value.items()}
-        case list() | tuple():
-            return [plain(item) for item in value]
-        case _:
-            return value
 
 
 def _scene(one: Curves) -> dict[str, Any]:
@@ -222,6 +206,3 @@ def _rows(one: Curves) -> Iterator[list[Any]]:
 
 def _cell(value: Any) -> Any:
     return "" if isinstance(value, float) and not math.isfinite(value) else plain(value)
-
-
-__all__ = ["COLUMNS", "KIND", "SCHEMA", "plain", "write_results", "write_table"]

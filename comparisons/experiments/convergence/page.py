@@ -283,6 +283,3 @@ def _crops(one: Curves, crops: Crops, white: float) -> dict[str, Any]:
 def _png(picture: FloatArray, white: float) -> str:
     """The data: URL of a picture, exposed for `white`."""
     return png_url(255.0 * encode(np.nan_to_num(picture), white))
-
-
-__all__ = ["write_page"]

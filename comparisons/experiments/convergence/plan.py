@@ -87,14 +87,3 @@ def why_left_out(
         f"{cost.rung(spp, settings.replicates):.2g} s, and {max(0.0, share - spent):.2g} s of its "
         f"{share:.2g} s are left"
     )
-
-
-__all__ = [
-    "MOST_SAMPLES",
-    "TRIAL_SEED",
-    "Cost",
-    "affordable",
-    "estimate",
-    "rungs",
-    "why_left_out",
-]

@@ -68,6 +68,3 @@ def _load(path: Path, size: tuple[int, ...]) -> tuple[FloatArray, int, int]:
 def _save(path: Path, pictures: FloatArray, spp: int, rounds: int) -> None:
     with suppress(ImageError, OSError):
         write_arrays(path, pictures=pictures, spp=spp, rounds=rounds)
-
-
-__all__ = ["COUNT", "key_of", "reference_of"]

@@ -217,6 +217,3 @@ def _reference_spp(cost: Cost, share: float, max_spp: int) -> int:
     while spp < 4 * max_spp and COUNT * cost.picture(2 * spp) <= share:
         spp *= 2
     return spp
-
-
-__all__ = ["converge", "prepared"]

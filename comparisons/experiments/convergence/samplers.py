@@ -40,6 +40,3 @@ def merits(scene: Scene, method: Method) -> dict[str, float]:
         )
         for name, taken in shots.items()
     }
-
-
-__all__ = ["CANDIDATES", "SPP", "merits"]

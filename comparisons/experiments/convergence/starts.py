@@ -94,6 +94,3 @@ def _child(
     except (subprocess.SubprocessError, ValueError, IndexError):
         return None
     return {stage: float(times[stage]) for stage in STAGES}
-
-
-__all__ = ["SPP", "STAGES", "starts_of"]

@@ -127,6 +127,3 @@ class Store:
         if self._folder is not None:
             with replacing(self._folder / f"{name}.json") as temporary:
                 temporary.write_text(json.dumps(sealed({"value": value})), encoding="utf-8")
-
-
-__all__ = ["Store", "run_key"]

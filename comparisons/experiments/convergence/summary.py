@@ -71,6 +71,3 @@ def again(path: Path, out: Path, settings: Settings) -> str:
     for name in settings.only:
         command += ["--only", name]
     return shlex.join(command if settings.starts else [*command, "--no-starts"])
-
-
-__all__ = ["again", "lines_of"]

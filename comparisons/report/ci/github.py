@@ -162,6 +162,3 @@ def _markdown(text: str) -> str:
     return re.sub(
         r"([\\`*_\[\]<>|~&#!@$])", r"\\\1", " ".join(printable(text, kept="\r\n\t").split())
     )
-
-
-__all__ = ["annotate", "is_there", "summarise", "summary_path"]
