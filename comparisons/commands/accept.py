@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import Baselines, Layer, NoiseFree
 from reference_rt.cli.main import guarded, say
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, UsageError
@@ -18,34 +19,31 @@ if TYPE_CHECKING:
 def accept(
     candidates: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[CANDIDATE]...", help="The pictures; several are replicates."),
+        typer.Argument(
+            metavar="[CANDIDATE]...", help="Picture files; several are replicates of one picture."
+        ),
     ] = None,
-    name: Annotated[str | None, typer.Option(help="What the baseline is called.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the baseline.")] = None,
     reason: Annotated[str | None, typer.Option(help="Why these pictures are right.")] = None,
     scene: Annotated[
         Path | None,
-        typer.Option(help="What they are pictures of: when it changes, they are stale."),
+        typer.Option(help="The scene shown; if it changes, the baseline becomes stale."),
     ] = None,
-    baselines: Annotated[Path, typer.Option(metavar="DIR", help="Baselines' folder.")] = Path(
-        "baselines"
-    ),
-    layer: Annotated[
-        str, typer.Option(help="Prefix of an EXR's channels: 'beauty' for beauty.R.")
-    ] = "",
-    noise_free: Annotated[
-        bool, typer.Option("--noise-free", help="The pictures are made without random numbers.")
-    ] = False,
+    baselines: Baselines = Path("baselines"),
+    layer: Layer = "",
+    noise_free: NoiseFree = False,
     listed: Annotated[
-        bool, typer.Option("--list", help="Say what baselines there are, and which are stale.")
+        bool, typer.Option("--list", help="List all baselines, and which are stale.")
     ] = False,
     unused: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="Say which baselines no results.json below DIR names: exit code 1."
+            metavar="DIR",
+            help="List the baselines that no results.json below DIR names; exit code 1 if any.",
         ),
     ] = None,
 ) -> None:
-    """Accept pictures as a baseline for `gate --baseline`; never in CI."""
+    """Accept pictures as a baseline for `gate --baseline`; refused in CI."""
     with compare_extra("accepting"):
         from comparisons.gate import baselines as store
         from comparisons.gate.digest import scene_digest
@@ -54,12 +52,12 @@ def accept(
         from comparisons.runs.provenance import ours
     if listed or unused is not None:
         if candidates or name:
-            raise UsageError("--list and --unused accept nothing; expected no candidates")
+            raise UsageError("--list and --unused write no baseline; expected no candidates")
         found = store.all_in(baselines)
         used = None if unused is None else store.used_in(unused)
         for one in found:
             if used is None or one.record.name not in used:
-                say(_told(one.record, baselines))
+                say(_described(one.record, baselines))
         idle = [one for one in found if used is not None and one.record.name not in used]
         raise typer.Exit(1 if idle else 0)
     if not candidates or name is None or reason is None:
@@ -89,13 +87,13 @@ def accept(
     say(f"{written.folder}: accepted; commit it", err=True)
     if len(pictures) == 1 and not noise_free:
         say(
-            "note: of one picture the noise is not known, and gates see less; accept several with "
-            "different seeds, or say --noise-free",
+            "note: the noise of a single picture is unknown, which makes the gate less sensitive; "
+            "accept several with different seeds, or use --noise-free",
             err=True,
         )
 
 
-def _told(record: "Record", folder: Path) -> str:
+def _described(record: "Record", folder: Path) -> str:
     """A baseline in one line."""
     from comparisons.gate.baselines import scene_of
     from comparisons.gate.digest import scene_digest

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import Fresh, Scenes
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -17,28 +18,26 @@ def bench(
     ] = Path("out/bench"),
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="ROW", help="Only these rows, and what is measured with them."),
+        typer.Option(metavar="ROW", help="Only these rows, and those measured together with them."),
     ] = None,
     mesh: Annotated[
         Path | None,
-        typer.Option(help="An .obj or .ply file to trace rays in.  [default: one made here]"),
+        typer.Option(help="An .obj or .ply file to trace rays in. (default: a generated mesh)"),
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Smaller pictures and fewer scenes.")
     ] = False,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is measured.")] = False,
+    fresh: Fresh = False,
     markdown: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Put the table between the lines '<!-- bench -->' and '<!-- end -->' of a file.",
+            help="Also write the table between '<!-- bench -->' and '<!-- end -->' of this file.",
         ),
     ] = None,
-    scenes: Annotated[Path, typer.Option(metavar="DIR", help="The folder of scenes.")] = Path(
-        "scenes"
-    ),
+    scenes: Scenes = Path("scenes"),
 ) -> None:
-    """Measure the speed of the renderer beside Mitsuba's; takes about half an hour."""
+    """Measure the renderer's speed against Mitsuba's; takes about half an hour."""
     with compare_extra():
         from rich.console import Console
 
@@ -47,20 +46,20 @@ def bench(
         from comparisons.experiments.bench.groups import chosen
         from comparisons.experiments.bench.run import run
         from comparisons.experiments.bench.setting import Setting
-        from comparisons.report import marked
+        from comparisons.report import marker_block
 
     groups = chosen(only or ())
     if mesh is not None and not mesh.is_file():
         raise UsageError(f"--mesh: there is no file '{mesh}'")
     if markdown is not None:
-        marked.check(markdown, "bench")
+        marker_block.check(markdown, "bench")
     with Display() as display:
         setting = Setting(scenes=scenes, mesh=mesh, quick=quick, say=display.say)
         outcome = run(groups, setting, out, display, fresh)
     Console().print(table.terminal(outcome.rows))
     if markdown is not None:
         written = table.markdown(outcome.rows, outcome.machine, outcome.not_measured)
-        marked.rewrite(markdown, "bench", written)
+        marker_block.rewrite(markdown, "bench", written)
     for name, why in outcome.not_measured.items():
         say(f"{name}: not measured: {why}", err=True)
     say(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)

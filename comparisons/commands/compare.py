@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import Fresh, Threads
 from reference_rt.cli.main import guarded
 
 if TYPE_CHECKING:
@@ -15,22 +16,29 @@ if TYPE_CHECKING:
 @guarded
 def compare(
     scenes: Annotated[
-        list[Path], typer.Argument(metavar="SCENE...", help="Scenes: .yaml or .json.")
+        list[Path], typer.Argument(metavar="SCENE...", help="Scene files: .yaml or .json.")
     ],
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder for results.json and report.html.")
     ] = Path("out"),
-    spp: Annotated[int | None, typer.Option(help="Samples per pixel of each replicate.")] = None,
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    spp: Annotated[
+        int | None,
+        typer.Option(help="Samples per pixel of each replicate. (default: the scene's)"),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="WIDTHxHEIGHT in pixels. (default: the scene's)")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first replicate.")] = None,
     replicates: Annotated[
-        int, typer.Option(min=2, help="Independent renderings on each side (path tracing).")
+        int, typer.Option(min=2, help="Independent pictures by each renderer (path tracing).")
     ] = 16,
-    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
+    threads: Threads = None,
+    fresh: Fresh = False,
 ) -> None:
-    """Render scenes here and in Mitsuba, and say whether they agree; what is done is not done
-    again."""
+    """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
+
+    Finished cases are kept in the output folder and not run again.
+    """
     with compare_extra():
         from comparisons.compare.budget import Budget
         from comparisons.results.verdict import exit_code
@@ -52,7 +60,7 @@ def compare(
 
 
 def _command(path: Path, changes: "Changes", replicates: int) -> str:
-    """What repeats one case alone."""
+    """The command that repeats one case alone."""
     import shlex
 
     options = {**changes.model_dump(), "replicates": replicates}

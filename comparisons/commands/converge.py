@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import Fresh
 from reference_rt.cli.main import guarded, say
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.console import ProgressLine
@@ -16,45 +17,52 @@ from reference_rt.util.errors import SceneError, UsageError, printable
 @guarded
 def converge(
     scenes: Annotated[
-        list[Path], typer.Argument(metavar="SCENE...", help=".yaml or .json scenes.")
+        list[Path], typer.Argument(metavar="SCENE...", help="Scene files: .yaml or .json.")
     ],
     out: Annotated[
         Path,
-        typer.Option("--out", "-o", metavar="DIR", help="For results.json, .csv and report.html."),
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder for results.json, .csv and report.html."
+        ),
     ] = Path("out/converge"),
     time_limit: Annotated[
         float,
         typer.Option(
-            min=0.1, metavar="SECONDS", help="For the rungs and the reference of one scene."
+            min=0.1, metavar="SECONDS", help="For all pictures and the reference of one scene."
         ),
     ] = 60.0,
     size: Annotated[
         str | None,
         typer.Option(
-            metavar="WIDTHxHEIGHT", help="In pixels.  [default: the scene's, at most 128 across]"
+            metavar="WIDTHxHEIGHT", help="In pixels. (default: the scene's, at most 128 wide)"
         ),
     ] = None,
     max_spp: Annotated[
-        int, typer.Option(min=4, help="Samples a pixel of the last rung at most.")
+        int, typer.Option(min=4, help="Maximum samples per pixel of the last rung.")
     ] = 4096,
-    replicates: Annotated[int, typer.Option(min=2, help="Pictures at each rung.")] = 8,
+    replicates: Annotated[int, typer.Option(min=2, help="Independent pictures per rung.")] = 8,
     targets: Annotated[
-        str, typer.Option(metavar="LIST", help="Relative errors, the time to which is told.")
+        str, typer.Option(metavar="LIST", help="Relative errors to report the time to.")
     ] = "0.1,0.03,0.01,0.003",
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="CONTESTANT", help="ours, mitsuba_llvm, ...: repeat for several."),
+        typer.Option(
+            metavar="METHOD", help="Only this method: ours, mitsuba_llvm, ...; repeatable."
+        ),
     ] = None,
     starts: Annotated[
-        bool, typer.Option(help="Time the start of processes, with caches empty and full.")
+        bool, typer.Option(help="Time process start-up, with empty and with full kernel caches.")
     ] = True,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
+    fresh: Fresh = False,
 ) -> None:
-    """Error against run time: ours and Mitsuba's; what is done is not done again."""
+    """Measure error against run time of reference_rt and of Mitsuba.
+
+    A rung is a number of samples per pixel.  Finished rungs are kept in the output folder.
+    """
     with compare_extra():
-        from comparisons.experiments.convergence.contestants import chosen
         from comparisons.experiments.convergence.curves import Curves
         from comparisons.experiments.convergence.data import Settings
+        from comparisons.experiments.convergence.methods import chosen
         from comparisons.experiments.convergence.outputs import write_results, write_table
         from comparisons.experiments.convergence.page import write_page
         from comparisons.experiments.convergence.run import converge as converge_scene
@@ -79,7 +87,7 @@ def converge(
     described = [read(path) for path in scenes]
     names = [printable(path.stem) for path in scenes]
     if double := [name for name in names if names.count(name) > 1]:
-        raise UsageError(f"two scenes are called '{double[0]}'; expected each once")
+        raise UsageError(f"two scenes have the name '{double[0]}'; expected different names")
     invalid = False
     files = [out / name for name in ("results.json", "results.csv", "report.html")]
     check_writable(*files, out / "rungs" / "a rung")

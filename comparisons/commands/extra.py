@@ -1,4 +1,4 @@
-"""What the commands say where the packages that comparing takes are not installed."""
+"""The message of a command whose Python packages, the extra `compare`, are not installed."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,8 +8,7 @@ from reference_rt.util.errors import ReferenceUnavailableError
 
 @contextmanager
 def compare_extra(doing: str = "comparing") -> Iterator[None]:
-    """Around a command's imports, which are made when it runs: `reference-rt render` must not wait
-    for what only comparing needs."""
+    """Wrap a command's own imports.  Raises ReferenceUnavailableError if a package is missing."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import Baselines, GitHub, JUnit, Layer, NoiseFree, Threads
 from reference_rt.cli.main import guarded, say
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.console import ProgressLine
@@ -29,64 +30,63 @@ def gate(
         ),
     ] = None,
     scene: Annotated[
-        Path | None, typer.Option(help="What they are pictures of; we render the reference.")
+        Path | None,
+        typer.Option(help="The scene shown; reference_rt renders it as the reference."),
     ] = None,
     reference: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Judge by this picture; several are replicates."),
+        typer.Option(
+            metavar="FILE", help="Compare with this picture instead; several are replicates."
+        ),
     ] = None,
     variance: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Variance per pixel of one --reference.")
     ] = None,
     baseline: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Judge by what `accept` wrote.")
+        str | None,
+        typer.Option(metavar="NAME", help="Compare with a baseline written by `accept` instead."),
     ] = None,
-    baselines: Annotated[Path, typer.Option(metavar="DIR", help="Baselines' folder.")] = Path(
-        "baselines"
-    ),
+    baselines: Baselines = Path("baselines"),
     command: Annotated[
         str | None,
         typer.Option(
-            help='Run a renderer instead: "prog {scene} -o {output} --seed {seed} --spp {spp}".'
+            help="Run this renderer to make the candidates: "
+            '"prog {scene} -o {output} --seed {seed} --spp {spp}".'
         ),
     ] = None,
     replicates: Annotated[
         int | None, typer.Option(min=1, help="Runs of --command. (default: 8; 1 without noise)")
     ] = None,
     spp: Annotated[
-        int | None, typer.Option(min=1, help="For {spp}. (default: the scene's)")
+        int | None, typer.Option(min=1, help="Value of {spp}. (default: the scene's)")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="First {seed}. (default: 1)")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="First value of {seed}. (default: 1)")
+    ] = None,
     time_limit: Annotated[
         float | None,
-        typer.Option(min=0.1, metavar="SECONDS", help="Of one run. (default: 600)"),
+        typer.Option(min=0.1, metavar="SECONDS", help="Limit of one run. (default: 600)"),
     ] = None,
     suffix: Annotated[
-        str | None, typer.Option(help="Of {output}. (default: .exr)", metavar=".EXT")
+        str | None, typer.Option(help="Suffix of {output}. (default: .exr)", metavar=".EXT")
     ] = None,
-    layer: Annotated[
-        str, typer.Option(help="Prefix of an EXR's channels: 'beauty' for beauty.R.")
-    ] = "",
+    layer: Layer = "",
     limit: Annotated[
-        float, typer.Option(help="Smallest relative bias of the image mean that must be seen.")
+        float,
+        typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
     ] = 0.005,
-    noise_free: Annotated[
-        bool, typer.Option("--noise-free", help="The pictures are made without random numbers.")
-    ] = False,
+    noise_free: NoiseFree = False,
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder for results.json and report.html.")
     ] = Path("out"),
-    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML too.")] = None,
-    github: Annotated[
-        bool,
-        typer.Option("--github", help="Annotations and a summary; by itself in GitHub Actions."),
-    ] = False,
-    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    junit: JUnit = None,
+    github: GitHub = False,
+    threads: Threads = None,
 ) -> None:
-    """Judge another renderer's pictures by a scene, a reference or a baseline.
+    """Compare another renderer's pictures with our rendering, a reference or a baseline.
 
-    Exit codes: 0 they agree, 1 they differ or are too noisy to tell, 2 usage, 3 invalid picture,
-    scene or baseline, 4 the renderer could not run, or the baseline is missing or stale.
+    Exit codes: 0: they agree; 1: they differ, or are too noisy to tell; 2: wrong usage; 3: invalid
+    picture, scene or baseline; 4: the renderer could not run, or the baseline is missing or stale.
     """
     with compare_extra("the gate"):
         from comparisons.gate import outputs
@@ -102,7 +102,7 @@ def gate(
     driving |= {"time-limit": time_limit}
     given = [name for name, value in driving.items() if value is not None]
     if command is None and given:
-        raise UsageError(f"--{given[0]}: is for --command; expected that too")
+        raise UsageError(f"--{given[0]}: only applies to --command; expected that too")
     described = None if scene is None else Scene.load(scene)
     run = None
     if command is not None:

@@ -15,19 +15,18 @@ from reference_rt.util.errors import UsageError
 @guarded
 def methods(
     out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for what is measured.")
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for results and the page.")
     ] = Path("out/methods"),
     family: Annotated[
         list[str] | None,
         typer.Option(help="Only these: sphere, triangle, box, polygon, csg, hierarchy."),
     ] = None,
     full: Annotated[
-        bool, typer.Option("--full/--quick", help="More rays and runs: minutes, not one.")
+        bool, typer.Option("--full/--quick", help="More rays and runs: minutes instead of one.")
     ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of shapes and rays.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random shapes and rays.")] = 1,
 ) -> None:
-    """Measure the text-book's ways to intersect: error against nanoseconds per ray."""
-    # Imported here: `reference-rt render` must not wait for what only measuring needs.
+    """Measure the textbook's intersection methods: error against nanoseconds per ray."""
     with compare_extra("measuring"):
         from comparisons.experiments.methods.page import write_page
         from comparisons.experiments.methods.run import FAMILIES, FULL, QUICK, run

@@ -12,15 +12,16 @@ from reference_rt.cli.main import guarded, say
 @guarded
 def report(
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="What a suite or `compare` wrote to.")
+        Path, typer.Argument(metavar="DIR", help="The output folder of `suite` or `compare`.")
     ],
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The page.  [default: DIR/report.html]")
+        Path | None,
+        typer.Option(metavar="FILE", help="The page to write. (default: DIR/report.html)"),
     ] = None,
 ) -> None:
-    """Write results.json and the page again, from the records of a suite or of `compare`.
+    """Write results.json and the page again, from the stored results of `suite` or `compare`.
 
-    Exit code 1 where cases are missing, because the run was interrupted.
+    Exit code 1: cases are missing, because the run was interrupted.
     """
     with compare_extra():
         from comparisons.report import write_report, write_results

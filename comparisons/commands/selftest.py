@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from comparisons.commands.options import Scenes
 from reference_rt.cli.main import guarded
 from reference_rt.util.errors import UsageError
 
@@ -17,15 +18,17 @@ def selftest(
         Path, typer.Option("--out", "-o", help="Folder for selftest.json and selftest.md.")
     ] = Path("out"),
     only: Annotated[
-        list[str] | None, typer.Option(help="Patterns of the names of faults to plant.")
+        list[str] | None, typer.Option(help="Only faults whose names match this pattern.")
     ] = None,
     seeds: Annotated[
-        int, typer.Option(min=0, help="Runs of the right renderer, to count false alarms.")
+        int, typer.Option(min=0, help="Runs of the correct renderer, to count false alarms.")
     ] = 1000,
-    power: Annotated[bool, typer.Option(help="Measure the power curves.")] = True,
-    scenes: Annotated[Path, typer.Option(help="Folder of the scenes.")] = Path("scenes"),
+    power: Annotated[
+        bool, typer.Option(help="Measure how often faults of each size are caught.")
+    ] = True,
+    scenes: Scenes = Path("scenes"),
 ) -> None:
-    """Plant faults and see whether the suites catch them; count false alarms without any."""
+    """Test the harness: plant faults and check that the suites catch them; count false alarms."""
     from comparisons.experiments.selftest import FAULTS
     from comparisons.experiments.selftest.run import SUITES, run
     from reference_rt.util.files import check_writable
@@ -33,7 +36,7 @@ def selftest(
     patterns = only or ["*"]
     faults = [f for f in FAULTS if any(fnmatchcase(f.name, pattern) for pattern in patterns)]
     if not faults:
-        raise UsageError(f"--only: no fault fits {', '.join(patterns)}")
+        raise UsageError(f"--only: no fault matches {', '.join(patterns)}")
     files = out / "selftest.json", out / "selftest.md"
     check_writable(*files)
     console = Console(stderr=True, highlight=False)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import Fresh
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -15,37 +16,41 @@ from reference_rt.util.errors import UsageError
 @guarded
 def stability(
     out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for what is found.")
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for results and the page.")
     ] = Path("out/stability"),
     family: Annotated[
-        list[str] | None, typer.Option(help="Only these, F1 to F14; several times for several.")
+        list[str] | None, typer.Option(help="Only this family, F1 to F14: repeat for several.")
     ] = None,
     full: Annotated[
-        bool, typer.Option("--full/--quick", help="All of it: some twenty minutes, not two.")
+        bool, typer.Option("--full/--quick", help="All settings: about 20 minutes instead of 2.")
     ] = False,
     series: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Only this series of the one family.")
+        str | None, typer.Option(metavar="NAME", help="Only this series; needs one --family.")
     ] = None,
     at: Annotated[
-        float | None, typer.Option(metavar="X", help="Only this setting of the one series.")
+        float | None, typer.Option(metavar="X", help="Only this setting; needs --series.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of all that is drawn.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random scenes and rays.")] = 1,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Processes at once.  [default: all cores]")
+        int | None, typer.Option(min=1, help="Parallel processes. (default: all cores)")
     ] = None,
     mitsuba: Annotated[
-        bool, typer.Option("--mitsuba/--no-mitsuba", help="Whether Mitsuba takes part.")
+        bool, typer.Option("--mitsuba/--no-mitsuba", help="Measure Mitsuba too.")
     ] = True,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is measured.")] = False,
+    fresh: Fresh = False,
     markdown: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Put the table between '<!-- stability -->' and '<!-- end -->' of a file.",
+            help="Also write the table between '<!-- stability -->' and '<!-- end -->' of this "
+            "file.",
         ),
     ] = None,
 ) -> None:
-    """Find where ours and Mitsuba fail as scenes become extreme; exact arithmetic decides."""
+    """Find where reference_rt and Mitsuba fail as scenes become extreme.
+
+    Exact arithmetic and closed forms decide which answer is right.
+    """
     with compare_extra():
         from rich.console import Console
 
@@ -62,7 +67,7 @@ def stability(
             run,
             shoot,
         )
-        from comparisons.report import marked
+        from comparisons.report import marker_block
         from comparisons.runs.provenance import ours, provenance
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
@@ -83,7 +88,7 @@ def stability(
     kept = out / "settings" / "a setting", out / "pictures" / "a picture"
     check_writable(out / "results.json", out / "results.csv", page, *kept)
     if markdown is not None:
-        marked.check(markdown, "stability")
+        marker_block.check(markdown, "stability")
     missing = mitsuba_is_there() if mitsuba else "not asked"
     effort: Effort = "full" if full else "quick"
     choice = Choice(names, effort, seed, series, at, not missing)
@@ -101,7 +106,7 @@ def stability(
         console.width = 180  # a log has no edge, and words stay whole
     console.print(table.terminal(found))
     if markdown is not None:
-        marked.rewrite(markdown, "stability", table.markdown(found, effort, seed, facts))
+        marker_block.rewrite(markdown, "stability", table.markdown(found, effort, seed, facts))
     holds = True
     for one in (s for some in table.summaries(found).values() for s in some):
         holds &= one.holds

@@ -8,12 +8,13 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import Fresh, GitHub, JUnit, Scenes
 from comparisons.results.case import COMPARED
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import UsageError
 
 MOST_JOBS = 4
-"""At once, where nobody says: each takes up to 2 GB."""
+"""Default limit of parallel processes: each takes up to 2 GB."""
 
 
 @guarded
@@ -23,28 +24,31 @@ def suite(
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Folder for what is found.  [default: out/NAME]"),
+        typer.Option("--out", "-o", help="Folder for results and the page. (default: out/NAME)"),
     ] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="GLOB", help="Only cases of such names, like 'material_*'."),
+        typer.Option(metavar="GLOB", help="Only cases whose names match, such as 'material_*'."),
     ] = None,
     rung: Annotated[
         list[str] | None,
-        typer.Option("--rung", "--tier", metavar="RUNG", help=f"Only: {', '.join(COMPARED)}."),
+        typer.Option(
+            "--rung", "--tier", metavar="RUNG", help=f"Only this rung: {', '.join(COMPARED)}."
+        ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes at once.")] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Do again what is done.")] = False,
-    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML too.")] = None,
-    github: Annotated[
-        bool,
-        typer.Option("--github", help="Annotations and a summary; by itself in GitHub Actions."),
-    ] = False,
-    scenes: Annotated[Path, typer.Option(metavar="DIR", help="The folder of scenes.")] = Path(
-        "scenes"
-    ),
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, help=f"Parallel processes. (default: all cores, at most {MOST_JOBS})"),
+    ] = None,
+    fresh: Fresh = False,
+    junit: JUnit = None,
+    github: GitHub = False,
+    scenes: Scenes = Path("scenes"),
 ) -> None:
-    """Compare all scenes of a folder with Mitsuba; what is done is not done again."""
+    """Compare all scenes of a folder with Mitsuba.
+
+    Finished cases are kept in the output folder and not run again.
+    """
     with compare_extra():
         from comparisons.report.ci import github as github_actions
         from comparisons.report.ci import junit as junit_xml
@@ -68,8 +72,8 @@ def suite(
     check_writable(*(path for path in (junit, summary) if path is not None))
 
     def tell(run: Run) -> None:
-        """Also of a run that is interrupted: what a build server shows must not be of a former
-        run."""
+        """Write all outputs, after an interruption too: a build server must not show those of an
+        earlier run."""
         if junit is not None:
             junit_xml.write(junit, run.cases, source.name, run.walls, run.not_run, run.missing)
         if on_github:

@@ -1,1 +1,14 @@
-"""The comparison of one scene with Mitsuba, from its measurements to a verdict."""
+"""The comparison of one scene with Mitsuba, from measurements to a verdict.
+
+`compare_scene` runs the deterministic rungs (film, geometry, direct, whitted) in order, renders the
+pictures of both sides (`pictures`), and hands the `Evidence` to `judge`, which adds the rungs of
+pictures and returns a `comparisons.results.case.Case`.  `diagnosis` names the likeliest cause of a
+difference.  `control` compares Mitsuba with itself: a difference there is a fault of the harness.
+
+A `Budget` says how much work a comparison may take and which relative bias it must detect; None
+means the scene's own value.  Pictures are (height, width, 3) float64 linear radiance, replicates
+(replicates, height, width, 3); times are wall-clock seconds by side and step.
+
+To add a rung, see `comparisons.rungs`; to add a hypothesis, yield it in `diagnosis.brightness` or
+`diagnosis.place`.
+"""

@@ -1,4 +1,4 @@
-"""How much work one comparison may be: samples, replicates, rays, and the bias it must see."""
+"""How much work one comparison may take: samples, replicates, rays, and the bias to detect."""
 
 from typing import Annotated
 
@@ -10,23 +10,23 @@ PixelSize = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
 
 
 class Budget(Description):
-    """The work that one comparison of a scene is worth, and what it must be able to see."""
+    """The work of one comparison of a scene, and the bias that it must be able to detect."""
 
     spp: Annotated[int, Field(ge=1)] | None = None
-    """Samples per pixel of each replicate;  none: the scene's own."""
+    """Samples per pixel of each replicate; None: the scene's own."""
     reference_spp: Annotated[int, Field(ge=1)] | None = None
-    """The same of Mitsuba's replicates alone;  none: as many as ours.  Its samples are cheaper and,
-    being independent, noisier: the noise of the difference is least for more of them."""
+    """Samples per pixel of Mitsuba's replicates; None: as many as ours.  Its samples are cheaper
+    and, being independent, noisier: with more of them the difference has the least noise."""
     size: Annotated[PixelSize, Field(strict=False)] | None = None
-    """Width and height in pixels;  none: the scene's own."""
+    """Width and height in pixels; None: the scene's own."""
     replicates: Annotated[int, Field(ge=2)] = 16
-    """Independent renderings on each side."""
+    """Independent pictures by each renderer."""
     pixels: Annotated[int, Field(ge=16)] = 16_700
     """Camera rays of the Whitted rung, and of the geometry rung, which traces six times as many
-    rays in all."""
+    rays in total."""
     light_pixels: Annotated[int, Field(ge=16)] = 1024
-    """The same of the rung of direct light."""
+    """Camera rays of the rung of direct light."""
     limit: Annotated[float, Field(gt=0)] = 0.005
-    """The smallest relative bias of the image mean that must be visible."""
+    """The smallest relative bias of the image mean that must be detectable."""
     control: bool = False
-    """Mitsuba against itself, other variant and other seeds, instead of ours against Mitsuba."""
+    """Compare Mitsuba with itself (another variant, other seeds) instead of ours with Mitsuba."""

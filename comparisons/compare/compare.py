@@ -1,4 +1,4 @@
-"""The comparison of one scene with Mitsuba, rung by rung, from its files to its verdict."""
+"""The comparison of one scene with Mitsuba, rung by rung, from the scene to the verdict."""
 
 import time
 from collections.abc import Callable
@@ -24,16 +24,16 @@ from reference_rt.scene.build import build_tables
 _NO_LIGHT = "ray casting shows surfaces, not light"
 
 LIGHT_SPP = 64
-"""Samples per pixel of pictures of single lights: they are to be recognised, not measured."""
+"""Samples per pixel of pictures of single lights: enough to recognise them in a difference."""
 
 Say = Callable[[str], None]
-"""Is told of each step, a line at a time."""
+"""Called with a line of text about each step."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """scene: what we render;  reference: what Mitsuba renders, the same unless a fault is planted
-    in one of them (None stands for the same)."""
+    """scene: what we render;  reference: what Mitsuba renders; None: the same, which it is unless a
+    test plants a fault in one of them."""
 
     scene: Scene
     reference: Scene | None = None
@@ -46,7 +46,7 @@ def compare_scene(
     threads: int | None = None,
     rungs: tuple[str, ...] = (),
 ) -> Case:
-    """One scene, rung by rung;  threads: of ours, None for all cores;  rungs: only these, if any.
+    """Compare one scene.  threads: ours, None for all cores;  rungs: only these; empty: all.
 
     Raises SceneError, ImageError, ReferenceUnavailableError.
     """
@@ -57,10 +57,10 @@ def compare_scene(
 
 
 def budgeted(scene: Scene, budget: Budget) -> Scene:
-    """The scene with the budget's size and samples, seen through a box filter.
+    """The scene with the budget's size and samples, and a box filter.
 
-    A filter wider than the pixel shares samples between pixels on Mitsuba's side, and their noise
-    with them: the statistics need independent pixels, and the filter has a rung of its own.
+    With a filter wider than a pixel, Mitsuba's neighbouring pixels share samples and hence noise,
+    but the statistics need independent pixels.  The scene's own filter is compared by its own rung.
     """
     film: dict[str, object] = {"filter": BoxFilter()}
     if budget.size is not None:
@@ -78,7 +78,7 @@ def gather(
     threads: int | None = None,
     only: tuple[str, ...] = (),
 ) -> Evidence:
-    """Climb the deterministic rungs and render the pictures of both sides."""
+    """Run the deterministic rungs and render the pictures of both sides."""
     scene = budgeted(subject.scene, budget)
     clock = time.perf_counter()
     tables = build_tables(scene)
@@ -125,7 +125,7 @@ def gather(
 
 
 def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:
-    """What the scene does not need, by the reason why."""
+    """The features that are specialised away because the scene lacks them, grouped by reason."""
     by_reason: dict[str, list[str]] = {}
     for what, why in explain(scene, tables)[1]:
         by_reason.setdefault(why, []).append(what)
@@ -141,8 +141,8 @@ def _deterministic_rungs(
     only: tuple[str, ...],
     say: Say,
 ) -> list[Tier]:
-    """The filter; geometry, then light, each only where the rung before it holds: a convention that
-    is wrong below must not be reported as light that is wrong above."""
+    """Film, geometry, then light; each only if the rungs below it hold: a wrong convention must not
+    be reported as wrong light."""
     climbs: dict[str, Callable[[], Tier]] = {
         "geometry": lambda: tiers.geometry(scene, tables, twin, budget.pixels),
         "direct": lambda: tiers.direct(scene, tables, twin, budget.light_pixels),

@@ -1,6 +1,6 @@
-"""The harness's own control: Mitsuba against itself, in another variant and with other seeds.
+"""The control cases: Mitsuba against itself, in another variant and with other seeds.
 
-What differs here is a fault of the comparison, or of Mitsuba, and none of ours.
+A difference here is a fault of the harness or of Mitsuba, not of reference_rt.
 """
 
 import math
@@ -22,11 +22,11 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 
 MOST_PIXELS = 64 * 48
-"""Of pictures without noise, whose rays scalar variants trace one by one in Python."""
+"""Size limit of pictures without noise: scalar variants trace their rays one by one in Python."""
 
 
 def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
-    """Compare the pictures of a scene by two variants of Mitsuba.  Raises SceneError,
+    """Compare the pictures of a scene by two of Mitsuba's variants.  Raises SceneError,
     ReferenceUnavailableError."""
     if scene.integrator.deterministic:
         scene = _smaller(scene)
@@ -41,7 +41,7 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
         for number, (side, variant) in enumerate(variants.items()):
             start = time.perf_counter()
             with backend.variant(variant):
-                # Seeds far apart: the candidate's replicates share none with the reference's.
+                # The candidate's seeds must not overlap the reference's.
                 found.append(_pictures(scene, budget, (1 - number) * 100_000))
             seconds[side] = {"render": time.perf_counter() - start}
             say(f"{variant}: {seconds[side]['render']:.1f} s")
@@ -58,7 +58,7 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
 
 
 def _smaller(scene: Scene) -> Scene:
-    """The scene with MOST_PIXELS at most, its sides in about the same ratio."""
+    """The scene with at most MOST_PIXELS, of about the same aspect ratio."""
     film = scene.film
     factor = min(1.0, math.sqrt(MOST_PIXELS / (film.width * film.height)))
     sides = {side: max(1, round(factor * getattr(film, side))) for side in ("width", "height")}
@@ -66,11 +66,11 @@ def _smaller(scene: Scene) -> Scene:
 
 
 class _LackingError(Exception):
-    """Mitsuba's scene is not one scene, and so has no light."""
+    """The scene has no counterpart in Mitsuba that can be lit."""
 
 
 def _pictures(scene: Scene, budget: Budget, seed: int) -> FloatArray:
-    """(replicates, height, width, 3), of a deterministic scene one, by the variant that is set."""
+    """(replicates, height, width, 3) by the active variant; one replicate if deterministic."""
     twin = load(scene)
     if isinstance(scene.integrator, RayCast):
         tables = build_tables(scene)

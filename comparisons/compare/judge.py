@@ -1,4 +1,4 @@
-"""From what was measured of a case to its verdict."""
+"""From the evidence about a case to its verdict."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from comparisons import statistics
-from comparisons.compare import causes
+from comparisons.compare import diagnosis
 from comparisons.results.case import RUNGS, Case, Cause, FloatArray, Images, Place, Tier
 from comparisons.results.verdict import decide
 from comparisons.rungs.images import images_tier
@@ -15,13 +15,13 @@ from comparisons.rungs.limited import limited
 from comparisons.statistics.metrics import image_metrics
 
 Lights = Callable[[], Mapping[str, FloatArray]]
-"""The reference's pictures of single lights (height, width, 3) by name, rendered when asked for."""
+"""Returns the reference's pictures of single lights (height, width, 3) by name; renders them."""
 
 
 @dataclass(frozen=True)
 class Rendered:
-    """images: the two pictures;  seconds: wall clock by side and step;  replicates: the noisy
-    pictures (replicates, height, width, 3) of each side that they are the means of, else None."""
+    """images: the two pictures;  seconds: wall clock by side and step;  replicates: for noisy
+    pictures, the replicates (replicates, height, width, 3) of each side whose means they are."""
 
     images: Images
     seconds: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -32,7 +32,8 @@ class Rendered:
 def of_replicates(
     candidate: FloatArray, reference: FloatArray, seconds: dict[str, dict[str, float]]
 ) -> Rendered:
-    """The means of noisy pictures (replicates, height, width, 3), and how exact they are."""
+    """The means of replicates (replicates, height, width, 3) and the standard error of their
+    difference."""
     if candidate.shape[1:] == reference.shape[1:]:
         error = statistics.standard_error(candidate, reference)
     else:
@@ -43,9 +44,8 @@ def of_replicates(
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a verdict is made from.  name: of the case;  rungs: the deterministic ones;  rendered:
-    the pictures of both sides, None where there are none;  lights: for the likeliest cause;  the
-    rest as in `Case`."""
+    """The input of a verdict.  name: the case's;  rungs: the deterministic ones;  rendered: the
+    pictures of both sides, if any;  lights: for the diagnosis;  the rest as in `Case`."""
 
     name: str
     rungs: tuple[Tier, ...]
@@ -58,9 +58,9 @@ class Evidence:
 
 
 def judge(evidence: Evidence, limit: float) -> Case:
-    """The verdict on all rungs; where there is a difference, its likeliest cause and its places.
+    """The verdict over all rungs; for a difference also its likeliest cause and the worst places.
 
-    limit: the smallest relative bias of the image mean that must be visible.
+    limit: the smallest relative bias of the image mean that must be detectable.
     """
     rungs, rendered = list(evidence.rungs), evidence.rendered
     metrics, images = None, None
@@ -75,9 +75,9 @@ def judge(evidence: Evidence, limit: float) -> Case:
     cause: Cause | None = None
     worst: tuple[Place, ...] = ()
     if verdict == "differ":
-        cause = causes.of_rungs(rungs)
+        cause = diagnosis.of_rungs(rungs)
         if rendered is not None and metrics is not None:
-            cause = cause or _cause_of(rendered.images, evidence.lights)
+            cause = cause or likeliest_cause(rendered.images, evidence.lights)
             worst = _places(rendered)
     return Case(
         scene=evidence.name,
@@ -96,7 +96,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
 
 
 def picture_rungs(rendered: Rendered, limit: float) -> list[Tier]:
-    """What is wrong with the pictures as such, and, of noisy ones, the statistics."""
+    """The rungs `input` and, for noisy pictures that are valid, `statistics`."""
     if rendered.replicates is None:
         images = rendered.images
         checked = input_tier(images.candidate, images.reference)
@@ -107,15 +107,17 @@ def picture_rungs(rendered: Rendered, limit: float) -> list[Tier]:
     return [checked, statistics.compare(*rendered.replicates, limit=limit)]
 
 
-def _cause_of(images: Images, lights: Lights | None) -> Cause | None:
-    plain = causes.likeliest(images)
+def likeliest_cause(images: Images, lights: Lights | None) -> Cause | None:
+    """The likeliest cause of a difference; single lights are rendered only if needed."""
+    plain = diagnosis.likeliest(images)
     if lights is None or (plain is not None and plain.explained > SURE):
         return plain
-    return causes.likeliest(images, lights())
+    return diagnosis.likeliest(images, lights())
 
 
 SURE = 0.98
-"""Of the squared difference: a cause that explains so much needs no pictures of single lights."""
+"""The fraction of the squared difference that a cause must explain for single lights not to be
+tried."""
 
 
 def _places(rendered: Rendered) -> tuple[Place, ...]:
@@ -123,6 +125,3 @@ def _places(rendered: Rendered) -> tuple[Place, ...]:
         return statistics.worst_places(*rendered.replicates)
     images = rendered.images
     return statistics.worst_places(images.candidate[np.newaxis], images.reference[np.newaxis])
-
-
-__all__ = ["Evidence", "Lights", "Rendered", "judge", "of_replicates", "picture_rungs"]

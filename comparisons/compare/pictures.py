@@ -1,4 +1,4 @@
-"""The two pictures of a scene, ours and Mitsuba's, as each integrator makes them."""
+"""The pictures of a scene by both renderers, for each integrator."""
 
 import time
 
@@ -25,7 +25,7 @@ from reference_rt.textures import At, colour_at
 
 
 def cast(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
-    """Ray casting: the shown layer as its picture, Mitsuba's from its own hits of the same rays."""
+    """Ray casting: the displayed layer; Mitsuba's is made from its own hits of the same rays."""
     ours = render(scene, tables=tables)
     start = time.perf_counter()
     theirs, notes = mitsuba_cast(scene, tables, twin, ours)
@@ -36,17 +36,17 @@ def cast(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
 def mitsuba_cast(
     scene: Scene, tables: SceneTables, twin: Twin, ours: Picture
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """The layer that `ours` shows, as displayed (height, width, 3), from Mitsuba's hits of the rays
-    through the pixels' middles; what a reader should know of it."""
+    """The layer that `ours` shows, as displayed (height, width, 3), made from Mitsuba's hits of the
+    rays through the pixel centres; and notes for the reader."""
     film = scene.film
     y, x = np.mgrid[0 : film.height, 0 : film.width]
     o, d = camera_rays(scene, x.ravel() + 0.5, y.ravel() + 0.5)
     hits = trace(twin, o, d)
-    notes = [f"the pictures show the layer '{ours.shown}' as displayed, not radiance"]
+    notes = [f"the pictures show the layer '{ours.shown}' in display values, not radiance"]
     uv = np.where(hits.has_uv[:, None], hits.uv, ours.layers["uv"].reshape(-1, 2))
     if ours.shown == "uv" and not hits.has_uv[hits.shape >= 0].all():
         notes.append(
-            "Mitsuba has other uv, or none, for some shapes: there ours stand on both sides"
+            "Mitsuba has different uv, or none, on some shapes: both pictures show ours there"
         )
     layers = {
         "colour": _colours(scene, tables, hits, uv),
@@ -60,12 +60,12 @@ def mitsuba_cast(
 
 
 def _colours(scene: Scene, tables: SceneTables, hits: Answers, uv: FloatArray) -> FloatArray:
-    """The colour (n, 3) of what was hit: of its material, or of a mesh's vertices at the place."""
+    """The colours (n, 3) at hits: the material's, or interpolated from a mesh's vertex colours."""
     sizes = ShapeSizes(scene)
     names = [*scene.materials, None]
     leaf, local = sizes.leaf_of(hits), sizes.local_points(hits)
     found = np.zeros((len(hits.t), 3))
-    mixed = np.full((len(hits.t), 3), -1.0)  # negative stands for none
+    mixed = np.full((len(hits.t), 3), -1.0)  # negative: no vertex colour
     material = np.full(len(hits.t), -1)
     for number in np.unique(leaf[leaf >= 0]).tolist():
         rows = np.flatnonzero(leaf == number)
@@ -93,8 +93,7 @@ def _shown(
 
 
 def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
-    """(n, 3) weights of the corners of triangles (n, 9), by the areas opposite, for points (n, 3)
-    of their planes."""
+    """Barycentric coordinates (n, 3) of points (n, 3) in the planes of triangles (n, 9)."""
     v = vertices.reshape(-1, 3, 3)
     normal = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
     areas = [np.sum(normal * np.cross(v[:, k - 2] - p, v[:, k - 1] - p), axis=1) for k in range(3)]
@@ -102,7 +101,7 @@ def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
 
 
 def whitted(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
-    """Recursive ray tracing: Mitsuba's plugin along the rays of our grid of samples."""
+    """Recursive ray tracing: our plugin for Mitsuba traces the rays of our grid of samples."""
     ours = render(scene, tables=tables)
     start = time.perf_counter()
     theirs = mitsuba_whitted(scene, tables, twin)
@@ -110,7 +109,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
 
 
 def mitsuba_whitted(scene: Scene, tables: SceneTables, twin: Twin) -> FloatArray:
-    """The picture (height, width, 3) by Mitsuba's plugin."""
+    """The picture (height, width, 3) by our plugin for Mitsuba."""
     assert isinstance(scene.integrator, Whitted)
     n = round(scene.resolved_sampler.spp**0.5)
     height, width = scene.film.height, scene.film.width
@@ -127,7 +126,7 @@ def mitsuba_whitted(scene: Scene, tables: SceneTables, twin: Twin) -> FloatArray
 
 
 AT_ONCE = 1 << 18
-"""Rays that Mitsuba's plugin gets together: a recursion's memory is many times theirs."""
+"""Rays per call of the plugin: its recursion takes many times their memory."""
 
 
 def replicates(
@@ -138,8 +137,8 @@ def replicates(
     reference_spp: int | None,
     threads: int | None,
 ) -> Rendered:
-    """Path tracing: `count` pictures on each side with independent seeds; the images are their
-    means.  "render" is the median time of one picture."""
+    """Path tracing: `count` pictures by each renderer with independent seeds; the images are their
+    means.  seconds["render"] is the median time of one picture."""
     sampler = scene.resolved_sampler
     first = getattr(sampler, "seed", 0)
     ours, times = [], []

@@ -1,4 +1,4 @@
-"""Pictures of a scene by one light at a time: what is missing, or there twice, looks like one."""
+"""Pictures of a scene under each light alone, to recognise a lost or doubled light."""
 
 from collections.abc import Mapping
 
@@ -9,14 +9,14 @@ from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 
 MOST = 8
-"""Lights: of more, one that is missing is hard to tell from the others."""
+"""Number of lights above which a missing one is hard to recognise."""
 
 DARK = (0.0, 0.0, 0.0)
 
 
 def single_lights(scene: Scene, spp: int, threads: int | None = None) -> Mapping[str, FloatArray]:
-    """Our picture (height, width, 3) of each of the scene's lights and shining materials, alone,
-    by its name; empty where there are fewer than two, or more than MOST."""
+    """Our picture (height, width, 3) under each light or emissive material alone, by its name;
+    empty if there are fewer than two, or more than MOST."""
     shining = [name for name, m in scene.materials.items() if isinstance(m, Emissive)]
     lights = [k for k, light in enumerate(scene.lights) if not isinstance(light, Ambient)]
     if not 2 <= len(shining) + len(lights) <= MOST:
@@ -36,7 +36,7 @@ def single_lights(scene: Scene, spp: int, threads: int | None = None) -> Mapping
 
 
 def _only(scene: Scene, name: str | None) -> dict[str, AnyMaterial]:
-    """The scene's materials, of which that one alone may shine."""
+    """The scene's materials; all emissive ones but `name` are dark."""
     return {
         other: material.model_copy(update={"radiance": DARK})
         if isinstance(material, Emissive) and other != name

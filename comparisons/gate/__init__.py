@@ -1,1 +1,15 @@
-"""The gate for other people's renderers: their pictures against a scene or another picture."""
+"""The gate: another renderer's pictures against our rendering of a scene, or other pictures.
+
+`pictures_in` reads candidates, `driver` runs a renderer to make them, `request` finds what they are
+compared with (`reference`: our rendering or files; `baselines`: accepted pictures), `gate` returns
+a `comparisons.results.case.Case`, `outputs` writes it.  `pytest_plugin` is the fixture
+`image_gate`.
+
+Pictures are linear sRGB radiance (height, width, 3) in float64, row 0 on top, premultiplied by
+opacity; replicates are (replicates, height, width, 3).  A baseline named "" and a scene None mean
+that there is none.  Files from outside are data from strangers: whatever is wrong with one is an
+ImageError that names it.
+
+To read another file format, add its first bytes to `pictures_in` and a reader to
+`reference_rt.core.image_files`.
+"""

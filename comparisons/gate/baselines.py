@@ -1,9 +1,9 @@
-"""Baselines: pictures that somebody looked at and accepted, with where they came from and why.
+"""Baselines: pictures that a person inspected and accepted, with their origin and the reason.
 
-A folder per baseline, `NAME/`: the replicates, as `picture-00.exr` and so on, and `baseline.json`,
-which has their SHA-256 and a seal of its own.  Replicates, not a mean and its variance: how well a
-variance is known decides what may be called a difference.  Only `accept` writes a baseline, never a
-gate, and never in CI.
+A baseline is a folder `NAME/` with its replicates, `picture-00.exr` and so on, and `baseline.json`,
+which holds their SHA-256 and a checksum of itself.  Replicates are stored instead of a mean and its
+variance, because the tests need to know how precise the variance is.  Only `accept` writes a
+baseline: never a gate, and never in CI.
 """
 
 import hashlib
@@ -34,20 +34,20 @@ from reference_rt.util.files import check_writable, read_input, read_text
 RECORD = "baseline.json"
 
 MOST_KEPT = 8
-"""Pictures: of more replicates the means of so many groups are kept, with 7 degrees of freedom."""
+"""Most stored pictures (7 degrees of freedom); more replicates are averaged in so many groups."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 class SceneOf(Description):
-    """The scene that a baseline is a picture of."""
+    """The scene that a baseline shows."""
 
     file: str
     digest: str
 
 
 class Former(Description):
-    """What a baseline replaced."""
+    """The record of a replaced baseline."""
 
     date: str
     reason: str
@@ -55,8 +55,8 @@ class Former(Description):
 
 
 class Record(Description):
-    """`baseline.json`.  files: SHA-256 by name;  sources: of each accepted picture its file, its
-    SHA-256 and the text in its header (software, samples, seed, where the renderer wrote them)."""
+    """`baseline.json`.  files: SHA-256 by name;  sources: for each accepted picture its file, its
+    SHA-256 and the text of its header (software, samples, seed, if the renderer wrote them)."""
 
     format: Annotated[int, Field(ge=1, le=1)] = 1
     name: str
@@ -87,8 +87,8 @@ class Baseline:
         for name, digest in self.record.files.items():
             if _sha256(self.folder / name) != digest:
                 raise BaselineEditedError(
-                    f"{self.folder / name}: is not what was accepted (SHA-256 differs); restore "
-                    "it, or accept a new baseline"
+                    f"{self.folder / name}: has changed since it was accepted (SHA-256 differs); "
+                    "restore it, or accept a new baseline"
                 )
         pictures = [read_candidate(self.folder / name) for name in sorted(self.record.files)]
         name = f"the baseline's, {self.record.name}"
@@ -96,11 +96,11 @@ class Baseline:
 
 
 def check_name(name: str) -> None:
-    """Refuse what could be a path.  Raises UsageError."""
+    """Refuse names that could be paths.  Raises UsageError."""
     if not _NAME.fullmatch(name):
         raise UsageError(
-            f"'{name}' is no name of a baseline; expected letters, digits, '.', '_' and '-', "
-            "beginning with a letter or a digit"
+            f"'{name}' is not a valid name of a baseline; expected letters, digits, '.', '_' and "
+            "'-', beginning with a letter or a digit"
         )
 
 
@@ -115,8 +115,8 @@ def check_place(folder: Path, name: str) -> None:
 def load(folder: Path, name: str, candidates: Sequence[str] = ()) -> Baseline:
     """The baseline `name` in `folder`.
 
-    candidates: files that could be accepted where there is none.  Raises UsageError,
-    BaselineMissingError, BaselineEditedError.
+    candidates: files that the message proposes to accept if there is no such baseline.  Raises
+    UsageError, BaselineMissingError, BaselineEditedError.
     """
     check_name(name)
     path = folder / name / RECORD
@@ -124,19 +124,19 @@ def load(folder: Path, name: str, candidates: Sequence[str] = ()) -> Baseline:
         files = shlex.join(candidates) if candidates else "CANDIDATE..."
         options = shlex.join(["--name", name, "--baselines", str(folder)])
         raise BaselineMissingError(
-            f"there is no baseline '{name}' in {folder}; look at the candidate, and if it is "
+            f"there is no baseline '{name}' in {folder}; inspect the candidate, and if it is "
             f'right: reference-rt accept {files} {options} --reason "..." [--scene SCENE]'
         )
     return Baseline(_record(path), folder / name)
 
 
 def check_fresh(baseline: Baseline, digest: str, scene: str) -> None:
-    """Refuse a baseline of another scene than that of `digest`.  Raises BaselineMissingError."""
+    """Refuse a baseline whose scene does not have this digest.  Raises BaselineMissingError."""
     accepted = baseline.record.scene
     if accepted is not None and accepted.digest != digest:
         raise BaselineMissingError(
             f"the baseline '{baseline.record.name}' is stale: {scene} has changed since it was "
-            f"accepted on {baseline.record.date}; render the scene anew and accept the picture"
+            f"accepted on {baseline.record.date}; render the scene again and accept the picture"
         )
 
 
@@ -157,10 +157,10 @@ def accept(
     machine: str,
     date: str,
 ) -> Baseline:
-    """Write the baseline `name`, whole or not at all, in place of a former one.
+    """Write the baseline `name`, whole or not at all; it replaces a former one.
 
     facts: versions, by package.  Raises UsageError (no reason, bad name, in CI) and ImageError
-    (pictures of unlike size, or none that could be a reference).
+    (pictures that differ in size or cannot be a reference).
     """
     refuse_in_ci()
     check_place(folder, name)
@@ -170,11 +170,11 @@ def accept(
     former = folder / name / RECORD
     history: tuple[Former, ...] = ()
     if former.exists():
-        with suppress(BaselineEditedError):  # one that was edited is what accepting mends
+        with suppress(BaselineEditedError):  # accepting replaces an edited baseline
             old = _record(former)
             history = (*old.history, Former(date=old.date, reason=old.reason, files=old.files))
     if noise_free and len(pictures) > 1:
-        raise UsageError(f"{len(pictures)} candidates of a picture without noise; expected one")
+        raise UsageError(f"{len(pictures)} candidates without noise; expected one")
     groups = np.array_split(pictures, min(len(pictures), MOST_KEPT))
     kept = {f"picture-{k:02d}.exr": group.mean(axis=0) for k, group in enumerate(groups)}
     try:
@@ -212,11 +212,11 @@ def accept(
 
 
 def refuse_in_ci() -> None:
-    """Raise UsageError in an automatic run, which is told by the variable that CI services set."""
+    """Raise UsageError in an automatic run: CI services set the variable CI."""
     if os.environ.get("CI", "").lower() not in ("", "0", "false"):
         raise UsageError(
-            "CI never writes baselines (the variable CI is set); accept on a machine of your own, "
-            "and commit the folder"
+            "baselines cannot be accepted in CI (the variable CI is set); accept on your own "
+            "machine, and commit the folder"
         )
 
 
@@ -230,7 +230,7 @@ def scene_of(record: Record, folder: Path) -> Scene | None:
 
 
 def used_in(results: Path) -> set[str]:
-    """The baselines that gates named whose `results.json` are in a folder or below it."""
+    """The names of the baselines that any `results.json` in or below a folder names."""
     found = set()
     for path in results.rglob("results.json"):
         with suppress(OSError, ValueError, AttributeError, KeyError, TypeError, RecursionError):
@@ -258,8 +258,8 @@ def _record(path: Path) -> Record:
     except (OSError, ValueError, KeyError, AttributeError, RecursionError, SceneError) as error:
         reason = "its fields" if isinstance(error, SceneError) else str(error)
         raise BaselineEditedError(
-            f"{path}: is not what `accept` wrote ({' '.join(reason.split())[:100]}); restore it, "
-            "or accept a new baseline"
+            f"{path}: has changed since `accept` wrote it ({' '.join(reason.split())[:100]}); "
+            "restore it, or accept a new baseline"
         ) from None
 
 

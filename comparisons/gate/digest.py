@@ -1,4 +1,4 @@
-"""What a scene is, as a number: the same digest, the same expected picture."""
+"""Digests of a scene and of our sources: with equal digests, the expected picture is the same."""
 
 import hashlib
 import json
@@ -20,8 +20,8 @@ _URI = re.compile(rb'"uri"\s*:\s*"([^"]+)"')
 
 
 def scene_digest(scene: Scene) -> str:
-    """SHA-256 of all that the expected picture depends on: the description, without what changes
-    no expectation, and the files that it names."""
+    """SHA-256 of all that the expected picture depends on: the files that the scene names, and its
+    description, without fields that do not change the expected value."""
     description = json.loads(scene.to_json())
     for key in ("description", "hierarchy"):
         description.pop(key, None)
@@ -29,13 +29,13 @@ def scene_digest(scene: Scene) -> str:
         description.pop("sampler", None)
     digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
     for path in _files(description, scene.folder):
-        with suppress(OSError):  # a file that is not there is for the loader to tell
+        with suppress(OSError):  # the loader reports a missing file
             digest.update(hashlib.sha256(read_input(path)).digest())
     return digest.hexdigest()
 
 
 def _files(part: Any, folder: Path) -> Iterator[Path]:
-    """The files that a description names, and those that a glTF file names."""
+    """The files that a description names, and those that glTF files among them name."""
     if isinstance(part, dict):
         if isinstance(part.get("file"), str):
             path = folder / part["file"]
@@ -54,7 +54,7 @@ def _files(part: Any, folder: Path) -> Iterator[Path]:
 
 @cache
 def source_digest() -> str:
-    """SHA-256 of the ray tracer's own source: another source, another picture."""
+    """SHA-256 of the sources of `reference_rt` and of NumPy's version."""
     package = Path(reference_rt.__file__).parent
     digest = hashlib.sha256(np.__version__.encode())
     for source in sorted(package.rglob("*.py")):

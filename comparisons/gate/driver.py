@@ -1,4 +1,4 @@
-"""Driving a renderer from outside: a command line, run once for each replicate."""
+"""Runs another renderer's command line, once per replicate."""
 
 import os
 import re
@@ -25,16 +25,16 @@ _BRACES = re.compile(r"\{([A-Za-z_]*)\}")
 _PICTURES = (".exr", ".png", ".pfm", ".hdr", ".npy", ".jpg", ".jpeg", ".ppm", ".tif", ".tiff")
 
 _LAST_LINES = 5
-"""Of what a renderer that failed has said."""
+"""Lines of a failed renderer's output that a message quotes."""
 
 
 @dataclass(frozen=True)
 class Command:
     """How a renderer is called.
 
-    template: the command line, split like a shell's but run without one; in its arguments {scene},
-    {output}, {seed} and {spp} are replaced;  scene: the file for {scene};  suffix: of the output,
-    which tells most renderers the format;  seconds: that one run may take.
+    template: the command line, split like a shell's but run without a shell; {scene}, {output},
+    {seed} and {spp} in its arguments are replaced;  scene: the file for {scene};  suffix: the
+    output's, from which most renderers derive the format;  seconds: time limit of one run.
     """
 
     template: str
@@ -62,23 +62,23 @@ class Command:
         for name in sorted(named - set(PLACEHOLDERS)):
             raise UsageError(f"--command: there is no {{{name}}}; expected some of {known}")
         if "output" not in named:
-            raise UsageError("--command: has no {output}; expected it where the picture is named")
+            raise UsageError("--command: has no {output}; expected it as the picture's file name")
         for name in sorted(named):
             if values[name] is None:
-                raise UsageError(f"--command: has {{{name}}}, but there is no --{name}")
+                raise UsageError(f"--command: has {{{name}}}; expected --{name} too")
         return [_BRACES.sub(lambda match: values[match[1]] or "", word) for word in words]
 
 
 def drive(
     command: Command, seeds: range, keep: Path, say: Callable[[str], None] = lambda line: None
 ) -> list[Picture]:
-    """The pictures of one run per seed, each into a fresh folder; they are kept in `keep`.
+    """The pictures of one run per seed, each in a new folder; copies are kept in `keep`.
 
-    Raises UsageError, RendererError (it hung, crashed, wrote nothing or elsewhere) and ImageError
-    (what it wrote is no picture).
+    Raises UsageError, RendererError (it hung, crashed, or did not write the output) and ImageError
+    (the output is not a picture).
     """
     command.arguments(Path("checked first"), 0)
-    with suppress(OSError):  # of an earlier run: what is there afterwards is of this one
+    with suppress(OSError):  # remove the candidates of an earlier run
         for old in keep.glob("candidate-*"):
             old.unlink()
     pictures = []
@@ -102,11 +102,11 @@ def drive(
 
 
 def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
-    """Run the renderer to its end, or kill it and all that it started."""
+    """Run the renderer; after the time limit, kill it and all its children."""
     with said.open("wb") as log:
         try:
-            # A session of its own, so that its children can be killed with it; files instead of
-            # pipes, which a child that lives on would keep open.
+            # A session of its own, so that its children can be killed with it; a file instead of
+            # a pipe, which a surviving child would keep open.
             process = subprocess.Popen(
                 arguments,
                 stdin=subprocess.DEVNULL,
@@ -124,8 +124,8 @@ def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
         code = process.wait(seconds)
     except subprocess.TimeoutExpired:
         raise RendererError(
-            f"{name} hung with seed {seed}: not done after {seconds:g} s, and was killed with its "
-            f"children; expected less, or a longer --time-limit{_last_lines(said)}"
+            f"{name} exceeded the time limit of {seconds:g} s with seed {seed}, and was killed "
+            f"with its children; a longer --time-limit would let it run on{_last_lines(said)}"
         ) from None
     finally:
         _kill(process)
@@ -143,8 +143,8 @@ def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
 
 
 def _guard(group: int) -> "subprocess.Popen[bytes]":
-    """A process that outlives this one, if this one is killed, by just long enough to kill the
-    renderer and its children: what it reads ends when this process does."""
+    """A process that kills the renderer and its children when this process ends, even if it is
+    killed: its standard input is then closed."""
     code = (
         "import os, signal, sys; sys.stdin.buffer.read(); "
         "os.killpg(int(sys.argv[1]), signal.SIGKILL)"
@@ -159,14 +159,14 @@ def _guard(group: int) -> "subprocess.Popen[bytes]":
 
 
 def _kill(process: "subprocess.Popen[bytes]") -> None:
-    """The process and what it left behind, which could write later."""
+    """Kill the process and its remaining children, which could write later."""
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
 def _last_lines(said: Path) -> str:
-    """The end of what the renderer said, in one line."""
+    """The end of the renderer's output, in one line."""
     with said.open("rb") as file:
         file.seek(0, os.SEEK_END)
         file.seek(max(0, file.tell() - 4000))
@@ -179,7 +179,8 @@ def _last_lines(said: Path) -> str:
 
 
 def _pictures_here() -> set[tuple[str, int]]:
-    """Name and time of the pictures in the working folder, where a renderer may write by itself."""
+    """Names and times of the pictures in the working folder, where a renderer that ignores {output}
+    may write."""
     found = set()
     with suppress(OSError), os.scandir() as entries:
         for entry in entries:
@@ -198,10 +199,10 @@ def _check_written(output: Path, before: set[tuple[str, int]], seed: int) -> Non
         found = [f"{name} in the same folder" for name in others[:3]]
         found += [f"{name} in the working folder" for name in here[:3]]
         raise RendererError(
-            f"the renderer wrote to another place with seed {seed}: {', '.join(found)}; expected "
-            f"{output.name}, at the path that {{output}} stands for"
+            f"the renderer wrote another file with seed {seed}: {', '.join(found)}; expected "
+            f"{output.name}, at the path given by {{output}}"
         )
     raise RendererError(
-        f"the renderer ended well with seed {seed}, but wrote nothing; expected {output.name}, at "
-        "the path that {output} stands for"
+        f"the renderer ended without an error with seed {seed}, but wrote no file; expected "
+        f"{output.name}, at the path given by {{output}}"
     )

@@ -1,4 +1,4 @@
-"""The gate: the pictures of somebody else's renderer against a reference, rung by rung."""
+"""The gate: another renderer's pictures against a reference, rung by rung."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from comparisons import statistics
-from comparisons.compare import causes
-from comparisons.compare.judge import SURE, Lights
+from comparisons.compare import diagnosis
+from comparisons.compare.judge import Lights, likeliest_cause
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
 from comparisons.results.case import Case, Cause, FloatArray, Images, Metrics, Place, Status, Tier
@@ -20,10 +20,10 @@ from reference_rt.textures.image_file import linear
 from reference_rt.util.errors import ImageError, UsageError
 
 LIMIT = 0.005
-"""The smallest relative bias of the image mean that must be visible."""
+"""The smallest relative bias of the image mean that must be detectable."""
 
-_NO_NOISE = "the scene asks for no random numbers: there is no noise"
-_UNKNOWN_NOISE = "the noise of a single picture is not known"
+_NO_NOISE = "the scene is rendered without random numbers: there is no noise"
+_UNKNOWN_NOISE = "the noise of a single picture is unknown"
 
 
 def gate_pictures(
@@ -35,19 +35,19 @@ def gate_pictures(
     lights: Lights | None = None,
     notes: Sequence[str] = (),
 ) -> Case:
-    """The verdict on candidates, which are replicates if they are several.
+    """The verdict on candidates; several are replicates.
 
-    limit: the smallest relative bias of the image mean that must be visible;  lights: for the
-    likeliest cause of a difference.  Raises ImageError for candidates of another size than the
-    reference, and UsageError for several candidates of what has no noise.
+    limit: the smallest relative bias of the image mean that must be detectable;  lights: for the
+    diagnosis of a difference.  Raises ImageError for candidates whose size is not the reference's,
+    UsageError for several candidates without noise.
     """
     check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
     notes = [*notes, *_notes(candidates)]
     if reference.noise_free and candidates[0].displayed:
         reference = replace(reference, pictures=_displayed(reference.pictures))
         notes.append(
-            "the candidate is kept in 8 bits of sRGB: the reference is rounded and ends at 1 like "
-            "it, and what is brighter is not judged"
+            "the candidate is stored as 8-bit sRGB: the reference is rounded and clamped to 1 in "
+            "the same way, and brighter values are not compared"
         )
     if reference.noise_free and len(candidates) > 1:
         raise UsageError(f"{len(candidates)} candidates of a picture without noise; expected one")
@@ -65,7 +65,7 @@ def gate_pictures(
     cause: Cause | None = None
     worst: tuple[Place, ...] = ()
     if verdict == "differ":
-        cause = causes.of_rungs(rungs) or _cause(images, lights)
+        cause = diagnosis.of_rungs(rungs) or likeliest_cause(images, lights)
         worst = statistics.worst_places(pictures, _judged_by(reference))
     return Case(
         scene=name,
@@ -83,7 +83,7 @@ def gate_pictures(
 
 
 def not_run(name: str, error: Exception) -> Case:
-    """What could not be carried through, as a case for the outputs."""
+    """A case for the outputs that says why the gate could not run."""
     status: Status = "invalid" if isinstance(error, ImageError) else "not-comparable"
     tier = Tier("run", status, str(error))
     return Case(
@@ -100,7 +100,7 @@ def _images(pictures: FloatArray, reference: Reference) -> Images:
 
 
 def _judged_by(reference: Reference) -> "FloatArray | statistics.Known":
-    """The reference as the statistics take it."""
+    """The reference in the form that the statistics take."""
     if reference.variance is None:
         return reference.pictures
     return statistics.Known(reference.pictures.mean(axis=0), reference.variance)
@@ -139,7 +139,7 @@ def _images_rung(
 
 
 def _replicates(reference: Reference) -> FloatArray | None:
-    """The reference as replicates: where only mean and variance of the mean are known, the two that
+    """The reference as replicates; if only the mean and its variance are known, two replicates that
     have exactly these."""
     if reference.variance is None:
         return reference.pictures if len(reference.pictures) > 1 else None
@@ -147,20 +147,13 @@ def _replicates(reference: Reference) -> FloatArray | None:
     return np.stack([mean + deviation, mean - deviation])
 
 
-def _cause(images: Images, lights: Lights | None) -> Cause | None:
-    found = causes.likeliest(images)
-    if lights is None or (found is not None and found.explained > SURE):
-        return found
-    return causes.likeliest(images, lights())
-
-
 def _displayed(pictures: FloatArray) -> FloatArray:
-    """As 8 bits of sRGB hold them."""
+    """Linear pictures rounded to 8-bit sRGB."""
     return linear(np.round(255.0 * srgb(np.clip(pictures, 0.0, 1.0))) / 255.0)
 
 
 def _notes(candidates: Sequence[Picture]) -> tuple[str, ...]:
-    """What a reader should know of the files."""
+    """Notes about the files, for the reader."""
     if any(picture.quantised and not picture.displayed for picture in candidates):
-        return ("the candidate is kept in 8 bits a channel: its rounding counts as its own",)
+        return ("the candidate has 8 bits per channel: its rounding counts as an error",)
     return ()

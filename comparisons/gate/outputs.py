@@ -1,4 +1,4 @@
-"""What a gate leaves behind: results.json and the page, JUnit XML, what GitHub shows."""
+"""The outputs of a gate: results.json, the page, JUnit XML and GitHub's annotations."""
 
 import sys
 from pathlib import Path
@@ -17,7 +17,7 @@ def write(
 ) -> tuple[Path, Path | None]:
     """`results.json` and `report.html` in `out`; their paths.  Raises ImageError.
 
-    facts: what to tell besides versions, date and machine, such as the baseline.
+    facts: provenance besides versions, date and machine, such as the baseline.
     """
     provenance = {**ours(), **facts}
     results, report = out / "results.json", out / "report.html"
@@ -30,8 +30,8 @@ def write(
 
 
 def prepare(out: Path, *others: Path) -> None:
-    """Check that `write` can write to `out`, and that these other files can be written; remove what
-    an earlier gate wrote: what is there afterwards is of this one.  Raises ImageError."""
+    """Check that `write` can write to `out`, and that these other files can be written; remove the
+    outputs of an earlier gate.  Raises ImageError."""
     files = out / "results.json", out / "report.html"
     check_writable(*files, *others)
     for file in files:
@@ -45,8 +45,10 @@ def ci_files(junit_file: Path | None, annotate: bool) -> tuple[Path, ...]:
 
 
 def for_ci(case: Case, junit_file: Path | None, about: str, annotate: bool) -> None:
-    """JUnit XML where it is asked for; annotations and a summary where it is, or by itself in
-    GitHub Actions.  about: the file that the case is about, "" for none.  Raises ImageError."""
+    """Write JUnit XML if requested, annotations and a summary if requested or in GitHub Actions.
+
+    about: the scene file that annotations refer to, "" for none.  Raises ImageError.
+    """
     if junit_file is not None:
         junit.write(junit_file, [case], "gate")
     if annotate or github.is_there():
@@ -56,5 +58,5 @@ def for_ci(case: Case, junit_file: Path | None, about: str, annotate: bool) -> N
 
 
 def code_of(case: Case) -> int:
-    """0 where the candidate passes, 3 where it is no picture that could be judged, else 1."""
+    """The exit code: 0 if the candidate passes, 3 if it is invalid, else 1."""
     return 3 if case.verdict == "invalid" else exit_code([case])

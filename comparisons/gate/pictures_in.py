@@ -21,16 +21,16 @@ KNOWN = "EXR, PNG, PFM, HDR or NPY"
 _BEGINNINGS = (b"v/1\x01", b"\x89PNG\r\n\x1a\n", b"PF", b"Pf", b"#?", b"\x93NUMPY")
 
 MOST_NUMBERS = 1 << 27
-"""Of one file: 8192 x 4096 pixels of four channels, and 1 GiB as float64.  What declares more is
-taken for a mistake or an attack."""
+"""Size limit of one file: 8192 x 4096 pixels of four channels, 1 GiB as float64.  A file that
+declares more is refused as a mistake or an attack."""
 
 
 @dataclass(frozen=True)
 class Picture:
     """radiance: (height, width, 3) linear sRGB, row 0 on top, premultiplied by opacity;  opacity:
-    (height, width) from 0 to 1, None where the file has none;  quantised: whether it was kept in
-    8 bits a channel;  displayed: whether these are codes of sRGB, which end at 1;  name: the
-    file's, or what stands for it;  header: text found in the file."""
+    (height, width) from 0 to 1, None if the file has none;  quantised: whether it was stored with
+    8 bits per channel;  displayed: whether these are sRGB values, clamped to 1;  name: the file's
+    name, or a description;  header: text found in the file."""
 
     radiance: FloatArray
     opacity: FloatArray | None = None
@@ -51,8 +51,8 @@ def read_candidate(path: Path, layer: str = "") -> Picture:
 def read_candidates(path: Path, layer: str = "") -> tuple[Picture, ...]:
     """The pictures in a file, of which only NPY can hold several; see `read_candidate`.
 
-    layer: of an EXR file, the prefix of its channels' names, such as "diffuse" for diffuse.R.  The
-    format is told by how the file begins, not by its name.
+    layer: prefix of the channel names in an EXR file, such as "diffuse" for diffuse.R.  The format
+    is recognised by the file's first bytes, not by its name.
     """
     try:
         with open_input(path) as file:
@@ -93,8 +93,7 @@ def _picture(image: ImageFile) -> Picture:
         if opacity is not None and covered is not None:
             opacity[rows] = covered
             if image.is_integer:
-                # Colours beside a transparent pixel's edge are not its own: what is seen is over
-                # black.
+                # Integer formats store straight alpha; premultiply, as if composited over black.
                 radiance[rows] *= covered[..., None]
     if image.is_integer and opacity is not None and not (opacity < 1.0).any():
         opacity = None
@@ -127,12 +126,12 @@ def from_array(array: npt.ArrayLike, name: str = "array") -> tuple[Picture, ...]
 
 
 def variance_of(path: Path) -> FloatArray:
-    """(height, width, 3): the layer `variance` of an EXR file, or its R, G, B, or those of another
-    format.  Raises ImageError."""
+    """(height, width, 3): the layer `variance` of an EXR file if it has one, else the picture in
+    the file.  Raises ImageError."""
     layer = "variance" if "variance.R" in _channel_names(path) else ""
     found = read_candidate(path, layer).radiance
     if not (found >= 0.0).all():  # also refuses NaN
-        raise ImageError(f"{path}: has variances that are negative or not numbers; expected >= 0")
+        raise ImageError(f"{path}: has variances that are negative or NaN; expected >= 0")
     return found
 
 
@@ -140,7 +139,7 @@ def _channel_names(path: Path) -> list[str]:
     try:
         return [channel.name for channel in read_header(path)["channels"]]
     except (OSError, ValueError):
-        return []  # reading it as a picture says better what is wrong
+        return []  # reading it as a picture gives a better message
 
 
 def check_size(width: int, height: int, channels: int, pictures: int = 1) -> None:
@@ -151,7 +150,7 @@ def check_size(width: int, height: int, channels: int, pictures: int = 1) -> Non
         raise ValueError(
             f"declares {width} x {height} pixels of {channels} channels"
             + (f", {pictures} times" if pictures > 1 else "")
-            + f"; expected at most {MOST_NUMBERS} numbers in all"
+            + f"; expected at most {MOST_NUMBERS} values in total"
         )
 
 

@@ -1,9 +1,9 @@
-"""pytest plugin: the fixture `image_gate`, which judges a picture in one line of a test.
+"""pytest plugin: the fixture `image_gate`, which checks a picture in one line of a test.
 
     def test_cornell_box(image_gate):
         image_gate(my_renderer("scenes/cornell_box.yaml"), scene="scenes/cornell_box.yaml")
 
-It imports nothing beyond pytest until it is used.
+It imports nothing but pytest until it is used.
 """
 
 import hashlib
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """`--image-gate-out` and `--image-gate-baselines`."""
-    group = parser.getgroup("image_gate", "pictures against scenes and baselines (reference-rt)")
+    group = parser.getgroup("image_gate", "compare pictures with scenes and baselines")
     group.addoption(
         "--image-gate-out",
         metavar="DIR",
         default="image-gate",
-        help="where results.json and, of failures, the pictures and a page go, a folder per test "
-        "(default: image-gate, in the root folder)",
+        help="folder for results.json and, for failures, the pictures and a page, in a folder per "
+        "test (default: image-gate, in the root folder)",
     )
     group.addoption(
         "--image-gate-baselines",
@@ -40,7 +40,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def image_gate(request: pytest.FixtureRequest) -> "ImageGate":
-    """Judges pictures: see `ImageGate.__call__`."""
+    """Compares pictures: see `ImageGate.__call__`."""
     return ImageGate(request.node, request.config)
 
 
@@ -63,17 +63,17 @@ class ImageGate:
         limit: float = 0.005,
         noise_free: bool = False,
     ) -> "Case":
-        """Fail the test unless `candidate` agrees with what it is judged by.
+        """Fail the test unless `candidate` agrees with the scene, the baseline or the reference.
 
         candidate: linear radiance, an array (height, width, 3), with opacity (height, width, 4), or
         (replicates, height, width, 3 or 4), or a file (EXR, PNG, PFM, HDR, NPY), or a list of
-        these, which are replicates;  scene: a scene file, in the root folder unless absolute, of
-        which we render the reference;  baseline: the name of one that `reference-rt accept` wrote;
-        reference: pictures, like `candidate`;  variance: a file, of one reference;  limit: the
-        smallest relative bias of the image mean that must be visible;  noise_free: the pictures are
-        made without random numbers.
+        these, which are replicates;  scene: a scene file, relative to the root folder, which
+        reference_rt renders as the reference;  baseline: the name of a baseline that `reference-rt
+        accept` wrote;  reference: pictures, like `candidate`;  variance: a file with the variance
+        of a single reference;  limit: the smallest relative bias of the image mean that must be
+        detectable;  noise_free: the candidates were rendered without random numbers.
 
-        Too noisy to tell is a failure too.  Returns what was found, a
+        Pictures that are too noisy to tell fail too.  Returns the
         `comparisons.results.case.Case`.
         """
         __tracebackhide__ = True
@@ -107,17 +107,17 @@ class ImageGate:
         self._node.user_properties.append(("image_gate", f"{case.verdict}: {case.reason}"))
         if not passed:
             _keep(given)
-            pytest.fail(_told(case, _relative(folder, self._root)))
+            pytest.fail(_message(case, _relative(folder, self._root)))
         return case
 
     def _folder(self) -> Path:
-        """A folder of this call alone, the same in each run; what a run left there is removed.
+        """The folder of this call, the same in each run; outputs of an earlier run are removed.
         Raises ImageError where it cannot be written."""
         from reference_rt.util.files import check_writable
 
         nodeid = self._node.nodeid
         plain = re.sub(r"[^A-Za-z0-9._-]+", "-", nodeid.rpartition("/")[2]).strip("-.")
-        # Names that differ in what was replaced must not meet.
+        # Names that differ only in replaced characters must not share a folder.
         unique = hashlib.sha256(nodeid.encode()).hexdigest()[:8]
         folder = self._out / f"{plain[:80]}-{unique}-{self._calls}"
         files = [folder / n for n in ("results.json", "report.html", "case.json", "pictures.exr")]
@@ -129,7 +129,7 @@ class ImageGate:
         return folder
 
     def _write(self, case: "Case", folder: Path, baseline: str) -> bool:
-        """results.json, and of a failure the page and the pictures; whether it passes."""
+        """Write results.json, for a failure also the page and the pictures; whether it passes."""
         from comparisons.gate import outputs
         from comparisons.results.record import write_case
 
@@ -141,8 +141,8 @@ class ImageGate:
 
 
 def _pictures(given: Any, folder: Path = Path()) -> "list[tuple[Picture, Path | None]]":
-    """The pictures in what was given, and for those from arrays the file in `folder` that they will
-    be if they fail, so that they can be looked at and accepted.  Raises ImageError."""
+    """The pictures in `given`; for those from arrays also the file in `folder` that they are saved
+    to if they fail, so that they can be inspected and accepted.  Raises ImageError."""
     from comparisons.gate.pictures_in import from_array, read_candidates
 
     several = isinstance(given, Sequence) and not isinstance(given, str)
@@ -158,7 +158,7 @@ def _pictures(given: Any, folder: Path = Path()) -> "list[tuple[Picture, Path | 
 
 
 def _keep(given: "Sequence[tuple[Picture, Path | None]]") -> list[str]:
-    """Write what came as arrays; the names of the files.  Raises ImageError."""
+    """Save the pictures that came as arrays; return their files.  Raises ImageError."""
     from reference_rt.core.exr import write_exr
 
     for picture, path in given:
@@ -171,12 +171,12 @@ def _keep(given: "Sequence[tuple[Picture, Path | None]]") -> list[str]:
 
 
 def _relative(path: Path, root: Path) -> Path:
-    """As people look for it: from the root folder, if it is there."""
+    """`path` relative to the root folder, if it is below it."""
     return path.relative_to(root) if path.is_relative_to(root) else path
 
 
-def _told(case: "Case", folder: Path) -> str:
-    """What a failed test says: verdict, reason, cause, numbers, and where the pictures are."""
+def _message(case: "Case", folder: Path) -> str:
+    """The message of a failed test: verdict, reason, cause, numbers, and paths of the outputs."""
     lines = [f"image_gate: {case.verdict}: {case.reason}"]
     if case.cause is not None:
         lines.append(f"likeliest cause: {case.cause.name}: {case.cause.evidence}")

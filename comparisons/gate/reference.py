@@ -1,4 +1,4 @@
-"""What a candidate is judged by: our float64 rendering of a scene, or pictures from files."""
+"""The reference of a gate: our float64 rendering of a scene, or pictures from files."""
 
 import hashlib
 import math
@@ -15,45 +15,43 @@ from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.results.sealed import read_arrays, write_arrays
 from reference_rt.core.arrays import FloatArray
-from reference_rt.rendering.render import render
+from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import build_tables
 from reference_rt.util.errors import ImageError, UsageError
 
 REPLICATES = 16
-"""Of the reference: its own noise is then known to one part in five (15 degrees of freedom)."""
+"""Pictures of the reference: its own noise is then known to 20 % (15 degrees of freedom)."""
 
 SHARE = 1 / 20
-"""The reference's standard error as a fraction of the bias that must be visible. Confidence
+"""The reference's standard error as a fraction of the bias that must be detectable. Confidence
 intervals for a few tests at a level of 5e-4 are about five standard errors wide to either side: a
 quarter of that bias is given to the reference's noise, the rest is left to the candidate's."""
 
 DARK = 0.1
-"""A channel is held to no more than this fraction of the picture's mean: see the statistics."""
+"""Errors are relative to the channel's mean, or to this fraction of the picture's mean if that is
+larger: see `comparisons.statistics`."""
 
 MOST_SAMPLES = 1 << 30
-"""Camera samples of a reference, some ten minutes: where these do not suffice the statistics say
-that the run was too noisy."""
+"""Limit of a reference's camera samples, about ten minutes; if they do not suffice, the statistics
+report that the run was too noisy."""
 
 _ROUND = 1 << 18
-"""Camera samples of one picture in one round, at least: half a second's work."""
+"""Minimum of camera samples of one picture in one round: half a second."""
 
 _MOST_NUMBERS = 1 << 28
-"""Of all replicates together, 2 GiB: large pictures have fewer replicates."""
+"""Values of all replicates together, 2 GiB: large pictures have fewer replicates."""
 
 _KEPT = 2 << 30
-"""Bytes of references in the cache; the one unused for longest goes first."""
-
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
+"""Bytes of references in the cache; the least recently used is deleted first."""
 
 
 @dataclass(frozen=True)
 class Reference:
     """pictures: (replicates, height, width, 3) linear radiance;  variance: (height, width, 3) of
-    their mean, where known from elsewhere;  noise_free: made without random numbers;  name: whose
-    it is, for people."""
+    their mean, if given separately;  noise_free: made without random numbers;  name: whose pictures
+    these are, for people."""
 
     pictures: FloatArray
     variance: FloatArray | None = None
@@ -63,7 +61,7 @@ class Reference:
 
 
 def is_noise_free(scene: Scene) -> bool:
-    """Whether a right renderer's picture of the scene has no noise: fixed samples, no chance."""
+    """Whether a correct picture of the scene has no noise, because its samples are fixed."""
     return scene.integrator.type == "ray_cast" or isinstance(scene.resolved_sampler, Grid)
 
 
@@ -72,22 +70,22 @@ def of_scene(
     limit: float,
     *,
     threads: int | None = None,
-    say: Say = lambda what, fraction: None,
+    say: Progress = lambda what, fraction: None,
 ) -> Reference:
-    """Our own pictures of a scene, so many that their noise is small beside `limit`.
+    """Our own replicates of a scene, with noise small compared with `limit`.
 
-    Each round adds the scene's own samples per pixel, with new seeds, to every replicate; rounds go
-    on until the standard error of the image mean is below SHARE of the limit in every channel, as
-    estimated from the replicates.  The cache keeps them for the same scene and the same source.
+    Each round adds the scene's samples per pixel, with new seeds, to every replicate, until the
+    standard error of the image mean, estimated from the replicates, is below SHARE of the limit in
+    every channel.  The cache keeps the pictures for the same scene and sources.
     """
     if is_noise_free(scene):
         picture = _cached(scene, 1, lambda pictures, rounds: rounds >= 1, threads, say)[0]
-        told = ("ray casting: the colours of what is hit are judged",)
+        note = ("ray casting: the colours of the surfaces hit are compared",)
         casts = scene.integrator.type == "ray_cast"
-        return Reference(picture, None, True, "reference_rt's", told if casts else ())
+        return Reference(picture, None, True, "reference_rt's", note if casts else ())
     pixels = scene.film.width * scene.film.height
     sampler = scene.resolved_sampler
-    # Small pictures in few rounds: a power of two, which suits Sobol' points.
+    # More samples per round for small pictures; a power of two, which suits Sobol' points.
     spp = max(sampler.spp, 1 << max(0, (_ROUND // pixels).bit_length() - 1))
     scene = scene.changed(sampler=sampler.model_copy(update={"spp": spp}))
     count = min(REPLICATES, max(4, _MOST_NUMBERS // (3 * pixels)))
@@ -100,11 +98,11 @@ def of_scene(
     pictures, rounds = _cached(scene, count, enough, threads, say, target)
     error = relative_error(pictures)
     notes = [
-        f"the reference: {count} pictures of {rounds * spp} samples a pixel, float64; the standard "
-        f"error of its mean is {100.0 * error:.2g} %"
+        f"the reference: {count} pictures of {rounds * spp} samples per pixel, float64; the "
+        f"standard error of the image mean is {100.0 * error:.2g} %"
     ]
     if error > target:
-        notes.append(f"the reference is noisier than the {100.0 * target:.2g} % that were meant")
+        notes.append(f"the reference is noisier than intended ({100.0 * target:.2g} %)")
     return Reference(pictures, None, False, "reference_rt's", tuple(notes))
 
 
@@ -112,11 +110,13 @@ def of_files(references: Sequence[Picture], variance: Path | None, noise_free: b
     """Pictures from files, several being replicates.  Raises ImageError, UsageError."""
     pictures = usable(references)
     if noise_free and len(pictures) > 1:
-        raise UsageError(f"{len(pictures)} references of a picture without noise; expected one")
+        raise UsageError(f"{len(pictures)} references without noise; expected one")
     spread = None
     if variance is not None:
         if len(pictures) > 1:
-            raise UsageError("--variance: of one reference; several tell their variance themselves")
+            raise UsageError(
+                "--variance: only applies to one reference; the variance of several is estimated"
+            )
         spread = variance_of(variance)
         if spread.shape != pictures.shape[1:]:
             raise ImageError(
@@ -137,8 +137,8 @@ def check_sizes(candidates: Sequence[Picture], expected: str, whose: str) -> Non
 
 
 def usable(pictures: Sequence[Picture]) -> FloatArray:
-    """(replicates, height, width, 3) of pictures to judge by.  Raises ImageError for unlike sizes,
-    for pixels that are not finite, and for blackness, by which nothing can be judged."""
+    """(replicates, height, width, 3) of pictures that can be a reference.  Raises ImageError for
+    different sizes, for pixels that are not finite, and for black pictures."""
     for picture in pictures:
         bad = int(np.count_nonzero(~np.isfinite(picture.radiance).all(axis=-1)))
         if bad:
@@ -156,7 +156,7 @@ def stacked(pictures: Sequence[Picture]) -> FloatArray:
         if other.radiance.shape != first.radiance.shape:
             raise ImageError(
                 f"{other.name}: is {size_of(other.radiance)} pixels; expected "
-                f"{size_of(first.radiance)}, as {first.name}: replicates are of one size"
+                f"{size_of(first.radiance)}, as {first.name}: replicates must have the same size"
             )
     return np.stack([picture.radiance for picture in pictures])
 
@@ -183,7 +183,7 @@ def _cached(
     count: int,
     enough: Callable[[FloatArray, int], bool],
     threads: int | None,
-    say: Say,
+    say: Progress,
     target: float = 0.0,
 ) -> tuple[FloatArray, int]:
     """`count` pictures of the scene, each the mean of some rounds, and the number of rounds."""
@@ -196,7 +196,7 @@ def _cached(
     pictures, rounds = _load(path, shape)
     if rounds > 0 and enough(pictures, rounds):
         return pictures, rounds
-    # Far from the seeds that people choose: equal ones would make equal noise on both sides.
+    # Far from the seeds that users choose: equal seeds would give both sides the same noise.
     first = int(name[40:52], 16) << 14
     tables = build_tables(scene)
     task, start = "rendering the reference", first + rounds * count
@@ -228,7 +228,7 @@ def _cached(
 
 
 def _rounds_needed(pictures: FloatArray, rounds: int, target: float) -> float:
-    """From the rounds that are whole: the error falls with the root of their number."""
+    """Estimate from the complete rounds: the error falls with the square root of their number."""
     if rounds == 0 or target == 0.0:
         return rounds + 1.0
     return max(rounds + 1.0, rounds * (relative_error(pictures) / target) ** 2)
@@ -241,7 +241,7 @@ def cache_folder() -> Path:
 
 
 def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
-    """What the cache has; zeros and 0 where it has nothing that can be used."""
+    """Pictures and rounds from the cache; zeros and 0 if it has none that can be used."""
     with suppress(KeyError):
         kept = read_arrays(path)
         pictures, rounds = kept["pictures"], int(kept["rounds"])
@@ -253,7 +253,7 @@ def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
 
 
 def _save(path: Path, pictures: FloatArray, rounds: int) -> None:
-    """Keep them, where there is a place for it, and forget what was unused for longest."""
+    """Store pictures if the cache can be written, and delete the least recently used ones."""
     with suppress(ImageError, OSError):
         write_arrays(path, pictures=pictures, rounds=rounds)
         kept = sorted(path.parent.glob("*.npz"), key=lambda file: -file.stat().st_mtime)

@@ -1,4 +1,4 @@
-"""What a gate is asked for: by what the candidates are judged, and what that needs."""
+"""A gate's request: what the candidates are compared with."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,23 +10,24 @@ from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture
-from comparisons.gate.reference import Reference, Say, check_sizes
+from comparisons.gate.reference import Reference, check_sizes
 from comparisons.results.case import Case
+from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
 
 LIGHT_SPP = 64
-"""Samples per pixel of the pictures of single lights: they only tell which one is missing."""
+"""Samples per pixel of the pictures of single lights: enough to recognise a missing one."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """The judge of some candidates: pictures (`references`), else a baseline, else our rendering of
-    the scene, which besides tells sizes, noise and lights.
+    """Candidates are compared with `references`, else a baseline, else our rendering of the scene.
+    The scene also gives size, noise and lights.
 
-    variance: a file, of the one reference;  baselines: their folder;  limit: the smallest relative
-    bias of the image mean that must be visible;  noise_free: the renderer uses no random numbers;
-    name: of the case.
+    variance: a file with the variance of a single reference;  baselines: their folder;  limit: the
+    smallest relative bias of the image mean that must be detectable;  noise_free: the renderer uses
+    no random numbers;  name: the case's.
     """
 
     scene: Scene | None = None
@@ -41,11 +42,11 @@ class Request:
 
     def __post_init__(self) -> None:
         if self.references and self.baseline:
-            raise UsageError("a reference and a baseline; expected one of them")
+            raise UsageError("got a reference and a baseline; expected one of them")
         if not (self.references or self.baseline or self.scene is not None):
-            raise UsageError("nothing to judge by; expected a scene, a reference or a baseline")
+            raise UsageError("nothing to compare with; expected a scene, reference or baseline")
         if self.variance is not None and not self.references:
-            raise UsageError("a variance without a reference; expected both")
+            raise UsageError("got a variance without a reference; expected both")
         if not 0.0 < self.limit < 1.0:
             raise UsageError(f"the limit is {self.limit:g}; expected a fraction, such as 0.005")
         if self.baseline:
@@ -55,7 +56,7 @@ class Request:
 def gated(
     request: Request,
     candidates: Sequence[Picture],
-    say: Say = lambda what, fraction: None,
+    say: Progress = lambda what, fraction: None,
 ) -> Case:
     """The verdict.  Raises ImageError, SceneError, UsageError, BaselineMissingError,
     BaselineEditedError."""
@@ -77,9 +78,9 @@ def gated(
 
 
 def _judge(
-    request: Request, scene: Scene | None, files: Sequence[str], say: Say
+    request: Request, scene: Scene | None, files: Sequence[str], say: Progress
 ) -> tuple[Reference, Scene | None]:
-    """What the candidates are judged by, and the scene, as far as it is known."""
+    """The reference, and the scene if it is known."""
     noise_free = request.noise_free or (scene is not None and reference.is_noise_free(scene))
     if request.references:
         found = reference.of_files(request.references, request.variance, noise_free)

@@ -1,4 +1,16 @@
-"""What a run found, written down: `results.json` for machines and one offline page for people."""
+"""Outputs of a run: `results.json` for machines, one offline HTML page for people, CI formats.
+
+`results_json` and `page` write the cases (`comparisons.results.case.Case`) of `compare`, `suite`
+and `gate`; `ci` writes JUnit XML and GitHub annotations.  `templates`, `plots`, `thumbnails`,
+`values`, `offline.html.jinja` and `macros.html.jinja` serve the experiments' pages too;
+`marker_block` writes tables into the README.  Radiance is in W/sr/m²; seconds are wall clock.
+
+Every file is written whole or not at all.  Pages load nothing from the network, escape all text,
+and show everything but interaction without JavaScript.  NaN and the infinities are null in JSON.
+
+To add a number to the page, add it to a rung's `numbers`: the page and `results.json` show all of
+them.  A new field of `Case` goes into `results_json`, `page.html.jinja` and `ci/junit.py`.
+"""
 
 from comparisons.report.page import write_report
 from comparisons.report.results_json import write_results

@@ -1,4 +1,4 @@
-"""Keeping the page small: whose float pictures are kept whole, averaged, or left out."""
+"""Limits the size of the page: reduces or omits the float pictures of some cases."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,15 +7,16 @@ from comparisons.report.pictures_data import as_json, pack
 from comparisons.results.case import Images
 
 COARSEST = 32
-"""Pixels of each side that are averaged into one at most, before float data is left out."""
+"""The largest block, in pixels of each side, that is averaged into one pixel; float pictures that
+are still too large are omitted."""
 
 FEWEST_BYTES = 1.0
-"""A pixel, as packed; only pictures that are nearly constant need fewer."""
+"""Bytes per packed pixel that nearly all pictures need at least."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """The float pictures of a case as JSON ("": left out), means over factor x factor pixels."""
+    """The float pictures of a case as JSON ("": omitted); means over factor x factor pixels."""
 
     data: str
     factor: int
@@ -26,8 +27,8 @@ def fitted(
 ) -> list[Fitted | None]:
     """The pictures of all cases within `most_bytes`; None where a case has none.
 
-    Detail goes where it matters least: from the largest pictures of the cases that did not fail,
-    and of failed ones only when nothing else is left to give.
+    The largest pictures of cases that did not fail are reduced first; those of failed cases only
+    when no others are left.
     """
     kept = {i: _packed(p, 1, most_bytes) for i, p in enumerate(pictures) if p is not None}
     while sum(len(one.data) for one in kept.values()) > most_bytes:

@@ -1,8 +1,8 @@
-"""One HTML page about a run: offline, a single file, what failed comes first.
+"""The HTML page about a run: a single offline file; failed cases come first.
 
-The page asks for nothing beyond itself (its content security policy forbids it), so it can be
-kept, mailed, or opened from disk. All text is escaped: names of scenes come from outside. The
-pictures are drawn from float data by the page's own script; without it there are thumbnails.
+The page loads nothing from the network (its content security policy forbids it), so it can be
+archived, mailed, or opened from disk. All text is escaped: scene names come from users. Its script
+draws the pictures from float data; without JavaScript there are thumbnails.
 """
 
 import base64
@@ -22,7 +22,7 @@ from comparisons.report.values import shown
 from comparisons.results.case import RUNGS, Case, Metrics, Status, how_many
 
 MOST_BYTES = 15_000_000
-"""Of a page, unless the caller says otherwise: what is still mailed and opened without a wait."""
+"""Default size limit of a page: it can still be mailed, and opens without a wait."""
 
 ORDER: tuple[Status, ...] = (
     "invalid",
@@ -33,7 +33,7 @@ ORDER: tuple[Status, ...] = (
     "reference-limited",
     "agree",
 )
-"""What needs attention comes first."""
+"""The order of cases on the page: those that need attention first."""
 
 FAILED = frozenset({"invalid", "differ", "inconclusive"})
 """Verdicts whose pictures are the last to lose detail."""
@@ -47,7 +47,7 @@ SIGNS: dict[Status, str] = {
     "reference-limited": "≈",
     "agree": "✓",
 }
-"""Beside the word of a verdict, which a reader need then not tell by its colour."""
+"""Shown beside a verdict, so that it is recognised without its colour."""
 
 MODES = (
     ("side", "side by side"),
@@ -56,10 +56,10 @@ MODES = (
     ("slider", "slider"),
     ("single", "single"),
 )
-"""Views of the pictures, in the order of their keys 1 to 5."""
+"""Ways of viewing the pictures, in the order of their keys 1 to 5."""
 
 SCRIPTS = ("unpack.js", "colour.js", "crop.js", "view.js", "viewer.js")
-"""In this order one module."""
+"""Concatenated in this order to one module."""
 
 
 def write_report(
@@ -70,25 +70,25 @@ def write_report(
     most_bytes: int = MOST_BYTES,
     missing: Sequence[str] = (),
 ) -> None:
-    """Write the page about `cases`, at once or not at all.
+    """Write the page about `cases`, whole or not at all.
 
-    missing: names of cases that were asked for and not run, because the run was interrupted.
-    `provenance` is shown as it comes: the caller names versions, Mitsuba's variant and why it was
-    chosen, the machine and the date. In the numbers of a tier, a name that ends in `_bias` means
-    a fraction and is shown in percent; nested mappings and lists are shown in line. A page that
-    would be larger than `most_bytes` loses detail in its float pictures, those of passing cases
-    first, and says so; its text and thumbnails are never cut.
+    missing: names of requested cases that were not run, because the run was interrupted;
+    provenance: facts by name, shown as they are: versions, Mitsuba's variant and why it was chosen,
+    machine and date;  most_bytes: a page that would be larger stores its float pictures at lower
+    resolution, those of passing cases first, and says so; text and thumbnails are never cut.
+
+    In the numbers of a rung, a name that ends in `_bias` means a fraction and is shown in percent.
     """
     ranked = sorted(cases, key=lambda case: ORDER.index(case.verdict))
     views = [_view(case) for case in ranked]
     filled = template("page.html.jinja").render
-    script = Markup(_script())  # our own, not from outside
+    script = Markup(_script())  # trusted: part of this package
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
     counts = Counter(case.verdict for case in cases)
 
     def rendered(pictures: Sequence[Fitted | None]) -> str:
         for view, data in zip(views, pictures, strict=True):
-            # JSON without <, > and & by its maker.
+            # Trusted: `as_json` escapes <, > and &.
             view["data"] = Markup(data.data) if data else ""
             view["factor"] = data.factor if data else 1
         return filled(
@@ -106,7 +106,7 @@ def write_report(
         )
 
     left = most_bytes - len(encoded(rendered([None] * len(views))))
-    # What stands around float data, or tells that it was left out, takes room, too.
+    # Room for the text around float data, or for the note that it is omitted.
     left -= 4000 * len(views)
     failed = [case.verdict in FAILED for case in ranked]
     pictures = [view["case"].images if view["pictures"] else None for view in views]
@@ -120,7 +120,7 @@ def _script() -> str:
 
 
 def _view(case: Case) -> dict[str, Any]:
-    """What the template shows of a case."""
+    """A case as the template takes it."""
     stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
     pictures = _thumbnails(case)
     return {
@@ -135,7 +135,7 @@ def _view(case: Case) -> dict[str, Any]:
 
 
 def _thumbnails(case: Case) -> Thumbnails | None:
-    """None also for pictures without a pixel, which a gate may have been given."""
+    """None without pictures, and for pictures without pixels, which a gate may get."""
     images = case.images
     if images is None or not images.candidate.size or not images.reference.size:
         return None
@@ -143,7 +143,7 @@ def _thumbnails(case: Case) -> Thumbnails | None:
 
 
 def _figures(case: Case, pictures: Thumbnails) -> list[tuple[str, Thumbnail, str]]:
-    """Kind, thumbnail and title of each picture; the z-map is drawn by the script alone."""
+    """Kind, thumbnail and title of each picture; the z-map, drawn by the script, has none."""
     candidate, reference = case.sides
     figures = [
         ("candidate", pictures.candidate, candidate),

@@ -1,14 +1,13 @@
-"""Float pictures inside the page, about 12 bytes a pixel; `unpack.js` reads them, as `unpack` does.
+"""Float pictures inside the page, about 12 bytes a pixel; decoded by `unpack.js` and `unpack`.
 
-A picture is kept as IEEE half floats times one power of two; what is too large for them stands in a
-list beside it.  Two pictures of one size share the power, and the candidate's codes are kept as
-differences from the reference's, which noise alone keeps small.  Half floats cannot tell 1.0001
-from 1, so the difference of the pictures is kept besides, as what it has more than the difference
-of the kept pictures.
+A picture is stored as IEEE half floats times one power of two; values too large for that are listed
+separately.  Pictures of the same size share the power of two, and the candidate's codes are stored
+as differences from the reference's, which are small.  Half floats cannot distinguish 1.0001 from 1:
+therefore the difference of the pictures is stored too, as the residual beyond the difference of the
+stored pictures.
 
-What comes back: radiance within one part in 1024; the difference within one part in 64; the
-standard error within one in 16; both to about a ten-thousand-millionth of the brightest values at
-worst.  NaN, the infinities and zeros come back as they are.
+Precision after decoding: radiance 1/1024, the difference 1/64, the standard error 1/16, relative;
+the latter two at worst 1e-10 of the brightest values.  NaN, infinities and zeros are exact.
 """
 
 import base64
@@ -24,15 +23,15 @@ import numpy.typing as npt
 from comparisons.results.case import FloatArray, Images
 
 RADIANCE_BITS, REST_BITS, ERROR_BITS = 11, 6, 4
-"""Significant bits, the leading one included; fewer bits are smaller once compressed."""
+"""Significant bits, including the leading one; fewer bits compress better."""
 
 NEAR = 1.0 / 64.0
-"""The relative difference below which a candidate is kept as the kept reference plus the
-difference, so that one that is equal has an equal code and the rest is the difference itself."""
+"""Candidate values within this relative difference are stored as the stored reference plus the
+difference: equal pixels then have equal codes, and the residual is the difference itself."""
 
 HEADROOM = 7
-"""Powers of two between the 99.9th percentile and the largest half float: values brighter by more
-(at most 0.1 % of all, fireflies) are listed one by one."""
+"""Powers of two between the 99.9th percentile and the largest half float: brighter values (at most
+0.1 % of all, fireflies) are listed separately."""
 
 _LARGEST_HALF = 16
 """65504 is just below 2^16."""
@@ -63,7 +62,7 @@ class Coded:
 
 @dataclass(frozen=True)
 class Unpacked:
-    """What the page knows of a case's pictures."""
+    """A case's pictures as the page decodes them."""
 
     candidate: FloatArray
     reference: FloatArray
@@ -100,7 +99,7 @@ def pack(images: Images, factor: int = 1) -> dict[str, Any]:
 
 
 def unpack(data: dict[str, Any]) -> Unpacked:
-    """What a reader of `pack`'s JSON gets: the same numbers as in the browser, bit for bit."""
+    """Decode `pack`'s JSON: the same numbers as in the browser, bit for bit."""
     raw = zlib.decompress(base64.b64decode(data["bytes"]), -zlib.MAX_WBITS)
     streams = iter(_inflated(raw, data))
     reference_codes, candidate_codes = next(streams), next(streams)
@@ -118,7 +117,7 @@ def unpack(data: dict[str, Any]) -> Unpacked:
 
 
 def as_json(data: dict[str, Any]) -> str:
-    """Strict JSON that cannot end the script element it stands in."""
+    """Strict JSON that cannot end the script element around it."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
@@ -136,8 +135,8 @@ def coded(values: FloatArray, exponent: int, bits: int = RADIANCE_BITS) -> Coded
 
 
 def reduced(image: FloatArray, factor: int) -> FloatArray:
-    """Means over factor x factor pixels, over fewer at the right and lower edge; a mean of what is
-    not finite is not finite."""
+    """Means over factor x factor pixels, fewer at the right and lower edge; not finite where any of
+    these values is not."""
     if factor == 1:
         return image
     return _block_sums(image, factor) / _block_counts(image, factor)
@@ -165,7 +164,7 @@ def _block_counts(image: FloatArray, factor: int) -> FloatArray:
 
 
 def _beside(candidate: FloatArray, reference: FloatArray, kept: Coded) -> dict[str, Coded]:
-    """The candidate and the rest of the difference, beside the kept reference."""
+    """The candidate and the residual of the difference, given the stored reference."""
     base = kept.decoded()
     with np.errstate(invalid="ignore", over="ignore"):
         difference = candidate - reference
@@ -177,13 +176,13 @@ def _beside(candidate: FloatArray, reference: FloatArray, kept: Coded) -> dict[s
 
 
 def _exponent(*pictures: FloatArray) -> int:
-    """The power of two that leaves nearly all values within half floats."""
+    """The power of two that brings nearly all values into the range of half floats."""
     values = np.concatenate([np.abs(picture).ravel() for picture in pictures])
     values = values[np.isfinite(values) & (values > 0.0)]
     if not values.size:
         return 0
     top = math.frexp(float(np.percentile(values, 99.9, method="lower")))[1]
-    # 2^exponent, and 65504 times it, must be float64s themselves, if subnormal ones.
+    # 2^exponent and 65504 times it must be float64 numbers; subnormal ones will do.
     return int(np.clip(top + HEADROOM - _LARGEST_HALF, -1070, 1008))
 
 

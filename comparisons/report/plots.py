@@ -1,4 +1,4 @@
-"""Log-log plots as inline SVG, in the colours of the page that they stand in."""
+"""Log-log plots as inline SVG, in the text colour of the page around them."""
 
 import hashlib
 import io
@@ -15,13 +15,13 @@ import numpy.typing as npt
 from comparisons.report.values import power_of_ten
 
 PALETTE = ("#3b8ed0", "#d9662b", "#2f9e77", "#b65fbf", "#c9920e", "#d4527a", "#7a8794", "#5b6ee1")
-"""Colours of curves in turn; of a lightness that shows on white and on black alike."""
+"""Colours of curves in turn; visible on white and on black."""
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-"""Beside the colour, so that no curve is told by that alone."""
+"""Markers of curves in turn, so that curves do not differ in colour alone."""
 
 _INK = "#010203"
-"""Stands for the page's own colour of text while matplotlib draws."""
+"""Placeholder for the page's text colour while matplotlib draws."""
 
 _STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
@@ -47,10 +47,10 @@ _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 class Curve:
     """Points joined by a line, with a band.
 
-    x, y (n,);  low, high (n,): of the band, where there is one;  dashed: for what is a fit, not
-    measured;  colour: number in `PALETTE`, by default the curve's place in the plot;  marked:
-    whether the points have markers.  Points where x or y is not positive and finite are left out; a
-    band whose lower end is not positive goes down to the plot's edge.
+    x, y (n,);  low, high (n,): the band, if any;  dashed: for fits, not measurements;  colour:
+    index into `PALETTE`, by default the curve's number in the plot;  marked: whether the points
+    have markers.  Points where x or y is not positive and finite are skipped; a band whose lower
+    end is not positive extends to the plot's edge.
     """
 
     name: str
@@ -74,10 +74,9 @@ def log_log(
 ) -> str:
     """An <svg> element with both axes logarithmic; the same arguments give the same text.
 
-    levels, uprights: horizontal and vertical lines by their names;  size: width and height in
-    inches of 72 px; the element shrinks with its parent.  Text stays text, in the colour of the
-    surrounding page; ids are unique among plots that differ.  A curve with an empty name has no
-    place in the legend.
+    levels, uprights: named horizontal and vertical lines;  size: width and height in inches of
+    72 px; the element shrinks with its parent.  Text stays text, in the page's colour; ids are
+    unique among plots that differ.  A curve with an empty name is not in the legend.
     """
     import matplotlib.style
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -120,8 +119,8 @@ def log_log(
 
 
 def _margins(figure: Any, rows: int, titled: bool) -> None:
-    """Room for labels of five characters, a title, and a legend of some rows: in inches, once for
-    all.  Matplotlib's own layout measures each text twice, which was half of the time."""
+    """Fixed margins, in inches, for labels of five characters, a title and a legend of some rows:
+    Matplotlib's own layout measures each text twice, which took half of the time."""
     width, height = figure.get_size_inches()
     bottom = 0.55 + (0.18 * rows + 0.1 if rows else 0.0)
     figure.subplots_adjust(
@@ -133,7 +132,7 @@ def _margins(figure: Any, rows: int, titled: bool) -> None:
 
 
 def _draw(axes: Any, curve: Curve, place: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Draws a curve; the points that can be shown."""
+    """Draw a curve; return the points that can be shown."""
     x, y = (np.asarray(values, dtype=np.float64) for values in (curve.x, curve.y))
     number = place if curve.colour is None else curve.colour
     colour = PALETTE[number % len(PALETTE)]
@@ -165,7 +164,7 @@ def _limit(
     drawn: Sequence[tuple[npt.NDArray[Any], npt.NDArray[Any]]],
     levels: Mapping[str, float],
 ) -> None:
-    """Limits from the points alone: a band that is open below would take all the room."""
+    """Set the limits from the points alone: a band without a lower end would fill the plot."""
     if not drawn:
         return
     for k, set_limits in enumerate((axes.set_xlim, axes.set_ylim)):
@@ -189,12 +188,12 @@ def _ticks(axis: Any, most: int) -> None:
     axis.set_major_locator(LogLocator(subs=steps, numticks=most))
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
     axis.set_minor_formatter(NullFormatter())
-    if decades > 8.0:  # a smear, and each of them takes its time
+    if decades > 8.0:  # minor ticks would touch each other, and each takes time
         axis.set_minor_locator(NullLocator())
 
 
 def _inline(svg: str, title: str) -> str:
-    """The <svg> element alone, its colours those of the page, its ids and its style its own."""
+    """The <svg> element alone, in the page's text colour, with ids and style of its own."""
     svg = svg[svg.index("<svg") :].strip().replace(_INK, "currentColor")
     own = "p" + hashlib.sha256(svg.encode()).hexdigest()[:10] + "-"
     svg = re.sub(r'(\bid="|xlink:href="#|url\(#)', rf"\g<1>{own}", svg)
@@ -202,6 +201,3 @@ def _inline(svg: str, title: str) -> str:
     style = "max-width: 100%; height: auto; stroke-linejoin: round; stroke-linecap: butt"
     attributes = f'role="img" aria-label="{escape(title)}" style="{style}"'
     return svg.replace("<svg ", f"<svg {attributes} ", 1)
-
-
-__all__ = ["PALETTE", "Curve", "log_log"]

@@ -1,4 +1,4 @@
-"""`results.json`: what a run found, for machines; anything prettier shows the same data."""
+"""`results.json`: the results of a run for machines; the page shows the same data."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from comparisons.results.case import Case, Tier
 from reference_rt.util.files import replacing
 
 SCHEMA = 2
-"""Raised whenever a reader of the former layout would misread the new one."""
+"""Increased whenever a reader of the former layout would misread the new one."""
 
 
 def write_results(
@@ -25,57 +25,58 @@ def write_results(
     not_run: Mapping[str, str] | None = None,
     missing: Sequence[str] = (),
 ) -> None:
-    """Write `results.json`, at once or not at all.
+    """Write `results.json`, whole or not at all.
 
         {"schema": 2, "suite": name or null, "provenance": {...},
-         "asked": number of cases that were asked for, those of "not_run" left out,
-         "missing": [names of those that are not here, because the run was interrupted],
+         "asked": number of requested cases, without those of "not_run",
+         "missing": [names of requested cases that were not run: the run was interrupted],
          "not_run": {name of a case: why it was not run},
          "cases": [{"scene", "verdict", "reason",
                     "sides": {"candidate": whose pictures, "reference": whose},
-                    "tiers": {name: {"status", "reason", and the numbers of the tier}},
+                    "tiers": {name of a rung: {"status", "reason", and the rung's numbers}},
                     "metrics": {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias",
                                 "nonfinite"} or null,
                     "cause": {"name", "evidence", "explained"} or null,
                     "worst": [{"x", "y", "width", "height", "what"}],
-                    "seconds": {side: {step: seconds}}, "notes": [...], "left_out": [...],
-                    "again": command}]}
+                    "seconds": {side: {step: seconds}}, "notes": [...],
+                    "left_out": [features that were specialised away, and why],
+                    "again": command that runs this case alone}]}
 
-    Strict JSON (RFC 8259): NaN and the infinities become null, so a null number says "undefined or
-    unbounded" (the PSNR of equal pictures, say), never zero. Raises ValueError if two tiers of a
-    case have one name or a number of a tier is called status or reason.
+    Strict JSON (RFC 8259): NaN and the infinities become null, so a null number means "undefined or
+    unbounded" (such as the PSNR of equal pictures), never zero. Raises ValueError if two rungs of a
+    case have the same name or a number of a rung is called status or reason.
     """
     document = {
         "schema": SCHEMA,
         "suite": suite,
-        "provenance": _plain(provenance),
+        "provenance": plain(provenance),
         "asked": len(cases) + len(missing),
         "missing": list(missing),
         "not_run": dict(not_run or {}),
         "cases": [_case(case) for case in cases],
     }
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
-    # Valid in JSON, but a terminal would obey them.
+    # Control characters, valid in JSON, would act on a terminal.
     text = re.sub("[\x7f-\x9f]", lambda found: f"\\u{ord(found[0]):04x}", text)
     with replacing(path) as temporary:
-        # A lone surrogate, of a file name that is not UTF-8, becomes JSON's escape for it.
+        # A lone surrogate, from a file name that is not UTF-8, becomes a JSON escape.
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def _case(case: Case) -> dict[str, Any]:
     tiers = {tier.name: _tier(tier) for tier in case.tiers}
     if len(tiers) < len(case.tiers):
-        raise ValueError(f"{case.scene}: two tiers have the same name")
+        raise ValueError(f"{case.scene}: two rungs have the same name")
     return {
         "scene": case.scene,
         "verdict": case.verdict,
         "reason": case.reason,
         "sides": dict(zip(("candidate", "reference"), case.sides, strict=True)),
         "tiers": tiers,
-        "metrics": _plain(asdict(case.metrics)) if case.metrics else None,
-        "cause": _plain(asdict(case.cause)) if case.cause else None,
-        "worst": [_plain(asdict(place)) for place in case.worst],
-        "seconds": _plain(case.seconds),
+        "metrics": plain(asdict(case.metrics)) if case.metrics else None,
+        "cause": plain(asdict(case.cause)) if case.cause else None,
+        "worst": [plain(asdict(place)) for place in case.worst],
+        "seconds": plain(case.seconds),
         "notes": list(case.notes),
         "left_out": list(case.left_out),
         "again": case.again,
@@ -83,20 +84,20 @@ def _case(case: Case) -> dict[str, Any]:
 
 
 def _tier(tier: Tier) -> dict[str, Any]:
-    numbers: dict[str, Any] = _plain(tier.numbers)
+    numbers: dict[str, Any] = plain(tier.numbers)
     if clash := {"status", "reason"} & numbers.keys():
         raise ValueError(f"{tier.name}: a number may not be called {', '.join(sorted(clash))}")
     return {"status": tier.status, "reason": tier.reason, **numbers}
 
 
-def _plain(value: Any) -> Any:
-    """`value` in the types of JSON: NumPy's become Python's, numbers not finite become None."""
+def plain(value: Any) -> Any:
+    """`value` in JSON's types: NumPy types become Python's, numbers that are not finite None."""
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -1,4 +1,4 @@
-"""How every page is made: from a template, all text escaped, whole or not at all."""
+"""Templates of pages: all text is escaped, and files are written whole or not at all."""
 
 import re
 from collections.abc import Callable
@@ -13,9 +13,9 @@ from reference_rt.util.files import replacing
 
 
 def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -> Template:
-    """A template of a folder of `comparisons`, which may include what lies in `report`.
+    """The template `name` in a folder of `comparisons`; it may include files of `report`.
 
-    filters: beside `shown` and `label`.
+    filters: in addition to `shown` and `label`.
     """
     environment = Environment(
         loader=ChoiceLoader([PackageLoader("comparisons", each) for each in (folder, "report")]),
@@ -29,15 +29,15 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
 
 
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-"""What HTML may not hold: characters that control terminals, and those that are none."""
+"""Characters that HTML does not allow: control characters, surrogates, non-characters."""
 
 
 def encoded(page: str) -> bytes:
-    """In UTF-8, with escapes in place of what HTML may not hold, as names from outside may."""
+    """The page in UTF-8; characters that HTML does not allow, which names may have, are escaped."""
     return _CONTROL.sub(lambda found: printable(found[0]), page).encode()
 
 
 def write(path: Path, page: str) -> None:
-    """At once or not at all."""
+    """Write the page, whole or not at all."""
     with replacing(path) as temporary:
         temporary.write_bytes(encoded(page))

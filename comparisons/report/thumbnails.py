@@ -1,4 +1,4 @@
-"""Small pictures of a case that show without a script, as PNGs inside the page."""
+"""Thumbnails of a case's pictures, shown without JavaScript, as PNGs inside the page."""
 
 import base64
 import io
@@ -13,7 +13,7 @@ from comparisons.results.case import FloatArray, Images
 from comparisons.statistics.metrics import count_nonfinite, encode, nonfinite_pixels, white_level
 
 DIFFERENCE_PERCENTILE = 99.5
-"""Where the difference's colours end: a few fireflies may saturate, the rest stays visible."""
+"""End of the difference's colour scale: a few fireflies may saturate, the rest stays visible."""
 
 LONGEST = 64
 """Pixels of the longer side of a thumbnail, at most; what a script shows is larger."""
@@ -29,9 +29,9 @@ class Thumbnail:
     """data: URL of a PNG"""
     width: int
     height: int
-    """of the picture itself, which the thumbnail stands for"""
+    """of the full picture"""
     nonfinite: int
-    """pixels of the picture"""
+    """pixels of the full picture that are not finite"""
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Thumbnails:
     candidate: Thumbnail
     reference: Thumbnail
     difference: Thumbnail | None
-    """None if the pictures are of unlike size."""
+    """None if the pictures differ in size."""
     white: float
-    """Radiance shown as white: the 99th percentile of what is lit in the reference."""
+    """Radiance shown as white: the 99th percentile of the reference's pixels that are not black."""
     span: float
     """Radiance difference shown as full red or blue; 0 if the pictures are equal."""
 
@@ -73,7 +73,7 @@ def _difference(images: Images) -> tuple[float, Thumbnail]:
         difference = images.candidate - images.reference
     sizes = np.abs(_largest(difference))
     sizes = sizes[np.isfinite(sizes)]
-    # The largest difference where fewer than 0.5 % of the pixels differ at all.
+    # If fewer than 0.5 % of the pixels differ at all, the percentile is 0: take the largest.
     span = float(np.percentile(sizes, DIFFERENCE_PERCENTILE) or sizes.max()) if sizes.size else 0.0
     small = _shrunk(difference)
     bad = nonfinite_pixels(small)
@@ -85,7 +85,7 @@ def _difference(images: Images) -> tuple[float, Thumbnail]:
 
 
 def _largest(difference: FloatArray) -> FloatArray:
-    """(h, w, 3) -> (h, w, 1): the channel that is farthest from zero."""
+    """(h, w, 3) -> (h, w, 1): the value of the channel farthest from zero."""
     most = np.abs(difference).argmax(axis=-1)[..., None]
     return np.take_along_axis(difference, most, axis=-1)
 
@@ -98,13 +98,12 @@ def _thumbnail(
     values: FloatArray, bad: npt.NDArray[np.bool_], shape: tuple[int, ...], nonfinite: int
 ) -> Thumbnail:
     """Pixels of 0 to 255, the bad ones in magenta."""
-    pixels = np.rint(values).astype(np.uint8)
-    pixels[bad] = MAGENTA
+    url = png_url(np.where(bad[..., None], MAGENTA, values))
+    return Thumbnail(url, shape[1], shape[0], nonfinite)
+
+
+def png_url(pixels: FloatArray) -> str:
+    """The data: URL of a PNG of pixels (height, width, 3) from 0 to 255, which are rounded."""
     buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "PNG", optimize=True)
-    return Thumbnail(
-        url="data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii"),
-        width=shape[1],
-        height=shape[0],
-        nonfinite=nonfinite,
-    )
+    Image.fromarray(np.rint(pixels).astype(np.uint8)).save(buffer, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 SHOWN_ITEMS = 8
-"""Of a list of numbers; `results.json` has them all."""
+"""Numbers shown of a list; `results.json` has all of them."""
 
 
 def shown(value: Any, name: str = "") -> str:
-    """A value for people: four digits, powers of ten, percent where `name` ends in `_bias`."""
+    """A value for people: four digits, powers of ten; percent if `name` ends in `_bias`."""
     match value:
         case None:
             return "–"
@@ -33,7 +33,7 @@ def shown(value: Any, name: str = "") -> str:
 
 
 def percent(fraction: float) -> str:
-    """Three digits of a percentage."""
+    """A fraction as a percentage with three digits."""
     return f"{_real(100.0 * fraction, '.3g')} %" if math.isfinite(fraction) else _real(fraction)
 
 

@@ -69,7 +69,7 @@ async function draw(section) {
   } catch (error) {
     // The thumbnails remain.
     const hint = section.querySelector(".exposed");
-    hint.textContent = `The pictures cannot be unpacked (${error.message}): these are thumbnails`;
+    hint.textContent = `The pictures cannot be decoded (${error.message}): these are thumbnails`;
   }
 }
 

@@ -1,4 +1,4 @@
-"""What `suite` or `compare` left in its folder, read again."""
+"""Reads the output folder of `suite` or `compare` again."""
 
 import json
 from pathlib import Path
@@ -11,9 +11,9 @@ from reference_rt.util.files import read_text
 
 
 class Archive(NamedTuple):
-    """The cases with their pictures, in order; what they were made with; the suite's name; why
-    other cases were not run, by name; and those that are missing, because the run was
-    interrupted."""
+    """cases: with their pictures, in order;  provenance: versions, machine, date;  suite: its name;
+    not_run: why other cases were skipped, by name;  missing: names of cases that an interrupted run
+    did not reach."""
 
     cases: tuple[Case, ...]
     provenance: dict[str, Any]
@@ -23,34 +23,36 @@ class Archive(NamedTuple):
 
 
 def check_archive(folder: Path) -> None:
-    """Raise RecordError where there is nothing that `read_archive` could read."""
+    """Raise RecordError if the folder has nothing that `read_archive` could read."""
     if not (folder / "results.json").exists() and not (folder / "cases").is_dir():
-        raise RecordError(
-            f"{folder}: holds no case; expected what `reference-rt suite` or `compare` wrote"
-        )
+        raise _no_case(folder)
 
 
 def read_archive(folder: Path) -> Archive:
-    """The cases that `results.json` in the folder names, from their records; where there is no such
-    file all records.  Raises RecordError."""
+    """The stored results of the cases that the folder's `results.json` names; without that file,
+    all stored results.  Raises RecordError."""
     path = folder / "results.json"
     records = folder / "cases"
     missing: tuple[str, ...] = ()
     try:
-        told = json.loads(read_text(path))
-        names = [folder_name(case["scene"]) for case in told["cases"]]
-        provenance, suite, not_run = told["provenance"], told["suite"], told["not_run"]
-        missing = tuple(told.get("missing", ()))
+        results = json.loads(read_text(path))
+        names = [folder_name(case["scene"]) for case in results["cases"]]
+        provenance, suite, not_run = results["provenance"], results["suite"], results["not_run"]
+        missing = tuple(results.get("missing", ()))
     except FileNotFoundError:
         names = sorted(record.parent.name for record in records.glob(f"*/{CASE}"))
         provenance, suite, not_run = {}, None, {}
     except OSError as error:
         raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise RecordError(f"{path}: is not what a suite writes; expected its results") from None
+        raise RecordError(f"{path}: was not written by `suite` or `compare`") from None
     if not names and not missing:
-        raise RecordError(
-            f"{folder}: holds no case; expected what `reference-rt suite` or `compare` wrote"
-        )
+        raise _no_case(folder)
     cases = tuple(read_case(records / name) for name in names)
     return Archive(cases, provenance, suite, not_run, missing)
+
+
+def _no_case(folder: Path) -> RecordError:
+    return RecordError(
+        f"{folder}: has no cases; expected the output folder of `reference-rt suite` or `compare`"
+    )

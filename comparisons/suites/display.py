@@ -1,5 +1,5 @@
-"""Progress of a suite for people: a bar and what runs on a terminal, a line per case without one;
-standard error only."""
+"""Progress of a suite on standard error: a bar with the running cases on a terminal, otherwise a
+line per case."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -28,8 +28,8 @@ _SLOWEST = 3
 
 
 class Display(Bar):
-    """Told of each case as it begins and ends.  steps: show every step and every reason as a line
-    that stays, for runs of few cases."""
+    """Shows the progress of cases.  steps: print every step and every reason, for runs of few
+    cases."""
 
     def __init__(self, cases: int, steps: bool = False) -> None:
         super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
@@ -38,7 +38,7 @@ class Display(Bar):
         self._running: dict[str, str] = {}
 
     def doing(self, request: Request, step: str) -> None:
-        """A case begins, or is at `step`."""
+        """A case has begun (step ""), or has reached `step`."""
         self._running[request.name] = step
         if self._steps and step:
             self.line(f"{request.name}: {step}")
@@ -59,8 +59,8 @@ class Display(Bar):
         self._show()
 
     def _show(self) -> None:
-        told = [f"{name} {step}".rstrip() for name, step in self._running.items()]
-        self._bar.update(self._task, description=", ".join(told)[: self._console.width // 2])
+        running = [f"{name} {step}".rstrip() for name, step in self._running.items()]
+        self._bar.update(self._task, description=", ".join(running)[: self._console.width // 2])
 
 
 def summarise(
@@ -69,16 +69,16 @@ def summarise(
     not_run: Mapping[str, str],
     missing: Sequence[str] = (),
 ) -> None:
-    """Counts of the verdicts, what failed and at which rung first, the slowest, what was not run,
-    and what is missing because the run was interrupted."""
+    """Print counts of the verdicts, failed cases with the first rung that broke, the slowest cases,
+    skipped cases, and those that an interrupted run did not reach."""
     console = Console(stderr=True, highlight=False)
     counts = Counter(case.verdict for case in cases)
-    told = ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
-    told = f": {told}" if told else ""
-    console.print(f"{how_many(len(cases), len(missing))}{told}", markup=False)
+    verdicts = ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
+    verdicts = f": {verdicts}" if verdicts else ""
+    console.print(f"{how_many(len(cases), len(missing))}{verdicts}", markup=False)
     failed = [case for case in ranked(cases) if case.verdict not in PASSING]
     if failed:
-        # Why has been told on the line of the case.
+        # The reason is on the line of the case above.
         table = Table("case", "verdict", "first rung", "seconds", box=None)
         for case in failed:
             rung = case.reason.partition(":")[0]
@@ -88,8 +88,8 @@ def summarise(
         console.print(table)
     slowest = sorted(walls, key=lambda name: walls[name], reverse=True)[:_SLOWEST]
     if slowest:
-        told = ", ".join(f"{name} {walls[name]:.1f} s" for name in slowest)
-        console.print(f"slowest: {told}", markup=False, soft_wrap=True)
+        times = ", ".join(f"{name} {walls[name]:.1f} s" for name in slowest)
+        console.print(f"slowest: {times}", markup=False, soft_wrap=True)
     for name, why in not_run.items():
         console.print(f"not run: {name}: {why}", markup=False, soft_wrap=True)
     if missing:

@@ -1,4 +1,4 @@
-"""What a case is made with, as one number: where that is unchanged, it need not be run again."""
+"""Keys of stored cases: a hash of all that a case depends on."""
 
 import hashlib
 import importlib.metadata
@@ -16,15 +16,14 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_input, read_text
 
 _APART = ("report", "commands", "gate", "experiments")
-"""Parts of `comparisons` that no verdict of a suite depends on."""
+"""Folders of `comparisons` that do not affect the verdicts of a suite."""
 
 _PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
 
 
 def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Backend) -> str:
-    """SHA-256 of the scene and the files it names, the budget, the rungs that are asked for, our
-    own sources, and the versions of what computes.  Raises SceneError for a file that is not there.
-    """
+    """SHA-256 of the scene and the files it names, the budget, the requested rungs, our sources,
+    and the versions of the packages that compute.  Raises SceneError for a missing file."""
     parts = {
         "scene": scene.digest(),
         "files": files_digest(scene),
@@ -46,14 +45,14 @@ def files_digest(scene: Scene) -> str:
             digest.update(os.fsencode(path.name) + b"\0")
             try:
                 digest.update(hashlib.sha256(read_input(path)).digest())
-            except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+            except (OSError, ValueError) as error:  # ValueError: not a valid file name
                 reason = getattr(error, "strerror", None) or error
                 raise scene.error(f"{path}: cannot be read: {reason}", *keys) from None
     return digest.hexdigest()
 
 
 def _named(value: Any, *keys: str | int) -> Iterator[tuple[str, tuple[str | int, ...]]]:
-    """The values of all keys `file`, however deep, each with the keys that lead to it."""
+    """The values of all keys `file` at any depth, each with the path of keys to it."""
     if isinstance(value, dict):
         for key, item in value.items():
             if key == "file" and isinstance(item, str):
@@ -66,7 +65,7 @@ def _named(value: Any, *keys: str | int) -> Iterator[tuple[str, tuple[str | int,
 
 
 def _with_parts(path: Path) -> list[Path]:
-    """The file, and those that it names itself, which of ours only .gltf does."""
+    """The file, and for .gltf also the files that it names."""
     if path.suffix.lower() != ".gltf":
         return [path]
     try:
@@ -78,5 +77,5 @@ def _with_parts(path: Path) -> list[Path]:
 
 
 def sources_digest() -> str:
-    """Of the sources that verdicts depend on."""
+    """The hash of the sources that verdicts depend on."""
     return sources.sources_digest(*_APART)

@@ -1,6 +1,6 @@
-"""Cases from their plan to their results: what is done is read, the rest is run, all of it told.
+"""Runs the cases of `reference-rt compare` and `reference-rt suite`, and writes their outputs.
 
-`reference-rt compare` and `reference-rt suite` both run their cases through `run_cases`.
+Finished cases are read from the output folder; the others are run by worker processes.
 """
 
 import contextlib
@@ -28,17 +28,17 @@ from reference_rt.util.errors import ImageError, SceneError
 from reference_rt.util.files import check_writable
 
 LOG = "stderr.txt"
-"""In the folder of a case that could not be carried through: what its process wrote meanwhile."""
+"""In the folder of a case whose worker failed: what the worker wrote to stderr."""
 
 _NO_LIMIT = 1e9
-"""Seconds, some thirty years: clocks of Python take no infinity."""
+"""Seconds, about thirty years: Python's timeouts do not accept infinity."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came of a run: cases, in the order they were asked for, the seconds each took, why
-    others were not run, by name, and the names of those that are missing, because the run was
-    interrupted."""
+    """The outcome of a run.  cases: in the requested order;  walls: seconds of each, by name;
+    not_run: why other cases were skipped, by name;  missing: names of cases that an interrupted run
+    did not reach."""
 
     cases: tuple[Case, ...]
     walls: dict[str, float]
@@ -48,10 +48,10 @@ class Run:
 
 @dataclass(frozen=True)
 class Options:
-    """out: folder of the results;  rungs: only these, all if none;  jobs: processes at once;
-    threads: of each;  fresh: do again what is done;  steps: show each step of a case, not only how
-    it ended;  tell: is called with what came of the run, also of one that is interrupted;  runner:
-    see `comparisons.suites.worker`."""
+    """out: folder of the results;  rungs: only these, empty: all;  jobs: parallel processes;
+    threads: of each process;  fresh: ignore stored cases;  steps: show each step of a case, not
+    only its result;  tell: called with the outcome, after an interruption too;  runner: see
+    `comparisons.suites.worker`."""
 
     out: Path
     rungs: tuple[str, ...] = ()
@@ -93,15 +93,15 @@ def run_cases(
     suite: str | None = None,
     facts: Mapping[str, Any] | None = None,
 ) -> Run:
-    """Run the cases that are not done yet.
+    """Run the cases that are not stored yet.
 
-    seconds: how long a case may take;  suite: the name of the suite, if it is one;  facts: what to
-    tell besides versions, date and machine.
+    seconds: time limit of a case;  suite: the suite's name, if any;  facts: provenance besides
+    versions, date and machine.
 
-    `results.json` in the folder is whole after each case and says how many were asked for, so that
-    an interrupted run keeps what it found.  `report.html` is written at the end, also by Ctrl-C or
-    SIGTERM; `reference-rt report` makes it of what a killed run left.  A scene that is invalid is a
-    case that says so.  Raises ReferenceUnavailableError; ImageError where nothing can be written.
+    `results.json` in the folder is whole after each case and says how many were requested, so that
+    an interrupted run keeps its results.  `report.html` is written at the end, after Ctrl-C or
+    SIGTERM too; after a kill, `reference-rt report` writes it.  A scene that is invalid is a case
+    with this verdict.  Raises ReferenceUnavailableError; ImageError where nothing can be written.
     """
     check_writable(options.results, options.report, options.out / "cases" / "a case")
     chosen = backend()
@@ -111,7 +111,7 @@ def run_cases(
 
     def add(case: Case, wall: float) -> None:
         if options.rungs and not _has_one_of(case, options.rungs):
-            run.not_run[case.scene] = f"has no rung {' or '.join(options.rungs)}"
+            run.not_run[case.scene] = f"the rung {' or '.join(options.rungs)} does not apply"
         else:
             found[case.scene], run.walls[case.scene] = case, wall
 
@@ -131,7 +131,7 @@ def run_cases(
 
     with Display(len(plan.work), options.steps) as display, _terminable():
         display.line(f"Mitsuba {told['mitsuba']}")
-        # The page of a former run must not be taken for one of this run.
+        # The page of an earlier run must not be mistaken for this run's.
         options.report.unlink(missing_ok=True)
         try:
             requests: list[Request] = []
@@ -158,7 +158,7 @@ def run_cases(
 
 
 class _Done(NamedTuple):
-    """A case that needs no worker;  remark: why not."""
+    """A case that needs no worker;  remark: why."""
 
     case: Case
     wall: float
@@ -166,8 +166,7 @@ class _Done(NamedTuple):
 
 
 def _begun(work: Work, options: Options, chosen: Backend) -> tuple[Request, _Done | None]:
-    """The request for a case, and the case itself if its scene is invalid or if it was done
-    before."""
+    """The request for a case, and the case itself if its scene is invalid or it is stored."""
     request = Request(
         name=work.name,
         scene=work.path,
@@ -188,7 +187,7 @@ def _begun(work: Work, options: Options, chosen: Backend) -> tuple[Request, _Don
 
 
 def _has_one_of(case: Case, rungs: tuple[str, ...]) -> bool:
-    """Whether the case could not be run, or any of these rungs says anything about it."""
+    """Whether the case could not be run, or any of these rungs applies to it."""
     said = {tier.name for tier in case.tiers if tier.status != "not-applicable"}
     return bool(said & {"scene", "run", "input", *rungs})
 
@@ -203,7 +202,7 @@ def _again(work: Work, source: Source, options: Options) -> str:
 
 
 def _done(request: Request) -> _Done | None:
-    """The case as recorded, if the record is of what is asked for."""
+    """The stored case, if its key is the request's."""
     try:
         record = read_record(request.folder)
         if record.key != request.key:
@@ -222,13 +221,13 @@ def _outcomes(
     if options.runner is not None:
         worker += ["--runner", options.runner]
     running = pool.run(requests, options.jobs, seconds, display.doing, worker)
-    # Closed at once if the caller is interrupted: no process outlives this one.
+    # If the caller is interrupted, the pool is closed at once: no worker outlives this process.
     with contextlib.closing(running):
         yield from running
 
 
 def _case(outcome: pool.Outcome[Request]) -> Case:
-    """The case as its worker recorded it, or one that says why there is none."""
+    """The case as its worker stored it, or an invalid one that says why there is none."""
     request = outcome.request
     log = request.folder / LOG
     log.unlink(missing_ok=True)
@@ -245,7 +244,7 @@ def _case(outcome: pool.Outcome[Request]) -> Case:
 
 
 def _without_result(request: Request, rung: str, reason: str, wall: float = 0.0) -> Case:
-    """Record an invalid case, without a key, so that it is run again next time."""
+    """Store an invalid case without a key, so that it is run again next time."""
     tier = Tier(rung, "invalid", reason)
     reason = f"{rung}: {reason}"
     case = Case(request.name, "invalid", reason, (tier,), None, {}, again=request.again)
@@ -255,14 +254,14 @@ def _without_result(request: Request, rung: str, reason: str, wall: float = 0.0)
 
 @contextlib.contextmanager
 def _terminable() -> Iterator[None]:
-    """Being told to end (SIGTERM, as build machines do) ends the workers too."""
+    """Turn SIGTERM, which CI services send, into SystemExit, which ends the workers too."""
 
     def leave(number: int, frame: FrameType | None) -> None:
         sys.exit(128 + number)
 
     try:
         former: Any = signal.signal(signal.SIGTERM, leave)
-    except ValueError:  # not the main thread, which alone may
+    except ValueError:  # only the main thread may set signal handlers
         yield
         return
     try:

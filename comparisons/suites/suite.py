@@ -1,4 +1,4 @@
-"""What a suite is: a YAML file that gives the scenes of a folder their budgets."""
+"""Suites: YAML files with the budgets of the scenes in a folder."""
 
 from fnmatch import fnmatchcase
 from importlib import resources
@@ -24,47 +24,46 @@ _SUFFIXES = (".yaml", ".yml", ".json")
 
 
 class Entry(Budget):
-    """What of the defaults is another for one scene."""
+    """A scene's budget: the fields given here replace the defaults."""
 
     skip: Annotated[str, Field(min_length=1)] | None = None
     """Why the scene is not compared."""
 
     @field_validator("control")
     @classmethod
-    def _is_told_by_the_place(cls, control: bool) -> bool:
-        raise ValueError("is told by the place; expected the scene under 'controls' instead")
+    def _is_not_a_field(cls, control: bool) -> bool:
+        raise ValueError("cannot be set for a scene; expected the scene under 'controls' instead")
 
     def over(self, defaults: Budget) -> Budget:
-        """`defaults`, changed by what is given here."""
+        """`defaults`, with the fields given here replaced."""
         given = self.model_fields_set - {"skip"}
         return defaults.model_copy(update={name: getattr(self, name) for name in given})
 
 
 class Part(Description):
-    """Cases of one kind."""
+    """Cases of one kind: comparisons, or controls."""
 
     defaults: Budget = Budget()
-    """The budget of scenes that are not named, and of what named ones do not say."""
+    """The budget of scenes that are not listed, and of fields that listed scenes do not set."""
     only: Annotated[tuple[str, ...], Field(strict=False)] | None = None
-    """Names of scenes, all others being left out;  none: every scene of the folder."""
+    """Names of the scenes to compare; None: every scene of the folder."""
     scenes: dict[str, Entry] = Field(default_factory=dict)
-    """Scenes by name with budgets of their own."""
+    """Budgets of single scenes, by name."""
 
 
 class Suite(Part):
     """Every scene of a folder, each with a budget."""
 
     about: str
-    """A line for people."""
+    """A one-line description."""
     case_seconds: Positive = 900.0
-    """How long one case may take before its process is ended."""
+    """Seconds after which a case's process is ended."""
     controls: Part | None = None
-    """Mitsuba against itself;  none: no such cases."""
+    """Cases of Mitsuba against itself; None: no such cases."""
 
 
 class Source(NamedTuple):
-    """A suite, its name, what the command line calls it, and the file it was read from with its
-    text, for errors."""
+    """A suite;  argument: its name on the command line;  file, text: for error messages."""
 
     suite: Suite
     name: str
@@ -101,7 +100,7 @@ def load_suite(name: str) -> Source:
 
 
 def parse_suite(text: str, file: str) -> Suite:
-    """A suite from YAML text; `file` stands in errors.  Raises SceneError."""
+    """A suite from YAML text; `file` is named in errors.  Raises SceneError."""
     try:
         data = yaml_text.load(text)
     except yaml_text.MalformedError as error:
@@ -118,12 +117,11 @@ def parse_suite(text: str, file: str) -> Suite:
 def plan(
     source: Source, folder: Path, only: tuple[str, ...] = (), rungs: tuple[str, ...] = ()
 ) -> Plan:
-    """What the suite means for the scenes of a folder, all of which are read; cases are in the
-    order of their names.
+    """The cases of a suite for a folder of scenes, ordered by name.  Reads all the scenes.
 
-    only: patterns as of a shell, one of which the name of a case must fit;  rungs: only these, all
-    if none.  A scene that is invalid is a case all the same.  Raises SceneError: the suite names a
-    scene that is not there;  UsageError: there is nothing to run.
+    only: shell patterns, one of which the name of a case must match;  rungs: only these, empty:
+    all.  An invalid scene is a case too.  Raises SceneError if the suite names a scene that does
+    not exist, UsageError if there is nothing to run.
     """
     suite = source.suite
     scenes = _scenes(folder)
@@ -147,21 +145,21 @@ def plan(
             work.append(Work(case, path, scene, budget))
     if not work:
         raise UsageError(
-            f"nothing to run: no case fits {', '.join(only)}" if only else "nothing to run"
+            f"nothing to run: no case matches {', '.join(only)}" if only else "nothing to run"
         )
     return Plan(tuple(sorted(work, key=lambda w: w.name)), skipped)
 
 
 def _scenes(folder: Path) -> _Scenes:
-    """The scenes of a folder by the names of their cases.  The suite's budgets name scenes without
-    the suffix, so that of two files with the same name only the first is valid."""
+    """The scenes of a folder by case name.  Budgets name scenes without the file's suffix;
+    therefore of two files with the same name only the first is valid."""
     if not folder.is_dir():
         raise UsageError(f"--scenes: there is no folder '{folder}'; expected one with scenes in it")
     found: _Scenes = {}
     for path in sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES):
         name = printable(path.stem)
         if name in found:
-            reason = f"has the name of {found[name][0].name}; expected one of its own"
+            reason = f"has the same name as {found[name][0].name}; expected a unique name"
             found[path.name] = path, SceneError(reason, file=str(path))
         else:
             found[name] = path, read(path)
@@ -171,7 +169,7 @@ def _scenes(folder: Path) -> _Scenes:
 
 
 def _check_names(part: Part, scenes: _Scenes, source: Source, *place: str) -> None:
-    """Raise SceneError for a scene that is named but not there."""
+    """Raise SceneError for a named scene that does not exist."""
     named: list[tuple[str, tuple[str | int, ...]]] = [(n, ("scenes", n)) for n in part.scenes]
     named += [(name, ("only", k)) for k, name in enumerate(part.only or ())]
     for name, keys in named:

@@ -1,4 +1,4 @@
-"""The cases that a run is asked for: which scenes, changed how, with which budgets."""
+"""The requested cases of a run: scenes, changes to them, and budgets."""
 
 import re
 import warnings
@@ -15,7 +15,7 @@ from reference_rt.util.errors import SceneError, SceneWarning, printable
 
 
 class Changes(BaseModel):
-    """What the command line changes of a scene, as `reference_rt.cli.main.adjusted` takes it."""
+    """Changes to a scene by command-line options; see `reference_rt.cli.main.adjusted`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -29,10 +29,10 @@ class Changes(BaseModel):
 
 
 class Work(NamedTuple):
-    """One case that is asked for.
+    """One requested case.
 
-    name: of the case;  path: the scene's file;  scene: as read and changed, or why it cannot be
-    used;  again: the command that repeats the case.
+    name: the case's;  path: the scene's file;  scene: as read and changed, or why it is invalid;
+    again: the command that repeats the case.
     """
 
     name: str
@@ -44,15 +44,15 @@ class Work(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """work: the cases, in the order they are shown;  skipped: why others are not run, by name."""
+    """work: the cases in order;  skipped: why other cases are not run, by name."""
 
     work: tuple[Work, ...]
     skipped: dict[str, str]
 
 
 def read(path: Path, changes: Changes | None = None) -> Scene | SceneError:
-    """The scene in the file at `path`, or why it is invalid: one bad scene must not keep a run from
-    comparing the others.  Warnings come with the case, from its worker.  Raises UsageError."""
+    """The scene in the file at `path`, or why it is invalid: an invalid scene must not stop a run.
+    Warnings are suppressed here; the worker reports them.  Raises UsageError."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SceneWarning)
         try:
@@ -62,10 +62,10 @@ def read(path: Path, changes: Changes | None = None) -> Scene | SceneError:
 
 
 def plan_of_files(paths: Iterable[Path], changes: Changes, budget: Budget) -> Plan:
-    """A case for each of these files, in their order, a file that is given twice once.
+    """A case for each of these files, in their order, without repeated files.
 
-    A case has the name of its file without the suffix; of files with the same name the second case
-    is called "NAME (2)", and so on.  Raises UsageError for changes that fit no such scene.
+    A case is named after its file without the suffix; further cases of the same name are "NAME (2)"
+    and so on.  Raises UsageError for changes that do not apply to a scene.
     """
     work: list[Work] = []
     for path in dict.fromkeys(paths):
@@ -82,5 +82,5 @@ def control_name(scene: str) -> str:
 
 
 def folder_name(case: str) -> str:
-    """The name of a case as that of a folder which no shell needs quotes for."""
+    """The folder name of a case, which needs no quoting in a shell."""
     return re.sub(r" \((\w+)\)$", r".\1", case)

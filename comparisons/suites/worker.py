@@ -1,10 +1,10 @@
-"""`python -m comparisons.suites.worker`: compares one case after another, as a pool tells it.
+"""`python -m comparisons.suites.worker`: the worker process, which runs one case after another.
 
-It keeps to `comparisons.runs.processes.protocol`; what it is asked for is a `Request`, and the case
-is put in its folder.
+It follows `comparisons.runs.processes.protocol`: it reads `Request`s and stores each case in the
+request's folder.
 
-`--runner module:function` puts another function in the place of `compare` (for tests: one that
-crashes, say); `--threads` is how many threads it may use.
+`--runner module:function` replaces the function `compare` (in tests, by one that crashes);
+`--threads` is the number of threads it may use.
 """
 
 import argparse
@@ -34,8 +34,9 @@ Runner = Callable[..., Case]
 class Request(BaseModel):
     """A case to run.
 
-    name: of the case;  scene: the scene's file;  changes: of the scene;  folder: where the record
-    goes;  key: what the record says it was made with;  again: the command that repeats the case.
+    name: the case's;  scene: the scene's file;  changes: to the scene;  folder: where the case is
+    stored;  key: stored with it, see `comparisons.suites.keys`;  again: the command that repeats
+    the case.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -51,7 +52,7 @@ class Request(BaseModel):
 
 
 def main() -> None:
-    """Answer until standard input ends."""
+    """Handle requests until standard input ends."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--runner", default="comparisons.suites.worker:compare")
     parser.add_argument("--threads", type=int, default=None)
@@ -69,7 +70,7 @@ def main() -> None:
 
 
 def answer(request: Request, runner: Runner, threads: int | None, answers: TextIO) -> None:
-    """Run one case, write its record, and say how it went."""
+    """Run and store one case, and report its status to the pool."""
 
     def run() -> None:
         start = time.perf_counter()
@@ -95,16 +96,16 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
 
 def described(budget: Budget) -> str:
     """A budget as a note for people."""
-    told = [f"limit {100.0 * budget.limit:g} %", f"{budget.replicates} replicates"]
+    parts = [f"limit {100.0 * budget.limit:g} %", f"{budget.replicates} replicates"]
     if budget.spp is not None:
-        told.append(f"{budget.spp} samples a pixel")
+        parts.append(f"{budget.spp} samples per pixel")
     if budget.reference_spp is not None:
-        told.append(f"{budget.reference_spp} of the reference")
+        parts.append(f"{budget.reference_spp} in the reference")
     if budget.size is not None:
-        told.append(f"{budget.size[0]} x {budget.size[1]} pixels")
+        parts.append(f"{budget.size[0]} x {budget.size[1]} pixels")
     if not budget.control:
-        told.append(f"{budget.pixels} and {budget.light_pixels} camera rays")
-    return "budget: " + ", ".join(told)
+        parts.append(f"{budget.pixels} camera rays, {budget.light_pixels} for direct light")
+    return "budget: " + ", ".join(parts)
 
 
 def compare(
@@ -114,7 +115,7 @@ def compare(
     threads: int | None,
     rungs: tuple[str, ...],
 ) -> Case:
-    """`comparisons.compare.compare.compare_scene`, Mitsuba with `threads` threads too."""
+    """`comparisons.compare.compare.compare_scene`, Mitsuba too with `threads` threads."""
     from comparisons.compare.compare import Subject, compare_scene
     from comparisons.mitsuba.backend import mitsuba
 

@@ -1,5 +1,9 @@
-"""`reference-rt bench`: the speed of the renderer, each number beside what it is measured against.
+"""`reference-rt bench`: the renderer's speed, each number with the one that it is compared with.
 
-One file per group of rows; `groups.py` lists them.  `run.py` measures what is not measured yet,
-`table.py` shows it.
+A row (`row.Row`) is one number of ours, a peer's, their ratio and the goal of that ratio: medians
+and quartiles of rounds in which both take turns (`timing.alternate`).  Rows that are measured
+together are a group; `run` measures the groups that are not stored yet, `table` shows them.
+
+To add a row, write a function `measure(setting) -> list[Row]` in a file of its own and list it in
+`groups`.  `spheres_only` is the renderer specialised by hand, the peer of the row `unused`.
 """

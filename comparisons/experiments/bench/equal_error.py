@@ -1,4 +1,4 @@
-"""Seconds until a relative error of 1 %, over the scenes that are path traced on both sides."""
+"""Seconds to a relative error of 1 %, over the scenes that both renderers path trace."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,10 +13,10 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceRtError
 
 TARGET = 0.01
-"""Relative error: the root of relMSE."""
+"""Relative error: the square root of relMSE."""
 
 SECONDS = 15.0
-"""Budget of a scene, all contestants together."""
+"""Time budget of a scene, for all methods together."""
 
 QUICK = ("cornell_box", "many_lights", "mesh_knot", "textured_room")
 
@@ -72,8 +72,11 @@ def rows(
     left_out: dict[str, str],
     extrapolated: Mapping[str, Sequence[str]] | None = None,
 ) -> list[Row]:
-    """The rows of times by scene and contestant; `left_out` says why other scenes have none,
-    `extrapolated` which times of a scene lie beyond what was measured."""
+    """The rows from the times `found`, by scene and method.
+
+    left_out: why other scenes have no times;  extrapolated: the methods whose time lies beyond the
+    measured rungs, by scene.
+    """
     guessed = extrapolated or {}
     against_default = _ratios(found, DEFAULT)
     against_best = _ratios(found, BEST)
@@ -107,14 +110,14 @@ def rows(
 
 
 def _is_extrapolated(scene: str, peer: str, extrapolated: Mapping[str, Sequence[str]]) -> bool:
-    """Whether a time that the ratio of a scene is made of was not measured."""
+    """Whether one of the two times of a scene's ratio is extrapolated."""
     return bool({"ours", peer} & set(extrapolated.get(scene, ())))
 
 
 def _scenes(
     ratios: Mapping[str, float], peer: str, extrapolated: Mapping[str, Sequence[str]]
 ) -> str:
-    """ "scenes", and of how many of them the ratio is extrapolated."""
+    """ "scenes", or how many there are, and how many ratios are extrapolated."""
     number = sum(_is_extrapolated(scene, peer, extrapolated) for scene in ratios)
     return f"{len(ratios)} scenes ({number} extrapolated)" if number else "scenes"
 
@@ -124,8 +127,8 @@ def _worst(scene: str, peer: str, extrapolated: Mapping[str, Sequence[str]]) -> 
 
 
 def _ratios(found: dict[str, dict[str, float]], peer: str) -> dict[str, float]:
-    """Ours over the peer's, by scene; of scenes that at least one of both reaches: an infinite time
-    is that of who never does."""
+    """Ours / the peer's time, for scenes in which at least one of them reaches the target; the time
+    of one that never does is infinite."""
     return {
         name: times["ours"] / times[peer]
         for name, times in found.items()
@@ -144,13 +147,13 @@ def _row(
     goal: float,
     details: dict[str, Any],
 ) -> Row:
-    """Medians over scenes of both times and of their ratios; the spread is that of the scenes."""
+    """The row of medians over scenes of both times and their ratios, with quartiles over scenes."""
     sampler = "default" if peer == DEFAULT else "best"
     low, median, high = (math.nan,) * 3
     ours = theirs = math.nan
     if ratios:
         values = list(ratios.values())
-        # Quartiles that are among the scenes: between an infinite one and another there is none.
+        # Quartiles that are values of scenes: one cannot interpolate to infinity.
         low = float(np.quantile(values, 0.25, method="lower"))
         median = float(np.median(values))
         high = float(np.quantile(values, 0.75, method="higher"))

@@ -1,4 +1,4 @@
-"""The Cornell box with the same number of samples: ours against Mitsuba."""
+"""Render times of the Cornell box at an equal number of samples: ours against Mitsuba."""
 
 from comparisons.experiments.bench.row import Row, against
 from comparisons.experiments.bench.setting import Setting
@@ -20,7 +20,7 @@ def measure(setting: Setting) -> list[Row]:
 
 
 def cornell_box(setting: Setting) -> Scene:
-    """The scene at the size that is measured, a quarter of it for a quick run."""
+    """The scene at the measured size; a quarter of the pixels for a quick run."""
     size = SIZE // 2 if setting.quick else SIZE
     film = Film(width=size, height=size, filter=BoxFilter())
     return setting.load(SCENE).changed(film=film, sampler=Sobol(spp=SPP))

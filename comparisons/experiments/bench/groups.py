@@ -22,7 +22,7 @@ from reference_rt.util.errors import UsageError
 
 
 class Group(NamedTuple):
-    """Rows that are measured together."""
+    """Rows that one function measures together."""
 
     name: str
     rows: tuple[str, ...]
@@ -48,12 +48,12 @@ GROUPS = (
 
 
 def chosen(patterns: Sequence[str]) -> tuple[Group, ...]:
-    """The groups that have a row of these names, which may be patterns as of a shell; all groups
-    for none.  Raises UsageError for a name that fits nothing."""
+    """The groups with a row that matches one of these shell patterns; all groups if there are no
+    patterns.  Raises UsageError for a pattern that matches no row."""
     for pattern in patterns:
         if not any(fnmatchcase(row, pattern) for group in GROUPS for row in group.rows):
             known = ", ".join(row for group in GROUPS for row in group.rows)
-            raise UsageError(f"--only: no row is called '{pattern}'; expected some of {known}")
+            raise UsageError(f"--only: no row has the name '{pattern}'; expected some of {known}")
     return tuple(
         group
         for group in GROUPS

@@ -1,4 +1,4 @@
-"""The machine that was measured on, as far as speed depends on it."""
+"""Properties of the machine that affect speed."""
 
 import importlib.metadata
 import os
@@ -10,11 +10,11 @@ from llvmlite import binding
 from comparisons.runs.provenance import ours
 
 _WIDTHS = (("avx512f", 512), ("avx2", 256), ("avx", 256), ("sse2", 128), ("neon", 128))
-"""Bits of the registers that each set of instructions has."""
+"""Vector register width in bits of each instruction set."""
 
 
 def machine() -> dict[str, Any]:
-    """Processor, cores, vector width, memory, system and versions; the load while it was asked."""
+    """Processor, cores, vector width, memory, system and versions, and the current load."""
     facts = ours()
     return {
         **facts,
@@ -29,7 +29,7 @@ def machine() -> dict[str, Any]:
 
 
 def vector_bits() -> int | None:
-    """Width of the vector registers that LLVM finds here; None where it knows no processor."""
+    """Width in bits of the vector registers that LLVM detects; None if it cannot."""
     try:
         features = binding.get_host_cpu_features()
     except RuntimeError:
@@ -40,7 +40,7 @@ def vector_bits() -> int | None:
 def _memory() -> float | None:
     try:
         return round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**30, 1)
-    except (ValueError, OSError, AttributeError):  # not every system tells
+    except (ValueError, OSError, AttributeError):  # not available on every system
         return None
 
 

@@ -1,7 +1,7 @@
-"""Rays in a mesh: ours in float64 against Mitsuba's (Embree, float32), and any hit against the
-closest one.
+"""Ray-mesh intersection: ours in float64 against Mitsuba's (Embree, float32), and any-hit against
+closest-hit.
 
-Both write the same for each ray: t, which triangle, and where on it.
+Both return the same for each ray: t, the triangle, and the position on it.
 """
 
 import math
@@ -26,7 +26,7 @@ from reference_rt.shapes import Mesh
 from reference_rt.util.errors import UsageError
 
 WIDTH = 1024
-"""2^20 rays: the pixels of a square picture of this width, row after row, for coherent ones."""
+"""Width of a square picture with one ray per pixel: 2^20 rays; coherent ones are in row order."""
 
 FOV = math.radians(40.0)
 
@@ -36,7 +36,7 @@ Rays = tuple[FloatArray, FloatArray]
 
 
 class Subject(NamedTuple):
-    """A mesh file, its name for people, and the tables of a scene of it alone."""
+    """A mesh file, its name for people, and the tables of a scene with this mesh."""
 
     path: Path
     title: str
@@ -159,13 +159,14 @@ def _against_mitsuba(kind: str, rays: Rays, subject: Subject, setting: Setting) 
 
 
 def _mitsuba_scene(mi: Any, path: Path, robust: bool) -> Any:
-    """The mesh alone; `robust` as in all comparisons, without it rays may slip through edges."""
+    """A scene with the mesh; comparisons use `robust`: without it, rays leak through edges."""
     mesh = {"type": path.suffix[1:].lower(), "filename": str(path), "face_normals": True}
     return mi.load_dict({"type": "scene", "embree_use_robust_intersections": robust, "mesh": mesh})
 
 
 def _mitsuba_rate(mi: Any, scene: Any, rays: Rays, hint: bool) -> Callable[[], float]:
-    """How to measure: the rays are on Mitsuba's side before, and what is found is evaluated."""
+    """A function that measures Mray/s.  The rays are converted for Mitsuba beforehand; its lazy
+    results are evaluated."""
     import drjit as dr
 
     o, d = (a.T.astype(np.float32) for a in rays)

@@ -1,4 +1,4 @@
-"""A mesh of as many triangles as one likes, and the files it is written to."""
+"""A generated mesh of any number of triangles, and writers of mesh files."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.util.files import replacing
 
 BUNNY = 69_451
-"""Triangles of the Stanford bunny, which others measure with."""
+"""Triangles of the Stanford bunny, a common benchmark."""
 
 MILLION = 1_000_000
 
@@ -22,8 +22,8 @@ class Blob(NamedTuple):
 
 
 def blob(triangles: int) -> Blob:
-    """A sphere with bumps that hide each other, of at least this many triangles: six grids, the
-    sides of a cube that is blown up."""
+    """A sphere with bumps that occlude each other, of at least this many triangles: the six faces
+    of a cube as grids, projected to the sphere."""
     n = int(np.ceil(np.sqrt(triangles / 12)))
     u, v = np.meshgrid(*(2 * [np.linspace(-1.0, 1.0, n + 1)]), indexing="ij")
     i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
@@ -62,7 +62,7 @@ def write_ply(path: Path, mesh: Blob) -> None:
 
 
 def write_obj(path: Path, mesh: Blob) -> None:
-    """A text file with the same positions, in the nine digits that float32 takes."""
+    """A text file of the same positions, with the nine digits that identify a float32."""
     with replacing(path) as temporary, temporary.open("w", encoding="ascii") as file:
         np.savetxt(file, mesh.vertices.astype("<f4"), fmt="v %.9g %.9g %.9g")
         np.savetxt(file, mesh.faces + 1, fmt="f %d %d %d")

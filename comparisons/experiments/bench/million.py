@@ -1,4 +1,4 @@
-"""A mesh of a million triangles: how long its hierarchy takes, and how much memory all of it."""
+"""A mesh of a million triangles: the time to build its tables, and the peak memory."""
 
 import json
 import os
@@ -21,7 +21,7 @@ _TIMEOUT = 600.0
 
 
 def measure(setting: Setting) -> list[Row]:
-    """Both rows, of the .ply file; those of the .obj file are among the details."""
+    """Both rows, for the .ply file; numbers of the .obj file are among the details."""
     mesh = blob(MILLION)
     found: dict[str, list[dict[str, float]]] = {"ply": [], "obj": []}
     with tempfile.TemporaryDirectory() as folder:
@@ -32,7 +32,7 @@ def measure(setting: Setting) -> list[Row]:
         _run(files["ply"])  # compile
         for k in range(ROUNDS):
             for suffix, path in files.items():
-                if suffix == "ply" or k == 0:  # reading text takes long, and is no row
+                if suffix == "ply" or k == 0:  # reading .obj is slow, and has no row
                     setting.say(f".{suffix}, {len(mesh.faces):,} triangles", k / ROUNDS)
                     found[suffix].append(_run(path))
     count = f"{len(mesh.faces):,} triangles"
@@ -40,14 +40,14 @@ def measure(setting: Setting) -> list[Row]:
     return [
         within(
             "million_build",
-            f"{count}: from positions and indices to all that rays need, hierarchy included",
+            f"{count}: from positions and indices to tables for rays, BVH included",
             [run["build"] for run in found["ply"]],
             BUILD_SECONDS,
             details=details,
         ),
         within(
             "million_memory",
-            f"{count}: most memory of load, build and render, whole process",
+            f"{count}: peak memory of load, build and render, whole process",
             [run["peak"] for run in found["ply"]],
             PEAK_MB,
             unit="MB",
@@ -57,7 +57,7 @@ def measure(setting: Setting) -> list[Row]:
 
 
 def _run(mesh: Path) -> dict[str, float]:
-    """What `million_worker` tells.  Raises ReferenceRtError."""
+    """Run `million_worker`.  Raises ReferenceRtError."""
     run = subprocess.run(
         [sys.executable, "-m", "comparisons.experiments.bench.million_worker", str(mesh)],
         env=dict(os.environ),

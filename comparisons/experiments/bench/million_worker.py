@@ -1,9 +1,9 @@
 """`python -m comparisons.experiments.bench.million_worker MESH`: loads, builds and renders a large
 mesh.
 
-A process of its own, since the most memory that a process ever had is asked of the system.  Prints
-a JSON object: seconds to "read" the file, to "build" all that rays need from what was read, and to
-"render" a small picture; "peak": the most memory in MB (10^6 bytes), and "base": before the mesh.
+It is a separate process because the system reports the peak memory of a process.  Prints a JSON
+object: seconds to "read" the file, to "build" the tables from its contents, and to "render" a small
+picture; "peak": peak memory in MB (10^6 bytes), and "base": the peak before the mesh.
 """
 
 import json
@@ -40,10 +40,10 @@ def scene_of(mesh: Path) -> Scene:
 
 
 def peak() -> float:
-    """The most memory that this process has had, in MB."""
+    """The peak memory of this process, in MB."""
     status = Path("/proc/self/status")
     if status.exists():
-        # Linux hands `ru_maxrss` of the process that starts another down to it; this begins anew.
+        # On Linux a child inherits `ru_maxrss` of its parent; VmHWM starts at zero.
         found = re.search(r"VmHWM:\s+(\d+) kB", status.read_text(encoding="ascii"))
         if found:
             return int(found[1]) * 1024 / 1e6
@@ -56,14 +56,14 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         small = Path(folder) / "small.ply"
         write_ply(small, blob(1000))
-        render(scene_of(small))  # compile, or load what was compiled
+        render(scene_of(small))  # compile kernels, or load them from the cache
     base = peak()
     scene = scene_of(mesh)
     start = time.perf_counter()
     tables = build_tables(scene)
     built = time.perf_counter() - start
     seconds = render(scene, tables=tables).seconds["render"]
-    most = peak()  # of all but what comes now
+    most = peak()  # before the mesh is read a second time, for its time alone
     del tables
     start = time.perf_counter()
     read_mesh(mesh)

@@ -1,4 +1,4 @@
-"""`reference-rt render` as a process of its own: what a person waits for."""
+"""Wall-clock time of the whole process `reference-rt render`."""
 
 import os
 import re
@@ -20,26 +20,26 @@ from reference_rt.util.errors import ReferenceRtError
 
 SIZE, SPP = "64x64", 16
 PICTURE = f"{SIZE}, {SPP} samples per pixel"
-"""A picture that takes next to no time, so that what is measured is everything else."""
+"""A picture that renders in almost no time, so that everything else is measured."""
 
 COLD_SECONDS, WARM_SECONDS = 15.0, 1.5
 
 WARM = ("cornell_box", "mesh_knot", "textured_room", "material_principled", "whitted_classic")
-"""Scenes that are rendered again and again: few shapes, many triangles, textures, a long material,
-and no random numbers."""
+"""Scenes of the row `warm`: few shapes, many triangles, textures, a complex material, and no random
+numbers."""
 
 QUICK = ("cornell_box", "mesh_knot", "textured_room")
 
 _TIMEOUT = 600.0
 
-_TOLD = re.compile(r"([\d.]+) s to build, ([\d.]+) s to compile.*?, ([\d.]+) s to render")
+_PRINTED = re.compile(r"([\d.]+) s to build, ([\d.]+) s to compile.*?, ([\d.]+) s to render")
 
 
 class Program:
-    """Renders scenes in processes of their own, which have `folder` for their pictures.
+    """Renders scenes in separate processes, which write to `folder`.
 
-    The byte code of our sources is kept there too, as pip does when it installs: where it is told
-    not to be written (PYTHONDONTWRITEBYTECODE) every process would read all sources anew.
+    `folder` has the byte code of our sources too, as after an installation by pip: with
+    PYTHONDONTWRITEBYTECODE set, every process would compile all sources again.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -49,18 +49,18 @@ class Program:
         self.environment["PYTHONPYCACHEPREFIX"] = str(folder / "bytecode")
 
     def prepare(self) -> None:
-        """Writes the byte code."""
+        """Write the byte code."""
         self._run(["--help"], None)
 
     def render(self, scene: Path, cache: str | None = None) -> dict[str, float]:
-        """Seconds of the whole process ("wall"), and what it tells itself, with the kernels of the
-        folder `cache`, or with those of the user.  Raises ReferenceRtError where it fails."""
+        """Seconds of the whole process ("wall"), and the times that it prints ("build", ...), with
+        the kernels of the folder `cache`, or the user's.  Raises ReferenceRtError if it fails."""
         picture = self.folder / "picture.png"
         start = time.perf_counter()
         options = ["--size", SIZE, "--spp", str(SPP), "-o", str(picture)]
-        told = self._run(["render", str(scene), *options], cache)
+        printed = self._run(["render", str(scene), *options], cache)
         found = {"wall": time.perf_counter() - start}
-        if match := _TOLD.search(told):
+        if match := _PRINTED.search(printed):
             names = ("build", "compile", "render")
             found |= dict(zip(names, map(float, match.groups()), strict=True))
         return found
@@ -83,7 +83,8 @@ class Program:
 
 
 def measure_cold(setting: Setting) -> list[Row]:
-    """Every scene once, each with an empty cache: compiling takes so long that one time tells."""
+    """The row `cold`: every scene once, each with an empty cache.  Compiling takes so long that one
+    run is enough."""
     names = [n for n in setting.names() if not setting.quick or n in QUICK]
     found: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -107,7 +108,7 @@ def measure_cold(setting: Setting) -> list[Row]:
 
 
 def measure_warm(setting: Setting) -> list[Row]:
-    """Some scenes again and again; the row is the slowest's."""
+    """The row `warm`: the slowest of some scenes, each rendered several times."""
     names = [n for n in WARM if not setting.quick or n in QUICK]
     found: dict[str, list[dict[str, float]]] = {name: [] for name in names}
     with tempfile.TemporaryDirectory() as folder:

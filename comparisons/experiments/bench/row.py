@@ -1,4 +1,4 @@
-"""A row of the table: a number of ours, another beside it, and the goal of their ratio."""
+"""A row of the table: a number of ours, a peer's, and the goal of their ratio."""
 
 import math
 from collections.abc import Sequence
@@ -6,18 +6,19 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from comparisons.experiments.bench.timing import Spread, ratios, spread
+from comparisons.report.results_json import plain
 
 Better = Literal["lower", "higher"]
 
 LIMIT = "the limit"
-"""The peer of what has no other one: a fixed number, and the goal is a ratio of 1."""
+"""The peer's name in a row that compares with a fixed limit; the goal is a ratio of 1."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """ours, peer: medians, in `unit`;  ratio: the median of ours / peer, which shall be at most
-    `goal`, or at least where higher is better;  spread: quartiles [low, high] of "ours", "peer" and
-    "ratio", of those that were measured;  details: what else was found."""
+    """ours, peer: medians, in `unit`;  ratio: the median of ours / peer;  goal: the largest ratio
+    that is good enough, or the smallest if higher is better;  spread: quartiles [low, high] of
+    "ours", "peer" and "ratio", as far as measured;  details: further numbers."""
 
     name: str
     title: str
@@ -33,12 +34,12 @@ class Row:
 
     @property
     def met(self) -> bool:
-        """Whether the ratio is as good as the goal; NaN is not."""
+        """Whether the ratio meets the goal; NaN does not."""
         return self.ratio <= self.goal if self.better == "lower" else self.ratio >= self.goal
 
     def as_json(self) -> dict[str, Any]:
-        """Strict JSON: what is not a finite number is null."""
-        document: dict[str, Any] = _finite(asdict(self) | {"met": self.met})
+        """Strict JSON: numbers that are not finite are null."""
+        document: dict[str, Any] = plain(asdict(self) | {"met": self.met})
         return document
 
 
@@ -53,7 +54,7 @@ def against(
     better: Better = "lower",
     details: dict[str, Any] | None = None,
 ) -> Row:
-    """The row of numbers (rounds,) of ours and of a named peer, measured in turn."""
+    """The row of numbers (rounds,) of ours and of a named peer, which took turns."""
     peer_name, theirs = peer
     mine, other, ratio = spread(ours), spread(theirs), ratios(ours, theirs)
     found = {"ours": mine, "peer": other, "ratio": ratio}
@@ -81,7 +82,7 @@ def within(
     unit: str = "s",
     details: dict[str, Any] | None = None,
 ) -> Row:
-    """The row of numbers (rounds,) that shall not pass a limit."""
+    """The row of numbers (rounds,) that must not exceed a limit."""
     mine = spread(ours)
     around = {"ours": _around(mine), "ratio": [x / limit for x in _around(mine)]}
     more = {"rounds": len(ours), **(details or {})}
@@ -102,16 +103,3 @@ def row_from(document: dict[str, Any]) -> Row:
 
 def _around(found: Spread) -> list[float]:
     return [found.low, found.high]
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-__all__ = ["LIMIT", "Better", "Row", "against", "row_from", "within"]

@@ -1,4 +1,4 @@
-"""The groups of rows, one after another: what is measured already is read, the rest is measured."""
+"""Measures the groups of rows one after another, or reads them if they are stored."""
 
 import datetime
 import hashlib
@@ -20,14 +20,14 @@ from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.files import check_writable, read_text, replacing
 
 SCHEMA = 1
-"""Raised whenever a reader of the former layout would misread the new one."""
+"""Increased whenever a reader of the former layout would misread the new one."""
 
 _PACKAGES = ("numpy", "numba", "mitsuba", "drjit")
 
 
 @dataclass
 class Outcome:
-    """rows: in the order of the table;  not_measured: why others are not, by group;  machine: see
+    """rows: in the order of the table;  not_measured: reasons, by group;  machine: see
     `comparisons.experiments.bench.machine`."""
 
     rows: list[Row] = field(default_factory=list)
@@ -36,7 +36,7 @@ class Outcome:
 
     @property
     def met(self) -> bool:
-        """Whether everything that was to be measured was, and every goal is met."""
+        """Whether everything was measured and every goal is met."""
         return not self.not_measured and all(row.met for row in self.rows)
 
 
@@ -47,11 +47,11 @@ def run(
     display: Display,
     fresh: bool = False,
 ) -> Outcome:
-    """Measure `groups`, which `display` is told of.
+    """Measure `groups`, and show the progress on `display`.
 
-    Each group's rows are kept in `out`/rows as soon as they are known, and not measured again for
-    the same sources, versions, machine and setting unless `fresh`; `results.json` and `bench.md`
-    are whole after each, with all groups that are kept.  Raises UsageError, SceneError, ImageError.
+    Each group's rows are stored in `out`/rows and not measured again for the same sources,
+    versions, machine and setting unless `fresh`; `results.json` and `bench.md` are whole after each
+    group, with all stored groups.  Raises UsageError, SceneError, ImageError.
     """
     check_writable(out / "results.json", out / "bench.md", out / "rows" / "a row")
     facts = machine()
@@ -78,7 +78,7 @@ def run(
 
 
 def key_of(setting: Setting, facts: dict[str, Any]) -> str:
-    """What rows are measured with: they are read again only where all of this is the same."""
+    """A hash of all that rows depend on; stored rows with another key are not used."""
     digest = hashlib.sha256(sources_digest().encode())
     for path in sorted(p for p in setting.scenes.rglob("*") if p.is_file()):
         digest.update(hashlib.sha256(path.read_bytes()).digest())
@@ -91,7 +91,7 @@ def key_of(setting: Setting, facts: dict[str, Any]) -> str:
 
 
 def read_rows(path: Path, key: str) -> list[Row] | None:
-    """The rows that are kept for this key, if any."""
+    """The rows that are stored with this key, if any."""
     try:
         kept = json.loads(read_text(path))
         return [row_from(row) for row in kept["rows"]] if kept["key"] == key else None
@@ -105,7 +105,7 @@ def _write_rows(path: Path, key: str, rows: Sequence[Row]) -> None:
 
 
 def _write(out: Path, outcome: Outcome, key: str, setting: Setting) -> None:
-    """What is known of all groups, in the order of the table."""
+    """Write the outputs with the stored rows of all groups, in the order of the table."""
     kept = {group.name: read_rows(out / "rows" / f"{group.name}.json", key) for group in GROUPS}
     outcome.rows = [row for rows in kept.values() for row in rows or ()]
     document = {

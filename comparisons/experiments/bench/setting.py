@@ -1,15 +1,12 @@
-"""What every group of rows is told."""
+"""The options of a benchmark, common to all groups of rows."""
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
-
-Say = Callable[[str, float], None]
-"""Told what is being measured, and which fraction of it is done."""
 
 
 def _silent(what: str, fraction: float) -> None:
@@ -18,14 +15,15 @@ def _silent(what: str, fraction: float) -> None:
 
 @dataclass(frozen=True)
 class Setting:
-    """scenes: folder of the suite's scenes;  mesh: file that rays are traced in, None for one made
-    here;  quick: fewer scenes and smaller pictures;  threads: of ours;  say: progress."""
+    """scenes: folder of the suite's scenes;  mesh: file that rays are traced against, None for a
+    generated mesh;  quick: fewer scenes and smaller pictures;  threads: of our renderer;  say:
+    called with the progress."""
 
     scenes: Path = Path("scenes")
     mesh: Path | None = None
     quick: bool = False
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
-    say: Say = _silent
+    say: Progress = _silent
 
     def file(self, name: str) -> Path:
         """The file of a scene.  Raises UsageError."""
@@ -44,6 +42,3 @@ class Setting:
         if not found:
             raise UsageError(f"--scenes: '{self.scenes}' holds no scene; expected .yaml files")
         return found
-
-
-__all__ = ["Say", "Setting"]

@@ -1,11 +1,10 @@
-"""A path tracer for spheres in diffuse colours under a white sky, and for nothing else.
+"""A path tracer for diffuse spheres under a white sky only: the renderer specialised by hand.
 
-What is left of `reference_rt`'s kernels when everything that such a scene does not use is deleted
-by hand: no table that may be absent, no choice among shapes, materials, lights, cameras, samplers
-or filters, no textures, no hierarchy, and of rays, hits and paths only the numbers that are read.
-The structure is the renderer's: blocks of paths, edge by edge, rays side by side.  It gives the
-same picture bit for bit (its test), and its time is what the renderer's own pruning is measured
-against.
+These are `reference_rt`'s kernels without everything that such a scene does not use: no optional
+tables, no dispatch over shapes, materials, lights, cameras, samplers or filters, no textures, no
+acceleration structure, and only those fields of rays, hits and paths that are read.  The structure
+is the renderer's: blocks of paths, one path edge at a time, rays in SoA layout.  The picture is the
+same bit for bit (its test); the time is the baseline of the renderer's own specialisation.
 """
 
 from typing import NamedTuple
@@ -108,7 +107,7 @@ class Shading(NamedTuple):
 
 
 def world_of(scene: Scene) -> World:
-    """The scene as the kernels here see it.  Raises ValueError where it has more than they know."""
+    """The scene for these kernels.  Raises ValueError for a scene that they do not support."""
     environment = scene.lights[0] if len(scene.lights) == 1 else None
     if not (
         all(isinstance(shape, Sphere) for shape in scene.shapes)
@@ -123,7 +122,7 @@ def world_of(scene: Scene) -> World:
     geometry = scene.tables.geometry
     spheres = geometry.shapes.spheres
     if spheres is None or geometry.bvh is not None:
-        raise ValueError("expected spheres, so few that no hierarchy leads to them")
+        raise ValueError("expected spheres, few enough to need no acceleration structure")
     colours = [m.reflectance for m in scene.materials.values() if isinstance(m, Diffuse)]
     return World(spheres, np.array(colours), Vec3(*environment.radiance))
 

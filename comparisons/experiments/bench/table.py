@@ -1,4 +1,4 @@
-"""The rows as tables: for a terminal, and as Markdown."""
+"""Tables of the rows, for a terminal and as Markdown."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,7 +11,7 @@ _COLUMNS = ("what", "ours", "against", "ratio", "quartiles", "goal", "met")
 
 
 def terminal(rows: Sequence[Row]) -> Table:
-    """A table for people at a terminal."""
+    """The table for a terminal."""
     table = Table(show_edge=False, pad_edge=False)
     for name in _COLUMNS:
         table.add_column(name, overflow="fold")
@@ -65,5 +65,5 @@ def _cells(row: Row) -> list[str]:
 
 
 def amount(value: float, unit: str) -> str:
-    """A number with three digits that count, and its unit."""
+    """A number with three significant digits, and its unit."""
     return f"{value:.0f} {unit}" if value >= 1000.0 else f"{value:.3g} {unit}"

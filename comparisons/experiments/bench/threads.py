@@ -1,4 +1,4 @@
-"""What a second thread brings."""
+"""The speed-up by a second thread."""
 
 from comparisons.experiments.bench.equal_samples import SCENE, SPP, cornell_box
 from comparisons.experiments.bench.row import Row, against

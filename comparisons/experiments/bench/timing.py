@@ -1,4 +1,4 @@
-"""Times of two things in one run, alternating, and what is said of them: medians and spread."""
+"""Alternating measurements of two things, and their medians and quartiles."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -9,7 +9,7 @@ import numpy as np
 from comparisons.runs.settling import settle
 
 ROUNDS = 7
-"""The fewest that a median is taken of here: then one disturbance, or two, do not move it far."""
+"""Default number of rounds: one or two disturbances do not move the median far."""
 
 
 class Spread(NamedTuple):
@@ -29,7 +29,7 @@ def spread(numbers: Sequence[float]) -> Spread:
 
 
 def ratios(ours: Sequence[float], peer: Sequence[float]) -> Spread:
-    """The spread of ours / peer, round by round: what slows both in a round cancels."""
+    """The spread of ours / peer, round by round: a disturbance of a whole round cancels."""
     return spread([a / b for a, b in zip(ours, peer, strict=True)])
 
 
@@ -45,10 +45,10 @@ def alternate(
     rounds: int = ROUNDS,
     say: Callable[[str, float], None] = lambda what, fraction: None,
 ) -> dict[str, list[float]]:
-    """What each of `measures` returns in each round, by name.
+    """The values of each of `measures` in each round, by name.
 
-    Every other round runs in the reverse order, so that a drift favours nobody.  `say` is told
-    what is measured, and which fraction of all is done.
+    Every other round runs in the reverse order, so that a drift favours neither.  say: called with
+    what is being measured, and the fraction that is done.
     """
     found: dict[str, list[float]] = {name: [] for name in measures}
     done, total = 0, rounds * len(measures)
@@ -59,6 +59,3 @@ def alternate(
             found[name].append(measures[name]())
             done += 1
     return found
-
-
-__all__ = ["ROUNDS", "Spread", "alternate", "ratios", "seconds", "spread"]

@@ -1,4 +1,16 @@
-"""Error against run time: ours and Mitsuba's, sample for sample and second for second."""
+"""`reference-rt converge`: error against run time, of our renderer and Mitsuba's.
+
+A method under test (`methods`) is a renderer with one sampler.  A rung is a number of samples per
+pixel; the `ladder` renders replicates at each rung, the methods taking turns.  `estimates`,
+`findings` and `fits` turn rungs into errors, slopes, bias and times to a target error; `store`
+keeps finished rungs; `outputs`, `page` and `summary` show the `Curves`.
+
+Errors are relMSE, or its square root, the relative error; times are seconds of warm renders on all
+cores.  Deterministic scenes have `Grids` instead of a ladder.
+
+To add a method, add it to `methods.METHODS`; if its renderer is another one, `methods.Stable.ready`
+must return a function (samples per pixel, replicate) -> `Shot` for it.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -7,29 +19,28 @@ from reference_rt.rendering.scene import Scene
 if TYPE_CHECKING:
     from comparisons.experiments.convergence.findings import Target
 
-CONTESTANTS = ("ours", "mitsuba_llvm", "mitsuba_llvm_best", "mitsuba_scalar")
+METHODS = ("ours", "mitsuba_llvm", "mitsuba_llvm_best", "mitsuba_scalar")
 
 NARROW = 64
-"""Pixels across of pictures for a quick answer."""
+"""Width in pixels of pictures for a quick answer."""
 
 
 def time_to_error(scene: Scene, target: float, seconds: float) -> dict[str, float]:
-    """Render seconds until the relative error, the root of relMSE, is `target`, by contestant: the
-    values of `reached`, which also says how they are known."""
+    """Render seconds to the relative error `target`, by method; see `reached`."""
     found = reached(scene, target, seconds)
     return {name: one.seconds.value for name, one in found.items()}
 
 
 def reached(scene: Scene, target: float, seconds: float) -> "dict[str, Target]":
-    """When the relative error, the root of relMSE, is `target`, by contestant.
+    """The time to the relative error `target` (the square root of relMSE), by method.
 
-    scene: of a random integrator; rendered through a box filter and at most 64 pixels wide, where
-    a short budget still reaches high rungs (times grow with the pixels, ratios do not);  seconds:
-    budget for all contestants together, after kernels are compiled.  Contestants:
-    "ours", "mitsuba_llvm", "mitsuba_llvm_best" (its best sampler), "mitsuba_scalar"; one that
-    cannot render the scene, or not within the budget, is absent; one with a proven bias above the
-    target takes infinitely long.  Times are medians of warm renders on all cores, read off the
-    measured ladder of samples, or off its fit where the target lies beyond ("extrapolated").
+    scene: with a random integrator; rendered with a box filter and at most 64 pixels wide, so that
+    a short budget reaches high rungs (times grow with the pixels, ratios do not);  seconds: time
+    budget of all methods together, without compilation.  Methods: "ours", "mitsuba_llvm",
+    "mitsuba_llvm_best" (its best sampler), "mitsuba_scalar".  A method that cannot render the
+    scene, or not within the budget, is absent; the time of one with a proven bias above the target
+    is infinite.  Times are medians of warm renders on all cores, interpolated between rungs, or
+    "extrapolated" by a fit beyond the last rung.
 
     Raises SceneError, ReferenceUnavailableError; ValueError for a deterministic scene.
     """
@@ -38,17 +49,17 @@ def reached(scene: Scene, target: float, seconds: float) -> "dict[str, Target]":
     from comparisons.experiments.convergence.run import converge
 
     if scene.integrator.deterministic:
-        raise ValueError(f"{scene.name}: is deterministic; expected an integrator with chance")
+        raise ValueError(f"{scene.name}: is deterministic; expected a random integrator")
     settings = Settings(
         time_limit=seconds,
         size=size_within(scene.film, NARROW),
         targets=(target,),
-        only=CONTESTANTS,
+        only=METHODS,
         starts=False,
         crops=False,
     )
     found = converge(scene, settings).findings
-    times = {name: found[name].targets[0] for name in CONTESTANTS if name in found}
+    times = {name: found[name].targets[0] for name in METHODS if name in found}
     return {name: one for name, one in times.items() if one.how != "unknown"}
 
 

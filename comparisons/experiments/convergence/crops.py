@@ -1,4 +1,4 @@
-"""What the contestants' pictures look like after equal times, and at equal errors."""
+"""Pictures by all methods at equal time and at equal error."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from comparisons.experiments.convergence.contestants import Renderer
 from comparisons.experiments.convergence.data import Reference, Rung, weights
 from comparisons.experiments.convergence.estimates import errors
 from comparisons.experiments.convergence.findings import points_of
 from comparisons.experiments.convergence.fits import linear_time, time_to
+from comparisons.experiments.convergence.methods import Renderer
 from comparisons.experiments.convergence.store import Store
 from reference_rt.core.arrays import FloatArray
 
@@ -19,15 +19,14 @@ SIDE = 4
 """A crop is this fraction of the picture's width and height."""
 
 REPLICATE = 1 << 19
-"""Of the pictures shown: none of the ladder's, none of a trial's."""
+"""Replicate number of the pictures shown, unused by the ladder and by trials."""
 
 Kind = Literal["time", "error"]
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture (height, width, 3) of a contestant: its samples a pixel, its seconds, its relative
-    error, the root of relMSE."""
+    """A picture (height, width, 3), its samples per pixel, seconds and relative error."""
 
     picture: FloatArray
     spp: int
@@ -37,10 +36,10 @@ class Shown:
 
 @dataclass(frozen=True)
 class Crops:
-    """Pictures of all contestants, by name, at about the same time or the same error.
+    """Pictures by all methods, by name, at about the same time or error.
 
-    level: the seconds, or the relative error, that was aimed at;  corner, size: left and upper
-    edge, width and height of the part where the errors are largest.
+    level: the intended seconds or relative error;  corner, size: left and upper edge, width and
+    height of the crop, where the errors are largest.
     """
 
     kind: Kind
@@ -56,7 +55,7 @@ def crops_of(
     reference: Reference,
     store: Store,
 ) -> tuple[Crops, ...]:
-    """At the longest time that all contestants have rungs for, and at the least error that all
+    """Crops at the longest time that all methods have rungs for, and at the least error that all
     reach."""
     if not rungs:
         return ()
@@ -103,7 +102,7 @@ def _at_equal_error(rungs: Mapping[str, list[Rung]]) -> tuple[float, dict[str, i
 def _shown(
     name: str, spp: int, renderer: Callable[[], Renderer], reference: Reference, store: Store
 ) -> Shown:
-    """Rendered twice, the first time to compile; or as it is stored."""
+    """The stored picture, or a new one, rendered twice because the first render may compile."""
     fact, picture = store.fact(name, spp), store.picture(name)
     if fact is None or picture is None:
         render = renderer()
@@ -120,8 +119,8 @@ def _shown(
 def worst_part(
     rungs: Mapping[str, list[Rung]], reference: Reference
 ) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Left and upper edge, width and height of the part where the relative variance of the last
-    rungs is largest, each contestant's relative to its own mean."""
+    """Left and upper edge, width and height of the crop in which the relative variance of the last
+    rungs is largest, summed over methods, each normalised by its mean."""
     weight = weights(reference.mean)
     height, width = reference.mean.shape[:2]
     total = np.zeros((height, width))
@@ -134,6 +133,3 @@ def worst_part(
     boxes = sums[h:, w:] - sums[:-h, w:] - sums[h:, :-w] + sums[:-h, :-w]
     y, x = divmod(int(boxes.argmax()), boxes.shape[1])
     return (x, y), size
-
-
-__all__ = ["Crops", "Shown", "crops_of", "worst_part"]

@@ -1,13 +1,13 @@
-"""A scene's curves: everything that a run found out about it, as data."""
+"""A scene's curves: all results of a run for it, as data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from comparisons.experiments.convergence.contestants import Contestant
 from comparisons.experiments.convergence.crops import Crops
 from comparisons.experiments.convergence.data import Reference
 from comparisons.experiments.convergence.findings import Findings, Ratio, compared
+from comparisons.experiments.convergence.methods import Method
 from reference_rt.core.arrays import FloatArray
 
 Starts = Mapping[str, Mapping[str, Mapping[str, float]]]
@@ -15,7 +15,7 @@ Starts = Mapping[str, Mapping[str, Mapping[str, float]]]
 
 
 class GridStep(NamedTuple):
-    """A picture of a deterministic scene with spp samples a pixel on a grid: its seconds, and its
+    """Our picture of a deterministic scene on a grid of spp samples per pixel: its seconds, and its
     errors against the finest grid."""
 
     spp: int
@@ -25,8 +25,8 @@ class GridStep(NamedTuple):
 
 
 class GridPoint(NamedTuple):
-    """Mitsuba's picture of a deterministic scene: its seconds, the samples of its grid, and the
-    errors between it and ours on the same grid."""
+    """Mitsuba's picture of a deterministic scene: its seconds, and its errors against ours on the
+    same grid."""
 
     variant: str
     spp: int
@@ -37,9 +37,9 @@ class GridPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class Grids:
-    """A deterministic scene: ours with finer and finer grids, and Mitsuba's picture.
+    """A deterministic scene: our pictures on finer and finer grids, and Mitsuba's picture.
 
-    finest: samples a pixel of the grid that errors are taken against;  picture: that one.
+    finest: samples per pixel of the grid that is the reference;  picture: on that grid.
     """
 
     steps: tuple[GridStep, ...]
@@ -52,17 +52,17 @@ class Grids:
 class Curves:
     """Error against time of one scene.
 
-    scene: its name;  size: width and height in pixels;  contestants, findings: by name;  absent:
-    why there are no findings of other contestants, by name;  grids: of a deterministic scene, which
-    has no reference and no findings;  starts: of processes;  crops: pictures at equal time and at
-    equal error;  left_out: what else was not done, and why;  notes: what a reader should know;
-    again: the command that repeats it;  problem: why there is nothing at all, because the scene is
-    invalid, or because the run was interrupted before it.
+    scene: its name;  size: width and height in pixels;  methods, findings: by name;  absent: why
+    other methods have no findings, by name;  grids: for a deterministic scene, which has no
+    reference and no findings;  starts: process start-up times;  crops: pictures at equal time and
+    at equal error;  left_out: what else was not measured, and why;  notes: for the reader;  again:
+    the command that repeats the scene;  problem: why there are no results: the scene is invalid, or
+    the run was interrupted before it.
     """
 
     scene: str
     size: tuple[int, int] = (0, 0)
-    contestants: Mapping[str, Contestant] = field(default_factory=dict)
+    methods: Mapping[str, Method] = field(default_factory=dict)
     findings: Mapping[str, Findings] = field(default_factory=dict)
     reference: Reference | None = None
     grids: Grids | None = None
@@ -76,11 +76,11 @@ class Curves:
 
     @property
     def missing(self) -> list[str]:
-        """A line for each contestant without findings: who, and why."""
-        return [f"{self.contestants[name].title}: {why}" for name, why in self.absent.items()]
+        """A line for each method without findings: its title, and why."""
+        return [f"{self.methods[name].title}: {why}" for name, why in self.absent.items()]
 
     def ratios(self, name: str = "ours") -> dict[str, list[Ratio]]:
-        """Times to the targets of contestant `name` over those of each other, with bands."""
+        """Times to the targets of method `name` over those of each other method, with bands."""
         if name not in self.findings:
             return {}
         mine = self.findings[name].targets
@@ -89,6 +89,3 @@ class Curves:
             for other, found in self.findings.items()
             if other != name
         }
-
-
-__all__ = ["Curves", "GridPoint", "GridStep", "Grids", "Starts"]

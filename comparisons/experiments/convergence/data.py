@@ -1,4 +1,4 @@
-"""What is asked of a run, and what its renderings leave behind."""
+"""Settings of a run, its reference, and its rungs."""
 
 from dataclasses import dataclass
 
@@ -9,24 +9,24 @@ from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray
 
 FIRST = 4
-"""Samples a pixel of the first rung; each rung has twice those of the one before."""
+"""Samples per pixel of the first rung; each rung has twice those of the one before."""
 
 WIDEST = 128
-"""Pixels across of pictures whose size nobody names: error and its fall are means over pixels, and
-twice the width costs four times the time."""
+"""Default limit of the width in pixels: errors are means over pixels, so that small pictures show
+the same slopes, and twice the width takes four times as long."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What is asked of a run.
+    """The settings of a run.
 
-    time_limit: seconds for the ladder and the reference of one scene, shared equally by the
-    contestants and the reference; starts of processes, compiling and trials (of costs, of Mitsuba's
-    samplers) come in addition;  size: width and height, none for the scene's, at most WIDEST pixels
-    across;  max_spp: no rung has more samples a pixel;  replicates: independent pictures at each
-    rung;  targets: relative errors, the time to which is asked for;  only: names of contestants,
-    all if none;  starts: whether to time the start of processes, with caches empty and full;
-    crops: whether to render pictures to show.
+    time_limit: seconds for the ladder and the reference of one scene, shared equally by the methods
+    and the reference; process starts, compilation and trials (of costs, of Mitsuba's samplers) come
+    in addition;  size: width and height, None: the scene's, at most WIDEST wide;  max_spp: largest
+    number of samples per pixel;  replicates: independent pictures at each rung;  targets: relative
+    errors to which the time is determined;  only: names of methods, empty: all;  starts: whether to
+    time process start-up with empty and with full kernel caches;  crops: whether to render pictures
+    to show.
     """
 
     time_limit: float = 60.0
@@ -40,26 +40,26 @@ class Settings:
 
 
 def size_within(film: Film, widest: int) -> tuple[int, int]:
-    """Width and height of a film, smaller in proportion where it is more than `widest` across."""
+    """Width and height of a film, scaled down to the width `widest` if it is wider."""
     if film.width <= widest:
         return film.width, film.height
     return widest, max(1, round(film.height * widest / film.width))
 
 
 def weights(reference: FloatArray) -> FloatArray:
-    """(height, width, 3): what squared errors are multiplied by to be relative ones: 1 / (r² +
-    epsilon m²), with m the reference's mean, as `comparisons.statistics.metrics` has it."""
+    """Weights (height, width, 3) that make squared errors relative: 1 / (r² + epsilon m²), with m
+    the reference's mean, as in `comparisons.statistics.metrics`."""
     scale = reference**2 + RELMSE_EPSILON * reference.mean() ** 2
     return np.asarray(1.0 / np.where(scale > 0.0, scale, 1.0))
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What errors are measured against: our own picture, with other seeds than any contestant's.
+    """The reference of errors: our own pictures, with seeds that no method uses.
 
     mean (height, width, 3): of independent pictures;  variance (height, width, 3): of that mean,
-    estimated from their scatter;  count: of the pictures;  spp: samples a pixel of each;  seconds:
-    that it took, 0 where the cache had it.
+    estimated from their scatter;  count: number of pictures;  spp: samples per pixel of each;
+    seconds: to render it, 0 if it came from the cache.
     """
 
     mean: FloatArray
@@ -70,17 +70,17 @@ class Reference:
 
     @property
     def relmse(self) -> float:
-        """What its own noise is, as relative error squared."""
+        """The relMSE of its own noise."""
         return float((weights(self.mean) * self.variance).mean())
 
 
 @dataclass(frozen=True)
 class Rung:
-    """The replicates of a contestant at one number of samples.
+    """The replicates of a method at one number of samples.
 
-    asked, spp: samples a pixel that were asked for and that were taken;  seconds (replicates,): of
-    each, by the clock on the wall;  mse, relmse (replicates,): see `estimates.errors`;  mean,
-    variance (height, width, 3): of the replicates, the variance being that of one.
+    asked, spp: requested and actual samples per pixel;  seconds (replicates,): wall clock;  mse,
+    relmse (replicates,): see `estimates.errors`;  mean, variance (height, width, 3): over the
+    replicates; the variance is that of one.
     """
 
     asked: int
@@ -97,9 +97,6 @@ class Rung:
 
     @property
     def warm(self) -> FloatArray:
-        """The seconds without those of the first picture, which may compile: Mitsuba's stratified
-        samplers have the number of samples as a constant in their kernels."""
+        """The seconds of all but the first picture, which may compile: the kernels of Mitsuba's
+        stratified samplers have the number of samples as a constant."""
         return self.seconds[1:] if len(self.seconds) > 1 else self.seconds
-
-
-__all__ = ["FIRST", "WIDEST", "Reference", "Rung", "Settings", "size_within", "weights"]

@@ -1,53 +1,51 @@
-"""Scenes without chance: how much finer grids of samples help, and how far Mitsuba's picture is."""
+"""Deterministic scenes: errors of sample grids against the finest one, and Mitsuba against ours."""
 
 import time
-from collections.abc import Callable
 
 import numpy as np
 
 from comparisons.compare import pictures
-from comparisons.experiments.convergence.contestants import AbsentError, failing
 from comparisons.experiments.convergence.curves import GridPoint, Grids, GridStep
 from comparisons.experiments.convergence.data import Settings, weights
+from comparisons.experiments.convergence.methods import AbsentError, failing
 from comparisons.experiments.convergence.store import Store
 from comparisons.mitsuba.backend import backend
 from comparisons.mitsuba.translate import UntranslatableError, load
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast
 from reference_rt.rendering.image import display
-from reference_rt.rendering.render import render
+from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
-
 REPEATS = 3
-"""Of the same picture, of whose seconds the median is told."""
+"""Renders of each picture; the median of their seconds is reported."""
 
 FINER = 4
-"""The finest grid has this many times the samples along each axis of the finest that is judged by
-it: the error of its own is then a few percent of that one's."""
+"""The finest grid has this many times more samples along each axis than the finest grid that is
+compared with it: its own error is then a few percent of that one's."""
 
 MOST_ACROSS = 64
-"""Samples along each axis of a pixel in the finest grid: its steps are then below the 8 bits in
-which pictures are looked at."""
+"""Samples along each axis of a pixel in the finest grid: its error is then below the 8 bits of a
+display."""
 
 
 WHOSE = {
-    "ray_cast": "Mitsuba's picture is made of its hits of the rays through the pixels' middles",
-    "whitted": "Mitsuba's picture is made by our plugin, which it traces in Python: its time says "
-    "little of Mitsuba",
+    "ray_cast": "Mitsuba's picture is made from its hits of the rays through the pixel centres",
+    "whitted": "Mitsuba's picture is rendered by our plugin, traced in Python: its time says "
+    "little about Mitsuba",
 }
-"""What a reader should know of Mitsuba's side, by integrator."""
+"""Notes about Mitsuba's pictures, by integrator."""
 
 
-def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[Grids, list[str]]:
-    """Our pictures on grids of 1, 4, 9, ... samples a pixel against the finest, and Mitsuba's.
+def grids_of(
+    scene: Scene, settings: Settings, store: Store, say: Progress
+) -> tuple[Grids, list[str]]:
+    """Our pictures on grids of 1, 4, 9, ... samples per pixel against the finest, and Mitsuba's.
 
-    The finest grid takes at most half of the time limit.  Of ray casting, which sees the pixels'
-    middles alone, a grid is a larger picture, averaged as displayed.  Returns also what was left
-    out and why.  Raises SceneError, ReferenceUnavailableError.
+    The finest grid takes at most half of the time limit.  Ray casting has one ray per pixel: its
+    grid is a larger picture, averaged in display values.  Also returns what was not measured, and
+    why.  Raises SceneError, ReferenceUnavailableError.
     """
     question = [settings.time_limit, settings.max_spp]
     stored, finest = store.fact("grids", question), store.picture("grid")
@@ -63,7 +61,7 @@ def grids_of(scene: Scene, settings: Settings, store: Store, say: Say) -> tuple[
     return grids, left_out
 
 
-def _made(scene: Scene, settings: Settings, say: Say) -> tuple[Grids, list[str]]:
+def _made(scene: Scene, settings: Settings, say: Progress) -> tuple[Grids, list[str]]:
     left_out: list[str] = []
     say("finest grid", 0.0)
     timed(scene, 2)  # compiles
@@ -76,8 +74,8 @@ def _made(scene: Scene, settings: Settings, say: Say) -> tuple[Grids, list[str]]
     most = max(1, across // FINER)
     if across < min(MOST_ACROSS, most_asked):
         left_out.append(
-            f"grids of more than {most * most} samples a pixel: the one to judge them by, "
-            f"{FINER} times finer, would take more than half of {settings.time_limit:g} s"
+            f"grids of more than {most * most} samples per pixel: their reference, {FINER} times "
+            f"finer along each axis, would take more than half of {settings.time_limit:g} s"
         )
     steps = []
     say("grids", 0.0)
@@ -96,7 +94,7 @@ def _made(scene: Scene, settings: Settings, say: Say) -> tuple[Grids, list[str]]
 
 
 def timed(scene: Scene, n: int) -> tuple[FloatArray, float]:
-    """The picture with n x n samples a pixel, displayed if it shows no light, and its seconds."""
+    """The picture with n x n samples per pixel (ray casting: in display values) and its seconds."""
     start = time.perf_counter()
     if isinstance(scene.integrator, RayCast):
         film = scene.film
@@ -136,6 +134,3 @@ def _mitsubas(scene: Scene) -> GridPoint:
     mse, relmse = differences(picture, display(ours) if casts else ours.colour)
     warm = float(np.median(seconds[1:]))
     return GridPoint(backend().variant, int(getattr(sampler, "spp", 1)), warm, mse, relmse)
-
-
-__all__ = ["WHOSE", "grids_of"]

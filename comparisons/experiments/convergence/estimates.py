@@ -25,8 +25,8 @@ BIAS_LEVEL = 0.99
 """Confidence of the upper bound of a bias."""
 
 SEEN_LEVEL = 0.9999
-"""Confidence of the lower bound, above which a bias is said to be seen: that is asked of each
-contestant of each scene."""
+"""Confidence of the lower bound; a bias is significant if that is above 0.  It is high because each
+method of each scene is tested."""
 
 
 class Estimate(NamedTuple):
@@ -38,10 +38,10 @@ class Estimate(NamedTuple):
 
 
 class Bias(NamedTuple):
-    """The mean squared bias, an error that no number of samples takes away.
+    """The mean squared bias: the error that remains at any number of samples.
 
-    squared: unbiased estimate, which may be negative;  low, high: one-sided bounds, with
-    confidences of SEEN_LEVEL and of BIAS_LEVEL.
+    squared: unbiased estimate, which may be negative;  low, high: one-sided bounds with confidences
+    SEEN_LEVEL and BIAS_LEVEL.
     """
 
     squared: float
@@ -55,10 +55,10 @@ class Bias(NamedTuple):
 
 def errors(picture: FloatArray, reference: Reference) -> tuple[float, float]:
     """The mean squared error over pixels and channels and the relative one, without the
-    reference's variance; negative where the picture is by chance nearer than that.
+    reference's variance; may be negative by chance.
 
-    The weights of the relative one are made of the noisy reference too: what this changes is of the
-    order of the error times the reference's own relMSE.
+    The weights of the relative error come from the noisy reference too, which changes the result by
+    about the error times the reference's own relMSE.
     """
     squared = (picture - reference.mean) ** 2 - reference.variance
     return float(squared.mean()), float((weights(reference.mean) * squared).mean())
@@ -123,8 +123,8 @@ def effective_number(values: FloatArray) -> float:
 def against(rung: Rung, reference: Reference) -> Rung:
     """The rung with its errors against another reference of the same scene.
 
-    Their means are exact, from the mean and the variance of the replicates; each replicate keeps
-    what sets it apart from the others, which a better reference changes little.
+    Their mean is exact, from the mean and the variance of the replicates; the deviations of single
+    replicates from it are kept, because a better reference changes them little.
     """
     n = rung.replicates
     squared = (rung.mean - reference.mean) ** 2 + rung.variance * ((n - 1) / n) - reference.variance
@@ -137,8 +137,8 @@ def against(rung: Rung, reference: Reference) -> Rung:
 
 
 class Accumulator:
-    """Replicates as they come: Welford's running mean and sum of squares, so that no more than one
-    picture is held.  done: those that are there already."""
+    """Accumulates replicates by Welford's running mean and sum of squares, so that only one picture
+    is in memory.  done: replicates from an earlier run."""
 
     def __init__(self, asked: int, reference: Reference, done: Rung | None = None) -> None:
         self.asked, self.spp = asked, asked
@@ -155,7 +155,7 @@ class Accumulator:
 
     @property
     def count(self) -> int:
-        """Of the replicates."""
+        """The number of replicates."""
         return len(self._rows)
 
     def add(self, picture: FloatArray, spp: int, seconds: float) -> None:
@@ -166,23 +166,7 @@ class Accumulator:
         self._squares += step * (picture - self._mean)
 
     def rung(self) -> Rung:
-        """Of what was added so far, at least one picture."""
+        """The rung of the replicates added so far, at least one."""
         seconds, mse, relmse = np.array(self._rows).T
         variance = self._squares / max(self.count - 1, 1)
         return Rung(self.asked, self.spp, seconds, mse, relmse, self._mean.copy(), variance)
-
-
-__all__ = [
-    "BIAS_LEVEL",
-    "LEVEL",
-    "SEEN_LEVEL",
-    "Accumulator",
-    "Bias",
-    "Estimate",
-    "against",
-    "bias_of",
-    "common_error",
-    "errors",
-    "mean_of",
-    "standard_error",
-]

@@ -1,4 +1,4 @@
-"""What the rungs of a contestant say: curves, slopes, bias, efficiency, times to targets."""
+"""Findings from the rungs of a method: curves, slopes, bias, efficiency, times to targets."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -42,10 +42,10 @@ class Step(NamedTuple):
 
 
 class Target(NamedTuple):
-    """When the relative error, the root of relMSE, is `error`.
+    """The time to the relative error `error`.
 
-    how: see `How`; of "below", seconds are those of the first rung;  drawn: seconds of curves drawn
-    within the scatter, the measured one first.
+    how: see `How`; for "below", seconds are those of the first rung;  drawn: seconds of resampled
+    curves, the measured one first.
     """
 
     error: float
@@ -56,12 +56,12 @@ class Target(NamedTuple):
 
 
 class Ratio(NamedTuple):
-    """A time to a target over another, and how much it is worth.
+    """The ratio of two times to the same target, and how reliable it is.
 
-    times: the ratio with the band of both, None where it is unknown;  extrapolated: whether a time
-    lies beyond the last rung that was measured;  bound: "at most" where only the first is reached
-    by the first rung already, so that its time is an upper bound, "at least" where only the second
-    is, "neither" where both are;  why: it is unknown, else "".
+    times: the ratio with its band, None if unknown;  extrapolated: whether a time lies beyond the
+    last measured rung;  bound: "at most" if only the numerator's first rung is below the target, so
+    that its time is an upper bound, "at least" if only the denominator's is, "neither" if both are;
+    why: it is unknown, else "".
     """
 
     times: Estimate | None
@@ -71,8 +71,8 @@ class Ratio(NamedTuple):
 
     @property
     def shown(self) -> Literal["", "less", "more"]:
-        """ "less" or "more" where measurements, with their bands, show the ratio to be less or more
-        than 1; what is extrapolated shows neither."""
+        """ "less" or "more" if the measured band lies below or above 1; "" if it contains 1 or is
+        extrapolated."""
         if self.times is None or self.extrapolated or self.bound == "neither":
             return ""
         if self.times.high < 1.0 and self.bound != "at least":
@@ -82,10 +82,10 @@ class Ratio(NamedTuple):
 
 @dataclass(frozen=True)
 class Findings:
-    """What is known of a contestant.
+    """The findings about a method.
 
-    slopes: of "mse" and "relmse" over "spp" and "seconds", None where there are too few rungs;
-    bias, relative_bias: from the last rung, the latter weighted as relMSE is.
+    slopes: of "mse" and "relmse" over "spp" and "seconds", None with too few rungs;  bias,
+    relative_bias: from the last rung, the latter weighted as relMSE.
     """
 
     steps: tuple[Step, ...]
@@ -98,8 +98,7 @@ class Findings:
 def findings_of(
     rungs: Sequence[Rung], reference: Reference, targets: Sequence[float], independent: bool
 ) -> Findings:
-    """Everything about a contestant that has at least one rung; independent: whether its samples
-    are."""
+    """The findings from at least one rung;  independent: whether the method's samples are."""
     weight = weights(reference.mean)
     steps = tuple(_step(rung, reference, weight) for rung in rungs)
     points = {
@@ -137,8 +136,8 @@ def _step(rung: Rung, reference: Reference, weight: FloatArray) -> Step:
 
 
 def points_of(rungs: Sequence[Rung], name: str, common: float = 0.0) -> Points:
-    """The curve of "mse" or "relmse", of the rungs where it is above zero; common: a standard error
-    that all rungs share."""
+    """The curve of "mse" or "relmse" over the rungs where it is positive;  common: the standard
+    error that all rungs share."""
     used = [r for r in rungs if r.replicates > 1 and getattr(r, name).mean() > 0.0]
     rows = [(r.spp, np.median(r.warm), getattr(r, name).mean()) for r in used]
     spp, seconds, errors = np.array(rows, dtype=np.float64).reshape(-1, 3).T
@@ -171,8 +170,8 @@ def _target(points: Points, error: float, bias: Bias, independent: bool) -> Targ
 
 
 def ratio(mine: Target, theirs: Target) -> Estimate | None:
-    """Times to one target, mine over theirs, with the band of both; None where one is unknown or
-    both are never."""
+    """The ratio mine / theirs of the times to a target, with its band; None if one is unknown or
+    both are infinite."""
     if len(mine.drawn) != len(theirs.drawn):
         if "unknown" in (mine.how, theirs.how):
             return None
@@ -181,14 +180,14 @@ def ratio(mine: Target, theirs: Target) -> Estimate | None:
     if not (math.isfinite(mine.seconds.value) and math.isfinite(theirs.seconds.value)):
         return None
     with np.errstate(invalid="ignore"):
-        # The draws of one are shuffled against those of the other: both used the same numbers.
+        # Shuffle the draws of one: both were made with the same random numbers.
         order = np.random.default_rng(len(mine.drawn)).permutation(len(mine.drawn) - 1) + 1
         drawn = mine.drawn / theirs.drawn[np.concatenate([[0], order])]
     return band(drawn[np.isfinite(drawn)])
 
 
 def compared(mine: Target, theirs: Target) -> Ratio:
-    """Times to one target, mine over theirs."""
+    """The ratio mine / theirs of the times to a target, with its reliability."""
     first = mine.how == "below", theirs.how == "below"
     unknown = [who for who, t in (("ours", mine), ("theirs", theirs)) if t.how == "unknown"]
     times = ratio(mine, theirs)
@@ -201,6 +200,3 @@ def compared(mine: Target, theirs: Target) -> Ratio:
         "neither" if all(first) else "at most" if first[0] else "at least" if first[1] else "",
         why,
     )
-
-
-__all__ = ["Findings", "Ratio", "Step", "Target", "compared", "findings_of", "points_of", "ratio"]

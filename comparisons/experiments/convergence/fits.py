@@ -11,17 +11,17 @@ from comparisons.experiments.convergence.estimates import LEVEL, Estimate
 from reference_rt.core.arrays import FloatArray
 
 DRAWS = 1000
-"""Of a curve within its scatter: the ends of a 95 % band are then known to a tenth of its width."""
+"""Resampled curves: the ends of a 95 % band are then known to a tenth of its width."""
 
 LAST = 6
-"""Rungs that a curve is continued by, at most: the lowest of many say nothing about its end."""
+"""The last rungs, at most, from which a curve is extrapolated."""
 
 SEED = 20260101
-"""Of the draws: the same measurements give the same bands."""
+"""Seed of the resampling: the same measurements give the same bands."""
 
 How = Literal["interpolated", "extrapolated", "below", "bias", "unknown"]
-"""Between rungs; beyond the last; reached by the first rung already; never, for a bias; the rungs
-are too few to tell."""
+"""The target lies between rungs; beyond the last; the first rung is below it already; it is never
+reached because of a bias; there are too few rungs."""
 
 
 class Line(NamedTuple):
@@ -34,7 +34,7 @@ class Line(NamedTuple):
 
 
 class Points(NamedTuple):
-    """A contestant's curve, of n rungs: samples, seconds and errors, with the standard errors of
+    """A method's curve, of n rungs: samples, seconds and errors, with the standard errors of
     the logarithms of the latter two and the degrees of freedom that those of the errors have; (n,)
     each but the last.  All errors are positive."""
 
@@ -86,10 +86,10 @@ def drawn(points: Points) -> tuple[FloatArray, FloatArray]:
 
 
 class Reached(NamedTuple):
-    """When a curve has come down to an error.
+    """Where a curve falls to an error.
 
-    log_seconds (DRAWS,): for each drawn curve, the measured one first;  how: for that one;  spp:
-    samples a pixel there.
+    log_seconds (DRAWS,): of each resampled curve, the measured one first;  how, spp (samples per
+    pixel): of the measured one.
     """
 
     log_seconds: FloatArray
@@ -199,17 +199,3 @@ def band(values: FloatArray) -> Estimate:
     # Quantiles that exist: infinities are not to be interpolated with.
     low, high = np.quantile(values, [tail, 1.0 - tail], method="inverted_cdf")
     return Estimate(float(values[0]), float(low), float(high))
-
-
-__all__ = [
-    "DRAWS",
-    "How",
-    "Line",
-    "Points",
-    "Reached",
-    "band",
-    "drawn",
-    "linear_time",
-    "log_line",
-    "time_to",
-]

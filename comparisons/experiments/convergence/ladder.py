@@ -1,4 +1,4 @@
-"""The ladder: replicates at each rung, contestants in turn, and what is stored of them."""
+"""The ladder: renders and stores the replicates of each rung; the methods take turns."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -7,29 +7,27 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from comparisons.experiments.convergence.contestants import AbsentError, Renderer
 from comparisons.experiments.convergence.data import Reference, Rung
 from comparisons.experiments.convergence.estimates import Accumulator, against
+from comparisons.experiments.convergence.methods import AbsentError, Renderer
 from comparisons.experiments.convergence.store import Store
+from reference_rt.rendering.render import Progress
 
 PATIENCE = 1.5
-"""Times its share of the time that a contestant may take, where a trial promised too much."""
+"""A method may take this many times its share of the time, if its trial was too fast."""
 
 STORED_EVERY = 15.0
-"""Seconds: what a kill can lose.  Ctrl-C loses no picture that is finished."""
-
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
+"""Seconds of work that a kill can lose.  Ctrl-C loses no finished picture."""
 
 
 @dataclass
 class Climb:
-    """One contestant on the ladder.
+    """One method on the ladder.
 
-    renderer: makes it ready, when first needed;  planned: its rungs;  share: its seconds;  apart:
-    whether its turn comes when the others are through with their rungs, since changing to it takes
-    time;  gathered: by samples asked for, what is done of them;  stopped: why not all are;  failed:
-    why it has no rungs at all.
+    renderer: prepares it when first needed;  planned: its rungs;  share: its seconds;  apart:
+    whether its turn comes after the others' rungs, because switching to it takes time;  gathered:
+    replicates so far, by requested samples;  stopped: why rungs were given up;  failed: why it has
+    no rungs at all.
     """
 
     renderer: Callable[[], Renderer]
@@ -42,12 +40,12 @@ class Climb:
 
     @property
     def rungs(self) -> list[Rung]:
-        """Those that are done, the lowest first."""
+        """The rungs with at least one replicate, the lowest first."""
         return [self.gathered[spp].rung() for spp in self.planned if self.gathered[spp].count]
 
     def add(self, spp: int, replicate: int) -> None:
-        """Render one more picture.  A contestant that cannot, or whose picture is not finite, gives
-        up all of its rungs."""
+        """Render one more picture.  A method that fails, or whose picture is not finite, loses all
+        its rungs."""
         try:
             shot = self.renderer()(spp, replicate)
         except AbsentError as error:
@@ -57,12 +55,12 @@ class Climb:
             if not bad:
                 self.gathered[spp].add(*shot)
                 return
-            self.failed = f"{bad} pixels of a picture of {spp} samples a pixel are not finite"
+            self.failed = f"{bad} pixels of a picture of {spp} samples per pixel are not finite"
         self.planned = ()
 
     def shorten(self, replicates: int) -> None:
-        """Give up the highest rungs where the pictures so far say that all replicates would take
-        PATIENCE times the share; two rungs stay, without which there is no curve."""
+        """Give up the highest rungs if all replicates would take more than PATIENCE times the
+        share, as extrapolated from those so far; two rungs stay, the minimum for a curve."""
         rungs = {spp: self.gathered[spp].rung() for spp in self.planned}
         taking = {spp: replicates * float(rung.warm.mean()) for spp, rung in rungs.items()}
         while len(taking) > 2 and sum(taking.values()) > PATIENCE * self.share:
@@ -70,8 +68,8 @@ class Climb:
             if self.gathered[highest].count >= replicates:
                 break
             self.stopped = (
-                f"rungs from {highest} samples a pixel: slower than the trial promised, "
-                f"{sum(taking.values()):.2g} s in all, and its share is {self.share:.2g} s"
+                f"rungs from {highest} samples per pixel: slower than in the trial, "
+                f"{sum(taking.values()):.2g} s in total, of a share of {self.share:.2g} s"
             )
             del taking[highest]
         self.planned = list(taking)
@@ -82,13 +80,13 @@ def climb(
     reference: Reference,
     replicates: int,
     store: Store,
-    say: Say = lambda what, fraction: None,
+    say: Progress = lambda what, fraction: None,
 ) -> None:
-    """Do what is planned and not stored, in sweeps: one picture of every rung of every contestant,
+    """Render what is planned and not stored, in sweeps: one picture of every rung of every method,
     then the next of each.
 
-    So each rung's pictures are spread over the whole run, and what disturbs the machine for a while
-    disturbs all contestants, and no rung's median.  What is done is stored, also when interrupted.
+    Each rung's pictures are thus spread over the whole run: a disturbance of the machine affects
+    all methods alike, and no rung's median.  Pictures are stored, after an interruption too.
     """
     for name, one in climbs.items():
         for spp in one.planned:
@@ -111,7 +109,7 @@ def climb(
             for name, spp in sweep:
                 one = climbs[name]
                 if one.gathered[spp].count <= k and not one.failed:
-                    # The numbers of other rungs' replicates are none of this one's.
+                    # No two rungs share replicate numbers, and hence seeds.
                     one.add(spp, spp * replicates + k)
                     changed.add((name, spp))
                 samples += spp
@@ -130,9 +128,6 @@ def climb(
 
 
 def _sweep(climbs: Mapping[str, Climb]) -> list[tuple[str, int]]:
-    """(contestant, samples): rung by rung, contestants in turn."""
+    """(method, samples): rung by rung, methods in turn."""
     pairs = [(name, spp) for name, one in climbs.items() for spp in one.planned]
     return sorted(pairs, key=lambda pair: (climbs[pair[0]].apart, pair[1]))
-
-
-__all__ = ["Climb", "climb"]

@@ -8,16 +8,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.findings import Findings, Target
 from comparisons.experiments.convergence.fits import Line
+from comparisons.report.results_json import plain
 from reference_rt.util.files import replacing
 
 SCHEMA = 1
-"""Raised whenever a reader of the former layout would misread the new one."""
+"""Increased whenever a reader of the former layout would misread the new one."""
 
 KIND = "convergence"
 
@@ -26,7 +25,7 @@ COLUMNS = (
     "seconds", "seconds_min", "seconds_max", "mse", "mse_low", "mse_high",
     "relmse", "relmse_low", "relmse_high", "relative_variance", "efficiency",
 )  # fmt: skip
-"""Of results.csv: one row for each contestant and rung.  A grid of a deterministic scene is a rung
+"""Of results.csv: one row for each method and rung.  A grid of a deterministic scene is a rung
 of ours with one replicate and neither bands nor variance."""
 
 
@@ -48,7 +47,7 @@ def write_results(
                          "bias" and "relative_bias": {"squared", "low", "high", "seen"},
                          "targets": [{"error", "how", "spp",
                                       "seconds": {"value", "low", "high"}}]}},
-                     "absent": {name of another contestant: why it has no findings},
+                     "absent": {name of another method: why it has no findings},
                      "ratios": {name: [{"error", "value", "low", "high", "extrapolated": whether a
                                         time lies beyond the measured rungs, "bound": "at most" or
                                         "at least" or "neither" where times of first rungs are
@@ -61,7 +60,7 @@ def write_results(
                      "problem": why there is nothing about the scene, "" for most}]}
 
     Bands hold the value with a confidence of 95 %; a squared bias lies above "low" with 99.99 % and
-    below "high" with 99 %.  "ratios" are ours over the contestant's.  Strict JSON (RFC 8259): NaN
+    below "high" with 99 %.  "ratios" are ours over the method's.  Strict JSON (RFC 8259): NaN
     and the infinities become null, so a null number says "undefined or unbounded".
     """
     document = {
@@ -85,21 +84,6 @@ def write_table(path: Path, curves: Sequence[Curves]) -> None:
             writer.writerows([_cell(value) for value in row] for row in _rows(one))
 
 
-def plain(value: Any) -> Any:
-    """What JSON can hold: lists, dicts, strings, finite numbers and None for others."""
-    match value:
-        case float() | np.floating():
-            return float(value) if math.isfinite(value) else None
-        case np.integer():
-            return int(value)
-        case Mapping():
-            return {str(key): plain(item) for key, item in value.items()}
-        case list() | tuple():
-            return [plain(item) for item in value]
-        case _:
-            return value
-
-
 def _scene(one: Curves) -> dict[str, Any]:
     reference = one.reference
     return {
@@ -114,7 +98,7 @@ def _scene(one: Curves) -> dict[str, Any]:
             "relmse": reference.relmse,
             "seconds": reference.seconds,
         },
-        "contestants": {name: _contestant(one, name) for name in one.findings},
+        "contestants": {name: _method(one, name) for name in one.findings},
         "absent": one.absent,
         "ratios": _ratios(one),
         "grids": None
@@ -144,12 +128,12 @@ def _scene(one: Curves) -> dict[str, Any]:
     }
 
 
-def _contestant(one: Curves, name: str) -> dict[str, Any]:
-    contestant, found = one.contestants[name], one.findings[name]
+def _method(one: Curves, name: str) -> dict[str, Any]:
+    method, found = one.methods[name], one.findings[name]
     return {
-        "title": contestant.title,
-        "sampler": contestant.sampler,
-        "side": contestant.side,
+        "title": method.title,
+        "sampler": method.sampler,
+        "side": method.side,
         "rungs": [
             {
                 "asked_spp": step.asked,
@@ -171,11 +155,11 @@ def _contestant(one: Curves, name: str) -> dict[str, Any]:
 
 
 def _slopes(found: Findings) -> dict[str, Any]:
-    def told(line: Line | None) -> Any:
+    def interval(line: Line | None) -> Any:
         return line and {"value": line.slope, "low": line.low, "high": line.high}
 
     return {
-        error: {over: told(line) for over, line in lines.items()}
+        error: {over: interval(line) for over, line in lines.items()}
         for error, lines in found.slopes.items()
     }
 
@@ -208,7 +192,7 @@ def _rows(one: Curves) -> Iterator[list[Any]]:
     for name, found in one.findings.items():
         for step in found.steps:
             yield [
-                one.scene, *one.size, name, one.contestants[name].sampler, step.asked, step.spp,
+                one.scene, *one.size, name, one.methods[name].sampler, step.asked, step.spp,
                 step.replicates, *step.seconds, *step.mse, *step.relmse, step.variance,
                 step.efficiency,
             ]  # fmt: skip
@@ -222,6 +206,3 @@ def _rows(one: Curves) -> Iterator[list[Any]]:
 
 def _cell(value: Any) -> Any:
     return "" if isinstance(value, float) and not math.isfinite(value) else plain(value)
-
-
-__all__ = ["COLUMNS", "KIND", "SCHEMA", "plain", "write_results", "write_table"]

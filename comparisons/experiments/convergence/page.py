@@ -1,7 +1,5 @@
 """One HTML page about error against time: offline, a single file, no script."""
 
-import base64
-import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
-from PIL import Image
 
 from comparisons.experiments.convergence.crops import Crops
 from comparisons.experiments.convergence.curves import Curves
@@ -20,19 +17,20 @@ from comparisons.experiments.convergence.fits import Line
 from comparisons.experiments.convergence.starts import STAGES
 from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template, write
+from comparisons.report.thumbnails import png_url
 from comparisons.report.values import percent, shown
 from comparisons.statistics.metrics import encode, white_level
 from reference_rt.core.arrays import FloatArray
 
 SECONDS = "render time of a picture, s"
-SAMPLES = "samples a pixel"
+SAMPLES = "samples per pixel"
 
 LOWEST = 1e-3
-"""Of the lowest point of a curve: what lies further below would leave no room for the curve."""
+"""Points below this fraction of a curve's lowest point are not drawn, to leave it room."""
 
 
 class Cell(NamedTuple):
-    """Of a table: what is said, what in small type beside it, and a class for its look."""
+    """A table cell: its text, text in small type, and a CSS class."""
 
     text: str
     small: str = ""
@@ -43,7 +41,7 @@ def write_page(
     path: Path, curves: Sequence[Curves], settings: Settings, provenance: Mapping[str, Any]
 ) -> None:
     """Write the page about `curves`, at once or not at all; all text is escaped."""
-    page = template("convergence.html.jinja").render(
+    page = template("convergence.html.jinja", "experiments/convergence").render(
         provenance=provenance,
         settings=settings,
         targets=[percent(target) for target in settings.targets],
@@ -55,12 +53,12 @@ def write_page(
 
 
 def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
-    """Ours against each other contestant at one target, scene by scene, and the medians."""
+    """Ours against each other method at one target, scene by scene, and the medians."""
     targets = list(settings.targets)
     if not targets:
         return {"target": "", "columns": [], "rows": [], "medians": [], "absent": []}
     place = targets.index(0.01) if 0.01 in targets else len(targets) - 1
-    titles = {name: c.title for one in curves for name, c in one.contestants.items()}
+    titles = {name: c.title for one in curves for name, c in one.methods.items()}
     names = [name for name in titles if name != "ours"]
     rows = []
     known: dict[str, list[Ratio]] = {name: [] for name in names}
@@ -80,20 +78,20 @@ def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
 
 
 def _instead(one: Curves) -> str:
-    """What is said of a scene that has no ladder."""
+    """The text in place of the ratios of a scene that has no ladder."""
     if one.problem:
         return one.problem
     if one.grids is None:
         return ""
-    return "; ".join(["deterministic: a grid of samples, no ladder", *one.left_out])
+    return "; ".join(["deterministic: grids of samples instead of rungs", *one.left_out])
 
 
 def _without_ratio(one: Curves, name: str) -> Cell:
-    """Of a scene and a contestant one of which was not asked for, or has no data."""
+    """The cell of a scene in which the method, or ours, was not requested or has no data."""
     who = next((n for n in ("ours", name) if n in one.absent), None)
     if who is None:
-        return Cell("–", "ours is not there" if name in one.findings else "not asked for")
-    return Cell("no data", "of ours" if who == "ours" else "see below", "bad")
+        return Cell("–", "ours not measured" if name in one.findings else "not requested")
+    return Cell("no data", "for ours" if who == "ours" else "see below", "bad")
 
 
 def _median(ratios: Sequence[Ratio]) -> Cell:
@@ -103,10 +101,10 @@ def _median(ratios: Sequence[Ratio]) -> Cell:
         return Cell("–")
     extrapolated = sum(ratio.extrapolated for ratio in ratios if ratio.times is not None)
     scenes = f"of {len(values)} scene{'s' if len(values) != 1 else ''}"
-    told = [scenes, *([f"{extrapolated} extrapolated"] if extrapolated else [])]
+    parts = [scenes, *([f"{extrapolated} extrapolated"] if extrapolated else [])]
     median = float(np.median(values))
     look = "extrapolated" if extrapolated else ""
-    return Cell(f"{median:.2f}" if math.isfinite(median) else "∞", ", ".join(told), look)
+    return Cell(f"{median:.2f}" if math.isfinite(median) else "∞", ", ".join(parts), look)
 
 
 def _view(one: Curves) -> dict[str, Any]:
@@ -118,7 +116,7 @@ def _view(one: Curves) -> dict[str, Any]:
         view["plots"] = _ladder_plots(one)
         view["crops"] = [_crops(one, crops, white) for crops in one.crops]
         view["reference"] = (
-            f"{one.reference.count} pictures of {one.reference.spp:,} samples a pixel; its own "
+            f"{one.reference.count} pictures of {one.reference.spp:,} samples per pixel; its own "
             f"noise, relative error {percent(math.sqrt(max(one.reference.relmse, 0.0)))}, "
             "is subtracted"
         )
@@ -128,7 +126,7 @@ def _view(one: Curves) -> dict[str, Any]:
     ratios = one.ratios()
     view["targets"] = [
         (
-            one.contestants[name].title,
+            one.methods[name].title,
             [_reached(target) for target in found.targets],
             [_ratio(ratio) for ratio in ratios[name]] if name in ratios else None,
         )
@@ -136,7 +134,7 @@ def _view(one: Curves) -> dict[str, Any]:
     ]
     view["laws"] = [
         (
-            one.contestants[name].title,
+            one.methods[name].title,
             [
                 _slope(found.slopes["relmse"]["spp"]),
                 _slope(found.slopes["relmse"]["seconds"]),
@@ -162,12 +160,12 @@ def _ladder_plots(one: Curves) -> list[Markup]:
     for name, text, marks in (("relmse", "E[relMSE]", levels), ("mse", "E[MSE]", {})):
         for over, x_label in (("seconds", SECONDS), ("spp", SAMPLES)):
             curves = []
-            for number, (contestant, found) in enumerate(one.findings.items()):
+            for number, (method, found) in enumerate(one.findings.items()):
                 bands = [getattr(step, name) for step in found.steps]
                 x = [s.seconds.value if over == "seconds" else s.spp for s in found.steps]
                 curves.append(
                     Curve(
-                        one.contestants[contestant].title,
+                        one.methods[method].title,
                         x,
                         [band.value for band in bands],
                         [band.low for band in bands],
@@ -223,7 +221,7 @@ def _seconds(value: float) -> str:
 
 
 def _ratio(found: Ratio) -> Cell:
-    """Green or red only where what was measured says so."""
+    """A ratio; green or red only if the measured band excludes 1."""
     times = found.times
     if times is None:
         return Cell("–", found.why)
@@ -231,13 +229,13 @@ def _ratio(found: Ratio) -> Cell:
     if times.low == times.high:
         return Cell("0" if times.value == 0.0 else "∞", "bias", look)
     sign = {"at most": "≤ ", "at least": "≥ ", "neither": "≈ ", "": ""}[found.bound]
-    told = [f"{times.low:.2f} to {times.high:.2f}"]
+    parts = [f"{times.low:.2f} to {times.high:.2f}"]
     if found.bound:
-        told.insert(0, "first rungs" if found.bound == "neither" else "first rung")
+        parts.insert(0, "first rungs" if found.bound == "neither" else "first rung")
     if found.extrapolated:
         sign, look = sign or "≈ ", "extrapolated"
-        told.insert(0, "extrapolated")
-    return Cell(f"{sign}{times.value:.2f}", ", ".join(told), look)
+        parts.insert(0, "extrapolated")
+    return Cell(f"{sign}{times.value:.2f}", ", ".join(parts), look)
 
 
 def _slope(line: Line | None) -> Cell:
@@ -253,10 +251,10 @@ def _bias(bias: Bias) -> Cell:
     if bias.is_seen:
         return Cell(
             percent(math.sqrt(bias.squared)),
-            f"seen; {percent(math.sqrt(bias.low))} to {most}",
+            f"significant; {percent(math.sqrt(bias.low))} to {most}",
             "bad",
         )
-    return Cell(f"< {most}", "not seen")
+    return Cell(f"< {most}", "not significant")
 
 
 # ---- pictures -----------------------------------------------------------------------------------
@@ -269,7 +267,7 @@ def _crops(one: Curves, crops: Crops, white: float) -> dict[str, Any]:
     figures = [("the reference", "", one.reference.mean)]
     for name, found in crops.shown.items():
         caption = f"{found.spp:,} samples, {_seconds(found.seconds)}, {percent(found.error)}"
-        figures.append((one.contestants[name].title, caption, found.picture))
+        figures.append((one.methods[name].title, caption, found.picture))
     return {
         "title": f"About {_seconds(crops.level)} each"
         if crops.kind == "time"
@@ -284,10 +282,4 @@ def _crops(one: Curves, crops: Crops, white: float) -> dict[str, Any]:
 
 def _png(picture: FloatArray, white: float) -> str:
     """The data: URL of a picture, exposed for `white`."""
-    pixels = np.rint(255.0 * encode(np.nan_to_num(picture), white)).astype(np.uint8)
-    stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, "PNG", optimize=True)
-    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
-
-
-__all__ = ["write_page"]
+    return png_url(255.0 * encode(np.nan_to_num(picture), white))

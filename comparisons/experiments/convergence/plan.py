@@ -1,10 +1,10 @@
-"""How far each contestant climbs within the time, from what a few pictures of it take."""
+"""Plans the rungs of each method within the time limit, from the times of a few pictures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from comparisons.experiments.convergence.contestants import Renderer
 from comparisons.experiments.convergence.data import FIRST, Settings
+from comparisons.experiments.convergence.methods import Renderer
 
 TRIALS = (FIRST, 4 * FIRST)
 """Samples a pixel of the pictures that costs are estimated from."""
@@ -18,7 +18,7 @@ MOST_SAMPLES = (1 << 32) - 1
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds of a picture are start + per_sample times the samples a pixel."""
+    """Seconds of a picture: start + per_sample * samples per pixel."""
 
     start: float
     per_sample: float
@@ -74,27 +74,16 @@ def why_left_out(
     pixels: int,
     factor: int = 2,
 ) -> str:
-    """Why the rung after the last one is not climbed; empty where it was not asked for."""
+    """Why the rung after the last planned one is not rendered; "" if it is above max_spp."""
     following = [spp for spp in rungs(settings.max_spp, factor) if spp not in planned]
     if not following:
         return ""
     spp = following[0]
     if spp * pixels > MOST_SAMPLES:
-        return f"rungs from {spp} samples a pixel: more than {MOST_SAMPLES:,} samples in a picture"
+        return f"rungs from {spp} samples per pixel: over {MOST_SAMPLES:,} samples in a picture"
     spent = sum(cost.rung(done, settings.replicates) for done in planned)
     return (
-        f"rungs from {spp} samples a pixel: {settings.replicates} pictures would take "
+        f"rungs from {spp} samples per pixel: {settings.replicates} pictures would take "
         f"{cost.rung(spp, settings.replicates):.2g} s, and {max(0.0, share - spent):.2g} s of its "
         f"{share:.2g} s are left"
     )
-
-
-__all__ = [
-    "MOST_SAMPLES",
-    "TRIAL_SEED",
-    "Cost",
-    "affordable",
-    "estimate",
-    "rungs",
-    "why_left_out",
-]

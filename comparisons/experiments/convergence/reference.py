@@ -1,8 +1,7 @@
-"""What errors are measured against: our own rendering of the scene, kept in the user's cache."""
+"""The reference of errors: our own rendering of the scene, kept in the user's cache."""
 
 import hashlib
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.reference import cache_folder
 from comparisons.results.sealed import read_arrays, write_arrays
 from reference_rt.core.arrays import FloatArray
-from reference_rt.rendering.render import render
+from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Sobol
 from reference_rt.util.errors import ImageError
@@ -22,20 +21,17 @@ COUNT = 16
 """Independent pictures: the variance of their mean is then known pixel by pixel to one part in
 three, and over thousands of pixels far better."""
 
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
-
 
 def key_of(scene: Scene) -> str:
-    """Of the scene, its size and filter included, and of our source."""
+    """The cache key: a hash of the scene, including size and filter, and of our sources."""
     text = f"convergence 1 {scene_digest(scene)} {source_digest()} {COUNT}"
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def reference_of(scene: Scene, spp: int, say: Say = lambda what, fraction: None) -> Reference:
-    """COUNT pictures of at least `spp` Sobol' samples a pixel.
+def reference_of(scene: Scene, spp: int, say: Progress = lambda what, fraction: None) -> Reference:
+    """COUNT pictures of at least `spp` Sobol' samples per pixel, with seeds that no method uses.
 
-    What the cache has is taken, and added to where it is less.  Seeds are none of a contestant's.
+    Cached pictures are used, and samples are added to them if they have fewer.
     """
     key = key_of(scene)
     path = cache_folder() / f"{key[:40]}.npz"
@@ -60,8 +56,7 @@ def reference_of(scene: Scene, spp: int, say: Say = lambda what, fraction: None)
 
 
 def _load(path: Path, size: tuple[int, ...]) -> tuple[FloatArray, int, int]:
-    """Pictures, their samples a pixel and in how many rounds; zeros where there is nothing that can
-    be used."""
+    """Cached pictures, their samples per pixel and number of rounds; zeros if none can be used."""
     with suppress(KeyError):
         kept = read_arrays(path)
         pictures, spp, rounds = kept["pictures"], int(kept["spp"]), int(kept["rounds"])
@@ -73,6 +68,3 @@ def _load(path: Path, size: tuple[int, ...]) -> tuple[FloatArray, int, int]:
 def _save(path: Path, pictures: FloatArray, spp: int, rounds: int) -> None:
     with suppress(ImageError, OSError):
         write_arrays(path, pictures=pictures, spp=spp, rounds=rounds)
-
-
-__all__ = ["COUNT", "key_of", "reference_of"]

@@ -1,9 +1,9 @@
-"""Which of Mitsuba's samplers is the best for a scene: the least variance times time."""
+"""Finds Mitsuba's best sampler for a scene: the one with the least variance times time."""
 
 import numpy as np
 
-from comparisons.experiments.convergence.contestants import Contestant, Shot, Stable, with_sampler
 from comparisons.experiments.convergence.data import size_within, weights
+from comparisons.experiments.convergence.methods import Method, Shot, Stable, with_sampler
 from reference_rt.rendering.scene import Scene
 
 CANDIDATES = ("independent", "multijitter", "ldsampler", "orthogonal")
@@ -21,14 +21,14 @@ PICTURES = 5
 """Of each: the first compiles; the variance is known to a few percent over all pixels."""
 
 
-def merits(scene: Scene, contestant: Contestant) -> dict[str, float]:
-    """Relative variance times seconds by sampler, of the contestant's side of Mitsuba; the least is
+def merits(scene: Scene, method: Method) -> dict[str, float]:
+    """Relative variance times seconds by sampler, of the method's side of Mitsuba; the least is
     the best.  Raises as `Stable.ready` does."""
     width, height = size_within(scene.film, WIDEST)
     film = scene.film.model_copy(update={"width": width, "height": height})
     shots: dict[str, list[Shot]] = {name: [] for name in CANDIDATES}
     with Stable(scene.changed(film=film)) as stable:
-        renderers = {name: stable.ready(with_sampler(contestant, name)) for name in CANDIDATES}
+        renderers = {name: stable.ready(with_sampler(method, name)) for name in CANDIDATES}
         for k in range(PICTURES):  # in turn: what disturbs the machine disturbs all
             for name, renderer in renderers.items():
                 shots[name].append(renderer(SPP, k))
@@ -40,6 +40,3 @@ def merits(scene: Scene, contestant: Contestant) -> dict[str, float]:
         )
         for name, taken in shots.items()
     }
-
-
-__all__ = ["CANDIDATES", "SPP", "merits"]

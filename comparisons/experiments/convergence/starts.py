@@ -1,4 +1,4 @@
-"""How long processes take until their first picture, by stage, with caches empty and full."""
+"""Time of a process from its start to its first picture, by stage, with empty and full caches."""
 
 import json
 import os
@@ -6,14 +6,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import platformdirs
 
-from comparisons.experiments.convergence.contestants import Contestant
+from comparisons.experiments.convergence.methods import Method
 from comparisons.experiments.convergence.store import Store
 from comparisons.mitsuba.backend import LIBRARY, LLVM, backend
+from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.child_processes import tied
 
@@ -21,25 +22,22 @@ STAGES = ("start", "load", "build", "compile", "render")
 """start: the interpreter and what it imports;  load: the scene's file read, for Mitsuba also
 translated;  build: tables and hierarchy, or `mitsuba.load_dict`;  compile: kernels compiled, or
 read from the cache; of Mitsuba what the first picture takes more than the second;  render: the
-second picture, with 16 samples a pixel."""
+second picture, with 16 samples per pixel."""
 
 SPP = 16
 
 TIMEOUT = 300.0
-"""Seconds: compiling takes ten, on a machine that others keep busy a few times that."""
-
-Say = Callable[[str, float], None]
-"""Is told what is being done, and the fraction of it that is done."""
+"""Time limit in seconds: compiling takes 10 s, a few times that on a busy machine."""
 
 
 def starts_of(
-    scene: Scene, contestants: Iterable[Contestant], store: Store, say: Say
+    scene: Scene, methods: Iterable[Method], store: Store, say: Progress
 ) -> dict[str, dict[str, dict[str, float]]]:
-    """Seconds by side, "cold" or "warm", and stage; nothing of a side whose processes failed.
+    """Seconds by side, "cold" or "warm", and stage; a side whose processes failed has none.
 
-    Cold are the caches of compiled kernels alone: the system has the programs' files in memory.
+    "cold" means empty caches of compiled kernels; the program files are in the system's file cache.
     """
-    sides = list(dict.fromkeys(contestant.side for contestant in contestants))
+    sides = list(dict.fromkeys(method.side for method in methods))
     found: dict[str, dict[str, dict[str, float]]] = {}
     for number, side in enumerate(sides):
         say("starts of processes", number / len(sides))
@@ -96,6 +94,3 @@ def _child(
     except (subprocess.SubprocessError, ValueError, IndexError):
         return None
     return {stage: float(times[stage]) for stage in STAGES}
-
-
-__all__ = ["SPP", "STAGES", "starts_of"]

@@ -1,4 +1,4 @@
-"""Finished rungs in a folder: what is done is not done again."""
+"""Stores finished rungs in a folder, so that they are not rendered again."""
 
 import hashlib
 import importlib.metadata
@@ -21,17 +21,17 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_text, replacing
 
 SCHEMA = 2
-"""Raised whenever what is stored, or what it means, changes."""
+"""Increased whenever what is stored, or its meaning, changes."""
 
 _ARRAYS = ("seconds", "mse", "relmse", "mean", "variance")
-"""Of a rung, in the order of its fields, after the two numbers."""
+"""The array fields of a rung, in order, after the two numbers."""
 
 _PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
 
 
 def run_key(scene: Scene, replicates: int) -> str:
-    """SHA-256 of all that rungs depend on: the scene as it is rendered and its files, our sources,
-    the versions of what computes, the machine, and how many replicates there are."""
+    """SHA-256 of all that rungs depend on: the scene as rendered and its files, our sources, the
+    versions of packages that compute, the machine, and the number of replicates."""
     chosen = backend()
     parts = {
         "schema": SCHEMA,
@@ -48,9 +48,9 @@ def run_key(scene: Scene, replicates: int) -> str:
 
 
 class Store:
-    """Rungs, and small facts by name, of one scene; everything of another key is deleted.
+    """Rungs, and small facts by name, of one scene.  Contents with another key are deleted.
 
-    folder: None keeps nothing.
+    folder: None stores nothing.
     """
 
     def __init__(self, folder: Path | None, key: str, *, fresh: bool = False) -> None:
@@ -61,17 +61,17 @@ class Store:
 
     # ---- rungs ----------------------------------------------------------------------------------
 
-    def rung(self, contestant: str, asked: int) -> Rung | None:
+    def rung(self, method: str, asked: int) -> Rung | None:
         """The stored one; None where there is none, or none that can be read."""
         if self._folder is None:
             return None
-        kept = read_arrays(self._rung_path(contestant, asked))
+        kept = read_arrays(self._rung_path(method, asked))
         with suppress(KeyError):
             arrays = [np.asarray(kept[name], np.float64) for name in _ARRAYS]
             return Rung(int(kept["asked"]), int(kept["spp"]), *arrays)
         return None
 
-    def keep(self, contestant: str, rung: Rung) -> None:
+    def keep(self, method: str, rung: Rung) -> None:
         """Store a rung, whole or not at all; its pictures as float32, whose rounding is far below
         their noise.  Raises ImageError where the folder cannot be written."""
         if self._folder is None:
@@ -79,12 +79,12 @@ class Store:
         arrays: dict[str, Any] = {name: getattr(rung, name) for name in _ARRAYS}
         for name in ("mean", "variance"):
             arrays[name] = arrays[name].astype(np.float32)
-        path = self._rung_path(contestant, rung.asked)
+        path = self._rung_path(method, rung.asked)
         write_arrays(path, asked=rung.asked, spp=rung.spp, **arrays)
 
-    def _rung_path(self, contestant: str, asked: int) -> Path:
+    def _rung_path(self, method: str, asked: int) -> Path:
         assert self._folder is not None
-        return self._folder / f"{contestant}-{asked}.npz"
+        return self._folder / f"{method}-{asked}.npz"
 
     # ---- pictures -------------------------------------------------------------------------------
 
@@ -127,6 +127,3 @@ class Store:
         if self._folder is not None:
             with replacing(self._folder / f"{name}.json") as temporary:
                 temporary.write_text(json.dumps(sealed({"value": value})), encoding="utf-8")
-
-
-__all__ = ["Store", "run_key"]

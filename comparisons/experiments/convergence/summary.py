@@ -1,4 +1,4 @@
-"""Curves in a few lines for a terminal, and the command that makes them again."""
+"""Curves in a few lines for a terminal, and the command that repeats them."""
 
 import shlex
 from pathlib import Path
@@ -10,32 +10,32 @@ from comparisons.report.values import percent
 
 
 def lines_of(curves: Curves) -> list[str]:
-    """A line for each contestant, or grid of samples, and for what was left out."""
+    """A line for each method, or grid of samples, and for what was not measured."""
     if curves.problem:
         return [f"{curves.scene}: {curves.problem}"]
     lines = []
     ratios = curves.ratios()
     for name, found in curves.findings.items():
-        times = ", ".join(f"{percent(target.error)} {_told(target)}" for target in found.targets)
+        times = ", ".join(f"{percent(target.error)} {_time(target)}" for target in found.targets)
         known = [_against(r) for r in ratios.get(name, []) if r.times is not None]
         against = f"; ours / this: {', '.join(known)}" if known else ""
         lines.append(f"{name}: {times}{against}")
-    lines += [f"no data of {line}" for line in curves.missing]
+    lines += [f"no data for {line}" for line in curves.missing]
     if curves.grids is not None:
         lines += [
             f"ours, {step.spp} samples: {percent(step.relmse**0.5)} in {step.seconds:.3g} s"
             for step in curves.grids.steps
         ]
         lines += [
-            f"Mitsuba {point.variant}, {point.spp} samples: {percent(point.relmse**0.5)} from ours "
-            f"in {point.seconds:.3g} s"
+            f"Mitsuba {point.variant}, {point.spp} samples: {percent(point.relmse**0.5)} against "
+            f"ours in {point.seconds:.3g} s"
             for point in curves.grids.points
         ]
-    lines += [f"left out: {line}" for line in curves.left_out]
+    lines += [f"not measured: {line}" for line in curves.left_out]
     return [f"{curves.scene}: {line}" for line in lines]
 
 
-def _told(target: Target) -> str:
+def _time(target: Target) -> str:
     seconds = f"{target.seconds.value:.3g} s"
     match target.how:
         case "bias":
@@ -51,13 +51,13 @@ def _told(target: Target) -> str:
 
 def _against(ratio: Ratio) -> str:
     assert ratio.times is not None
-    told = f"{ratio.times.value:.2f}"
+    text = f"{ratio.times.value:.2f}"
     match ratio.bound:
         case "at most" | "at least":
-            told = f"{ratio.bound} {told}"
+            text = f"{ratio.bound} {text}"
         case "neither":
-            told += " (first rungs)"
-    return f"{told} (extrapolated)" if ratio.extrapolated else told
+            text += " (first rungs)"
+    return f"{text} (extrapolated)" if ratio.extrapolated else text
 
 
 def again(path: Path, out: Path, settings: Settings) -> str:
@@ -71,6 +71,3 @@ def again(path: Path, out: Path, settings: Settings) -> str:
     for name in settings.only:
         command += ["--only", name]
     return shlex.join(command if settings.starts else [*command, "--no-starts"])
-
-
-__all__ = ["again", "lines_of"]

@@ -10,10 +10,10 @@ from comparisons.experiments.methods.wording import QUIET
 from comparisons.report.plots import Curve, log_log
 
 FLOOR = 0.1
-"""Of errors in u, on axes that know no zero."""
+"""Errors below this, in u, are drawn here, because a logarithmic axis has no zero."""
 
 VARIES = 1.3
-"""Times are drawn against x where they change by this factor and more."""
+"""Times are drawn against x where they change by at least this factor."""
 
 WIDE, NARROW = (5.2, 4.0), (4.6, 3.6)
 """Inches."""
@@ -43,7 +43,7 @@ def of_family(rows: Sequence[Row]) -> list[str]:
 
 
 def _points(some: Sequence[Row], every: Sequence[Row], y: Callable[[Row], float]) -> list[Curve]:
-    """Points without lines, in the colours that the methods have everywhere."""
+    """Points without lines; a method has the same colour in all plots."""
     curves = []
     for number, method in enumerate(methods_of(every)):
         for place, row in enumerate(of_method(some, method)):
@@ -53,7 +53,7 @@ def _points(some: Sequence[Row], every: Sequence[Row], y: Callable[[Row], float]
 
 
 def of_series(rows: Sequence[Row]) -> list[str]:
-    """Against x: errors that are not all small, wrong answers where there are any, times where they
+    """Plots against x: errors unless all are small, wrong answers if there are any, times if they
     change."""
     if not rows[0].axis:
         return []
@@ -117,10 +117,10 @@ def _varies(rows: Sequence[Row]) -> bool:
 
 
 def _surely(row: Row) -> float:
-    """The share of answers that are wrong and no ties."""
+    """The share of wrong answers, without ties."""
     return (row.errors.wrong - row.errors.ties) / max(row.errors.decided, 1)
 
 
 def _least(rows: Sequence[Row]) -> float:
-    """Where none is drawn: at half a ray."""
+    """Where a share of zero is drawn: at half a ray."""
     return 0.5 / float(np.max([row.errors.decided for row in rows]))

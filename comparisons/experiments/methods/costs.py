@@ -1,4 +1,4 @@
-"""What the methods' own docstrings say they cost and where they fail."""
+"""Operation counts and known failures of the methods, parsed from their docstrings."""
 
 import re
 from types import ModuleType
@@ -12,7 +12,7 @@ MODULES: dict[str, ModuleType] = {
     "polygon": polygon,
     "csg": csg,
 }
-"""By family; the hierarchies share one kernel and have no such docstring."""
+"""By family; acceleration structures share one kernel and have no such docstring."""
 
 
 def stated(method: str) -> dict[str, str]:

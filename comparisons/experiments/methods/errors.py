@@ -13,29 +13,29 @@ U = 2.0**-53
 """Unit roundoff: half a unit in the last place of 1."""
 
 PIXEL = 1e-3
-"""A hit is misplaced if it is off by this share of the shape's size: a pixel, where the shape fills
-a picture of 1000."""
+"""A hit is misplaced if it is off by more than this share of the shape's size: a pixel, where the
+shape fills a picture 1000 pixels wide."""
 
 NEIGHBOURS = 4
-"""Units in the last place by which each number of a ray is moved, at most, to see whether the exact
-answer hangs on them: the methods round each some four times before it decides."""
+"""Units in the last place by which each component of a ray is perturbed, at most, to see whether
+that changes the exact answer: the methods round each component about four times."""
 
 MOVES = 32
-"""Rays tried in place of one: a fence on the far side of which one moved ray in seven falls is
-overlooked once in 100 times."""
+"""Perturbed rays per ray: where one in seven of them changes the answer, all of them fail to show
+it once in 100 times."""
 
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Of `checked` rays, less those that run exactly through an edge (`touching`):
+    """Counts over `checked` rays, without those that go exactly through an edge (`touching`).
 
-    lost: hits reported as misses;  false: misses reported as hits;  misplaced: hits off by more
-    than PIXEL of the size;  ties: of all these, rays whose exact answer is another within a few
-    units in the last place (`NEIGHBOURS`);  hits: exact ones;  median, p99, worst: |t - exact| of
-    rays that both hit, in u (|t| + size / |d|), or u |t| where the series says so; None where there
-    are none.
+    hits: exact hits;  lost: hits reported as misses;  false: misses reported as hits;  misplaced:
+    hits off by more than PIXEL of the size;  ties: of these three, rays whose exact answer changes
+    if they are perturbed by a few units in the last place (`NEIGHBOURS`);  median, p99, worst:
+    |t - exact| where both are hits, in u (|t| + size / |d|), or u |t| in a relative series; None
+    without such rays.
     """
 
     checked: int
@@ -59,7 +59,7 @@ class Errors:
 
     @property
     def share(self) -> float:
-        """Of wrong answers."""
+        """The fraction of wrong answers."""
         return self.wrong / self.decided if self.decided else 0.0
 
     @property
@@ -68,7 +68,7 @@ class Errors:
 
 
 def share_interval(k: int, n: int) -> tuple[float, float]:
-    """Where a share lies of which k in n were seen: Clopper and Pearson's, of 95 %."""
+    """The 95 % confidence interval of a proportion, k of n seen (Clopper and Pearson)."""
     tail = 0.5 * (1.0 - CONFIDENCE)
     low = float(stats.beta.ppf(tail, k, n - k + 1)) if k else 0.0
     high = float(stats.beta.ppf(1.0 - tail, k + 1, n - k)) if k < n else 1.0
@@ -76,19 +76,19 @@ def share_interval(k: int, n: int) -> tuple[float, float]:
 
 
 def truth(family: Family, trial: Trial, o: FloatArray, d: FloatArray) -> Truth:
-    """The first over all parts."""
+    """The exact first hit over all parts."""
     found = [family.exact(part, o, d) for part in trial.ideal or trial.parts]
     t = np.min([np.asarray(f.t) for f in found], axis=0)
     touching = np.any([f.touching for f in found], axis=0)
     if len(found) > 1:
-        # Neighbours share edges: a ray exactly through one meets both, at one t, and is a hit.
+        # A ray exactly through an edge that two parts share hits both at the same t: it is a hit.
         touching = touching & (t == NEVER)
     return Truth(np.asarray(t, dtype=object), np.asarray(touching))
 
 
 @dataclass(frozen=True)
 class Checked:
-    """Rays of one trial with the truth about them."""
+    """Rays of one trial with their exact answers."""
 
     family: Family
     trial: Trial
@@ -107,7 +107,7 @@ class Checked:
         return np.asarray(self.trial.size / np.linalg.norm(self.d, axis=1))
 
     def judge(self, t: FloatArray) -> "Judged":
-        """What is wrong with these answers."""
+        """Compare a method's answers t (n,), inf for a miss, with the exact ones."""
         there, found = self.truth.t != NEVER, np.isfinite(t)
         sure = ~self.truth.touching
         both = there & found
@@ -124,7 +124,7 @@ class Checked:
         )
 
     def ties(self, rays: BoolArray, rng: np.random.Generator) -> BoolArray:
-        """Which of these rays (n,) sit on a fence."""
+        """Which of these rays (n,) are ties: their exact answer changes if they are perturbed."""
         which = np.flatnonzero(rays)
         fence = np.zeros(len(rays), bool)
         if len(which) == 0:
@@ -143,7 +143,7 @@ class Checked:
 
 @dataclass(frozen=True)
 class Judged:
-    """lost, false, misplaced (n,): see `Errors`;  units: errors of those that both hit."""
+    """lost, false, misplaced (n,): see `Errors`;  units: errors where both are hits."""
 
     lost: BoolArray
     false: BoolArray
@@ -158,7 +158,7 @@ class Judged:
 def measure(
     checked: list[Checked], answer: Callable[[Trial, int], FloatArray], seed: int
 ) -> Errors:
-    """Errors of a method: `answer(trial, n)` is what it says about the first n rays."""
+    """Errors of a method; `answer(trial, n)` returns its t for the first n rays of a trial."""
     rng = np.random.default_rng(seed)
     judged = [part.judge(answer(part.trial, len(part.o))) for part in checked]
     ties = sum(
@@ -182,18 +182,18 @@ def measure(
 
 
 def _moved(rng: np.random.Generator, values: FloatArray) -> FloatArray:
-    """Each number but zeros moved by a few units in its last place."""
+    """`values`, each perturbed by a few units in the last place; zeros stay."""
     steps = rng.integers(-NEIGHBOURS, NEIGHBOURS + 1, values.shape)
     return np.asarray(np.where(values == 0.0, values, values + steps * np.spacing(values)))
 
 
 def float_of(fixed: int) -> float:
-    """The nearest."""
+    """The nearest float64."""
     return fixed / (1 << FRACTION)
 
 
 def _distance(t: FloatArray, exact: Fixed) -> FloatArray:
-    """|t - exact|; the difference is taken before it is rounded."""
+    """|t - exact|, rounded once: the difference itself is exact."""
     one = 1 << FRACTION
     found = []
     for value, fixed in zip(t.tolist(), exact.tolist(), strict=True):

@@ -1,7 +1,8 @@
-"""Solids: ever more operands, and faces that coincide.
+"""CSG solids: more and more operands, and coincident faces.
 
-The coincident faces are planes of numbers of few bits under a shear by integers, whose inverse is
-one of integers too: the tables hold them exactly, and a film between them is rounding alone.
+The coincident faces are planes with coordinates of few bits under a shear with integer entries,
+whose inverse has integer entries too: the tables hold them exactly, and a film that a method leaves
+between them is its own rounding error.
 """
 
 from typing import Any
@@ -9,21 +10,14 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import (
-    Draw,
-    Family,
-    FloatArray,
-    Series,
-    Trial,
-    Truth,
-    powers,
-    unit_vectors,
-)
+from comparisons.experiments.methods.setting import Draw, Family, Trial, Truth, powers
+from comparisons.experiments.methods.vectors import unit_vectors
 from comparisons.geometry.exact.dyadic import NEVER
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.sizes import ShapeSizes
 from reference_rt import textbook
 from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import CsgParameters, Method, SceneParameters
 
 SHEAR = ((1.0, 1.0, -1.0, 0.0), (0.0, 1.0, 1.0, 0.0), (0.0, 0.0, 1.0, 0.0))
@@ -32,10 +26,10 @@ SHEAR = ((1.0, 1.0, -1.0, 0.0), (0.0, 1.0, 1.0, 0.0), (0.0, 0.0, 1.0, 0.0))
 RENDERS = textbook.METHODS["hierarchy.none"]
 
 SHAPES = 8
-"""Rotations of the turned box."""
+"""Rotations of the rotated box."""
 
 CHECKED = 2000
-"""Rays of a setting that exact arithmetic is asked, at most: some 0.3 ms each."""
+"""Rays of a setting that are checked by exact arithmetic, at most: 0.3 ms each."""
 
 
 def _prepare_renderer(parameters: CsgParameters) -> Any:
@@ -45,7 +39,7 @@ def _prepare_renderer(parameters: CsgParameters) -> Any:
 EVENTS = Method(
     "csg.renderer",
     "T12",
-    "crossings one after another, near ones at once: what renders",
+    "crossings in order, near ones at once: the renderer's own",
     "reference_rt.accel.csg.evaluate",
     CsgParameters,
     _prepare_renderer,
@@ -59,6 +53,9 @@ def exact(parameters: CsgParameters, o: FloatArray, d: FloatArray) -> Truth:
     return Truth(t, np.array([truth.touching for truth in truths]))
 
 
+CSG = Family("csg", exact, (EVENTS,), lambda _, wanted: min(wanted, CHECKED))
+
+
 def _vector(center: FloatArray) -> tuple[float, float, float]:
     x, y, z = center.tolist()
     return x, y, z
@@ -69,8 +66,10 @@ def _turn(rng: np.random.Generator) -> transform.Rotate:
     return transform.Rotate(rotate=transform.Turn(axis=axis, degrees=rng.uniform(0.0, 360.0)))
 
 
+@CSG.sweep("operands", "operands", powers(1, 2, 3, 4, 5, 6, base=2.0), extreme=32.0)
 def operands(draw: Draw, number: float) -> list[Trial]:
-    """Spheres and turned boxes in a unit ball: half of them together, without the other half."""
+    """Spheres and rotated boxes in a unit ball: the union of half of them minus the other half;
+    camera rays from all around."""
     shapes: list[Any] = []
     rng = draw.rng
     for k in range(int(number)):
@@ -88,39 +87,48 @@ def operands(draw: Draw, number: float) -> list[Trial]:
 
 
 def slab(half_width: float, middle: float, *steps: transform.Step) -> rt.Box:
-    """The cube [-1, 1]³, of another width along x, around x = middle."""
+    """The cube [-1, 1]³, scaled to this half width along x and centred at x = middle."""
     narrow = transform.Scale(scale=(half_width, 1.0, 1.0))
     aside = transform.Translate(translate=(middle, 0.0, 0.0))
     return rt.Box(transform=(narrow, aside, *steps))
 
 
 def cut_box(half_width: float, overlap: float, *steps: transform.Step) -> Any:
-    """The cube without a slab on its +x side, which stands out by `overlap`."""
+    """The cube minus a slab on its +x side, which extends beyond it by `overlap`."""
     return rt.Box(transform=steps) - slab(half_width, 1.0 - half_width + overlap, *steps)
 
 
 def _rays_through_the_cut(
     rng: np.random.Generator, n: int, m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """At points of what was cut off, from its side, so that they pass the face that is gone."""
+    """Rays at points of what was subtracted, from its side: they cross the face that is gone."""
     o = rng.uniform((2.0, -0.8, -0.8), (3.0, 0.8, 0.8), (n, 3))
     target = rng.uniform((0.45, -0.7, -0.7), (0.9, 0.7, 0.7), (n, 3))
     return o @ m.T, (target - o) @ m.T
 
 
+@CSG.sweep(
+    "overlap", "size / overlap", powers(4, 16, 32, 44, 47, 50, 52, base=2.0), extreme=2.0**32
+)
 def overlapping(draw: Draw, inverse: float) -> list[Trial]:
+    """A sheared cube minus a slab as wide as one half of it, which extends beyond the cube by a
+    small overlap; rays from that side at points of what was subtracted."""
     shear = transform.Matrix(matrix=SHEAR)
     solid = cut_box(0.5, 0.0 if np.isinf(inverse) else 1.0 / inverse, shear)
     o, d = _rays_through_the_cut(draw.rng, draw.rays, np.array(SHEAR)[:, :3])
     return [Trial((CsgParameters(solid),), o, d, 2.0)]
 
 
+@CSG.sweep("coincident")
 def coincident(draw: Draw, _: float) -> list[Trial]:
+    """The same without any overlap: both faces lie in one plane."""
     return overlapping(draw, np.inf)
 
 
+@CSG.sweep("turned")
 def turned(draw: Draw, _: float) -> list[Trial]:
-    """Rotations round, and so do the tables: the truth is that of the box that is left."""
+    """A cube minus a slab of 0.3 of its width under any rotation, which rounds the coincident faces
+    apart; the exact answer is that of the box that is left."""
     trials = []
     for _shape in range(SHAPES):
         turn = _turn(draw.rng)
@@ -129,48 +137,3 @@ def turned(draw: Draw, _: float) -> list[Trial]:
         ideal = (CsgParameters(slab(0.7, -0.3, turn)),)
         trials.append(Trial((CsgParameters(cut_box(0.3, 0.0, turn)),), o, d, 2.0, ideal))
     return trials
-
-
-CSG = Family(
-    "csg",
-    {name: textbook.METHODS[name] for name in textbook.names("csg")} | {EVENTS.name: EVENTS},
-    (
-        Series(
-            "operands",
-            "operands",
-            "Spheres and turned boxes in a ball: half of them together, without the other half;"
-            " camera rays from all around.",
-            powers(1, 2, 3, 4, 5, 6, base=2.0),
-            32.0,
-            operands,
-        ),
-        Series(
-            "overlap",
-            "size / overlap",
-            "A sheared cube without one of its halves, which stands out by a little; rays from"
-            " there at points of what was cut off.",
-            powers(4, 16, 32, 44, 47, 50, 52, base=2.0),
-            2.0**32,
-            overlapping,
-        ),
-        Series(
-            "coincident",
-            "",
-            "The same without any overlap: both faces are in one plane.",
-            (1.0,),
-            0.0,
-            coincident,
-        ),
-        Series(
-            "turned",
-            "",
-            "A cube without 0.6 of its width under any rotation, whose roundings part the faces;"
-            " the truth is the box that is left.",
-            (1.0,),
-            0.0,
-            turned,
-        ),
-    ),
-    exact,
-    lambda _, wanted: min(wanted, CHECKED),
-)

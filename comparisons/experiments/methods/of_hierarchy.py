@@ -1,4 +1,4 @@
-"""Hierarchies: triangles strewn in a cube, in clusters, and long thin ones."""
+"""Acceleration structures: over triangles scattered in a cube, in clusters, and needles."""
 
 import time
 from pathlib import Path
@@ -7,37 +7,30 @@ from typing import get_args
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import (
-    Draw,
-    Family,
-    FloatArray,
-    Series,
-    Trial,
-    Truth,
-    powers,
-    unit_vectors,
-)
+from comparisons.experiments.methods.setting import Draw, Family, Trial, Truth, powers
+from comparisons.experiments.methods.vectors import unit_vectors
 from comparisons.geometry.exact import first_hit
 from comparisons.geometry.exact.crossings import IntArray
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray
 from comparisons.geometry.exact.referee import MARGIN
-from reference_rt import textbook
 from reference_rt.accel import bvh
+from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import SceneParameters
 
 AS_FAST = 5e3
-"""Triangles up to which exact arithmetic is asked about as many rays as elsewhere, and beyond about
-as many pairs of both: floats find the few that meet in some 0.1 to 0.6 µs a pair."""
+"""Triangles up to which the full number of rays is checked by exact arithmetic; with more, as many
+ray-triangle pairs are checked.  Floats find the few pairs that may meet, in 0.1 to 0.6 µs a pair.
+"""
 
 LEAST = 64
-"""Rays that it is asked about in any case."""
+"""Rays that are checked in any case."""
 
 AT_ONCE = 5e5
-"""Pairs in memory, at up to 500 bytes."""
+"""Ray-triangle pairs in memory at once, at up to 500 bytes each."""
 
 
 def exact(parameters: SceneParameters, o: FloatArray, d: FloatArray) -> Truth:
-    """Of all triangles; those that a line is clearly beside, as floats see it, are left out."""
+    """The first hit over all triangles; those that a ray clearly misses in floats are skipped."""
     v = _vertices(parameters)
     ray, triangle = _near(v, o, d)
     hit = first_hit("triangles", {"vertices": v[triangle].reshape(-1, 9)}, o[ray], d[ray])
@@ -55,8 +48,8 @@ def _vertices(parameters: SceneParameters) -> FloatArray:
 
 
 def _clearly_beside(corners: FloatArray, d: FloatArray) -> BoolArray:
-    """By the volumes that a line spans with the edges, of corners (n, 3, 3) relative to the origin:
-    of both signs by more than a thousand times what they round by."""
+    """Whether rays from the origin along d miss triangles of corners (n, 3, 3): the signed volumes
+    that ray and edges span have both signs, by more than a thousand times their rounding error."""
     after = np.roll(corners, -1, axis=1)
     volumes = np.einsum("nij,nj->ni", np.cross(corners, after), d)
     size = np.linalg.norm(corners, axis=2) * np.linalg.norm(after, axis=2)
@@ -65,7 +58,7 @@ def _clearly_beside(corners: FloatArray, d: FloatArray) -> BoolArray:
 
 
 def _near(v: FloatArray, o: FloatArray, d: FloatArray) -> tuple[IntArray, IntArray]:
-    """(ray, triangle) of all pairs that may meet."""
+    """(ray, triangle) indices of all pairs that may meet."""
     middle = v.mean(axis=1)
     radius = np.linalg.norm(v - middle[:, None], axis=2).max(axis=1)
     reach = radius + MARGIN * (np.abs(v).max() + np.abs(o).max())
@@ -73,7 +66,7 @@ def _near(v: FloatArray, o: FloatArray, d: FloatArray) -> tuple[IntArray, IntArr
     found, step = [], max(int(AT_ONCE / len(v)), 1)
     for begin in range(0, len(o), step):
         rays = slice(begin, begin + step)
-        # Balls around the triangles first.  By the cross product, since the difference of squares
+        # Bounding spheres first.  By the cross product, because the difference of squares
         # |c - o|² - (u·(c - o))² cancels.
         off = np.cross(middle[None] - o[rays, None], unit[rays, None])
         ray, triangle = np.nonzero(np.einsum("ijk,ijk->ij", off, off) <= reach**2)
@@ -84,8 +77,28 @@ def _near(v: FloatArray, o: FloatArray, d: FloatArray) -> tuple[IntArray, IntArr
     return ray, triangle
 
 
+def _checked(number: float, wanted: int) -> int:
+    return max(int(wanted * min(1.0, AS_FAST / number)), LEAST)
+
+
+def build(method: str, parameters: SceneParameters) -> float:
+    """Seconds, the best of three: other load on the machine only adds to it."""
+    v = _vertices(parameters)
+    bounds, corners = (v.min(axis=1), v.max(axis=1)), v.reshape(-1, 9)
+    kind = next(k for k in get_args(bvh.Method) if method == f"hierarchy.{k}")
+    times = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        bvh.build(*bounds, kind, corners)
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+HIERARCHY = Family("hierarchy", exact, checked=_checked, build=build)
+
+
 def _write_ply(path: Path, v: FloatArray) -> None:
-    """Triangles (n, 3, 3) as a file that the renderer reads, without loss."""
+    """Write triangles (n, 3, 3) as float64, so that the renderer reads them without rounding."""
     n = len(v)
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {3 * n}\nproperty double x\n"
@@ -114,14 +127,18 @@ def _triangles(draw: Draw, centers: FloatArray, sizes: FloatArray) -> FloatArray
     return np.asarray(centers[:, None] + sizes.reshape(-1, 1, 1) * corners)
 
 
+@HIERARCHY.sweep("strewn", "triangles", powers(1, 2, 3, 4, 5), extreme=1e4)
 def strewn(draw: Draw, number: float) -> list[Trial]:
+    """Triangles scattered in a cube, smaller the more there are; rays from all around into it."""
     n = int(number)
     sizes = np.full(n, 0.5 * number ** (-1.0 / 3.0))
     return _trial(draw, _triangles(draw, draw.rng.uniform(-1.0, 1.0, (n, 3)), sizes))
 
 
+@HIERARCHY.sweep("clustered", "triangles", powers(1, 2, 3, 4, 5), extreme=1e4)
 def clustered(draw: Draw, number: float) -> list[Trial]:
-    """Nine in ten in ten clusters, each a hundredth as wide as the cube; the rest strewn."""
+    """Nine triangles in ten in ten small clusters, each a hundredth as wide as the cube; the same
+    rays, most of which miss."""
     n = int(number)
     middles = draw.rng.uniform(-0.9, 0.9, (10, 3))
     centers = middles[draw.rng.integers(0, 10, n)] + 0.02 * draw.rng.normal(size=(n, 3))
@@ -131,61 +148,10 @@ def clustered(draw: Draw, number: float) -> list[Trial]:
     return _trial(draw, _triangles(draw, centers, np.where(apart, scale, 0.04 * scale)))
 
 
+@HIERARCHY.sweep("needles", "triangles", powers(1, 2, 3, 4), extreme=1e3)
 def needles(draw: Draw, number: float) -> list[Trial]:
-    """From one random point to another, a thousandth as wide as the cube."""
+    """Triangles as long as the cube and a thousandth as wide."""
     n = int(number)
     ends = draw.rng.uniform(-1.0, 1.0, (2, n, 3))
     third = ends[1] + 0.002 * unit_vectors(draw.rng, n)
     return _trial(draw, np.stack([*ends, third], axis=1))
-
-
-def _checked(number: float, wanted: int) -> int:
-    return max(int(wanted * min(1.0, AS_FAST / number)), LEAST)
-
-
-def build(method: str, parameters: SceneParameters) -> float:
-    """Seconds, the best of three: what else the machine does only adds to it."""
-    v = _vertices(parameters)
-    bounds, corners = (v.min(axis=1), v.max(axis=1)), v.reshape(-1, 9)
-    kind = next(k for k in get_args(bvh.Method) if method == f"hierarchy.{k}")
-    times = []
-    for _ in range(3):
-        begin = time.perf_counter()
-        bvh.build(*bounds, kind, corners)
-        times.append(time.perf_counter() - begin)
-    return min(times)
-
-
-HIERARCHY = Family(
-    "hierarchy",
-    {name: textbook.METHODS[name] for name in textbook.names("hierarchy")},
-    (
-        Series(
-            "strewn",
-            "triangles",
-            "Triangles strewn in a cube, the more the smaller; rays from all around into the cube.",
-            powers(1, 2, 3, 4, 5),
-            1e4,
-            strewn,
-        ),
-        Series(
-            "clustered",
-            "triangles",
-            "Nine triangles in ten in ten small clusters; rays as before, so that most pass by.",
-            powers(1, 2, 3, 4, 5),
-            1e4,
-            clustered,
-        ),
-        Series(
-            "needles",
-            "triangles",
-            "Triangles as long as the cube and a thousandth as wide.",
-            powers(1, 2, 3, 4),
-            1e3,
-            needles,
-        ),
-    ),
-    exact,
-    _checked,
-    build,
-)

@@ -1,7 +1,7 @@
-"""Polygons: many vertices, points level with vertices, edges that neighbours share, far away.
+"""Polygons: many vertices, far away, thin; points level with vertices, and shared edges.
 
-Vertices are p = c + x U + y V with numbers of so few bits that all of a ring lies exactly in one
-plane: what is inside is then no matter of rounding.
+Vertices are p = c + x U + y V with numbers of so few bits that all vertices of a ring lie exactly
+in one plane: rounding then has no part in what is inside.
 """
 
 import math
@@ -9,21 +9,12 @@ from functools import reduce
 
 import numpy as np
 
-from comparisons.experiments.methods.setting import (
-    Draw,
-    Family,
-    FloatArray,
-    Series,
-    Trial,
-    Truth,
-    across,
-    powers,
-    unit_rows,
-)
+from comparisons.experiments.methods.setting import Draw, Family, Trial, Truth, powers
+from comparisons.experiments.methods.vectors import across, unit_rows
 from comparisons.geometry.exact import first_of
 from comparisons.geometry.exact.dyadic import Dyadic, cross, dot
 from comparisons.geometry.exact.flat import polygons
-from reference_rt import textbook
+from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import PolygonParameters
 
 SHAPES = 8
@@ -39,14 +30,14 @@ PLANES = np.array(
         [(-0.25, 0.5, 1.0), (1.0, 0.75, 0.25)],
     ]
 )
-"""Pairs U, V; oblique, so that points of the plane round."""
+"""Pairs U, V; oblique, so that points of the plane are rounded."""
 
 TEETH = 8
 FAN = 6
 
 
 def exact(polygon: PolygonParameters, o: FloatArray, d: FloatArray) -> Truth:
-    """By the winding number in the plane, seen along an axis that it is not parallel to."""
+    """By the winding number in the plane, projected along the normal's largest component."""
     (ring,) = (np.asarray(r, np.float64) for r in polygon.rings)
     normal = _normal(ring)
     axis = int(np.argmax(np.abs(normal)))
@@ -67,7 +58,8 @@ def exact(polygon: PolygonParameters, o: FloatArray, d: FloatArray) -> Truth:
 
 
 def _normal(ring: FloatArray) -> FloatArray:
-    """Of a ring in one plane; integers without a common factor.  Raises ValueError if it is not."""
+    """The normal (3,) of a planar ring, as integers without a common factor.  Raises ValueError for
+    a ring that is not planar."""
     legs = Dyadic.of(ring) - Dyadic.of(ring[:1])
     # The widest of the triangles at the first vertex; any that has an area would do.
     far = int(np.argmax(np.linalg.norm(ring - ring[0], axis=1)))
@@ -79,6 +71,9 @@ def _normal(ring: FloatArray) -> FloatArray:
     if [int(x) * factor for x in normal] != n or dot(legs, Dyadic.of(normal[None])).sign().any():
         raise ValueError("expected a ring that lies exactly in a plane of few bits")
     return normal
+
+
+POLYGON = Family("polygon", exact)
 
 
 def _plane(draw: Draw) -> FloatArray:
@@ -120,25 +115,39 @@ def _gears(
     return trials
 
 
+@POLYGON.sweep("vertices", "vertices", powers(2, 4, 6, 8, 10, base=2.0), extreme=256.0)
 def many_vertices(draw: Draw, vertices: float) -> list[Trial]:
+    """Gears from three units away, up to 60° from the normal, at points in and around them."""
     return _gears(draw, int(vertices), np.zeros(3))
 
 
-def moved_away(draw: Draw, offset: float) -> list[Trial]:
-    return _gears(draw, TEETH, offset * np.array([1.0, -1.0, 0.5]))
-
-
-def thin(draw: Draw, thinness: float) -> list[Trial]:
-    return _gears(draw, TEETH, np.zeros(3), thinness)
-
-
+@POLYGON.sweep("distance", "distance / size", powers(1, 2, 4, 6, 8), extreme=1e4)
 def from_afar(draw: Draw, distance: float) -> list[Trial]:
+    """A gear of 8 vertices from afar."""
     return _gears(draw, TEETH, np.zeros(3), distance=distance)
 
 
+@POLYGON.sweep(
+    "offset",
+    "distance of both from the origin of coordinates",
+    powers(0, 7, 13, 20, 27, base=2.0),
+    extreme=2.0**13,
+)
+def moved_away(draw: Draw, offset: float) -> list[Trial]:
+    """The same gear: polygon and rays together, translated away from the origin of coordinates."""
+    return _gears(draw, TEETH, offset * np.array([1.0, -1.0, 0.5]))
+
+
+@POLYGON.sweep("aspect", "length / height", powers(0, 7, 13, 20, 27, base=2.0), extreme=2.0**13)
+def thin(draw: Draw, thinness: float) -> list[Trial]:
+    """The same gear, ever thinner."""
+    return _gears(draw, TEETH, np.zeros(3), thinness)
+
+
+@POLYGON.sweep("level")
 def level_with_vertices(draw: Draw, _: float) -> list[Trial]:
-    """Lattice polygons in z = 0 from straight above: the point is exact, and vertices lie on the
-    line from it to +x, one after another."""
+    """Lattice polygons seen along their normal; the points have the same y as vertices."""
+    # The hit point is exact; vertices lie on the line from it to +x, one after another.
     trials = []
     for _ in range(SHAPES):
         ring = np.rint(_gear(draw, 32) * 16.0)
@@ -152,8 +161,10 @@ def level_with_vertices(draw: Draw, _: float) -> list[Trial]:
     return trials
 
 
+@POLYGON.sweep("edges", "distance", powers(0, 2, 4, 6))
 def at_edges(draw: Draw, distance: float) -> list[Trial]:
-    """Triangles around a point, all in one plane; rays at the edges that two of them share."""
+    """6 triangles around a point in one oblique plane; rays at the edges that two of them share.
+    Each must hit one: a miss is a leak."""
     trials = []
     for _ in range(SHAPES):
         plane, n = _plane(draw), draw.rays // SHAPES
@@ -170,8 +181,9 @@ def at_edges(draw: Draw, distance: float) -> list[Trial]:
     return trials
 
 
+@POLYGON.sweep("upright edges")
 def at_upright_edges(draw: Draw, _: float) -> list[Trial]:
-    """The same in z = 0 and from straight above, where all compute the same point."""
+    """The same in the plane z = 0 and along its normal: all neighbours compute the same point."""
     trials = []
     flat = np.eye(2, 3)
     for _shape in range(SHAPES):
@@ -183,69 +195,3 @@ def at_upright_edges(draw: Draw, _: float) -> list[Trial]:
         o = apex + along * (rim[draw.rng.integers(0, FAN, len(along))] - apex) + (0.0, 0.0, 1.0)
         trials.append(Trial(parts, o, np.tile((0.0, 0.0, -1.0), (len(o), 1)), 2.0))
     return trials
-
-
-POLYGON = Family(
-    "polygon",
-    {name: textbook.METHODS[name] for name in textbook.names("polygon")},
-    (
-        Series(
-            "vertices",
-            "vertices",
-            "Gears from three units away, up to 60° from the normal, at points in and around them.",
-            powers(2, 4, 6, 8, 10, base=2.0),
-            256.0,
-            many_vertices,
-        ),
-        Series(
-            "distance",
-            "distance / size",
-            f"A gear of {TEETH} vertices from afar.",
-            powers(1, 2, 4, 6, 8),
-            1e4,
-            from_afar,
-        ),
-        Series(
-            "offset",
-            "distance of both from the origin of coordinates",
-            "The same gear, polygon and rays moved away together.",
-            powers(0, 7, 13, 20, 27, base=2.0),
-            2.0**13,
-            moved_away,
-        ),
-        Series(
-            "aspect",
-            "length / height",
-            "The same gear, ever thinner.",
-            powers(0, 7, 13, 20, 27, base=2.0),
-            2.0**13,
-            thin,
-        ),
-        Series(
-            "level",
-            "",
-            "Lattice polygons from straight above, points level with vertices.",
-            (1.0,),
-            0.0,
-            level_with_vertices,
-        ),
-        Series(
-            "edges",
-            "distance",
-            f"{FAN} triangles around a point in one oblique plane; rays at edges that two share."
-            " Each must meet one: a miss is a leak.",
-            powers(0, 2, 4, 6),
-            0.0,
-            at_edges,
-        ),
-        Series(
-            "upright edges",
-            "",
-            "The same in the plane z = 0 from straight above, where all neighbours see one point.",
-            (1.0,),
-            0.0,
-            at_upright_edges,
-        ),
-    ),
-    exact,
-)

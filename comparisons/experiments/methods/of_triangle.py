@@ -1,21 +1,11 @@
-"""Triangles: thin, grazed, far away, and edges and vertices that neighbours share."""
+"""Triangles: thin, at grazing angles, far away; shared edges and vertices."""
 
 import numpy as np
 
-from comparisons.experiments.methods.setting import (
-    Draw,
-    Family,
-    FloatArray,
-    Series,
-    Trial,
-    Truth,
-    across,
-    powers,
-    unit_rows,
-    unit_vectors,
-)
+from comparisons.experiments.methods.setting import Draw, Family, Trial, Truth, powers
+from comparisons.experiments.methods.vectors import across, unit_rows, unit_vectors
 from comparisons.geometry.exact import first_hit
-from reference_rt import textbook
+from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import TriangleParameters
 
 SHAPES = 16
@@ -28,6 +18,9 @@ FAN = 6
 def exact(triangle: TriangleParameters, o: FloatArray, d: FloatArray) -> Truth:
     hit = first_hit("triangles", {"vertices": np.concatenate(triangle)[None]}, o, d)
     return Truth(hit.fixed, hit.touching)
+
+
+TRIANGLE = Family("triangle", exact)
 
 
 def _size(corners: FloatArray) -> float:
@@ -46,7 +39,7 @@ def _targets(draw: Draw, v: FloatArray, n: int) -> FloatArray:
 
 
 def _any(rng: np.random.Generator) -> FloatArray:
-    """A triangle that is nowhere thin: corners near those of an equilateral one, turned."""
+    """A random triangle (3, 3) that is not thin: near an equilateral one, rotated."""
     x = across(rng, unit_vectors(rng, 1))[0]
     y = across(rng, x[None])[0]
     angles = 2.0 * np.pi / 3.0 * np.arange(3) + rng.uniform(-0.3, 0.3, 3)
@@ -55,8 +48,8 @@ def _any(rng: np.random.Generator) -> FloatArray:
 
 
 def _aimed(draw: Draw, v: FloatArray, distance: float, cosine: float | None = None) -> Trial:
-    """Rays from `distance` sizes away, at any angle from the normal up to some 70 degrees, or at
-    this one."""
+    """Rays from `distance` sizes away, at angles up to 70 degrees from the normal, or all at the
+    angle of this cosine."""
     n = draw.rays // SHAPES
     targets, size = _targets(draw, v, n), _size(v)
     normal = unit_rows(np.cross(v[1] - v[0], v[2] - v[0]))
@@ -68,27 +61,40 @@ def _aimed(draw: Draw, v: FloatArray, distance: float, cosine: float | None = No
     return Trial((TriangleParameters(*v),), targets - d, d, size)
 
 
+@TRIANGLE.sweep("aspect", "length / height", powers(*range(9)), extreme=1e4)
 def thin(draw: Draw, aspect: float) -> list[Trial]:
-    """The third corner comes near the edge across from it."""
+    """Ever thinner triangles from three lengths away, up to 70° from the normal; three rays in four
+    at points inside, the others beyond an edge."""
     trials = []
     for _ in range(SHAPES):
         v = _any(draw.rng)
+        # The third corner moves towards the edge opposite to it.
         foot = v[0] + draw.rng.uniform(0.2, 0.8) * (v[1] - v[0])
         v[2] = foot + (v[2] - foot) / aspect
         trials.append(_aimed(draw, v, 3.0))
     return trials
 
 
+@TRIANGLE.sweep("grazing", "1 / cosine", powers(*range(9)), extreme=1e4)
 def grazed(draw: Draw, inverse_cosine: float) -> list[Trial]:
+    """Triangles that are not thin, all rays at the same angle to the normal."""
     return [_aimed(draw, _any(draw.rng), 3.0, 1.0 / inverse_cosine) for _ in range(SHAPES)]
 
 
+@TRIANGLE.sweep("distance", "distance / length", powers(*range(9)), extreme=1e4)
 def from_afar(draw: Draw, distance: float) -> list[Trial]:
+    """Triangles that are not thin, from afar."""
     return [_aimed(draw, _any(draw.rng), distance) for _ in range(SHAPES)]
 
 
+@TRIANGLE.sweep(
+    "offset",
+    "distance of both from the origin of coordinates",
+    powers(*range(9)),
+    extreme=1e4,
+)
 def moved_away(draw: Draw, offset: float) -> list[Trial]:
-    """Triangle and rays together, away from the origin of coordinates."""
+    """Triangle and rays together, translated away from the origin of coordinates."""
     return [
         _aimed(draw, _any(draw.rng) + offset * unit_vectors(draw.rng, 1)[0], 3.0)
         for _ in range(SHAPES)
@@ -96,9 +102,9 @@ def moved_away(draw: Draw, offset: float) -> list[Trial]:
 
 
 def _fan(draw: Draw, rim: int, distance: float, at_vertex: bool) -> Trial:
-    """`rim` triangles around an apex that stands a little out, seen from outside.
+    """A fan of `rim` triangles around a raised apex, seen from outside.
 
-    Rays go to the apex, or to points of the edges from there, so that they must meet the fan.
+    Rays go to the apex, or to points of the edges from there, so that they must hit the fan.
     """
     rng, n = draw.rng, draw.rays // SHAPES
     axis = unit_vectors(rng, 1)
@@ -117,68 +123,14 @@ def _fan(draw: Draw, rim: int, distance: float, at_vertex: bool) -> Trial:
     return Trial(parts, target - d, d, 2.0)
 
 
+@TRIANGLE.sweep("edges", "distance", powers(0, 2, 4, 6))
 def at_edges(draw: Draw, distance: float) -> list[Trial]:
+    """Fans of 6 triangles around an apex; rays at the edges that two of them share.  Each must hit
+    the fan: a miss is a leak."""
     return [_fan(draw, FAN, distance, at_vertex=False) for _ in range(SHAPES)]
 
 
+@TRIANGLE.sweep("vertices", "distance", powers(0, 2, 4, 6))
 def at_vertices(draw: Draw, distance: float) -> list[Trial]:
+    """The same fans; rays at the apex, which 6 triangles share."""
     return [_fan(draw, FAN, distance, at_vertex=True) for _ in range(SHAPES)]
-
-
-TRIANGLE = Family(
-    "triangle",
-    {name: textbook.METHODS[name] for name in textbook.names("triangle")},
-    (
-        Series(
-            "aspect",
-            "length / height",
-            "Ever thinner triangles from three lengths away, up to 70° from the normal; three rays"
-            " in four at points inside, the others beyond an edge.",
-            powers(*range(9)),
-            1e4,
-            thin,
-        ),
-        Series(
-            "grazing",
-            "1 / cosine",
-            "The same with one angle between ray and plane.",
-            powers(*range(9)),
-            1e4,
-            grazed,
-        ),
-        Series(
-            "distance",
-            "distance / length",
-            "The same from afar.",
-            powers(*range(9)),
-            1e4,
-            from_afar,
-        ),
-        Series(
-            "offset",
-            "distance of both from the origin of coordinates",
-            "The same, triangle and rays moved away together.",
-            powers(*range(9)),
-            1e4,
-            moved_away,
-        ),
-        Series(
-            "edges",
-            "distance",
-            f"Fans of {FAN} triangles around an apex; rays at the edges that two of them share."
-            " Each must meet the fan: a miss is a leak.",
-            powers(0, 2, 4, 6),
-            0.0,
-            at_edges,
-        ),
-        Series(
-            "vertices",
-            "distance",
-            f"The same fans; rays at the apex, which {FAN} triangles share.",
-            powers(0, 2, 4, 6),
-            0.0,
-            at_vertices,
-        ),
-    ),
-    exact,
-)

@@ -1,23 +1,22 @@
 """Pictures of failures: the same small view by each method of a family."""
 
-import base64
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from PIL import Image
 
 from comparisons.experiments.methods import of_csg
 from comparisons.experiments.methods.errors import PIXEL
 from comparisons.experiments.methods.run import FAMILIES, Row
-from comparisons.experiments.methods.setting import FloatArray, unit_rows
 from comparisons.experiments.methods.summary import short
+from comparisons.experiments.methods.vectors import unit_rows
 from comparisons.experiments.methods.wording import percent
 from comparisons.geometry.exact.dyadic import NEVER
+from comparisons.report.thumbnails import png_url
 from comparisons.report.values import power_of_ten
 from reference_rt import textbook
 from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import CsgParameters, SphereParameters, TriangleParameters
 
 SIDE = 72
@@ -38,7 +37,7 @@ class Failure:
 
 
 def failures(rows: Sequence[Row]) -> dict[str, Failure]:
-    """By family, of those that were measured and failed."""
+    """By family, of those that were measured and have failures."""
     measured = {row.family for row in rows}
     found: dict[str, Failure | None] = {}
     if "sphere" in measured:
@@ -51,10 +50,7 @@ def failures(rows: Sequence[Row]) -> dict[str, Failure]:
 
 
 def _png(pixels: FloatArray) -> str:
-    image = Image.fromarray(np.rint(255.0 * np.clip(pixels, 0.0, 1.0)).astype(np.uint8))
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG", optimize=True)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+    return png_url(255.0 * np.clip(pixels, 0.0, 1.0))
 
 
 def _grid() -> FloatArray:
@@ -72,9 +68,9 @@ def _shown(colours: FloatArray) -> str:
 
 
 def _sphere(rows: Sequence[Row]) -> Failure | None:
-    """From the first distance of the series at which a method answers wrongly.
+    """Seen from the smallest distance of the series at which a method is wrong.
 
-    Each method casts its own shadows, from 1/1000 of a radius above the point that it found.
+    Each method traces its own shadow rays, from 1/1000 of a radius above its hit point.
     """
     some = [row for row in rows if (row.family, row.series) == ("sphere", "distance")]
     failing = [row.x for row in some if row.errors.wrong > row.errors.ties]
@@ -105,12 +101,12 @@ def _sphere(rows: Sequence[Row]) -> Failure | None:
         lost = float(np.mean(~found[hit]))
         black = float(np.mean((dark & (n @ lamp > 0.1))[hit & found]))
         said = [f"{percent(lost)} of the hits lost"] if lost else []
-        said += [f"{percent(black)} falsely in shadow"] if black else []
+        said += [f"{percent(black)} wrongly in shadow"] if black else []
         views.append((short(name), _shown(colours), ", ".join(said)))
     return Failure(
         f"A sphere seen from {power_of_ten(distance)} radii",
-        "Dark where a shadow ray from 1/1000 of a radius above the point that was found meets the"
-        " sphere; red: a hit that is lost, or one that is none.",
+        "Dark: the shadow ray, from 1/1000 of a radius above the hit point, hits the sphere.  Red:"
+        " a lost hit or a false one.",
         views,
     )
 
@@ -150,11 +146,11 @@ def _wall() -> Failure:
     for name, picture in colours.items():
         holes = int(np.sum(np.all(picture == WRONG, axis=-1)))
         views.append(
-            (short(name), _png(picture), f"{holes} of {edge:,} slip through" if holes else "")
+            (short(name), _png(picture), f"{holes} of {edge:,} rays leak" if holes else "")
         )
     return Failure(
-        "A wall of triangles, every third pixel aimed at an edge that two of them share",
-        "Red: the ray meets neither.",
+        "A wall of triangles; every third pixel is aimed at an edge that two of them share",
+        "Red: the ray hits neither triangle.",
         views,
     )
 
@@ -162,7 +158,7 @@ def _wall() -> Failure:
 def _in_square(
     a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, u: float, v: float
 ) -> FloatArray:
-    """The point at u to the right and v down: of a b d above the diagonal, of a d c below it."""
+    """The point at u to the right, v down: on triangle a b d above the diagonal, else on a d c."""
     if u >= v:
         return np.asarray(a + (u - v) * (b - a) + v * (d - a))
     return np.asarray(a + (v - u) * (c - a) + u * (d - a))
@@ -172,7 +168,7 @@ def _in_square(
 
 
 def _film() -> Failure:
-    """A turned cube, seen from the side that is cut off."""
+    """A rotated cube, seen from the side that is subtracted."""
     turn = transform.Rotate(rotate=transform.Turn(axis=(1.0, 2.0, 3.0), degrees=71.0))
     solid = CsgParameters(of_csg.cut_box(0.3, 0.0, turn))
     m = transform.affine((turn,))[:, :3]
@@ -187,7 +183,7 @@ def _film() -> Failure:
         t = method.intersect(solid, o @ m.T, d @ m.T)
         found = np.isfinite(t)
         q = o + np.where(found, t, 0.0)[:, None] * d
-        # In the cube's own coordinates, where what is left is -1 <= x <= 0.4.
+        # In the cube's own coordinates, in which the remaining box is -1 <= x <= 0.4.
         side = np.argmax(np.abs((q - np.array([-0.3, 0.0, 0.0])) / (0.7, 1.0, 1.0)), axis=1)
         shade = np.array([1.0, 0.75, 0.55])[side][:, None] * (PAINT + 0.3)
         colours = np.where(found[:, None], shade, GROUND)
@@ -201,7 +197,7 @@ def _film() -> Failure:
             )
         )
     return Failure(
-        "A turned cube of which one side is cut off: faces of both coincide",
-        "Red: a film is left where the ray should meet nothing.",
+        "A rotated cube minus a slab at one side: a face of each coincides with one of the other",
+        "Red: the method leaves a film of the cube where the ray should hit nothing.",
         views,
     )

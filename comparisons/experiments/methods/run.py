@@ -1,4 +1,4 @@
-"""All settings of a family, measured."""
+"""Measures all settings of a family."""
 
 import tempfile
 import zlib
@@ -24,8 +24,8 @@ FAMILIES = {f.name: f for f in (SPHERE, TRIANGLE, BOX, POLYGON, CSG, HIERARCHY)}
 
 
 class Effort(NamedTuple):
-    """rays: of a setting;  checked: how many of them exact arithmetic is asked about;  runs: how
-    often each is timed."""
+    """rays: in a setting;  checked: how many of them are checked by exact arithmetic;  runs: how
+    often each method is timed."""
 
     rays: int
     checked: int
@@ -40,10 +40,10 @@ FULL = Effort(rays=32768, checked=4096, runs=15)
 class Row:
     """One method in one setting.
 
-    extreme: whether the setting counts as such;  rays: of the setting, a share of which is checked
-    and timed;  hits: their share, of those checked;  differs: of `compared` rays, those whose t is
-    not that of the family's first method, bit for bit: hierarchies should all find the same;
-    build: seconds, where something must be built.
+    extreme: whether the setting counts as such;  rays: in the setting, a part of which is checked
+    and timed;  parts: shapes that each ray is traced against;  differs: of `compared` rays, those
+    whose t differs in any bit from that of the family's first method (acceleration structures must
+    all give the same);  build: seconds, None without an acceleration structure.
     """
 
     family: str
@@ -63,14 +63,14 @@ class Row:
 
 
 def settings(family: Family) -> list[tuple[Series, float]]:
-    """All, in the order in which they are measured."""
+    """(series, x) of all settings, in the order in which they are measured."""
     return [(series, x) for series in family.series for x in series.values]
 
 
 def draw_trials(
     series: Series, family: str, x: float, draw_from: int, rays: int, folder: Path
 ) -> list[Trial]:
-    """The same for the same seed, whatever else is measured."""
+    """The trials of a setting: the same for the same seed, whatever else is measured."""
     name = zlib.crc32(f"{family} {series.name} {x!r}".encode())
     return series.make(Draw(np.random.default_rng((draw_from, name)), rays, folder), x)
 
@@ -112,7 +112,7 @@ def measure_setting(
 
 
 def run(family: Family, effort: Effort, seed: int, progress: Progress) -> list[Row]:
-    """All settings of a family."""
+    """Measure all settings of a family."""
     rows: list[Row] = []
     every = settings(family)
     progress(family.name, 0.0)

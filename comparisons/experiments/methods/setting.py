@@ -1,21 +1,23 @@
-"""What methods are asked: series of settings, from ordinary to extreme."""
+"""Families of intersection methods, and the parameter sweeps (series) that they are measured in."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from comparisons.experiments.methods.vectors import across, unit_rows, unit_vectors
 from comparisons.geometry.exact.dyadic import BoolArray, Fixed
+from reference_rt import textbook
+from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import Method
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Draw(NamedTuple):
-    """What settings are drawn with: random numbers, how many rays, a folder for meshes."""
+    """What a setting is generated from: the random generator, the number of rays, and a folder for
+    mesh files."""
 
     rng: np.random.Generator
     rays: int
@@ -24,11 +26,12 @@ class Draw(NamedTuple):
 
 @dataclass(frozen=True)
 class Trial:
-    """Rays at one shape, or at neighbours: what they meet is the first over all `parts`.
+    """Rays and the shape, or the adjacent shapes, that they are traced against.  The answer is the
+    nearest hit over all `parts`.
 
-    parts: parameters of the family;  o, d (n, 3), in no order;  size: the shape's largest extent;
-    ideal: parameters of what the parts should be, where their own tables are rounded into something
-    else.
+    parts: parameters of the shapes, as the family's methods take them;  o, d (n, 3): rays in random
+    order;  size: the shape's largest extent;  ideal: the parameters that the exact answer is
+    computed from, where those in `parts` are rounded; empty: `parts`.
     """
 
     parts: tuple[Any, ...]
@@ -38,13 +41,16 @@ class Trial:
     ideal: tuple[Any, ...] = ()
 
 
+Make = Callable[[Draw, float], list[Trial]]
+
+
 @dataclass(frozen=True)
 class Series:
-    """Settings that become more extreme: `make(draw, x)` for x in `values`.
+    """A parameter sweep from ordinary to extreme: `make(draw, x)` for each x of `values`.
 
-    name: "distance";  axis: what x is, "" where there is one setting alone;  about: one sentence;
-    extreme: from which x on a setting counts as extreme;  relative: whether errors count in units
-    of t alone, not of t and the shape's size: where t near zero is what matters.
+    axis: what x is, "" for a series of one setting;  about: a description for the page;  extreme:
+    settings with x at or above this count as extreme;  relative: errors are in units of t alone
+    instead of t plus the shape's size, for series in which t near zero matters.
     """
 
     name: str
@@ -52,13 +58,13 @@ class Series:
     about: str
     values: tuple[float, ...]
     extreme: float
-    make: Callable[[Draw, float], list[Trial]]
+    make: Make
     relative: bool = False
 
 
 class Truth(NamedTuple):
-    """What rays (n,) meet: t in fixed point, NEVER for a miss;  touching: a line runs exactly
-    through an edge or touches, so that either answer is right."""
+    """The exact answer for rays (n,).  t: in fixed point, NEVER for a miss;  touching: the ray is
+    tangent, or goes exactly through an edge, so that hit and miss are both right."""
 
     t: Fixed
     touching: BoolArray
@@ -66,35 +72,60 @@ class Truth(NamedTuple):
 
 @dataclass(frozen=True)
 class Family:
-    """Methods that answer the same question.
+    """Methods that answer the same question about the same shape.
 
-    exact(part, o, d): the truth about one part;  checked(x, wanted): rays of a setting that exact
-    arithmetic is asked about, where it is slow;  build(method, part): seconds to build what the
-    method needs first, where that takes time.
+    exact(part, o, d): the exact answer for one part;  also: methods besides those that
+    `reference_rt.textbook` registers for the family;  checked(x, wanted): how many rays of a
+    setting are checked by exact arithmetic, fewer where it is slow;  build(method, part): seconds
+    to build the method's acceleration structure, None for families without one.
     """
 
     name: str
-    methods: dict[str, Method]
-    series: tuple[Series, ...]
     exact: Callable[[Any, FloatArray, FloatArray], Truth]
+    also: tuple[Method, ...] = ()
     checked: Callable[[float, int], int] = lambda _x, wanted: wanted
     build: Callable[[str, Any], float] | None = None
+    series: list[Series] = field(default_factory=list)
 
+    @cached_property
+    def methods(self) -> dict[str, Method]:
+        """By name."""
+        registered = [textbook.METHODS[name] for name in textbook.names(self.name)]
+        return {method.name: method for method in (*registered, *self.also)}
 
-def unit_vectors(rng: np.random.Generator, n: int) -> FloatArray:
-    """(n, 3), evenly over the sphere."""
-    v = rng.normal(size=(n, 3))
-    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
+    def sweep(
+        self,
+        name: str,
+        axis: str = "",
+        values: tuple[float, ...] = (1.0,),
+        extreme: float = 0.0,
+        *,
+        relative: bool = False,
+    ) -> Callable[[Make], Make]:
+        """A decorator that adds a `Series` made by the function; its docstring is the series'
+        description on the page."""
 
+        def add(make: Make) -> Make:
+            about = " ".join((make.__doc__ or "").split())
+            self.series.append(Series(name, axis, about, values, extreme, make, relative))
+            return make
 
-def across(rng: np.random.Generator, v: FloatArray) -> FloatArray:
-    """Unit vectors at right angles to the vectors v (n, 3)."""
-    return unit_rows(np.cross(v, unit_vectors(rng, len(v))))
-
-
-def unit_rows(v: FloatArray) -> FloatArray:
-    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+        return add
 
 
 def powers(*exponents: int, base: float = 10.0) -> tuple[float, ...]:
     return tuple(float(base**k) for k in exponents)
+
+
+__all__ = [
+    "Draw",
+    "Family",
+    "FloatArray",
+    "Series",
+    "Trial",
+    "Truth",
+    "across",
+    "powers",
+    "unit_rows",
+    "unit_vectors",
+]

@@ -1,4 +1,4 @@
-"""Rows added up: a method at ordinary and at extreme settings, and a series from end to end."""
+"""Rows grouped by method, series and family, and their totals."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ from comparisons.experiments.methods.run import Row
 class Total:
     """A method in several settings.
 
-    ns: the geometric mean;  worst: error in u (|t| + size / |d|), of series that are not relative;
-    wrong, decided: rays;  surely_wrong: less those that are ties.
+    ns: geometric mean of nanoseconds per ray;  worst: error in u (|t| + size / |d|), without
+    relative series;  decided, wrong: numbers of rays;  surely_wrong: wrong ones that are not ties.
     """
 
     settings: int
@@ -26,17 +26,17 @@ class Total:
 
     @property
     def share(self) -> float:
-        """Of wrong answers that are no ties."""
+        """The fraction of wrong answers, without ties."""
         return self.surely_wrong / self.decided if self.decided else 0.0
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Of that share, 95 %."""
+        """The 95 % confidence interval of `share`."""
         return share_interval(self.surely_wrong, self.decided)
 
 
 def total(rows: Iterable[Row]) -> Total | None:
-    """None of no rows."""
+    """The total of some rows of one method; None for no rows."""
     rows = list(rows)
     if not rows:
         return None
@@ -52,22 +52,21 @@ def total(rows: Iterable[Row]) -> Total | None:
 
 
 def methods_of(rows: Sequence[Row]) -> list[str]:
-    return list(dict.fromkeys(row.method for row in rows))
+    return _unique(rows, "method")
+
+
+def _unique(rows: Sequence[Row], name: str) -> list[str]:
+    """The values of a field, in the order of their first appearance."""
+    return list(dict.fromkeys(getattr(row, name) for row in rows))
 
 
 def series_of(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Rows of one family by series."""
-    found: dict[str, list[Row]] = {}
-    for row in rows:
-        found.setdefault(row.series, []).append(row)
-    return found
+    return {name: [r for r in rows if r.series == name] for name in _unique(rows, "series")}
 
 
 def families_of(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    found: dict[str, list[Row]] = {}
-    for row in rows:
-        found.setdefault(row.family, []).append(row)
-    return found
+    return {name: [r for r in rows if r.family == name] for name in _unique(rows, "family")}
 
 
 def of_method(rows: Sequence[Row], method: str) -> list[Row]:
@@ -75,7 +74,7 @@ def of_method(rows: Sequence[Row], method: str) -> list[Row]:
 
 
 def short(method: str) -> str:
-    """Without the family: "robust"."""
+    """A method's name for people, without its family: "Möller-Trumbore"."""
     name = method.partition(".")[2]
     return _SPELT.get(name, name.replace("_", " "))
 

@@ -17,7 +17,8 @@ from comparisons.experiments.methods.wording import nanoseconds, percent, units,
 
 
 def tables(rows: Sequence[Row]) -> list[Table]:
-    """Of one family: its methods at ordinary and extreme settings, and where each series ends."""
+    """Tables of one family: its methods at ordinary and extreme settings, and the most extreme
+    setting of each series."""
     return [_methods(rows), _series(rows)]
 
 
@@ -43,9 +44,9 @@ def _cells(some: Total | None) -> list[str]:
 
 
 def _series(rows: Sequence[Row]) -> Table:
-    """At the last x of each: wrong answers, or where there are none the worst error, or where that
-    is the same for all the time."""
-    table = Table(title="at the far end of each series", title_justify="left", box=None)
+    """At the last x of each series: the share of wrong answers; where that is zero, the worst
+    error; where that is the same for all methods, the time."""
+    table = Table(title="most extreme setting of each series", title_justify="left", box=None)
     table.add_column("series")
     table.add_column("x", justify="right")
     names = methods_of(rows)

@@ -1,4 +1,4 @@
-"""Nanoseconds per ray, of methods in turn."""
+"""Nanoseconds per ray; the methods take turns."""
 
 import time
 from collections.abc import Mapping
@@ -14,11 +14,11 @@ LONGEST = 15e6
 """Nanoseconds of one run: fewer rays are traced where all would take longer."""
 
 PROBE = 64
-"""Rays of each trial that tell how long all would take."""
+"""Rays of each trial from whose time that of all is estimated."""
 
 
 class Prepared:
-    """A method that is ready to be asked about trials again and again."""
+    """A method with its precomputed data for some trials, to be run repeatedly."""
 
     def __init__(self, method: Method, trials: list[Trial]) -> None:
         self.method = method
@@ -28,7 +28,7 @@ class Prepared:
         self._t = np.empty(max(len(trial.o) for trial in trials))
 
     def answer(self, trial: Trial, rays: int) -> FloatArray:
-        """t (n,) of the first n rays: the first over all parts, inf for a miss."""
+        """t (n,) of the first n rays: the nearest hit over all parts, inf for a miss."""
         (number,) = (k for k, other in enumerate(self.trials) if other is trial)
         o, d, t = trial.o[:rays], trial.d[:rays], np.empty(rays)
         closest = np.full(rays, np.inf)
@@ -39,18 +39,18 @@ class Prepared:
         return closest
 
     def nanoseconds(self, rays: int) -> float:
-        """Of one run over the first rays of all trials, for each ray and part."""
-        asked, jobs = 0, list[tuple[Any, FloatArray, FloatArray, FloatArray]]()
+        """Time one run over the first `rays` rays of all trials: nanoseconds per ray and part."""
+        traced, jobs = 0, list[tuple[Any, FloatArray, FloatArray, FloatArray]]()
         for trial, parts in zip(self.trials, self.parts, strict=True):
             o, d = trial.o[:rays], trial.d[:rays]
             jobs += [(part, o, d, self._t[: len(o)]) for part in parts]
-            asked += len(o) * len(parts)
+            traced += len(o) * len(parts)
         run = self.method.run
         with np.errstate(all="ignore"):
             begin = time.perf_counter_ns()
             for job in jobs:
                 run(*job)
-            return (time.perf_counter_ns() - begin) / asked
+            return (time.perf_counter_ns() - begin) / traced
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ class Time:
 
 
 def measure(prepared: Mapping[str, Prepared], runs: int) -> dict[str, Time]:
-    """By method.  All take turns, so that what slows the machine for a while slows all of them."""
+    """Times by method.  The methods take turns, so that other load on the machine slows them all
+    alike."""
     rays = {name: _affordable(method) for name, method in prepared.items()}
     found: dict[str, list[float]] = {name: [] for name in prepared}
     for _ in range(runs):
@@ -74,13 +75,13 @@ def measure(prepared: Mapping[str, Prepared], runs: int) -> dict[str, Time]:
     times = {}
     for name, values in found.items():
         low, median, high = (float(q) for q in np.quantile(values, (0.25, 0.5, 0.75)))
-        asked = sum(min(rays[name], len(trial.o)) for trial in prepared[name].trials)
-        times[name] = Time(median, low, high, runs, asked)
+        traced = sum(min(rays[name], len(trial.o)) for trial in prepared[name].trials)
+        times[name] = Time(median, low, high, runs, traced)
     return times
 
 
 def _affordable(method: Prepared) -> int:
-    """Rays of each trial; the first runs compile or load the kernel and warm it up."""
+    """How many rays of each trial take LONGEST; the first runs compile or load the kernel."""
     method.nanoseconds(1)
     expected = method.nanoseconds(PROBE)
     shapes = sum(map(len, method.parts))

@@ -1,4 +1,4 @@
-"""What a reader sees in the numbers, said in words that are made from them."""
+"""Sentences that summarise the measured numbers."""
 
 from collections.abc import Sequence
 
@@ -10,24 +10,24 @@ from comparisons.experiments.methods.summary import methods_of, of_method, serie
 from comparisons.report.values import power_of_ten
 
 QUIET = 10.0
-"""Worst errors in u up to which a series has nothing to tell of them, nor to draw."""
+"""A series whose worst errors are below this, in u, gets no sentence and no plot about them."""
 
 GROWS = 0.2
-"""The least exponent of an error's growth that is told: less is no growth over eight decades."""
+"""The smallest exponent of an error's growth that is reported: less is no growth over 8 decades."""
 
 FEW = 0.1
-"""The share of wrong answers up to which errors are seen to grow: beyond, those that would be the
-largest are lost."""
+"""The share of wrong answers up to which the growth of errors is fitted: beyond it, the hits with
+the largest errors are missing."""
 
 SLOWER = 3.0
-"""Times as slow at one end as at the other: what is told of times that depend on x."""
+"""The ratio of the slowest to the fastest setting from which a series' times are reported."""
 
 CHEAPER = 1.05
-"""Times as fast; below, two costs count as the same."""
+"""The ratio of two times below which they count as equal."""
 
 
 def nanoseconds(value: float) -> str:
-    """Three digits."""
+    """A time with three digits; without a unit it is nanoseconds."""
     if value >= 1e6:
         return f"{value / 1e6:.3g} ms"
     if value >= 1e4:
@@ -67,11 +67,13 @@ def _costs(rows: Sequence[Row]) -> str:
         parts.append(f"{short(row.method)} {with_unit(row.time.median)}{times}")
     hits = first[0].errors.hits / first[0].errors.checked
     where = f"{rows[0].axis} {_x(rows[0].x)}" if rows[0].axis else rows[0].series
-    return f"An ordinary ray ({where}; {percent(hits)} hit) costs: {', '.join(parts)}."
+    return (
+        f"Time per ray at an ordinary setting ({where}; {percent(hits)} hit): {', '.join(parts)}."
+    )
 
 
 def with_unit(ns: float) -> str:
-    """The same as `nanoseconds`, and "ns" where no other unit is."""
+    """`nanoseconds`, always with a unit."""
     text = nanoseconds(ns)
     return text if text.endswith("s") else text + " ns"
 
@@ -82,7 +84,7 @@ def _series(name: str, rows: Sequence[Row]) -> str:
 
 
 def _decisions(rows: Sequence[Row]) -> str:
-    """Who answers wrongly, from where on, and how often at worst; who never does."""
+    """Which methods answer wrongly, from which x on, and how often at worst; which never do."""
     wrong, never, only_ties = [], [], []
     for method in methods_of(rows):
         some = of_method(rows, method)
@@ -94,7 +96,7 @@ def _decisions(rows: Sequence[Row]) -> str:
             where = f" from {_x(surely[0].x)} on" if worst.axis and len(surely) > 1 else ""
             at = f" at {_x(worst.x)}" if worst.axis else ""
             wrong.append(
-                f"{short(method)} errs{where}, {percent(k / n)}{at} [{low:.2g}, {high:.2g} %]"
+                f"{short(method)} is wrong{where}, {percent(k / n)}{at} [{low:.2g}, {high:.2g} %]"
             )
         elif any(row.errors.ties for row in some):
             only_ties.append(short(method))
@@ -102,9 +104,9 @@ def _decisions(rows: Sequence[Row]) -> str:
             never.append(short(method))
     decided = sum(row.errors.decided for row in of_method(rows, rows[0].method))
     if not wrong and not only_ties:
-        return f"no method answers any of {decided:,} rays wrongly"
+        return f"no method is wrong for any of {decided:,} rays"
     if only_ties:
-        wrong.append(f"{_list(only_ties)} only where the ray itself is on the fence")
+        wrong.append(f"{_list(only_ties)} only at ties")
     if never:
         wrong.append(f"{_list(never)} never, in {decided:,} rays")
     return ", ".join(wrong)
@@ -115,7 +117,7 @@ def _sure_share(row: Row) -> float:
 
 
 def _errors(rows: Sequence[Row]) -> str:
-    """Median errors where the series ends, and how they grow towards there."""
+    """Median errors at the last setting of the series, and how they grow with x."""
     said, growing = [], []
     for method in methods_of(rows):
         some = [row for row in of_method(rows, method) if row.errors.median]
@@ -136,11 +138,11 @@ def _errors(rows: Sequence[Row]) -> str:
         text = f"the median error{end} is {units(float(np.median(values)))} u for all"
     else:
         text = f"median errors{end}: " + ", ".join(f"{m} {units(v)} u" for v, m in sorted(said))
-    return text + (f"; they grow, {_list(growing)}" if growing else "")
+    return text + (f"; growth with x: {_list(growing)}" if growing else "")
 
 
 def _growth(rows: Sequence[Row]) -> float | None:
-    """The exponent of the median error as a power of x, where few answers are wrong."""
+    """The exponent of the median error as a power of x, over settings with few wrong answers."""
     fit = [row for row in rows if row.errors.share < FEW and row.errors.median]
     if len(fit) < 3 or not fit[0].axis:
         return None
@@ -148,18 +150,18 @@ def _growth(rows: Sequence[Row]) -> float | None:
 
 
 def _law(power: float) -> str:
-    """Of growth with x, to a tenth."""
+    """The growth with x in words, the exponent to a tenth."""
     rounded = round(power, 1)
     return {0.5: "as √x", 1.0: "as x", 2.0: "as x²"}.get(rounded, f"as x^{rounded:g}")
 
 
 def _power(x: Sequence[float], y: Sequence[float]) -> float:
-    """k of the nearest y = c x^k."""
+    """k of the best fit y = c x^k."""
     return float(np.polyfit(np.log10(x), np.log10(y), 1)[0])
 
 
 def _times(rows: Sequence[Row]) -> str:
-    """Where they depend on x."""
+    """Times of the methods that depend strongly on x."""
     said = []
     for method in methods_of(rows):
         some = of_method(rows, method)
@@ -169,18 +171,18 @@ def _times(rows: Sequence[Row]) -> str:
             said.append(
                 f"{short(method)} {with_unit(times[0])} to {with_unit(times[-1])} ({_law(power)})"
             )
-    return f"time from one end to the other: {', '.join(said)}" if said else ""
+    return f"time from the first to the last setting: {', '.join(said)}" if said else ""
 
 
 def _builds(rows: Sequence[Row]) -> str:
-    """Of hierarchies: what they take to build where the series ends, and whether all agree."""
+    """Of acceleration structures: build times at the last setting, and whether all agree."""
     last = [row for row in rows if row.x == rows[-1].x and row.build is not None]
     if not last:
         return ""
     built = ", ".join(f"{short(row.method)} {1e3 * (row.build or 0.0):.3g} ms" for row in last)
     differs = sum(row.differs for row in rows)
-    same = "all find the same to the last bit" if differs == 0 else f"{differs} t differ"
-    return f"{same}; built at {_x(rows[-1].x)} in: {built}"
+    same = "all give the same t, bit for bit" if differs == 0 else f"{differs} t differ"
+    return f"{same}; build times at {_x(rows[-1].x)}: {built}"
 
 
 def _x(value: float) -> str:

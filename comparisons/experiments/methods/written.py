@@ -1,4 +1,4 @@
-"""What was measured, for machines: `results.json` and `results.csv`, which hold the same rows."""
+"""The rows for machines: `results.json` and `results.csv`, which hold the same columns."""
 
 import csv
 import json
@@ -11,31 +11,31 @@ from comparisons.experiments.methods.run import Effort, Row
 from reference_rt.util.files import replacing
 
 SCHEMA = 1
-"""Raised whenever a reader of the former layout would misread the new one."""
+"""Increased whenever a reader of the former layout would misread the new one."""
 
 MEANING = {
     "x": "how extreme the setting is; null in a series of one setting",
     "extreme": "whether it counts as extreme",
-    "parts": "shapes that each ray is asked about; the answer is the nearest hit",
-    "checked": "rays that exact arithmetic was asked about",
-    "touching": "of these, rays exactly through an edge or tangent: either answer is right",
+    "parts": "shapes that each ray is traced against; the answer is the nearest hit",
+    "checked": "rays that were checked by exact arithmetic",
+    "touching": "of these, rays exactly through an edge or tangent: hit and miss are both right",
     "hits": "exact hits",
     "lost": "hits reported as misses",
     "false": "misses reported as hits",
     "misplaced": f"hits off by more than {PIXEL:g} of the shape's size",
-    "ties": "of these three, rays whose exact answer is another for one of "
-    f"{MOVES} rays moved by up to {NEIGHBOURS} units in the last place",
+    "ties": "of these three, rays whose exact answer changes for at least one of "
+    f"{MOVES} copies perturbed by up to {NEIGHBOURS} units in the last place",
     "wrong_share": "(lost + false + misplaced) / (checked - touching)",
-    "wrong_low": f"Clopper and Pearson's interval of {CONFIDENCE:.0%}",
-    "wrong_high": "its other end",
-    "error_median": "|t - exact| of rays that both hit, in units of 2^-53 (|t| + size / |d|), or"
-    " of 2^-53 |t| in a series that is relative",
+    "wrong_low": f"lower end of its {CONFIDENCE:.0%} confidence interval (Clopper and Pearson)",
+    "wrong_high": "upper end of that interval",
+    "error_median": "|t - exact| where both are hits, in units of 2^-53 (|t| + size / |d|), or"
+    " of 2^-53 |t| in a relative series",
     "ns": "nanoseconds per ray and part, one thread, warm: the median of `runs` runs",
     "ns_low": "lower quartile of the runs",
     "ns_high": "upper quartile",
     "timed": "rays of a run",
-    "differs": "of `compared` rays, those whose t is not bit for bit that of the first method",
-    "build_seconds": "to build the hierarchy, the best of three",
+    "differs": "of `compared` rays, those whose t differs in any bit from the first method's",
+    "build_seconds": "to build the acceleration structure, the best of three",
 }
 
 

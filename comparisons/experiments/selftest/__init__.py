@@ -1,7 +1,11 @@
-"""Does the harness fail when the renderer is wrong, and pass when only the noise differs?
+"""`reference-rt selftest`: does the harness fail if the renderer is wrong, and only then?
 
-Sensitivity: faults are planted, and the suites are asked whether they see them.  Specificity: the
-right renderer is judged with many seeds, and the false alarms are counted.
+Sensitivity: faults are planted in pictures (`of_pictures`), scenes (`of_scenes`) and the renderer's
+source (`of_sources`), and compared with a suite's budgets; `finding` says whether a fault was
+caught, and at which rung.  `power`: the fraction of runs that catch a fault, by its size.
+Specificity: the correct renderer is compared with many seeds, and false alarms are counted.
+
+To add a fault, add it to FAULTS of its file; a source fault's old text must occur exactly once.
 """
 
 from comparisons.experiments.selftest import of_pictures, of_scenes, of_sources

@@ -1,4 +1,4 @@
-"""What a planted fault is: a small patch of a picture, of a scene, or of the renderer's source."""
+"""Planted faults: a small change of a picture, of a scene, or of the renderer's source."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from reference_rt.rendering.scene import Scene
 
 @dataclass(frozen=True)
 class PictureFault:
-    """name: in a few words;  scene: whose pictures;  change: of the replicates (replicates, height,
-    width, 3) of the right renderer, given also a random generator."""
+    """name: in a few words;  scene: name of the scene;  change: applied to the replicates
+    (replicates, height, width, 3) of the correct renderer."""
 
     name: str
     scene: str
@@ -19,7 +19,7 @@ class PictureFault:
 
 @dataclass(frozen=True)
 class SceneFault:
-    """change: of the scene that we render; Mitsuba keeps the right one."""
+    """change: applied to the scene that we render; Mitsuba renders the original."""
 
     name: str
     scene: str
@@ -28,7 +28,7 @@ class SceneFault:
 
 @dataclass(frozen=True)
 class SourceFault:
-    """old, new: the text of `file` of the package that is patched, which must hold `old` once."""
+    """The text `old`, which must occur once in `file` of the package, is replaced by `new`."""
 
     name: str
     scene: str

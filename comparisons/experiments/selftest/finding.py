@@ -1,4 +1,4 @@
-"""What a suite made of a planted fault."""
+"""The result of a suite for a planted fault."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -11,8 +11,9 @@ CAUGHT = ("differ", "invalid")
 
 @dataclass(frozen=True)
 class Finding:
-    """caught: whether the case fails for a difference, not merely for too much noise;  rung: which
-    rung saw it first;  strength: how clearly, in that rung's terms;  cause: named, or empty."""
+    """caught: whether the case fails with `differ` or `invalid`, not only with too much noise;
+    rung: the first that broke;  strength: how clearly, in that rung's numbers;  cause: the
+    diagnosis, or ""."""
 
     fault: str
     kind: str
@@ -29,7 +30,7 @@ class Finding:
 
 
 def finding(fault: Fault, suite: str, case: Case) -> Finding:
-    """From the case of a faulty side."""
+    """The finding from the case with the fault."""
     gravest = "invalid" if case.verdict == "invalid" else "differ"
     by_name = {tier.name: tier for tier in case.tiers}
     rung = next((n for n in RUNGS if n in by_name and by_name[n].status == gravest), "")
@@ -49,7 +50,7 @@ def finding(fault: Fault, suite: str, case: Case) -> Finding:
 
 
 LONGEST = 90
-"""Characters of a reason in the table; the case has it all."""
+"""Characters of a reason in the table."""
 
 
 def _strength(rung: str, numbers: dict[str, Any], reason: str) -> str:

@@ -1,4 +1,4 @@
-"""Faults of pictures: what goes wrong after rendering, or in a camera or a film."""
+"""Faults of pictures: errors after rendering, or in the camera or the film."""
 
 import numpy as np
 from scipy import ndimage
@@ -9,11 +9,11 @@ from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
 
 SCENE = "colour_bleeding"
-"""One without a background; of its pixels, those of the lamp alone have no noise."""
+"""A scene without a background; only the pixels of its lamp have no noise."""
 
 
 def gain(factor: float, channel: int | None = None) -> PictureFault:
-    """All channels, or one, brighter by a factor."""
+    """All channels, or one, multiplied by a factor."""
 
     def change(pictures: FloatArray) -> FloatArray:
         factors = np.full(3, factor) if channel is None else np.ones(3)
@@ -26,7 +26,7 @@ def gain(factor: float, channel: int | None = None) -> PictureFault:
 
 
 def shifted(x: float, y: float) -> PictureFault:
-    """Moved by pixels, the edge repeated; bilinear between them."""
+    """Shifted by pixels, with bilinear interpolation and repeated edges."""
 
     def change(pictures: FloatArray) -> FloatArray:
         return np.asarray(ndimage.shift(pictures, (0, y, x, 0), order=1, mode="nearest"))
@@ -76,7 +76,7 @@ def _dead_pixel(pictures: FloatArray) -> FloatArray:
 
 
 def _shared_noise(pictures: FloatArray) -> FloatArray:
-    """Every replicate is half its own and half the first: their seeds overlap."""
+    """Overlapping seeds: every replicate is the mean of itself and the first."""
     return 0.5 * pictures + 0.5 * pictures[:1]
 
 
@@ -93,7 +93,7 @@ def dark_tile(fraction: float) -> PictureFault:
 
 
 def black_level(radiance: float) -> PictureFault:
-    """Something added to every pixel."""
+    """A constant radiance added to every pixel."""
     name = f"black level {radiance:+g} W/sr/m²"
     return PictureFault(name, SCENE, lambda pictures: pictures + radiance)
 

@@ -1,4 +1,4 @@
-"""Faults of scenes: our side renders a scene that is slightly another."""
+"""Faults of scenes: we render a slightly changed scene, Mitsuba the original."""
 
 import functools
 import tempfile
@@ -14,7 +14,7 @@ from reference_rt.util.files import read_text
 
 
 def material(name: str, **fields: Any) -> Callable[[Scene], Scene]:
-    """A material with other fields."""
+    """Change fields of a material."""
 
     def change(scene: Scene) -> Scene:
         changed = scene.materials[name].model_copy(update=fields)
@@ -24,7 +24,7 @@ def material(name: str, **fields: Any) -> Callable[[Scene], Scene]:
 
 
 def shape(index: int, **fields: Any) -> Callable[[Scene], Scene]:
-    """A shape with other fields."""
+    """Change fields of a shape."""
 
     def change(scene: Scene) -> Scene:
         shapes = list(scene.shapes)
@@ -35,7 +35,7 @@ def shape(index: int, **fields: Any) -> Callable[[Scene], Scene]:
 
 
 def light(index: int, **fields: Any) -> Callable[[Scene], Scene]:
-    """An entry of the lights with other fields."""
+    """Change fields of an entry of the lights."""
 
     def change(scene: Scene) -> Scene:
         lights = list(scene.lights)
@@ -46,7 +46,7 @@ def light(index: int, **fields: Any) -> Callable[[Scene], Scene]:
 
 
 def part(name: str, **fields: Any) -> Callable[[Scene], Scene]:
-    """The camera, the film or the integrator with other fields."""
+    """Change fields of the camera, the film or the integrator."""
 
     def change(scene: Scene) -> Scene:
         return scene.changed(**{name: getattr(scene, name).model_copy(update=fields)})
@@ -55,7 +55,7 @@ def part(name: str, **fields: Any) -> Callable[[Scene], Scene]:
 
 
 LAMP = 5
-"""Its place among the shapes of `colour_bleeding`."""
+"""Index of the lamp among the shapes of `colour_bleeding`."""
 
 
 def _lamp_moved(scene: Scene) -> Scene:
@@ -78,18 +78,18 @@ def _texture_turned(scene: Scene) -> Scene:
 
 @functools.cache
 def _folder() -> tempfile.TemporaryDirectory[str]:
-    """Of changed meshes; removed when the process ends."""
+    """The folder of changed meshes; removed when the process ends."""
     return tempfile.TemporaryDirectory(prefix="reference_rt_selftest_")
 
 
 def _one_face_flipped(scene: Scene) -> Scene:
-    """The first mesh, of an .obj, with one face wound the other way."""
+    """The scene with one face of its first shape, an .obj mesh, wound in reverse."""
     mesh = scene.shapes[0]
     assert isinstance(mesh, Mesh)
     assert mesh.file is not None
     lines = read_text(scene.folder / mesh.file).splitlines()
     faces = [k for k, line in enumerate(lines) if line.startswith("f ")]
-    # The twentieth part of all: a face that the camera sees, and that is no special one.
+    # Face number n / 20: an ordinary one that the camera sees.
     flipped = faces[len(faces) // 20]
     head, *corners = lines[flipped].split()
     lines[flipped] = " ".join([head, *reversed(corners)])

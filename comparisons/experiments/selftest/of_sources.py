@@ -1,7 +1,7 @@
-"""Faults of the renderer: a line or two of its source, as they go wrong in renderers.
+"""Faults of the renderer's source: typical bugs of renderers, of one or two lines.
 
-`tests/comparisons/experiments/test_selftest.py` checks that each old text stands in its file
-exactly once.
+`tests/comparisons/experiments/test_selftest.py` checks that each old text occurs exactly once in
+its file.
 """
 
 from comparisons.experiments.selftest.fault import SourceFault

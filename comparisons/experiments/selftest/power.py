@@ -1,4 +1,4 @@
-"""How strong a fault must be: the fraction of runs that catch it, by its size."""
+"""Statistical power: the fraction of runs that catch a fault, by its size."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -26,7 +26,7 @@ from reference_rt.rendering.scene import Scene
 
 RUNS = 10
 POOL = 3
-"""Times as many replicates are rendered as one run uses: runs draw from them at random."""
+"""Rendered replicates over those that one run uses: each run draws some at random."""
 
 CURVES: Mapping[str, tuple[Callable[[float], PictureFault], tuple[float, ...]]] = {
     "gain, %": (lambda x: gain(1.0 + x / 100.0), (0.05, 0.1, 0.2, 0.3, 0.5, 1.0)),
@@ -40,8 +40,8 @@ CURVES: Mapping[str, tuple[Callable[[float], PictureFault], tuple[float, ...]]] 
 
 @dataclass(frozen=True)
 class Curve:
-    """fault: what, and in which unit;  sizes;  caught: the fraction of runs that caught each size;
-    runs: of each."""
+    """fault: its name and unit;  sizes: of the fault;  caught: the fraction of runs that caught
+    each size;  runs: per size."""
 
     fault: str
     sizes: tuple[float, ...]
@@ -53,7 +53,7 @@ class Curve:
 
 
 def power_curves(budget: Budget, scenes: Path, say: Say) -> list[Curve]:
-    """Of the faults in CURVES, on pictures of one scene with a suite's budget."""
+    """Power curves of the faults in CURVES, for one scene with a suite's budget."""
     scene = Scene.load(scenes / f"{SCENE}.yaml")
     many = budget.model_copy(update={"replicates": POOL * budget.replicates})
     pool = gather(Subject(scene), many, say, only=("statistics", "images"))

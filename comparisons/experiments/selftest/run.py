@@ -1,4 +1,4 @@
-"""The whole self-test: sensitivity, power, specificity, and the tables made of them."""
+"""The whole self-test: sensitivity, power and specificity, and their tables."""
 
 import json
 from collections.abc import Sequence
@@ -20,25 +20,26 @@ from reference_rt.util.files import replacing
 SUITES = ("standard", "smoke")
 
 SMOKE_SHARE = 0.9
-"""Of the faults: what the short suite must catch; the standard one must catch all."""
+"""The fraction of faults that the smoke suite must catch; the standard suite must catch all."""
 
 
 @dataclass
 class Outcome:
-    """What was found so far; whether it is enough is said by `holds`."""
+    """The results so far."""
 
     findings: list[Finding] = field(default_factory=list)
     curves: list[Curve] = field(default_factory=list)
     alarms: Sequence[Alarms] = ()
 
     def share(self, suite: str) -> tuple[int, int]:
-        """How many faults the suite caught, of how many."""
+        """(caught, all) faults of the suite."""
         of_suite = [f for f in self.findings if f.suite == suite]
         return sum(f.caught for f in of_suite), len(of_suite)
 
     @property
     def holds(self) -> bool:
-        """Whether standard catches all, smoke nearly all, and false alarms are as rare as said."""
+        """Whether `standard` catches all faults, `smoke` SMOKE_SHARE of them, and false alarms are
+        as rare as promised."""
         standard, smoke = (self.share(suite) for suite in SUITES)
         return (
             standard[0] == standard[1]
@@ -59,7 +60,7 @@ def budgets_of(scenes: Path) -> Budgets:
 def run(
     faults: Sequence[Fault], scenes: Path, seeds: int, out: Path, say: Say, with_power: bool
 ) -> Outcome:
-    """Plant `faults`, then count false alarms over `seeds` seeds; `out` is whole after each."""
+    """Plant `faults`, then count false alarms over `seeds` seeds; writes files after each step."""
     budgets = budgets_of(scenes)
     outcome = Outcome()
     for found in sensitivity(faults, budgets, scenes, say):
@@ -98,7 +99,7 @@ def _write(out: Path, outcome: Outcome) -> None:
 
 
 def markdown(outcome: Outcome) -> str:
-    """The tables, as the README shows them."""
+    """The tables of the README."""
     lines = ["| fault | planted in | scene | standard: rung, strength | smoke: rung, strength |"]
     lines.append("|---|---|---|---|---|")
     by_name: dict[str, dict[str, Finding]] = {}

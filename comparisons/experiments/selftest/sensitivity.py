@@ -1,4 +1,4 @@
-"""Faults are planted, and each suite is asked what it makes of them."""
+"""Plants faults and compares the faulty renderer with each suite's budgets."""
 
 import json
 import os
@@ -25,20 +25,20 @@ from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
 
 Budgets = Mapping[str, Mapping[str, Budget]]
-"""By suite and scene."""
+"""Budgets by suite and scene."""
 
 MOST_SECONDS = 900.0
-"""Of one patched renderer, whose kernels are compiled anew."""
+"""Time limit of one patched renderer, which compiles its kernels."""
 
 
 class StaleFaultError(ReferenceRtError):
-    """The text that a fault replaces no longer stands in the source."""
+    """The text that a fault replaces does not occur exactly once in the source."""
 
 
 def sensitivity(
     faults: Sequence[Fault], budgets: Budgets, scenes: Path, say: Say, jobs: int = 2
 ) -> Iterator[Finding]:
-    """What each suite makes of each fault, in the order in which they are done."""
+    """The finding of each suite for each fault, as they are made."""
     right = {}
     for fault in faults:
         for suite, by_scene in budgets.items():
@@ -87,8 +87,8 @@ def patched_text(fault: SourceFault) -> str:
     text = file.read_text(encoding="utf-8")
     if text.count(fault.old) != 1:
         raise StaleFaultError(
-            f"selftest: '{fault.name}': {fault.file} holds the text that it replaces "
-            f"{text.count(fault.old)} times; expected once"
+            f"selftest: '{fault.name}': the text that it replaces occurs {text.count(fault.old)} "
+            f"times in {fault.file}; expected once"
         )
     return text.replace(fault.old, fault.new)
 
@@ -96,7 +96,7 @@ def patched_text(fault: SourceFault) -> str:
 def _patched(
     fault: SourceFault, budgets: Mapping[str, Budget], scenes: Path, threads: int
 ) -> list[Finding]:
-    """Judge a copy of the renderer that has the fault, in a process of its own."""
+    """Compare a patched copy of the renderer with Mitsuba, in its own process."""
     text = patched_text(fault)
     with tempfile.TemporaryDirectory(prefix="reference_rt_selftest_") as folder:
         package = Path(folder) / "reference_rt"
@@ -110,7 +110,7 @@ def _patched(
             "threads": threads,
         }
         run = subprocess.run(
-            # -P: the current folder, where a reference_rt may lie, is not searched.
+            # -P: do not import from the current folder, which may have a reference_rt.
             [sys.executable, "-P", "-m", "comparisons.experiments.selftest.source_worker"],
             input=json.dumps(task),
             env={**os.environ, "PYTHONPATH": folder, "REFERENCE_RT_CACHE": f"{folder}/cache"},
@@ -122,6 +122,6 @@ def _patched(
         )
     if run.returncode != 0:
         lines = [line for line in run.stderr.splitlines() if line.strip()]
-        told = lines[-1] if lines else f"exit code {run.returncode}"
-        raise ReferenceRtError(f"selftest: '{fault.name}' could not be judged: {told}")
+        reason = lines[-1] if lines else f"exit code {run.returncode}"
+        raise ReferenceRtError(f"selftest: '{fault.name}' could not be compared: {reason}")
     return [Finding(**fields) for fields in json.loads(run.stdout)]

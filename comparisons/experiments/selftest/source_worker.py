@@ -1,5 +1,7 @@
-"""Runs in a process whose `reference_rt` is a patched copy: one fault of the source, judged with
-the budgets that it is told.  Reads and writes JSON."""
+"""A process whose `reference_rt` is a patched copy with one source fault: compares it with Mitsuba.
+
+Reads a request and writes findings as JSON.
+"""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""How often the right renderer is said to be wrong, over many seeds."""
+"""The rate of false alarms: verdicts against the correct renderer, over many seeds."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -23,16 +23,17 @@ SCENES: tuple[tuple[str, Budget], ...] = (
     ("cornell_box", Budget(size=(32, 32), spp=16)),
     ("caustic_glass", Budget(size=(32, 24), spp=64)),
 )
-"""Small pictures, of which thousands can be rendered; the second one's noise is heavy-tailed."""
+"""Small pictures, which can be rendered thousands of times; the second has heavy-tailed noise."""
 
 ALLOWED = 1e-3
-"""False alarms a case."""
+"""Allowed false alarms per case."""
 
 
 @dataclass(frozen=True)
 class Alarms:
-    """runs: comparisons of fresh replicates;  false_alarms: verdicts `differ` and `invalid`;
-    rungs: of these;  upper: the 95 % confidence bound on their rate (Clopper and Pearson 1934)."""
+    """runs: comparisons with new replicates;  false_alarms: verdicts `differ` and `invalid`;
+    rungs: their numbers by rung;  upper: the upper 95 % confidence bound of their rate (Clopper and
+    Pearson 1934)."""
 
     scene: str
     runs: int
@@ -43,7 +44,7 @@ class Alarms:
 
     @property
     def holds(self) -> bool:
-        """Whether no more than ALLOWED were seen."""
+        """Whether the rate is at most ALLOWED."""
         return self.false_alarms <= ALLOWED * self.runs
 
     def as_json(self) -> dict[str, Any]:
@@ -51,7 +52,7 @@ class Alarms:
 
 
 def specificity(runs: int, scenes: Path, say: Say) -> Sequence[Alarms]:
-    """Judge `runs` sets of replicates a scene, no seed used twice."""
+    """Compare `runs` sets of replicates per scene; no seed is used twice."""
     return [_of_scene(scenes / f"{name}.yaml", budget, runs, say) for name, budget in SCENES]
 
 

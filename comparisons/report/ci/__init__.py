@@ -1,1 +1,1 @@
-"""What a run found, for the machines that build and test."""
+"""Results of a run in the formats of CI services: JUnit XML, GitHub annotations and summaries."""

@@ -1,4 +1,4 @@
-"""GitHub Actions: annotations on the run, and its summary, within their limits."""
+"""GitHub Actions: annotations and the step summary, within GitHub's size limits."""
 
 import os
 import re
@@ -13,16 +13,16 @@ from comparisons.results.verdict import PASSING
 from reference_rt.util.errors import ImageError, printable
 
 MOST_ANNOTATIONS = 10
-"""Of each kind that a step may make; GitHub drops the rest without a word."""
+"""Annotations of each kind per step; GitHub silently drops any more."""
 
 MOST_BYTES = 1 << 20
-"""Of the summary of a step; GitHub drops a longer one as a whole."""
+"""Size limit of a step's summary; GitHub drops a longer one entirely."""
 
 _ROOM = 256
-"""Bytes for the line that says how many cases were dropped."""
+"""Bytes reserved for the line that says how many cases are not shown."""
 
 _MOST_CHARACTERS = 1000
-"""Of a reason: what is longer is in results.json."""
+"""Length at which a reason is cut; results.json has all of it."""
 
 _KINDS = {"invalid": "error", "differ": "error", "inconclusive": "warning"} | {
     "not-comparable": "warning"
@@ -35,7 +35,7 @@ def is_there() -> bool:
 
 
 def summary_path() -> Path | None:
-    """Where the step's summary goes, None where GitHub wants none."""
+    """The file of the step's summary; None outside of GitHub Actions."""
     path = os.environ.get("GITHUB_STEP_SUMMARY")
     return Path(path) if path else None
 
@@ -46,12 +46,12 @@ def annotate(
     files: Mapping[str, str] | None = None,
     missing: Sequence[str] = (),
 ) -> None:
-    """Write an annotation for each case that fails, the worst first: errors for what is invalid or
-    differs, warnings for what could not be told.
+    """Write an annotation for each case that fails, the worst first: errors for `invalid` and
+    `differ`, warnings for `inconclusive` and `not-comparable`.
 
-    files: the file that a case is about, by the case's name;  missing: names of cases that an
-    interrupted run did not come to: one error.  Where there are more cases than annotations, the
-    last one says how many.
+    files: each case's scene file, by the case's name;  missing: names of cases that an interrupted
+    run did not reach, reported by one error.  If there are more cases than annotations, the last
+    annotation names the others.
     """
     if missing:
         title = {"title": how_many(len(cases), len(missing))}
@@ -64,7 +64,7 @@ def annotate(
             where = {"title": f"{case.scene}: {case.verdict}"}
             if files and case.scene in files:
                 where = {"file": files[case.scene], **where}
-            _command(stream, kind, where, _told(case))
+            _command(stream, kind, where, _message(case))
         if len(failed) > len(shown):
             number = len(failed) - len(shown)
             title = {"title": f"{number} more cases"}
@@ -73,17 +73,17 @@ def annotate(
 
 
 def _command(stream: TextIO, kind: str, properties: Mapping[str, str], message: str) -> None:
-    told = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
-    stream.write(f"::{kind} {told}::{_data(message)}\n")
+    joined = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
+    stream.write(f"::{kind} {joined}::{_data(message)}\n")
     stream.flush()
 
 
-def _told(case: Case) -> str:
+def _message(case: Case) -> str:
     lines = [_cut(case.reason)]
     if case.cause:
         lines.append(_cut(f"Likeliest cause: {case.cause.name}: {case.cause.evidence}"))
     if case.again:
-        lines.append(f"Again: {case.again}")
+        lines.append(f"Reproduce: {case.again}")
     return "\n".join(lines)
 
 
@@ -106,13 +106,16 @@ def summarise(
     not_run: Mapping[str, str] | None = None,
     missing: Sequence[str] = (),
 ) -> None:
-    """Append a summary in Markdown: counts, then a table of the cases, the worst first, as many as
-    there is room for.  missing: names of cases that an interrupted run did not come to.  Raises
-    ImageError where the file cannot be written."""
+    """Append a summary in Markdown: counts, then a table of as many cases as fit, the worst first.
+
+    not_run: why other cases were skipped, by name;  missing: names of cases that an interrupted run
+    did not reach.  Raises ImageError where the file cannot be written.
+    """
     counts = Counter(case.verdict for case in cases)
-    told = ", ".join(f"**{counts[v]}** {v}" for v in SEVERITY if counts[v]) or "no case was run"
-    head = f"## {_markdown(title)}\n\n{how_many(len(cases), len(missing))}: {told}\n\n"
-    head += "| case | verdict | why |\n| --- | --- | --- |\n"
+    verdicts = ", ".join(f"**{counts[v]}** {v}" for v in SEVERITY if counts[v])
+    head = f"## {_markdown(title)}\n\n{how_many(len(cases), len(missing))}: "
+    head += f"{verdicts or 'no case was run'}\n\n"
+    head += "| case | verdict | reason |\n| --- | --- | --- |\n"
     rows = [f"| {_markdown(name)} | ❌ missing | {INTERRUPTED} |\n" for name in missing]
     rows += [_row(case) for case in ranked(cases)]
     rows += [
@@ -123,7 +126,7 @@ def summarise(
         used = path.stat().st_size if path.exists() else 0
         text = head + _fitting(rows, MOST_BYTES - used - len(head.encode()) - _ROOM)
         if used + len(text.encode()) > MOST_BYTES:
-            return  # one that is too long costs what is there already
+            return  # GitHub would drop the earlier part of the summary too
         with path.open("a", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except OSError as error:
@@ -138,7 +141,7 @@ def _fitting(rows: Sequence[str], room: int) -> str:
             break
         kept.append(row)
     if len(kept) < len(rows):
-        kept.append(f"\n{len(rows) - len(kept)} more cases were dropped: no room.\n")
+        kept.append(f"\n{len(rows) - len(kept)} more cases are not shown: size limit.\n")
     return "".join([*kept, "\n"])
 
 
@@ -155,10 +158,7 @@ def _cut(text: str) -> str:
 
 
 def _markdown(text: str) -> str:
-    """`text` as text: on one line, and none of it markup."""
+    """`text` on one line, with all markup escaped."""
     return re.sub(
         r"([\\`*_\[\]<>|~&#!@$])", r"\\\1", " ".join(printable(text, kept="\r\n\t").split())
     )
-
-
-__all__ = ["annotate", "is_there", "summarise", "summary_path"]

@@ -1,4 +1,4 @@
-"""JUnit XML, which build servers show as tests."""
+"""JUnit XML, which CI services show as test results: a test per case."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ from reference_rt.util.errors import printable
 from reference_rt.util.files import replacing
 
 _BROKEN = "invalid"
-"""The verdict that makes no statement about agreement: an error, where the others are failures."""
+"""This verdict says nothing about agreement: it is an error, other verdicts are failures."""
 
 
 def write(
@@ -25,9 +25,9 @@ def write(
 ) -> None:
     """Write one test suite `name` of the cases, the worst first.  Raises ImageError.
 
-    seconds: of each case by its name, where more is known than the case says;  not_run: why other
-    cases were not run, by name: they are skipped tests;  missing: names of cases that an
-    interrupted run did not come to: they are errors.
+    seconds: of whole cases by name, by default the sum over their steps;  not_run: why other cases
+    were skipped, by name: skipped tests;  missing: names of cases that an interrupted run did not
+    reach: errors.
     """
     suite = TestSuite(_legal(name))
     for case in ranked(cases):
@@ -64,7 +64,7 @@ def _test(case: Case, suite: str, seconds: float) -> TestCase:
 
 
 def _details(case: Case) -> list[str]:
-    """What there is to know about a case, a line each."""
+    """The text of a case's test, line by line."""
     lines = [f"{case.scene}: {case.verdict}: {case.reason}"]
     lines += [f"{tier.name}: {tier.status}: {tier.reason}" for tier in case.tiers]
     if case.cause:
@@ -74,11 +74,11 @@ def _details(case: Case) -> list[str]:
         for place in case.worst
     ]
     if case.again:
-        lines.append(f"again: {case.again}")
+        lines.append(f"reproduce: {case.again}")
     return lines
 
 
 def _legal(text: str) -> str:
-    """`text` with escapes in place of what XML 1.0 cannot hold (section 2.2, Char), and of other
-    characters that do not print."""
+    """`text`, in which characters that XML 1.0 does not allow (section 2.2, Char) and other
+    unprintable ones are escaped."""
     return printable(text, kept="\n\t")

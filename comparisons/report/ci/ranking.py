@@ -1,4 +1,4 @@
-"""The worst first: what a reader must see where there is no room for all."""
+"""The order of cases where there is not room for all: the worst first."""
 
 from collections.abc import Sequence
 
@@ -17,12 +17,12 @@ SEVERITY: tuple[Status, ...] = (
 
 
 def ranked(cases: Sequence[Case]) -> list[Case]:
-    """Cases by verdict, those that break at a lower rung first, then by name."""
+    """Cases ordered by verdict, then by the first rung that breaks, then by name."""
     return sorted(cases, key=lambda c: (SEVERITY.index(c.verdict), _first_rung(c), c.scene))
 
 
 def _first_rung(case: Case) -> int:
-    """The place in the ladder of the first rung that has the verdict of the case."""
+    """The index in RUNGS of the first rung that has the verdict of the case."""
     return min(
         (RUNGS.index(t.name) for t in case.tiers if t.status == case.verdict and t.name in RUNGS),
         default=len(RUNGS),

@@ -17,7 +17,7 @@ import reference_rt as rt
 from comparisons.gate.baselines import used_in
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.pictures_in import read_candidate, variance_of
-from comparisons.report.marked import around
+from comparisons.report.marker_block import around
 from comparisons.results.record import CASE, read_record
 from comparisons.suites.archive import read_archive
 from comparisons.suites.keys import files_digest

@@ -15,7 +15,7 @@ from suite_runs import run_in, scenes
 from typer.testing import CliRunner
 
 import comparisons.commands.register
-import comparisons.experiments.convergence.contestants
+import comparisons.experiments.convergence.methods
 import comparisons.mitsuba.backend
 import reference_rt.rendering.render
 import reference_rt.scene.build

@@ -119,7 +119,7 @@ def test_names_of_rows_are_told_apart_and_choose_their_groups() -> None:
         "equal_samples",
         "million",
     ]
-    with pytest.raises(UsageError, match="no row is called 'speed'"):
+    with pytest.raises(UsageError, match="no row has the name 'speed'"):
         chosen(("threads", "speed"))
 
 
@@ -133,7 +133,7 @@ def command() -> Any:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--only", "speed"), "no row is called 'speed'"),
+        (("--only", "speed"), "no row has the name 'speed'"),
         (("--mesh", "nowhere.ply"), "there is no file 'nowhere.ply'"),
         (("--markdown", "nowhere.md"), "cannot be read"),
     ],

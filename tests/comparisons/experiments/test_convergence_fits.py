@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from comparisons.experiments.convergence.contestants import Shot
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.findings import Target, ratio
 from comparisons.experiments.convergence.fits import DRAWS, Points, linear_time, log_line, time_to
+from comparisons.experiments.convergence.methods import Shot
 from comparisons.experiments.convergence.plan import Cost, affordable, estimate, rungs, why_left_out
 
 

@@ -1,4 +1,4 @@
-"""Page, JSON and terminal say what is extrapolated, and which contestants have no data."""
+"""Page, JSON and terminal say what is extrapolated, and which methods have no data."""
 
 import itertools
 import json
@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 import comparisons.commands.register
 from comparisons.experiments.bench import equal_error
 from comparisons.experiments.convergence import run
-from comparisons.experiments.convergence.contestants import CONTESTANTS, AbsentError, Shot, failing
 from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.estimates import Estimate
 from comparisons.experiments.convergence.findings import Ratio, Target, compared, findings_of
 from comparisons.experiments.convergence.ladder import Climb, climb
+from comparisons.experiments.convergence.methods import METHODS, AbsentError, Shot, failing
 from comparisons.experiments.convergence.outputs import write_results
 from comparisons.experiments.convergence.page import write_page
 from comparisons.experiments.convergence.store import Store
@@ -31,7 +31,7 @@ SCENES = Path(__file__).parents[3] / "scenes"
 if not any(command.name == "converge" for command in app.registered_commands):
     comparisons.commands.register.register(app)
 
-BY_NAME = {c.name: c for c in CONTESTANTS}
+BY_NAME = {c.name: c for c in METHODS}
 MEASURED, BEYOND = 0.55, 1e-3
 """Relative errors that the fakes reach between their rungs, and far beyond the last one."""
 
@@ -97,8 +97,8 @@ class Failing(Fake):
 
 SAID = {
     "raises": "Mitsuba cannot render: no memory",
-    "nan": "1 pixels of a picture of 4 samples a pixel are not finite",
-    "inf": "1 pixels of a picture of 4 samples a pixel are not finite",
+    "nan": "1 pixels of a picture of 4 samples per pixel are not finite",
+    "inf": "1 pixels of a picture of 4 samples per pixel are not finite",
 }
 
 
@@ -131,15 +131,17 @@ def curves_of(scene, *, absent=None, **noises):
     some = climbs(**{name: Fake(noise) for name, noise in noises.items()})
     climb(some, EXACT, 8, Store(None, ""))
     found = {n: findings_of(c.rungs, EXACT, (MEASURED, BEYOND), False) for n, c in some.items()}
-    contestants = {name: BY_NAME[name] for name in (*noises, *(absent or {}))}
-    return Curves(scene, (16, 12), contestants, found, EXACT, absent=absent or {})
+    methods = {name: BY_NAME[name] for name in (*noises, *(absent or {}))}
+    return Curves(scene, (16, 12), methods, found, EXACT, absent=absent or {})
 
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
     """The headline, the whole page and the JSON of four scenes."""
     folder = tmp_path_factory.mktemp("page")
-    why = "two rungs at least make a curve; rungs from 8 samples a pixel: 8 pictures would take 9 s"
+    why = (
+        "two rungs at least make a curve; rungs from 8 samples per pixel: 8 pictures would take 9 s"
+    )
     curves = [
         curves_of("all", ours=1.0, mitsuba_llvm=1.3),
         curves_of("lonely", ours=1.0, absent={"mitsuba_llvm": why}),
@@ -187,7 +189,7 @@ def test_the_headline_names_who_is_missing_and_why(told):
     assert "without: ours, Sobol&#39; (default and best): &lt;failed&gt;" in headline
     assert "<failed>" not in page
     assert ("bad", "no data see below") in cells(headline)
-    assert ("bad", "no data of ours") in cells(headline)
+    assert ("bad", "no data for ours") in cells(headline)
     assert "invalid: bad.yaml:3: shapes[1].file: cannot be read" in headline
 
 
@@ -207,12 +209,12 @@ def test_json_and_terminal_say_the_same(told):
         r"ours: 55 % in [\d.e-]+ s, 0.1 % in about [\d.e+]+ s \(extrapolated\)$", lines[0][5:]
     )
     assert re.search(r"; ours / this: 0.\d\d, 0.\d\d \(extrapolated\)$", lines[1])
-    assert lines_of(curves[1])[1].startswith("lonely: no data of Mitsuba llvm, independent (def")
+    assert lines_of(curves[1])[1].startswith("lonely: no data for Mitsuba llvm, independent (def")
     assert lines_of(curves[3]) == ["bad: invalid: bad.yaml:3: shapes[1].file: cannot be read"]
 
 
 def test_who_is_never_there_is_part_of_the_median(tmp_path):
-    """A contestant whose bias keeps it from the target must not drop out of the median."""
+    """A method whose bias keeps it from the target must not drop out of the median."""
     from comparisons.experiments.convergence.page import _median
 
     never, half = Ratio(Estimate(math.inf, math.inf, math.inf)), Ratio(Estimate(0.5, 0.4, 0.6))
@@ -270,7 +272,7 @@ def test_an_invalid_scene_does_not_cost_the_others(tmp_path, monkeypatch):
     assert "the run was interrupted" in (out / "report.html").read_text()
 
 
-def test_a_contestant_without_enough_time_is_absent(monkeypatch):
+def test_a_method_without_enough_time_is_absent(monkeypatch):
     """As planned by the program itself."""
     scene = Scene.load(SCENES / "cornell_box.yaml")
 
@@ -280,10 +282,10 @@ def test_a_contestant_without_enough_time_is_absent(monkeypatch):
             return self
 
         def __exit__(self, *error): ...
-        def ready(self, contestant, progress=None):
-            if contestant.name == "mitsuba_scalar":
+        def ready(self, method, progress=None):
+            if method.name == "mitsuba_scalar":
                 raise AbsentError("no such plugin")
-            return Fake(speed=10.0 if contestant.name == "mitsuba_llvm" else 1e-3)
+            return Fake(speed=10.0 if method.name == "mitsuba_llvm" else 1e-3)
 
     monkeypatch.setattr(run, "Stable", Stable)
     monkeypatch.setattr(run, "reference_of", lambda *_: EXACT)
@@ -293,7 +295,7 @@ def test_a_contestant_without_enough_time_is_absent(monkeypatch):
     )  # fmt: skip
     found = run.converge(scene, settings)
     assert list(found.findings) == ["ours"]
-    assert set(found.contestants) == {"ours", "mitsuba_llvm", "mitsuba_scalar"}
+    assert set(found.methods) == {"ours", "mitsuba_llvm", "mitsuba_scalar"}
     assert found.absent["mitsuba_scalar"] == "no such plugin"
     assert found.absent["mitsuba_llvm"].startswith("two rungs at least make a curve; rungs from 4")
     assert found.left_out == ()

@@ -1,16 +1,16 @@
-"""The ladder: contestants take turns, and what is done is not done again."""
+"""The ladder: methods take turns, and what is done is not done again."""
 
 import numpy as np
 import pytest
 from convergence_fakes import EXACT, Fake, climbs
 
 from comparisons.experiments.convergence import ladder
-from comparisons.experiments.convergence.contestants import Shot
 from comparisons.experiments.convergence.ladder import Climb, climb
+from comparisons.experiments.convergence.methods import Shot
 from comparisons.experiments.convergence.store import Store
 
 
-def test_contestants_take_turns_and_numbers_are_used_once():
+def test_methods_take_turns_and_numbers_are_used_once():
     asked = []
 
     class Told(Fake):
@@ -73,7 +73,7 @@ def test_slower_than_promised_climbs_less():
     climb({"a": one}, EXACT, 8, Store(None, ""))
     # 8 pictures of 4 and 8 samples take 96 s; those of 16, another 128 s.
     assert [rung.asked for rung in one.rungs] == [4, 8]
-    assert "rungs from 16 samples a pixel" in one.stopped
+    assert "rungs from 16 samples per pixel" in one.stopped
 
 
 def test_long_runs_are_stored_on_the_way(tmp_path, monkeypatch):

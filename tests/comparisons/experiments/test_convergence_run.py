@@ -14,17 +14,17 @@ from typer.testing import CliRunner
 
 import comparisons.commands.register
 from comparisons.experiments import convergence
-from comparisons.experiments.convergence.contestants import (
-    CONTESTANTS,
+from comparisons.experiments.convergence.curves import Curves
+from comparisons.experiments.convergence.data import Settings, size_within, weights
+from comparisons.experiments.convergence.findings import findings_of
+from comparisons.experiments.convergence.ladder import Climb, climb
+from comparisons.experiments.convergence.methods import (
+    METHODS,
     AbsentError,
     Stable,
     chosen,
     with_sampler,
 )
-from comparisons.experiments.convergence.curves import Curves
-from comparisons.experiments.convergence.data import Settings, size_within, weights
-from comparisons.experiments.convergence.findings import findings_of
-from comparisons.experiments.convergence.ladder import Climb, climb
 from comparisons.experiments.convergence.outputs import COLUMNS, write_results, write_table
 from comparisons.experiments.convergence.page import write_page
 from comparisons.experiments.convergence.reference import COUNT, reference_of
@@ -171,7 +171,7 @@ def test_times_to_an_error(own_cache):
 def test_solids_have_no_mitsuba():
     scene = Scene.load(SCENES / "csg_dice.yaml")
     with Stable(scene) as stable, pytest.raises(AbsentError, match="set operations"):
-        stable.ready(next(c for c in CONTESTANTS if c.name == "mitsuba_llvm"))
+        stable.ready(next(c for c in METHODS if c.name == "mitsuba_llvm"))
 
 
 # ---- parts --------------------------------------------------------------------------------------
@@ -192,18 +192,18 @@ def test_key_changes_with_what_matters():
     assert run_key(small, 8) == keys[0]
 
 
-def test_contestants_by_name():
+def test_methods_by_name():
     assert [c.name for c in chosen(("mitsuba_llvm", "ours"))] == ["ours", "mitsuba_llvm"]
-    assert chosen(()) == CONTESTANTS
+    assert chosen(()) == METHODS
     with pytest.raises(UsageError, match="mine"):
         chosen(("mine",))
-    best = with_sampler(CONTESTANTS[3], "ldsampler")
+    best = with_sampler(METHODS[3], "ldsampler")
     assert (best.title, best.factor, best.is_independent) == (
         "Mitsuba llvm, ldsampler (best)",
         4,
         False,
     )
-    assert CONTESTANTS[2].is_independent
+    assert METHODS[2].is_independent
 
 
 def test_page_escapes_what_comes_from_outside(tmp_path):
@@ -213,7 +213,7 @@ def test_page_escapes_what_comes_from_outside(tmp_path):
     curves = Curves(
         "<script>alert(1)</script>",
         (16, 12),
-        {"ours": CONTESTANTS[0]},
+        {"ours": METHODS[0]},
         found,
         EXACT,
         left_out=("a & b",),

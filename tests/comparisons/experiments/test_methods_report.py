@@ -80,14 +80,14 @@ def test_the_page_stands_alone(rows, tmp_path):
 
 def test_sentences_follow_the_numbers(rows):
     said = sentences([r for r in rows if r.family == "sphere"])
-    assert said[0].startswith("An ordinary ray (distance / radius 10;")
+    assert said[0].startswith("Time per ray at an ordinary setting (distance / radius 10;")
     assert "robust never, in 640 rays" in said[1]
-    assert "algebraic errs from 10⁷ on" in said[1]
+    assert "algebraic is wrong from 10⁷ on" in said[1]
     right = [
         replace(r, errors=replace(r.errors, lost=0, false=0, misplaced=0, ties=0)) for r in rows
     ]
     said = sentences([r for r in right if r.family == "sphere"])
-    assert "no method answers any of 640 rays wrongly" in said[1]
+    assert "no method is wrong for any of 640 rays" in said[1]
     assert [units(v) for v in (None, 0.0, 3.14, 123.4, 2e7)] == ["–", "0", "3.1", "123", "2 × 10⁷"]
 
 

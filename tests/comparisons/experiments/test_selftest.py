@@ -35,7 +35,7 @@ def test_source_fault_fits_the_source_and_is_still_python(fault: SourceFault) ->
 
 
 def test_source_fault_whose_text_is_gone_is_told() -> None:
-    with pytest.raises(StaleFaultError, match=r"ray.py holds the text that it replaces 0 times"):
+    with pytest.raises(StaleFaultError, match=r"occurs 0 times in core/ray.py"):
         patched_text(SourceFault("gone", "cornell_box", "core/ray.py", "no such text", ""))
 
 

@@ -156,7 +156,7 @@ def test_a_baseline_from_nothing_to_stale(right: FloatArray) -> None:
     write("baselines/ball/picture-02.exr", 1.03 * right.mean(axis=0))
     result, found = run(*candidates, "--baseline", "ball")
     assert result.exit_code == 3
-    assert "picture-02.exr: is not what was accepted (SHA-256 differs)" in result.output
+    assert "picture-02.exr: has changed since it was accepted (SHA-256 differs)" in result.output
     assert found["cases"][0]["verdict"] == "invalid"
 
 

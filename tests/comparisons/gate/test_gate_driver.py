@@ -82,7 +82,10 @@ def test_each_seed_has_its_picture(renderer: str, tmp_path: Path) -> None:
             r"one \| the sky\?\[2J is \| falling$",
         ),
         ("crashes", "crashed with seed 1: SIGSEGV; it said"),
-        ("nothing", "ended well with seed 1, but wrote nothing; expected candidate-00.npy"),
+        (
+            "nothing",
+            "ended without an error with seed 1, but wrote no file; expected candidate-00.npy",
+        ),
         ("beside", "another place with seed 1: mine.npy in the same folder; expected candidate-00"),
         ("here", "another place with seed 1: mine.npy in the working folder; expected candidate"),
         ("folder", "another place with seed 1: candidate-00.npy in the same folder"),
@@ -109,7 +112,9 @@ def test_what_is_written_must_be_a_picture(
 def test_what_hangs_is_killed_with_its_children(renderer: str, tmp_path: Path) -> None:
     note = tmp_path / "child.pid"
     hanging = Command(f"{renderer} hangs {{output}} {{seed}} {note}", seconds=3.0)
-    with pytest.raises(RendererError, match=r"hung with seed 3: not done after 3 s, and was kill"):
+    with pytest.raises(
+        RendererError, match=r"exceeded the time limit of 3 s with seed 3, and was kill"
+    ):
         drive(hanging, range(3, 4), tmp_path / "kept")
     child = int(note.read_text())
     for _ in range(100):  # an orphan's end is noted by init, when it comes to it
@@ -140,9 +145,9 @@ def test_placeholders(tmp_path: Path) -> None:
     ]
     for template, message in (
         ("render {output} {sed}", "there is no {sed}; expected some of {scene}, {output}, {seed}"),
-        ("render {scene}", "has no {output}; expected it where the picture is named"),
-        ("render {output} {scene}", "has {scene}, but there is no --scene"),
-        ("render {output} {spp}", "has {spp}, but there is no --spp"),
+        ("render {scene}", "has no {output}; expected it as the picture's file name"),
+        ("render {output} {scene}", "has {scene}; expected --scene too"),
+        ("render {output} {spp}", "has {spp}; expected --spp too"),
         ("render '{output}", "no closing quotation; expected closed quotes"),
         ("", "is empty; expected a program"),
     ):

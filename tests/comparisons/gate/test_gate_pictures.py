@@ -130,5 +130,5 @@ def test_variance_of_a_layer_or_a_file(tmp_path: Path, picture: FloatArray) -> N
     write_exr(tmp_path / "a.exr", names | dict.fromkeys("RGB", 0.0 * picture[..., 0]), {})
     np.testing.assert_array_equal(variance_of(tmp_path / "a.exr"), picture)
     np.testing.assert_array_equal(variance_of(exr(tmp_path / "b.exr", picture)), picture)
-    with pytest.raises(ImageError, match=r"negative or not numbers; expected >= 0"):
+    with pytest.raises(ImageError, match=r"negative or NaN; expected >= 0"):
         variance_of(exr(tmp_path / "c.exr", -picture))

@@ -88,7 +88,7 @@ def test_bad_png(tmp_path: Path) -> None:
             read_candidate(path)
     bomb = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 9**6, 9**6, 8, 2, 0, 0, 0))
     path.write_bytes(bomb + chunk(b"IDAT", b""))
-    with pytest.raises(ImageError, match=f"expected at most {MOST_NUMBERS} numbers in all"):
+    with pytest.raises(ImageError, match=f"expected at most {MOST_NUMBERS} values in total"):
         read_candidate(path)
     png(path, values % 256, 8, chunk(b"gAMA", struct.pack(">I", 100000)))
     with pytest.raises(ImageError, match="is encoded with gamma 1; expected sRGB"):

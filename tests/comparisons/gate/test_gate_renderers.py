@@ -59,11 +59,14 @@ def test_a_renderer_is_driven(right: FloatArray, how: str, code: int, verdict: s
 @pytest.mark.parametrize(
     ("how", "message"),
     [
-        ("hangs", "hung with seed 1: not done after 1 s, and was killed"),
+        ("hangs", "exceeded the time limit of 1 s with seed 1, and was killed"),
         ("crashes", "failed with seed 1: exit code 1, expected 0; it said: out of light"),
-        ("nothing", "ended well with seed 1, but wrote nothing; expected candidate-00.npy"),
-        ("beside", "wrote to another place with seed 1: other.npy in the same folder"),
-        ("stale", "wrote to another place with seed 1: candidate-00.npy in the working folder"),
+        (
+            "nothing",
+            "ended without an error with seed 1, but wrote no file; expected candidate-00.npy",
+        ),
+        ("beside", "wrote another file with seed 1: other.npy in the same folder"),
+        ("stale", "wrote another file with seed 1: candidate-00.npy in the working folder"),
     ],
 )
 def test_a_renderer_that_fails(right: FloatArray, how: str, message: str) -> None:

@@ -104,10 +104,10 @@ def test_wrong_usage(right: FloatArray) -> None:
         ([candidate], "expected a scene, a reference or a baseline"),
         (["--scene", "ball.yaml"], "expected either candidates or --command"),
         ([candidate, "--command", "x {output}"], "expected either candidates or --command"),
-        ([candidate, "--scene", "ball.yaml", "--spp", "3"], "--spp: is for --command"),
+        ([candidate, "--scene", "ball.yaml", "--spp", "3"], "--spp: only applies to --command"),
         ([candidate, "--scene", "ball.yaml", "--variance", "v.exr"], "variance without a referen"),
         ([candidate, "--reference", candidate, "--baseline", "b"], "a reference and a baseline"),
-        ([candidate, "--baseline", "../b"], "'../b' is no name of a baseline"),
+        ([candidate, "--baseline", "../b"], "'../b' is not a valid name of a baseline"),
         (["--command", "x {outptu}", "--scene", "ball.yaml"], "there is no {outptu}"),
         (["--command", "x {scene}", "--scene", "ball.yaml"], "has no {output}"),
     ):

@@ -151,7 +151,7 @@ def test_no_scene(image_gate):
         "image_gate: small.npy: is 32 x 31 pixels; expected 32 x 32",
         "image_gate: none.npy: there is no such file",
         "image_gate: array: holds uint8; expected floats",
-        "image_gate: nothing to judge by; expected a scene, a reference or a baseline",
+        "image_gate: nothing to compare with; expected a scene, reference or baseline",
         "none.yaml: cannot be read: No such file",
     ):
         assert message in text, message

@@ -59,7 +59,7 @@ def test_junit_says_what_failed_and_why(tmp_path):
     assert isinstance(failure, Failure)
     assert failure.message == "differ: geometry: why"
     assert failure.type == "differ"
-    for told in ("input: agree: fine", "gain: 1.02 times", "again: do it again"):
+    for told in ("input: agree: fine", "gain: 1.02 times", "reproduce: do it again"):
         assert told in failure.text
     assert isinstance(tests["scene-invalid"].result[0], Error)
     assert isinstance(tests["scene-inconclusive"].result[0], Failure)
@@ -172,7 +172,7 @@ def test_a_long_summary_says_what_it_drops(tmp_path):
     assert len(text.encode()) <= github.MOST_BYTES
     kept = len(re.findall(r"^\| s\d+ \|", text, re.MULTILINE))
     assert 100 < kept < 3000
-    assert f"{3000 - kept} more cases were dropped" in text
+    assert f"{3000 - kept} more cases are not shown" in text
     assert "| s00000 |" in text
     before = path.read_text(encoding="utf-8")
     path.write_text("x" * github.MOST_BYTES)

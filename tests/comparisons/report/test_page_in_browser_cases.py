@@ -142,7 +142,7 @@ def test_without_a_script_tables_and_thumbnails_show(show):
     assert page.locator("#case-1 .rungs").is_visible()
     assert not page.locator(".toolbar").is_visible()
     assert not page.get_by_role("button", name="copy").is_visible()
-    assert page.get_by_text("Without JavaScript there are thumbnails only").is_visible()
+    assert page.get_by_text("Without JavaScript there are only thumbnails").is_visible()
 
 
 def test_hostile_names_stay_text(show):

@@ -140,7 +140,7 @@ def test_equal_pictures_and_pictures_of_unlike_size(page):
     nothing = np.full((3, 5, 3), math.nan)
     assert "equal everywhere" not in page(case("invalid", images=Images(nothing, nothing)))[1]
     _, text = page(case("invalid", images=Images(picture, picture[1:])))
-    assert "unlike size" in text
+    assert "differ in size" in text
 
 
 @pytest.mark.parametrize("value", [0.0, math.nan, -math.inf, 1e300, 5e-324, -1.0])

@@ -102,10 +102,10 @@ def test_a_number_may_not_hide_the_status(tmp_path, name):
     assert not list(tmp_path.iterdir())
 
 
-def test_two_tiers_of_one_name_are_a_mistake(tmp_path):
+def test_two_rungs_of_one_name_are_a_mistake(tmp_path):
     tier = Tier("geometry", "agree", "")
     twice = Case("scene", "agree", "", (tier, tier), None, {})
-    with pytest.raises(ValueError, match="two tiers"):
+    with pytest.raises(ValueError, match="two rungs"):
         write_results(tmp_path / "results.json", [twice], {})
 
 

@@ -110,7 +110,7 @@ def test_a_suite_runs_the_other_scenes(tmp_path, folder, program):
     mine.write_text("about: mine\n")
     common = ("suite", mine, "--scenes", folder, "--out", out)
     result = program(*common, "--junit", junit)
-    double = {"z.yaml": f"{folder}/z.yaml: has the name of z.json; expected one of its own"}
+    double = {"z.yaml": f"{folder}/z.yaml: has the same name as z.json; expected a unique name"}
     check(program.found.cases, folder, double)
     assert result.exit_code == 3, result.output
     number = len(expected(folder)) + 1

@@ -78,11 +78,11 @@ def test_a_report_is_rendered_again(tmp_path, program):
 def test_a_report_of_what_is_no_suite_is_refused(tmp_path, program):
     result = program("report", tmp_path)
     assert result.exit_code == 3
-    assert "holds no case" in result.output
+    assert "has no cases" in result.output
     (tmp_path / "results.json").write_text("[]")
     result = program("report", tmp_path)
     assert result.exit_code == 3
-    assert "is not what a suite writes" in result.output
+    assert "was not written by `suite` or `compare`" in result.output
     (tmp_path / "results.json").write_text(
         '{"cases": [{"scene": "a"}], "provenance": {}, "suite": null, "not_run": {}}'
     )

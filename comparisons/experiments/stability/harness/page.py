@@ -32,9 +32,8 @@ def write_page(
 ) -> None:
     """Write the page, at once or not at all; all text is escaped."""
     everything = table.summaries(found)
-    page = template(
-        "stability.html.jinja", "experiments/stability", number=table.number, named=named
-    ).render(
+    folder = "experiments/stability"
+    page = template("stability.html.jinja", folder, number=table.number, named=named).render(
         provenance=provenance,
         effort=effort,
         seed=seed,

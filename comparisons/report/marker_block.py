@@ -1,4 +1,4 @@
-"""The place of a table in a file of ours: between `<!-- NAME -->` and `<!-- end -->`."""
+"""Replaces a marker block of a text file: what is between `<!-- NAME -->` and `<!-- end -->`."""
 
 from pathlib import Path
 
@@ -9,14 +9,14 @@ END = "<!-- end -->"
 
 
 def begin(name: str) -> str:
-    """The line before the place."""
+    """The marker at the block's beginning."""
     return f"<!-- {name} -->"
 
 
 def rewrite(path: Path, name: str, text: str) -> None:
-    """Put text, which ends a line, in the place of what is there.
+    """Replace the contents of the block `name` by `text`, which ends with a newline.
 
-    Raises UsageError where the file cannot be read, or has no such place.
+    Raises UsageError where the file cannot be read, or has no such block.
     """
     before, after = around(path, name)
     with replacing(path) as temporary:
@@ -24,13 +24,13 @@ def rewrite(path: Path, name: str, text: str) -> None:
 
 
 def check(path: Path, name: str) -> None:
-    """Raise what `rewrite` would raise, before the work whose result it writes begins."""
+    """Raise what `rewrite` would raise: called before long work whose result `rewrite` writes."""
     around(path, name)
     check_writable(path)
 
 
 def around(path: Path, name: str) -> tuple[str, str]:
-    """What stands before and after the place.  Raises UsageError."""
+    """The text before and after the block.  Raises UsageError."""
     try:
         text = read_text(path)
     except OSError as error:
@@ -40,7 +40,5 @@ def around(path: Path, name: str) -> tuple[str, str]:
     before, first, rest = text.partition(begin(name))
     _, end, after = rest.partition(END)
     if not first or not end:
-        raise UsageError(
-            f"{path}: has no place for the table; expected '{begin(name)}' and '{END}'"
-        )
+        raise UsageError(f"{path}: has no marker block; expected '{begin(name)}' and '{END}'")
     return before, after

@@ -4,30 +4,29 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from comparisons.compare.causes import brightness, place
-from comparisons.compare.causes.hypothesis import Hypothesis
-from comparisons.compare.causes.misfit import Misfit
-from comparisons.compare.causes.spots import one_place
+from comparisons.compare.diagnosis import brightness, place
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.spots import one_place
 from comparisons.results.case import Cause, FloatArray, Images
 from comparisons.statistics.metrics import count_nonfinite
 
 MOST = 0.6
-"""Of the squared difference beyond noise: a cause explains at least so much, more than half and not
-just so."""
+"""The fraction of the squared difference beyond noise that a cause must explain at least."""
 
 CLEARER = 0.7
-"""What a cause leaves unexplained is at most this fraction of what the next one leaves."""
+"""A cause must leave at most this fraction of what the next best one leaves unexplained."""
 
 NO_MATTER = 1e-3
-"""What is left unexplained below it is rounding, and does not tell hypotheses apart."""
+"""Unexplained fractions below this are rounding, and do not distinguish hypotheses."""
 
 PENALTY = 0.5
-"""A hypothesis with more parameters must leave less than this fraction of what a simpler one
-leaves: with its own right parameters it always leaves a little less."""
+"""A hypothesis with more parameters must leave less than this fraction of what a simpler one leaves
+unexplained: with fitted parameters it always leaves a little less."""
 
 
 GENERALISED = {"gain": "gains", "gain of a channel": "gains", "sRGB": "gamma"}
-"""Which family can nearly or wholly do what another one does: it is no rival."""
+"""A family's generalisation, which fits as well and is therefore not its rival."""
 
 
 def likeliest(images: Images, lights: Mapping[str, FloatArray] | None = None) -> Cause | None:
@@ -52,10 +51,12 @@ def likeliest(images: Images, lights: Mapping[str, FloatArray] | None = None) ->
     if best is not None:
         hypothesis, unexplained = best
         explained = 1.0 - unexplained
-        told = f"{hypothesis.evidence}: that explains {100.0 * explained:.4g} % of the difference"
-        return Cause(hypothesis.name, told, explained)
+        evidence = (
+            f"{hypothesis.evidence}: that explains {100.0 * explained:.4g} % of the difference"
+        )
+        return Cause(hypothesis.name, evidence, explained)
     if left.min() < 1.0 - MOST:
-        return None  # several explain it, and none is clearly the one
+        return None  # several hypotheses explain it, none clearly better than the others
     return one_place(misfit)
 
 

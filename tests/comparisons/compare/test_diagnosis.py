@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from comparisons.compare.causes import likeliest, of_rungs
+from comparisons.compare.diagnosis import likeliest, of_rungs
 from comparisons.results.case import FloatArray, Images, Tier
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render

@@ -1,4 +1,4 @@
-"""How well a picture made from the reference fits the candidate: what hypotheses are judged by."""
+"""How well a predicted picture fits the candidate: the score of a hypothesis."""
 
 import math
 from collections.abc import Iterator
@@ -9,38 +9,38 @@ from scipy import ndimage
 from comparisons.results.case import FloatArray, Images
 
 FLOOR = 0.005
-"""Of a pixel's brightness, or of the picture's where that is brighter: differences below it weigh
-little, so that dark pixels and noise-free ones do not have all the say."""
+"""Relative to a pixel's brightness, or the picture's if that is brighter: smaller differences have
+little weight, so that dark and noise-free pixels do not dominate."""
 
 BLOCKS = (1, 8, 32)
-"""Pixels: sums over blocks show what is wrong with brightness in more noise than pixels do."""
+"""Block sides in pixels: sums over blocks reveal errors of brightness in more noise than pixels."""
 
 FEWEST_BLOCKS = 3
-"""Along either side: with fewer, hypotheses look alike."""
+"""Blocks along either side: with fewer, hypotheses cannot be distinguished."""
 
 KURTOSIS = 3.0
-"""How much more than those of Gaussian noise squares of real noise scatter, as a variance."""
+"""The variance of squares of real noise, relative to that of Gaussian noise."""
 
 CLEARLY = 6.0
-"""Standard deviations by which a difference must exceed noise before a cause is looked for."""
+"""Standard deviations by which a difference must exceed noise before a cause is sought."""
 
 
 DISTINCT = 50.0
-"""Of the noise of one value: squares that differ by so much tell two fits apart.  The difference of
-two is as of four standard deviations, of noise with KURTOSIS."""
+"""Two fits are distinguished if their squares differ by this many times the noise of one value:
+about four standard deviations of the difference, for noise with KURTOSIS."""
 
 
 class Misfit:
-    """The weighted squared difference between the candidate and what is made of the reference, by
-    pixels or by blocks: whichever shows more that there is more than noise.
+    """The weighted squared difference between the candidate and a predicted picture, over pixels or
+    blocks: the scale at which the difference exceeds the noise most clearly.
 
-    The weights are one over the variance of the noise and of FLOOR.
+    The weights are 1 / (variance of the noise + FLOOR's).
     """
 
     def __init__(self, images: Images) -> None:
         self.candidate, self.reference = images.candidate, images.reference
         error2 = np.zeros_like(self.reference) if images.error is None else images.error**2
-        # A few replicates know their variance badly; neighbours have much the same.
+        # Few replicates estimate the variance badly; neighbouring pixels have similar ones.
         error2 = np.maximum(error2, ndimage.uniform_filter(error2, (3, 3, 1)))
         size = np.maximum(np.abs(self.candidate), np.abs(self.reference))
         size = ndimage.maximum_filter(size, (3, 3, 1))
@@ -56,26 +56,25 @@ class Misfit:
         self._scale = max(scales, key=lambda scale: scale.clearness(difference))
         self.clear = self._scale.clearness(difference) > CLEARLY
         self.excess = self._scale.squares(difference) - self._scale.noise
-        """Of the squares over what noise alone gives."""
+        """How much the squares exceed those of noise alone."""
 
     @property
     def margin(self) -> float:
-        """How much less than another a hypothesis must leave unexplained for noise not to have made
-        the difference."""
+        """The difference of two hypotheses' unexplained fractions that noise cannot make."""
         values = self._scale.error2.size
         return DISTINCT * self._scale.noise / values / self.excess
 
     def squares(self, picture: FloatArray) -> float:
-        """Of the candidate less a picture."""
+        """The weighted squares of candidate - picture."""
         return self._scale.squares(self.candidate - picture)
 
     def left(self, picture: FloatArray) -> float:
-        """The fraction of the excess that is left with a picture in the reference's place; noise
-        may make it less than zero."""
+        """The fraction of the excess that remains with `picture` as the reference; noise may make
+        it negative."""
         return (self.squares(picture) - self._scale.noise) / self.excess
 
     def amount(self, direction: FloatArray) -> float:
-        """How much of `direction`, added to the reference, fits best (least squares)."""
+        """The least-squares factor of `direction`, added to the reference."""
         w = self._scale.weights
         along = self._scale.binned(direction)
         power = float((w * along**2).sum())
@@ -83,8 +82,8 @@ class Misfit:
         return float((w * along * difference).sum()) / power if power else 0.0
 
     def excesses(self) -> Iterator[tuple[int, FloatArray]]:
-        """The side of blocks, in pixels, and the excess of each (rows, columns), on every scale
-        that shows more than noise."""
+        """The block side in pixels and the excess of each block (rows, columns), for every scale
+        at which the difference clearly exceeds noise."""
         difference = self.candidate - self.reference
         for scale in self._scales:
             if scale.clearness(difference) > CLEARLY:
@@ -97,14 +96,14 @@ class _Scale:
 
     def __init__(self, block: int, error2: FloatArray, floor2: FloatArray) -> None:
         self.block = block
-        # Noise of pixels is independent; the floor's part is not, and does not average out.
+        # The noise of pixels is independent and averages out; the floor does not.
         self.error2 = self.binned(error2) / block**2
         self.weights = 1.0 / (self.error2 + self.binned(floor2))
         self.noise = float((self.weights * self.error2).sum())
         self.scatter = math.sqrt(2.0 * KURTOSIS * float(((self.weights * self.error2) ** 2).sum()))
 
     def binned(self, x: FloatArray) -> FloatArray:
-        """Means over whole blocks; what is left over at the edges is not looked at."""
+        """Means over whole blocks; partial blocks at the edges are ignored."""
         b = self.block
         if b == 1:
             return x

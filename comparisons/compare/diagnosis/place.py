@@ -1,4 +1,4 @@
-"""Hypotheses about where things are: shifts, mirrors, filters."""
+"""Hypotheses about positions: shifts, mirrors, filters."""
 
 import math
 from collections.abc import Iterator
@@ -6,16 +6,16 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import ndimage, optimize
 
-from comparisons.compare.causes.hypothesis import Hypothesis
-from comparisons.compare.causes.misfit import Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 
 FARTHEST = 3
-"""Pixels of shift in x and y that are tried."""
+"""The largest shift that is tried, in pixels along x and y."""
 
 
 CORNERS = np.array([[0.0, 0.0], [0.4, 0.1], [0.1, 0.4]])
-"""Of the triangle of shifts, in pixels, that the search begins with."""
+"""The initial simplex of the search for a shift, in pixels."""
 
 
 def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -45,7 +45,7 @@ def _mirrors(r: FloatArray) -> Iterator[Hypothesis]:
 
 
 def _shifted(channels: list[FloatArray], x: float, y: float, order: int) -> FloatArray:
-    """Of single channels, which are splines' coefficients for order 3."""
+    """Shift single channels, which must be spline coefficients for order 3."""
     moved = [
         ndimage.shift(channel, (y, x), order=order, mode="nearest", prefilter=False)
         for channel in channels
@@ -70,7 +70,7 @@ def _whole_shift(misfit: Misfit) -> tuple[int, int]:
 def _shifts(misfit: Misfit) -> Iterator[Hypothesis]:
     start = _whole_shift(misfit)
     channels = [np.ascontiguousarray(misfit.reference[..., k]) for k in range(3)]
-    # Bilinear is how pictures are resampled; a spline is nearer to a camera that is aside.
+    # Resampled pictures are shifted bilinearly; a cubic spline resembles a shifted camera.
     for order in (1, 3):
         if order == 3:
             channels = [
@@ -94,9 +94,9 @@ def _shifts(misfit: Misfit) -> Iterator[Hypothesis]:
         )
         x, y = (float(v) for v in fit.x)
         if max(abs(x), abs(y)) > FARTHEST + 1:
-            continue  # run away: the edge alone is left of the picture
-        told = f"the candidate is the reference moved by {x:+.3g}, {y:+.3g} pixels (right, down)"
-        yield Hypothesis("shift", _name(x, y), told, _shifted(channels, x, y, order), 2)
+            continue  # the search diverged: only the repeated edge is left of the picture
+        evidence = f"the candidate is the reference shifted {x:+.3g}, {y:+.3g} pixels (right, down)"
+        yield Hypothesis("shift", _name(x, y), evidence, _shifted(channels, x, y, order), 2)
 
 
 def _name(x: float, y: float) -> str:
@@ -122,12 +122,13 @@ def _filters(misfit: Misfit) -> Iterator[Hypothesis]:
         options={"xatol": 0.01, "maxiter": 25},
     )
     sigma = float(fit.x)
-    told = f"the candidate is the reference through a Gaussian of sigma {sigma:.2g} pixels"
-    yield Hypothesis("filter", f"blurred by {sigma:.2g} pixels", told, blurred(sigma), 1)
+    evidence = f"the candidate is the reference through a Gaussian of sigma {sigma:.2g} pixels"
+    yield Hypothesis("filter", f"blurred by {sigma:.2g} pixels", evidence, blurred(sigma), 1)
     detail = r - blurred(0.7)
     amount = misfit.amount(detail)
     if amount > 0.0:
-        told = (
-            f"the candidate has {1.0 + amount:.3g} times the reference's details of a pixel's size"
+        evidence = (
+            f"details of the size of a pixel are {1.0 + amount:.3g} times as strong as the "
+            "reference's"
         )
-        yield Hypothesis("filter", "sharpened", told, r + amount * detail, 1)
+        yield Hypothesis("filter", "sharpened", evidence, r + amount * detail, 1)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from comparisons.report.marked import END, begin, rewrite
+from comparisons.report.marker_block import END, begin, rewrite
 from reference_rt.util.errors import UsageError
 
 BEGIN = begin("bench")
@@ -28,7 +28,7 @@ def test_rewriting_a_file_is_idempotent(tmp_path: Path) -> None:
 def test_a_file_without_markers_is_refused_and_kept(tmp_path: Path, text: str) -> None:
     path = tmp_path / "README.md"
     path.write_text(text)
-    with pytest.raises(UsageError, match="no place for the table"):
+    with pytest.raises(UsageError, match="has no marker block"):
         rewrite(path, "bench", "x\n")
     assert path.read_text() == text
 

@@ -1,18 +1,18 @@
-"""Differences that are in one place: what is wrong is not known, but where."""
+"""Differences that are confined to one place: a row, column, tile or a few pixels."""
 
 import numpy as np
 
-from comparisons.compare.causes.misfit import Misfit
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import Cause, FloatArray
 
 SHARE = 0.9
-"""Of the excess, that one place must have."""
+"""The fraction of the excess that must lie in the place."""
 
 FEW = 1e-3
-"""Of all pixels: so few, or one, are single ones."""
+"""The fraction of all pixels up to which wrong pixels are called few."""
 
 SMALL = 0.1
-"""Of the picture: the largest rectangle that is called a place."""
+"""The fraction of the picture up to which a rectangle is called a tile."""
 
 
 def one_place(misfit: Misfit) -> Cause | None:
@@ -33,15 +33,15 @@ def _line(excess: FloatArray, total: float) -> Cause | None:
         k = int(np.argmax(sums))
         share = float(sums[k]) / total
         along = excess[k] if axis == 1 else excess[:, k]
-        # All of it is wrong, not a pixel or two that happen to be in it.
+        # The whole line must be wrong, not only a pixel or two in it.
         if share > SHARE and np.median(along) > EVEN * along.mean():
-            told = f"{_percent(share)} of the difference are in {name} {k}"
-            return Cause(f"one bad {name}", told, min(share, 1.0))
+            evidence = f"{_percent(share)} of the difference are in {name} {k}"
+            return Cause(f"one bad {name}", evidence, min(share, 1.0))
     return None
 
 
 EVEN = 0.05
-"""Of the mean difference along a line: what the median has at least, if all of it is wrong."""
+"""The least median difference along a wrong line, relative to the mean."""
 
 
 def _percent(share: float) -> str:
@@ -58,12 +58,12 @@ def _pixels(excess: FloatArray, total: float) -> Cause | None:
     y, x = (int(i) for i in np.unravel_index(int(order[0]), excess.shape))
     share = min(float(shares[-1]), 1.0)
     many = "one pixel" if needed == 1 else f"{needed} pixels"
-    told = f"{_percent(share)} of the difference are in {many}, the worst at x {x}, y {y}"
-    return Cause("a single wrong pixel" if needed == 1 else "a few wrong pixels", told, share)
+    evidence = f"{_percent(share)} of the difference are in {many}, the worst at x {x}, y {y}"
+    return Cause("a single wrong pixel" if needed == 1 else "a few wrong pixels", evidence, share)
 
 
 def _rectangle(excess: FloatArray, total: float, block: int) -> Cause | None:
-    """The rows and columns that hold the difference, less the tail at either end."""
+    """The rectangle of rows and columns that holds the difference, without the tails."""
     tail = 0.5 * (1.0 - SHARE) / 2.0
     edges = []
     for axis in (0, 1):
@@ -74,10 +74,10 @@ def _rectangle(excess: FloatArray, total: float, block: int) -> Cause | None:
     width, height = right - left, bottom - top
     if not (inside > SHARE and 0.0 < width * height < SMALL * excess.size):
         return None
-    told = (
+    evidence = (
         f"{_percent(inside)} of the difference are in the {width * block} x {height * block} "
         f"pixels at x {left * block}, y {top * block}"
     )
     thin = block == 1 and 1 in (width, height) and max(width, height) > 8
     name = ("one bad row" if height == 1 else "one bad column") if thin else "one bad tile"
-    return Cause(name, told, min(inside, 1.0))
+    return Cause(name, evidence, min(inside, 1.0))

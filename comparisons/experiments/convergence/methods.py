@@ -1,4 +1,4 @@
-"""Who is timed: ours and Mitsuba's variants, each with its default sampler and its best one."""
+"""The methods under test: our renderer and Mitsuba's variants, each with one sampler."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -21,8 +21,8 @@ from reference_rt.util.errors import UsageError
 
 
 class Shot(NamedTuple):
-    """A picture (height, width, 3), the samples a pixel that were taken, and the seconds between
-    asking for it and having it as an array."""
+    """A picture (height, width, 3), its actual samples per pixel, and the seconds from the call to
+    the array."""
 
     picture: FloatArray
     spp: int
@@ -30,23 +30,23 @@ class Shot(NamedTuple):
 
 
 class Renderer(Protocol):
-    """A contestant that is ready to render."""
+    """A method that is ready to render."""
 
     def __call__(self, spp: int, replicate: int) -> Shot:
-        """A picture of about `spp` samples a pixel; another `replicate` is independent of it."""
+        """A picture of about `spp` samples per pixel; different replicates are independent."""
 
 
 MOST_TOLD = 200
 """Characters of a renderer's message that a reason quotes."""
 
 BEST = "best"
-"""Stands for the sampler that a trial is to find."""
+"""Placeholder for the best sampler, which a trial determines."""
 
 
 @dataclass(frozen=True)
-class Contestant:
+class Method:
     """name: for files and options;  title: for people;  sampler: its name, or BEST;  side: "ours"
-    or the Mitsuba variant, contestants of which share what is loaded."""
+    or the Mitsuba variant, methods of which share what is loaded."""
 
     name: str
     title: str
@@ -55,52 +55,52 @@ class Contestant:
 
     @property
     def is_independent(self) -> bool:
-        """Whether samples are independent of each other: squared errors fall as 1 / n."""
+        """Whether samples are independent of each other; squared errors then fall as 1 / n."""
         return self.sampler == "independent"
 
     @property
     def factor(self) -> int:
-        """Between the samples of one rung and the next.
+        """The ratio of samples between one rung and the next.
 
-        Powers of four alone where Mitsuba would take other numbers: multijitter takes 35 for 32,
-        which is no power of two, and a third longer for each (measured); ldsampler takes 64.
+        4 for samplers that round other numbers up: multijitter takes 35 for 32, which is not a
+        power of two, and a third longer per sample (measured); ldsampler takes 64.
         """
         return 4 if self.sampler in ("multijitter", "ldsampler") else 2
 
 
-def with_sampler(contestant: Contestant, sampler: str) -> Contestant:
+def with_sampler(method: Method, sampler: str) -> Method:
     """The same side of Mitsuba with its best sampler, which is this one."""
-    title = contestant.title.partition(",")[0]
-    return replace(contestant, sampler=sampler, title=f"{title}, {sampler} (best)")
+    title = method.title.partition(",")[0]
+    return replace(method, sampler=sampler, title=f"{title}, {sampler} (best)")
 
 
-CONTESTANTS = (
-    Contestant("ours", "ours, Sobol' (default and best)", "sobol", "ours"),
-    Contestant("ours_independent", "ours, independent", "independent", "ours"),
-    Contestant("mitsuba_llvm", "Mitsuba llvm, independent (default)", "independent", LLVM),
-    Contestant("mitsuba_llvm_best", "Mitsuba llvm, its best sampler", BEST, LLVM),
-    Contestant("mitsuba_scalar", "Mitsuba scalar, independent (default)", "independent", SCALAR),
-    Contestant("mitsuba_scalar_best", "Mitsuba scalar, its best sampler", BEST, SCALAR),
+METHODS = (
+    Method("ours", "ours, Sobol' (default and best)", "sobol", "ours"),
+    Method("ours_independent", "ours, independent", "independent", "ours"),
+    Method("mitsuba_llvm", "Mitsuba llvm, independent (default)", "independent", LLVM),
+    Method("mitsuba_llvm_best", "Mitsuba llvm, its best sampler", BEST, LLVM),
+    Method("mitsuba_scalar", "Mitsuba scalar, independent (default)", "independent", SCALAR),
+    Method("mitsuba_scalar_best", "Mitsuba scalar, its best sampler", BEST, SCALAR),
 )
 
-NAMES = tuple(contestant.name for contestant in CONTESTANTS)
+NAMES = tuple(method.name for method in METHODS)
 
 
-def chosen(only: tuple[str, ...]) -> tuple[Contestant, ...]:
-    """Those of these names, all if none is given.  Raises UsageError for a name that is none."""
+def chosen(only: tuple[str, ...]) -> tuple[Method, ...]:
+    """The methods with these names, all if there are none.  Raises UsageError for unknown names."""
     if unknown := [name for name in only if name not in NAMES]:
         raise UsageError(f"--only: expected some of {', '.join(NAMES)}, got '{unknown[0]}'")
-    return tuple(c for c in CONTESTANTS if not only or c.name in only)
+    return tuple(c for c in METHODS if not only or c.name in only)
 
 
 class AbsentError(Exception):
-    """A contestant cannot render the scene; the message says why."""
+    """A method cannot render the scene; the message says why."""
 
 
 @contextmanager
 def failing(what: str) -> Iterator[None]:
-    """Turn the exceptions of Mitsuba and Dr.Jit into AbsentError: one contestant that fails must
-    not cost the curves of the others."""
+    """Turn exceptions of Mitsuba and Dr.Jit into AbsentError: a method that fails must not stop the
+    others."""
     try:
         yield
     except (RuntimeError, MemoryError) as error:
@@ -108,19 +108,19 @@ def failing(what: str) -> Iterator[None]:
 
 
 def remarks(scene: Scene) -> list[str]:
-    """What a reader should know of Mitsuba's pictures of the scene."""
-    told = ["Mitsuba traces with Embree's robust flag, without which rays pass between triangles"]
+    """Notes about Mitsuba's pictures of the scene, for the reader."""
+    notes = ["Mitsuba traces with Embree's robust flag, without which rays leak between triangles"]
     if notes_of(scene):
-        told.append(
+        notes.append(
             "Mitsuba renders with its own materials and their approximations, which `compare` "
-            "replaces: they are part of its bias"
+            "replaces: they contribute to its bias"
         )
-    return told
+    return notes
 
 
 class Stable:
-    """Makes contestants ready, and keeps what several of them share; a context, which leaves
-    Mitsuba in the variant that it was in."""
+    """Prepares methods and keeps what they share.  A context manager: it restores Mitsuba's variant
+    at its end."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -133,8 +133,7 @@ class Stable:
         self._entered.close()
 
     def _in(self, side: str) -> Any:
-        """Mitsuba in this variant, until another is asked for: switching makes it define all of its
-        own plugins again."""
+        """Mitsuba in this variant, until another is needed: a switch defines its plugins again."""
         mi = mitsuba()
         if mi.variant() != side:
             self._entered.close()
@@ -142,27 +141,27 @@ class Stable:
                 self._entered.enter_context(variant(side))
         return mi
 
-    def ready(self, contestant: Contestant, progress: Progress | None = None) -> Renderer:
+    def ready(self, method: Method, progress: Progress | None = None) -> Renderer:
         """Load and compile.  Raises SceneError, ReferenceUnavailableError, AbsentError."""
-        if contestant.side == "ours":
-            return self._ours(contestant, progress)
-        if contestant.side == LLVM and backend().variant != LLVM:
+        if method.side == "ours":
+            return self._ours(method, progress)
+        if method.side == LLVM and backend().variant != LLVM:
             raise AbsentError(f"Mitsuba's variant {LLVM} does not run here: {backend().reason}")
         copies = copies_of(self._scene)
         if any(member.tree is not None for copy in copies for member in copy.members):
             raise AbsentError("Mitsuba has no set operations")
         try:
-            return self._mitsubas(contestant)
+            return self._mitsubas(method)
         except UntranslatableError as error:
             raise AbsentError(str(error)) from None
 
-    def _ours(self, contestant: Contestant, progress: Progress | None) -> Renderer:
+    def _ours(self, method: Method, progress: Progress | None) -> Renderer:
         scene = self._scene
         make: Callable[..., Sobol | Independent]
-        make = Sobol if contestant.sampler == "sobol" else Independent
+        make = Sobol if method.sampler == "sobol" else Independent
         tables = scene.tables
-        # Far from the seeds that people choose, and from those of the reference.
-        first = FIRST_SEED if contestant.sampler == "sobol" else 2 * FIRST_SEED
+        # Far from the seeds that users choose, and from those of the reference.
+        first = FIRST_SEED if method.sampler == "sobol" else 2 * FIRST_SEED
 
         def shot(spp: int, replicate: int) -> Shot:
             seeded = scene.changed(sampler=make(spp=spp, seed=first + replicate))
@@ -175,13 +174,13 @@ class Stable:
         render(small, tables=tables, progress=progress)
         return shot
 
-    def _mitsubas(self, contestant: Contestant) -> Renderer:
-        mi = self._in(contestant.side)
+    def _mitsubas(self, method: Method) -> Renderer:
+        mi = self._in(method.side)
         description = to_mitsuba(self._scene, native=True)
-        description["sensor"]["sampler"] = {"type": contestant.sampler}
+        description["sensor"]["sampler"] = {"type": method.sampler}
         parts = [part for part in description.values() if isinstance(part, dict)]
         instances = sum(part.get("type") == "instance" for part in parts)
-        if contestant.side == LLVM and instances > FEW:
+        if method.side == LLVM and instances > FEW:
             raise AbsentError(
                 f"{instances} instances, for which Mitsuba's llvm variant takes minutes to compile"
             )
@@ -190,10 +189,10 @@ class Stable:
         sampler = mi_scene.sensors()[0].sampler()
 
         def shot(spp: int, replicate: int) -> Shot:
-            mi = self._in(contestant.side)
+            mi = self._in(method.side)
             settle()
             start = time.perf_counter()
-            with failing(f"Mitsuba cannot render {spp} samples a pixel"):
+            with failing(f"Mitsuba cannot render {spp} samples per pixel"):
                 # The array is what forces the lazy rendering to happen.
                 found = np.array(mi.render(mi_scene, spp=spp, seed=seed_of(replicate)))
             seconds = time.perf_counter() - start
@@ -206,25 +205,10 @@ FIRST_SEED = 1 << 40
 
 
 def seed_of(replicate: int) -> int:
-    """Mitsuba's 32-bit seeds, far apart (multiples of the golden ratio modulo 1): it numbers the
-    pixels from a seed on, so that near ones may give one picture's numbers to another's pixels."""
+    """Mitsuba's 32-bit seeds, spread as multiples of the golden ratio: it adds the pixel index to
+    the seed, so that close seeds would give different pixels the same random numbers."""
     return (1 + replicate) * 0x9E3779B1 % (1 << 32)
 
 
 def _three(picture: Any) -> FloatArray:
     return np.asarray(picture, dtype=np.float64)[..., :3]
-
-
-__all__ = [
-    "BEST",
-    "CONTESTANTS",
-    "NAMES",
-    "AbsentError",
-    "Contestant",
-    "Renderer",
-    "Shot",
-    "Stable",
-    "chosen",
-    "remarks",
-    "with_sampler",
-]

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy import optimize
 
-from comparisons.compare.causes.hypothesis import Hypothesis
-from comparisons.compare.causes.misfit import Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
@@ -25,10 +25,10 @@ REMARKABLE = {
     4.0: "four times",
     0.25: "a quarter of",
 }
-"""Factors that hint at their origin."""
+"""Factors with a likely origin, and their names."""
 
 NEAR = 0.01
-"""How near a fitted factor must be to one that is remarkable."""
+"""Relative difference up to which a fitted factor counts as a remarkable one."""
 
 
 def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
@@ -43,33 +43,31 @@ def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hyp
 def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
     r = misfit.reference
     gain = 1.0 + misfit.amount(r)
-    told = f"the candidate is {gain:.4g} times the reference ({100.0 * (gain - 1.0):+.3g} %)"
+    evidence = f"the candidate is {gain:.4g} times the reference ({100.0 * (gain - 1.0):+.3g} %)"
     for factor, name in REMARKABLE.items():
         if abs(gain / factor - 1.0) < NEAR:
-            told += f", {name} what it should be"
-    yield Hypothesis("gain", f"constant gain of {gain:.4g}", told, gain * r, 1)
+            evidence += f", {name} what it should be"
+    yield Hypothesis("gain", f"constant gain of {gain:.4g}", evidence, gain * r, 1)
     gains = np.ones(3)
     for k, channel in enumerate(CHANNELS):
         alone = np.zeros_like(r)
         alone[..., k] = r[..., k]
         amount = misfit.amount(alone)
         gains[k] += amount
-        told = (
-            f"{channel} is {1.0 + amount:.4g} times the reference's, the other channels are right"
-        )
+        evidence = f"{channel} is {1.0 + amount:.4g} times the reference's; other channels agree"
         yield Hypothesis(
             "gain of a channel",
             f"gain of {channel} of {1 + amount:.4g}",
-            told,
+            evidence,
             r + amount * alone,
             1,
         )
     each = ", ".join(f"{g:.4g}" for g in gains)
-    told = f"red, green and blue are {each} times the reference's"
-    yield Hypothesis("gains", "another gain of each channel", told, gains * r, 3)
+    evidence = f"red, green and blue are {each} times the reference's"
+    yield Hypothesis("gains", "another gain of each channel", evidence, gains * r, 3)
     amount = misfit.amount(np.ones_like(r))
-    told = f"every pixel of the candidate has {amount:+.3g} W/sr/m² more than the reference"
-    yield Hypothesis("offset", f"constant offset of {amount:+.3g}", told, r + amount, 1)
+    evidence = f"every pixel of the candidate differs from the reference by {amount:+.3g} W/sr/m²"
+    yield Hypothesis("offset", f"constant offset of {amount:+.3g}", evidence, r + amount, 1)
 
 
 def _permutations(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -97,8 +95,8 @@ def _curves(misfit: Misfit) -> Iterator[Hypothesis]:
         options={"xatol": 1e-4},
     )
     gamma = math.exp(float(fit.x))
-    told = f"the candidate is the reference to the power of {gamma:.4g}"
-    yield Hypothesis("gamma", f"gamma of {gamma:.4g}", told, r**gamma, 1)
+    evidence = f"the candidate is the reference to the power of {gamma:.4g}"
+    yield Hypothesis("gamma", f"gamma of {gamma:.4g}", evidence, r**gamma, 1)
     clipped = np.clip(r, 0.0, 1.0)
     for encoded in (srgb(r), srgb(clipped)):
         yield Hypothesis(
@@ -122,9 +120,9 @@ def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
     above = r > top
     if above.any() and top > 0.0:
         count = int(np.count_nonzero(above))
-        told = f"{count} values of the reference are above the candidate's maximum, {top:.6g}"
+        evidence = f"{count} values of the reference are above the candidate's maximum, {top:.6g}"
         name = f"highlights clamped to {top:.4g}"
-        yield Hypothesis("clamped", name, told, np.minimum(r, top), 1)
+        yield Hypothesis("clamped", name, evidence, np.minimum(r, top), 1)
     clipped = np.clip(r, 0.0, 1.0)
     for name, rounded in (
         ("sRGB", linear(np.round(255.0 * srgb(clipped)) / 255.0)),
@@ -132,12 +130,12 @@ def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
     ):
         if len(np.unique(misfit.candidate[..., 0].astype(np.float32))) > 256:
             continue
-        told = f"the candidate is the reference rounded to 8 bits ({name})"
-        yield Hypothesis("8 bits", f"rounded to 8 bits ({name})", told, rounded, 0)
+        evidence = f"the candidate is the reference rounded to 8 bits ({name})"
+        yield Hypothesis("8 bits", f"rounded to 8 bits ({name})", evidence, rounded, 0)
 
 
 ONE = 0.1
-"""How near to once a light must be missing or there in excess, to be told lost or counted twice."""
+"""How close to -1 or +1 the excess of a light must be for it to be called lost or doubled."""
 
 
 def _lights(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
@@ -152,5 +150,5 @@ def _lights(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypoth
             what = f"light counted twice: {name}"
         else:
             what = f"light of another strength: {name}"
-        told = f"the candidate has {1.0 + amount:.3g} times what the reference has of {name}"
-        yield Hypothesis("light", what, told, r + amount * light, 1)
+        evidence = f"the candidate has {1.0 + amount:.3g} times what the reference has of {name}"
+        yield Hypothesis("light", what, evidence, r + amount * light, 1)

@@ -1,0 +1,34 @@
+"""Options that several commands have, with one help text each."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Baselines = Annotated[Path, typer.Option(metavar="DIR", help="The folder of baselines.")]
+
+Fresh = Annotated[
+    bool, typer.Option("--fresh", help="Ignore stored results and do everything again.")
+]
+
+GitHub = Annotated[
+    bool,
+    typer.Option(
+        "--github", help="Write annotations and a step summary; automatic in GitHub Actions."
+    ),
+]
+
+JUnit = Annotated[Path | None, typer.Option(metavar="FILE", help="Also write JUnit XML.")]
+
+Layer = Annotated[
+    str, typer.Option(help="Prefix of an EXR's channel names: 'beauty' for beauty.R.")
+]
+
+NoiseFree = Annotated[
+    bool,
+    typer.Option("--noise-free", help="The candidates were rendered without random numbers."),
+]
+
+Scenes = Annotated[Path, typer.Option(metavar="DIR", help="The folder of scene files.")]
+
+Threads = Annotated[int | None, typer.Option(min=1, help="Threads. (default: all cores)")]
