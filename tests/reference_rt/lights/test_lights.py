@@ -232,52 +232,6 @@ def test_a_sky_without_other_lights_keeps_its_share():
         np.testing.assert_allclose(chances, expected, rtol=1e-15)
 
 
-def test_open_furnace():
-    """A convex body in a constant environment: reflectance times radiance, wherever it is seen."""
-    camera = rt.Orthographic(eye=(0, 0, 5), width=0.5)
-    scene = scene_of(rt.Sphere(material="floor"), sky=(1.0, 2.0, 3.0), camera=camera)
-    assert_estimates(scene, RHO * [1, 2, 3])
-
-
-@pytest.mark.parametrize("rr_depth", [1, 5, 40])
-def test_closed_furnace(rr_depth):
-    """Walls that emit 1 and reflect a see 1 / (1 - a), whatever roulette does."""
-    walls = []
-    for axis, degrees in (((1, 0, 0), 0), ((1, 0, 0), 90), ((1, 0, 0), 180), ((1, 0, 0), 270),
-                          ((0, 1, 0), 90), ((0, 1, 0), 270)):  # fmt: skip
-        back = transform.Translate(translate=(0, 0, -1))  # then its normal points at the middle
-        turn = transform.Rotate(rotate=transform.Turn(axis=axis, degrees=degrees))
-        walls.append(rt.Rectangle(material="lamp", transform=(back, turn)))
-    scene = scene_of(
-        *walls,
-        camera=rt.Orthographic(eye=(0.1, 0.2, 0.3), target=(-1, -1, -1), width=0.5),
-        film=rt.Film(width=24, height=24),
-        sampler=rt.Sobol(spp=64, seed=5),
-        integrator=rt.Path(rr_depth=rr_depth),
-        materials={
-            "lamp": rt.Emissive(radiance=(1, 1, 1), base="white"),
-            "white": rt.Diffuse(reflectance=(0.0, 0.5, 0.8)),
-        },
-    )
-    assert_estimates(scene, 1 / (1 - np.array([0.0, 0.5, 0.8])))
-
-
-@pytest.mark.parametrize("n", [1.5, 0.75])
-def test_glass_in_a_furnace_vanishes(n):
-    """A clear ball in a constant environment looks like the environment; path by path."""
-    scene = scene_of(
-        rt.Sphere(material="glass"),
-        sky=(1.0, 2.0, 3.0),
-        camera=rt.Orthographic(eye=(0, 0, 3), width=2.5),
-        film=rt.Film(width=24, height=24),
-        sampler=rt.Sobol(spp=16),
-        integrator=rt.Path(rr_depth=4096),
-        materials={"glass": rt.Dielectric(interior_ior=n)},
-    )
-    # 1/eta² on the way in, eta² on the way out, and a few roundings each time.
-    assert np.allclose(rt.render(scene).colour, [1.0, 2.0, 3.0], rtol=1e-12)
-
-
 def test_unlimited_paths_without_any_light_are_black():
     scene = rt.Scene(
         film=rt.Film(width=2, height=2), shapes=(rt.Sphere(),), camera=rt.Perspective(eye=(0, 0, 5))
