@@ -1,4 +1,4 @@
-"""A small scene with lights of every kind, to which rays and points are put one by one."""
+"""A small scene with lights of every kind, for tests of queries."""
 
 LIT = """
 integrator: {type: whitted}

@@ -1,4 +1,4 @@
-"""Candidates from files: what is read is what was written."""
+"""Candidate pictures from files: what is read is what was written."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""One set of image readers: every kind of file, in every place that takes one."""
+"""Image readers: every kind of file, as a texture, an environment map and a candidate."""
 
 import io
 import zlib

@@ -1,4 +1,4 @@
-"""Every public type, translated, is what it is in ours: conventions are compared by rays."""
+"""Every public type, translated to Mitsuba: rays show that conventions agree."""
 
 from pathlib import Path
 from typing import ClassVar
@@ -137,7 +137,7 @@ def test_cameras_send_the_same_rays(
     "change",
     [{"fov": 70.01}, {"fov_axis": "y"}, {"up": (0.1001, 1.0, 0.2)}, {"eye": (3.0, 2.0, -5.0001)}],
 )
-def test_another_camera_is_told_apart(change: dict[str, object]) -> None:
+def test_another_camera_is_distinguished(change: dict[str, object]) -> None:
     scene = Scene(camera=TILTED, film=Film(width=31, height=17), shapes=(Sphere(),))
     other = scene.changed(camera=TILTED.model_copy(update=change))
     assert "the camera" in compare_camera(scene, load(other), 10_000).problem

@@ -1,4 +1,4 @@
-"""Every camera, translated, sends the rays that ours sends, in both kinds of Mitsuba's variants."""
+"""Every camera, translated, makes the same rays in both kinds of Mitsuba's variants."""
 
 from collections.abc import Iterator
 
@@ -88,7 +88,7 @@ BOX = Pinhole(**TILTED)
         (LENS, LENS.model_copy(update={"fov": 50.01})),
     ],
 )
-def test_another_camera_is_told_apart(camera: AnyCamera, other: AnyCamera) -> None:
+def test_another_camera_is_distinguished(camera: AnyCamera, other: AnyCamera) -> None:
     scene = seen_by(camera)
     problem = compare_camera(scene, load(seen_by(other)), 200).problem
     assert problem.startswith("the camera: ")
@@ -139,7 +139,7 @@ def test_what_the_cameras_see(camera: AnyCamera) -> None:
         ),
     ],
 )
-def test_what_has_no_twin(camera: AnyCamera, size: tuple[int, int], told: str) -> None:
+def test_what_has_no_counterpart(camera: AnyCamera, size: tuple[int, int], told: str) -> None:
     with pytest.raises(UntranslatableError, match=told) as caught:
         to_mitsuba(seen_by(camera, size))
     assert "\n" not in str(caught.value)

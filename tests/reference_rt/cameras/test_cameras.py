@@ -1,4 +1,4 @@
-"""Cameras: their rays against the text-book's formulas; descriptions."""
+"""Cameras: their rays against the textbook's formulas; descriptions."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Images for textures: what is read of every kind of file, and what is said of every fault."""
+"""Images for textures: how every kind of file is read, and the message of every fault."""
 
 import struct
 import zlib

@@ -1,4 +1,4 @@
-"""Files of compiled kernels: a damaged one is never used, and never stands in the way."""
+"""Files of compiled kernels: a damaged one is never used, and is replaced."""
 
 import errno
 import os
@@ -154,7 +154,7 @@ def test_what_cannot_be_written_is_compiled_each_time(error, kept, monkeypatch):
     assert kept.heals()
 
 
-def test_tuples_of_one_name_are_told_apart(kept):
+def test_tuples_of_one_name_are_distinguished(kept):
     def of(name):
         return signature_of(namedtuple(name, "x")(np.ones(1)))
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from builders import U
 from flint import acb, arb, ctx
+from leaf_checks import NOWHERE
 
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs import conductor
 from reference_rt.materials.bsdfs.conductor import Conductor
 from reference_rt.materials.material import sample_branch
 from reference_rt.materials.microfacet.fresnel import conductor_colour, conductor_reflectance
-from reference_rt.textures import NO_TEXTURES, At
+from reference_rt.textures import NO_TEXTURES
 from reference_rt.util.errors import SceneError
 
-NOWHERE = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
 GOLD = {"eta": (0.143, 0.375, 1.442), "k": (3.983, 2.386, 1.603)}
 
 

@@ -1,4 +1,4 @@
-"""The pane: both faces' mirrorings summed one by one, energy, both sides alike, bad input."""
+"""The thin dielectric: bounces between its faces summed one by one, energy, symmetry, bad input."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Queries with arrays: their shapes, their errors, and that each is what rendering uses."""
+"""Queries with arrays: their shapes, their errors, and that rendering uses the same code."""
 
 import math
 
@@ -108,7 +108,7 @@ def test_any_array_of_numbers_will_do(scene, make):
         (([0, 0, 1], [0, 0, 1], 0.0, 1.0, 0), "threads: expected 1 or more, got 0"),
     ],
 )
-def test_what_is_wrong_with_arrays_of_rays_is_told(scene, arguments, message):
+def test_what_is_wrong_with_arrays_of_rays_is_reported(scene, arguments, message):
     asked = [scene.intersect, scene.first_hits, scene.crossings]
     for ask in asked:
         with pytest.raises(ValueError, match=message):
@@ -137,7 +137,7 @@ def test_what_is_wrong_with_arrays_of_rays_is_told(scene, arguments, message):
         (lambda s: s.camera_rays([1, 2], lens=[2.0, 0.0]), "lens: expected numbers from 0 to 1"),
     ],
 )
-def test_what_is_wrong_with_other_arrays_is_told(scene, ask, message):
+def test_what_is_wrong_with_other_arrays_is_reported(scene, ask, message):
     with pytest.raises((ValueError, rt.SceneError), match=message):
         ask(scene)
 

@@ -1,4 +1,4 @@
-"""Queries for lights: what their samples are, and that densities are of these."""
+"""Queries for lights: what is sampled, and that its densities are right."""
 
 import math
 

@@ -246,7 +246,7 @@ def test_wrong_scene(name, refused, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".yaml", ".json"])
-def test_malformed_json_tells_the_line(suffix, refused, tmp_path):
+def test_malformed_json_reports_the_line(suffix, refused, tmp_path):
     file = tmp_path / f"scene{suffix}"
     file.write_text('{\n  "film": {"width": 4},\n  "camera": {]\n}\n')
     assert refused(3, "explain", str(file)).startswith(f"{file}:3: malformed: ")
