@@ -27,6 +27,11 @@ OFF_AXIS = (-0.15, 0.75, -0.5, 0.1)
 CASES: tuple[tuple[AnyCamera, tuple[int, int]], ...] = (
     *((Perspective(**TILTED, fov=70.0, fov_axis=axis), WIDE) for axis in AXES),
     *((Perspective(**TILTED, fov=70.0, fov_axis=axis), TALL) for axis in AXES),
+    (
+        Perspective(eye=(0.0, 0.0, 0.0), target=(0.0, -1.0, 0.0), up=(1.0, 0.0, 0.0), fov=150.0),
+        TALL,
+    ),
+    (Perspective(eye=(-40.0, 3.0, 9.0), fov=0.5), WIDE),
     (Perspective(**TILTED, view=OFF_AXIS), WIDE),
     (Perspective(**TILTED, view=OFF_AXIS, distance=0.2), WIDE),
     (Perspective(**TILTED, view=(-2.0, 3.0, 4.0, 16.5), distance=3.0), TALL),
@@ -66,6 +71,7 @@ def test_cameras_send_the_same_rays(variant: str, camera: AnyCamera, size: tuple
     assert found.numbers["max_camera_direction_error_over_bound"] <= 0.7
 
 
+PLAIN = Perspective(**TILTED, fov=70.0)
 FRONTAL = Perspective(**TILTED, view=OFF_AXIS)
 LENS = ThinLens(**TILTED, fov=50.0, aperture_radius=0.2, focus_distance=4.0)
 BOX = Pinhole(**TILTED)
@@ -74,6 +80,10 @@ BOX = Pinhole(**TILTED)
 @pytest.mark.parametrize(
     ("camera", "other"),
     [
+        (PLAIN, PLAIN.model_copy(update={"fov": 70.01})),
+        (PLAIN, PLAIN.model_copy(update={"fov_axis": "y"})),
+        (PLAIN, PLAIN.model_copy(update={"up": (0.1001, 1.0, 0.2)})),
+        (PLAIN, PLAIN.model_copy(update={"eye": (3.0, 2.0, -5.0001)})),
         (FRONTAL, Perspective(**TILTED, view=(-0.75, 0.15, -0.5, 0.1))),
         (FRONTAL, Perspective(**TILTED, view=(-0.15, 0.75, -0.1, 0.5))),
         (FRONTAL, Perspective(**TILTED, view=(-0.1499, 0.7501, -0.5, 0.1))),

@@ -39,6 +39,19 @@ def test_total_reflection_beyond_the_critical_angle(n):
     assert fresnel(-1.000001 * critical, n).reflectance < 1.0
 
 
+@given(cosines, etas)
+def test_fresnel_is_reciprocal(cosine, eta):
+    """The same fraction, there and back along the same path."""
+    there = fresnel(cosine, eta)
+    if there.reflectance < 1.0:
+        back = fresnel(-there.cos_t, eta)
+        # Each cosine is the root of a difference, whose rounding (up to 1 + eta² or 1 + 1/eta²
+        # times u) it stretches by one over itself; the reflectance's slope is a few.
+        tolerance = 64 * U * (1 + eta**2) * (1 + eta**-2) / (cosine * there.cos_t)
+        assert back.reflectance == pytest.approx(there.reflectance, abs=tolerance)
+        assert back.eta == pytest.approx(1 / there.eta)
+
+
 @given(cosines, azimuths, etas, st.sampled_from([1.0, -1.0]))
 def test_dielectric_branches(cosine, phi, eta, side):
     table = rt.Dielectric(interior_ior=eta).tabulate(NO_TEXTURES)

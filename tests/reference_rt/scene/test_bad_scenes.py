@@ -135,18 +135,6 @@ WRONG = {
         "materials.a.base",
         "'a' is emissive itself; expected",
     ),
-    "bright": (
-        "materials: {a: {type: diffuse, reflectance: 1.5}}",
-        1,
-        "materials.a.reflectance",
-        "expected numbers from 0 to 1",
-    ),
-    "two environments": (
-        "lights:\n  - {type: constant, radiance: 1}\n  - {type: constant, radiance: 1}",
-        1,
-        "lights",
-        "more than one environment; expected",
-    ),
     "grid with path": (
         "integrator: {type: path}\nsampler: {type: grid}",
         2,

@@ -21,6 +21,7 @@ from rational import q
 
 import reference_rt as rt
 from reference_rt.core import transform
+from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.shapes import PLANE
 from reference_rt.shapes.flat import base, plane
@@ -148,7 +149,7 @@ def test_not_in_a_group():
 def test_spans(o, d, expected):
     """The line's part below, over all t; none in the plane."""
     tables, _ = shapes_in_order([rt.Plane()])
-    ray = rt.ray.Ray(Vec3(*map(float, o)), Vec3(*map(float, d)), math.inf)
+    ray = Ray(Vec3(*map(float, o)), Vec3(*map(float, d)), math.inf)
     spans = plane.spans(tables.planes, 0, ray)
     assert (spans.t0, spans.t1) == expected
     assert spans.t2 == math.inf

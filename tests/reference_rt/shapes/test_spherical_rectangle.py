@@ -85,8 +85,10 @@ def exact_solid_angle(h, x0, x1, y0, y1):
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_solid_angle(case):
     found = spherical_rectangle.see(*case).solid_angle
-    # Four angles of at most pi/2, each right to some u, and the sums of them.
-    assert found == pytest.approx(exact_solid_angle(*case), rel=16 * U, abs=32 * U)
+    # Four angles of at most pi/2, each right to some u, and the sums of them.  Close above the
+    # middle the triangles' denominators cancel, by at most length over height.
+    cancels = max(abs(x) for x in case[1:]) / case[0]
+    assert found == pytest.approx(exact_solid_angle(*case), rel=16 * U * cancels, abs=32 * U)
 
 
 def test_solid_angles_of_distant_and_of_flat_views():
