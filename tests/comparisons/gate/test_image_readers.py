@@ -152,6 +152,7 @@ def test_every_kind_in_every_place(tmp_path, name):
     covered = opacity is not None and name.endswith(".png")
     expected = colours * opacity[..., None] if covered else colours
     np.testing.assert_array_equal(found.radiance, expected)
+    assert found.quantised == (name.startswith("8 bits") or name.endswith(".hdr"))
     if opacity is None:
         assert found.opacity is None
     else:
