@@ -48,7 +48,6 @@ ONE_EACH = [
     ("F5", "copies", 100.0),
     ("F5", "slivers", 1e15),
     ("F5", "size", 1e100),
-    ("F5", "everything", 1.0),
 ]
 
 

@@ -8,7 +8,6 @@ import pytest
 from builders import U, unit_vectors
 from chi_square import UNIT_SQUARE, integrate, sidak
 from leaf_checks import (
-    NOWHERE,
     albedo,
     check_same_bits,
     check_weights,
@@ -24,13 +23,14 @@ from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs import principled, principled_lobes, rough_dielectric
 from reference_rt.materials.bsdfs.principled import Principled
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric
-from reference_rt.textures import NO_TEXTURES
+from reference_rt.textures import NO_TEXTURES, At
 from reference_rt.util.errors import SceneError
 
 NUMBERS = (
     *("roughness", "metallic", "spec_tint", "anisotropic", "sheen", "sheen_tint"),
     *("clearcoat", "clearcoat_gloss", "spec_trans", "flatness"),
 )
+AT = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
 
 
 def random_materials(n, seed, least=0.2):
@@ -52,7 +52,7 @@ def random_materials(n, seed, least=0.2):
 
 def surface(side=1.0, **fields):
     table = Principled(**fields).tabulate(NO_TEXTURES)
-    return principled._surface(table, 0, NOWHERE, side)
+    return principled._surface(table, 0, AT, side)
 
 
 @pytest.mark.parametrize("cases", [14, pytest.param(300, marks=pytest.mark.slow)])
@@ -102,7 +102,7 @@ def test_glass_is_the_rough_dielectric():
     found = evaluate(glass.tabulate(NO_TEXTURES), wo, wi)[0]
     table = twin.tabulate(NO_TEXTURES)
     for k in range(len(wo)):
-        expected = rough_dielectric.evaluate(table, 0, NOWHERE, Vec3(*wo[k]), Vec3(*wi[k]))
+        expected = rough_dielectric.evaluate(table, 0, AT, Vec3(*wo[k]), Vec3(*wi[k]))
         assert found[k] == pytest.approx(np.array(expected), rel=1e-11)
 
 
