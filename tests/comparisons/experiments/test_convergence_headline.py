@@ -1,4 +1,4 @@
-"""Page, JSON and terminal name what is extrapolated, and the methods under test without data."""
+"""Page, JSON and terminal say what is extrapolated, and which contestants have no data."""
 
 import itertools
 import json

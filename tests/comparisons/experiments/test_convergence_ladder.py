@@ -1,4 +1,4 @@
-"""The ladder of budgets: methods under test take turns, and no step is run twice."""
+"""The ladder: contestants take turns, and what is done is not done again."""
 
 import numpy as np
 import pytest

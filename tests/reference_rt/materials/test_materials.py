@@ -119,10 +119,7 @@ def test_diffuse_is_one_sided_and_reciprocal(a, b):
     assert diffuse.evaluate(table, 0, AT, below, wo) == (0.0, 0.0, 0.0)
     assert diffuse.pdf(table, 0, AT, wo, below) == diffuse.pdf(table, 0, AT, below, wo) == 0.0
     assert diffuse.sample(table, 0, AT, below, 0.5, 0.5, 0.5).pdf == 0.0
-    there, back = (
-        diffuse.evaluate(table, 0, AT, wo, wi).x,
-        diffuse.evaluate(table, 0, AT, wi, wo).x,
-    )
+    there, back = diffuse.evaluate(table, 0, AT, wo, wi).x, diffuse.evaluate(table, 0, AT, wi, wo).x
     assert there / wi.z == pytest.approx(back / wo.z, rel=4 * U)
 
 
