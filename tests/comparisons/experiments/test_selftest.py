@@ -1,4 +1,4 @@
-"""The self-test: its planted faults are what they claim to be, and its counts are right."""
+"""The self-test: that its faults are what they say, and that what it counts is what it found."""
 
 from pathlib import Path
 
@@ -34,7 +34,7 @@ def test_source_fault_fits_the_source_and_is_still_python(fault: SourceFault) ->
     compile(text, fault.file, "exec")
 
 
-def test_source_fault_whose_text_is_gone_is_reported() -> None:
+def test_source_fault_whose_text_is_gone_is_told() -> None:
     with pytest.raises(StaleFaultError, match=r"ray.py holds the text that it replaces 0 times"):
         patched_text(SourceFault("gone", "cornell_box", "ray.py", "no such text", ""))
 
