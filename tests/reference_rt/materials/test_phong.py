@@ -1,4 +1,4 @@
-"""Phong: the text-book's formula, its lobes' integrals, samples against densities and integrals,
+"""Phong: the textbook's formula, its lobes' integrals, samples against densities and integrals,
 the bound of its energy."""
 
 import math

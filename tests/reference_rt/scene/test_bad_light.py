@@ -213,7 +213,7 @@ def test_scenes(text, keys, rest, refused, folder):
 
 
 def test_energy_is_asked_of_paths_alone():
-    """The text-book's shading is no law of nature; Whitted's integrator may have any of it."""
+    """The textbook's shading is no law of nature; Whitted's integrator may have any of it."""
     bright = rt.Scene(
         materials={"m": rt.Phong(diffuse=(1, 1, 1))},
         shapes=(rt.Sphere(material="m"),),

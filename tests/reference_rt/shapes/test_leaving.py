@@ -89,16 +89,19 @@ FLAT = {
 
 @pytest.mark.parametrize("name", FLAT)
 def test_leaving_the_stretched(name):
-    """Sheared, mirrored, up to 1e6 times as long as wide, and 1e12 away."""
+    """Sheared, mirrored, up to 1e6 times as long as wide, and 1e12 away; a plane is left as far
+    from its middle too."""
     rng = np.random.default_rng(3)
     make, kind = FLAT[name]
     left = 0
-    for stretch, offset in ((0.0, 0.0), (3.0, 1.0), (3.0, 1e6), (1.0, 1e12)):
+    for stretch, offset, reach in ((0, 0, 1), (3, 1, 1), (3, 1e6, 1e3), (1, 1e12, 1e12)):
         shapes = [make(transform=(random_map(rng, stretch, offset),)) for _ in range(50)]
         tables, rows = shapes_in_order(shapes)
         (table,) = (t for t in tables if t is not None)
         rows = np.tile(rows, 400)
         x, y = rng.uniform(-0.7, 0.7, (2, len(rows)))
+        if kind == PLANE:
+            x, y = reach * x, reach * y
         if kind == POLYGON:  # its table's coordinates have another origin
             low, high = table.lower[rows].T, table.upper[rows].T
             x, y = (low + high + (high - low) * [x, y]) / 2
