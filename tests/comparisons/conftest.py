@@ -1,4 +1,4 @@
-"""Fixtures that several modules of tests share."""
+"""Fixtures that several test modules share."""
 
 import os
 import shutil

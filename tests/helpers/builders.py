@@ -3,10 +3,11 @@
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 from PIL import Image
 
 import reference_rt as rt
@@ -39,6 +40,19 @@ def in_plain_python(test_file: str, function: str, *arguments: Path) -> None:
         env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
         check=True,
     )
+
+
+def same_in_plain_python(write: Callable[[Path, Path], None], folder: Path) -> NpzFile:
+    """The arrays that `write(folder, file)` of a test's module stores, after it is checked that
+    plain Python gives the same bits as compiled kernels."""
+    files = folder / "compiled.npz", folder / "plain.npz"
+    write(folder, files[0])
+    in_plain_python(write.__code__.co_filename, write.__name__, folder, files[1])
+    compiled, plain = (np.load(file) for file in files)
+    assert set(compiled.files) == set(plain.files)
+    for name in compiled.files:
+        assert compiled[name].tobytes() == plain[name].tobytes(), name
+    return compiled
 
 
 def unit_vectors(rng: np.random.Generator, n: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Triangles to build hierarchies over, and what holds of every tree."""
+"""Triangles to build hierarchies over, and checks that hold for every tree."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Cameras that tests are made of, and their rays."""
+"""Cameras for tests, and their rays."""
 
 import numpy as np
 

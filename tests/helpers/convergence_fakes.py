@@ -1,4 +1,4 @@
-"""Renderers of known noise and speed."""
+"""Fake renderers of known noise and speed."""
 
 import math
 

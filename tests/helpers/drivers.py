@@ -1,4 +1,4 @@
-"""Compiled loops over many inputs, for kernels that have no query of their own."""
+"""Compiled loops that call kernels without a public query for many inputs."""
 
 import math
 

@@ -1,25 +1,14 @@
-"""What the tests of flat shapes share: maps, rays, and the plane in rational arithmetic."""
+"""Helpers for tests of flat shapes: maps, rays, and the plane in rational arithmetic."""
 
+import itertools
 from fractions import Fraction as Q
 
 import numpy as np
 from builders import U, unit_vectors
 from drivers import probe
+from rational import cross, dot, q
 
 from reference_rt.core import transform
-
-
-def exact(v):
-    return [Q(float(x)) for x in v]
-
-
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b, strict=True))
-
-
-def cross(a, b):
-    (ax, ay, az), (bx, by, bz) = a, b
-    return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
 
 
 def random_map(rng, stretch=1.0, offset=3.0):
@@ -65,8 +54,8 @@ class ExactHits:
         self.t, self.x, self.y = [], [], []
         self.t_error, self.x_error, self.y_error = np.zeros((3, len(rows)))
         for i in range(len(rows)):
-            f = [p - q for p, q in zip(exact(o[i]), exact(c[i]), strict=True)]
-            direction, u, v = exact(d[i]), exact(a[i]), exact(b[i])
+            f = [p - q for p, q in zip(q(o[i]), q(c[i]), strict=True)]
+            direction, u, v = q(d[i]), q(a[i]), q(b[i])
             n = cross(u, v)
             n2, slope = dot(n, n), dot(direction, n)
             if slope == 0:
@@ -84,9 +73,30 @@ class ExactHits:
             self.y_error[i] = 13 * U * r / cosine * float(dot(y_of, y_of)) ** 0.5
 
 
+def check_distances(tables, kind, rows, o, d):
+    """t to 16 ulp of itself and the size, in lengths, where the cosine is 0.1 and more."""
+    table = next(t for t in tables if t is not None)
+    found, right = probe(tables, kind, rows, o, d), ExactHits(table, rows, o, d)
+    speed = np.linalg.norm(d, axis=1)
+    cosine = np.abs(np.sum(d * table.normal[rows], axis=1)) / speed
+    size = np.linalg.norm(np.hstack([table.x_edge, table.y_edge])[rows], axis=1)
+    worst = max(
+        abs(float(Q(found.t[i]) - right.t[i])) * speed[i] / (found.t[i] * speed[i] + size[i])
+        for i in np.flatnonzero(np.isfinite(found.t) & (cosine > 0.1))
+    )
+    assert worst <= 16 * 2 * U
+
+
+def lattice_rays(reach=2):
+    """From integers up to `reach`, along axes and diagonals, with either zero."""
+    origins = np.array(list(itertools.product(range(-reach, reach + 1), repeat=3)), float)
+    directions = [w for w in itertools.product((-1.0, 0.0, -0.0, 1.0), repeat=3) if any(w)]
+    return np.repeat(origins, len(directions), axis=0), np.tile(directions, (len(origins), 1))
+
+
 def exact_normal(table, i):
     """That of x_edge x y_edge (3,), and its sign against the table's."""
-    n = [float(x) for x in cross(exact(table.x_edge[i]), exact(table.y_edge[i]))]
+    n = [float(x) for x in cross(q(table.x_edge[i]), q(table.y_edge[i]))]
     n = np.array(n) / np.abs(n).max()
     n /= np.linalg.norm(n)
     return n, np.sign(n @ table.normal[i])

@@ -1,7 +1,4 @@
-"""What the tests of methods share: an example of each family, and rational arithmetic.
-
-Floats are rationals, so the right answer is exact.  u = 2**-53 is the unit roundoff.
-"""
+"""Helpers for tests of the textbook's methods: an example of each family, and errors of t."""
 
 import itertools
 import math
@@ -35,28 +32,6 @@ EXAMPLES = {
     "hierarchy": textbook.SceneParameters(SCENE),
 }
 DIRECTIONS = [d for d in itertools.product((-1.0, -0.0, 0.0, 1.0), repeat=3) if any(d)]
-
-
-def q(v):
-    return [Q(float(x)) for x in v]
-
-
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b, strict=True))
-
-
-def sub(a, b):
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
-def cross(a, b):
-    (ax, ay, az), (bx, by, bz) = a, b
-    return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
-
-
-def root(x):
-    """sqrt of a rational to 200 binary places."""
-    return Q(math.isqrt((x.numerator << 400) // x.denominator), 1 << 200)
 
 
 def first(*candidates):

@@ -1,4 +1,4 @@
-"""Polygons that tests are made of, and what is in them by definition."""
+"""Polygons for tests, and which points are inside by definition."""
 
 import math
 

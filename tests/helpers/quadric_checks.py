@@ -1,4 +1,4 @@
-"""What tests of quadrics share: rays, what the kernels say of these, and checks."""
+"""Helpers for tests of quadrics: rays, what the kernels return for them, and checks."""
 
 import math
 from fractions import Fraction

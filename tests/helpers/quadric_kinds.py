@@ -1,4 +1,4 @@
-"""Quadrics of every kind."""
+"""Quadrics of every kind: by coefficients, ellipsoids, cylinders, cones and frustums."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,24 @@ KINDS = {
         *open_and_capped(1, 0, 0, 0, 0, 0, 0, 0, 0, -0.25),
     ],
     "box": [quadric_of(0, 0, 0, 0, 0, 0, 0, 0, 0, -1, capped=True)],
+    "cylinder": [rt.Cylinder(), rt.Cylinder(radius=0.3, z_min=-2.0, z_max=0.7)],
+    "tube": [rt.Cylinder(capped=False), rt.Cylinder(radius=3, z_min=-2, z_max=0.7, capped=False)],
+    "cone": [rt.Cone(), rt.Cone(radius=0.7, height=2.1), rt.Cone(radius=3, height=0.1)],
+    "open cone": [rt.Cone(capped=False), rt.Cone(radius=0.7, height=2.1, capped=False)],
+    "frustum": [
+        rt.Cone(top_radius=0.3),
+        rt.Cone(radius=0.5, top_radius=1.3, height=0.7),
+        rt.Cone(top_radius=0.9999),
+        rt.Cone(top_radius=1.0),
+    ],
+    "open frustum": [rt.Cone(top_radius=0.3, capped=False)],
 }
+TURNED = ("cylinder", "tube", "cone", "open cone", "frustum", "open frustum")
+CONVEX = {
+    **{name: KINDS[name] for name in ("ellipsoid", "cylinder", "cone", "frustum", "box")},
+    "paraboloid": KINDS["paraboloid"][1:],
+}
+"""The capped ones."""
 BY_NAME = pytest.mark.parametrize("name", KINDS)
 
 

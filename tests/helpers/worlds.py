@@ -45,6 +45,16 @@ MATERIALS = {
 }
 
 
+def lambert(corners: FloatArray, n: FloatArray = UP) -> float:
+    """The irradiance of a polygon of radiance 1 above the horizon of the origin (Lambert 1760):
+    half the sum over edges of the angle times the cosine between n and the edge's plane."""
+    total = np.zeros(3)
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        cross = np.cross(a, b)
+        total += math.atan2(np.linalg.norm(cross), a @ b) * cross / np.linalg.norm(cross)
+    return float(abs(total @ n) / 2)
+
+
 def at(x: float, y: float, z: float) -> tuple:
     return (transform.Translate(translate=(x, y, z)),)
 

@@ -105,3 +105,17 @@ def test_tests_mirror_the_packages():
     folders = {p.parent.relative_to(ROOT / "tests") for p in (ROOT / "tests").rglob("test_*.py")}
     mirrored = {Path(package, folder) for package, names in FLOORS.items() for folder in names}
     assert folders <= mirrored | {Path("project")}
+
+
+def test_the_longest_tests_exist():
+    """The names by which `tests/conftest.py` orders files."""
+    tree = ast.parse((ROOT / "tests" / "conftest.py").read_text(encoding="utf-8"))
+    (names,) = (
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "LONGEST_FIRST"
+    )
+    files = [path.stem for path in (ROOT / "tests").rglob("test_*.py")]
+    assert set(names) <= set(files)
+    assert len(set(names)) == len(names)
+    assert len(set(files)) == len(files)

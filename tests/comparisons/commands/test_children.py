@@ -1,4 +1,4 @@
-"""No child process outlives its parent: ended by a signal that it can answer, or killed."""
+"""Child processes never outlive their parent, whether a signal ends it or it is killed."""
 
 import ast
 import json

@@ -68,7 +68,7 @@ def test_one_light_alone_needs_no_pictures(scene: Scene) -> None:
     assert single_lights(scene.changed(lights=()), 4) == {}
 
 
-def test_a_lost_light_is_told_with_its_place(scene: Scene) -> None:
+def test_a_lost_light_is_reported_with_its_place(scene: Scene) -> None:
     budget = Budget(spp=64, replicates=8, pixels=100, light_pixels=64)
     lost = Subject(scene.changed(lights=()), scene)
     case = compare_scene(lost, budget, silent, rungs=("statistics", "images"))

@@ -1,4 +1,4 @@
-"""Causes: each that is planted on a picture is named, and none where only noise differs."""
+"""Diagnoses: each fault planted in a picture is named, and none where only noise differs."""
 
 from collections.abc import Callable
 from functools import cache

@@ -111,7 +111,7 @@ def test_damaged_rows_are_measured_anew(tmp_path: Path, text: str) -> None:
     assert run.read_rows(path, "k") is None
 
 
-def test_names_of_rows_are_told_apart_and_choose_their_groups() -> None:
+def test_names_of_rows_are_distinguished_and_choose_their_groups() -> None:
     names = [row for group in GROUPS for row in group.rows]
     assert len(set(names)) == len(names)
     assert chosen(()) == GROUPS
@@ -138,7 +138,7 @@ def command() -> Any:
         (("--markdown", "nowhere.md"), "cannot be read"),
     ],
 )
-def test_wrong_usage_is_told_before_anything_is_measured(
+def test_wrong_usage_is_reported_before_anything_is_measured(
     command: Any, arguments: tuple[str, ...], message: str, tmp_path: Path
 ) -> None:
     result = command(*arguments, "--out", str(tmp_path / "out"))

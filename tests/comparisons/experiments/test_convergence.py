@@ -1,4 +1,4 @@
-"""Error against time: estimators of known error, slope, bias and speed give these back."""
+"""Error against time: estimators of known error, slope, bias and speed are measured as such."""
 
 import math
 

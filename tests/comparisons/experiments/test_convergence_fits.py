@@ -1,4 +1,4 @@
-"""Slopes, times to an error and plans: curves of known ones give these back."""
+"""Fitted slopes, times to an error and plans: those of known curves are recovered."""
 
 import math
 from collections.abc import Callable
@@ -96,7 +96,7 @@ def test_what_strata_catch_does_not_fall_for_ever():
     assert caught.spp == pytest.approx(1e4, rel=1e-6)
 
 
-def test_times_that_cannot_be_told():
+def test_times_that_cannot_be_determined():
     spp = [4, 8, 16]
     curve = points(spp, [0.1, 0.2, 0.4], [0.5, 0.25, 0.125])
     first = time_to(curve, 0.9)

@@ -1,4 +1,4 @@
-"""`reference-rt converge` as a whole, and what a second run does not do again."""
+"""`reference-rt converge` as a whole, and what a second run reuses."""
 
 import csv
 import json

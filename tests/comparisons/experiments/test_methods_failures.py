@@ -1,4 +1,4 @@
-"""The known failures of the text-book's methods, as `reference-rt methods` measures them, and the
+"""The known failures of the textbook's methods, as `reference-rt methods` measures them, and the
 methods that do not have them."""
 
 import pytest

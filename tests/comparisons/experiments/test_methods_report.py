@@ -1,4 +1,4 @@
-"""`reference-rt methods`: what is written, and the command."""
+"""`reference-rt methods`: the command, and what it writes."""
 
 import csv
 import json

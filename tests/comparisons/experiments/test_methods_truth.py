@@ -1,5 +1,5 @@
-"""What `reference-rt methods` takes for true, what it draws, and its measures on methods that are
-wrong on purpose."""
+"""`reference-rt methods`: its ground truth, its random tests, and its error measures, applied to
+methods that are wrong on purpose."""
 
 import math
 from dataclasses import replace

@@ -205,7 +205,7 @@ def test_edited_by_hand(files: list[str], edit: str) -> None:
     baselines.load(Path("baselines"), "ball").reference()
 
 
-def test_a_missing_one_tells_how_it_is_accepted() -> None:
+def test_a_missing_one_says_how_it_is_accepted() -> None:
     with pytest.raises(BaselineMissingError, match="there is no baseline 'ball' in") as caught:
         baselines.load(Path("baselines"), "ball", ["out/a b.exr"])
     told = "reference-rt accept 'out/a b.exr' --name ball --baselines baselines --reason"

@@ -1,4 +1,4 @@
-"""Driving a renderer: each way to fail has its message, and none leaves a picture behind."""
+"""Running a renderer: each way to fail has its message, and none leaves a picture behind."""
 
 import os
 import shlex

@@ -1,4 +1,4 @@
-"""Files and arrays that are no candidates say so."""
+"""Files and arrays that are no candidate pictures are refused, each with its message."""
 
 import struct
 import sys

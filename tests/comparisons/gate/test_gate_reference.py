@@ -1,4 +1,4 @@
-"""What candidates are judged by: our own pictures, exact enough, kept; and pictures from files."""
+"""References of the gate: our own pictures, precise enough and stored; and pictures from files."""
 
 from pathlib import Path
 

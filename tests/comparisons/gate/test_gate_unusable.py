@@ -1,4 +1,4 @@
-"""Pictures and options that the gate can make nothing of: each has its message."""
+"""Pictures and options that the gate cannot use: each has its message."""
 
 from pathlib import Path
 

@@ -1,9 +1,7 @@
-"""One set of image readers: every kind of file, in every place that takes one."""
+"""Image readers: every kind of file, as a texture, an environment map and a candidate."""
 
 import io
-import os
-import subprocess
-import sys
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +12,10 @@ from PIL import Image
 
 import reference_rt as rt
 from comparisons.gate.pictures_in import read_candidate
+from reference_rt.core.image_files import open_image
 from reference_rt.scene.build import build_tables
 from reference_rt.textures.image_file import linear
+from reference_rt.util import memory
 from reference_rt.util.errors import ImageError
 
 HEIGHT, WIDTH = 6, 11
@@ -46,17 +46,17 @@ def decoded(values, bits):
     return linear(np.ascontiguousarray(colours)), scaled[..., -1] if has_opacity else None
 
 
-def half_exr(path):
-    planes = {c: HALVES[..., k].astype(np.float16) for k, c in enumerate("RGB")}
-    with OpenEXR.File({"compression": OpenEXR.PIZ_COMPRESSION}, planes) as file:
-        file.write(str(path))
+def exr_of(values, header):
+    def write(path):
+        planes = {c: np.ascontiguousarray(values[..., k]) for k, c in enumerate("RGB")}
+        with OpenEXR.File(header, planes) as file:
+            file.write(str(path))
+
+    return write
 
 
-def tiled_exr(path):
-    planes = {c: FLOATS[..., k].astype(np.float32) for k, c in enumerate("RGB")}
-    header = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
-    with OpenEXR.File(header, planes) as file:
-        file.write(str(path))
+HALF = {"compression": OpenEXR.PIZ_COMPRESSION}
+TILED = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
 
 
 def floats(make):
@@ -70,8 +70,8 @@ FLIPS |= {"+Y {} -X {}": (-1, -1)}
 
 KINDS = {
     "float.exr": (lambda path: exr(path, COLOUR), COLOUR, None),
-    "half.exr": (half_exr, HALVES[..., :3], None),
-    "tiled.exr": (tiled_exr, COLOUR, None),
+    "half.exr": (exr_of(HALVES.astype(np.float16), HALF), HALVES[..., :3], None),
+    "tiled.exr": (exr_of(FLOATS.astype(np.float32), TILED), COLOUR, None),
     "grey.exr": (lambda path: exr(path, COLOUR, "Y"), GREY, None),
     "opacity.exr": (lambda path: exr(path, FLOATS, "RGBA"), COLOUR, FLOATS[..., 0]),
     "little.pfm": (floats(lambda: pfm(COLOUR, "-1.0")), COLOUR, None),
@@ -108,6 +108,13 @@ AS_TEXTURES = {
 """Which scenes take besides, and the gate refuses."""
 
 
+def write(name, path):
+    if name in KINDS:
+        KINDS[name][0](path)
+    else:
+        Image.fromarray(codes(8, 3).astype(np.uint8)).save(path, **AS_TEXTURES[name])
+
+
 def bitmap_of(path):
     scene = rt.Scene(textures={"t": rt.Bitmap(file=str(path))})
     bitmaps = build_tables(scene).textures.bitmaps
@@ -135,9 +142,9 @@ def gate_of(path):
 
 @pytest.mark.parametrize("name", KINDS)
 def test_every_kind_in_every_place(tmp_path, name):
-    """To the bit."""
-    write, colours, opacity = KINDS[name]
-    write(tmp_path / name)
+    """To the bit; of a texture whatever the file is called."""
+    _, colours, opacity = KINDS[name]
+    write(name, tmp_path / name)
     for consumer in (bitmap_of, environment_of):
         np.testing.assert_array_equal(consumer(tmp_path / name), colours, consumer.__name__)
     found = read_candidate(tmp_path / name)
@@ -145,16 +152,18 @@ def test_every_kind_in_every_place(tmp_path, name):
     covered = opacity is not None and name.endswith(".png")
     expected = colours * opacity[..., None] if covered else colours
     np.testing.assert_array_equal(found.radiance, expected)
+    assert found.quantised == (name.startswith("8 bits") or name.endswith(".hdr"))
     if opacity is None:
         assert found.opacity is None
     else:
         np.testing.assert_array_equal(found.opacity, opacity)
+    other = (tmp_path / name).rename(tmp_path / "picture.dat")
+    np.testing.assert_array_equal(bitmap_of(other), colours)
 
 
 @pytest.mark.parametrize("name", AS_TEXTURES)
 def test_other_kinds_in_scenes(tmp_path, name):
-    picture = Image.fromarray(codes(8, 3).astype(np.uint8))
-    picture.save(tmp_path / name, **AS_TEXTURES[name])
+    write(name, tmp_path / name)
     with Image.open(tmp_path / name) as image:
         expected = linear(np.asarray(image) / 255.0)
     for consumer in (bitmap_of, environment_of):
@@ -163,23 +172,12 @@ def test_other_kinds_in_scenes(tmp_path, name):
         gate_of(tmp_path / name)
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_the_name_of_a_file_does_not_tell_its_kind(tmp_path, name):
-    write, colours, _ = KINDS[name]
-    write(tmp_path / name)
-    other = (tmp_path / name).rename(tmp_path / "picture.dat")
-    np.testing.assert_array_equal(bitmap_of(other), colours)
-
-
 @pytest.mark.parametrize("name", [*KINDS, *AS_TEXTURES])
 def test_damaged_files_in_every_place(tmp_path, name, capfd):
     """Truncated anywhere, or with bytes of others: one line of ours, or a picture; nothing printed
     by the libraries, and no other error."""
     path = tmp_path / name
-    if name in KINDS:
-        KINDS[name][0](path)
-    else:
-        Image.fromarray(codes(8, 3).astype(np.uint8)).save(path, **AS_TEXTURES[name])
+    write(name, path)
     whole = path.read_bytes()
     rng = np.random.default_rng(11)
     cuts = {0, 1, 3, 7, 12, 20, 60, len(whole) // 3, len(whole) // 2, len(whole) - 1}
@@ -217,7 +215,7 @@ def test_many_bitmaps_are_one_array(tmp_path):
     """Each in its place, without copies of the others."""
     names = ("float.exr", "8 bits, 3.png", "little.pfm", "8 bits, 3.png")
     for name in names:
-        KINDS[name][0](tmp_path / name)
+        write(name, tmp_path / name)
     textures = {f"t{k}": rt.Bitmap(file=name) for k, name in enumerate(names)}
     (tmp_path / "scene.json").write_text(rt.Scene(textures=textures).to_json())
     bitmaps = build_tables(rt.Scene.load(tmp_path / "scene.json")).textures.bitmaps
@@ -228,89 +226,6 @@ def test_many_bitmaps_are_one_array(tmp_path):
 
 # ---- memory -------------------------------------------------------------------------------------
 
-SIZE = (1600, 2500)
-
-CHILD = """
-import sys
-from pathlib import Path
-import numpy as np
-import reference_rt as rt
-from reference_rt.scene.build import _texture_tables
-from reference_rt.lights.emitters.environment_map import tabulate
-import reference_rt.core.image_files, OpenEXR
-from PIL import Image
-
-def peak():
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM"))
-
-Image.init()
-tabulate(np.ones((4, 8, 3)), np.eye(3))  # what it compiles is not what is measured
-before = peak()
-if sys.argv[1] == "bitmap":
-    files = sys.argv[2:]
-    scene = rt.Scene(textures={f"t{k}": rt.Bitmap(file=f) for k, f in enumerate(files)})
-    tables = _texture_tables(scene)
-else:
-    tables = rt.EnvironmentMap(file=sys.argv[2]).tabulate(Path())
-print(peak() - before)
-"""
-
-LARGE = {
-    "a.png": lambda path: Image.fromarray(large_codes(3)).save(path, compress_level=1),
-    "deep.png": lambda path: png(path, large_codes(3).astype(np.int64) * 257, 16),
-    "a.jpg": lambda path: Image.fromarray(large_codes(3)).save(path),
-    "a.exr": lambda path: exr(path, large_floats()),
-    "a.pfm": lambda path: path.write_bytes(pfm(large_floats(), "-1")),
-    "a.npy": lambda path: path.write_bytes(npy(large_floats().astype(np.float64))),
-    "a.hdr": lambda path: path.write_bytes(hdr(rgbe(large_floats()), runs=False)),
-}
-
-
-QUICK = ("deep.png", "a.exr")
-"""Those that come nearest to the bound, or would be beyond it if they were read as a whole."""
-
-
-def large_codes(channels):
-    values = np.arange(SIZE[0] * SIZE[1] * channels) % 251
-    return values.reshape(*SIZE, channels).astype(np.uint8)
-
-
-def large_floats():
-    return large_codes(3).astype(np.float32) + 0.5
-
-
-def peak_of(place, *files):
-    """Bytes a pixel that a process took at most."""
-    done = subprocess.run(
-        [sys.executable, "-c", CHILD, place, *map(str, files)],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
-    )
-    return int(done.stdout) / (SIZE[0] * SIZE[1] * len(files))
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for the most memory so far")
-@pytest.mark.parametrize(
-    "name",
-    [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in LARGE],
-)
-def test_memory_of_a_texture(tmp_path, name):
-    """At most 32 bytes a pixel, of which 24 stay."""
-    LARGE[name](tmp_path / name)
-    assert peak_of("bitmap", tmp_path / name) <= 32.0
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for the most memory so far")
-def test_memory_of_several_textures_and_of_an_environment(tmp_path):
-    """The same for two textures.  An environment map stores 32 bytes a pixel, 8 for its sums: two
-    more for what is freed between them but not given back."""
-    LARGE["a.png"](tmp_path / "a.png")
-    assert peak_of("bitmap", tmp_path / "a.png", tmp_path / "a.png") <= 32.0
-    assert peak_of("environment", tmp_path / "a.png") <= 34.0
-
 
 @pytest.mark.parametrize("consumer", [bitmap_of, environment_of, gate_of])
 def test_what_would_not_fit_into_memory_is_refused_by_its_header(tmp_path, consumer):
@@ -320,8 +235,6 @@ def test_what_would_not_fit_into_memory_is_refused_by_its_header(tmp_path, consu
     huge = (1 << 19).to_bytes(4, "big")
     picture = bytearray(whole.getvalue())
     picture[16:24] = huge + huge
-    import zlib
-
     picture[29:33] = zlib.crc32(bytes(picture[12:29])).to_bytes(4, "big")
     (tmp_path / "a.png").write_bytes(picture)
     said = "declares 524288 x 524288" if consumer is gate_of else "which take 8192.0 GiB of memory"
@@ -330,8 +243,6 @@ def test_what_would_not_fit_into_memory_is_refused_by_its_header(tmp_path, consu
 
 
 def test_many_textures_that_would_not_fit_together(tmp_path, monkeypatch):
-    from reference_rt.util import memory
-
     KINDS["float.exr"][0](tmp_path / "a.exr")
     pixels = HEIGHT * WIDTH
     monkeypatch.setattr(memory, "machine_memory", lambda: 3 * 32 * pixels)
@@ -346,8 +257,6 @@ def test_pillows_own_limit_is_not_ours():
     """It is of the process, and stays what it was."""
     before = Image.MAX_IMAGE_PIXELS
     assert before is not None
-    from reference_rt.core.image_files import open_image
-
     with pytest.raises(OSError, match="No such file"):
         open_image(Path("missing.png"))
     assert before == Image.MAX_IMAGE_PIXELS

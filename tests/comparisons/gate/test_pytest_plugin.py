@@ -1,4 +1,4 @@
-"""The plugin from outside: test modules that use it, run by pytest itself."""
+"""The pytest plugin from outside: test modules that use it, run by pytest itself."""
 
 import importlib.metadata
 import json

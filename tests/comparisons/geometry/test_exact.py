@@ -1,4 +1,4 @@
-"""Exact arithmetic against fractions and closed forms; ours and Mitsuba are not asked."""
+"""Exact arithmetic against fractions and closed forms; no renderer takes part."""
 
 from fractions import Fraction
 
@@ -133,7 +133,7 @@ def test_tangents_to_the_last_bit() -> None:
     assert touching.tolist() == [False, True, False]
 
 
-def test_edges_and_corners_are_told() -> None:
+def test_edges_and_corners_are_reported() -> None:
     for shape, o in (
         ("{type: box}", [-2.0, 1.0, 0.3]),  # in the plane of a face
         ("{type: triangle, v0: [1, 0, 0], v1: [1, 1, 0], v2: [1, 0, 1]}", [0.0, 0.0, 0.25]),

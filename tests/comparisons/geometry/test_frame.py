@@ -1,4 +1,4 @@
-"""Where Mitsuba sees a scene: moved and scaled where float32 needs that, and only there."""
+"""The frame of Mitsuba's copy of a scene: moved and scaled where float32 needs it, only there."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Which Mitsuba runs is found out in child processes, and told."""
+"""Which variant of Mitsuba works is found out in child processes, and reported."""
 
 import os
 import subprocess
@@ -77,7 +77,7 @@ def test_a_broken_memory_is_none(bogus: str, monkeypatch: pytest.MonkeyPatch) ->
         assert file.read_bytes() == whole
 
 
-def test_an_abort_of_the_child_is_told_and_not_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_abort_of_the_child_is_reported_and_not_shared(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(backend, "_PROOF", "import os; os.abort()")
     assert backend.prove("llvm_ad_rgb", None) == "ends the process by signal 6"
 

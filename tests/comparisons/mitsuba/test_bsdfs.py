@@ -1,4 +1,4 @@
-"""Material by material: what our kernels scatter is what their twins in Mitsuba do."""
+"""Material by material: the BSDFs of our kernels are those of their counterparts in Mitsuba."""
 
 from pathlib import Path
 from typing import Any
@@ -125,7 +125,7 @@ def test_the_same_is_scattered(material: Material) -> None:
     ],
     ids=lambda x: x.type if isinstance(x, Material) else "",
 )
-def test_a_slightly_different_material_is_told_apart(
+def test_a_slightly_different_material_is_distinguished(
     material: Material, wrong: dict[str, Any]
 ) -> None:
     wo, wi = pairs(material)
@@ -184,7 +184,7 @@ SAMPLED: tuple[Material, ...] = (
 
 
 @pytest.mark.parametrize("material", SAMPLED, ids=lambda m: m.type)
-def test_twins_draw_what_they_say(material: Material) -> None:
+def test_counterparts_draw_what_they_say(material: Material) -> None:
     """The mean of the weights of those that are written here is the integral of what they give."""
     import drjit as dr
 

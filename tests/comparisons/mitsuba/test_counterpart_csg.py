@@ -1,16 +1,16 @@
-"""The twin of solids: Mitsuba's crossings, put together in NumPy; and crowds of instances."""
+"""The counterpart of CSG solids, Mitsuba's crossings combined in NumPy; many instances."""
 
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from counterparts import coarse_meshes
 
 from comparisons.geometry.flatten import Tree
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.csg import evaluated
 from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.shapes import canonical, tori
 from comparisons.rungs import geometry
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
@@ -40,10 +40,9 @@ def rays(n: int, reach: float = 1.5) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.fixture
-def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Meshes that take less time to make."""
-    monkeypatch.setattr(tori, "CELLS", (256, 128))
-    monkeypatch.setattr(canonical, "CURVED", (256, 128))
+def coarse() -> Iterator[None]:
+    with coarse_meshes(256, 128):
+        yield
 
 
 @pytest.fixture
@@ -82,7 +81,7 @@ LAWS = (
 
 
 @pytest.mark.parametrize(("one", "other"), LAWS)
-def test_laws_hold_of_the_twin(one: str, other: str) -> None:
+def test_laws_hold_of_the_counterpart(one: str, other: str) -> None:
     o, d = rays(3000)
     first, second = (trace(load(scene_of(text)), o, d) for text in (one, other))
     met = first.shape >= 0
@@ -133,7 +132,7 @@ def test_solids_beside_shapes() -> None:
         assert geometry(scene, tables, load(other), pixels=200).status == "differ"
 
 
-def test_light_has_no_twin() -> None:
+def test_light_has_no_counterpart() -> None:
     twin = load(scene_of(MIXED[0]))
     assert "set operations" in twin.lacking
     assert load(scene_of(MIXED[2])).lacking == ""
@@ -188,7 +187,7 @@ def test_a_crowd_of_instances() -> None:
         (solid("difference", BOX, BALL, ROD),),
     ],
 )
-def test_twins_in_the_scalar_variant(shapes: tuple[str, ...]) -> None:
+def test_counterparts_in_the_scalar_variant(shapes: tuple[str, ...]) -> None:
     scene = scene_of(*shapes)
     tier = geometry(scene, build_tables(scene), load(scene), pixels=60)
     assert tier.status in ("agree", "reference-limited"), tier.reason

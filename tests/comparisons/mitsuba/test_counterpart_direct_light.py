@@ -1,11 +1,11 @@
-"""Light on the twins of shapes that Mitsuba has in other ways: stand-ins, instances, disks."""
+"""Light on the counterparts of shapes that Mitsuba has in other ways: proxies, instances, disks."""
 
 from typing import Any
 
 import pytest
+from counterparts import coarse_meshes, faulty_counterpart
 
 from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.shapes import canonical, tori
 from comparisons.rungs import direct, whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.scene import Scene
@@ -52,10 +52,7 @@ lights:
 
 @pytest.fixture(scope="module", autouse=True)
 def coarse() -> Any:
-    """Meshes that take less time to make."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tori, "CELLS", (512, 256))
-        patch.setattr(canonical, "CURVED", (512, 256))
+    with coarse_meshes(512, 256):
         yield
 
 
@@ -92,9 +89,8 @@ def test_the_same_light(scene: Scene, tables: SceneTables) -> None:
         ("[9, 8, 7]", "[9, 8, 7.1]"),
     ],
 )
-def test_another_lamp_is_told_apart(
+def test_another_lamp_is_distinguished(
     scene: Scene, tables: SceneTables, right: str, wrong: str
 ) -> None:
-    assert TEXT.count(right) == 1
-    other = load(Scene.parse(TEXT.replace(right, wrong)))
+    other = faulty_counterpart(TEXT, right, wrong)
     assert whitted(scene, tables, other, 200).status == "differ"

@@ -1,16 +1,16 @@
-"""Materials and lights against their twins, in a scene."""
+"""Materials and lights in a scene, against their counterparts in Mitsuba."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from counterparts import coarse_meshes, faulty_counterpart
 
 from comparisons.compare.pictures import whitted as whitted_pictures
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
-from comparisons.mitsuba.translate.shapes import tori
 from comparisons.rungs import direct, geometry, whitted
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
@@ -79,17 +79,15 @@ def tables(scene: Scene) -> Any:
     return build_tables(scene)
 
 
-@pytest.fixture(autouse=True)
-def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A mesh for the torus that takes less time to make."""
-    monkeypatch.setattr(tori, "CELLS", (256, 128))
+@pytest.fixture(scope="module", autouse=True)
+def coarse() -> Any:
+    with coarse_meshes(256, 128):
+        yield
 
 
 @pytest.fixture(scope="module")
 def twin(scene: Scene) -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tori, "CELLS", (256, 128))
-        return load(scene)
+    return load(scene)
 
 
 def test_the_same_light(scene: Scene, tables: Any, twin: Any) -> None:
@@ -136,12 +134,11 @@ MORE_FAULTS: tuple[tuple[Any, str, str], ...] = (
 def test_a_planted_fault_is_seen(
     rung: Any, right: str, wrong: str, scene: Scene, tables: Any, image_folder: Path
 ) -> None:
-    assert SCENE.count(right) == 1
-    faulty = load(Scene.parse(SCENE.replace(right, wrong), folder=image_folder))
+    faulty = faulty_counterpart(SCENE, right, wrong, image_folder)
     assert rung(scene, tables, faulty, 500).status == "differ"
 
 
-def test_notes_tell_what_is_not_mitsubas(scene: Scene) -> None:
+def test_notes_report_what_is_not_mitsubas(scene: Scene) -> None:
     notes = " ".join(notes_of(scene))
     for told in ("of a coat's", "no Phong", "blend is wrong", "masks as opaque", "normal maps"):
         assert told in notes

@@ -1,4 +1,4 @@
-"""Twins of shapes that Mitsuba lacks, of groups and of solids: same rays, and planted faults."""
+"""Counterparts of shapes that Mitsuba lacks, of groups and of solids: rays, and planted faults."""
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ def climbed(ours: str, theirs: str) -> Tier:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_twin_is_met_in_the_same_places(name: str) -> None:
+def test_a_counterpart_is_met_in_the_same_places(name: str) -> None:
     text = text_of(SCENES[name][0])
     tier = climbed(text, text)
     assert tier.status in ("agree", "reference-limited"), tier.reason
@@ -83,7 +83,7 @@ def test_a_twin_is_met_in_the_same_places(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_another_twin_is_told_apart(name: str) -> None:
+def test_another_counterpart_is_distinguished(name: str) -> None:
     shape, right, wrong = SCENES[name]
     text = text_of(shape)
     assert text.count(right) == 1

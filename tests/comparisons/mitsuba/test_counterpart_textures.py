@@ -1,4 +1,4 @@
-"""Textures and environment maps against their twins."""
+"""Textures and environment maps against their counterparts in Mitsuba."""
 
 from pathlib import Path
 from typing import Any

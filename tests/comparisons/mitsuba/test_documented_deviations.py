@@ -1,5 +1,5 @@
-"""How far Mitsuba's materials are from the exact law, where a twin stands in for them: what README
-and the notes of a case say is what is measured here, with Mitsuba's own materials."""
+"""How far Mitsuba's materials are from the exact law, where a counterpart replaces them: what the
+README and the notes of a case say is what is measured here, with Mitsuba's own materials."""
 
 import itertools
 import re

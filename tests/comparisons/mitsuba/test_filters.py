@@ -52,7 +52,7 @@ def test_the_rung_of_the_film(film_filter: AnyFilter) -> None:
     assert (tier.name, tier.status) == ("film", "agree"), tier.reason
 
 
-def test_another_filter_is_told_apart() -> None:
+def test_another_filter_is_distinguished() -> None:
     third = 1.0 / 3.0
     reference = MitchellFilter(b=third, c=third)
     assert film(reference, reference).status == "agree"

@@ -1,4 +1,4 @@
-"""Which LLVM libraries are tried for Mitsuba, in which order, and what each needs."""
+"""LLVM libraries for Mitsuba: which are tried, in which order, and what each needs."""
 
 import os
 import shutil

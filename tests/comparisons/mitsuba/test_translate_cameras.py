@@ -1,4 +1,4 @@
-"""Every camera, translated, sends the rays that ours sends, in both kinds of Mitsuba's variants."""
+"""Every camera, translated, makes the same rays in both kinds of Mitsuba's variants."""
 
 from collections.abc import Iterator
 
@@ -27,6 +27,11 @@ OFF_AXIS = (-0.15, 0.75, -0.5, 0.1)
 CASES: tuple[tuple[AnyCamera, tuple[int, int]], ...] = (
     *((Perspective(**TILTED, fov=70.0, fov_axis=axis), WIDE) for axis in AXES),
     *((Perspective(**TILTED, fov=70.0, fov_axis=axis), TALL) for axis in AXES),
+    (
+        Perspective(eye=(0.0, 0.0, 0.0), target=(0.0, -1.0, 0.0), up=(1.0, 0.0, 0.0), fov=150.0),
+        TALL,
+    ),
+    (Perspective(eye=(-40.0, 3.0, 9.0), fov=0.5), WIDE),
     (Perspective(**TILTED, view=OFF_AXIS), WIDE),
     (Perspective(**TILTED, view=OFF_AXIS, distance=0.2), WIDE),
     (Perspective(**TILTED, view=(-2.0, 3.0, 4.0, 16.5), distance=3.0), TALL),
@@ -66,6 +71,7 @@ def test_cameras_send_the_same_rays(variant: str, camera: AnyCamera, size: tuple
     assert found.numbers["max_camera_direction_error_over_bound"] <= 0.7
 
 
+PLAIN = Perspective(**TILTED, fov=70.0)
 FRONTAL = Perspective(**TILTED, view=OFF_AXIS)
 LENS = ThinLens(**TILTED, fov=50.0, aperture_radius=0.2, focus_distance=4.0)
 BOX = Pinhole(**TILTED)
@@ -74,6 +80,10 @@ BOX = Pinhole(**TILTED)
 @pytest.mark.parametrize(
     ("camera", "other"),
     [
+        (PLAIN, PLAIN.model_copy(update={"fov": 70.01})),
+        (PLAIN, PLAIN.model_copy(update={"fov_axis": "y"})),
+        (PLAIN, PLAIN.model_copy(update={"up": (0.1001, 1.0, 0.2)})),
+        (PLAIN, PLAIN.model_copy(update={"eye": (3.0, 2.0, -5.0001)})),
         (FRONTAL, Perspective(**TILTED, view=(-0.75, 0.15, -0.5, 0.1))),
         (FRONTAL, Perspective(**TILTED, view=(-0.15, 0.75, -0.1, 0.5))),
         (FRONTAL, Perspective(**TILTED, view=(-0.1499, 0.7501, -0.5, 0.1))),
@@ -88,7 +98,7 @@ BOX = Pinhole(**TILTED)
         (LENS, LENS.model_copy(update={"fov": 50.01})),
     ],
 )
-def test_another_camera_is_told_apart(camera: AnyCamera, other: AnyCamera) -> None:
+def test_another_camera_is_distinguished(camera: AnyCamera, other: AnyCamera) -> None:
     scene = seen_by(camera)
     problem = compare_camera(scene, load(seen_by(other)), 200).problem
     assert problem.startswith("the camera: ")
@@ -139,7 +149,7 @@ def test_what_the_cameras_see(camera: AnyCamera) -> None:
         ),
     ],
 )
-def test_what_has_no_twin(camera: AnyCamera, size: tuple[int, int], told: str) -> None:
+def test_what_has_no_counterpart(camera: AnyCamera, size: tuple[int, int], told: str) -> None:
     with pytest.raises(UntranslatableError, match=told) as caught:
         to_mitsuba(seen_by(camera, size))
     assert "\n" not in str(caught.value)

@@ -181,7 +181,7 @@ def test_a_long_summary_says_what_it_drops(tmp_path):
     assert before
 
 
-def test_a_summary_that_cannot_be_written_is_told(tmp_path):
+def test_a_summary_that_cannot_be_written_is_reported(tmp_path):
     with pytest.raises(ImageError, match="cannot be written"):
         github.summarise(EVERY, tmp_path, "smoke")
 

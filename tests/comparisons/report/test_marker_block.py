@@ -1,4 +1,4 @@
-"""Tables in files between their marks."""
+"""Tables that are written into files between markers."""
 
 from pathlib import Path
 

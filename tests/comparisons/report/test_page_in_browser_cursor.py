@@ -1,4 +1,4 @@
-"""The page's cursor, its zoom, and the places that it leads to, in a real browser."""
+"""The page's cursor, its zoom, and its links to places, in a real browser."""
 
 import math
 import re

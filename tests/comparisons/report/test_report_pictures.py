@@ -1,4 +1,4 @@
-"""Float pictures on the page: what is packed comes back, and what does not fit is made smaller."""
+"""Float pictures on the page: packing loses nothing, and what is too large is made smaller."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""results.json: strict, complete, whole or not at all."""
+"""results.json: strict JSON, complete, and written as a whole or not at all."""
 
 import json
 import math
@@ -36,7 +36,7 @@ def written(path, *cases, **more):
     return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
 
 
-def test_everything_is_told(tmp_path):
+def test_everything_is_reported(tmp_path):
     found = written(
         tmp_path / "results.json",
         case(rays=np.int64(5), worst=np.float32(0.5), by_kind={"t": np.arange(2)}),

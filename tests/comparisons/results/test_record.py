@@ -1,4 +1,4 @@
-"""Records of cases: what is written comes back, and what is damaged is not believed."""
+"""Stored results of cases: read back as they were written; damaged ones are refused."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Files that later runs continue from: no changed bit and no lost byte is believed."""
+"""Files that later runs continue from: every changed bit and lost byte is noticed."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Which rung names the verdict, and what a run's exit code says."""
+"""Which rung decides the verdict, and a run's exit code."""
 
 import pytest
 

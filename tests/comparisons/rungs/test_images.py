@@ -1,4 +1,4 @@
-"""The images rung: what it calls noise, and what it does not."""
+"""The images rung: which differences it takes for noise, and which it does not."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The rung of the input: each thing that is wrong with a picture is told as what it is."""
+"""The input rung: each defect of a picture is reported as what it is."""
 
 import numpy as np
 import pytest

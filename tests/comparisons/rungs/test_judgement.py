@@ -1,4 +1,4 @@
-"""Whose fault a mismatch is: faults planted in ours, and in Mitsuba's scene, are told apart."""
+"""Which renderer is wrong: faults planted in ours and in Mitsuba's scene are attributed rightly."""
 
 import dataclasses
 from typing import Any

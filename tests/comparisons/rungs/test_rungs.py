@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from counterparts import faulty_counterpart
 
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.translate import load
@@ -123,9 +124,7 @@ MORE_FAULTS: tuple[tuple[Rung, str, str], ...] = (
 def test_a_planted_fault_is_seen(
     rung: Rung, right: str, wrong: str, scene: Scene, tables: SceneTables
 ) -> None:
-    assert SCENE.count(right) == 1
-    faulty = load(Scene.parse(SCENE.replace(right, wrong)))
-    tier = rung(scene, tables, faulty)
+    tier = rung(scene, tables, faulty_counterpart(SCENE, right, wrong))
     assert tier.status == "differ"
     assert tier.reason
 

@@ -1,4 +1,4 @@
-"""Nothing is measured beside what is still at work."""
+"""Measurements wait until the threads of earlier work are idle."""
 
 import time
 

@@ -42,7 +42,7 @@ def test_constant_pictures_in_closed_form():
     assert metrics.ssim == pytest.approx(expected)
 
 
-def test_bias_is_told_per_channel(picture):
+def test_bias_is_reported_per_channel(picture):
     metrics = image_metrics(Images(picture * [1.0, 1.02, 0.9], picture))
     assert metrics.mean_bias == pytest.approx((0.0, 0.02, -0.1), abs=1e-12)
 

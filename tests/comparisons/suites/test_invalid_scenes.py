@@ -42,7 +42,7 @@ MALFORMED = {
 
 
 @pytest.mark.parametrize("what", MISSING_FILES)
-def test_a_missing_file_is_told_with_its_line(what, tmp_path):
+def test_a_missing_file_is_reported_with_its_line(what, tmp_path):
     text, line, keys = MISSING_FILES[what]
     (tmp_path / "s.yaml").write_text(text)
     scene = Scene.load(tmp_path / "s.yaml")
@@ -172,7 +172,7 @@ def test_where_a_case_could_not_run_as_well_that_counts(tmp_path):
     assert exit_code(run_in(tmp_path / "out", folder).cases) == 4
 
 
-def test_warnings_about_a_scene_are_told_with_its_case(tmp_path, program):
+def test_warnings_about_a_scene_are_reported_with_its_case(tmp_path, program):
     """The worker that reads the scene has no terminal."""
     folder = scenes(tmp_path / "scenes", "warn")
     for _ in range(2):  # the second time from the record

@@ -1,4 +1,4 @@
-"""A run that was interrupted says everywhere how many cases it ran, of how many."""
+"""An interrupted run states everywhere how many of its cases it ran."""
 
 import io
 import json

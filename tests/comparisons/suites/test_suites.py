@@ -1,4 +1,4 @@
-"""Suites: their files, what of them is run and what is not run again."""
+"""Suites: their files, which cases are run and which results are reused."""
 
 import json
 
@@ -37,7 +37,7 @@ pytestmark = pytest.mark.usefixtures("fake_runners")
         ("about: x\ncase_seconds: .nan\n", "s.yaml:2: case_seconds: expected"),
     ],
 )
-def test_a_wrong_suite_is_told_with_its_line(text, expected):
+def test_a_wrong_suite_is_reported_with_its_line(text, expected):
     with pytest.raises(SceneError) as error:
         parse_suite(text, "s.yaml")
     assert str(error.value).startswith(expected)
@@ -182,7 +182,7 @@ def test_a_damaged_record_is_made_again(tmp_path):
     assert read_case(out / "cases" / "a").images is not None
 
 
-def test_keys_tell_what_a_case_is_made_with(tmp_path):
+def test_keys_report_what_a_case_is_made_with(tmp_path):
     (tmp_path / "bitmap.png").write_bytes(b"1")
     (tmp_path / "s.yaml").write_text("textures: {t: {type: bitmap, file: bitmap.png}}\n")
 

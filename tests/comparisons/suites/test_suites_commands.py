@@ -30,7 +30,7 @@ def test_the_command_as_a_whole(tmp_path, program):
     assert again[:6] == ["reference-rt", "suite", str(mine), "--only", "a", "--fresh"]
 
 
-def test_github_is_told_by_itself(tmp_path, program, monkeypatch):
+def test_annotations_for_github_need_no_option(tmp_path, program, monkeypatch):
     folder = scenes(tmp_path / "scenes", "a", "differ")
     mine = tmp_path / "mine.yaml"
     mine.write_text("about: mine\n")
@@ -51,7 +51,7 @@ def test_github_is_told_by_itself(tmp_path, program, monkeypatch):
         (("smoke", "--jobs", "0"), 2, "jobs"),
     ],
 )
-def test_wrong_use_is_told(program, arguments, code, told):
+def test_wrong_use_is_reported(program, arguments, code, told):
     options = () if "--scenes" in arguments else ("--scenes", SCENES)
     result = program("suite", *arguments, *options)
     assert result.exit_code == code

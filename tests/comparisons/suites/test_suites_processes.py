@@ -23,7 +23,7 @@ from reference_rt.util.errors import ReferenceUnavailableError
 pytestmark = pytest.mark.usefixtures("fake_runners")
 
 
-def test_what_fails_is_told_and_the_others_go_on(tmp_path):
+def test_what_fails_is_reported_and_the_others_go_on(tmp_path):
     names = ("a", "crash", "exit", "print", "raise", "scene_error", "z")
     folder, out = scenes(tmp_path / "scenes", *names), tmp_path / "out"
     found = run_in(out, folder)

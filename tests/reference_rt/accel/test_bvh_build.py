@@ -1,4 +1,4 @@
-"""The builders: nothing is lost, nothing is too deep, whatever the input."""
+"""BVH builders: no primitive is lost and no tree too deep, whatever the input."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""What each way of building a hierarchy promises, and its statistics."""
+"""What each BVH builder guarantees, and the statistics of trees."""
 
 import numpy as np
 import pytest

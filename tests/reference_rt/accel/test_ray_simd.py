@@ -1,4 +1,4 @@
-"""Rays side by side find what each finds alone, and paths too, to the last bit."""
+"""SIMD blocks of rays find what each ray finds alone, and so do paths, to the last bit."""
 
 import math
 

@@ -1,10 +1,10 @@
-"""Rays on their ways through a hierarchy together find what each finds alone, to the last bit."""
+"""Stream traversal of a hierarchy finds what each ray finds alone, to the last bit."""
 
 import math
 
 import numpy as np
 import pytest
-from builders import cube, icosphere, in_plain_python, unit_vectors, write_obj
+from builders import cube, icosphere, same_in_plain_python, unit_vectors, write_obj
 
 import reference_rt as rt
 from reference_rt.accel.block_query import any_hits, closest_hits
@@ -178,9 +178,5 @@ def write_hits(folder, file):
 
 
 def test_plain_python_gives_the_same_bits(tmp_path):
-    write_hits(tmp_path, tmp_path / "compiled.npz")
-    in_plain_python(__file__, "write_hits", tmp_path, tmp_path / "plain.npz")
-    compiled, plain = (np.load(tmp_path / f"{name}.npz") for name in ("compiled", "plain"))
+    compiled = same_in_plain_python(write_hits, tmp_path)
     assert 5 < compiled["blocked"].sum() < 35
-    for name in compiled.files:
-        assert compiled[name].tobytes() == plain[name].tobytes(), name

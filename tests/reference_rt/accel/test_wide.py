@@ -1,4 +1,4 @@
-"""The wide hierarchy: everything of the binary one is in it, in boxes that hold it."""
+"""The wide BVH: everything of the binary one is in it, in boxes that contain it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Cameras: their rays against the text-book's formulas; descriptions."""
+"""Cameras: their rays against the textbook's formulas; descriptions."""
 
 import math
 
@@ -196,10 +196,8 @@ def test_a_pinholes_picture():
 WRONG = {
     "both": ("type: perspective, fov: 40, view: [-1, 1, -1, 1]", "", "both 'fov' and 'view'"),
     "axis of a rectangle": (
-        "type: thin_lens, aperture_radius: 1, fov_axis: y, view: [-1, 1, -1, 1]",
-        "",
-        "both 'fov_axis' and 'view'",
-    ),
+     "type: thin_lens, aperture_radius: 1, fov_axis: y, view: [-1, 1, -1, 1]", "",
+     "both 'fov_axis' and 'view'"),
     "distance alone": ("type: perspective, distance: 2", "", "'distance' is that of 'view'"),
     "width and view": ("type: orthographic, width: 2, view: [0, 1, 0, 1]", "", "both 'width' and"),
     "l = r": ("type: perspective, view: [1, 1, 0, 1]", ".view", "expected [l, r, b, t] with l < r"),
@@ -212,21 +210,12 @@ WRONG = {
     "infinite": ("type: orthographic, view: [0, .inf, 0, 1]", ".view", "of finite size"),
     "long": (f"type: orthographic, view: [0, 1{'0' * 400}, 0, 1]", ".view", "expected finite"),
     "endless": ("type: perspective, view: [-1e308, 1e308, 0, 1]", ".view", "of finite size"),
-    "zero distance": (
-        "type: perspective, view: [0, 1, 0, 1], distance: 0",
-        ".distance",
-        "expected",
-    ),
-    "a point": (
-        "type: perspective, view: [0, 1.0e-200, 0, 1], distance: 1.0e+200",
-        "",
-        "the distance makes the rectangle a point",
-    ),
-    "180 degrees": (
-        "type: perspective, view: [0, 1, 0, 1], distance: 1.0e-17",
-        "",
-        "the rectangle fills all 180 degrees",
-    ),
+    "zero distance": ("type: perspective, view: [0, 1, 0, 1], distance: 0", ".distance",
+     "expected"),
+    "a point": ("type: perspective, view: [0, 1.0e-200, 0, 1], distance: 1.0e+200", "",
+     "the distance makes the rectangle a point"),
+    "180 degrees": ("type: perspective, view: [0, 1, 0, 1], distance: 1.0e-17", "",
+     "the rectangle fills all 180 degrees"),
     "unknown axis": ("type: perspective, fov_axis: z", ".fov_axis", "expected 'x', 'y', 'diag"),
     "flat angle": ("type: thin_lens, aperture_radius: 1, fov: 180", ".fov", "expected less than"),
     "no film": ("type: pinhole, film_width: 0", ".film_width", "expected greater than 0"),
@@ -234,17 +223,11 @@ WRONG = {
     "film beside the hole": ("type: pinhole, film_distance: 1.0e-17", "", "the rectangle fills"),
     "no lens": ("type: thin_lens", ".aperture_radius", "missing; expected"),
     "empty lens": ("type: thin_lens, aperture_radius: 0", ".aperture_radius", "expected greater"),
-    "focus in the lens": (
-        "type: thin_lens, aperture_radius: 1, focus_distance: 0",
-        ".focus_distance",
-        "expected greater than 0",
-    ),
-    "wide lens": (
-        "type: thin_lens, aperture_radius: 1, focus_distance: 1.0e-17",
-        "",
-        "the lens is too wide",
-    ),
-}
+    "focus in the lens": ("type: thin_lens, aperture_radius: 1, focus_distance: 0",
+     ".focus_distance", "expected greater than 0"),
+    "wide lens": ("type: thin_lens, aperture_radius: 1, focus_distance: 1.0e-17", "",
+     "the lens is too wide"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "keys", "told"), WRONG.values(), ids=WRONG)

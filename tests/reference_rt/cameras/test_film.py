@@ -1,4 +1,4 @@
-"""Reconstruction filters: what they are, unbiased draws from them, a step seen through each."""
+"""Reconstruction filters: formulas, unbiased samples of them, an edge seen through each."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The program: exit codes, options, what lands in the folder."""
+"""The program: exit codes, options, and the files that it writes."""
 
 import json
 

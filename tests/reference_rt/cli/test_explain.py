@@ -1,4 +1,4 @@
-"""explain: what it says is what the tables hold; nothing is both used and left out."""
+"""explain: it describes what the tables hold; no feature is both used and left out."""
 
 import numpy as np
 import pytest

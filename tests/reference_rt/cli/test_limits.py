@@ -1,4 +1,4 @@
-"""What is beyond float64 is told at the stated bounds, and not before."""
+"""What exceeds float64's precision is reported at the stated bounds, and not before."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ def test_the_law_is_that_of_points_on_surfaces() -> None:
 
 
 @pytest.mark.parametrize("offset", [1.0e3, 1.0e9])
-def test_a_shape_as_small_as_its_error_is_told(offset: float) -> None:
+def test_a_shape_as_small_as_its_error_is_reported(offset: float) -> None:
     eye = f"camera: {{type: perspective, eye: [0, 0, {offset}], target: [0, 0, 0]}}\n"
     # Its far side and the eye are at the offset, to within its own size.
     bound = LAW * 2.0 * offset
@@ -38,7 +38,7 @@ def test_a_shape_as_small_as_its_error_is_told(offset: float) -> None:
         assert beyond(f"{eye}shapes:\n  - {{type: sphere, {ball}}}\n") == law
 
 
-def test_a_shape_whose_products_overflow_is_told() -> None:
+def test_a_shape_whose_products_overflow_is_reported() -> None:
     for exponent, law in ((510, ["range"]), (506, [])):
         ball = f"shapes:\n  - {{type: sphere, radius: {2.0**exponent!r}}}\n"
         (found,) = [limit for limit in limits(ball) if limit.law == "range"]
@@ -58,7 +58,7 @@ def test_a_far_eye_counts_as_a_far_shape() -> None:
 
 
 @pytest.mark.parametrize("inner", [True, False])
-def test_a_gap_as_narrow_as_two_errors_is_told(inner: bool) -> None:
+def test_a_gap_as_narrow_as_two_errors_is_reported(inner: bool) -> None:
     error = LAW * (1.0 + 1.0 + 2.0)  # eye and sphere within 1 of the origin, 2 across
     if inner:
         shapes = "  - {{type: sphere}}\n  - {{type: sphere, radius: {0!r}}}\n"
@@ -80,7 +80,7 @@ def test_what_is_in_one_place_is_no_gap() -> None:
 
 
 @pytest.mark.parametrize(("ulps", "law"), [(0, []), (1, ["index"]), (2, [])])
-def test_an_index_within_rounding_of_1_is_told(ulps: int, law: list[str]) -> None:
+def test_an_index_within_rounding_of_1_is_reported(ulps: int, law: list[str]) -> None:
     material = f"  glass: {{type: dielectric, interior_ior: {1.0 + ulps * 2.0 * U!r}}}\n"
     assert beyond("materials:\n" + material) == law
 
@@ -98,7 +98,7 @@ shapes:
     assert sorted(found) == ["shapes[0], dots[0] (sphere)", "shapes[1], operand 1 (box)"]
 
 
-def test_it_is_told_in_words() -> None:
+def test_it_is_reported_in_words() -> None:
     assert told(Limit("gap", "a and b", 2e-16, 1e-15)) == "a and b: 2e-16, float64's error is 1e-15"
     assert "2 times" in told(Limit("gap", "a and b", 2e-15, 1e-15))
 

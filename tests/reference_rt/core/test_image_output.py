@@ -1,4 +1,4 @@
-"""Files: what is written is what is read; whole or not at all; what is not finite stays visible."""
+"""Image files: read back as they were written; whole or absent; NaN and infinity stay visible."""
 
 import numpy as np
 import pytest

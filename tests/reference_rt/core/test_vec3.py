@@ -1,4 +1,4 @@
-"""Vec3: the text-book's algebra, and bases around any normal."""
+"""Vec3: the textbook's algebra, and bases around any normal."""
 
 import math
 import operator

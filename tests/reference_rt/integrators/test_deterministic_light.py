@@ -32,7 +32,7 @@ LIGHTS = {
 
 
 def arriving(light, p):
-    """(n, 3): irradiance on the floor (y = 0, normal +y) at p, by the text-book."""
+    """(n, 3): irradiance on the floor (y = 0, normal +y) at p, by the textbook."""
     if isinstance(light, rt.Directional):
         d = np.array(light.direction)
         return np.outer(np.full(len(p), -d[1] / np.linalg.norm(d)), light.irradiance)

@@ -1,4 +1,4 @@
-"""Light that is scattered to and fro where every bounce has a formula."""
+"""Interreflection in enclosures where every bounce has a closed form."""
 
 import math
 

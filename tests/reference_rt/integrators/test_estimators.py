@@ -1,4 +1,4 @@
-"""Estimators of one number agree: ways of sampling, with and without roulette, `direct`."""
+"""Estimators of one number agree: sampling strategies, with and without roulette, `direct`."""
 
 import numpy as np
 import pytest

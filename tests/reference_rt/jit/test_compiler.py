@@ -1,4 +1,4 @@
-"""Numba's own compiler takes the place of ours where that does not fit, with the same bits."""
+"""Numba's own compiler replaces ours where ours does not fit, with the same bits."""
 
 import importlib.metadata
 import os
@@ -47,7 +47,7 @@ def test_pyproject_asks_for_what_is_supported():
 
 
 @pytest.mark.parametrize("version", ["0.67.1", "0.69.0", "0.69.0rc1", "0.680.0", "1.68.0"])
-def test_another_release_is_told_in_one_line(version, monkeypatch):
+def test_another_release_is_reported_in_one_line(version, monkeypatch):
     monkeypatch.setattr(numba, "__version__", version)
     with pytest.warns(RuntimeWarning) as told:
         chosen = compiler.choose()

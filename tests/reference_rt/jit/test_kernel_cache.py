@@ -1,15 +1,11 @@
-"""Files of compiled kernels: a damaged one is never used, and never stands in the way."""
+"""Files of compiled kernels: a damaged one is never used, and is replaced."""
 
 import errno
 import os
 import random
 import shutil
-import signal
-import subprocess
-import sys
 import time
 from collections import namedtuple
-from contextlib import ExitStack
 from pathlib import Path
 
 import numba
@@ -158,101 +154,7 @@ def test_what_cannot_be_written_is_compiled_each_time(error, kept, monkeypatch):
     assert kept.heals()
 
 
-_KERNEL = """
-import os, signal, sys
-from pathlib import Path
-import numpy as np
-from reference_rt.jit.kernel import entry_kernel
-
-@entry_kernel
-def halve(x):
-    x[0] *= 0.5
-
-def run():
-    x = np.ones(1)
-    halve(x)
-    assert x[0] == 0.5
-    return sum(halve.stats.cache_hits.values())
-"""
-
-_KILLED = """
-def write(path, data):
-    with path.open("wb") as file:
-        file.write(data[:len(data) // 2])
-        file.flush()
-        os.kill(os.getpid(), signal.SIGKILL)
-
-Path.write_bytes = write
-"""
-
-
-@pytest.fixture
-def start(tmp_path):
-    """start(code) begins a process that runs the code after `_KERNEL`, with an empty cache at
-    first.  It is waited for, or ended, when the test ends."""
-    (tmp_path / "halves.py").write_text(_KERNEL)
-    with ExitStack() as ending:
-
-        def begin(code):
-            process = subprocess.Popen(
-                [sys.executable, "-c", f"from halves import *\n{code}"],
-                env=os.environ | {"REFERENCE_RT_CACHE": str(tmp_path / "cache")},
-                cwd=tmp_path,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-            )
-            ending.enter_context(process)
-            ending.callback(process.kill)
-            return process
-
-        yield begin
-
-
-def _done(process):
-    out, errors = process.communicate(timeout=300.0)
-    assert errors == ""
-    return process.returncode, out.strip()
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="nothing kills so")
-def test_a_writer_that_is_killed_leaves_nothing_that_is_read(start, tmp_path):
-    assert _done(start(_KILLED + "run()")) == (-signal.SIGKILL, "")
-    (folder,) = (tmp_path / "cache" / "kernels").iterdir()
-    (left,) = folder.iterdir()
-    assert left.name.startswith(".")
-    assert [_done(start("print(run())")) for _ in range(2)] == [(0, "0"), (0, "1")]
-    assert left.exists()  # for all that is known its writer is still at it
-    long_ago = time.time() - kernel_cache._UNFINISHED_FOR - 60.0
-    os.utime(left, (long_ago, long_ago))
-    assert _done(start("print(run())")) == (0, "1")
-    assert not left.exists()
-
-
-_WRITES = """
-halve._cache.load_overload = lambda *arguments: None  # what was loaded cannot be written again
-run()
-compiled, = halve.overloads.values()
-for _ in range(100):
-    halve._cache.save_overload(compiled.signature.args, compiled)
-"""
-
-_READS = """
-run()
-compiled, = halve.overloads.values()
-for _ in range(100):
-    assert halve._cache.load_overload(compiled.signature.args, halve.targetctx) is not None
-"""
-
-
-def test_processes_write_and_read_at_the_same_time(start):
-    """Each finds a whole file whenever it looks."""
-    together = [start(code) for code in (_WRITES, _READS, _WRITES)]
-    assert [_done(process) for process in together] == [(0, "")] * 3
-    assert _done(start("print(run())")) == (0, "1")
-
-
-def test_tuples_of_one_name_are_told_apart(kept):
+def test_tuples_of_one_name_are_distinguished(kept):
     def of(name):
         return signature_of(namedtuple(name, "x")(np.ones(1)))
 
@@ -324,6 +226,24 @@ def test_other_versions_are_deleted_when_they_are_old(kernels):
 
 def test_other_compilers_have_other_folders(kernels):
     assert kernel_cache.prepare_folder("one") != kernel_cache.prepare_folder("another")
+
+
+def test_an_edit_anywhere_in_the_package_gives_another_folder(kernels, monkeypatch):
+    """Kernels call each other across folders: a source in any of them is part of the machine code,
+    and so are its place and its name."""
+    whole = Path(kernel_cache.__file__).parents[1]
+    package = kernels.parent / "package"
+    shutil.copytree(whole, package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(kernel_cache, "__file__", str(package / "jit" / "kernel_cache.py"))
+    found = [kernel_cache.prepare_folder("one")]
+    one_of_each_folder = {path.parent: path for path in sorted(package.rglob("*.py"))}
+    assert {package, package / "jit", package / "shapes" / "curved"} <= set(one_of_each_folder)
+    for path in one_of_each_folder.values():
+        path.write_text(path.read_text() + "# edited\n")
+        found.append(kernel_cache.prepare_folder("one"))
+        path.rename(path.with_stem("renamed"))
+        found.append(kernel_cache.prepare_folder("one"))
+    assert len(set(found)) == len(found) > 40
 
 
 @pytest.mark.parametrize("what", ["file", "link to nothing"])

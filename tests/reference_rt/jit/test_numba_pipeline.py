@@ -1,4 +1,4 @@
-"""How kernels become machine code: nothing is left of what is inlined, and tuples arrive whole."""
+"""How kernels become machine code: inlining leaves no call, and tuples are passed whole."""
 
 import math
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Kernels compiled in two processes, and kernels called at an address."""
+"""Kernels compiled in two processes, and kernels called through function pointers."""
 
 import os
 import subprocess

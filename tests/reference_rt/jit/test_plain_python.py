@@ -1,4 +1,4 @@
-"""NUMBA_DISABLE_JIT=1 runs the same text as plain Python, to the same last bit."""
+"""NUMBA_DISABLE_JIT=1 runs the same functions as plain Python, with the same bits."""
 
 import os
 import subprocess

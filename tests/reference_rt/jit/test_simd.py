@@ -1,4 +1,4 @@
-"""Lane kernels: the vector code that is emitted gives NumPy's bits, whatever the numbers."""
+"""SIMD kernels: the vector code that is emitted gives NumPy's bits, whatever the numbers."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Environment maps: where texels stand, and directions with a density that is exactly theirs."""
+"""Environment maps: where texels are, and samples whose density is exactly theirs."""
 
 import math
 

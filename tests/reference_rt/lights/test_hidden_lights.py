@@ -105,7 +105,7 @@ def test_the_inside_of_a_hollow_shines():
     assert np.all(rt.render(scene).colour == (2.0, 3.0, 4.0))
 
 
-def test_explain_tells():
+def test_explain_reports():
     from reference_rt.cli.explain import explain
 
     scene = rt.Scene(materials=LAMP, shapes=(FLOOR, CASES["polygon"]))

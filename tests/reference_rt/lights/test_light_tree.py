@@ -1,4 +1,4 @@
-"""The tree over many lights: a probability for every light that can shine, and the right one."""
+"""The light tree: a probability for every light that can shine, and the right one."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Boundaries keep their digits: at matched indices, at grazing angles, from either side."""
+"""Precision at dielectric boundaries: matched indices, grazing angles, either side."""
 
 import math
 
@@ -14,7 +14,6 @@ from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, both,
 from reference_rt.materials.microfacet.fresnel import MOST_INDEX, fresnel, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import bend, half_vector, refract
 from reference_rt.sampling.warp import uniform_sphere
-from reference_rt.shapes.flat.spherical_rectangle import solid_angle_of
 from reference_rt.textures import NO_TEXTURES, At
 
 AT = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
@@ -48,7 +47,7 @@ def test_reflectance_and_transmittance_to_the_last_digits(cosine, n):
     s, p = (c - eta * t) / (c + eta * t), (eta * c - t) / (eta * c + t)
     r = (s * s + p * p) / 2
     found = fresnel(cosine, n)
-    assert abs(float((arb(found.reflectance) - r) / r)) <= 64 * U
+    assert abs(float((arb(found.reflectance) - r) / r)) <= 32 * U
     assert abs(float((arb(found.transmittance) - (1 - r)) / (1 - r))) <= 64 * U
     assert abs(float((arb(found.gap) - (c / eta - t)) / (c / eta - t))) <= 16 * U
     assert abs(float((arb(found.cos_t) - t) / t)) <= 8 * U
@@ -128,23 +127,6 @@ def test_glass_that_hardly_bends(index, distribution):
             # A direction tells the half vector's slope to u / |n - 1|, D to 14 / alpha of it.
             off = 4 * 14.0 / 0.2 * U / abs(index - 1.0)
             assert value == pytest.approx(found.weight.x * found.pdf, rel=32 * U + off)
-
-
-def test_solid_angles_of_rectangles():
-    """Against differences of angles at the corners in 300 bits; an eighth of all directions for a
-    corner of a cube."""
-    assert 6 * solid_angle_of(1.0, -1.0, 1.0, -1.0, 1.0) == pytest.approx(4 * math.pi, rel=4 * U)
-    rng = np.random.default_rng(71)
-    ctx.prec = 300
-    for _ in range(300):
-        h = float(10.0 ** rng.uniform(-20, 10))
-        x0, y0 = rng.uniform(1.0, 3.0, 2).tolist()
-        x1, y1 = x0 + float(10.0 ** rng.uniform(-6, 0)), y0 + float(10.0 ** rng.uniform(-6, 0))
-        exact = arb(0)
-        for x, y, sign in ((x1, y1, 1), (x0, y1, -1), (x1, y0, -1), (x0, y0, 1)):
-            x, y, z = arb(x), arb(y), arb(h)
-            exact += sign * (x * y / (z * (x * x + y * y + z * z).sqrt())).atan()
-        assert solid_angle_of(h, x0, x1, y0, y1) == pytest.approx(float(exact), rel=32 * U)
 
 
 @pytest.mark.parametrize("u0", [0.0, 2.0**-53, 1e-12, 0.3, 1.0 - 2.0**-53])

@@ -1,4 +1,4 @@
-"""Materials that are made of others: what their layers must add up to."""
+"""Materials that are made of others: what their parts must add up to."""
 
 import math
 

@@ -1,5 +1,5 @@
 """Plastics: the hemispherical integral of Fresnel's reflectance, samples against densities and
-integrals, reciprocity, energy, limits, bad input."""
+integrals, reciprocity, energy, limits."""
 
 import math
 
@@ -31,7 +31,6 @@ from reference_rt.materials.bsdfs.rough_plastic import (
 from reference_rt.materials.microfacet.fresnel import fresnel
 from reference_rt.materials.microfacet.ggx_and_smith import Microfacets
 from reference_rt.textures import NO_TEXTURES
-from reference_rt.util.errors import SceneError
 
 
 def exact_hemispherical(n):
@@ -249,16 +248,3 @@ def test_compiled_is_plain():
         RoughPlastic(reflectance=1.0, interior_ior=0.1, alpha=10.0),
     )
     check_same_bits([*materials, *extremes], np.random.default_rng(53))
-
-
-@pytest.mark.parametrize("material", [Plastic, RoughPlastic])
-@pytest.mark.parametrize(
-    "fields",
-    [
-        *({"reflectance": 1.1}, {"specular": -0.1}, {"interior_ior": 0}, {"nonlinear": 1}),
-        *({"exterior_ior": float("nan")}, {"alpha": 0}, {"alpha": [0.1, 0.2]}),
-    ],
-)
-def test_bad_input(material, fields):
-    with pytest.raises(SceneError):
-        material(**fields)

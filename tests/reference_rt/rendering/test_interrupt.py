@@ -1,4 +1,4 @@
-"""Ctrl-C and kill while rendering: no half-written file, no rubbish, the exit code says so."""
+"""Ctrl-C and kill while rendering: no partial and no temporary file, and the right exit code."""
 
 import signal
 import subprocess

@@ -46,7 +46,7 @@ def test_tables_may_be_given(cornell):
     assert np.array_equal(render(cornell, tables=tables).colour, render(cornell).colour)
 
 
-def test_progress_is_told_in_order(cornell):
+def test_progress_is_reported_in_order(cornell):
     said = []
     render(cornell, progress=lambda *what: said.append(what))
     kinds = [what for what, _ in said]

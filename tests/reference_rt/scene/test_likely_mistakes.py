@@ -137,7 +137,7 @@ def test_render_warns(tmp_path):
     assert "probably a mistake" in told.stdout
 
 
-def test_a_black_picture_is_told(tmp_path):
+def test_a_black_picture_is_reported(tmp_path):
     """The camera looks away: on the command line alone, which people look at."""
     file = tmp_path / "scene.yaml"
     away = "camera: {type: perspective, eye: [0, 0, 5], target: [0, 0, 9]}\n"

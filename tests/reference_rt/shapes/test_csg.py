@@ -10,8 +10,6 @@ from reference_rt.core import transform
 from reference_rt.rendering import query
 
 N = 8_000
-
-
 TINY = (
     transform.Scale(scale=(1e-3, 1e-3, 1e-3)),
     transform.Translate(translate=(0.0, 0.0, -1e6)),
@@ -303,9 +301,6 @@ def test_operands_must_be_solids(tmp_path):
     assert message.startswith("shapes[0]: operand 1, a mesh: ")
     assert "3" in message
     assert "edge" in message
-
-
-def test_nothing_to_combine():
     with pytest.raises(rt.SceneError, match="shapes"):
         rt.Scene.parse("shapes: [{type: union, of: []}]")
 

@@ -1,4 +1,4 @@
-"""Cylinders, cones and frustums: against rational arithmetic, and what is special about them."""
+"""What is special about cylinders, cones and frustums; the rest is in `test_quadrics`."""
 
 import math
 import re
@@ -7,10 +7,6 @@ import numpy as np
 import pytest
 from quadric_checks import (
     ULP,
-    all_spans,
-    anywhere,
-    check_against_exact,
-    check_leaving,
     guides_at,
     probe,
     put,
@@ -18,122 +14,21 @@ from quadric_checks import (
     rotation,
     table_of,
 )
-from quadric_exact import exactly, meetings
+from quadric_exact import exactly
+from quadric_kinds import KINDS, TURNED
 
 import reference_rt as rt
 from reference_rt.core import transform
 from reference_rt.shapes.curved import quadrics
 
-KINDS = {
-    "cylinder": [rt.Cylinder(), rt.Cylinder(radius=0.3, z_min=-2.0, z_max=0.7)],
-    "tube": [rt.Cylinder(capped=False), rt.Cylinder(radius=3, z_min=-2, z_max=0.7, capped=False)],
-    "cone": [rt.Cone(), rt.Cone(radius=0.7, height=2.1), rt.Cone(radius=3, height=0.1)],
-    "open cone": [rt.Cone(capped=False), rt.Cone(radius=0.7, height=2.1, capped=False)],
-    "frustum": [
-        rt.Cone(top_radius=0.3),
-        rt.Cone(radius=0.5, top_radius=1.3, height=0.7),
-        rt.Cone(top_radius=0.9999),
-        rt.Cone(top_radius=1.0),
-    ],
-    "open frustum": [rt.Cone(top_radius=0.3, capped=False)],
-}
-BY_NAME = pytest.mark.parametrize("name", KINDS)
-CLOSED = ("cylinder", "cone", "frustum")
 
-
-def seeded(name, *more):
-    return np.random.default_rng([list(KINDS).index(name), *more])
-
-
-def hits_of(name, distance, n):
-    rng = seeded(name, 1)
-    hits = 0
-    for shape in KINDS[name]:
-        placed = anywhere(rng, shape, 0.3)
-        hits += check_against_exact(placed, *rays_at(rng, exactly(placed), n, distance))
-    assert hits > n * len(KINDS[name]) / 3
-
-
-@BY_NAME
-@pytest.mark.parametrize("distance", [(-2.0, 1.0), (3.0, 7.0)])
-def test_hits(name, distance):
-    hits_of(name, distance, 150)
-
-
-@pytest.mark.slow
-@BY_NAME
-@pytest.mark.parametrize("distance", [(-2.0, 1.0), (1.0, 4.0), (3.0, 7.0)])
-def test_hits_of_many(name, distance):
-    hits_of(name, distance, 2000)
-
-
-def leave_of(name, spread, n):
-    rng = seeded(name, 2)
-    hits = 0
-    for shape in KINDS[name]:
-        placed = anywhere(rng, shape, spread)
-        o, d = rays_at(rng, exactly(placed), n)
-        hits += check_leaving(placed, o, d, guides_at(rng, n))
-    assert hits > n * len(KINDS[name]) / 3
-
-
-@BY_NAME
-@pytest.mark.parametrize("spread", [0.3, 3.0])
-def test_leaving(name, spread):
-    leave_of(name, spread, 300)
-
-
-@pytest.mark.slow
-@BY_NAME
-@pytest.mark.parametrize("spread", [0.3, 3.0])
-def test_leaving_of_many(name, spread):
-    leave_of(name, spread, 5000)
-
-
-@pytest.mark.parametrize("name", CLOSED)
-@pytest.mark.parametrize("spread", [0.3, 3.0])
-def test_what_is_convex_is_not_met_again(name, spread):
-    rng = seeded(name, 3)
-    for shape in KINDS[name]:
-        placed = anywhere(rng, shape, spread)
-        guides = guides_at(rng, 10_000)
-        guides[:, 2] = np.abs(guides[:, 2])
-        found = probe(placed, *rays_at(rng, exactly(placed), 10_000), guides)
-        # Along the surface, w's rounding decides which side it leaves on.
-        outwards = found.hits[found.side[found.hits] > 0]
-        assert len(outwards) > 2000
-        assert np.isinf(found.next_t[outwards]).all()
-
-
-@pytest.mark.parametrize("name", CLOSED)
-def test_spans(name):
-    rng = seeded(name, 4)
-    for shape in KINDS[name]:
-        placed = anywhere(rng, shape, 0.3)
-        o, d = rays_at(rng, exactly(placed), 100, (-1.0, 1.0))
-        t, face = all_spans(placed, o, d)
-        for i in range(100):
-            true = meetings(exactly(placed), o[i], d[i])
-            assert len(true) in (0, 2)
-            assert [m.face for m in true] == [
-                f for f, x in zip(face[i], t[i], strict=True) if x < math.inf
-            ]
-            assert np.allclose(t[i][: len(true)], [float(m.t) for m in true], rtol=1e-9)
-
-
-@BY_NAME
+@pytest.mark.parametrize("name", TURNED)
 def test_bounds_are_tight(name):
     for shape in KINDS[name]:
         exact = exactly(shape)
         lower, upper = quadrics.bounds(table_of(shape))
         assert np.allclose(lower[0], [float(x) for x in exact.lower], rtol=1e-14, atol=1e-14)
         assert np.allclose(upper[0], [float(x) for x in exact.upper], rtol=1e-14, atol=1e-14)
-        rng = seeded(name, 5)
-        placed = anywhere(rng, shape, 1.0)
-        found = probe(placed, *rays_at(rng, exactly(placed), 2000))
-        lower, upper = quadrics.bounds(table_of(placed))
-        assert (found.p[found.hits] >= lower).all()
-        assert (found.p[found.hits] <= upper).all()
 
 
 def test_coordinates_and_faces():

@@ -1,4 +1,4 @@
-"""Shapes as lights: their densities against the solid angles that they are seen under."""
+"""Shapes as lights: their densities against the solid angles that they subtend."""
 
 import math
 

@@ -1,32 +1,13 @@
 """Mesh files: what they hold is what is rendered, or an error with the line."""
 
-import struct
-
 import numpy as np
 import pytest
 from builders import cube, write_obj
+from mesh_writers import SQUARE, V, corners, read, square, written
 
 import reference_rt as rt
 from reference_rt.rendering import query
 from reference_rt.shapes.meshes.mesh import read_mesh
-
-V = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
-HEADER = (
-    "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
-    "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
-)
-POINTS = struct.pack("<12f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0)
-
-
-def ply(vertices=4, faces=1, body=b"", form="binary_little_endian"):
-    return HEADER.format(form, vertices, faces).encode() + body
-
-
-def corners(tmp_path, content, name="mesh.obj"):
-    """The triangles (m, 3, 3) of a file."""
-    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    mesh = read_mesh(tmp_path / name)
-    return mesh.vertices[mesh.faces], mesh
 
 
 def test_every_bit_of_an_obj(tmp_path):
@@ -37,45 +18,20 @@ def test_every_bit_of_an_obj(tmp_path):
     assert np.array_equal(read.vertices[read.faces], vertices[faces])
 
 
-@pytest.mark.parametrize("form", ["binary_little_endian", "binary_big_endian", "ascii"])
-def test_ply(tmp_path, form):
-    order = ">" if "big" in form else "<"
-    points = np.frombuffer(POINTS, "<f4").reshape(4, 3)
-    body = points.astype(order + "f4").tobytes() + struct.pack(order + "B3i", 3, 0, 1, 2)
-    if form == "ascii":
-        body = b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n"
-    found, _ = corners(tmp_path, ply(body=body, form=form), "mesh.ply")
-    assert np.array_equal(found, points[None, :3])
-
-
 @pytest.mark.parametrize("count", [1, 3])
 def test_quadrilaterals_become_two_triangles(tmp_path, count):
     """Three of them have as many numbers as four triangles: nothing must take them for these."""
-    a, b, c, d = np.frombuffer(POINTS, "<f4").reshape(4, 3).astype(float)
-    expected = np.array([[a, b, c], [a, c, d]] * count)
-    assert np.array_equal(corners(tmp_path, V + "f 1 2 3 4\n" * count)[0], expected)
-    body = POINTS + struct.pack("<B4i", 4, 0, 1, 2, 3) * count
-    assert np.array_equal(corners(tmp_path, ply(4, count, body), "mesh.ply")[0], expected)
-
-
-def test_indices_count_back_from_where_they_stand(tmp_path):
-    found, _ = corners(tmp_path, V + "f -4 -3 -2\nv 7 7 7\nf 1 2 -1\n")
-    assert found[0].tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
-    assert found[1].tolist() == [[0, 0, 0], [1, 0, 0], [7, 7, 7]]
-
-
-def test_a_vertex_may_have_a_normal_for_each_face(tmp_path):
-    text = V + "vn 0 0 1\nvn 0 2 0\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n"
-    _, mesh = corners(tmp_path, text)
-    expected = [[[0, 0, 1]] * 3, [[0, 1, 0]] * 3]
-    assert mesh.normals[mesh.faces].tolist() == expected
+    expected = np.tile(SQUARE[[[0, 1, 2], [0, 2, 3]]], (count, 1, 1))
+    assert np.array_equal(corners(read(tmp_path, V + "f 1 2 3 4\n" * count)), expected)
+    content = square("binary_little_endian", [(0, 1, 2, 3)] * count)
+    assert np.array_equal(corners(read(tmp_path, content, "mesh.ply")), expected)
 
 
 @pytest.mark.parametrize("face", ["1 2 3", "1/1 2/1 3/1", "1//1 2//1 3//1", "1/1/1 2/1/1 3/1/1"])
 def test_ways_to_write_a_face(tmp_path, face):
     text = "# caf\xe9\n" + V + f"vt 0 0\nvn 0 0 1\ng a\nusemtl b\ns 1\nf {face} # end\n"
-    found, mesh = corners(tmp_path, text.encode("latin-1").replace(b"\n", b"\r\n"))
-    assert found.tolist() == [[[0, 0, 0], [1, 0, 0], [1, 1, 0]]]
+    mesh = read(tmp_path, text.encode("latin-1").replace(b"\n", b"\r\n"))
+    assert np.array_equal(corners(mesh), SQUARE[None, :3])
     assert (mesh.normals is None) == ("//" not in face and face.count("/") < 6)
 
 
@@ -116,58 +72,22 @@ def test_meshes_are_placed_and_turned_like_other_shapes(tmp_path):
 
 
 WRONG = {
-    "out of range": ("mesh.obj", V + "f 1 2 5\n", "line 5: index 5 of 4 'v' lines is out of range"),
-    "zero": ("mesh.obj", V + "f 0 1 2\n", "line 5: index 0 of 4 'v' lines is out of range"),
-    "far back": ("mesh.obj", V + "f -1 -2 -5\n", "line 5: index -5 of 4 'v' lines is out of range"),
-    "normal out of range": ("mesh.obj", V + "f 1//1 2 3\n", "line 5: index 1 of 0 'vn' lines is"),
-    "not an index": ("mesh.obj", V + "f 1 2 x\n", "line 5: "),
-    "two corners": ("mesh.obj", V + "f 1 2\n", "line 5: a face has fewer than three corners"),
-    "NaN": ("mesh.obj", "v 0 0 nan\n", "line 1: 'v' needs three finite numbers"),
-    "infinity": ("mesh.obj", "v 0 1e999 0\n", "line 1: 'v' needs three finite numbers"),
-    "two coordinates": ("mesh.obj", "v 0 0\n", "line 1: 'v' needs three finite numbers"),
-    "words": ("mesh.obj", "v a b c\n", "line 1: could not convert"),
-    "zero normal": ("mesh.obj", V + "vn 0 0 0\nf 1//1 2//1 3//1\n", "a vertex normal is zero"),
-    "no faces": ("mesh.obj", V, "is empty; expected vertices and faces"),
-    "nothing": ("mesh.obj", "", "is empty; expected vertices and faces"),
-    "rubbish": ("mesh.obj", b"\x80\xff\x00\n" * 50, "is empty; expected"),
+    "index": ("mesh.obj", V + "f 1 2 5\n", "line 5: index 5 of 4 'v' lines is out of range"),
     "no area": ("mesh.obj", V + "f 1 1 2\n", "no triangle has any area"),
+    "ply: nothing": ("mesh.ply", "", "is malformed: Not a ply file!"),
     "unknown format": (
         "mesh.xyzw",
         "solid",
         "'.xyzw' is not supported; expected one of .obj, .ply, .stl, .off, .glb, .gltf",
     ),
-    "ply: cut": ("mesh.ply", ply(body=POINTS + b"\x03\0\0"), "is malformed: "),
-    "ply: cut earlier": ("mesh.ply", ply(body=POINTS[:20]), "is malformed: "),
-    "ply: cut header": ("mesh.ply", ply()[:60], "is malformed: "),
-    "ply: rubbish": ("mesh.ply", bytes(range(256)), "is malformed: Not a ply file!"),
-    "ply: nothing": ("mesh.ply", "", "is malformed: Not a ply file!"),
-    "ply: no faces": ("mesh.ply", ply(faces=0, body=POINTS), "is empty; expected vertices and"),
-    "ply: endless": ("mesh.ply", ply(vertices=10**12, body=POINTS), "is malformed: "),
-    "ply: index": (
-        "mesh.ply",
-        ply(body=POINTS + struct.pack("<B3i", 3, 0, 1, 7)),
-        "index 7, out of",
-    ),
-    "ply: negative": (
-        "mesh.ply",
-        ply(body=POINTS + struct.pack("<B3i", 3, 0, 1, -1)),
-        "index -1, out",
-    ),
-    "ply: NaN": (
-        "mesh.ply",
-        ply(
-            body=struct.pack("<12f", *[0] * 5, float("nan"), *range(6))
-            + struct.pack("<B3i", 3, 0, 1, 2)
-        ),
-        "vertex 1 is not finite",
-    ),
 }
+"""What the program says; `test_bad_mesh_files` has all faults."""
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_wrong_mesh(name, refused, tmp_path):
     file, content, message = WRONG[name]
-    (tmp_path / file).write_bytes(content if isinstance(content, bytes) else content.encode())
+    written(tmp_path, content, file)
     scene = tmp_path / "scene.yaml"
     scene.write_text(f"film: {{}}\nshapes:\n  - {{type: mesh, file: {file}}}\n")
     said = refused(3, "render", str(scene), "-o", str(tmp_path / "out.exr"))

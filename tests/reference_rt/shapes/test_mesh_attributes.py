@@ -1,4 +1,4 @@
-"""What a mesh file says of its vertices is read under every usual name, or named in a warning."""
+"""A mesh file's vertex attributes are read under every usual name, or named in a warning."""
 
 import re
 

@@ -168,7 +168,7 @@ def test_polygons_are_numbered_as_their_fans(tmp_path):
     assert sorted(face.tolist()) == [1, 2, 3, 4]
 
 
-def test_explain_and_the_command_line_tell(tmp_path):
+def test_explain_and_the_command_line_report(tmp_path):
     flat = PLACES["everywhere"]
     mesh_of("mesh.obj", *grid(flat), tmp_path)
     (tmp_path / "scene.yaml").write_text(
@@ -190,7 +190,7 @@ def test_explain_and_the_command_line_tell(tmp_path):
     )
 
 
-def test_told_once(tmp_path):
+def test_reported_once(tmp_path):
     """Not again for second tables, nor for those of a changed scene."""
     flat = PLACES["middle"]
     scene = placed(tmp_path, mesh_of("mesh.obj", *grid(flat), tmp_path))
@@ -199,7 +199,7 @@ def test_told_once(tmp_path):
     scene.changed(film=rt.Film(width=4)).tables  # noqa: B018
 
 
-def test_nothing_is_told_where_nothing_is_left_out(tmp_path):
+def test_nothing_is_reported_where_nothing_is_left_out(tmp_path):
     scene = placed(tmp_path, mesh_of("mesh.obj", *grid(()), tmp_path))
     used, left_out = explain(scene, scene.tables)
     assert not [what for what, _ in [*used, *left_out] if "shapes[0]" in what]

@@ -1,47 +1,18 @@
 """Every shape against rational arithmetic: floats are rationals, so the right answer is exact."""
 
-import itertools
 from fractions import Fraction as Q
 
 import numpy as np
 import pytest
 from builders import U, random_shape, shapes_in_order, unit_vectors
 from drivers import probe
+from flat_checks import lattice_rays
+from rational import dot, q, solve, sub
 
 import reference_rt as rt
 from reference_rt.shapes import BOX, RECTANGLE, SPHERE, TRIANGLE
 
 N = 800
-
-
-def q(v):
-    return [Q(float(x)) for x in v]
-
-
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b, strict=True))
-
-
-def sub(a, b):
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
-def cross(a, b):
-    (ax, ay, az), (bx, by, bz) = a, b
-    return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
-
-
-def solve(columns, right):
-    """The three coefficients of `columns` that sum to `right` (Cramer); None where singular."""
-    a, b, c = columns
-    determinant = dot(a, cross(b, c))
-    if determinant == 0:
-        return None
-    return [
-        dot(right, cross(b, c)) / determinant,
-        dot(a, cross(right, c)) / determinant,
-        dot(a, cross(b, right)) / determinant,
-    ]
 
 
 def rays_towards(rng, points):
@@ -233,19 +204,10 @@ def test_box_from_outside_and_inside():
 
 # ---- lattices: small integers, on which float64 is exact ----------------------------------------
 
-ORIGINS = np.array(list(itertools.product((-3, -2, -1, 0, 1, 2, 3), repeat=3)), float)
-ZEROS = [0.0, -0.0]
-DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, -0.0, 1.0), repeat=3) if any(d)])
-
-
-def lattice():
-    n, m = len(ORIGINS), len(DIRECTIONS)
-    return np.repeat(ORIGINS, m, axis=0), np.tile(DIRECTIONS, (n, 1))
-
 
 def first_hits(shape, kind):
     tables, _ = shapes_in_order([shape])
-    o, d = lattice()
+    o, d = lattice_rays(3)
     return o, d, probe(tables, kind, np.zeros(len(o)), o, d)
 
 

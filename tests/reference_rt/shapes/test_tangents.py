@@ -1,4 +1,4 @@
-"""dp/du and dp/dv against differences of what is met, and where there are none."""
+"""dp/du and dp/dv against differences of hit points, and where there are none."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The torus against exact roots of its quartic, and when rays leave it."""
+"""The torus against exact roots of its quartic; rays that leave it."""
 
 import flint
 import numpy as np

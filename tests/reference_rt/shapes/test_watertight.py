@@ -1,4 +1,6 @@
-"""Rays inside a closed mesh never leave it; rays through it cross it as often as they must."""
+"""Rays inside a closed mesh never leave it, with a hierarchy and without; rays in its planes.
+
+F3 of the stability suites has more meshes, sizes and distances, and numbers of crossings."""
 
 import numpy as np
 import pytest
@@ -9,31 +11,18 @@ from reference_rt.core import transform
 from reference_rt.rendering import query
 from reference_rt.scene import build_hierarchies
 
-MESHES = {
-    "ball": icosphere(3),
-    "cube": cube(7),
-    "coarse cube": cube(1),
-    "coarse ball": icosphere(1),
-}
+MESHES = {"ball": icosphere(3), "coarse cube": cube(1), "coarse ball": icosphere(1)}
 RAYS = 100_000
 
 
-def _placement(name):
-    if name == "as is":
-        return ()
-    return placed(np.random.default_rng(5), 1.0, {"turned": 0.0, "far away": 100.0}[name])
-
-
-@pytest.mark.parametrize("placement", ["as is", "turned", "far away"])
 @pytest.mark.parametrize(
-    ("mesh", "bvh_from"),
-    [("ball", 1), ("cube", 1), ("coarse cube", 1), ("coarse ball", 1000), ("coarse cube", 1000)],
+    ("mesh", "bvh_from"), [("ball", 1), ("coarse ball", 1000), ("coarse cube", 1000)]
 )
-def test_no_ray_leaks(mesh, bvh_from, placement, tmp_path, monkeypatch):
+def test_no_ray_leaks(mesh, bvh_from, tmp_path, monkeypatch):
     """Aimed at vertices, at middles of edges, at points along edges, and anywhere."""
     vertices, faces = MESHES[mesh]
     monkeypatch.setattr(build_hierarchies, "BVH_FROM", bvh_from)
-    steps = _placement(placement)
+    steps = placed(np.random.default_rng(5), 1.0, 100.0)
     file = write_obj(tmp_path / "mesh.obj", vertices, faces)
     scene = rt.build_tables(rt.Scene(shapes=(rt.Mesh(file=str(file), transform=steps),)))
     m = transform.affine(steps)
@@ -47,41 +36,6 @@ def test_no_ray_leaks(mesh, bvh_from, placement, tmp_path, monkeypatch):
     aim = rng.integers(0, 4, RAYS)
     d = np.choose(aim[:, None], d)
     assert np.isfinite(query.intersect(scene, o, d).t).all()
-
-
-def _crossings(v, o, d):
-    """How many triangles (n, 3, 3) each ray crosses, by signs of volumes: no code in common."""
-    to = v[None] - o[:, None, None]
-    sides = [
-        np.einsum("nmi,ni->nm", np.cross(to[:, :, k], to[:, :, (k + 1) % 3]), d) for k in range(3)
-    ]
-    inside = (np.min(sides, axis=0) > 0) | (np.max(sides, axis=0) < 0)
-    n = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
-    ahead = np.einsum("nmi,mi->nm", to[:, :, 0], n) * (d @ n.T) > 0
-    return np.sum(inside & ahead, axis=1)
-
-
-def test_parity(tmp_path):
-    """A ray from outside, restarted behind each hit, hits as often as an independent count says,
-    which is an even number of times."""
-    vertices, faces = icosphere(1)
-    file = write_obj(tmp_path / "mesh.obj", vertices, faces)
-    scene = rt.build_tables(rt.Scene(shapes=(rt.Mesh(file=str(file)),)))
-    rng = np.random.default_rng(12)
-    o = 3.0 * unit_vectors(rng, 500)
-    d = unit_vectors(rng, 500) - o
-    expected = _crossings(vertices[faces], o, d)
-    counted = np.zeros(500, int)
-    origin, alive = o.copy(), np.ones(500, bool)
-    for _ in range(4):
-        found = query.intersect(scene, origin, d)
-        alive &= np.isfinite(found.t)
-        counted += alive
-        # 1e-9 of the ball: far above rounding, far below the length of any chord met here.
-        step = np.where(alive, found.t, 0.0)[:, None]
-        origin = origin + d * (step + 1e-9)
-    assert np.array_equal(counted, expected)
-    assert set(np.unique(expected)) == {0, 2}
 
 
 def test_rays_in_a_plane_hit_what_is_there(tmp_path):

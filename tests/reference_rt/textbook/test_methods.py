@@ -1,14 +1,10 @@
-"""All methods by name: what there is, what is refused, that they agree, also as plain Python."""
+"""All methods by name: which there are, what is refused, that they agree, also as plain Python."""
 
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import HELPERS, U, unit_vectors
+from builders import U, same_in_plain_python, unit_vectors
 from method_checks import CUBE, DIRECTIONS, EXAMPLES, L_SHAPE, TRIANGLE, UNIT_SPHERE, mixed_lengths
 
 import reference_rt as rt
@@ -95,14 +91,6 @@ def test_all_methods_of_a_family_agree(family):
         assert np.max(np.abs(t[hit] / first_t[hit] - 1)) <= 640 * U
 
 
-_PLAIN = """
-import sys, numpy as np
-sys.path.insert(0, sys.argv[1])
-import test_methods as here
-np.savez(sys.argv[2], **here.answers())
-"""
-
-
 def answers():
     """t of every method for the same rays, many of them along the axes or on edges."""
     rng = np.random.default_rng(11)
@@ -116,17 +104,12 @@ def answers():
     }
 
 
+def write_answers(_folder, file):
+    np.savez(file, **answers())
+
+
 def test_plain_python_gives_the_same_bits(tmp_path):
-    file = tmp_path / "plain.npz"
-    subprocess.run(
-        [sys.executable, "-W", "error", "-c", _PLAIN, str(Path(__file__).parent), str(file)],
-        check=True,
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(HELPERS)},
-    )
-    plain, compiled = dict(np.load(file)), answers()
-    assert set(plain) == set(compiled)
-    for name, t in compiled.items():
-        assert t.tobytes() == plain[name].tobytes(), name
+    for name, t in same_in_plain_python(write_answers, tmp_path).items():
         assert 10 < np.isfinite(t).sum() < len(t), name
 
 

@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from method_checks import CUBE, DIRECTIONS, first, mixed_lengths, off, q
+from method_checks import CUBE, DIRECTIONS, first, mixed_lengths, off
+from rational import q
 
 import reference_rt as rt
 from reference_rt import textbook

@@ -1,4 +1,4 @@
-"""The operations that docstrings state, counted."""
+"""The numbers of operations that docstrings state, counted."""
 
 import collections
 import math

@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from method_checks import DIRECTIONS, Q, dot, first, mixed_lengths, off, q, root, sub
+from method_checks import DIRECTIONS, first, mixed_lengths, off
+from rational import Q, dot, q, root, sub
 
 import reference_rt as rt
 from reference_rt import textbook

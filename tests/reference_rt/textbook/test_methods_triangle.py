@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 from builders import U
-from method_checks import DIRECTIONS, TRIANGLE, cross, dot, first, off, q, sub
+from method_checks import DIRECTIONS, TRIANGLE, first, off
+from rational import cross, dot, q, sub
 
 import reference_rt as rt
 from reference_rt import textbook

@@ -1,0 +1,108 @@
+"""Files of compiled kernels that several processes use, at once or after one is killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+
+import numba
+import pytest
+
+from reference_rt.jit import kernel_cache
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+
+_KERNEL = """
+import os, signal, sys
+from pathlib import Path
+import numpy as np
+from reference_rt.jit.kernel import entry_kernel
+
+@entry_kernel
+def halve(x):
+    x[0] *= 0.5
+
+def run():
+    x = np.ones(1)
+    halve(x)
+    assert x[0] == 0.5
+    return sum(halve.stats.cache_hits.values())
+"""
+
+_KILLED = """
+def write(path, data):
+    with path.open("wb") as file:
+        file.write(data[:len(data) // 2])
+        file.flush()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+Path.write_bytes = write
+"""
+
+
+@pytest.fixture
+def start(tmp_path):
+    """start(code) begins a process that runs the code after `_KERNEL`, with an empty cache at
+    first.  It is waited for, or ended, when the test ends."""
+    (tmp_path / "halves.py").write_text(_KERNEL)
+    with ExitStack() as ending:
+
+        def begin(code):
+            process = subprocess.Popen(
+                [sys.executable, "-c", f"from halves import *\n{code}"],
+                env=os.environ | {"REFERENCE_RT_CACHE": str(tmp_path / "cache")},
+                cwd=tmp_path,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            ending.enter_context(process)
+            ending.callback(process.kill)
+            return process
+
+        yield begin
+
+
+def _done(process):
+    out, errors = process.communicate(timeout=300.0)
+    assert errors == ""
+    return process.returncode, out.strip()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing kills so")
+def test_a_writer_that_is_killed_leaves_nothing_that_is_read(start, tmp_path):
+    assert _done(start(_KILLED + "run()")) == (-signal.SIGKILL, "")
+    (folder,) = (tmp_path / "cache" / "kernels").iterdir()
+    (left,) = folder.iterdir()
+    assert left.name.startswith(".")
+    assert [_done(start("print(run())")) for _ in range(2)] == [(0, "0"), (0, "1")]
+    assert left.exists()  # for all that is known its writer is still at it
+    long_ago = time.time() - kernel_cache._UNFINISHED_FOR - 60.0
+    os.utime(left, (long_ago, long_ago))
+    assert _done(start("print(run())")) == (0, "1")
+    assert not left.exists()
+
+
+_WRITES = """
+halve._cache.load_overload = lambda *arguments: None  # what was loaded cannot be written again
+run()
+compiled, = halve.overloads.values()
+for _ in range(100):
+    halve._cache.save_overload(compiled.signature.args, compiled)
+"""
+
+_READS = """
+run()
+compiled, = halve.overloads.values()
+for _ in range(100):
+    assert halve._cache.load_overload(compiled.signature.args, halve.targetctx) is not None
+"""
+
+
+def test_processes_write_and_read_at_the_same_time(start):
+    """Each finds a whole file whenever it looks."""
+    together = [start(code) for code in (_WRITES, _READS, _WRITES)]
+    assert [_done(process) for process in together] == [(0, "")] * 3
+    assert _done(start("print(run())")) == (0, "1")
