@@ -100,7 +100,6 @@ def test_codes_are_compared_in_the_order_of_the_rows():
 
 
 def test_the_code_may_be_an_expression():
-    """All parameters but the tables are then passed on."""
     fields = Tables(A, None, None)
     other = ByCode([(OTHER, "adders", SimpleNamespace(value=lambda table, first, x: first + x))])
 
@@ -110,6 +109,25 @@ def test_the_code_may_be_an_expression():
 
     assert choice(fields, 2 + 5j, 1.0) == 3 + 5j
     assert choice(fields, 3 + 5j, 1.0) == 1.0
+
+
+def test_kernels_take_the_parameters_that_they_name():
+    some = SimpleNamespace(value=lambda table, z, x: 10 * z + x)
+    other = SimpleNamespace(value=lambda table: 7)
+
+    @ByCode([(0, "adders", some), (1, "scalers", other)])("value")
+    def choice(tables: Tables, kind: int, x: float, y: float, z: float) -> float:
+        return y
+
+    assert [choice(Tables(A, B, C), kind, 1.0, 2.0, 3.0) for kind in range(3)] == [31.0, 7, 2.0]
+
+
+def test_a_parameter_that_cannot_be_given_is_an_error():
+    with pytest.raises(TypeError, match=r"_add, for adders: parameters \{'x'\} are none of those"):
+
+        @by_code("value")
+        def choice(tables: Tables, kind: int) -> float:
+            return 0.0
 
 
 def test_tracebacks_show_the_generated_line():

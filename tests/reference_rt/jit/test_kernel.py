@@ -13,7 +13,8 @@ import reference_rt
 from reference_rt.jit.kernel import entry_kernel, local_floats, local_integers, reciprocal
 
 _HIT = """
-from reference_rt import Scene, Sphere, build_tables, kernel, query
+from reference_rt import Scene, Sphere, build_tables, query
+from reference_rt.jit import kernel
 found = query.intersect(build_tables(Scene(shapes=(Sphere(),))), [[0, 0, 3.0]], [[0, 0, -1.0]])
 from reference_rt.rendering.query.tracing import closest_of_few
 print(kernel.CACHE_FOLDER, found.t[0], sum(closest_of_few.stats.cache_hits.values()))
@@ -51,7 +52,7 @@ def test_an_edit_of_a_callee_is_seen(copy, tmp_path):
     warm = first_hit(copy, tmp_path)
     assert cold == (warm[0], 2.0, 0)
     assert warm[1:] == (2.0, 1)
-    callee = copy / "reference_rt" / "shapes" / "sphere.py"
+    callee = copy / "reference_rt" / "shapes" / "curved" / "sphere.py"
     text = callee.read_text()
     found = "return Crossing(t, 0.0, 0.0)"
     assert text.count(found) == 1
