@@ -12,7 +12,7 @@ from reference_rt.core.transform import Affine
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes.csg import Difference, Solid, Union
 from reference_rt.shapes.instances import Instance
-from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.shape import Shape, TabulationContext
 
 
 class Leaf(NamedTuple):
@@ -55,9 +55,9 @@ class Copy(NamedTuple):
     outer: Affine
 
 
-def place_of(scene: Scene, leaf: Leaf, outer: Affine) -> Place:
+def place_of(scene: Scene, leaf: Leaf, outer: Affine) -> TabulationContext:
     """The place with which a leaf is tabulated;  outer: the map of its group to the scene."""
-    return Place(folder=scene.folder, outer=transform.compose(leaf.outer, outer))
+    return TabulationContext(folder=scene.folder, outer=transform.compose(leaf.outer, outer))
 
 
 def copies_of(scene: Scene) -> list[Copy]:

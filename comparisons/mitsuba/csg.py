@@ -19,7 +19,7 @@ from comparisons.mitsuba.stand_ins import MitsubaShape
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes import Plane
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 MOST_CROSSINGS = 200
 """Most crossings of a ray with one operand; the torus knot has a dozen."""
@@ -54,7 +54,7 @@ class Operand(NamedTuple):
     mi_scene: Any
     pieces: Mapping[str, MitsubaShape]
     leaf: Leaf
-    place: Place
+    place: TabulationContext
 
     def walk(self, o: FloatArray, d: FloatArray) -> tuple[BoolArray, list[Crossings]]:
         """Whether rays start inside (n,), and all their crossings in order."""

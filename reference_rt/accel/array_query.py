@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
 from reference_rt.accel.geometry import Geometry, closest_hit
-from reference_rt.accel.packet.packet import BUNDLE
+from reference_rt.accel.packet.packet import PACKET_SIZE
 from reference_rt.accel.packet.traversal import FOUND, INCOHERENT, closest_of_packet
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import BLOCK, Hit, Ray
@@ -16,8 +16,8 @@ from reference_rt.core.ray_block import (
     HIT_FLOATS,
     HIT_INTEGERS,
     RAY_FLOATS,
-    Hits,
-    Rays,
+    HitBlock,
+    RayBlock,
     put_ray,
     ray_of,
 )
@@ -35,28 +35,28 @@ class Primitives(NamedTuple):
     uv: FloatArray
 
 
-MOST_ADDED = BLOCK + BUNDLE
-"""The most hits that one call of `trace_bundle` adds to its output."""
+MOST_ADDED = BLOCK + PACKET_SIZE
+"""The most hits that one call of `trace_packet` adds to its output."""
 
 
-class Work(NamedTuple):
-    """Scratch buffers of `trace_bundle`.  packet, hits: the rays of a packet and their hits (hits
+class TraceScratch(NamedTuple):
+    """Scratch buffers of `trace_packet`.  packet, hits: the rays of a packet and their hits (hits
     also of a block);  rays, numbers (BLOCK,): incoherent rays that wait until they fill a block,
     and their indices."""
 
-    packet: Rays
-    hits: Hits
-    rays: Rays
+    packet: RayBlock
+    hits: HitBlock
+    rays: RayBlock
     numbers: IntArray
 
 
 @kernel
-def trace_bundle(
+def trace_packet(
     geometry: Geometry,
     o: FloatArray,
     d: FloatArray,
     begin: int,
-    work: Work,
+    work: TraceScratch,
     waiting: int,
     found: Primitives,
     numbers: IntArray,
@@ -69,9 +69,9 @@ def trace_bundle(
     Returns both as they are afterwards.  Hits come in any order; the call for the last of the n
     rays empties the queue.
     """
-    end = min(begin + BUNDLE, len(o))
+    end = min(begin + PACKET_SIZE, len(o))
     outcome = INCOHERENT
-    if end == begin + BUNDLE:
+    if end == begin + PACKET_SIZE:
         outcome = closest_of_packet(geometry, o, d, begin, work.packet, work.hits)
     for i in range(begin, end):
         hit = Hit(math.inf, -1, -1, 0.0, 0.0, -1)
@@ -87,7 +87,7 @@ def trace_bundle(
         _put_hit(found, filled, hit)
         numbers[filled] = i
         filled += 1
-    if waiting > BLOCK - BUNDLE or end == len(o):
+    if waiting > BLOCK - PACKET_SIZE or end == len(o):
         closest_hits(geometry, work.rays, work.hits, waiting)
         for j in range(waiting):
             _put_hit(found, filled, hit_of(geometry, ray_of(work.rays, j), work.hits, j))
@@ -119,8 +119,8 @@ def occluded_rays(
     geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
 ) -> None:
     """Whether each ray hits anything at 0 < t < t_max (n,), written to out (n,)."""
-    rays = Rays(local_floats(RAY_FLOATS))
-    hits = Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
+    rays = RayBlock(local_floats(RAY_FLOATS))
+    hits = HitBlock(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
     numbers = local_integers(BLOCK)
     for k in range(RAY_FLOATS):
         rays.numbers[k] = 1.0

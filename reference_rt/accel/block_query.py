@@ -13,13 +13,13 @@ from reference_rt.core.ray_block import (
     HIT_FLOATS,
     HIT_INTEGERS,
     RAY_FLOATS,
-    Hits,
-    Rays,
+    HitBlock,
+    RayBlock,
     put_hit,
     ray_of,
 )
 from reference_rt.core.ray_block import hit_of as hit_in_block
-from reference_rt.jit.function_pointer import Address, call_at
+from reference_rt.jit.function_pointer import FunctionPointer, call_pointer
 from reference_rt.jit.kernel import kernel, signature_of
 from reference_rt.jit.parallel_compile import Call
 from reference_rt.shapes.instances import Instances
@@ -35,19 +35,19 @@ def tracer_of(geometry: Geometry) -> Call | None:
     bvh, shapes, solids = geometry.bvh, geometry.shapes, geometry.solids
     if numba.config.DISABLE_JIT or bvh is None or geometry.instances is not None:
         return None
-    rays = Rays(np.empty(RAY_FLOATS))
-    hits = Hits(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
+    rays = RayBlock(np.empty(RAY_FLOATS))
+    hits = HitBlock(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
     return trace_block, signature_of(bvh, shapes, solids, rays, hits, 0, False)
 
 
 @kernel
-def closest_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
+def closest_hits(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int) -> None:
     """`closest_hit` of the first n rays; read the hits with `hit_of`."""
     _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, False)
 
 
 @kernel
-def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
+def any_hits(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int) -> None:
     """`occluded` of the first n rays: hits.codes[j] >= 0 for those that are; the rest of the hits
     means nothing."""
     _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, True)
@@ -57,10 +57,10 @@ def any_hits(geometry: Geometry, rays: Rays, hits: Hits, n: int) -> None:
 def _trace(
     bvh: Bvh | None,
     instances: Instances | None,
-    tracer: Address | None,
+    tracer: FunctionPointer | None,
     geometry: Geometry,
-    rays: Rays,
-    hits: Hits,
+    rays: RayBlock,
+    hits: HitBlock,
     n: int,
     any_hit: bool,
 ) -> None:
@@ -77,7 +77,7 @@ def _trace(
                 put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
         return
     if tracer is not None:
-        call_at(tracer[0], (bvh, shapes, solids, rays, hits, n, any_hit))
+        call_pointer(tracer[0], (bvh, shapes, solids, rays, hits, n, any_hit))
         return
     if any_hit:
         any_of_block(bvh, shapes, solids, rays, hits, n)
@@ -86,13 +86,13 @@ def _trace(
 
 
 @kernel
-def hit_of(geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
+def hit_of(geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
     """The hit of ray j after `closest_hits`."""
     return _hit_of(geometry.bvh, geometry, ray, hits, j)
 
 
 @kernel
-def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: Hits, j: int) -> Hit:
+def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
     if bvh is None:
         return any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
     return hit_in_block(hits, j)

@@ -9,7 +9,7 @@ from reference_rt.accel.bvh import (
     WIDE_STACK,
     Bvh,
     first_of,
-    is_packet,
+    is_triangle_leaf,
     kind_of,
     row_of,
     size_of,
@@ -21,22 +21,22 @@ from reference_rt.accel.single_ray import (
     can_be_nearer,
     enter,
     nearest_child,
-    view_of,
+    slab_ray_of,
 )
 from reference_rt.core.ray import Hit, Ray, SurfacePoint, no_hit
 from reference_rt.core.vec3 import Vec3
-from reference_rt.jit.function_pointer import Address
+from reference_rt.jit.function_pointer import FunctionPointer
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes import TRIANGLE, Packets, Shapes
 from reference_rt.shapes.csg.anchor import out_of_solid, ray_near
 from reference_rt.shapes.csg.tables import Parts, Solids
 from reference_rt.shapes.instances import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.shapes.meshes import triangle
-from reference_rt.shapes.meshes.watertight import SEEN_FLOATS, Shear, shear_of
+from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS, Shear, shear_of
 from reference_rt.shapes.shape import Tangents
 
-STACK = 2 * WIDE_STACK + LANES + 1
+STACK = 2 * WIDE_STACK + VECTOR_WIDTH + 1
 """Entries of the traversal stack: for the scene's BVH, for one group's, for the instances of a leaf
 and for `Bvh.unbounded`."""
 
@@ -53,7 +53,7 @@ class Geometry(NamedTuple):
     solids: Solids | None
     instances: Instances | None
     parts: Parts | None
-    tracer: Address | None = None
+    tracer: FunctionPointer | None = None
 
 
 @kernel
@@ -91,7 +91,7 @@ def local_ray(bvh: Bvh, instances: Instances | None, instance: int, ray: Ray) ->
     if instances is not None:
         if instance >= 0:
             root = instances.root[instance]
-    return LocalRay(local, view_of(bvh, root, local), shear_of(local))
+    return LocalRay(local, slab_ray_of(bvh, root, local), shear_of(local))
 
 
 @kernel
@@ -107,7 +107,7 @@ def _traverse(
     which the ray enters their boxes (`waiting`) and the instance in whose space they are
     (`space`)."""
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
-    distances, seen = local_floats(LANES), local_floats(SEEN_FLOATS)
+    distances, seen = local_floats(VECTOR_WIDTH), local_floats(PROJECTION_FLOATS)
     closest = no_hit(ray)
     instance = -1
     local = local_ray(bvh, instances, instance, ray)
@@ -128,7 +128,7 @@ def _traverse(
             if instances is not None:
                 for k in range(bottom, top):
                     space[k] = instance
-        if is_packet(node):
+        if is_triangle_leaf(node):
             closest = nearest_of_triangle_leaf(
                 bvh.corners, bvh, shapes, node, local.shear, seen, instance, closest
             )

@@ -1,18 +1,18 @@
 """Rays against the contents of a BVH leaf: primitives, SIMD triangles, solids."""
 
 from reference_rt import shapes as any_shape
-from reference_rt.accel.bvh import Bvh, first_of, is_packet, kind_of, row_of, size_of
+from reference_rt.accel.bvh import Bvh, first_of, is_triangle_leaf, kind_of, row_of, size_of
 from reference_rt.accel.crossing_order import precedes
 from reference_rt.accel.csg import evaluate
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Crossing, Hit, Ray
-from reference_rt.core.ray_block import Hits, Rays, hit_of, put_hit, ray_of
+from reference_rt.core.ray_block import HitBlock, RayBlock, hit_of, put_hit, ray_of
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd_kernels import lowest
 from reference_rt.shapes import TRIANGLE, Shapes
 from reference_rt.shapes.csg.tables import Solids
 from reference_rt.shapes.meshes import triangle
-from reference_rt.shapes.meshes.watertight import Shear, see
+from reference_rt.shapes.meshes.watertight import Shear, project_leaf
 
 SOLID, INSTANCE = 100, 101
 """Kinds of references to rows of `Solids` and `Instances` rather than of a shape's table.  Rays hit
@@ -25,16 +25,16 @@ def nearest_of_leaf(
     shapes: Shapes,
     solids: Solids | None,
     leaf: int,
-    rays: Rays,
+    rays: RayBlock,
     j: int,
     shear: Shear,
     seen: FloatArray,
-    hits: Hits,
+    hits: HitBlock,
 ) -> Hit:
     """The closest of hit j and all hits of ray j of a block in a leaf without instances; it becomes
     hit j.  seen (SEEN_FLOATS,) is scratch."""
     closest = hit_of(hits, j)
-    if is_packet(leaf):
+    if is_triangle_leaf(leaf):
         closest = nearest_of_triangle_leaf(bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest)
     else:
         ray, first = ray_of(rays, j), first_of(leaf)
@@ -78,12 +78,12 @@ def nearest_of_triangle_leaf(
     instance: int,
     closest: Hit,
 ) -> Hit:
-    """The closest of `closest` and the hits with a leaf of triangles, tested LANES at once.  seen
-    (SEEN_FLOATS,) is scratch."""
+    """The closest of `closest` and the hits with a leaf of triangles, tested VECTOR_WIDTH at once.
+    seen (SEEN_FLOATS,) is scratch."""
     if corners is None:
         return closest
     first, size = first_of(node), size_of(node)
-    met = see(corners, first, size, shear, seen)
+    met = project_leaf(corners, first, size, shear, seen)
     while met != 0:
         lane = lowest(met)
         met &= met - 1

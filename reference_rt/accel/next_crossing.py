@@ -16,9 +16,9 @@ from reference_rt.accel.leaf import INSTANCE, SOLID
 from reference_rt.accel.single_ray import can_be_nearer, enter, nearest_child
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes import TABLES, Shapes
-from reference_rt.shapes.crossings import MOST, along, number_of
+from reference_rt.shapes.crossings import MAX_CROSSINGS, along, primitive_count
 from reference_rt.shapes.csg.tables import Solids
 from reference_rt.shapes.instances import Instances
 from reference_rt.shapes.meshes.watertight import Shear, shear_of
@@ -47,7 +47,7 @@ def _next(bvh: Bvh | None, geometry: Geometry, ray: Ray, after: OrderedCrossing)
 def _brute_force(shapes: Shapes, ray: Ray, after: OrderedCrossing) -> OrderedCrossing:
     best, shear = nothing_at(ray.t_max), shear_of(ray)
     for kind in range(KINDS):
-        for i in range(number_of(shapes, kind)):
+        for i in range(primitive_count(shapes, kind)):
             best = _of_primitive(shapes, kind, i, ray, shear, -1, after, best)
     return best
 
@@ -65,7 +65,7 @@ def _of_primitive(
 ) -> OrderedCrossing:
     """The earliest of `best` and of the primitive's crossings that come after `after`."""
     spans, v = along(shapes, kind, i, ray, shear)
-    for number in range(MOST):
+    for number in range(MAX_CROSSINGS):
         t, u = spans.t0, spans.u0
         if number == 1:
             t, u = spans.t1, spans.u1
@@ -105,7 +105,7 @@ def _traverse(
 ) -> OrderedCrossing:
     """As `geometry._traverse`."""
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
-    distances = local_floats(LANES)
+    distances = local_floats(VECTOR_WIDTH)
     best = nothing_at(ray.t_max)
     instance = -1
     local = local_ray(bvh, instances, instance, ray)

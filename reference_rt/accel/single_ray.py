@@ -9,8 +9,8 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray, surface_error
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel, reciprocal
-from reference_rt.jit.simd import LANES, larger, smaller
-from reference_rt.jit.simd_kernels import lane_kernel, lowest, prefetch
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, smaller
+from reference_rt.jit.simd_kernels import lowest, prefetch, simd_kernel
 
 
 class SlabRay(NamedTuple):
@@ -30,7 +30,7 @@ class SlabRay(NamedTuple):
 
 
 @kernel
-def view_of(bvh: Bvh, root: int, ray: Ray) -> SlabRay:
+def slab_ray_of(bvh: Bvh, root: int, ray: Ray) -> SlabRay:
     """Prepares a ray for the tree whose root is node `root`: once per ray and tree."""
     inverse = Vec3(reciprocal(ray.d.x), reciprocal(ray.d.y), reciprocal(ray.d.z))
     frame = bvh.frames
@@ -68,14 +68,14 @@ def slab_test(boxes: Any, node: Any, slab_ray: Any, t_max: Any) -> Any:
     first = node * NODE_SINGLES
     t_in, t_out = 0.0, t_max
     for axis, (row, near, far, inverse) in enumerate(slab_ray):
-        near_plane = boxes.load(first + row * LANES)
-        far_plane = boxes.load(first + (3 + 2 * axis - row) * LANES)
+        near_plane = boxes.load(first + row * VECTOR_WIDTH)
+        far_plane = boxes.load(first + (3 + 2 * axis - row) * VECTOR_WIDTH)
         t_in = larger(t_in, (near_plane - near) * inverse)
         t_out = smaller(t_out, (far_plane - far) * inverse)
     return t_in, t_in <= t_out * FAR_SLACK
 
 
-@lane_kernel
+@simd_kernel
 def _entered(
     boxes: Any,
     node: Any,
@@ -109,7 +109,7 @@ def _entered(
 @kernel
 def enter(bvh: Bvh, node: int, slab_ray: SlabRay, t_max: float, distances: FloatArray) -> int:
     """The children of a node whose boxes a ray enters before t_max, as bits; into distances
-    (LANES,) the t at which it does."""
+    (VECTOR_WIDTH,) the t at which it does."""
     return _entered(
         bvh.boxes,
         node,

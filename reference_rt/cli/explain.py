@@ -6,20 +6,20 @@ from typing import Any
 import numpy as np
 
 from reference_rt.accel import bvh
-from reference_rt.cli.limits import limits_of, told
+from reference_rt.cli.limits import in_words, limits_of
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import Lights
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.materials import any_smooth
 from reference_rt.materials.bsdfs.tables import TABLES as MATERIAL_TABLES
-from reference_rt.materials.nested.flattened import Layers
+from reference_rt.materials.nested.flattened import FlattenedMaterials
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Mesh, Shape
 from reference_rt.shapes.csg import Solid
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 from reference_rt.textures import TABLES as TEXTURE_TABLES
 
 Lines = list[tuple[str, str]]
@@ -51,8 +51,8 @@ def explain(scene: Scene, tables: SceneTables) -> tuple[Lines, Lines]:
 def margins(scene: Scene) -> tuple[Lines, Lines]:
     """(how close the scene is to float64's limits, where it exceeds them), each (limit, what)."""
     found = limits_of(scene)
-    near = [(limit.law, told(limit)) for limit in found if not limit.is_beyond]
-    return near, [(limit.law, told(limit)) for limit in found if limit.is_beyond]
+    near = [(limit.law, in_words(limit)) for limit in found if not limit.is_beyond]
+    return near, [(limit.law, in_words(limit)) for limit in found if limit.is_beyond]
 
 
 def _shapes(tables: SceneTables, used: Lines, pruned: Lines) -> None:
@@ -90,7 +90,7 @@ def _meshes(scene: Scene, used: Lines, pruned: Lines) -> None:
         def left(_: int, note: str, name: str = name) -> None:
             pruned.append((f"of {name}", note))
 
-        mesh.tabulate(Place(folder=scene.folder, warn=left))
+        mesh.tabulate(TabulationContext(folder=scene.folder, warn=left))
         if mesh.smooth and mesh.makes_normals(mesh.data(scene.folder)):
             used.append((f"smooth {name}", "its vertex normals are made, weighted by angle"))
         elif mesh.smooth:
@@ -146,14 +146,14 @@ def _materials(tables: SceneTables, used: Lines, pruned: Lines) -> None:
             pruned.append((field, "no material of this kind: its kernels are not compiled"))
         else:
             used.append((field, f"{_rows(table):,}"))
-    _layers(materials.layers, used, pruned)
+    _layers(materials.flat_leaves, used, pruned)
     if materials.oriented is None:
         pruned.append(("tangents", "no material depends on the directions of u and v"))
     else:
         used.append(("tangents", "dp/du and dp/dv at every hit"))
 
 
-def _layers(layers: Layers | None, used: Lines, pruned: Lines) -> None:
+def _layers(layers: FlattenedMaterials | None, used: Lines, pruned: Lines) -> None:
     if layers is None:
         pruned.append(("layers", "no material is nested"))
         return

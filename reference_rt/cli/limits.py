@@ -22,7 +22,7 @@ from reference_rt.shapes import TABLES, Mesh
 from reference_rt.shapes.csg import Solid
 from reference_rt.shapes.csg.description import operands_of
 from reference_rt.shapes.instances import Instance
-from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.shape import Shape, TabulationContext
 
 MOST = 2000
 """Most shapes that are examined, instances and operands of solids included.  Of a mesh in a group
@@ -103,7 +103,7 @@ def _placed(scene: Scene) -> Iterator[tuple[str, Shape, Affine]]:
 
 
 def _leaf(name: str, shape: Shape, outer: Affine, scene: Scene) -> Leaf:
-    table = shape.tabulate(Place(folder=scene.folder, outer=outer))
+    table = shape.tabulate(TabulationContext(folder=scene.folder, outer=outer))
     field, module = next((f, m) for _, f, t, m in TABLES if t is type(table))
     lower, upper = module.bounds(table)
     far = np.maximum(np.abs(lower), np.abs(upper)).max(axis=1)
@@ -259,7 +259,7 @@ def _indices(scene: Scene) -> Iterator[Limit]:
             yield Limit("index", f"materials.{name}: eta - 1", away, 3.0 * UNIT_ROUNDOFF)
 
 
-def told(limit: Limit) -> str:
+def in_words(limit: Limit) -> str:
     """A limit in words."""
     if limit.law == RANGE:
         return f"{limit.what}: reaches {limit.bound:.3g}, float64's products {limit.size:.3g}"

@@ -16,14 +16,14 @@ RAY_FLOATS = 7 * BLOCK
 HIT_FLOATS, HIT_INTEGERS = 3 * BLOCK, 3 * BLOCK
 
 
-class Rays(NamedTuple):
+class RayBlock(NamedTuple):
     """Up to BLOCK rays as SoA: numbers (RAY_FLOATS,), o.x of all rays, then o.y, o.z, d.x, d.y, d.z
     and t_max."""
 
     numbers: FloatArray
 
 
-class Hits(NamedTuple):
+class HitBlock(NamedTuple):
     """Up to BLOCK hits as SoA: numbers (HIT_FLOATS,), t of all hits, then u and v;  codes
     (HIT_INTEGERS,), kind of all hits, then row and instance."""
 
@@ -53,21 +53,21 @@ def add_vector(numbers: FloatArray, column: int, j: int, v: Vec3) -> None:
 
 
 @kernel
-def ray_of(rays: Rays, j: int) -> Ray:
+def ray_of(rays: RayBlock, j: int) -> Ray:
     """Ray j."""
     numbers = rays.numbers
     return Ray(vector_of(numbers, 0, j), vector_of(numbers, 3, j), numbers[6 * BLOCK + j])
 
 
 @kernel
-def put_ray(rays: Rays, j: int, ray: Ray) -> None:
+def put_ray(rays: RayBlock, j: int, ray: Ray) -> None:
     put_vector(rays.numbers, 0, j, ray.o)
     put_vector(rays.numbers, 3, j, ray.d)
     rays.numbers[6 * BLOCK + j] = ray.t_max
 
 
 @kernel
-def hit_of(hits: Hits, j: int) -> Hit:
+def hit_of(hits: HitBlock, j: int) -> Hit:
     """Hit j."""
     numbers, codes = hits.numbers, hits.codes
     return Hit(
@@ -81,7 +81,7 @@ def hit_of(hits: Hits, j: int) -> Hit:
 
 
 @kernel
-def put_hit(hits: Hits, j: int, hit: Hit) -> None:
+def put_hit(hits: HitBlock, j: int, hit: Hit) -> None:
     numbers, codes = hits.numbers, hits.codes
     numbers[j], numbers[BLOCK + j], numbers[2 * BLOCK + j] = hit.t, hit.u, hit.v
     codes[j], codes[BLOCK + j], codes[2 * BLOCK + j] = hit.kind, hit.row, hit.instance

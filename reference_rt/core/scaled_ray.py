@@ -34,6 +34,6 @@ def scaled(o: Vec3, d: Vec3, t_max: float) -> Scaled:
 
 
 @kernel
-def is_told(t: float, p: Vec3) -> bool:
+def is_representable(t: float, p: Vec3) -> bool:
     """Whether a hit is representable in float64: 0 < t < inf and p finite."""
     return 0.0 < t < math.inf and is_finite(p)

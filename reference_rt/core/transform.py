@@ -95,7 +95,7 @@ def invert(m: Affine) -> Affine:
     return np.column_stack([inverse, -inverse @ m[:, 3]])
 
 
-def mirrors(m: Affine) -> bool:
+def flips_orientation(m: Affine) -> bool:
     """Whether the map flips orientation: right-handed becomes left-handed."""
     return bool(np.linalg.slogdet(m[:, :3])[0] < 0.0)  # determinants of extreme scales overflow
 

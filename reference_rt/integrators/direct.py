@@ -65,7 +65,7 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: sampling
     if hit.kind < 0:
         behind: Vec3 = any_light.background(lights.environment, ray.d)
         return behind
-    kept = local_floats(any_material.kept_floats(scene.materials))
+    kept = local_floats(any_material.scratch_floats(scene.materials))
     shading = shade(scene, ray, hit, kept)
     total = area.emitted(lights.areas, shading.point, shading.at, -ray.d)
     normal = light_selection_normal(scene, shading)

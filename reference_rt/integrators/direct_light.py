@@ -53,7 +53,7 @@ def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Dire
         black = Vec3(0.0, 0.0, 0.0)
         return Direct(light, black, black, 0.0)
     wi = to_local(shading.frame, light.wi)
-    scattered = any_material.both(scene.materials, shading, wi)
+    scattered = any_material.eval_pdf(scene.materials, shading, wi)
     return Direct(light, wi, scattered.value * light.radiance, scattered.density)
 
 

@@ -104,7 +104,7 @@ class Step(NamedTuple):
     state: State
 
 
-class Lit(NamedTuple):
+class LightConnection(NamedTuple):
     """Next-event estimation before its visibility test.  light: what it adds to the path's
     radiance, weight included, if the ray `shadow` is not occluded; 0 for no contribution."""
 
@@ -118,7 +118,7 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sa
     direction."""
     total = Vec3(0.0, 0.0, 0.0)
     state = start(ray)
-    kept = local_floats(any_material.kept_floats(scene.materials))
+    kept = local_floats(any_material.scratch_floats(scene.materials))
     for depth in range(path.max_depth):
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
@@ -234,11 +234,11 @@ def _next_event_estimation(
     shading: Shading,
     sampler: sampling.Sample,
     depth: int,
-) -> Lit:
+) -> LightConnection:
     """Direct light of one randomly selected light: throughput f |cos| L_e / pdf, MIS-weighted
     against BSDF sampling.  Random numbers that decide nothing are not drawn."""
     point, dimension = shading.point, sampling.PER_BOUNCE * depth
-    nothing = Lit(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
+    nothing = LightConnection(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
     count = any_light.count(scene.lights)
     if count == 0 or not any_material.is_smooth(scene.materials, point.material):
         return nothing
@@ -259,7 +259,7 @@ def _next_event_estimation(
     if not light.is_delta:
         weight = _mis_weight(path.strategy, _LIGHT_SAMPLING, pdf, sample.bsdf_pdf)
     arriving = sample.contribution * (weight / pdf)
-    return Lit(state.throughput * arriving, shadow_ray(point, light))
+    return LightConnection(state.throughput * arriving, shadow_ray(point, light))
 
 
 @kernel
@@ -275,7 +275,7 @@ def _scatter(
     point, dimension = shading.point, sampling.PER_BOUNCE * depth
     ended = Step(False, Ray(point.p, point.n, 0.0), state)
     u_lobe = 0.5
-    if any_material.chooses(scene.materials, point.material):
+    if any_material.uses_u_lobe(scene.materials, point.material):
         _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
     u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
     scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)

@@ -39,8 +39,8 @@ def state_of(scene: SceneTables, scratch: Scratch, j: int) -> State:
     """The state of active path j."""
     numbers, nowhere = scratch.states, Vec3(0.0, 0.0, 0.0)
     eta = numbers[4 * BLOCK + j] if any_material.any_transmits(scene.materials) else 1.0
-    previous = vector_of(numbers, 5, j) if any_light.asks_place(scene.lights) else nowhere
-    normal = vector_of(numbers, 8, j) if any_light.asks_normal(scene.lights) else nowhere
+    previous = vector_of(numbers, 5, j) if any_light.depends_on_point(scene.lights) else nowhere
+    normal = vector_of(numbers, 8, j) if any_light.depends_on_normal(scene.lights) else nowhere
     return State(vector_of(numbers, 0, j), eta, numbers[3 * BLOCK + j], previous, normal)
 
 
@@ -54,7 +54,7 @@ def put_state(scene: SceneTables, scratch: Scratch, j: int, k: int, state: State
     numbers[3 * BLOCK + j] = state.bsdf_pdf
     if any_material.any_transmits(scene.materials):
         numbers[4 * BLOCK + j] = state.eta
-    if any_light.asks_place(scene.lights):
+    if any_light.depends_on_point(scene.lights):
         put_vector(numbers, 5, j, state.previous)
-    if any_light.asks_normal(scene.lights):
+    if any_light.depends_on_normal(scene.lights):
         put_vector(numbers, 8, j, state.normal)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import BLOCK
-from reference_rt.core.ray_block import RAY_FLOATS, Hits, Rays
+from reference_rt.core.ray_block import RAY_FLOATS, HitBlock, RayBlock
 from reference_rt.jit.kernel import kernel
 
 STATE_FLOATS = 11 * BLOCK
@@ -18,15 +18,15 @@ class Scratch(NamedTuple):
     Buffers of integrators: shadows, the shadow rays; for each of them lights (VECTOR_FLOATS,), what
     it adds if it is not occluded, and lit (BLOCK,), the sample that it belongs to;  hits;  states
     (STATE_FLOATS,) of the active paths and samples (BLOCK,), the sample of each;  kept
-    (`materials.kept_floats`,), the buffer of `shade`.
+    (`materials.scratch_floats`,), the buffer of `shade`.
     """
 
-    rays: Rays
+    rays: RayBlock
     totals: FloatArray
-    shadows: Rays
+    shadows: RayBlock
     lights: FloatArray
     lit: IntArray
-    hits: Hits
+    hits: HitBlock
     states: FloatArray
     samples: IntArray
     kept: FloatArray

@@ -6,9 +6,9 @@ from reference_rt.core.ray import Hit, Ray
 from reference_rt.core.vec3 import Frame, Vec3, frame_from_normal, to_local
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials import Shading, asks_textures, prepare
+from reference_rt.materials import Shading, prepare, uses_textures
 from reference_rt.materials.frame import oriented_frame
-from reference_rt.materials.textured import look, looked_floats
+from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Textures
 
@@ -19,16 +19,17 @@ _NO_COLOUR = Vec3(-1.0, -1.0, -1.0)
 def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
     """The BSDF's input at a hit (not a miss), seen along the ray.
 
-    kept (`materials.kept_floats`,): buffer for texture values and layers; the result refers to it.
+    kept (`materials.scratch_floats`,): buffer for texture values and layers; the result refers to
+    it.
     """
     point = surface(scene.geometry, ray, hit)
     world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
     frame = _frame(scene.materials.oriented, point.ns, world)
     local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))
     at = _place(scene, point.material, ray, hit)
-    looked = look(scene.materials.textured, point.material, at, kept)
-    layers = kept[looked_floats(scene.materials.textured) :]
-    shading = Shading(point, frame, to_local(frame, -ray.d), looked, local, layers)
+    looked = evaluate_textures(scene.materials.textured, point.material, at, kept)
+    flat_leaves = kept[lookup_cache_size(scene.materials.textured) :]
+    shading = Shading(point, frame, to_local(frame, -ray.d), looked, local, flat_leaves)
     prepare(scene.materials, shading, at)
     return shading
 
@@ -36,7 +37,7 @@ def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
 @kernel
 def _place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
     """Texture coordinates at a hit for material m; any, if it has no textures."""
-    if not asks_textures(scene.materials, m):
+    if not uses_textures(scene.materials, m):
         return At(scene.textures, 0.0, 0.0, _NO_COLOUR)
     return texture_place(scene.textures, scene.geometry, ray, hit)
 

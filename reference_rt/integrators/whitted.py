@@ -21,7 +21,7 @@ from reference_rt.integrators.direct_light import direct_from
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import kernel, local_floats
-from reference_rt.lights import ENVIRONMENT, Choice
+from reference_rt.lights import ENVIRONMENT, LightSampler
 from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
 
@@ -71,7 +71,7 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampl
     level leaves at most all its branches but one on the stack."""
     waiting = 2 * any_material.most_branches(scene.materials) - 1
     stack = local_floats(10 * (waiting * whitted.max_depth + 2))
-    kept = local_floats(any_material.kept_floats(scene.materials))
+    kept = local_floats(any_material.scratch_floats(scene.materials))
     _push(stack, 0, ray, Vec3(1.0, 1.0, 1.0), 0)
     top = 1
     total = Vec3(0.0, 0.0, 0.0)
@@ -110,7 +110,7 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampl
 
 
 @kernel
-def _direct_light(scene: SceneTables, choice: Choice | None, shading: Shading) -> Vec3:
+def _direct_light(scene: SceneTables, choice: LightSampler | None, shading: Shading) -> Vec3:
     """Direct light of every point, spot and directional light, and of the middle of every area
     light."""
     total = Vec3(0.0, 0.0, 0.0)

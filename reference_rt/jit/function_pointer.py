@@ -15,18 +15,18 @@ from numba.extending import intrinsic
 
 from reference_rt.jit.kernel import COMPILER, Signature
 
-Address = npt.NDArray[np.intp]
+FunctionPointer = npt.NDArray[np.intp]
 """(1,) the function pointer of an entry kernel, stored before the first call."""
 
 
-def address_of(compiled: Callable[..., Any], signature: Signature) -> int:
+def pointer_to(compiled: Callable[..., Any], signature: Signature) -> int:
     """The function pointer of an entry kernel that is compiled for arguments of these types."""
     found = compiled.overloads[signature]  # type: ignore[attr-defined]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def call_at(typing_context: Any, address: Any, arguments: Any) -> Any:
+def call_pointer(typing_context: Any, address: Any, arguments: Any) -> Any:
     """Call the entry kernel at `address` with a tuple of arguments; it returns nothing.
 
     The arguments must have the types for which it was compiled.

@@ -172,14 +172,14 @@ if numba.config.DISABLE_JIT:
         """Scratch for `n` integers, likewise."""
         return np.empty(n, np.int64)
 
-    def local_naturals(n: int) -> npt.NDArray[np.uint32]:
+    def local_uint32(n: int) -> npt.NDArray[np.uint32]:
         """Scratch for `n` unsigned 32-bit integers, likewise."""
         return np.empty(n, np.uint32)
 
 else:
     local_floats = _local_array(types.float64)
     local_integers = _local_array(types.int64)
-    local_naturals = _local_array(types.uint32)
+    local_uint32 = _local_array(types.uint32)
 
 
 @kernel

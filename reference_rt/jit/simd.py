@@ -1,11 +1,11 @@
 """SIMD vectors: functions that run as vector instructions, as scalar code and as plain Python.
 
 LLVM does not vectorise the loops over a node's boxes, a leaf's triangles or a block's rays by
-itself.  Instead a generic function is traced: it is called while a kernel compiles, with `Lanes`
-operands, whose operators emit LLVM vector instructions.  With NumPy arrays of LANES numbers, or
-with single numbers, the same function runs as it is.  Each operation rounds once, by IEEE's rules,
-in the order written: all results have the same bits.  On processors with narrower vectors LLVM
-splits the instructions.
+itself.  Instead a generic function is traced: it is called while a kernel compiles, with
+`SimdVector` operands, whose operators emit LLVM vector instructions.  With NumPy arrays of
+VECTOR_WIDTH numbers, or with single numbers, the same function runs as it is.  Each operation
+rounds once, by IEEE's rules, in the order written: all results have the same bits.  On processors
+with narrower vectors LLVM splits the instructions.
 
 A generic function has no branches.  It uses `select`, `smaller` and `larger` instead, the square
 root and the sign functions below, and &, | and ~ for conditions.  `simd_kernels.py` makes such a
@@ -25,11 +25,11 @@ from numba.extending import intrinsic
 
 from reference_rt.jit.kernel import overload_kernel
 
-LANES = 8
+VECTOR_WIDTH = 8
 """The vector width: eight float64 are one AVX-512 register."""
 
 I32, I64 = ir.IntType(32), ir.IntType(64)
-REALS = ir.VectorType(ir.DoubleType(), LANES)
+F64_VECTOR = ir.VectorType(ir.DoubleType(), VECTOR_WIDTH)
 
 
 class Mask:
@@ -48,55 +48,61 @@ class Mask:
         return Mask(self.builder, self.builder.not_(self.value))
 
 
-class Lanes:
-    """A vector of LANES float64 in the code that is being generated."""
+class SimdVector:
+    """A vector of VECTOR_WIDTH float64 in the code that is being generated."""
 
     def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
         self.builder, self.value = builder, value
 
     def of(self, x: Any) -> ir.Value:
         """The LLVM value of `x`, a vector or a number that is the same in all lanes."""
-        return x.value if isinstance(x, Lanes) else ir.Constant(REALS, [float(x)] * LANES)
+        return (
+            x.value
+            if isinstance(x, SimdVector)
+            else ir.Constant(F64_VECTOR, [float(x)] * VECTOR_WIDTH)
+        )
 
-    def call(self, name: str, *others: Any) -> "Lanes":
+    def call(self, name: str, *others: Any) -> "SimdVector":
         """Emit a call of an LLVM intrinsic."""
         values = [self.value, *map(self.of, others)]
-        of_type = ir.FunctionType(REALS, [REALS] * len(values))
-        name = f"llvm.{name}.v{LANES}f64"
+        of_type = ir.FunctionType(F64_VECTOR, [F64_VECTOR] * len(values))
+        name = f"llvm.{name}.v{VECTOR_WIDTH}f64"
         function = cgutils.get_or_insert_function(self.builder.module, of_type, name)
-        return Lanes(self.builder, self.builder.call(function, values))
+        return SimdVector(self.builder, self.builder.call(function, values))
 
-    def moved(self, by: int) -> "Lanes":
+    def moved(self, by: int) -> "SimdVector":
         """A shuffle: lane k gets the number of lane k ^ by."""
-        which = ir.Constant(ir.VectorType(I32, LANES), [lane ^ by for lane in range(LANES)])
-        undefined = ir.Constant(REALS, ir.Undefined)
-        return Lanes(self.builder, self.builder.shuffle_vector(self.value, undefined, which))
+        which = ir.Constant(
+            ir.VectorType(I32, VECTOR_WIDTH), [lane ^ by for lane in range(VECTOR_WIDTH)]
+        )
+        undefined = ir.Constant(F64_VECTOR, ir.Undefined)
+        return SimdVector(self.builder, self.builder.shuffle_vector(self.value, undefined, which))
 
     def compared(self, how: str, other: Any) -> Mask:
         return Mask(self.builder, self.builder.fcmp_ordered(how, self.value, self.of(other)))
 
-    def __add__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fadd(self.value, self.of(other)))
+    def __add__(self, other: Any) -> "SimdVector":
+        return SimdVector(self.builder, self.builder.fadd(self.value, self.of(other)))
 
-    def __sub__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fsub(self.value, self.of(other)))
+    def __sub__(self, other: Any) -> "SimdVector":
+        return SimdVector(self.builder, self.builder.fsub(self.value, self.of(other)))
 
-    def __rsub__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fsub(self.of(other), self.value))
+    def __rsub__(self, other: Any) -> "SimdVector":
+        return SimdVector(self.builder, self.builder.fsub(self.of(other), self.value))
 
-    def __mul__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fmul(self.value, self.of(other)))
+    def __mul__(self, other: Any) -> "SimdVector":
+        return SimdVector(self.builder, self.builder.fmul(self.value, self.of(other)))
 
-    def __truediv__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fdiv(self.value, self.of(other)))
+    def __truediv__(self, other: Any) -> "SimdVector":
+        return SimdVector(self.builder, self.builder.fdiv(self.value, self.of(other)))
 
-    def __rtruediv__(self, other: Any) -> "Lanes":
-        return Lanes(self.builder, self.builder.fdiv(self.of(other), self.value))
+    def __rtruediv__(self, other: Any) -> "SimdVector":
+        return SimdVector(self.builder, self.builder.fdiv(self.of(other), self.value))
 
-    def __neg__(self) -> "Lanes":
-        return Lanes(self.builder, self.builder.fneg(self.value))
+    def __neg__(self) -> "SimdVector":
+        return SimdVector(self.builder, self.builder.fneg(self.value))
 
-    def __abs__(self) -> "Lanes":
+    def __abs__(self) -> "SimdVector":
         return self.call("fabs")
 
     def __lt__(self, other: Any) -> Mask:
@@ -116,8 +122,8 @@ def select(condition: Any, a: Any, b: Any) -> Any:
     """`a` in lanes where the condition is true, else `b`."""
     if isinstance(condition, Mask):
         builder = condition.builder
-        lanes = Lanes(builder, condition.value)
-        return Lanes(builder, builder.select(condition.value, lanes.of(a), lanes.of(b)))
+        lanes = SimdVector(builder, condition.value)
+        return SimdVector(builder, builder.select(condition.value, lanes.of(a), lanes.of(b)))
     if isinstance(condition, np.ndarray):
         return np.where(condition, a, b)
     return a if condition else b
@@ -135,19 +141,19 @@ def larger(a: Any, b: Any) -> Any:
 
 def least(x: Any) -> Any:
     """The minimum over the lanes, in every lane; none may be NaN."""
-    if not isinstance(x, Lanes):
-        return np.full(LANES, np.min(x))
+    if not isinstance(x, SimdVector):
+        return np.full(VECTOR_WIDTH, np.min(x))
     for half in (4, 2, 1):
         x = smaller(x, x.moved(half))
     return x
 
 
 def square_root(x: Any) -> Any:
-    return x.call("sqrt") if isinstance(x, Lanes) else math.sqrt(x)
+    return x.call("sqrt") if isinstance(x, SimdVector) else math.sqrt(x)
 
 
 def with_sign(x: Any, sign: Any) -> Any:
-    if isinstance(x, Lanes):
+    if isinstance(x, SimdVector):
         return x.call("copysign", sign)
     return np.copysign(x, sign) if isinstance(x, np.ndarray) else math.copysign(x, sign)
 
@@ -155,7 +161,7 @@ def with_sign(x: Any, sign: Any) -> Any:
 def product_error(x: Any, y: Any, product: Any) -> Any:
     """The rounding error x y - product, exactly, for product = fl(x y).  Compiled it is one fused
     multiply-add; plain Python computes it in rational numbers."""
-    if isinstance(x, Lanes):
+    if isinstance(x, SimdVector):
         return x.call("fma", y, -product)
     if isinstance(x, np.ndarray):
         return np.vectorize(product_error, otypes=[np.float64])(x, y, product)
@@ -190,9 +196,9 @@ _compiled_as(with_sign, lambda x, sign: math.copysign(x, sign))
 _compiled_as(product_error, lambda x, y, product: _fused(x, y, -product))
 
 
-def in_all_lanes(builder: ir.IRBuilder, x: ir.Value, of: ir.Type = REALS) -> ir.Value:
+def broadcast(builder: ir.IRBuilder, x: ir.Value, of: ir.Type = F64_VECTOR) -> ir.Value:
     """A vector with `x` in every lane."""
     undefined = ir.Constant(of, ir.Undefined)
     one = builder.insert_element(undefined, x, I32(0))
-    which = ir.Constant(ir.VectorType(I32, LANES), [0] * LANES)
+    which = ir.Constant(ir.VectorType(I32, VECTOR_WIDTH), [0] * VECTOR_WIDTH)
     return builder.shuffle_vector(one, undefined, which)

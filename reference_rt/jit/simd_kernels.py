@@ -1,4 +1,4 @@
-"""`lane_kernel`: makes a generic function of `simd.py` callable from kernels."""
+"""`simd_kernel`: makes a generic function of `simd.py` callable from kernels."""
 
 import functools
 import inspect
@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from reference_rt.jit.simd import I32, I64, LANES, REALS, Lanes, in_all_lanes
+from reference_rt.jit.simd import F64_VECTOR, I32, I64, VECTOR_WIDTH, SimdVector, broadcast
 
 
 class _Index:
@@ -41,21 +41,23 @@ class _Memory:
     def __init__(self, builder: ir.IRBuilder, data: ir.Value, is_single: bool) -> None:
         self.builder, self.data, self.is_single = builder, data, is_single
 
-    def load(self, start: Any) -> Lanes:
-        of = ir.VectorType(ir.FloatType(), LANES) if self.is_single else REALS
+    def load(self, start: Any) -> SimdVector:
+        of = ir.VectorType(ir.FloatType(), VECTOR_WIDTH) if self.is_single else F64_VECTOR
         value = self.builder.load(self._place(start, of), align=4 if self.is_single else 8)
-        return Lanes(self.builder, self.builder.fpext(value, REALS) if self.is_single else value)
+        return SimdVector(
+            self.builder, self.builder.fpext(value, F64_VECTOR) if self.is_single else value
+        )
 
-    def everywhere(self, i: Any) -> Lanes:
+    def everywhere(self, i: Any) -> SimdVector:
         value = self.builder.load(self._place(i, ir.DoubleType()))
-        return Lanes(self.builder, in_all_lanes(self.builder, value))
+        return SimdVector(self.builder, broadcast(self.builder, value))
 
-    def natural(self, i: Any) -> _Index:
+    def load_index(self, i: Any) -> _Index:
         value = self.builder.load(self._place(i, I32))
         return _Index(self.builder, self.builder.zext(value, I64))
 
-    def store(self, start: Any, lanes: Lanes) -> None:
-        self.builder.store(lanes.value, self._place(start, REALS), align=8)
+    def store(self, start: Any, lanes: SimdVector) -> None:
+        self.builder.store(lanes.value, self._place(start, F64_VECTOR), align=8)
 
     def _place(self, start: Any, of: ir.Type) -> ir.Value:
         at = start.value if isinstance(start, _Index) else I64(start)
@@ -67,16 +69,16 @@ class _PlainMemory:
         self.flat = array.reshape(-1)
 
     def load(self, start: int) -> Any:
-        return self.flat[start : start + LANES].astype(np.float64)
+        return self.flat[start : start + VECTOR_WIDTH].astype(np.float64)
 
     def everywhere(self, i: int) -> Any:
-        return np.full(LANES, self.flat[i])
+        return np.full(VECTOR_WIDTH, self.flat[i])
 
-    def natural(self, i: int) -> int:
+    def load_index(self, i: int) -> int:
         return int(self.flat[i])
 
     def store(self, start: int, lanes: Any) -> None:
-        self.flat[start : start + LANES] = lanes
+        self.flat[start : start + VECTOR_WIDTH] = lanes
 
 
 def _conditions(found: Any) -> tuple[Any, ...]:
@@ -84,14 +86,14 @@ def _conditions(found: Any) -> tuple[Any, ...]:
 
 
 def plain(function: Callable[..., Any]) -> Callable[..., int]:
-    """A SIMD kernel as plain Python on NumPy arrays of LANES numbers."""
+    """A SIMD kernel as plain Python on NumPy arrays of VECTOR_WIDTH numbers."""
 
     @functools.wraps(function)
     def run(*arguments: Any) -> int:
         wrapped: list[Any] = [
             _PlainMemory(a)
             if isinstance(a, np.ndarray)
-            else (np.full(LANES, a) if isinstance(a, float) else int(a))
+            else (np.full(VECTOR_WIDTH, a) if isinstance(a, float) else int(a))
             for a in arguments
         ]
         lanes = np.concatenate(_conditions(function(*wrapped)))
@@ -100,13 +102,14 @@ def plain(function: Callable[..., Any]) -> Callable[..., int]:
     return run
 
 
-def lane_kernel(function: Callable[..., Any]) -> Callable[..., int]:
+def simd_kernel(function: Callable[..., Any]) -> Callable[..., int]:
     """Make a generic function callable from kernels.
 
     `function` returns a condition, or several.  The kernel returns them as a bit mask, one bit per
     lane; the first condition's bits are the lowest.  Arguments of `function`:
 
-    - C-contiguous arrays of float64 or float32: load(i) is the vector of LANES numbers from number
+    - C-contiguous arrays of float64 or float32: load(i) is the vector of VECTOR_WIDTH numbers from
+    number
       i on, everywhere(i) is number i in every lane, store(i, lanes) (float64 only) stores a vector;
     - C-contiguous arrays of uint32: natural(i) is number i, an integer;
     - float64 numbers: the same number in every lane;
@@ -123,13 +126,15 @@ def lane_kernel(function: Callable[..., Any]) -> Callable[..., int]:
                     data = context.make_array(of)(context, builder, value).data
                     written.append(_Memory(builder, data, of.dtype == types.float32))
                 elif of == types.float64:
-                    written.append(Lanes(builder, in_all_lanes(builder, value)))
+                    written.append(SimdVector(builder, broadcast(builder, value)))
                 else:
                     written.append(_Index(builder, value))
             bits = I64(0)
             for k, condition in enumerate(_conditions(function(*written))):
-                of_lanes = builder.bitcast(condition.value, ir.IntType(LANES))
-                bits = builder.or_(bits, builder.shl(builder.zext(of_lanes, I64), I64(k * LANES)))
+                of_lanes = builder.bitcast(condition.value, ir.IntType(VECTOR_WIDTH))
+                bits = builder.or_(
+                    bits, builder.shl(builder.zext(of_lanes, I64), I64(k * VECTOR_WIDTH))
+                )
             return bits
 
         return types.int64(*map(_taken_as, arguments)), generate

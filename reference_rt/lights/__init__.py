@@ -33,10 +33,10 @@ from reference_rt.lights.dispatch import (
     Lights,
     ambient,
     area_pdf,
-    asks_normal,
-    asks_place,
     background,
     count,
+    depends_on_normal,
+    depends_on_point,
     environment_pdf,
     is_area,
     middle,
@@ -61,7 +61,7 @@ from reference_rt.lights.light import (
     LightSample,
     shadow_ray,
 )
-from reference_rt.lights.selection.choice import Choice
+from reference_rt.lights.selection.choice import LightSampler
 from reference_rt.lights.selection.tree import Pick
 
 AnyLight = Annotated[
@@ -86,22 +86,22 @@ __all__ = [
     "Ambient",
     "AnyLight",
     "Areas",
-    "Choice",
     "Constant",
     "Directional",
     "Environment",
     "EnvironmentMap",
     "LightSample",
+    "LightSampler",
     "Lights",
     "Pick",
     "Point",
     "Spot",
     "ambient",
     "area_pdf",
-    "asks_normal",
-    "asks_place",
     "background",
     "count",
+    "depends_on_normal",
+    "depends_on_point",
     "environment_pdf",
     "is_area",
     "middle",

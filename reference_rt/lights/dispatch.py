@@ -1,7 +1,7 @@
 """The lights of a scene: pick one, sample it, and the densities of both.
 
-`pick` chooses an entry k of the light sampler (`Choice`), by power or by a tree; `sample_one` draws
-a direction to it.  p and n are the point and the shading normal for which light is sampled.
+`pick` chooses an entry k of the light sampler (`LightSampler`), by power or by a tree; `sample_one`
+draws a direction to it.  p and n are the point and the shading normal for which light is sampled.
 """
 
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from reference_rt.lights.emitters.point import Points
 from reference_rt.lights.emitters.spot import Spots
 from reference_rt.lights.light import AREA, DIRECTIONAL, POINT, SPOT, LightSample, no_light
 from reference_rt.lights.selection import choice
-from reference_rt.lights.selection.choice import Choice
+from reference_rt.lights.selection.choice import LightSampler
 from reference_rt.lights.selection.tree import LightTree, Pick
 from reference_rt.shapes import Shapes
 from reference_rt.textures import Textures
@@ -40,7 +40,7 @@ class Lights(NamedTuple):
     areas: Areas | None
     environment: Environment | EnvironmentMaps | None
     ambient: FloatArray | None
-    choice: Choice | None
+    choice: LightSampler | None
     tree: LightTree | None
 
 
@@ -92,7 +92,7 @@ def pick(lights: Lights, p: Vec3, n: Vec3, u: float) -> Pick:
 
 
 @kernel
-def _pick(lights: Choice | None, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> Pick:
+def _pick(lights: LightSampler | None, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> Pick:
     if lights is None:
         return Pick(0, 0.0)
     return choice.pick(lights, tree, p, n, u)
@@ -106,7 +106,7 @@ def pick_probability(lights: Lights, p: Vec3, n: Vec3, k: int) -> float:
 
 @kernel
 def _pick_probability(
-    lights: Choice | None, tree: LightTree | None, p: Vec3, n: Vec3, k: int
+    lights: LightSampler | None, tree: LightTree | None, p: Vec3, n: Vec3, k: int
 ) -> float:
     if lights is None:
         return 0.0
@@ -114,13 +114,13 @@ def _pick_probability(
 
 
 @kernel
-def asks_place(lights: Lights) -> bool:
+def depends_on_point(lights: Lights) -> bool:
     """Whether any probability or density depends on the point p: a constant."""
     return lights.areas is not None or lights.tree is not None
 
 
 @kernel
-def asks_normal(lights: Lights) -> bool:
+def depends_on_normal(lights: Lights) -> bool:
     """Whether any probability depends on the normal n: a constant."""
     return lights.tree is not None
 
@@ -132,7 +132,7 @@ def count(lights: Lights) -> int:
 
 
 @kernel
-def _count(lights: Choice | None) -> int:
+def _count(lights: LightSampler | None) -> int:
     if lights is None:
         return 0
     return choice.count(lights)
@@ -148,7 +148,7 @@ def sample_one(
 
 @kernel
 def _sample_one(
-    entries: Choice | None,
+    entries: LightSampler | None,
     lights: Lights,
     k: int,
     shapes: Shapes,
@@ -187,7 +187,7 @@ def middle(
 
 @kernel
 def _middle_of_one(
-    entries: Choice | None,
+    entries: LightSampler | None,
     lights: Lights,
     k: int,
     shapes: Shapes,

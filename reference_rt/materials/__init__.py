@@ -9,7 +9,7 @@ Contract: directions are unit vectors in the shading frame (z is the shading nor
 from the surface, `wo` towards the viewer and `wi` towards the light.  Colours are linear sRGB.
 Call `prepare` once at each hit, before the others.  Then
 
-- `both` returns f(wo, wi) |cos wi| and the density of `sample` at wi, per solid angle (1/sr),
+- `eval_pdf` returns f(wo, wi) |cos wi| and the density of `sample` at wi, per solid angle (1/sr),
   without delta lobes; a value of zero means that nothing is scattered from wi to wo;
 - `sample` takes three numbers from [0, 1) and returns a direction with f |cos wi| / pdf; pdf = 0
   means that sampling failed and the path ends here;
@@ -42,19 +42,19 @@ from reference_rt.materials.dispatch import (
     ambient,
     any_smooth,
     any_transmits,
-    asks_textures,
-    both,
     branch_count,
     branches,
-    chooses,
+    eval_pdf,
     evaluate,
     is_smooth,
-    kept_floats,
     most_branches,
     pdf,
     prepare,
     sample,
+    scratch_floats,
     takes_light_from_behind,
+    uses_textures,
+    uses_u_lobe,
 )
 from reference_rt.materials.emissive import Emissive
 from reference_rt.materials.material import Branches, BsdfSample, Material
@@ -113,17 +113,17 @@ __all__ = [
     "ambient",
     "any_smooth",
     "any_transmits",
-    "asks_textures",
-    "both",
     "branch_count",
     "branches",
-    "chooses",
+    "eval_pdf",
     "evaluate",
     "is_smooth",
-    "kept_floats",
     "most_branches",
     "pdf",
     "prepare",
     "sample",
+    "scratch_floats",
     "takes_light_from_behind",
+    "uses_textures",
+    "uses_u_lobe",
 ]

@@ -14,9 +14,14 @@ from reference_rt.materials.bsdfs import tables as bsdf
 from reference_rt.materials.bsdfs.tables import Leaves
 from reference_rt.materials.material import Branches, BsdfSample, Scattered, no_sample
 from reference_rt.materials.nested import flattened
-from reference_rt.materials.nested.flattened import Layer, Layers, layer_at, lets
+from reference_rt.materials.nested.flattened import (
+    FlattenedLeaf,
+    FlattenedMaterials,
+    leaf_at,
+    scatters_from,
+)
 from reference_rt.materials.shading import Shading
-from reference_rt.materials.textured import Textured, looked_floats
+from reference_rt.materials.textured import Textured, lookup_cache_size
 from reference_rt.textures import At, Colours
 
 
@@ -39,13 +44,13 @@ class Materials(NamedTuple):
     kind: IntArray | None
     row: IntArray | None
     smooth: IntArray | None
-    chooses: IntArray | None
+    uses_u_lobe: IntArray | None
     behind: IntArray | None
     shown: Colours
     oriented: IntArray | None
     asks: IntArray | None
     textured: Textured | None
-    layers: Layers | None
+    flat_leaves: FlattenedMaterials | None
     leaves: Leaves
 
 
@@ -82,13 +87,13 @@ def is_smooth(materials: Materials, m: int) -> bool:
 
 
 @kernel
-def chooses(materials: Materials, m: int) -> bool:
+def uses_u_lobe(materials: Materials, m: int) -> bool:
     """Whether `sample` uses `u_lobe`, its random number for the choice of a lobe."""
-    return _flag(materials.chooses, m, False)
+    return _flag(materials.uses_u_lobe, m, False)
 
 
 @kernel
-def asks_textures(materials: Materials, m: int) -> bool:
+def uses_textures(materials: Materials, m: int) -> bool:
     """Whether the material has textures, so that texture coordinates are needed."""
     return _flag(materials.asks, m, True)
 
@@ -108,41 +113,43 @@ def any_transmits(materials: Materials) -> bool:
 @kernel
 def evaluate(materials: Materials, shading: Shading, wi: Vec3) -> Vec3:
     """f(wo, wi) |cos wi|, without perfect reflection and refraction."""
-    return both(materials, shading, wi).value
+    return eval_pdf(materials, shading, wi).value
 
 
 @kernel
 def pdf(materials: Materials, shading: Shading, wi: Vec3) -> float:
     """The density per solid angle with which `sample` picks `wi`, without discrete directions."""
-    return both(materials, shading, wi).density
+    return eval_pdf(materials, shading, wi).density
 
 
 @kernel
-def both(materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
+def eval_pdf(materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
     """`evaluate` and `pdf` at once, which share much of their work."""
-    return _both(materials.layers, materials, shading, wi)
+    return _eval_pdf(materials.flat_leaves, materials, shading, wi)
 
 
 @kernel
-def _both(layers: Layers | None, materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
+def _eval_pdf(
+    flat_leaves: FlattenedMaterials | None, materials: Materials, shading: Shading, wi: Vec3
+) -> Scattered:
     m = shading.point.material
-    if layers is None:
+    if flat_leaves is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
-        return bsdf.both(materials.leaves, kind, i, shading.at, shading.wo, wi)
+        return bsdf.eval_pdf(materials.leaves, kind, i, shading.at, shading.wo, wi)
     value, density, total = Vec3(0.0, 0.0, 0.0), 0.0, 0.0
-    first = layers.first[m]
-    for k in range(layers.number[m]):
-        layer = layer_at(shading, k)
-        if layer.weight > 0.0:
-            total += layer.weight
-            wo_in, wi_in = to_local(layer.basis, shading.wo), to_local(layer.basis, wi)
-            kind, i = layers.kind[first + k], layers.row[first + k]
-            one = bsdf.both(materials.leaves, kind, i, shading.at, wo_in, wi_in)
-            if lets(layer, wi):
-                value = value + one.value * layer.weight
-            elif layers.number[m] == 1:  # `sample` rejects such directions
+    first = flat_leaves.first[m]
+    for k in range(flat_leaves.number[m]):
+        leaf = leaf_at(shading, k)
+        if leaf.weight > 0.0:
+            total += leaf.weight
+            wo_in, wi_in = to_local(leaf.basis, shading.wo), to_local(leaf.basis, wi)
+            kind, i = flat_leaves.kind[first + k], flat_leaves.row[first + k]
+            one = bsdf.eval_pdf(materials.leaves, kind, i, shading.at, wo_in, wi_in)
+            if scatters_from(leaf, wi):
+                value = value + one.value * leaf.weight
+            elif flat_leaves.number[m] == 1:  # `sample` rejects such directions
                 continue
-            density += one.density * layer.weight
+            density += one.density * leaf.weight
     return Scattered(value, density / total if total > 0.0 else 0.0)
 
 
@@ -151,12 +158,12 @@ def sample(
     materials: Materials, shading: Shading, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
     """A direction sampled for `shading.wo`; pdf = 0 if the material scatters nothing."""
-    return _sample(materials.layers, materials, shading, u_lobe, u0, u1)
+    return _sample(materials.flat_leaves, materials, shading, u_lobe, u0, u1)
 
 
 @kernel
 def _sample(
-    layers: Layers | None,
+    flat_leaves: FlattenedMaterials | None,
     materials: Materials,
     shading: Shading,
     u_lobe: float,
@@ -164,43 +171,43 @@ def _sample(
     u1: float,
 ) -> BsdfSample:
     m = shading.point.material
-    if layers is None:
+    if flat_leaves is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
-    first, count = layers.first[m], layers.number[m]
+    first, count = flat_leaves.first[m], flat_leaves.number[m]
     total = 0.0
     for k in range(count):
-        total += layer_at(shading, k).weight
+        total += leaf_at(shading, k).weight
     if not total > 0.0:
         return no_sample()
     # Choose a layer with probability weight / total; u_lobe, rescaled within the layer's interval,
     # is the random number for the layer's own choice.
     rest, chosen = u_lobe * total, 0
-    layer = layer_at(shading, 0)
-    while rest >= layer.weight and chosen + 1 < count:
-        rest -= layer.weight
+    leaf = leaf_at(shading, 0)
+    while rest >= leaf.weight and chosen + 1 < count:
+        rest -= leaf.weight
         chosen += 1
-        layer = layer_at(shading, chosen)
-    if not layer.weight > 0.0:
+        leaf = leaf_at(shading, chosen)
+    if not leaf.weight > 0.0:
         return no_sample()
-    u_inner = min(rest / layer.weight, 1.0 - 2.0**-53)
-    wo_in = to_local(layer.basis, shading.wo)
-    kind, i = layers.kind[first + chosen], layers.row[first + chosen]
+    u_inner = min(rest / leaf.weight, 1.0 - 2.0**-53)
+    wo_in = to_local(leaf.basis, shading.wo)
+    kind, i = flat_leaves.kind[first + chosen], flat_leaves.row[first + chosen]
     drawn = bsdf.sample(materials.leaves, kind, i, shading.at, wo_in, u_inner, u0, u1)
-    wi = to_world(layer.basis, drawn.wi)
+    wi = to_world(leaf.basis, drawn.wi)
     if drawn.pdf == 0.0:
         return no_sample()
     if drawn.is_delta or count == 1:
-        if not lets(layer, wi):
+        if not scatters_from(leaf, wi):
             return no_sample()
     if drawn.is_delta:
         # weight / total is the probability of the layer, by which its contribution is divided.
-        probability = drawn.pdf * (layer.weight / total)
+        probability = drawn.pdf * (leaf.weight / total)
         return BsdfSample(wi, drawn.weight * total, probability, drawn.eta, True)
     if count == 1:
         return BsdfSample(wi, drawn.weight * total, drawn.pdf, drawn.eta, False)
     # Any of the layers could have sampled this direction: use the sum of their densities.
-    found = _both(layers, materials, shading, wi)
+    found = _eval_pdf(flat_leaves, materials, shading, wi)
     if not found.density > 0.0:
         return no_sample()
     return BsdfSample(wi, found.value * (1.0 / found.density), found.density, drawn.eta, False)
@@ -209,53 +216,55 @@ def _sample(
 @kernel
 def branch_count(materials: Materials, m: int) -> int:
     """The number of `branches` of a material."""
-    return _branch_count(materials.layers, m)
+    return _branch_count(materials.flat_leaves, m)
 
 
 @kernel
-def _branch_count(layers: Layers | None, m: int) -> int:
-    if layers is None:
+def _branch_count(flat_leaves: FlattenedMaterials | None, m: int) -> int:
+    if flat_leaves is None:
         return 1
-    return int(layers.number[m])
+    return int(flat_leaves.number[m])
 
 
 @kernel
 def most_branches(materials: Materials) -> int:
     """The largest `branch_count`."""
-    return max(1, flattened.most(materials.layers))
+    return max(1, flattened.most(materials.flat_leaves))
 
 
 @kernel
-def kept_floats(materials: Materials) -> int:
+def scratch_floats(materials: Materials) -> int:
     """The size of the scratch buffer that `shade` needs for this scene's materials."""
-    layers = flattened.SIZE * flattened.most(materials.layers)
-    return looked_floats(materials.textured) + layers
+    flat_leaves = flattened.SIZE * flattened.most(materials.flat_leaves)
+    return lookup_cache_size(materials.textured) + flat_leaves
 
 
 @kernel
 def prepare(materials: Materials, shading: Shading, at: At) -> None:
-    """Write `shading.layers`, which all other functions need.  `at`: the place for textures whose
-    lookups are not cached."""
-    flattened.prepare(materials.layers, shading, at)
+    """Write `shading.flat_leaves`, which all other functions need.  `at`: the place for textures
+    whose lookups are not cached."""
+    flattened.prepare(materials.flat_leaves, shading, at)
 
 
 @kernel
 def ambient(materials: Materials, shading: Shading) -> Vec3:
     """The ambient reflectance k_a of the Phong model, summed over the layers; black for others."""
-    return _ambient(materials.layers, materials, shading)
+    return _ambient(materials.flat_leaves, materials, shading)
 
 
 @kernel
-def _ambient(layers: Layers | None, materials: Materials, shading: Shading) -> Vec3:
+def _ambient(
+    flat_leaves: FlattenedMaterials | None, materials: Materials, shading: Shading
+) -> Vec3:
     m = shading.point.material
-    if layers is None:
+    if flat_leaves is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.ambient(materials.leaves, kind, i, shading.at)
     total = Vec3(0.0, 0.0, 0.0)
-    first = layers.first[m]
-    for k in range(layers.number[m]):
-        weight = layer_at(shading, k).weight
-        kind, i = layers.kind[first + k], layers.row[first + k]
+    first = flat_leaves.first[m]
+    for k in range(flat_leaves.number[m]):
+        weight = leaf_at(shading, k).weight
+        kind, i = flat_leaves.kind[first + k], flat_leaves.row[first + k]
         value = bsdf.ambient(materials.leaves, kind, i, shading.at)
         total = total + value * weight
     return total
@@ -264,27 +273,29 @@ def _ambient(layers: Layers | None, materials: Materials, shading: Shading) -> V
 @kernel
 def branches(materials: Materials, shading: Shading, k: int) -> Branches:
     """The perfectly reflected and refracted directions of layer k of a material."""
-    return _branches(materials.layers, materials, shading, k)
+    return _branches(materials.flat_leaves, materials, shading, k)
 
 
 @kernel
-def _branches(layers: Layers | None, materials: Materials, shading: Shading, k: int) -> Branches:
+def _branches(
+    flat_leaves: FlattenedMaterials | None, materials: Materials, shading: Shading, k: int
+) -> Branches:
     m = shading.point.material
-    if layers is None:
+    if flat_leaves is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.branches(materials.leaves, kind, i, shading.at, shading.wo)
-    layer = layer_at(shading, k)
-    k += layers.first[m]
-    wo_in = to_local(layer.basis, shading.wo)
-    kind, i = layers.kind[k], layers.row[k]
+    leaf = leaf_at(shading, k)
+    k += flat_leaves.first[m]
+    wo_in = to_local(leaf.basis, shading.wo)
+    kind, i = flat_leaves.kind[k], flat_leaves.row[k]
     found = bsdf.branches(materials.leaves, kind, i, shading.at, wo_in)
-    reflected = to_world(layer.basis, found.reflected)
-    refracted = to_world(layer.basis, found.refracted)
+    reflected = to_world(leaf.basis, found.reflected)
+    refracted = to_world(leaf.basis, found.refracted)
     return Branches(
         reflected,
-        _let(layer, reflected, found.reflectance),
+        _let(leaf, reflected, found.reflectance),
         refracted,
-        _let(layer, refracted, found.transmittance),
+        _let(leaf, refracted, found.transmittance),
         found.share,
         found.passing,
         found.eta,
@@ -292,7 +303,7 @@ def _branches(layers: Layers | None, materials: Materials, shading: Shading, k: 
 
 
 @kernel
-def _let(layer: Layer, wi: Vec3, factor: Vec3) -> Vec3:
-    if not lets(layer, wi):
+def _let(leaf: FlattenedLeaf, wi: Vec3, factor: Vec3) -> Vec3:
+    if not scatters_from(leaf, wi):
         return Vec3(0.0, 0.0, 0.0)
-    return factor * layer.weight
+    return factor * leaf.weight

@@ -23,7 +23,7 @@ class Material(Description):
     delta: ClassVar[bool] = False
     """Whether it has `branches`: delta lobes, whose directions no light sample can find."""
 
-    chooses: ClassVar[bool] = True
+    uses_u_lobe: ClassVar[bool] = True
     """Whether `sample` uses its number `u_lobe`, which picks a lobe."""
 
     @property

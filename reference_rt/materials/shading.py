@@ -20,4 +20,4 @@ class Shading(NamedTuple):
     wo: Vec3
     at: At
     tangents: Tangents
-    layers: FloatArray
+    flat_leaves: FloatArray

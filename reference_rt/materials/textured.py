@@ -18,7 +18,7 @@ from reference_rt.materials.material import Material
 from reference_rt.materials.nested.bump import Bump
 from reference_rt.materials.nested.wrappers import Wrapper
 from reference_rt.textures import At, Palette, texture_names
-from reference_rt.textures.lookup import Looked, lookup
+from reference_rt.textures.lookup import CachedLookups, lookup
 
 
 class Textured(NamedTuple):
@@ -56,10 +56,10 @@ def _textures(name: str, materials: Mapping[str, Material], palette: Palette) ->
     return found.union(*(_textures(base, materials, palette) for base in _bases(material)))
 
 
-def asks_textures(name: str, materials: Mapping[str, Material]) -> bool:
+def uses_textures(name: str, materials: Mapping[str, Material]) -> bool:
     """Whether a material uses any texture, also for heights."""
     material = materials[name]
-    asked = [asks_textures(base, materials) for base in _bases(material)]
+    asked = [uses_textures(base, materials) for base in _bases(material)]
     return bool(texture_names(material)) or any(asked)
 
 
@@ -73,8 +73,8 @@ def _bases(material: Material) -> list[str]:
 
 
 @kernel
-def looked_floats(textured: Textured | None) -> int:
-    """The size of the array that `look` writes."""
+def lookup_cache_size(textured: Textured | None) -> int:
+    """The size of the array that `evaluate_textures` writes."""
     if textured is None:
         return 0
     return 3 * textured.size
@@ -91,12 +91,12 @@ def _look(textured: Textured, m: int, at: At, colours: FloatArray) -> At:
     for s in range(first, first + textured.number[m]):
         k = textured.texture[s]
         colours[3 * k], colours[3 * k + 1], colours[3 * k + 2] = lookup(k, at)
-    return At(Looked(colours), at.u, at.v, at.colour)
+    return At(CachedLookups(colours), at.u, at.v, at.colour)
 
 
 _choice = ByClass("look")
 _choice.register(type(None), _nothing)
 _choice.register(Textured, _look)
-look = _choice.function
+evaluate_textures = _choice.function
 """look(textured, m, at, colours) -> At.  Evaluates the textures of material m at `at`, into the
 scratch buffer `colours`, and returns a place where `lookup` reads these."""

@@ -18,10 +18,10 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import Path, RayCast
 from reference_rt.integrators.path import PathSetup
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.jit.function_pointer import address_of
+from reference_rt.jit.function_pointer import pointer_to
 from reference_rt.jit.kernel import signature_of
 from reference_rt.jit.parallel_compile import Call, precompile_all
-from reference_rt.rendering.tiles import cast_band, first_hits_band, render_band
+from reference_rt.rendering.tiles import aov_tile, first_hits_tile, render_tile
 from reference_rt.scene.build import BuiltScene, build_tables
 from reference_rt.scene.likely_mistakes import likely_mistakes
 
@@ -109,7 +109,7 @@ def render(
     say("compile", 0.0)
     threads = threads or os.cpu_count() or 1
     calls = [(job.kernel, signature_of(*job.arguments, 0, 0, 0, 0)) for job in jobs]
-    kernels = compile_bands(calls, tables, tracer, threads)
+    kernels = compile_tile_kernels(calls, tables, tracer, threads)
     say("compile", 1.0)
     clock.append(time.perf_counter())
     pixels = scene.film.width * scene.film.height
@@ -118,7 +118,7 @@ def render(
         def say_part(what: str, fraction: float, k: int = k) -> None:
             say(what, (k + fraction) / len(jobs))
 
-        run_bands(kernel, job.arguments, pixels, job.spp, threads, say_part)
+        run_tiles(kernel, job.arguments, pixels, job.spp, threads, say_part)
     clock.append(time.perf_counter())
     seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
     return Picture(layers, shown, seconds)
@@ -134,7 +134,7 @@ def with_tracer(tables: SceneTables, integrator: Any) -> tuple[SceneTables, Call
     return tables, tracer
 
 
-def compile_bands(
+def compile_tile_kernels(
     calls: Sequence[Call], tables: SceneTables, tracer: Call | None, threads: int
 ) -> Sequence[Callable[..., Any]]:
     """Compile kernels, in parallel with the tracer; write the tracer's function pointer into the
@@ -143,7 +143,7 @@ def compile_bands(
         return precompile_all(calls, threads)
     *kernels, _ = precompile_all([*calls, tracer], threads)
     address: Any = tables.geometry.tracer
-    address[0] = address_of(*tracer)
+    address[0] = pointer_to(*tracer)
     return kernels
 
 
@@ -152,7 +152,7 @@ def _aov_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict[
     film = scene.film
     out = np.zeros((film.height, film.width, 10))
     view = scene.camera.setup(film.width, film.height)
-    job = _Job(cast_band, (tables, view, (film.width, film.height), out.reshape(-1, 10)), 1)
+    job = _Job(aov_tile, (tables, view, (film.width, film.height), out.reshape(-1, 10)), 1)
     layers = {
         "colour": out[..., 0:3],
         "distance": out[..., 3],
@@ -175,13 +175,13 @@ def _render_jobs(
     view = scene.camera.setup(*shape)
     setups = (tables, view, film.filter.setup(), sampler.setup(), shape, spp)
     arguments = (integrator, *setups, out.reshape(-1, 3), rows)
-    jobs, layers = [_Job(render_band, arguments, spp)], {"colour": out}
+    jobs, layers = [_Job(render_tile, arguments, spp)], {"colour": out}
     if variance is not None:
         layers["variance"] = variance
     if {"albedo", "normal"} & set(film.layers):
         layers |= {"albedo": np.zeros_like(out), "normal": np.zeros_like(out)}
         hits = [layers[name].reshape(-1, 3) for name in ("albedo", "normal")]
-        jobs.append(_Job(first_hits_band, (*setups, *hits), spp))
+        jobs.append(_Job(first_hits_tile, (*setups, *hits), spp))
     if {"depth", "id"} & set(film.layers):
         centres, cast = _aov_jobs(scene, tables)
         jobs += centres
@@ -212,7 +212,7 @@ def _check(scene: BuiltScene) -> None:
         )
 
 
-def run_bands(
+def run_tiles(
     kernel: Any, arguments: Sequence[Any], pixels: int, spp: int, threads: int, say: Progress
 ) -> None:
     """Run a kernel for all tiles on a thread pool.  Kernels release the GIL; the main thread

@@ -17,8 +17,8 @@ from reference_rt.core.ray_block import (
     HIT_FLOATS,
     HIT_INTEGERS,
     RAY_FLOATS,
-    Hits,
-    Rays,
+    HitBlock,
+    RayBlock,
     put_ray,
     vector_of,
 )
@@ -29,13 +29,13 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.integrators.shading import texture_place
 from reference_rt.jit.kernel import ByClass, entry_kernel, kernel, local_floats, local_integers
-from reference_rt.materials import kept_floats
+from reference_rt.materials import scratch_floats
 from reference_rt.sampling import (
     PAIR_FLOATS,
     PAIR_INTEGERS,
     Samplers,
     draw_pair,
-    forget_pairs,
+    invalidate_pairs,
     sampler_of,
     start_sample,
 )
@@ -85,7 +85,7 @@ _film_ray = _film_rays.function
 
 
 @entry_kernel
-def render_band(
+def render_tile(
     integrator: Any,
     scene: SceneTables,
     view: Any,
@@ -104,15 +104,15 @@ def render_band(
     the mean.  variance (n, 3), if any: M2, the sum of squared deviations, which the last sample
     turns into the variance of the mean."""
     scratch = Scratch(
-        rays=Rays(local_floats(RAY_FLOATS)),
+        rays=RayBlock(local_floats(RAY_FLOATS)),
         totals=local_floats(VECTOR_FLOATS),
-        shadows=Rays(local_floats(RAY_FLOATS)),
+        shadows=RayBlock(local_floats(RAY_FLOATS)),
         lights=local_floats(VECTOR_FLOATS),
         lit=local_integers(BLOCK),
-        hits=Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
+        hits=HitBlock(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
         states=local_floats(STATE_FLOATS),
         samples=local_integers(BLOCK),
-        kept=local_floats(kept_floats(scene.materials)),
+        kept=local_floats(scratch_floats(scene.materials)),
     )
     weights = local_floats(BLOCK)
     samplers = Samplers(
@@ -123,7 +123,7 @@ def render_band(
         local_integers(PAIR_INTEGERS),
     )
     prepare(scratch)
-    forget_pairs(samplers)
+    invalidate_pairs(samplers)
     count = last - first
     paths = (end - begin) * count
     for start in range(0, paths, BLOCK):
@@ -176,7 +176,7 @@ def _m2_to_variance(m2: FloatArray | None, pixel: int, spp: int) -> None:
 
 
 @entry_kernel
-def first_hits_band(
+def first_hits_tile(
     scene: SceneTables,
     view: Any,
     film_filter: Any,
@@ -212,7 +212,7 @@ def first_hits_band(
 
 
 @entry_kernel
-def cast_band(
+def aov_tile(
     scene: SceneTables,
     view: Any,
     shape: tuple[int, int],

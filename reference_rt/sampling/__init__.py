@@ -76,7 +76,7 @@ class Samplers(NamedTuple):
 
 
 @kernel
-def forget_pairs(samplers: Samplers) -> None:
+def invalidate_pairs(samplers: Samplers) -> None:
     """Empties the cache of pairs: called before the first sample."""
     for k in range(PAIR_INTEGERS):
         samplers.made[k] = -1
@@ -109,7 +109,7 @@ __all__ = [
     "Samplers",
     "Sobol",
     "draw_pair",
-    "forget_pairs",
+    "invalidate_pairs",
     "sampler_of",
     "start_in_block",
     "start_sample",

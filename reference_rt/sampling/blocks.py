@@ -22,14 +22,14 @@ from reference_rt.sampling import sobol
 from reference_rt.sampling.orders import GROUP, OF_DIGITS
 from reference_rt.sampling.sobol import SobolSetup, pair, reverse_bits, seeds_of
 
-TOGETHER = 16
+BLOCK_SAMPLES = 16
 """Samples in a block."""
 
 DIMENSIONS = 11 * GROUP
 """The dimensions whose pairs are computed in blocks, those of the first eleven bounces; later ones
 are computed singly.  Their pairs take 11 KiB, which leaves most of the L1 cache to the scene."""
 
-FLOATS, INTEGERS = 2 * TOGETHER * DIMENSIONS, DIMENSIONS
+FLOATS, INTEGERS = 2 * BLOCK_SAMPLES * DIMENSIONS, DIMENSIONS
 """The sizes of `BlockSample.pairs` and `BlockSample.made`."""
 
 
@@ -50,7 +50,7 @@ def start(
     setup: SobolSetup, pixel: int, sample: int, pairs: FloatArray, made: IntArray
 ) -> BlockSample:
     # At most 2^31 samples, 16 in each block.
-    block = pixel * 2**27 + sample // TOGETHER
+    block = pixel * 2**27 + sample // BLOCK_SAMPLES
     return BlockSample(sobol.start(setup, pixel, 0).key, sample, block, pairs, made)
 
 
@@ -61,13 +61,13 @@ def draw(sampler: BlockSample, dimension: int) -> tuple[float, float]:
     if dimension >= DIMENSIONS:
         seeds = seeds_of(sampler.key, dimension)
         return pair(seeds, dimension % GROUP, reverse_bits(np.uint64(sample)))
-    at = 2 * TOGETHER * dimension
-    lane = sample % TOGETHER
+    at = 2 * BLOCK_SAMPLES * dimension
+    lane = sample % BLOCK_SAMPLES
     if sampler.made[dimension] != sampler.block:
         order, x_seed, y_seed = seeds_of(sampler.key, dimension)
         fill(order, x_seed, y_seed, dimension % GROUP, sample - lane, pairs, at)
         sampler.made[dimension] = sampler.block
-    return pairs[at + lane], pairs[at + TOGETHER + lane]
+    return pairs[at + lane], pairs[at + BLOCK_SAMPLES + lane]
 
 
 @kernel
@@ -81,22 +81,22 @@ def fill_plainly(
     at: int,
 ) -> None:
     """Computes the pairs of TOGETHER samples from `first` on: u0 into pairs[at :], then u1."""
-    for lane in range(TOGETHER):
+    for lane in range(BLOCK_SAMPLES):
         u0, u1 = pair((order, x_seed, y_seed), place, reverse_bits(np.uint64(first + lane)))
-        pairs[at + lane], pairs[at + TOGETHER + lane] = u0, u1
+        pairs[at + lane], pairs[at + BLOCK_SAMPLES + lane] = u0, u1
 
 
-_WORDS = ir.VectorType(ir.IntType(32), TOGETHER)
-_REALS = ir.VectorType(ir.DoubleType(), TOGETHER)
+_WORDS = ir.VectorType(ir.IntType(32), BLOCK_SAMPLES)
+_REALS = ir.VectorType(ir.DoubleType(), BLOCK_SAMPLES)
 
 
 def _all(value: int | float, of: ir.VectorType = _WORDS) -> ir.Constant:
-    return ir.Constant(of, [value] * TOGETHER)
+    return ir.Constant(of, [value] * BLOCK_SAMPLES)
 
 
 def _reverse(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
     of_type = ir.FunctionType(_WORDS, [_WORDS])
-    name = f"llvm.bitreverse.v{TOGETHER}i32"
+    name = f"llvm.bitreverse.v{BLOCK_SAMPLES}i32"
     return builder.call(cgutils.get_or_insert_function(builder.module, of_type, name), [x])
 
 
@@ -149,7 +149,7 @@ def _reordered(builder: ir.IRBuilder, x: ir.Value, place: ir.Value, lanes: Any) 
 def _generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
     *seeds, place, first, pairs, at = arguments
 
-    def in_all_lanes(x: ir.Value) -> ir.Value:
+    def broadcast(x: ir.Value) -> ir.Value:
         word = ir.IntType(32)
         low = x if x.type == word else builder.trunc(x, word)
         one = builder.insert_element(_all(0), low, word(0))
@@ -162,12 +162,12 @@ def _generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: An
         place = builder.gep(array.data, [builder.add(at, at.type(offset))])
         builder.store(u, builder.bitcast(place, _REALS.as_pointer()), align=8)
 
-    order, x_seed, y_seed = (in_all_lanes(seed) for seed in seeds)
-    sample = builder.add(in_all_lanes(first), ir.Constant(_WORDS, list(range(TOGETHER))))
+    order, x_seed, y_seed = (broadcast(seed) for seed in seeds)
+    sample = builder.add(broadcast(first), ir.Constant(_WORDS, list(range(BLOCK_SAMPLES))))
     index = _reverse(builder, _scramble(builder, _reverse(builder, sample), order))
-    index = _reordered(builder, index, place, in_all_lanes)
+    index = _reordered(builder, index, place, broadcast)
     store(_scramble(builder, index, x_seed), 0)
-    store(_scramble(builder, _pascal(builder, index), y_seed), TOGETHER)
+    store(_scramble(builder, _pascal(builder, index), y_seed), BLOCK_SAMPLES)
     return context.get_dummy_value()
 
 

@@ -10,14 +10,14 @@ from reference_rt.accel.geometry import Geometry
 from reference_rt.accel.leaf import SOLID
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
 from reference_rt.core.transform import Affine, affine, identity, invert
-from reference_rt.scene.build_hierarchies import Copies, Reference, Trees
+from reference_rt.scene.build_hierarchies import ExpandedInstance, HierarchyBuilder, TableRows
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes, csg
 from reference_rt.shapes.csg import NOT, OR, Solid
 from reference_rt.shapes.csg.tables import Parts, Solids
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.meshes.topology import describe_boundary
-from reference_rt.shapes.shape import Place, outward
+from reference_rt.shapes.shape import TabulationContext, outward
 
 _CODES = {table: code for code, _, table, _ in TABLES}
 
@@ -31,13 +31,13 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
     Raises SceneError with file, line and key path.
     """
     work = _Assembly(scene, materials)
-    top: list[Reference] = []
-    copies: list[Copies] = []
+    top: list[TableRows] = []
+    copies: list[ExpandedInstance] = []
     for i, shape in enumerate(scene.shapes):
         try:
             if isinstance(shape, Instance):
                 numbers, maps = work.expand(shape.group)
-                copies.append(Copies(i, numbers, _composed(maps, _map_of(shape))))
+                copies.append(ExpandedInstance(i, numbers, _composed(maps, _map_of(shape))))
             else:
                 top.append(work.member(shape, i, None))
         except ValueError as error:
@@ -52,7 +52,7 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
             bounds[code] = module.bounds(table)
     if work.solids:
         bounds[SOLID] = _concatenated_bounds([solid.bounds for solid in work.solids])
-    trees = Trees(scene.hierarchy, tables, bounds)
+    trees = HierarchyBuilder(scene.hierarchy, tables, bounds)
     roots = [trees.add(references, whole=whole) for references, whole in work.trees]
     trees.finish(top, copies, roots)
     solids = work.solid_tables(trees, roots)
@@ -89,7 +89,7 @@ class _Assembly:
         self.rows = dict.fromkeys(self.tables, 0)
         # The primitives of each hierarchy except the scene's own, and whether spatial splits are
         # forbidden in it.
-        self.trees: list[tuple[list[Reference], bool]] = []
+        self.trees: list[tuple[list[TableRows], bool]] = []
         # Key paths of owners that are not top-level shapes of the scene.
         self.paths: dict[int, tuple[str | int, ...]] = {}
         # (shape, part, solid, turned) by owner number: the scene's shapes first.
@@ -99,14 +99,14 @@ class _Assembly:
         self.operands: list[tuple[int, int, int]] = []
         self.expansions: dict[str, tuple[IntArray, FloatArray]] = {}
 
-    def add(self, shape: Shape, place: Place) -> Reference:
+    def add(self, shape: Shape, place: TabulationContext) -> TableRows:
         """Add a primitive shape's rows to their table."""
         table = shape.tabulate(place)
         code = _CODES[type(table)]
         first = self.rows[code]
         self.rows[code] += len(table.owner)
         self.tables[code].append(table)
-        return Reference(code, np.arange(first, self.rows[code]))
+        return TableRows(code, np.arange(first, self.rows[code]))
 
     def check_finite(self, table: Any) -> None:
         """Raise SceneError for a shape whose numbers have overflowed."""
@@ -119,22 +119,22 @@ class _Assembly:
                     *self.path_of(int(owner)),
                 )
 
-    def member(self, shape: Shape, owner: int, material: str | None) -> Reference:
+    def member(self, shape: Shape, owner: int, material: str | None) -> TableRows:
         """Add a shape of the scene or of a group that is not an instance."""
         name = shape.material if shape.material is not None else material
         if isinstance(shape, Solid):
-            return Reference(SOLID, np.array([self.solid(shape, owner, name)]))
+            return TableRows(SOLID, np.array([self.solid(shape, owner, name)]))
         return self.add(shape, self.place(owner, name))
 
     def part(
         self, shape: int, number: int, material: str | None, solid: int = -1, turned: bool = False
-    ) -> Place:
+    ) -> TabulationContext:
         """The tabulation context of a part of a shape, with a new owner number."""
         self.parts.append((shape, number, solid, int(turned)))
         return self.place(len(self.parts) - 1, material)
 
-    def place(self, owner: int, material: str | None) -> Place:
-        return Place(owner, self.materials[material], self.scene.folder, warn=self.warn)
+    def place(self, owner: int, material: str | None) -> TabulationContext:
+        return TabulationContext(owner, self.materials[material], self.scene.folder, warn=self.warn)
 
     def path_of(self, owner: int) -> tuple[str | int, ...]:
         """The key path of an owner in the scene file."""
@@ -162,7 +162,7 @@ class _Assembly:
         self.solids.append(_Program(first, csg.postfix(shape), boxes, anchor))
         return len(self.solids) - 1
 
-    def operand(self, shape: Shape, place: Place) -> Bounds:
+    def operand(self, shape: Shape, place: TabulationContext) -> Bounds:
         """Add an operand, and return its box (3,), (3,)."""
         reference = self.add(shape, place)
         code = reference.kind
@@ -181,14 +181,14 @@ class _Assembly:
         lower, upper = module.bounds(table)
         return lower.min(axis=0), upper.max(axis=0)
 
-    def box_of(self, reference: Reference) -> Bounds:
+    def box_of(self, reference: TableRows) -> Bounds:
         """The boxes of the shape that was added last."""
         if reference.kind == SOLID:
             return self.solids[-1].bounds
         bounds: Bounds = TABLES[reference.kind][3].bounds(self.tables[reference.kind][-1])
         return bounds
 
-    def solid_tables(self, trees: Trees, roots: Sequence[int]) -> Solids | None:
+    def solid_tables(self, trees: HierarchyBuilder, roots: Sequence[int]) -> Solids | None:
         if not self.solids:
             return None
         counts = np.array([len(s.steps) for s in self.solids])
@@ -225,7 +225,7 @@ class _Assembly:
         return self.expansions[name]
 
     def _expansion(self, name: str, path: Sequence[str]) -> tuple[IntArray, FloatArray]:
-        references: list[Reference] = []
+        references: list[TableRows] = []
         trees, maps = [], []
         for k, shape in enumerate(self.scene.groups[name]):
             try:

@@ -21,14 +21,14 @@ ONE_BY_ONE each (a core with AVX-512)."""
 ONE_BY_ONE = 10
 
 
-class Reference(NamedTuple):
+class TableRows(NamedTuple):
     """Primitives or solids of one kind: their rows (n,)."""
 
     kind: int
     rows: IntArray
 
 
-class Copies(NamedTuple):
+class ExpandedInstance(NamedTuple):
     """An expanded instance: its index in the scene, hierarchies (k,) and transforms (k, 3, 4)."""
 
     owner: int
@@ -36,7 +36,7 @@ class Copies(NamedTuple):
     maps: FloatArray
 
 
-class Trees:
+class HierarchyBuilder:
     """Builds the hierarchies of a scene and joins them into the arrays of one `Bvh`.
 
     method: of `bvh.build`, or "auto";  tables: by field of `Shapes`;  bounds: boxes of each kind.
@@ -58,7 +58,7 @@ class Trees:
         self._new_rows: dict[int, IntArray] = {}
         self._scene: int | None = None
 
-    def add(self, references: Sequence[Reference], whole: bool = False) -> int:
+    def add(self, references: Sequence[TableRows], whole: bool = False) -> int:
         """Build a hierarchy over these, and return its number.  whole: reference each only once."""
         kinds, rows = _joined(references)
         lower, upper = self._bounds_of(kinds, rows)
@@ -69,14 +69,14 @@ class Trees:
         return self._append(nodes, kinds[order], rows[order])
 
     def finish(
-        self, top: Sequence[Reference], copies: Sequence[Copies], roots: Sequence[int]
+        self, top: Sequence[TableRows], copies: Sequence[ExpandedInstance], roots: Sequence[int]
     ) -> None:
         """Build the scene's top-level hierarchy over shapes and instances, and sort the tables into
         leaf order.  roots: the numbers of the hierarchies that `copies` refer to."""
         if copies:
             self._instances = self._place(copies, roots)
             count = len(self._instances.owner)
-            top = [*top, Reference(INSTANCE, np.arange(count))]
+            top = [*top, TableRows(INSTANCE, np.arange(count))]
         kinds, rows = _joined(top)
         if len(kinds) > 0 and not (self.method == "auto" and self._is_few(kinds)):
             lower, upper = self._bounds_of(kinds, rows)
@@ -87,7 +87,7 @@ class Trees:
             if finite.any():
                 self._scene = self.add(
                     [
-                        Reference(int(k), rows_of[0][kinds_of[0] == k])
+                        TableRows(int(k), rows_of[0][kinds_of[0] == k])
                         for k in _distinct(kinds_of[0])
                     ]
                 )
@@ -180,7 +180,7 @@ class Trees:
             corners[mine] = self.tables["triangles"].vertices[rows[mine]]
         return corners
 
-    def _place(self, copies: Sequence[Copies], roots: Sequence[int]) -> Instances:
+    def _place(self, copies: Sequence[ExpandedInstance], roots: Sequence[int]) -> Instances:
         """The table of instances, with the hierarchy's number as `root`.  Computes their bounds."""
         maps = np.concatenate([c.maps for c in copies])
         trees = np.array(roots)[np.concatenate([c.trees for c in copies])]
@@ -238,7 +238,7 @@ def _first_named(rows: IntArray, count: int) -> IntArray:
     return np.argsort(first, kind="stable")
 
 
-def _joined(references: Sequence[Reference]) -> tuple[IntArray, IntArray]:
+def _joined(references: Sequence[TableRows]) -> tuple[IntArray, IntArray]:
     """Kinds and rows (n,)."""
     none = np.zeros(0, np.int64)
     kinds = [np.full(len(r.rows), r.kind) for r in references]

@@ -13,10 +13,10 @@ from reference_rt.lights import (
     TABLES,
     Ambient,
     Areas,
-    Choice,
     Constant,
     EnvironmentMap,
     Lights,
+    LightSampler,
 )
 from reference_rt.lights.emitters import constant, environment_map
 from reference_rt.lights.selection import bounds
@@ -94,7 +94,7 @@ def scene_radius(geometry: Geometry) -> float:
     return 0.5 * size if 0.0 < size < np.inf else 1.0
 
 
-def _choice(kind: Any, row: Any, weight: FloatArray) -> Choice | None:
+def _choice(kind: Any, row: Any, weight: FloatArray) -> LightSampler | None:
     """The light sampler by power; None if no light that can be sampled has power."""
     # Scaled by the largest, so that extreme values neither overflow nor vanish in the sum.
     largest = weight.max(initial=0.0)
@@ -104,13 +104,13 @@ def _choice(kind: Any, row: Any, weight: FloatArray) -> Choice | None:
     return _choice_by(kind, row, weight / weight.sum())
 
 
-def _choice_by(kind: Any, row: Any, probability: FloatArray) -> Choice:
+def _choice_by(kind: Any, row: Any, probability: FloatArray) -> LightSampler:
     bounded = probability[(kind != DIRECTIONAL) & (kind != ENVIRONMENT)].sum()
     cumulative = np.cumsum(probability) if len(probability) > 1 else None
-    return Choice(kind, row, probability, cumulative, np.array([bounded]))
+    return LightSampler(kind, row, probability, cumulative, np.array([bounded]))
 
 
-def _mostly_others(choice: Choice) -> Choice:
+def _mostly_others(choice: LightSampler) -> LightSampler:
     """The light sampler with the constant environment, its last light, capped at SKY_SHARE if other
     lights have power."""
     others = choice.probability[:-1]

@@ -11,10 +11,15 @@ from reference_rt.materials.bsdfs.phong import Phong
 from reference_rt.materials.bsdfs.tables import BLACK, CLEAR, TABLES, Leaves
 from reference_rt.materials.emissive import Emissive
 from reference_rt.materials.material import Material
-from reference_rt.materials.nested.flattened import LayerTables
-from reference_rt.materials.nested.paths import Way, needs_tangents, transmits, ways
+from reference_rt.materials.nested.flattened import FlattenedBuilder
+from reference_rt.materials.nested.paths import (
+    MaterialPath,
+    material_paths,
+    needs_tangents,
+    transmits,
+)
 from reference_rt.materials.nested.wrappers import Wrapper
-from reference_rt.materials.textured import asks_textures, textured_table
+from reference_rt.materials.textured import textured_table, uses_textures
 from reference_rt.scene.model import SceneModel
 from reference_rt.textures import Palette
 from reference_rt.textures.parameter import join
@@ -32,7 +37,7 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
     materials: dict[str, Material] = {**scene.materials}
     if default or not materials:
         materials[DEFAULT] = Diffuse()
-    leaves, layers = _Leaves(materials, palette), LayerTables(palette)
+    leaves, flat_leaves = _Leaves(materials, palette), FlattenedBuilder(palette)
     kinds, rows, traits, shown = [], [], [], []
     oriented = False
     for name in materials:
@@ -42,41 +47,43 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
             if scattering is None or (name == DEFAULT and not default):
                 found = []
             else:
-                found = ways(scattering, materials)
+                found = material_paths(scattering, materials)
             if scene.integrator.type == "path":
                 _check_energy(found, materials, palette)
-            numbers = [leaves.add(way.leaf) for way in found]
-            layers.add(list(zip(found, numbers, strict=True)))
+            numbers = [leaves.add(path.leaf) for path in found]
+            flat_leaves.add(list(zip(found, numbers, strict=True)))
         except ValueError as error:
             raise scene.error(str(error), "materials", name) from None
         kind, row = numbers[0] if len(numbers) == 1 else (BLACK, -1)
         kinds.append(kind)
         rows.append(row)
         traits.append(_traits(found, materials))
-        oriented = oriented or any(needs_tangents(way, materials) for way in found)
-    smooth, chooses, behind = np.ascontiguousarray(np.array(traits, np.int64).T)
-    asks = np.array([asks_textures(name, materials) for name in materials], np.int64)
+        oriented = oriented or any(needs_tangents(path, materials) for path in found)
+    smooth, uses_u_lobe, behind = np.ascontiguousarray(np.array(traits, np.int64).T)
+    asks = np.array([uses_textures(name, materials) for name in materials], np.int64)
     is_one_table = len(leaves.parts) == 1 and set(kinds) == leaves.parts.keys()
     return Materials(
         kind=None if is_one_table else np.array(kinds),
         row=None if is_one_table and rows == list(range(len(rows))) else np.array(rows),
         smooth=None if smooth.all() else smooth,
-        chooses=chooses if chooses.any() else None,
+        uses_u_lobe=uses_u_lobe if uses_u_lobe.any() else None,
         behind=behind if behind.any() else None,
         shown=join(shown),
         oriented=np.zeros(1, np.int64) if oriented else None,
         asks=asks if asks.any() and not asks.all() else None,
         textured=textured_table(materials, palette),
-        layers=layers.tables(),
+        flat_leaves=flat_leaves.tables(),
         leaves=leaves.tables(),
     )
 
 
-def _check_energy(found: list[Way], materials: Mapping[str, Material], palette: Palette) -> None:
+def _check_energy(
+    found: list[MaterialPath], materials: Mapping[str, Material], palette: Palette
+) -> None:
     """Raise ValueError for a Phong material that reflects more light than arrives, which path
     tracing cannot render."""
-    for way in found:
-        leaf = materials[way.leaf] if way.leaf is not None else None
+    for path in found:
+        leaf = materials[path.leaf] if path.leaf is not None else None
         if isinstance(leaf, Phong) and leaf.energy_bound(palette) > 1.0:
             raise ValueError(
                 f"creates energy: up to {leaf.energy_bound(palette):.4g} of the light comes back; "
@@ -98,13 +105,15 @@ def _shown(name: str, materials: Mapping[str, Material]) -> tuple[float, float, 
     return material.colour
 
 
-def _traits(found: list[Way], materials: Mapping[str, Material]) -> tuple[bool, bool, bool]:
-    """`Materials.smooth`, `chooses` and `behind`."""
-    leaves = [materials[way.leaf] for way in found if way.leaf is not None]
+def _traits(
+    found: list[MaterialPath], materials: Mapping[str, Material]
+) -> tuple[bool, bool, bool]:
+    """`Materials.smooth`, `uses_u_lobe` and `behind`."""
+    leaves = [materials[path.leaf] for path in found if path.leaf is not None]
     return (
         any(leaf.smooth for leaf in leaves),
-        len(found) > 1 or any(leaf.chooses for leaf in leaves),
-        any(transmits(way, materials) or way.turns for way in found),
+        len(found) > 1 or any(leaf.uses_u_lobe for leaf in leaves),
+        any(transmits(path, materials) or path.turns for path in found),
     )
 
 

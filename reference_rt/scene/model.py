@@ -19,7 +19,7 @@ from reference_rt.integrators import AnyIntegrator
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import AnyLight, Constant, EnvironmentMap
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
-from reference_rt.materials.nested.paths import ways
+from reference_rt.materials.nested.paths import material_paths
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.scene import yaml_text
 from reference_rt.scene.yaml_lines import line_of
@@ -82,7 +82,7 @@ class SceneModel(Description):
         for name, material in self.materials.items():
             if isinstance(material, Wrapper):
                 try:
-                    ways(name, self.materials)
+                    material_paths(name, self.materials)
                 except ValueError as error:
                     raise SceneError(str(error), ("materials", name)) from None
         if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:

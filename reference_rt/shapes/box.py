@@ -12,12 +12,12 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import larger, select, smaller
 from reference_rt.shapes import placement
 from reference_rt.shapes.placement import columns, local_point, world_surface
-from reference_rt.shapes.ray_simd import nearer_by
+from reference_rt.shapes.ray_simd import make_nearer
 from reference_rt.shapes.shape import (
     LightPoint,
-    Place,
     Shape,
     Spans,
+    TabulationContext,
     Tangents,
     lane_vector,
     lift,
@@ -33,7 +33,7 @@ class Box(Shape):
 
     type: Literal["box"] = "box"
 
-    def tabulate(self, context: Place) -> "Boxes":
+    def tabulate(self, context: TabulationContext) -> "Boxes":
         m = self.map_in(context)
         edges = m[:, :3]
         face_areas = 4.0 * np.linalg.norm(np.cross(edges.T[[1, 2, 0]], edges.T[[2, 0, 1]]), axis=1)
@@ -130,7 +130,7 @@ def distance(ray: Ray, center: Vec3, x_of: Vec3, y_of: Vec3, z_of: Vec3) -> floa
     return nearest
 
 
-nearer = nearer_by(distance)
+nearer = make_nearer(distance)
 
 
 @kernel

@@ -1,18 +1,18 @@
 """Closest hits by brute force, without a BVH: faster for scenes of a few shapes.
 
-Spheres, rectangles and boxes are tested with SIMD: LANES shapes against one ray (`nearest`), or
-one shape against LANES rays (`nearest_of_rays`).
+Spheres, rectangles and boxes are tested with SIMD: VECTOR_WIDTH shapes against one ray (`nearest`),
+or one shape against VECTOR_WIDTH rays (`nearest_of_rays`).
 """
 
 from typing import Any, NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Crossing, Hit, Ray, miss, no_hit
-from reference_rt.core.ray_block import Hits, Rays, ray_of
+from reference_rt.core.ray_block import HitBlock, RayBlock, ray_of
 from reference_rt.core.vec3 import row, triple
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes import box
 from reference_rt.shapes.box import Boxes
 from reference_rt.shapes.curved import sphere
@@ -63,15 +63,15 @@ _found = of_table("found", _not_found)
 def _nearest_in_packets(
     kind: int, table: Any, packets: FloatArray | None, ray: Ray, closest: Hit
 ) -> Hit:
-    """The nearest of `closest` and all shapes of a table, LANES shapes at a time."""
+    """The nearest of `closest` and all shapes of a table, VECTOR_WIDTH shapes at a time."""
     if table is None:
         return closest
     if packets is None:
         return closest
-    distances = local_floats(LANES)
+    distances = local_floats(VECTOR_WIDTH)
     best, t = -1, closest.t
     for k in range(len(packets)):
-        for lane in range(LANES):
+        for lane in range(VECTOR_WIDTH):
             distances[lane] = _lane_distance(table, packets, k, lane, ray)
         best, t = nearest_lane(distances, k, best, t)
     if best < 0:
@@ -140,16 +140,16 @@ def _nearest_triangle(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hi
 
 
 _KIND = 2**40
-"""`Hits.codes` are kind * _KIND + row."""
+"""`HitBlock.codes` are kind * _KIND + row."""
 
 
 @kernel
-def nearest_of_rays(shapes: Shapes, rays: Rays, hits: Hits, n: int, any_hit: bool) -> None:
-    """Test the first n of `rays`, LANES at a time, against the types with SIMD kernels; writes
-    `hits`, which `nearest_of_ray` completes.  any_hit: against all types, and the result is only
-    whether a ray hits anything, which is the sign of its code."""
-    t, codes = local_floats(LANES), local_integers(LANES)
-    for at in range(0, n, LANES):
+def nearest_of_rays(shapes: Shapes, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
+    """Test the first n of `rays`, VECTOR_WIDTH at a time, against the types with SIMD kernels;
+    writes `hits`, which `nearest_of_ray` completes.  any_hit: against all types, and the result is
+    only whether a ray hits anything, which is the sign of its code."""
+    t, codes = local_floats(VECTOR_WIDTH), local_integers(VECTOR_WIDTH)
+    for at in range(0, n, VECTOR_WIDTH):
         begin(rays.numbers, at, t, codes)
         _nearer_spheres(shapes.spheres, rays, at, t, codes)
         _nearer_rectangles(shapes.rectangles, rays, at, t, codes)
@@ -163,7 +163,7 @@ def nearest_of_rays(shapes: Shapes, rays: Rays, hits: Hits, n: int, any_hit: boo
 
 
 @kernel
-def nearest_of_ray(shapes: Shapes, ray: Ray, hits: Hits, j: int) -> Hit:
+def nearest_of_ray(shapes: Shapes, ray: Ray, hits: HitBlock, j: int) -> Hit:
     """`nearest` for ray number j, after `nearest_of_rays`."""
     closest = _hit_of_code(shapes, ray, hits.codes[j], hits.numbers[j])
     return _nearest_of_others(shapes, ray, closest)
@@ -186,7 +186,7 @@ def _hit_of_code(shapes: Shapes, ray: Ray, code: int, t: float) -> Hit:
 
 @kernel
 def _nearer_spheres(
-    spheres: Spheres | None, rays: Rays, at: int, t: FloatArray, codes: IntArray
+    spheres: Spheres | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
 ) -> None:
     if spheres is not None:
         for i in range(len(spheres.owner)):
@@ -196,7 +196,7 @@ def _nearer_spheres(
 
 @kernel
 def _nearer_rectangles(
-    table: Rectangles | None, rays: Rays, at: int, t: FloatArray, codes: IntArray
+    table: Rectangles | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
 ) -> None:
     if table is not None:
         for i in range(len(table.owner)):
@@ -206,7 +206,9 @@ def _nearer_rectangles(
 
 
 @kernel
-def _nearer_boxes(boxes: Boxes | None, rays: Rays, at: int, t: FloatArray, codes: IntArray) -> None:
+def _nearer_boxes(
+    boxes: Boxes | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
+) -> None:
     if boxes is not None:
         for i in range(len(boxes.owner)):
             of = boxes.to_local

@@ -11,7 +11,7 @@ from reference_rt.shapes.meshes.watertight import Shear
 from reference_rt.shapes.shape import Spans, no_spans, one_span
 from reference_rt.shapes.tables import BOX, QUADRIC, SPHERE, TORUS, Shapes, by_code
 
-MOST = 4
+MAX_CROSSINGS = 4
 """The most crossings of one primitive: of a torus, and of a capped quadric of two sheets."""
 
 
@@ -47,6 +47,6 @@ def _rows(table: Any) -> int:
 
 
 @by_code(lambda module: _rows)
-def number_of(shapes: Shapes, kind: int) -> int:
+def primitive_count(shapes: Shapes, kind: int) -> int:
     """The number of primitives of a kind."""
     return 0

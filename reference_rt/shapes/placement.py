@@ -15,10 +15,10 @@ from reference_rt.core.ray import UNIT_ROUNDOFF, Ray, SurfacePoint
 from reference_rt.core.transform import Affine, invert
 from reference_rt.core.vec3 import Vec3, dot, length, max_abs, row, triple
 from reference_rt.jit.kernel import kernel
-from reference_rt.shapes.shape import Place, outward
+from reference_rt.shapes.shape import TabulationContext, outward
 
 
-def columns(m: Affine, context: Place) -> dict[str, Any]:
+def columns(m: Affine, context: TabulationContext) -> dict[str, Any]:
     """The columns of every table of placed primitives, one row, for the map m of one shape."""
     return {
         "center": m[:, 3].copy()[None],
@@ -28,7 +28,7 @@ def columns(m: Affine, context: Place) -> dict[str, Any]:
     }
 
 
-def owners(context: Place) -> dict[str, Any]:
+def owners(context: TabulationContext) -> dict[str, Any]:
     """The columns of every table of shapes, one row.
 
     owner: the shape id, an index in the scene (in the group);  material, light: rows of those

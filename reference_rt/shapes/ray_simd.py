@@ -1,7 +1,7 @@
-"""A block of rays against one shape, LANES rays at a time, as vector instructions.
+"""A block of rays against one shape, VECTOR_WIDTH rays at a time, as vector instructions.
 
 The shape's kernel `distance` is a generic function (`jit/simd.py`): it runs for one ray, and for
-LANES rays at once.
+VECTOR_WIDTH rays at once.
 """
 
 import math
@@ -16,9 +16,9 @@ from numba.extending import intrinsic
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import BLOCK, Ray
 from reference_rt.core.vec3 import Vec3
-from reference_rt.jit.simd import I64, LANES, REALS, Lanes, in_all_lanes
+from reference_rt.jit.simd import F64_VECTOR, I64, VECTOR_WIDTH, SimdVector, broadcast
 
-_WORDS = ir.VectorType(I64, LANES)
+_WORDS = ir.VectorType(I64, VECTOR_WIDTH)
 _FIRST = I64(0)
 
 
@@ -41,31 +41,31 @@ class _Writer:
     ) -> None:
         self.builder.store(value, self._place(array_type, array, value.type, at), align=8)
 
-    def lanes(self, value: ir.Value, *at: int) -> Lanes:
+    def lanes(self, value: ir.Value, *at: int) -> SimdVector:
         """A number of a tuple, in every lane."""
         number = self.builder.extract_value(value, at)
-        return Lanes(self.builder, in_all_lanes(self.builder, number))
+        return SimdVector(self.builder, broadcast(self.builder, number))
 
     def vector(self, value: ir.Value, k: int) -> Vec3:
         """Item k of a tuple, a `Vec3`, in every lane."""
         components: list[Any] = [self.lanes(value, k, axis) for axis in range(3)]
         return Vec3(*components)
 
-    def column(self, array_type: Any, rays: ir.Value, column: int, at: ir.Value) -> Lanes:
-        """One component (see `Rays.numbers`) of LANES rays."""
+    def column(self, array_type: Any, rays: ir.Value, column: int, at: ir.Value) -> SimdVector:
+        """One component (see `RayBlock.numbers`) of VECTOR_WIDTH rays."""
         place = self.builder.add(at, I64(column * BLOCK))
-        return Lanes(self.builder, self.load(array_type, rays, REALS, place))
+        return SimdVector(self.builder, self.load(array_type, rays, F64_VECTOR, place))
 
 
-def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
+def make_nearer(distance: Callable[..., Any]) -> Callable[..., None]:
     """The kernel nearer(rays, at, shape, code, t, codes) of a `distance(ray, *shape)`.
 
-    It tests LANES rays, from number `at` on, of `rays` (`ray_block.Rays.numbers`) against a shape.
-    For each that meets the shape before t (LANES,), it writes the distance to t and `code` to codes
-    (LANES,).
+    It tests VECTOR_WIDTH rays, from number `at` on, of `rays` (`RayBlock.numbers`) against a shape.
+    For each that meets the shape before t (VECTOR_WIDTH,), it writes the distance to t and `code`
+    to codes (VECTOR_WIDTH,).
     """
     if numba.config.DISABLE_JIT:
-        return nearer_plainly(distance)
+        return make_plain_nearer(distance)
 
     @intrinsic  # type: ignore[untyped-decorator]
     def nearer(
@@ -83,10 +83,10 @@ def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
             ]
             ray = Ray(Vec3(*numbers[:3]), Vec3(*numbers[3:]), math.inf)
             found = distance(ray, *arguments).value
-            best = writer.load(t, t_value, REALS)
+            best = writer.load(t, t_value, F64_VECTOR)
             which = writer.load(codes, codes_value, _WORDS)
             is_nearer = builder.fcmp_ordered("<", found, best)
-            own = in_all_lanes(builder, code_value, _WORDS)
+            own = broadcast(builder, code_value, _WORDS)
             writer.store(t, t_value, builder.select(is_nearer, found, best))
             writer.store(codes, codes_value, builder.select(is_nearer, own, which))
             return context.get_dummy_value()
@@ -98,13 +98,13 @@ def nearer_by(distance: Callable[..., Any]) -> Callable[..., None]:
     return made
 
 
-def nearer_plainly(distance: Callable[..., Any]) -> Callable[..., None]:
-    """The kernel that `nearer_by` returns, as plain Python."""
+def make_plain_nearer(distance: Callable[..., Any]) -> Callable[..., None]:
+    """The kernel that `make_nearer` returns, as plain Python."""
 
     def nearer(
         rays: FloatArray, at: int, shape: Any, code: int, t: FloatArray, codes: IntArray
     ) -> None:
-        for lane in range(LANES):
+        for lane in range(VECTOR_WIDTH):
             x = [rays[k * BLOCK + at + lane] for k in range(6)]
             found = distance(Ray(Vec3(*x[:3]), Vec3(*x[3:]), math.inf), *shape)
             if found < t[lane]:
@@ -114,13 +114,13 @@ def nearer_plainly(distance: Callable[..., Any]) -> Callable[..., None]:
 
 
 def _begin(rays: FloatArray, at: int, t: FloatArray, codes: IntArray) -> None:
-    """Initialise for LANES rays from number `at` on, without hits: t = t_max, codes = -1."""
-    t[:], codes[:] = rays[6 * BLOCK + at : 6 * BLOCK + at + LANES], -1
+    """Initialise for VECTOR_WIDTH rays from number `at` on, without hits: t = t_max, codes = -1."""
+    t[:], codes[:] = rays[6 * BLOCK + at : 6 * BLOCK + at + VECTOR_WIDTH], -1
 
 
 def _end(t: FloatArray, codes: IntArray, at: int, to: FloatArray, to_codes: IntArray) -> None:
-    """Store t and codes of LANES rays to the results of the rays from number `at` on."""
-    to[at : at + LANES], to_codes[at : at + LANES] = t, codes
+    """Store t and codes of VECTOR_WIDTH rays to the results of the rays from number `at` on."""
+    to[at : at + VECTOR_WIDTH], to_codes[at : at + VECTOR_WIDTH] = t, codes
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -128,7 +128,7 @@ def _begin_lanes(typing_context: Any, rays: Any, at: Any, t: Any, codes: Any) ->
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         writer = _Writer(context, builder)
         writer.store(t, values[2], writer.column(rays, values[0], 6, values[1]).value)
-        writer.store(codes, values[3], ir.Constant(_WORDS, [-1] * LANES))
+        writer.store(codes, values[3], ir.Constant(_WORDS, [-1] * VECTOR_WIDTH))
         return context.get_dummy_value()
 
     return types.void(rays, types.int64, t, codes), generate
@@ -138,7 +138,7 @@ def _begin_lanes(typing_context: Any, rays: Any, at: Any, t: Any, codes: Any) ->
 def _end_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_codes: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         writer = _Writer(context, builder)
-        writer.store(to, values[3], writer.load(t, values[0], REALS), values[2])
+        writer.store(to, values[3], writer.load(t, values[0], F64_VECTOR), values[2])
         writer.store(to_codes, values[4], writer.load(codes, values[1], _WORDS), values[2])
         return context.get_dummy_value()
 

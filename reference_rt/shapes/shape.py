@@ -13,14 +13,14 @@ from reference_rt.core.model import Description
 from reference_rt.core.transform import IDENTITY, Affine, Transform, affine, compose, invert
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 
 
 def _ignore_warning(owner: int, message: str) -> None:
     """Ignores a warning: of a shape that is tabulated once more, after the scene has warned."""
 
 
-class Place(NamedTuple):
+class TabulationContext(NamedTuple):
     """The context in which a shape is tabulated.
 
     owner: the shape id, its index in the scene (in its group);  material: the row of its material;
@@ -44,7 +44,7 @@ class Shape(Description):
     transform: Transform = ()
     """Steps from the shape's own coordinates to the world's, the first one first."""
 
-    def tabulate(self, context: Place) -> Any:
+    def tabulate(self, context: TabulationContext) -> Any:
         """This shape as rows of its table.  Raises ValueError (what is wrong, what was
         expected)."""
         raise NotImplementedError
@@ -61,7 +61,7 @@ class Shape(Description):
         """The points of the first solid that are not in the second."""
         return Difference(of=(self, other))
 
-    def map_in(self, context: Place) -> Affine:
+    def map_in(self, context: TabulationContext) -> Affine:
         """The map from the shape's own coordinates to those of the context: its transform, then
         `context.outer`.  Raises ValueError for one that flattens space."""
         if not self.transform and context.outer is IDENTITY:
@@ -107,8 +107,8 @@ def pack(*columns: FloatArray) -> FloatArray:
     Rows of NaN fill the last packet: every comparison with them fails.
     """
     table = np.concatenate([c.reshape(len(c), -1) for c in columns], axis=1)
-    padding = np.full((-len(table) % LANES, table.shape[1]), np.nan)
-    packets = np.concatenate([table, padding]).reshape(-1, LANES, table.shape[1])
+    padding = np.full((-len(table) % VECTOR_WIDTH, table.shape[1]), np.nan)
+    packets = np.concatenate([table, padding]).reshape(-1, VECTOR_WIDTH, table.shape[1])
     return np.ascontiguousarray(packets.transpose(0, 2, 1))
 
 
@@ -125,9 +125,9 @@ def lane_vector(packets: FloatArray, packet: int, column: int, lane: int) -> Vec
 @kernel
 def nearest_lane(d: FloatArray, packet: int, best: int, t: float) -> tuple[int, float]:
     """Updates (row, distance) of the nearest so far with the distances of a packet's lanes."""
-    for lane in range(LANES):
+    for lane in range(VECTOR_WIDTH):
         nearer = d[lane] < t
-        best = packet * LANES + lane if nearer else best
+        best = packet * VECTOR_WIDTH + lane if nearer else best
         t = min(t, d[lane])
     return best, t
 

@@ -14,7 +14,7 @@ from reference_rt.shapes import TABLES, TRIANGLE, Shapes, csg
 from reference_rt.shapes.meshes.topology import describe_boundary
 from reference_rt.shapes.meshes.triangle import Triangles, on_line
 from reference_rt.shapes.meshes.watertight import Shear, project, shear_of
-from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.shape import Shape, TabulationContext
 from reference_rt.textbook.method import FloatArray, ray_of
 
 
@@ -62,7 +62,7 @@ def _tree(shape: Shape, outer: Affine, folder: Path) -> Tree:
     if isinstance(shape, csg.Solid):
         parts = tuple(_tree(part, to_world, folder) for part in shape.of)
         return Combination(_OPERATIONS[type(shape)], parts)
-    table = shape.tabulate(Place(folder=folder, outer=outer))
+    table = shape.tabulate(TabulationContext(folder=folder, outer=outer))
     kind, field, _, module = next(entry for entry in TABLES if entry[2] is type(table))
     shapes = Shapes(**(dict.fromkeys(Shapes._fields) | {field: table}))
     if kind == TRIANGLE:

@@ -25,7 +25,7 @@ class Textures(NamedTuple):
     vertex_colours: VertexColourTable | None
 
 
-class Looked(NamedTuple):
+class CachedLookups(NamedTuple):
     """Cached lookups, in place of `Textures`.  values (3 n,): the colours, at the hit, of those of
     all n textures that its material uses."""
 
@@ -39,7 +39,7 @@ class At(NamedTuple):
     is none;  textures: None if the scene has none; the other fields are then undefined.
     """
 
-    textures: Textures | Looked | None
+    textures: Textures | CachedLookups | None
     u: float
     v: float
     colour: Vec3
@@ -81,7 +81,7 @@ def _no_colour(textures: None, k: int, at: At) -> Vec3:
 
 
 @kernel
-def _looked(looked: Looked, k: int, at: At) -> Vec3:
+def _looked(looked: CachedLookups, k: int, at: At) -> Vec3:
     values = looked.values
     return Vec3(values[3 * k], values[3 * k + 1], values[3 * k + 2])
 
@@ -95,7 +95,7 @@ def _ask(textures: Textures, k: int, at: At) -> Vec3:
 
 _choice = ByClass("lookup")
 _choice.register(type(None), _no_colour)
-_choice.register(Looked, _looked)
+_choice.register(CachedLookups, _looked)
 _choice.register(Textures, _ask)
 _lookup = _choice.function
 

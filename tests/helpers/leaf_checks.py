@@ -32,18 +32,18 @@ _MODULES = {
     rough_dielectric.RoughDielectrics: rough_dielectric,
     rough_plastic.RoughPlastics: rough_plastic,
 }
-_both, _sample = ByClass("both"), ByClass("sample")
+_eval_pdf, _sample = ByClass("eval_pdf"), ByClass("sample")
 for _table, _module in _MODULES.items():
-    _both.register(_table, _module.both)
+    _eval_pdf.register(_table, _module.eval_pdf)
     _sample.register(_table, _module.sample)
-_both_one, _sample_one = _both.function, _sample.function
+_eval_pdf_one, _sample_one = _eval_pdf.function, _sample.function
 
 
 def _evaluate_rows(table, wo, wi, values, densities):
     at = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
     for i in range(len(wo)):
         a, b = Vec3(wo[i, 0], wo[i, 1], wo[i, 2]), Vec3(wi[i, 0], wi[i, 1], wi[i, 2])
-        values[i], densities[i] = _both_one(table, 0, at, a, b)
+        values[i], densities[i] = _eval_pdf_one(table, 0, at, a, b)
 
 
 def _sample_rows(table, wo, u, wi, weights, others):

@@ -13,7 +13,7 @@ from reference_rt.core.vec3 import dot, frame_from_normal, row
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.shapes import QUADRIC
 from reference_rt.shapes.curved import quadrics
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 # ---- what the kernels say -----------------------------------------------------------------------
 
@@ -61,7 +61,7 @@ def _probe(table, o, d, guides, out):
 
 
 def table_of(shape):
-    return shape.tabulate(Place())
+    return shape.tabulate(TabulationContext())
 
 
 def probe(shape, o, d, guides=None) -> Probe:

@@ -19,7 +19,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import BLOCK, Hit, Ray, SurfacePoint, ray_from
 from reference_rt.core.ray_block import (
     RAY_FLOATS,
-    Rays,
+    RayBlock,
     add_vector,
     put_ray,
     put_vector,
@@ -38,15 +38,22 @@ from reference_rt.core.vec3 import (
 )
 from reference_rt.integrators import Path
 from reference_rt.integrators.direct_light import power_heuristic
-from reference_rt.integrators.path import ROULETTE_CAP, Lit
+from reference_rt.integrators.path import ROULETTE_CAP, LightConnection
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_integers
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.lights import Constant
 from reference_rt.lights.emitters.constant import PDF
 from reference_rt.materials import Diffuse
 from reference_rt.materials.material import INV_PI
 from reference_rt.rendering.scene import Scene
-from reference_rt.sampling import PAIR_FLOATS, PAIR_INTEGERS, Samplers, Sobol, blocks, forget_pairs
+from reference_rt.sampling import (
+    PAIR_FLOATS,
+    PAIR_INTEGERS,
+    Samplers,
+    Sobol,
+    blocks,
+    invalidate_pairs,
+)
 from reference_rt.sampling.blocks import BlockSample
 from reference_rt.sampling.sobol import SobolSetup
 from reference_rt.sampling.warp import cosine_hemisphere, uniform_sphere
@@ -72,9 +79,9 @@ class Scratch(NamedTuple):
     """As `reference_rt.integrators.scratch.Scratch`;  hits: distances (BLOCK,), and the spheres
     (BLOCK,), -1 for none;  states (STATE_FLOATS,): throughput and pdf of paths."""
 
-    rays: Rays
+    rays: RayBlock
     totals: FloatArray
-    shadows: Rays
+    shadows: RayBlock
     lights: FloatArray
     lit: IntArray
     distances: FloatArray
@@ -128,10 +135,12 @@ def world_of(scene: Scene) -> World:
 
 
 @kernel
-def _nearest(spheres: Spheres, rays: Rays, distances: FloatArray, hits: IntArray, n: int) -> None:
+def _nearest(
+    spheres: Spheres, rays: RayBlock, distances: FloatArray, hits: IntArray, n: int
+) -> None:
     """The nearest sphere to each of the first n rays."""
-    t, codes = local_floats(LANES), local_integers(LANES)
-    for at in range(0, n, LANES):
+    t, codes = local_floats(VECTOR_WIDTH), local_integers(VECTOR_WIDTH)
+    for at in range(0, n, VECTOR_WIDTH):
         begin_lanes(rays.numbers, at, t, codes)
         for i in range(len(spheres.radius)):
             shape = (row(spheres.center, i), spheres.radius[i])
@@ -160,9 +169,9 @@ def _put_state(scratch: Scratch, j: int, k: int, state: State) -> None:
 @kernel
 def _next_event(
     world: World, state: State, shading: Shading, sampler: BlockSample, depth: int
-) -> Lit:
+) -> LightConnection:
     point = shading.point
-    nothing = Lit(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
+    nothing = LightConnection(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
     u0, u1 = blocks.draw(sampler, sampling.PER_BOUNCE * depth + sampling.LIGHT_POINT)
     towards = uniform_sphere(u0, u1)
     wi = to_local(shading.frame, towards)
@@ -171,7 +180,7 @@ def _next_event(
     density = wi.z * INV_PI
     weight = power_heuristic(PDF, density)
     arriving = row(world.reflectance, point.material) * density * world.sky * (weight / PDF)
-    return Lit(state.throughput * arriving, ray_from(point, towards))
+    return LightConnection(state.throughput * arriving, ray_from(point, towards))
 
 
 @kernel
@@ -246,7 +255,7 @@ def _radiances(
 
 
 @entry_kernel
-def render_band(
+def render_tile(
     max_depth: int,
     rr_depth: int,
     world: World,
@@ -260,11 +269,11 @@ def render_band(
     first: int,
     last: int,
 ) -> None:
-    """As `reference_rt.rendering.tiles.render_band`."""
+    """As `reference_rt.rendering.tiles.render_tile`."""
     scratch = Scratch(
-        rays=Rays(local_floats(RAY_FLOATS)),
+        rays=RayBlock(local_floats(RAY_FLOATS)),
         totals=local_floats(VECTOR_FLOATS),
-        shadows=Rays(local_floats(RAY_FLOATS)),
+        shadows=RayBlock(local_floats(RAY_FLOATS)),
         lights=local_floats(VECTOR_FLOATS),
         lit=local_integers(BLOCK),
         distances=local_floats(BLOCK),
@@ -277,7 +286,7 @@ def render_band(
     samplers = Samplers(setup, pixels, numbers, pairs, made)
     for k in range(RAY_FLOATS):  # see `reference_rt.integrators.scratch.prepare`
         scratch.rays.numbers[k] = scratch.shadows.numbers[k] = 1.0
-    forget_pairs(samplers)
+    invalidate_pairs(samplers)
     width, height = shape
     count = last - first
     paths = (end - begin) * count

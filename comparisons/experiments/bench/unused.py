@@ -16,7 +16,7 @@ from reference_rt.integrators import Path
 from reference_rt.jit.kernel import precompile, signature_of
 from reference_rt.lights import Constant
 from reference_rt.materials import AnyMaterial, Diffuse
-from reference_rt.rendering.render import Picture, render, run_bands
+from reference_rt.rendering.render import Picture, render, run_tiles
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Sobol
 from reference_rt.shapes import Sphere
@@ -124,8 +124,8 @@ def render_pruned(scene: Scene, threads: int | None = None) -> Picture:
         out.reshape(-1, 3),
     )
     pixels, threads = out[..., 0].size, threads or os.cpu_count() or 1
-    band = precompile(spheres_only.render_band, signature_of(*arguments, 0, 0, 0, 0))
-    run_bands(band, arguments, pixels, sampler.spp, threads, _silent)
+    band = precompile(spheres_only.render_tile, signature_of(*arguments, 0, 0, 0, 0))
+    run_tiles(band, arguments, pixels, sampler.spp, threads, _silent)
     return Picture({"colour": out})
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from reference_rt.accel.bvh.nodes import Nodes
 from reference_rt.accel.bvh.wide import CHILDREN, NOTHING, Bvh, codes_of
 from reference_rt.core.arrays import FloatArray
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 
 
 class Statistics(NamedTuple):
@@ -56,7 +56,7 @@ def of_wide(bvh: Bvh) -> Statistics:
     while len(level) > 0:
         depth += 1
         children = codes_of(bvh)[level].astype(np.int64)
-        planes = bvh.boxes[level, :CHILDREN].reshape(-1, 6, LANES).transpose(0, 2, 1)
+        planes = bvh.boxes[level, :CHILDREN].reshape(-1, 6, VECTOR_WIDTH).transpose(0, 2, 1)
         there = children != NOTHING
         codes.append(children[there])
         boxes.append(planes[there].astype(np.float64))
@@ -64,10 +64,10 @@ def of_wide(bvh: Bvh) -> Statistics:
     code, box = np.concatenate(codes), np.concatenate(boxes)
     leaf = code < 0
     sizes = ((-1 - code[leaf]) >> 1) & 15
-    is_packet = (-1 - code[leaf]) & 1 == 1
+    is_triangle_leaf = (-1 - code[leaf]) & 1 == 1
     root = np.concatenate([boxes[0][:, :3].min(axis=0), boxes[0][:, 3:].max(axis=0)])
     tests = np.ones(len(code) + 1)
-    tests[1:][leaf] = np.where(is_packet, 1, sizes)
+    tests[1:][leaf] = np.where(is_triangle_leaf, 1, sizes)
     return Statistics(
         nodes=1 + int((~leaf).sum()),
         leaves=int(leaf.sum()),

@@ -1,8 +1,9 @@
 """The BVH that rays traverse: its memory layout, nodes of up to eight children.
 
 A node's eight boxes are tested at once (`reference_rt.accel.single_ray`), and so are the triangles
-of a leaf (`shapes.meshes.watertight.see`): half as many steps as in a binary tree, and twice as
-many rays per second (measured on the Stanford bunny).  `widening` makes it from a binary one.
+of a leaf (`shapes.meshes.watertight.project_leaf`): half as many steps as in a binary tree, and
+twice as many rays per second (measured on the Stanford bunny).  `widening` makes it from a binary
+one.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from reference_rt.accel.bvh.nodes import STACK_SIZE
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 
 Singles = npt.NDArray[np.float32]
 Codes = npt.NDArray[np.int32]
@@ -27,11 +28,11 @@ CENTER = 28
 """The column of `Bvh.frames` with x of a tree's centre; after x, y, z follows the tree's size."""
 MOST_REFERENCES = 2**26
 """The most references: leaf codes have no bits for more."""
-WIDE_STACK = (LANES - 1) * (STACK_SIZE + 1)
+WIDE_STACK = (VECTOR_WIDTH - 1) * (STACK_SIZE + 1)
 """Stack entries of a traversal: at most seven siblings per level, and no more levels than the
 binary BVH has."""
 
-LEAF_SHARE = LANES
+LEAF_SHARE = VECTOR_WIDTH
 """The most references of a leaf."""
 
 
@@ -39,16 +40,16 @@ class Bvh(NamedTuple):
     """One or several BVHs, one after another, as traversals read them.
 
     A node is a row of 256 bytes, with three views:
-    boxes (n, 64): float32, lower x of LANES children, lower y, lower z, upper x, y and z, relative
-    to the tree's centre and rounded outwards (boxes only cull, so that half the memory suffices);
-    children (64 n,): int32, in each node from CHILDREN on the children's codes;
+    boxes (n, 64): float32, lower x of VECTOR_WIDTH children, lower y, lower z, upper x, y and z,
+    relative to the tree's centre and rounded outwards (boxes only cull, so that half the memory
+    suffices); children (64 n,): int32, in each node from CHILDREN on the children's codes;
     frames (n, 32): float64, in a tree's root from CENTER on its centre and its size, the largest
     magnitude of a coordinate.
 
     The code of a node is its row, that of a leaf is its `leaf_code`.  references (m, 2): kind and
     row of each reference, leaf after leaf;  corners (9 m + 8,): the vertices of leaves with
-    triangles only, see `shapes.meshes.watertight.see`, None without such leaves;  unbounded: the
-    root of the tree over everything that has no finite box, -1 for none.
+    triangles only, see `shapes.meshes.watertight.project_leaf`, None without such leaves;
+    unbounded: the root of the tree over everything that has no finite box, -1 for none.
     """
 
     boxes: Singles
@@ -60,8 +61,8 @@ class Bvh(NamedTuple):
 
 
 class Wide(NamedTuple):
-    """One wide BVH: boxes (n, 6, LANES) in world space, codes (n, LANES) of the children; lanes
-    without a child hold the empty box and NOTHING."""
+    """One wide BVH: boxes (n, 6, VECTOR_WIDTH) in world space, codes (n, VECTOR_WIDTH) of the
+    children; lanes without a child hold the empty box and NOTHING."""
 
     boxes: FloatArray
     codes: IntArray
@@ -72,10 +73,10 @@ NOTHING = -1
 
 
 @kernel
-def leaf_code(first: int, size: int, is_packet: bool) -> int:
+def leaf_code(first: int, size: int, is_triangle_leaf: bool) -> int:
     """The code of a leaf of references first..first + size, at most LEAF_SHARE;  is_packet: all are
     triangles, with vertices in `Bvh.corners`."""
-    return -1 - (32 * first + 2 * size + int(is_packet))
+    return -1 - (32 * first + 2 * size + int(is_triangle_leaf))
 
 
 @kernel
@@ -91,7 +92,7 @@ def size_of(code: int) -> int:
 
 
 @kernel
-def is_packet(code: int) -> bool:
+def is_triangle_leaf(code: int) -> bool:
     """Whether all of a leaf's references are triangles, stored as SoA in `Bvh.corners`."""
     return (-1 - code) & 1 == 1
 
@@ -104,8 +105,8 @@ def child_of(bvh: Bvh, node: int, lane: int) -> int:
 
 
 def codes_of(bvh: Bvh) -> Codes:
-    """The codes of all nodes' children (n, LANES)."""
-    return bvh.children.reshape(-1, NODE_SINGLES)[:, CHILDREN : CHILDREN + LANES]
+    """The codes of all nodes' children (n, VECTOR_WIDTH)."""
+    return bvh.children.reshape(-1, NODE_SINGLES)[:, CHILDREN : CHILDREN + VECTOR_WIDTH]
 
 
 @kernel
@@ -148,9 +149,11 @@ def joined(
         boxes[here, : CHILDREN // 2] = _below(tree.boxes[:, :3], center)
         boxes[here, CHILDREN // 2 : CHILDREN] = -_below(-tree.boxes[:, 3:], -center)
         codes = np.where(tree.codes < NOTHING, tree.codes - 32 * reference, tree.codes)
-        children[here, CHILDREN : CHILDREN + LANES] = np.where(codes >= 0, codes + node, codes)
+        children[here, CHILDREN : CHILDREN + VECTOR_WIDTH] = np.where(
+            codes >= 0, codes + node, codes
+        )
         node, reference = here.stop, reference + len(of_tree)
-    codes = children[:, CHILDREN : CHILDREN + LANES].astype(np.int64)
+    codes = children[:, CHILDREN : CHILDREN + VECTOR_WIDTH].astype(np.int64)
     references = np.column_stack([np.concatenate(kinds), np.concatenate(rows)]).astype(np.int32)
     corners = None if vertices is None else _corners_of(vertices, codes, references[:, 1])
     return Bvh(boxes, children.reshape(-1), frames, references, corners, -1)
@@ -164,7 +167,8 @@ def _aligned(n: int) -> FloatArray:
 
 
 def _below(planes: FloatArray, center: FloatArray) -> Singles:
-    """float32 numbers (n, 3 LANES), none above its plane (n, 3, LANES) minus the centre."""
+    """float32 numbers (n, 3 VECTOR_WIDTH), none above its plane (n, 3, VECTOR_WIDTH) minus the
+    centre."""
     with np.errstate(over="ignore"):
         exact = np.nextafter(planes - center[None, :, None], -np.inf)
         rounded = exact.astype(np.float32)
@@ -179,7 +183,7 @@ def _corners_of(vertices: FloatArray, codes: IntArray, rows: Codes) -> FloatArra
     if len(leaves) == 0:
         return None
     first, size = (-1 - leaves) >> 5, ((-1 - leaves) >> 1) & 15
-    corners = np.zeros(9 * len(rows) + LANES)
+    corners = np.zeros(9 * len(rows) + VECTOR_WIDTH)
     for s in range(1, LEAF_SHARE + 1):
         at = first[size == s][:, None]
         lanes = vertices[rows[at + np.arange(s)]].transpose(0, 2, 1)

@@ -11,7 +11,7 @@ from reference_rt.accel.bvh.nodes import STACK_SIZE, Nodes, half_area
 from reference_rt.accel.bvh.wide import LEAF_SHARE, NOTHING, Wide, leaf_code
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import entry_kernel, kernel, local_integers
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 
 TRIANGLE_LEAF_COST, PRIMITIVE_COST = 1.0, 0.5
 """The cost of a leaf of triangles, and of each primitive in any other leaf, in units of the test of
@@ -38,9 +38,9 @@ def _plan(
 ) -> None:
     """Computes the cheapest way to turn each binary node into at most i children of a wide node.
 
-    cost, choice (n, LANES + 1): by node and i.  choice for i = 1: _INNER, or 0 for a leaf; for
-    i > 1: how many of the i go to the left child, or _FEWER: i - 1 are as cheap.  count, triangles
-    (n,): references below each node, and how many of these are triangles.
+    cost, choice (n, VECTOR_WIDTH + 1): by node and i.  choice for i = 1: _INNER, or 0 for a leaf;
+    for i > 1: how many of the i go to the left child, or _FEWER: i - 1 are as cheap.  count,
+    triangles (n,): references below each node, and how many of these are triangles.
     """
     n = len(nodes.first)
     for k in range(n):
@@ -48,22 +48,22 @@ def _plan(
         area = half_area(nodes.boxes[node])
         leaf = area * _leaf_cost(count[node], triangles[node])
         if nodes.size[node] > 0:
-            for i in range(1, LANES + 1):
+            for i in range(1, VECTOR_WIDTH + 1):
                 cost[node, i] = leaf
                 choice[node, i] = 0 if i == 1 else _FEWER
             continue
         left = nodes.first[node]
-        for i in range(2, LANES + 1):
+        for i in range(2, VECTOR_WIDTH + 1):
             cost[node, i], choice[node, i] = np.inf, 1
             for j in range(1, i):
                 both = cost[left, j] + cost[left + 1, i - j]
                 if both < cost[node, i]:
                     cost[node, i], choice[node, i] = both, j
-        inner = area + cost[node, LANES]
+        inner = area + cost[node, VECTOR_WIDTH]
         is_leaf = count[node] <= LEAF_SHARE and not inner < leaf
         cost[node, 1] = leaf if is_leaf else inner
         choice[node, 1] = 0 if is_leaf else _INNER
-        for i in range(2, LANES + 1):
+        for i in range(2, VECTOR_WIDTH + 1):
             if cost[node, i - 1] <= cost[node, i]:
                 cost[node, i], choice[node, i] = cost[node, i - 1], _FEWER
 
@@ -87,7 +87,7 @@ def _collapse(
         waiting -= 1
         node, row = jobs[waiting, 0], jobs[waiting, 1]
         # The binary node that a wide node is made of is always opened.
-        opening[0], shares[0] = node, LANES
+        opening[0], shares[0] = node, VECTOR_WIDTH
         top, lane, whole = 1, 0, True
         while top > 0:
             top -= 1
@@ -146,8 +146,8 @@ def widened(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
     n = len(nodes.first)
     start, count, triangles = np.empty((3, n), np.int64)
     _count(nodes, is_triangle, start, count, triangles)
-    choice = np.empty((n, LANES + 1), np.int8)
-    _plan(nodes, count, triangles, np.empty((n, LANES + 1)), choice)
+    choice = np.empty((n, VECTOR_WIDTH + 1), np.int8)
+    _plan(nodes, count, triangles, np.empty((n, VECTOR_WIDTH + 1)), choice)
     # Every wide node takes up at least one inner node.
     most = int((nodes.size == 0).sum())
     boxes, codes = _empty(most)
@@ -158,9 +158,9 @@ def widened(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
 
 
 def _empty(n: int) -> tuple[FloatArray, IntArray]:
-    boxes = np.empty((n, 6, LANES))
+    boxes = np.empty((n, 6, VECTOR_WIDTH))
     boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
-    return boxes, np.full((n, LANES), NOTHING)
+    return boxes, np.full((n, VECTOR_WIDTH), NOTHING)
 
 
 def _leaf(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
@@ -177,10 +177,10 @@ def _leaf(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
     rows: list[IntArray] = []
     # From the leaves up; the root comes last here and first in the result.
     while True:
-        parents = -(-len(level) // LANES)
-        padded = np.full(parents * LANES, NOTHING)
+        parents = -(-len(level) // VECTOR_WIDTH)
+        padded = np.full(parents * VECTOR_WIDTH, NOTHING)
         padded[: len(level)] = level
-        rows.extend(padded.reshape(parents, LANES))
+        rows.extend(padded.reshape(parents, VECTOR_WIDTH))
         if parents == 1:
             break
         level = np.arange(len(rows) - parents, len(rows))

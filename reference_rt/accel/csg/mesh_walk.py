@@ -4,10 +4,10 @@ import math
 from typing import NamedTuple
 
 from reference_rt.accel.bvh import NOTHING, WIDE_STACK, Bvh, first_of, row_of, size_of
-from reference_rt.accel.single_ray import enter, nearest_child, view_of
+from reference_rt.accel.single_ray import enter, nearest_child, slab_ray_of
 from reference_rt.core.ray import Ray
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.meshes.watertight import shear_of
@@ -50,8 +50,8 @@ def _walk(
     if triangles is None:
         return found, balance
     stack, waiting = local_integers(WIDE_STACK), local_floats(WIDE_STACK)
-    distances = local_floats(LANES)
-    slab_ray, shear = view_of(bvh, root, ray), shear_of(ray)
+    distances = local_floats(VECTOR_WIDTH)
+    slab_ray, shear = slab_ray_of(bvh, root, ray), shear_of(ray)
     node, top = root, 0
     while True:
         while node >= 0:

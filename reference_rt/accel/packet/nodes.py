@@ -4,20 +4,20 @@ and what each ray needs for the tests in leaves."""
 from typing import Any
 
 from reference_rt.accel.bvh import CENTER, FAR_SLACK, NODE_SINGLES, Bvh
-from reference_rt.accel.packet.packet import BUNDLE, RayPacket
+from reference_rt.accel.packet.packet import PACKET_SIZE, RayPacket
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import BLOCK
-from reference_rt.core.ray_block import Rays
+from reference_rt.core.ray_block import RayBlock
 from reference_rt.core.vec3 import component
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.simd import LANES, larger, smaller
-from reference_rt.jit.simd_kernels import lane_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, smaller
+from reference_rt.jit.simd_kernels import simd_kernel
 from reference_rt.shapes.meshes.watertight import Shear
 
-PER_RAY_FLOATS = 12 * BUNDLE
+PER_RAY_FLOATS = 12 * PACKET_SIZE
 
 
-@lane_kernel
+@simd_kernel
 def _entered(
     boxes: Any,
     node: Any,
@@ -49,11 +49,11 @@ def _entered(
     first = node * NODE_SINGLES
 
     def enter(row: Any, near: Any, least: Any, most: Any) -> Any:
-        side = boxes.load(first + row * LANES) - near
+        side = boxes.load(first + row * VECTOR_WIDTH) - near
         return smaller(side * least, side * most)
 
     def leave(row: Any, far: Any, least: Any, most: Any) -> Any:
-        side = boxes.load(first + row * LANES) - far
+        side = boxes.load(first + row * VECTOR_WIDTH) - far
         return larger(side * most, side * least)
 
     t_in = larger(0.0, enter(x, near_x, least_x, most_x))
@@ -67,11 +67,11 @@ def _entered(
 
 
 @kernel
-def enter_together(
+def enter_packet(
     bvh: Bvh, node: int, packet: RayPacket, t_max: float, distances: FloatArray
 ) -> int:
     """The children of a node whose boxes rays of a packet may enter, as bits; into distances
-    (LANES,) lower bounds of t."""
+    (VECTOR_WIDTH,) lower bounds of t."""
     return _entered(
         bvh.boxes,
         node,
@@ -95,7 +95,7 @@ def enter_together(
     )
 
 
-@lane_kernel
+@simd_kernel
 def _prepare_rays(
     rays: Any,
     x: Any,
@@ -112,16 +112,18 @@ def _prepare_rays(
     """Fills per_ray (PER_RAY_FLOATS,): near, far and inverse of each ray's `single_ray.SlabRay`,
     and the shear of `watertight.shear_of` for axes x, y, z."""
     place = ((center_x, error_x), (center_y, error_y), (center_z, error_z))
-    for j in range(0, BUNDLE, LANES):
+    for j in range(0, PACKET_SIZE, VECTOR_WIDTH):
         for k, (center, error) in enumerate(place):
             o, d = rays.load(k * BLOCK + j), rays.load((3 + k) * BLOCK + j)
-            per_ray.store(k * BUNDLE + j, o - center + error)
-            per_ray.store((3 + k) * BUNDLE + j, o - center - error)
-            per_ray.store((6 + k) * BUNDLE + j, 1.0 / (d + 0.0))  # of -0 inf too, as in `_slab`
+            per_ray.store(k * PACKET_SIZE + j, o - center + error)
+            per_ray.store((3 + k) * PACKET_SIZE + j, o - center - error)
+            per_ray.store(
+                (6 + k) * PACKET_SIZE + j, 1.0 / (d + 0.0)
+            )  # of -0 inf too, as in `_slab`
         d_x, d_y, d_z = (rays.load(axis * BLOCK + (3 * BLOCK + j)) for axis in (x, y, z))
-        per_ray.store(9 * BUNDLE + j, d_x / d_z)
-        per_ray.store(10 * BUNDLE + j, d_y / d_z)
-        per_ray.store(11 * BUNDLE + j, 1.0 / d_z)
+        per_ray.store(9 * PACKET_SIZE + j, d_x / d_z)
+        per_ray.store(10 * PACKET_SIZE + j, d_y / d_z)
+        per_ray.store(11 * PACKET_SIZE + j, 1.0 / d_z)
     return rays.load(0) <= float("inf")
 
 
@@ -135,7 +137,7 @@ def shear_axes(packet: RayPacket) -> tuple[int, int, int]:
 
 
 @kernel
-def prepare_rays(bvh: Bvh, packet: RayPacket, rays: Rays, per_ray: FloatArray) -> None:
+def prepare_rays(bvh: Bvh, packet: RayPacket, rays: RayBlock, per_ray: FloatArray) -> None:
     """Called before the first leaf only: most packets of a picture reach none."""
     x, y, z = shear_axes(packet)
     frame = bvh.frames
@@ -155,7 +157,7 @@ def prepare_rays(bvh: Bvh, packet: RayPacket, rays: Rays, per_ray: FloatArray) -
 
 
 @kernel
-def shear_in(packet: RayPacket, rays: Rays, j: int, per_ray: FloatArray) -> Shear:
+def shear_in(packet: RayPacket, rays: RayBlock, j: int, per_ray: FloatArray) -> Shear:
     """`watertight.shear_of` ray j of a packet."""
     x, y, z = shear_axes(packet)
     o = rays.numbers
@@ -166,13 +168,13 @@ def shear_in(packet: RayPacket, rays: Rays, j: int, per_ray: FloatArray) -> Shea
         o[x * BLOCK + j],
         o[y * BLOCK + j],
         o[z * BLOCK + j],
-        per_ray[9 * BUNDLE + j],
-        per_ray[10 * BUNDLE + j],
-        per_ray[11 * BUNDLE + j],
+        per_ray[9 * PACKET_SIZE + j],
+        per_ray[10 * PACKET_SIZE + j],
+        per_ray[11 * PACKET_SIZE + j],
     )
 
 
-@lane_kernel
+@simd_kernel
 def _enter_box(
     per_ray: Any,
     j: Any,
@@ -184,15 +186,15 @@ def _enter_box(
     far_y: Any,
     far_z: Any,
 ) -> Any:
-    """The mask of the rays j to j + LANES - 1 that enter a box before their ends: the slab test of
-    `single_ray`, one box for LANES rays."""
-    inverse = [per_ray.load(j + k * BUNDLE) for k in (6, 7, 8)]
+    """The mask of the rays j to j + VECTOR_WIDTH - 1 that enter a box before their ends: the slab
+    test of `single_ray`, one box for VECTOR_WIDTH rays."""
+    inverse = [per_ray.load(j + k * PACKET_SIZE) for k in (6, 7, 8)]
     t_in = larger(0.0, (near_x - per_ray.load(j)) * inverse[0])
-    t_in = larger(t_in, (near_y - per_ray.load(j + BUNDLE)) * inverse[1])
-    t_in = larger(t_in, (near_z - per_ray.load(j + 2 * BUNDLE)) * inverse[2])
-    t_out = smaller(ends.load(j), (far_x - per_ray.load(j + 3 * BUNDLE)) * inverse[0])
-    t_out = smaller(t_out, (far_y - per_ray.load(j + 4 * BUNDLE)) * inverse[1])
-    t_out = smaller(t_out, (far_z - per_ray.load(j + 5 * BUNDLE)) * inverse[2])
+    t_in = larger(t_in, (near_y - per_ray.load(j + PACKET_SIZE)) * inverse[1])
+    t_in = larger(t_in, (near_z - per_ray.load(j + 2 * PACKET_SIZE)) * inverse[2])
+    t_out = smaller(ends.load(j), (far_x - per_ray.load(j + 3 * PACKET_SIZE)) * inverse[0])
+    t_out = smaller(t_out, (far_y - per_ray.load(j + 4 * PACKET_SIZE)) * inverse[1])
+    t_out = smaller(t_out, (far_z - per_ray.load(j + 5 * PACKET_SIZE)) * inverse[2])
     return t_in <= t_out * FAR_SLACK
 
 
@@ -200,18 +202,18 @@ def _enter_box(
 def enter_child(
     bvh: Bvh, slot: int, packet: RayPacket, j: int, per_ray: FloatArray, ends: FloatArray
 ) -> int:
-    """The rays j to j + LANES - 1 of a packet that enter the child in a slot (node * LANES + lane)
-    before ends[j + lane], as bits."""
-    node, lane = slot // LANES, slot % LANES
+    """The rays j to j + VECTOR_WIDTH - 1 of a packet that enter the child in a slot (node *
+    VECTOR_WIDTH + lane) before ends[j + lane], as bits."""
+    node, lane = slot // VECTOR_WIDTH, slot % VECTOR_WIDTH
     box = bvh.boxes[node]
     return _enter_box(
         per_ray,
         j,
         ends,
-        float(box[packet.x * LANES + lane]),
-        float(box[packet.y * LANES + lane]),
-        float(box[packet.z * LANES + lane]),
-        float(box[(3 - packet.x) * LANES + lane]),
-        float(box[(5 - packet.y) * LANES + lane]),
-        float(box[(7 - packet.z) * LANES + lane]),
+        float(box[packet.x * VECTOR_WIDTH + lane]),
+        float(box[packet.y * VECTOR_WIDTH + lane]),
+        float(box[packet.z * VECTOR_WIDTH + lane]),
+        float(box[(3 - packet.x) * VECTOR_WIDTH + lane]),
+        float(box[(5 - packet.y) * VECTOR_WIDTH + lane]),
+        float(box[(7 - packet.z) * VECTOR_WIDTH + lane]),
     )

@@ -10,10 +10,10 @@ from reference_rt.core.ray import surface_error
 from reference_rt.core.scaled_ray import SHORT
 from reference_rt.core.vec3 import Vec3, component, max_abs
 from reference_rt.jit.kernel import kernel, reciprocal
-from reference_rt.jit.simd import LANES, larger, smaller
-from reference_rt.jit.simd_kernels import lane_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, smaller
+from reference_rt.jit.simd_kernels import simd_kernel
 
-BUNDLE = 16
+PACKET_SIZE = 16
 """Rays in a packet.  Measured on the bunny, camera rays along rows of 1024 pixels, at a time when
 every number was computed for each ray: 8 take 38 ns per ray, 16 take 30, 32 take 31, 64 take
 40."""
@@ -26,8 +26,8 @@ Chosen between gain and loss on spheres of triangles, 40 degrees of view.  Time 
 time without: 300 triangles 0.78 at 64 pixels a row and 1.31 at 32; 5,292 triangles 0.73 at 128 and
 1.30 at 64; 69,312 triangles 0.80 at 256 and 1.32 at 128; a million 0.70 at 1024 and 1.12 at 512."""
 
-_TURNS = 3 * LANES
-SPAN_FLOATS = 4 * _TURNS + LANES
+_TURNS = 3 * VECTOR_WIDTH
+SPAN_FLOATS = 4 * _TURNS + VECTOR_WIDTH
 
 
 class RayPacket(NamedTuple):
@@ -55,38 +55,39 @@ class RayPacket(NamedTuple):
 @kernel
 def may_be_coherent(first: Vec3, last: Vec3) -> bool:
     """A quick test of the first and the last direction: rejects most groups of random rays for a
-    few per cent of their time.  `bundle_of` decides on the others."""
+    few per cent of their time.  `packet_of` decides on the others."""
     length = 0.25 * max_abs(first)
     off = last - first
     return abs(off.x) <= length and abs(off.y) <= length and abs(off.z) <= length
 
 
-@lane_kernel
+@simd_kernel
 def _span(o: Any, d: Any, first: Any, boxes: Any, span: Any) -> Any:
     """Componentwise bounds of BUNDLE origins and directions, from float `first` of their arrays on.
 
-    Into span (SPAN_FLOATS,): the smallest numbers of o and d, then the largest, each as 3 LANES
-    numbers that are x, y, z in turn and still to be reduced; then how far each child of the root
-    reaches beyond the tree's centre.  Returns the mask of lanes whose numbers are all finite.
+    Into span (SPAN_FLOATS,): the smallest numbers of o and d, then the largest, each as 3
+    VECTOR_WIDTH numbers that are x, y, z in turn and still to be reduced; then how far each child
+    of the root reaches beyond the tree's centre.  Returns the mask of lanes whose numbers are all
+    finite.
     """
     is_finite = boxes.load(0) <= float("inf")
     for place, vectors in ((0, o), (_TURNS, d)):
-        for begin in range(0, 3 * LANES, LANES):
+        for begin in range(0, 3 * VECTOR_WIDTH, VECTOR_WIDTH):
             low = high = vectors.load(first + begin)
-            for more in range(0, 3 * BUNDLE, 3 * LANES):
+            for more in range(0, 3 * PACKET_SIZE, 3 * VECTOR_WIDTH):
                 x = vectors.load(first + (begin + more))
                 is_finite = is_finite & (abs(x) < float("inf"))
                 low, high = smaller(low, x), larger(high, x)
             span.store(place + begin, low)
             span.store(2 * _TURNS + place + begin, high)
-    upper = larger(boxes.load(3 * LANES), boxes.load(4 * LANES))
-    span.store(4 * _TURNS, larger(upper, boxes.load(5 * LANES)))
+    upper = larger(boxes.load(3 * VECTOR_WIDTH), boxes.load(4 * VECTOR_WIDTH))
+    span.store(4 * _TURNS, larger(upper, boxes.load(5 * VECTOR_WIDTH)))
     return is_finite
 
 
 @kernel
 def _lowest(span: FloatArray, place: int) -> Vec3:
-    """The smallest x, y and z of the 3 LANES numbers of `_span` at `place`."""
+    """The smallest x, y and z of the 3 VECTOR_WIDTH numbers of `_span` at `place`."""
     low = Vec3(span[place], span[place + 1], span[place + 2])
     for j in range(place + 3, place + _TURNS, 3):
         low = Vec3(min(low.x, span[j]), min(low.y, span[j + 1]), min(low.z, span[j + 2]))
@@ -103,13 +104,13 @@ def _highest(span: FloatArray, place: int) -> Vec3:
 
 
 @kernel
-def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArray) -> RayPacket:
+def packet_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArray) -> RayPacket:
     """The packet of the BUNDLE rays begin, begin + 1, ...; span (SPAN_FLOATS,) is scratch."""
-    is_coherent = _span(o, d, 3 * begin, bvh.boxes, span) == (1 << LANES) - 1
+    is_coherent = _span(o, d, 3 * begin, bvh.boxes, span) == (1 << VECTOR_WIDTH) - 1
     o_low, d_low = _lowest(span, 0), _lowest(span, _TURNS)
     o_high, d_high = _highest(span, 2 * _TURNS), _highest(span, 3 * _TURNS)
     reach = 0.0
-    for lane in range(LANES):
+    for lane in range(VECTOR_WIDTH):
         reach = max(reach, span[4 * _TURNS + lane])
     steep = Vec3(
         _least_abs(d_low.x, d_high.x),
@@ -123,7 +124,7 @@ def bundle_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArr
         axis = 1
     frame = bvh.frames
     size = frame[0, CENTER + 3]
-    # As in `view_of`, for a point as far from 0 as any of the origins.
+    # As in `slab_ray_of`, for a point as far from 0 as any of the origins.
     far_out = Vec3(
         max(abs(o_low.x), abs(o_high.x)),
         max(abs(o_low.y), abs(o_high.y)),

@@ -8,10 +8,10 @@ import numpy.typing as npt
 from reference_rt.accel.bvh import CENTER, NODE_SINGLES, STACK_SIZE, Bvh
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import BLOCK, SURFACE_ROUNDING
-from reference_rt.core.ray_block import Hits, Rays, ray_of
+from reference_rt.core.ray_block import HitBlock, RayBlock, ray_of
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.simd import LANES, larger, with_sign
-from reference_rt.jit.simd_kernels import lane_kernel, prefetch
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, with_sign
+from reference_rt.jit.simd_kernels import prefetch, simd_kernel
 from reference_rt.shapes.meshes.watertight import Shear
 
 Naturals = npt.NDArray[np.uint32]
@@ -22,7 +22,7 @@ LEVELS = STACK_SIZE
 
 
 @kernel
-def natural(numbers: Naturals, i: int) -> int:
+def load_index(numbers: Naturals, i: int) -> int:
     """Element i, converted to the integers that kernels compute with."""
     number: int = np.int64(numbers[i])  # type: ignore[assignment]
     return number
@@ -59,10 +59,10 @@ class Lengths(NamedTuple):
 
 
 @kernel
-def prepare(bvh: Bvh, state: StreamState, rays: Rays, n: int) -> None:
+def prepare(bvh: Bvh, state: StreamState, rays: RayBlock, n: int) -> None:
     """Computes what stays the same during the traversal of the first n rays: slab_rays and axes."""
     frame = bvh.frames
-    for j in range(0, n, LANES):
+    for j in range(0, n, VECTOR_WIDTH):
         _prepare_slab_rays(
             rays.numbers,
             j,
@@ -88,12 +88,12 @@ def prepare(bvh: Bvh, state: StreamState, rays: Rays, n: int) -> None:
         state.axes[5 * BLOCK + j] = z
 
 
-@lane_kernel
+@simd_kernel
 def _prepare_slab_rays(
     rays: Any, j: Any, center_x: Any, center_y: Any, center_z: Any, extent: Any, slab_rays: Any
 ) -> Any:
-    """`single_ray.view_of` the rays j to j + LANES - 1, without the rows;  extent: 3 times the
-    tree's size."""
+    """`single_ray.slab_ray_of` the rays j to j + VECTOR_WIDTH - 1, without the rows;  extent: 3
+    times the tree's size."""
     o = [rays.load(j + axis * BLOCK) for axis in range(3)]
     far_out = larger(larger(abs(o[0]), abs(o[1])), abs(o[2]))
     error = (far_out + far_out + extent) * SURFACE_ROUNDING
@@ -107,7 +107,7 @@ def _prepare_slab_rays(
 
 
 @kernel
-def start_at_root(state: StreamState, hits: Hits, root: int, n: int, any_hit: bool) -> Lengths:
+def start_at_root(state: StreamState, hits: HitBlock, root: int, n: int, any_hit: bool) -> Lengths:
     """Queues all rays at a root; with `any_hit` only those without a hit so far."""
     count = 0
     for j in range(n):
@@ -118,11 +118,11 @@ def start_at_root(state: StreamState, hits: Hits, root: int, n: int, any_hit: bo
 
 
 @kernel
-def shear_in(state: StreamState, rays: Rays, j: int) -> Shear:
+def shear_in(state: StreamState, rays: RayBlock, j: int) -> Shear:
     """`watertight.shear_of` ray j."""
     numbers, axes = rays.numbers, state.axes
-    x, y = natural(axes, 3 * BLOCK + j), natural(axes, 4 * BLOCK + j)
-    z = natural(axes, 5 * BLOCK + j)
+    x, y = load_index(axes, 3 * BLOCK + j), load_index(axes, 4 * BLOCK + j)
+    z = load_index(axes, 5 * BLOCK + j)
     d_z = numbers[(3 + z) * BLOCK + j]
     return Shear(
         x,
@@ -141,7 +141,7 @@ def slab_ray_in(slab_rays: Any, axes: Any, j: Any) -> Any:
     """Ray j as `single_ray.slab_test` takes it."""
     return [
         (
-            axes.natural(j + axis * BLOCK),
+            axes.load_index(j + axis * BLOCK),
             slab_rays.everywhere(j + axis * BLOCK),
             slab_rays.everywhere(j + (3 + axis) * BLOCK),
             slab_rays.everywhere(j + (6 + axis) * BLOCK),

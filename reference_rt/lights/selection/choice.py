@@ -13,7 +13,7 @@ FEW = 8
 """Lights that are picked by power alone; more are given a tree."""
 
 
-class Choice(NamedTuple):
+class LightSampler(NamedTuple):
     """All lights in one list: kind (n,) and row (n,) in the tables, the probability (n,) of picking
     it by power and the running sum (n,) of these, None if there is only one light;  bounded (1,):
     the probability of picking from the tree."""
@@ -26,7 +26,7 @@ class Choice(NamedTuple):
 
 
 @kernel
-def count(choice: Choice) -> int:
+def count(choice: LightSampler) -> int:
     """The number of lights: a compile-time constant if there is only one."""
     return _count(choice.cumulative)
 
@@ -39,7 +39,7 @@ def _count(cumulative: FloatArray | None) -> int:
 
 
 @kernel
-def pick(choice: Choice, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> Pick:
+def pick(choice: LightSampler, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> Pick:
     """A light for a surface at `p` with normal `n`; n = 0 for light from both sides."""
     if tree is None:
         return _by_power(choice.cumulative, choice, u)
@@ -51,7 +51,7 @@ def pick(choice: Choice, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> 
 
 
 @kernel
-def _by_power(cumulative: FloatArray | None, choice: Choice, u: float) -> Pick:
+def _by_power(cumulative: FloatArray | None, choice: LightSampler, u: float) -> Pick:
     """The light whose interval of the running sum contains `u`."""
     if cumulative is None:
         return Pick(0, 1.0)
@@ -60,7 +60,7 @@ def _by_power(cumulative: FloatArray | None, choice: Choice, u: float) -> Pick:
 
 
 @kernel
-def probability(choice: Choice, tree: LightTree | None, p: Vec3, n: Vec3, k: int) -> float:
+def probability(choice: LightSampler, tree: LightTree | None, p: Vec3, n: Vec3, k: int) -> float:
     """The probability that `pick` returns light k."""
     if tree is None:
         return _power_of(choice.cumulative, choice, k)
@@ -70,7 +70,7 @@ def probability(choice: Choice, tree: LightTree | None, p: Vec3, n: Vec3, k: int
 
 
 @kernel
-def _power_of(cumulative: FloatArray | None, choice: Choice, k: int) -> float:
+def _power_of(cumulative: FloatArray | None, choice: LightSampler, k: int) -> float:
     """The probability that `_by_power` returns light k."""
     if cumulative is None:
         return 1.0

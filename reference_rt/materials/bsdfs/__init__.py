@@ -7,7 +7,7 @@ in the contract of `materials`:
 - `both(table, i, at, wo, wi) -> Scattered`: f(wo, wi) |cos wi| and the density of `sample` per
   solid angle; needed by a material whose class says `smooth`;
 - `sample(table, i, at, wo, u_lobe, u0, u1) -> BsdfSample`: pdf = 0 means that sampling failed; its
-  weight and pdf agree with `both`; needed like `both`;
+  weight and pdf agree with `eval_pdf`; needed like `eval_pdf`;
 - `branches(table, i, at, wo) -> Branches`: the delta lobes; needed if the class says `delta`;
 - `ambient(table, i, at) -> Vec3`: k_a of Whitted's integrator; optional.
 

@@ -13,7 +13,7 @@ class Diffuse(Material):
     """Scatters equally to all sides of its front; its back is black."""
 
     smooth: ClassVar[bool] = True
-    chooses: ClassVar[bool] = False
+    uses_u_lobe: ClassVar[bool] = False
     type: Literal["diffuse"] = "diffuse"
     reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
 
@@ -32,7 +32,7 @@ class Diffuses(NamedTuple):
 
 
 @kernel
-def both(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+def eval_pdf(diffuses: Diffuses, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     """f(wo, wi) cos wi, and the density of `sample`: cos wi / pi."""
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)

@@ -134,7 +134,7 @@ def _shares(phongs: Phongs, i: int, at: At) -> Shares:
 
 
 @kernel
-def both(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+def eval_pdf(phongs: Phongs, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     """f(wo, wi) cos wi, and the density of `sample`, both without the mirrored direction.
 
     The lobe's density is (p + 1) / (2 pi) (e·r)^p around the mirrored direction; with half vectors
@@ -188,7 +188,7 @@ def sample(
             wi = to_world(frame_from_normal(mirrored), lobe)
     else:
         wi = cosine_hemisphere(u0, u1)
-    value, density = both(phongs, i, at, wo, wi)
+    value, density = eval_pdf(phongs, i, at, wo, wi)
     if not density > 0.0:
         return no_sample()
     weight = value * (1.0 / density)

@@ -124,7 +124,7 @@ def _diffuse(plastics: Plastics, i: int, shares: Shares, wi: Vec3) -> Vec3:
 
 
 @kernel
-def both(plastics: Plastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+def eval_pdf(plastics: Plastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     """f(wo, wi) cos wi, and the density of `sample`, both without the mirrored direction."""
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)

@@ -42,10 +42,10 @@ from reference_rt.materials.microfacet.fresnel import Refraction, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import (
     GGX,
     Microfacets,
-    bend,
     g1,
     half_vector,
     refract,
+    refraction_half,
     sample_visible,
 )
 from reference_rt.sampling.warp import cosine_hemisphere
@@ -215,10 +215,10 @@ def _shares(s: Surface, wo: Vec3) -> _Shares:
 
 @kernel
 def _scattered(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
-    """`both` for wo above the surface."""
+    """`eval_pdf` for wo above the surface."""
     total = shares.cosine + shares.coat + shares.main
     if wi.z < 0.0:
-        bent = bend(wo, wi, s.relative_ior, s.front)
+        bent = refraction_half(wo, wi, s.relative_ior, s.front)
         f = facet(s, bent.refraction)
         normals = visible_normals(s.m, wo, bent.h) * bent.spread
         value = f.refracted * (normals * g1(s.m, wi))
@@ -242,7 +242,7 @@ def _scattered(s: Surface, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
 
 
 @kernel
-def both(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+def eval_pdf(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     """f(wo, wi) |cos wi|, and the density of `sample`."""
     side = wo.z
     if side == 0.0 or wi.z == 0.0:

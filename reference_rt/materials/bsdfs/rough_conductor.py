@@ -33,7 +33,7 @@ class RoughConductor(Metal):
     """A rough metal; its back is black."""
 
     smooth: ClassVar[bool] = True
-    chooses: ClassVar[bool] = False
+    uses_u_lobe: ClassVar[bool] = False
     type: Literal["rough_conductor"] = "rough_conductor"
     distribution: Distribution = "ggx"
     alpha: AlphaParameter = (0.1, 0.1)
@@ -67,7 +67,7 @@ def _mirrored(conductors: RoughConductors, i: int, at: At, cosine: float) -> Vec
 
 
 @kernel
-def both(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+def eval_pdf(conductors: RoughConductors, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     """f(wo, wi) cos wi, and the density of `sample`: that of visible normals over 4 wo·h."""
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)

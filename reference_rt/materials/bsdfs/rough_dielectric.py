@@ -27,7 +27,6 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     Distribution,
     Microfacets,
     Roughnesses,
-    bend,
     density,
     g1,
     g1_over_cos,
@@ -35,6 +34,7 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     is_anisotropic,
     microfacets_at,
     refract,
+    refraction_half,
     roughnesses,
     sample_visible,
     visible_density,
@@ -121,7 +121,7 @@ def _mirrored_density(m: Microfacets, wo: Vec3, h: Vec3) -> float:
 
 
 @kernel
-def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+def eval_pdf(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     """f(wo, wi) |cos wi|, and the density of `sample`."""
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
@@ -137,7 +137,7 @@ def both(dielectrics: RoughDielectrics, i: int, at: At, wo: Vec3, wi: Vec3) -> S
         value = facet.mirrored * (0.25 * normals * shown)
         return Scattered(value, facet.share * (0.25 * seen * normals))
     n = float(dielectrics.eta[i])
-    found = bend(wo, wi, n, side > 0.0)
+    found = refraction_half(wo, wi, n, side > 0.0)
     facet = _facet(dielectrics, i, at, found.refraction)
     normals = density(m, found.h)
     value = facet.refracted * (normals * found.spread * shown)

@@ -170,7 +170,7 @@ def _lobes(plastics: RoughPlastics, i: int, at: At, wo: Vec3) -> _Lobes:
 
 @kernel
 def _scattered(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec3) -> Scattered:
-    """`both` for directions above the surface."""
+    """`eval_pdf` for directions above the surface."""
     eta, half = float(plastics.eta[i]), half_vector(wo, wi)
     f = fresnel(half.cosine, eta).reflectance
     normals = 0.25 * g1_over_cos(lobes.m, wo) * density(lobes.m, half.h)
@@ -182,7 +182,7 @@ def _scattered(plastics: RoughPlastics, i: int, lobes: _Lobes, wo: Vec3, wi: Vec
 
 
 @kernel
-def both(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+def eval_pdf(plastics: RoughPlastics, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     """f(wo, wi) cos wi, and the density of `sample`."""
     if wo.z <= 0.0 or wi.z <= 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)

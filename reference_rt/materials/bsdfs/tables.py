@@ -113,34 +113,9 @@ def only(leaves: Leaves) -> int:
     return code
 
 
-@by_code("evaluate")
-def evaluate(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> Vec3:
-    """f(wo, wi) |cos wi| of one BSDF, without perfect reflection and refraction."""
-    return Vec3(0.0, 0.0, 0.0)
-
-
-@by_code("pdf")
-def pdf(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> float:
-    """The density of `sample` per solid angle, without discrete directions."""
-    return 0.0
-
-
-def _both_of(module: Any) -> Any:
-    """The kernel `both` of a material's module, by default made of `evaluate` and `pdf`."""
-    if hasattr(module, "both") or not hasattr(module, "evaluate"):
-        return getattr(module, "both", None)
-    evaluate_row, pdf_row = module.evaluate, module.pdf
-
-    @kernel
-    def evaluate_and_pdf(table: Any, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-        return Scattered(evaluate_row(table, i, at, wo, wi), pdf_row(table, i, at, wo, wi))
-
-    return evaluate_and_pdf
-
-
-@by_code(_both_of)
-def both(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
-    """`evaluate` and `pdf` at once, which share much of their work."""
+@by_code("eval_pdf")
+def eval_pdf(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
+    """f(wo, wi) |cos wi| and the density of `sample` per solid angle, without delta lobes."""
     return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
 
 

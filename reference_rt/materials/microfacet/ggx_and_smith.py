@@ -221,7 +221,7 @@ def refract(wo: Vec3, h: Vec3, refraction: Refraction) -> Vec3:
     return wi * (1.5 - 0.5 * dot(wi, wi))
 
 
-class Bend(NamedTuple):
+class RefractionHalf(NamedTuple):
     """The microfacet that refracts wo to wi.  h: its normal;  spread: the Jacobian dh / dwi, times
     wo·h / eta², 0 where no microfacet refracts wo to wi;  refraction: its Fresnel terms, computed
     from the side of the smaller index, where no digits cancel."""
@@ -232,7 +232,7 @@ class Bend(NamedTuple):
 
 
 @kernel
-def bend(wo: Vec3, wi: Vec3, n: float, is_outside: bool) -> Bend:
+def refraction_half(wo: Vec3, wi: Vec3, n: float, is_outside: bool) -> RefractionHalf:
     """Walter et al. 2007, eq. 16 and 17;  n: the index inside over that outside;  is_outside:
     whether wo is outside.
 
@@ -244,7 +244,7 @@ def bend(wo: Vec3, wi: Vec3, n: float, is_outside: bool) -> Bend:
     scaled = (outer + inner) + inner * (n - 1.0)  # at least |n - 1| long
     length2 = dot(scaled, scaled)
     if length2 < 1e-280:
-        return Bend(Vec3(0.0, 0.0, 0.0), 0.0, fresnel(0.0, n))
+        return RefractionHalf(Vec3(0.0, 0.0, 0.0), 0.0, fresnel(0.0, n))
     h = scaled * (1.0 / math.sqrt(length2))
     if h.z < 0.0:
         h = -h
@@ -252,6 +252,6 @@ def bend(wo: Vec3, wi: Vec3, n: float, is_outside: bool) -> Bend:
     thin = dot(outer, h) if n > 1.0 else dot(inner, h)
     refraction = fresnel(math.copysign(thin, n - 1.0), n)
     if cos_o <= 0.0 or cos_i >= 0.0:
-        return Bend(h, 0.0, refraction)
+        return RefractionHalf(h, 0.0, refraction)
     scale = 1.0 if is_outside else n * n  # |wo + eta wi| is |outer + n inner| / n from inside
-    return Bend(h, cos_o * -cos_i * scale / length2, refraction)
+    return RefractionHalf(h, cos_o * -cos_i * scale / length2, refraction)

@@ -23,7 +23,7 @@ from reference_rt.materials.nested.paths import (
     FRONT_ONLY,
     ONE_MINUS_WEIGHT,
     WEIGHT,
-    Way,
+    MaterialPath,
 )
 from reference_rt.materials.shading import Shading
 from reference_rt.shapes.shape import Tangents
@@ -31,7 +31,7 @@ from reference_rt.textures import At, Numbers, Palette, number_at
 from reference_rt.textures.parameter import join
 
 
-class Layers(NamedTuple):
+class FlattenedMaterials(NamedTuple):
     """For each material m: first (m,) and number (m,) of its flattened leaves.  For each of these,
     k: its table and row, kind (k,) and row (k,), and its steps, step_first (k,) and step_count
     (k,).  For each step s: its code, step (s,), and the row of its parameter, step_row (s,), in one
@@ -50,7 +50,7 @@ class Layers(NamedTuple):
     normal_maps: NormalMaps | None
 
 
-class Layer(NamedTuple):
+class FlattenedLeaf(NamedTuple):
     """A flattened leaf at a point.  weight: from 0 to 1;  basis: its frame, in coordinates of the
     shading frame;  side: 0 if its frame is not tilted by a bump or normal map, else 1, or -1 if it
     is flipped to the other side."""
@@ -60,7 +60,7 @@ class Layer(NamedTuple):
     side: float
 
 
-class LayerTables:
+class FlattenedBuilder:
     """Collects the flattened leaves of a scene's materials."""
 
     def __init__(self, palette: Palette) -> None:
@@ -72,17 +72,17 @@ class LayerTables:
         self.steps: list[tuple[int, int]] = []
         self.rows: dict[type, list[Any]] = {}
 
-    def add(self, layers: list[tuple[Way, tuple[int, int]]]) -> None:
+    def add(self, flat_leaves: list[tuple[MaterialPath, tuple[int, int]]]) -> None:
         """Adds the next material: its paths, with the (kind, row) of their leaves.
 
         Raises ValueError.
         """
         self.first.append(len(self.leaves))
-        self.count.append(len(layers))
-        for way, leaf in layers:
+        self.count.append(len(flat_leaves))
+        for path, leaf in flat_leaves:
             self.leaves.append(leaf)
-            self.step_counts.append(len(way.steps))
-            self.steps += [(step.code, self._row(step.parameter)) for step in way.steps]
+            self.step_counts.append(len(path.steps))
+            self.steps += [(step.code, self._row(step.parameter)) for step in path.steps]
 
     def _row(self, parameter: Any) -> int:
         """Puts a step's parameter into its table; returns its row there."""
@@ -96,7 +96,7 @@ class LayerTables:
         rows.append(table)
         return len(rows) - 1
 
-    def tables(self) -> Layers | None:
+    def tables(self) -> FlattenedMaterials | None:
         """None if no material is made of others."""
         if not self.steps:
             return None
@@ -107,7 +107,7 @@ class LayerTables:
         def table(cls: type) -> Any:
             return join(self.rows[cls]) if cls in self.rows else None
 
-        return Layers(
+        return FlattenedMaterials(
             first=np.array(self.first),
             number=np.array(self.count),
             kind=np.array(kind),
@@ -127,29 +127,29 @@ SIZE = 11
 
 
 @kernel
-def most(layers: Layers | None) -> int:
+def most(flat_leaves: FlattenedMaterials | None) -> int:
     """The largest number of flattened leaves of any material."""
-    if layers is None:
+    if flat_leaves is None:
         return 0
     found = 0
-    for m in range(len(layers.number)):
-        found = max(found, layers.number[m])
+    for m in range(len(flat_leaves.number)):
+        found = max(found, flat_leaves.number[m])
     return found
 
 
 @kernel
-def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
-    """Writes the flattened leaves of the material to the scratch buffer `shading.layers`.
+def prepare(flat_leaves: FlattenedMaterials | None, shading: Shading, at: At) -> None:
+    """Writes the flattened leaves of the material to the scratch buffer `shading.flat_leaves`.
 
     They depend on the point and on wo, not on wi: evaluated once per hit they serve all calls of
     `both`, `sample` and `branches`, and their code is compiled once.
     """
-    if layers is None:
+    if flat_leaves is None:
         return
     m = shading.point.material
-    for k in range(layers.number[m]):
-        found = _layer(layers, layers.first[m] + k, shading, at)
-        buffer = shading.layers[SIZE * k : SIZE * (k + 1)]
+    for k in range(flat_leaves.number[m]):
+        found = _leaf_at_hit(flat_leaves, flat_leaves.first[m] + k, shading, at)
+        buffer = shading.flat_leaves[SIZE * k : SIZE * (k + 1)]
         buffer[0], buffer[10] = found.weight, found.side
         buffer[1], buffer[2], buffer[3] = found.basis.s
         buffer[4], buffer[5], buffer[6] = found.basis.t
@@ -157,28 +157,30 @@ def prepare(layers: Layers | None, shading: Shading, at: At) -> None:
 
 
 @kernel
-def layer_at(shading: Shading, k: int) -> Layer:
+def leaf_at(shading: Shading, k: int) -> FlattenedLeaf:
     """Flattened leaf k of the material, from the scratch buffer."""
-    buffer = shading.layers[SIZE * k : SIZE * (k + 1)]
+    buffer = shading.flat_leaves[SIZE * k : SIZE * (k + 1)]
     basis = Frame(
         Vec3(buffer[1], buffer[2], buffer[3]),
         Vec3(buffer[4], buffer[5], buffer[6]),
         Vec3(buffer[7], buffer[8], buffer[9]),
     )
-    return Layer(buffer[0], basis, buffer[10])
+    return FlattenedLeaf(buffer[0], basis, buffer[10])
 
 
 @kernel
-def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
+def _leaf_at_hit(
+    flat_leaves: FlattenedMaterials, k: int, shading: Shading, at: At
+) -> FlattenedLeaf:
     """Runs the steps of flattened leaf k of the scene, for `shading.wo`."""
     weight, side, tilted = 1.0, 1.0, False
     basis = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
-    begin = layers.step_first[k]
-    for s in range(begin, begin + layers.step_count[k]):
-        code, i = layers.step[s], layers.step_row[s]
+    begin = flat_leaves.step_first[k]
+    for s in range(begin, begin + flat_leaves.step_count[k]):
+        code, i = flat_leaves.step[s], flat_leaves.step_row[s]
         above = to_local(basis, shading.wo).z > 0.0
         if code in (WEIGHT, ONE_MINUS_WEIGHT):
-            w = _weight(layers.weights, i, shading)
+            w = _weight(flat_leaves.weights, i, shading)
             weight *= w if code == WEIGHT else 1.0 - w
         elif code == FRONT_ONLY:
             weight = weight if above else 0.0
@@ -195,15 +197,15 @@ def _layer(layers: Layers, k: int, shading: Shading, at: At) -> Layer:
                 to_local(basis, shading.tangents.dpdu), to_local(basis, shading.tangents.dpdv)
             )
             if code == BUMP:
-                tilted_basis = _bumped(layers.bumps, i, at, local)
+                tilted_basis = _bumped(flat_leaves.bumps, i, at, local)
             else:
-                tilted_basis = _mapped(layers.normal_maps, i, shading, local)
+                tilted_basis = _mapped(flat_leaves.normal_maps, i, shading, local)
             basis = Frame(
                 to_world(basis, tilted_basis.s),
                 to_world(basis, tilted_basis.t),
                 to_world(basis, tilted_basis.n),
             )
-    return Layer(weight, basis, side if tilted else 0.0)
+    return FlattenedLeaf(weight, basis, side if tilted else 0.0)
 
 
 @kernel
@@ -233,9 +235,9 @@ def _mapped(maps: NormalMaps | None, i: int, shading: Shading, tangents: Tangent
 
 
 @kernel
-def lets(layer: Layer, wi: Vec3) -> bool:
+def scatters_from(leaf: FlattenedLeaf, wi: Vec3) -> bool:
     """Whether a flattened leaf scatters light from the local `wi`: not where wi is on different
     sides of the surface and of the tilted frame (Mitsuba's rule)."""
-    if layer.side == 0.0:
+    if leaf.side == 0.0:
         return True
-    return layer.side * wi.z * to_local(layer.basis, wi).z > 0.0
+    return leaf.side * wi.z * to_local(leaf.basis, wi).z > 0.0

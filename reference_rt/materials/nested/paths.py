@@ -17,7 +17,7 @@ from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided
 # the viewer's side; BUMP, NORMAL_MAP: the frame tilted.
 WEIGHT, ONE_MINUS_WEIGHT, FRONT_ONLY, BACK_ONLY, FACE_VIEWER, BUMP, NORMAL_MAP = range(7)
 
-MOST_LAYERS = 64
+MOST_LEAVES = 64
 """The most leaves of a material: a blend of blends doubles them at each level."""
 
 
@@ -28,7 +28,7 @@ class Step(NamedTuple):
     parameter: Any
 
 
-class Way(NamedTuple):
+class MaterialPath(NamedTuple):
     """A path: its steps and the name of its leaf, None for the clear part of a mask."""
 
     steps: tuple[Step, ...]
@@ -40,26 +40,31 @@ class Way(NamedTuple):
         return any(step.code in (FACE_VIEWER, BACK_ONLY) for step in self.steps)
 
 
-def ways(name: str, materials: Mapping[str, Material]) -> list[Way]:
+def material_paths(name: str, materials: Mapping[str, Material]) -> list[MaterialPath]:
     """The paths from a material to its leaves.  Raises ValueError (what is wrong, what was
     expected)."""
-    return _ways(name, materials, ())
+    return _material_paths(name, materials, ())
 
 
-def _ways(name: str, materials: Mapping[str, Material], above: tuple[str, ...]) -> list[Way]:
+def _material_paths(
+    name: str, materials: Mapping[str, Material], above: tuple[str, ...]
+) -> list[MaterialPath]:
     if name in above:
         raise ValueError(f"contains itself: {' -> '.join([*above, name])}; expected no circle")
     above = (*above, name)
-    if len(above) > MOST_LAYERS:
-        raise ValueError(f"is nested too deeply; expected at most {MOST_LAYERS} materials")
+    if len(above) > MOST_LEAVES:
+        raise ValueError(f"is nested too deeply; expected at most {MOST_LEAVES} materials")
     material = materials[name]
 
-    def below(base: str, *steps: Step) -> list[Way]:
-        return [Way((*steps, *way.steps), way.leaf) for way in _ways(base, materials, above)]
+    def below(base: str, *steps: Step) -> list[MaterialPath]:
+        return [
+            MaterialPath((*steps, *path.steps), path.leaf)
+            for path in _material_paths(base, materials, above)
+        ]
 
-    found = [Way((), name)]
+    found = [MaterialPath((), name)]
     if isinstance(material, Mask):
-        clear = Way((Step(ONE_MINUS_WEIGHT, material.opacity),), None)
+        clear = MaterialPath((Step(ONE_MINUS_WEIGHT, material.opacity),), None)
         found = [*below(material.base, Step(WEIGHT, material.opacity)), clear]
     elif isinstance(material, Blend):
         rest, take = (
@@ -79,26 +84,28 @@ def _ways(name: str, materials: Mapping[str, Material], above: tuple[str, ...]) 
     elif isinstance(material, Bump | NormalMap):
         code = BUMP if isinstance(material, Bump) else NORMAL_MAP
         found = below(material.base, Step(code, material))
-        if any(sum(s.code in (BUMP, NORMAL_MAP) for s in way.steps) > 1 for way in found):
+        if any(sum(s.code in (BUMP, NORMAL_MAP) for s in path.steps) > 1 for path in found):
             raise ValueError(f"'{material.base}' is tilted already; expected one map at most")
-    if len(found) > MOST_LAYERS:
-        raise ValueError(f"'{name}' has {len(found)} layers; expected at most {MOST_LAYERS}")
+    if len(found) > MOST_LEAVES:
+        raise ValueError(f"'{name}' has {len(found)} layers; expected at most {MOST_LEAVES}")
     return found
 
 
-def _check_one_sided(name: str, found: list[Way], materials: Mapping[str, Material]) -> None:
-    if any(transmits(way, materials) for way in found):
+def _check_one_sided(
+    name: str, found: list[MaterialPath], materials: Mapping[str, Material]
+) -> None:
+    if any(transmits(path, materials) for path in found):
         raise ValueError(
             f"'{name}' lets light pass; expected materials with one side to make two of"
         )
 
 
-def transmits(way: Way, materials: Mapping[str, Material]) -> bool:
+def transmits(path: MaterialPath, materials: Mapping[str, Material]) -> bool:
     """Whether the leaf lets light pass."""
-    return way.leaf is None or materials[way.leaf].transmits
+    return path.leaf is None or materials[path.leaf].transmits
 
 
-def needs_tangents(way: Way, materials: Mapping[str, Material]) -> bool:
+def needs_tangents(path: MaterialPath, materials: Mapping[str, Material]) -> bool:
     """Whether the leaf's scattering depends on the directions of u and v."""
-    tilted = any(step.code in (BUMP, NORMAL_MAP) for step in way.steps)
-    return tilted or (way.leaf is not None and materials[way.leaf].oriented)
+    tilted = any(step.code in (BUMP, NORMAL_MAP) for step in path.steps)
+    return tilted or (path.leaf is not None and materials[path.leaf].oriented)

@@ -12,8 +12,8 @@ from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.scaled_ray import scaled
 from reference_rt.core.vec3 import Frame, Vec3, normalize, row
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
-from reference_rt.materials import Materials, Shading, kept_floats
-from reference_rt.materials.textured import look, looked_floats
+from reference_rt.materials import Materials, Shading, scratch_floats
+from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.query.rays import (
     broadcast,
@@ -57,10 +57,10 @@ def _shading(
     frame = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), z)
     tangents = Tangents(Vec3(at[5], at[6], at[7]), Vec3(at[8], at[9], at[10]))
     place = At(textures, at[0], at[1], Vec3(at[2], at[3], at[4]))
-    looked = look(materials.textured, m, place, kept)
+    looked = evaluate_textures(materials.textured, m, place, kept)
     point = SurfacePoint(zero, z, z, 0.0, m, -1)
-    layers = kept[looked_floats(materials.textured) :]
-    shading = Shading(point, frame, wo, looked, tangents, layers)
+    flat_leaves = kept[lookup_cache_size(materials.textured) :]
+    shading = Shading(point, frame, wo, looked, tangents, flat_leaves)
     any_material.prepare(materials, shading, place)
     return shading
 
@@ -79,7 +79,7 @@ def _scatter(
 ) -> None:
     """Evaluate, if u is `NOTHING`: value and density towards wi, into out (n, 4).  Or sample with
     u: wi, weight, pdf, eta and is_delta, into out (n, 9)."""
-    kept = local_floats(kept_floats(materials))
+    kept = local_floats(scratch_floats(materials))
     origin = Vec3(0.0, 0.0, 0.0)
     for i in range(len(wo)):
         for k in range(out.shape[1]):
@@ -91,9 +91,9 @@ def _scatter(
         if len(u) == 0:
             forth, _, valid = scaled(origin, row(wi, i), math.inf)
             if valid:
-                both = any_material.both(materials, shading, normalize(forth.d))
-                out[i, 0], out[i, 1], out[i, 2] = both.value
-                out[i, 3] = both.density
+                eval_pdf = any_material.eval_pdf(materials, shading, normalize(forth.d))
+                out[i, 0], out[i, 1], out[i, 2] = eval_pdf.value
+                out[i, 3] = eval_pdf.density
             continue
         drawn = any_material.sample(materials, shading, u[i, 0], u[i, 1], u[i, 2])
         out[i, 7] = 1.0

@@ -18,7 +18,7 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import entry_kernel, local_floats
 from reference_rt.lights import TABLES, Constant, EnvironmentMap, Lights
-from reference_rt.materials import kept_floats
+from reference_rt.materials import scratch_floats
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.query.rays import (
     broadcast,
@@ -130,7 +130,7 @@ def _pdf(
 def _direct(
     scene: SceneTables, o: FloatArray, d: FloatArray, k: int, u: float, v: float, out: FloatArray
 ) -> None:
-    kept = local_floats(kept_floats(scene.materials))
+    kept = local_floats(scratch_floats(scene.materials))
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
         hit = closest_hit(scene.geometry, ray)

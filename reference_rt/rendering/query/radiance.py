@@ -15,8 +15,8 @@ from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel, signature_of
 from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
-from reference_rt.rendering.render import compile_bands, run_bands, with_tracer
-from reference_rt.rendering.tiles import GivenRays, render_band
+from reference_rt.rendering.render import compile_tile_kernels, run_tiles, with_tracer
+from reference_rt.rendering.tiles import GivenRays, render_tile
 from reference_rt.sampling import Independent
 from reference_rt.scene.build import BuiltScene
 
@@ -141,9 +141,9 @@ def estimate(
             *(setup, tables, GivenRays(o, d), None, sampler.setup(), (n, 1), spp),
             *(mean, variance),
         )
-        call = render_band, signature_of(*arguments, 0, 0, 0, 0)
-        (kernel,) = compile_bands([call], tables, tracer, threads)
-        run_bands(kernel, arguments, n, spp, threads, lambda what, fraction: None)
+        call = render_tile, signature_of(*arguments, 0, 0, 0, 0)
+        (kernel,) = compile_tile_kernels([call], tables, tracer, threads)
+        run_tiles(kernel, arguments, n, spp, threads, lambda what, fraction: None)
     if spp == 1:
         variance[:] = math.inf
     mean[~valid], variance[~valid] = 0.0, 0.0

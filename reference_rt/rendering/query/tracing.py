@@ -8,18 +8,18 @@ import numpy as np
 from reference_rt.accel.array_query import (
     MOST_ADDED,
     Primitives,
-    Work,
+    TraceScratch,
     closest_one_by_one,
-    trace_bundle,
+    trace_packet,
 )
 from reference_rt.accel.crossing_order import nothing_at
 from reference_rt.accel.geometry import Geometry, owner, surface
 from reference_rt.accel.next_crossing import next_crossing
-from reference_rt.accel.packet.packet import BUNDLE
+from reference_rt.accel.packet.packet import PACKET_SIZE
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import BLOCK, Hit, at
-from reference_rt.core.ray_block import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, Hits, Rays
-from reference_rt.core.scaled_ray import is_told, scaled
+from reference_rt.core.ray_block import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, HitBlock, RayBlock
+from reference_rt.core.scaled_ray import is_representable, scaled
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_integers
 
@@ -80,18 +80,18 @@ def closest(
     keep all hits.  Hits are described while they are in the processor's cache: a separate pass
     over all of them took a third longer (measured).
     """
-    work = Work(
-        Rays(local_floats(RAY_FLOATS)),
-        Hits(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
-        Rays(local_floats(RAY_FLOATS)),
+    work = TraceScratch(
+        RayBlock(local_floats(RAY_FLOATS)),
+        HitBlock(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
+        RayBlock(local_floats(RAY_FLOATS)),
         local_integers(BLOCK),
     )
     for k in range(RAY_FLOATS):
         work.rays.numbers[k] = 1.0  # lanes without a ray are traced too
     waiting, filled = 0, 0
-    for begin in range(0, len(o), BUNDLE):
-        waiting, filled = trace_bundle(geometry, o, d, begin, work, waiting, found, numbers, filled)
-        if filled > len(numbers) - MOST_ADDED or begin + BUNDLE >= len(o):
+    for begin in range(0, len(o), PACKET_SIZE):
+        waiting, filled = trace_packet(geometry, o, d, begin, work, waiting, found, numbers, filled)
+        if filled > len(numbers) - MOST_ADDED or begin + PACKET_SIZE >= len(o):
             for k in range(filled):
                 _describe(geometry, o, d, numbers[k], t_max, found, k, out, numbers[k])
             filled = 0
@@ -164,7 +164,7 @@ def _describe(
         out.p[i, 0], out.p[i, 1], out.p[i, 2] = point.p
         out.n[i, 0], out.n[i, 1], out.n[i, 2] = point.n
         out.ns[i, 0], out.ns[i, 1], out.ns[i, 2] = point.ns
-    if not is_told(t, p):
+    if not is_representable(t, p):
         _put_miss(out, i)
         return
     whose = owner(geometry, ray, hit)
@@ -213,7 +213,7 @@ def cross(
         while filled - first < most:
             after = next_crossing(geometry, ray, after)
             hit, t = after.hit, after.hit.t * unit
-            if hit.kind < 0 or not (t < t_max[i] and is_told(t, at(ray, hit.t))):
+            if hit.kind < 0 or not (t < t_max[i] and is_representable(t, at(ray, hit.t))):
                 break
             if not t > t_min[i]:  # t_min / unit has underflowed
                 continue

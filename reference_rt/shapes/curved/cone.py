@@ -8,7 +8,7 @@ from pydantic import Field
 from reference_rt.core.model import Positive
 from reference_rt.shapes.curved.quadric import tabulate
 from reference_rt.shapes.curved.quadrics import Quadrics
-from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.shape import Shape, TabulationContext
 
 
 class Cone(Shape):
@@ -27,7 +27,7 @@ class Cone(Shape):
     capped: bool = True
     """Whether this is a solid, closed by disks; else it is the side alone, seen from both sides."""
 
-    def tabulate(self, context: Place) -> Quadrics:
+    def tabulate(self, context: TabulationContext) -> Quadrics:
         r, top = Fraction(self.radius), Fraction(self.top_radius)
         slope = (top - r) / Fraction(self.height)
         zero, one = Fraction(0), Fraction(1)

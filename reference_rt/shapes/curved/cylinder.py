@@ -8,7 +8,7 @@ from pydantic import model_validator
 from reference_rt.core.model import Positive
 from reference_rt.shapes.curved.quadric import tabulate
 from reference_rt.shapes.curved.quadrics import Quadrics
-from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.shape import Shape, TabulationContext
 
 
 class Cylinder(Shape):
@@ -33,7 +33,7 @@ class Cylinder(Shape):
             raise ValueError("expected 'z_min' below 'z_max'")
         return self
 
-    def tabulate(self, context: Place) -> Quadrics:
+    def tabulate(self, context: TabulationContext) -> Quadrics:
         r = self.radius
         form = (*map(Fraction, (1, 1, 0, 0, 0, 0, 0, 0, 0)), -(Fraction(r) ** 2))
         lower, upper = (-r, -r, self.z_min), (r, r, self.z_max)

@@ -23,7 +23,7 @@ from reference_rt.shapes.curved.quadratic_form import (
 )
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.placement import columns
-from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.shape import Shape, TabulationContext
 
 
 class Quadric(Shape):
@@ -54,7 +54,7 @@ class Quadric(Shape):
             raise ValueError("expected each coordinate of 'lower' to be below that of 'upper'")
         return self
 
-    def tabulate(self, context: Place) -> "Quadrics":
+    def tabulate(self, context: TabulationContext) -> "Quadrics":
         form = tuple(Fraction(x) for x in self.coefficients)
         sign = definite_sign(form)
         if sign != 0:
@@ -74,7 +74,7 @@ _LARGEST = 1e140
 
 
 def tabulate(
-    context: Place,
+    context: TabulationContext,
     m: Affine,
     form: Form,
     lower: Point,
@@ -112,7 +112,7 @@ def tabulate(
     return table
 
 
-def ellipsoid(context: Place, m: Affine, middle: Vector, radius: float) -> Quadrics:
+def ellipsoid(context: TabulationContext, m: Affine, middle: Vector, radius: float) -> Quadrics:
     """The image under m of the sphere around `middle`."""
     unit_sphere = tuple(Fraction(k) for k in (1, 1, 1, 0, 0, 0, 0, 0, 0))
     form = seen_from((*unit_sphere, -(Fraction(radius) ** 2)), [-Fraction(x) for x in middle])

@@ -16,13 +16,13 @@ from reference_rt.sampling.warp import on_circle
 from reference_rt.shapes.curved.quadric import ellipsoid
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.placement import local_vector, owners, world_covector
-from reference_rt.shapes.ray_simd import nearer_by
+from reference_rt.shapes.ray_simd import make_nearer
 from reference_rt.shapes.rounding import along_from
 from reference_rt.shapes.shape import (
     LightPoint,
-    Place,
     Shape,
     Spans,
+    TabulationContext,
     Tangents,
     any_tangents,
     lane_vector,
@@ -41,7 +41,7 @@ class Sphere(Shape):
     center: Vector = (0.0, 0.0, 0.0)
     radius: Positive = 1.0
 
-    def tabulate(self, context: Place) -> "Spheres | Quadrics":
+    def tabulate(self, context: TabulationContext) -> "Spheres | Quadrics":
         m = self.map_in(context)
         if m is transform.IDENTITY:
             return Spheres(
@@ -124,7 +124,7 @@ def distance(ray: Ray, center: Vec3, r: float) -> float:
     return nearest
 
 
-nearer = nearer_by(distance)
+nearer = make_nearer(distance)
 
 
 @kernel

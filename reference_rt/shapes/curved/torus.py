@@ -20,7 +20,7 @@ from reference_rt.shapes.placement import (
     world_vector,
 )
 from reference_rt.shapes.rounding import along_from
-from reference_rt.shapes.shape import Place, Shape, Spans, Tangents
+from reference_rt.shapes.shape import Shape, Spans, TabulationContext, Tangents
 
 
 class Torus(Shape):
@@ -32,7 +32,7 @@ class Torus(Shape):
     minor_radius: Positive = 0.25
     """r, of the tube; less than R."""
 
-    def tabulate(self, context: Place) -> "Tori":
+    def tabulate(self, context: TabulationContext) -> "Tori":
         if not self.minor_radius < self.major_radius:
             raise ValueError(
                 f"minor_radius is {self.minor_radius:g}; expected less than major_radius, "

@@ -17,7 +17,7 @@ from reference_rt.core.transform import FLAT, Affine
 from reference_rt.core.vec3 import Vec3, dot, max_abs, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.placement import owners
-from reference_rt.shapes.shape import Place, lift
+from reference_rt.shapes.shape import TabulationContext, lift
 
 Integers = npt.NDArray[np.object_]
 
@@ -31,7 +31,7 @@ def integers(a: FloatArray) -> tuple[Integers, int]:
 
 
 def columns(
-    center: FloatArray, x_edge: FloatArray, y_edge: FloatArray, context: Place
+    center: FloatArray, x_edge: FloatArray, y_edge: FloatArray, context: TabulationContext
 ) -> dict[str, Any]:
     """The columns of every flat table, one row; the normal is that of x_edge x y_edge.
 
@@ -64,7 +64,7 @@ def columns(
     }
 
 
-def facing_z(m: Affine, context: Place) -> dict[str, Any]:
+def facing_z(m: Affine, context: TabulationContext) -> dict[str, Any]:
     """`columns` for the plane z = 0 with normal +z under the map m; also for a map that flips
     orientation the normal is on the side that +z is mapped to."""
     made = columns(m[:, 3], m[:, 0], m[:, 1], context)

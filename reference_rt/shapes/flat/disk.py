@@ -13,8 +13,8 @@ from reference_rt.sampling.warp import concentric_disk
 from reference_rt.shapes.flat import base
 from reference_rt.shapes.shape import (
     LightPoint,
-    Place,
     Shape,
+    TabulationContext,
     Tangents,
     any_tangents,
     outward,
@@ -27,7 +27,7 @@ class Disk(Shape):
 
     type: Literal["disk"] = "disk"
 
-    def tabulate(self, context: Place) -> "Disks":
+    def tabulate(self, context: TabulationContext) -> "Disks":
         disks = Disks(**base.facing_z(self.map_in(context), context))
         base.check_area("disk", areas(disks)[0])
         return disks

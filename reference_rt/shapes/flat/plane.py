@@ -10,7 +10,7 @@ from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import dot, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.flat import base
-from reference_rt.shapes.shape import Place, Shape, Spans, Tangents, no_spans, one_span
+from reference_rt.shapes.shape import Shape, Spans, TabulationContext, Tangents, no_spans, one_span
 
 
 class Plane(Shape):
@@ -19,7 +19,7 @@ class Plane(Shape):
 
     type: Literal["plane"] = "plane"
 
-    def tabulate(self, context: Place) -> "Planes":
+    def tabulate(self, context: TabulationContext) -> "Planes":
         return Planes(**base.facing_z(self.map_in(context), context))
 
 

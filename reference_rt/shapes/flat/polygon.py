@@ -23,7 +23,7 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.flat import base
 from reference_rt.shapes.flat.base import Integers, integers
 from reference_rt.shapes.rounding import product_error
-from reference_rt.shapes.shape import Place, Shape, Tangents, outward
+from reference_rt.shapes.shape import Shape, TabulationContext, Tangents, outward
 
 OFF_PLANE = 64
 """The largest distance of a point from the plane of the others, in u times the largest coordinate:
@@ -79,7 +79,7 @@ class Polygon(Shape):
     ring in a ring is a hole), or points that the rings go round a number of times that is not 0 (a
     hole is a ring in a ring the other way round)."""
 
-    def tabulate(self, context: Place) -> "Polygons":
+    def tabulate(self, context: TabulationContext) -> "Polygons":
         m = self.map_in(context)
         points = np.array([p for ring in self.rings for p in ring])
         if np.abs(points).max() > 2.0**1000:
@@ -102,7 +102,7 @@ class Polygon(Shape):
             (linear[:, k] - s * linear[:, axis]) * scale for k, s in zip(kept, slopes, strict=True)
         ]
         made = base.columns(linear[:, axis] * origin + m[:, 3], edges[0], edges[1], context)
-        if clockwise != transform.mirrors(m):
+        if clockwise != transform.flips_orientation(m):
             made["normal"] = -made["normal"]
         return Polygons(
             lower=outline[:, :2].min(axis=0)[None],

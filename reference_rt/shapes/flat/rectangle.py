@@ -11,12 +11,12 @@ from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import select
 from reference_rt.shapes.flat import base, spherical_rectangle
-from reference_rt.shapes.flat.spherical_rectangle import Seen
-from reference_rt.shapes.ray_simd import nearer_by
+from reference_rt.shapes.flat.spherical_rectangle import SphericalRectangle
+from reference_rt.shapes.ray_simd import make_nearer
 from reference_rt.shapes.shape import (
     LightPoint,
-    Place,
     Shape,
+    TabulationContext,
     Tangents,
     lane_vector,
     outward,
@@ -47,7 +47,7 @@ class Rectangle(Shape):
 
     type: Literal["rectangle"] = "rectangle"
 
-    def tabulate(self, context: Place) -> "Rectangles":
+    def tabulate(self, context: TabulationContext) -> "Rectangles":
         m = self.map_in(context)
         rectangles = Rectangles(**base.facing_z(m, context), lengths=_lengths(m[:, 0], m[:, 1]))
         base.check_area("rectangle", areas(rectangles)[0])
@@ -106,7 +106,7 @@ def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> fl
     return nearest
 
 
-nearer = nearer_by(distance)
+nearer = make_nearer(distance)
 
 
 @kernel
@@ -155,24 +155,24 @@ def tangents(rectangles: Rectangles, ray: Ray, hit: Hit) -> Tangents:
 
 
 @kernel
-def _as_seen_from(rectangles: Rectangles, i: int, p: Vec3) -> Seen:
+def _as_seen_from(rectangles: Rectangles, i: int, p: Vec3) -> SphericalRectangle:
     """Rectangle i as seen from `p` in front of it, in units of half its diagonal; its solid angle
     is 0 where it is to be sampled by area."""
     w = p - row(rectangles.center, i)
     width, height = rectangles.lengths[i, 0], rectangles.lengths[i, 1]
     half_diagonal2 = width * width + height * height
     if dot(w, w) >= _NEAR * _NEAR * half_diagonal2:
-        return spherical_rectangle.unseen()
+        return spherical_rectangle.empty()
     height_of_p = dot(w, row(rectangles.normal, i))
     if height_of_p <= base.lift_of(rectangles, i, p):
-        return spherical_rectangle.unseen()  # behind it, or a point of the rectangle itself
+        return spherical_rectangle.empty()  # behind it, or a point of the rectangle itself
     unit = 1.0 / math.sqrt(half_diagonal2)
     h = height_of_p * unit
     if h <= _LEAST_HEIGHT:
-        return spherical_rectangle.unseen()
+        return spherical_rectangle.empty()
     width, height = width * unit, height * unit
     x, y = dot(w, row(rectangles.x_of, i)), dot(w, row(rectangles.y_of, i))
-    return spherical_rectangle.see(
+    return spherical_rectangle.project(
         h, -(1.0 + x) * width, (1.0 - x) * width, -(1.0 + y) * height, (1.0 - y) * height
     )
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from reference_rt.jit.kernel import kernel, reciprocal
 
 
-class Seen(NamedTuple):
+class SphericalRectangle(NamedTuple):
     """h > 0; the sides; phi, the signed solid angle between y0 and y1 from x = 0 to x0;
     solid_angle, that of the rectangle."""
 
@@ -52,19 +52,19 @@ def solid_angle_of(h: float, x0: float, x1: float, y0: float, y1: float) -> floa
 
 
 @kernel
-def see(h: float, x0: float, x1: float, y0: float, y1: float) -> Seen:
+def project(h: float, x0: float, x1: float, y0: float, y1: float) -> SphericalRectangle:
     phi = _corner(x0, y1, h) - _corner(x0, y0, h)
-    return Seen(h, x0, x1, y0, y1, phi, solid_angle_of(h, x0, x1, y0, y1))
+    return SphericalRectangle(h, x0, x1, y0, y1, phi, solid_angle_of(h, x0, x1, y0, y1))
 
 
 @kernel
-def unseen() -> Seen:
+def empty() -> SphericalRectangle:
     """A rectangle of solid angle 0."""
-    return Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return SphericalRectangle(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def sample(seen: Seen, u0: float, u1: float) -> tuple[float, float]:
+def sample(seen: SphericalRectangle, u0: float, u1: float) -> tuple[float, float]:
     """(x, y), uniform in solid angle.
 
     x: where the solid angle from x0 is u0 of the whole, G(x, y1) - G(x, y0) = phi + u0 solid_angle.

@@ -20,7 +20,7 @@ from reference_rt.shapes.meshes.triangle_table import (
     soup,
 )
 from reference_rt.shapes.meshes.vertex_normals import smooth_normals
-from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.shape import Shape, TabulationContext
 
 _MOST_NAMED = 12
 """The number of ignored parts of a file that a warning names."""
@@ -94,7 +94,7 @@ class Mesh(Shape):
         assert self.faces is not None
         return checked(RawMesh(self.vertices, self.faces, self.normals, self.uv, self.colours))
 
-    def tabulate(self, context: Place) -> Triangles:
+    def tabulate(self, context: TabulationContext) -> Triangles:
         m = self.map_in(context)
         data = self.data(context.folder)
         name = "the mesh" if self.file is None else f"mesh {context.folder / self.file}"

@@ -31,13 +31,13 @@ from reference_rt.shapes.meshes.watertight import (
     Projection,
     Shear,
     exact_edge_function,
+    load_projection,
     project,
-    project_lane,
 )
 from reference_rt.shapes.shape import (
     LightPoint,
-    Place,
     Shape,
+    TabulationContext,
     Tangents,
     any_tangents,
     lift,
@@ -54,7 +54,7 @@ class Triangle(Shape):
     v1: Vector
     v2: Vector
 
-    def tabulate(self, context: Place) -> "Triangles":
+    def tabulate(self, context: TabulationContext) -> "Triangles":
         m = self.map_in(context)
         vertices = transform.apply_points(m, np.array([self.v0, self.v1, self.v2]))
         triangles = facing(m, soup(vertices.reshape(1, 9), context))
@@ -73,8 +73,8 @@ def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
 def intersect_lane(
     corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
 ) -> Crossing:
-    """`intersect` for a triangle of a BVH leaf, see `watertight.see`."""
-    return _crossing(project_lane(corners, first, size, lane, shear, seen), shear)
+    """`intersect` for a triangle of a BVH leaf, see `watertight.project_leaf`."""
+    return _crossing(load_projection(corners, first, size, lane, shear, seen), shear)
 
 
 @kernel

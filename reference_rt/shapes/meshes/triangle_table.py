@@ -7,7 +7,7 @@ import numpy as np
 
 from reference_rt.core import transform
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 
 class Triangles(NamedTuple):
@@ -28,7 +28,7 @@ class Triangles(NamedTuple):
 
 def soup(
     vertices: FloatArray,
-    context: Place,
+    context: TabulationContext,
     normals: FloatArray | None = None,
     uvs: FloatArray | None = None,
     colours: FloatArray | None = None,
@@ -51,7 +51,7 @@ def soup(
 def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
     """Keeps the front of triangles whose vertices the map m has transformed: one that flips
     orientation reverses the order of the corners, which is reversed again here."""
-    if not transform.mirrors(m):
+    if not transform.flips_orientation(m):
         return triangles
     uvs = _barycentrics(triangles) if triangles.uvs is None else triangles.uvs
     return triangles._replace(

@@ -6,8 +6,8 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import component
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.simd import LANES, select
-from reference_rt.jit.simd_kernels import lane_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, select
+from reference_rt.jit.simd_kernels import simd_kernel
 from reference_rt.shapes.rounding import product_error
 
 
@@ -80,15 +80,19 @@ def project(vertices: FloatArray, i: int, shear: Shear) -> Projection:
 
 
 @kernel
-def project_lane(
+def load_projection(
     corners: FloatArray, first: int, size: int, lane: int, shear: Shear, seen: FloatArray
 ) -> Projection:
-    """A triangle of a BVH leaf, in ray space;  seen: the results that `see` has stored."""
+    """A triangle of a BVH leaf, in ray space;  seen: the results that `project_leaf` has stored."""
     if seen[_DOUBT + lane] == 0.0:
         e0 = seen[lane]
         side = 1 if e0 > 0.0 else -1
-        e1, e2 = seen[LANES + lane], seen[2 * LANES + lane]
-        depths = seen[3 * LANES + lane], seen[4 * LANES + lane], seen[5 * LANES + lane]
+        e1, e2 = seen[VECTOR_WIDTH + lane], seen[2 * VECTOR_WIDTH + lane]
+        depths = (
+            seen[3 * VECTOR_WIDTH + lane],
+            seen[4 * VECTOR_WIDTH + lane],
+            seen[5 * VECTOR_WIDTH + lane],
+        )
         return Projection(side, e0, e1, e2, depths[0], depths[1], depths[2])
     return _project(corners, 9 * first + lane, size, shear)
 
@@ -136,12 +140,12 @@ def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection
     return Projection(side, e0, e1, e2, a_z, b_z, c_z)
 
 
-_DOUBT = 6 * LANES
-SEEN_FLOATS = 7 * LANES
+_DOUBT = 6 * VECTOR_WIDTH
+PROJECTION_FLOATS = 7 * VECTOR_WIDTH
 
 
-@lane_kernel
-def _see(
+@simd_kernel
+def _project_leaf(
     corners: Any,
     start: Any,
     size: Any,
@@ -172,7 +176,7 @@ def _see(
     left2, right2 = b_x * a_y, b_y * a_x
     e0, e1, e2 = left0 - right0, left1 - right1, left2 - right2
     for k, number in enumerate((e0, e1, e2, a_z, b_z, c_z)):
-        seen.store(k * LANES, number)
+        seen.store(k * VECTOR_WIDTH, number)
     products = abs(left0) + abs(right0) + abs(left1) + abs(right1) + abs(left2) + abs(right2)
     in_front = (e0 > 0.0) & (e1 > 0.0) & (e2 > 0.0)
     behind = (e0 < 0.0) & (e1 < 0.0) & (e2 < 0.0)
@@ -184,16 +188,16 @@ def _see(
 
 
 @kernel
-def see(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArray) -> int:
+def project_leaf(corners: FloatArray, first: int, size: int, shear: Shear, seen: FloatArray) -> int:
     """Projects the triangles of a BVH leaf in SIMD.  Returns, as bits, for which of them
-    `project_lane` must be called: all that the ray meets, and some whose edges it passes through;
-    seen (`SEEN_FLOATS`,): where the results are stored for that.
+    `load_projection` must be called: all that the ray meets, and some whose edges it passes
+    through; seen (`PROJECTION_FLOATS`,): where the results are stored for that.
 
     The vertices of references first .. first + size, VECTOR_WIDTH at most, are in `corners` from 9
     first on: the first coordinate of each, the second of each, and so on.  Lanes beyond the last
     reference read the numbers that follow, and are ignored.
     """
-    met = _see(
+    met = _project_leaf(
         corners,
         9 * first,
         size,

@@ -20,7 +20,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh, Sphere
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.meshes.files import read_mesh
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 from reference_rt.util.errors import SceneWarning
 
 
@@ -147,16 +147,16 @@ def test_vertex_normals_are_mitsubas(tmp_path: Path, name: str, with_seam: bool)
     values = mi.traverse(mi.load_dict({"type": name[-3:], "filename": str(path)}))
     faces = np.array(values["faces"]).reshape(-1, 3)
     theirs = np.array(values["vertex_normals"]).reshape(-1, 3)[faces]
-    ours = Mesh(file=str(path), smooth=True).tabulate(Place()).normals
+    ours = Mesh(file=str(path), smooth=True).tabulate(TabulationContext()).normals
     assert ours is not None
     corners = np.array(values["vertex_positions"]).reshape(-1, 3)[faces]
-    expected = Mesh(file=str(path)).tabulate(Place()).vertices.reshape(-1, 3, 3)
+    expected = Mesh(file=str(path)).tabulate(TabulationContext()).vertices.reshape(-1, 3, 3)
     assert np.array_equal(corners, expected.astype(np.float32))
     # Edges of 0.2 between points near 1 round by five times u each, and normals with them; angles
     # and six sums round some ten times: below 64 u in all.
     assert np.abs(ours.reshape(-1, 3, 3) - theirs).max() < 64 * UNIT_ROUNDOFF
     if with_seam:
         smooth = Mesh(file=str(_written(tmp_path, "bare.obj", False)), smooth=True)
-        bare = smooth.tabulate(Place()).normals
+        bare = smooth.tabulate(TabulationContext()).normals
         assert bare is not None
         assert np.abs(bare - ours).max() > 0.01

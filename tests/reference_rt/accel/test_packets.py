@@ -8,14 +8,14 @@ from builders import cube, icosphere, same_in_plain_python, unit_vectors, write_
 
 import reference_rt as rt
 from reference_rt.accel.geometry import closest_hit
-from reference_rt.accel.packet.nodes import enter_together
-from reference_rt.accel.packet.packet import BUNDLE, SPAN_FLOATS, bundle_of
-from reference_rt.accel.single_ray import enter, view_of
+from reference_rt.accel.packet.nodes import enter_packet
+from reference_rt.accel.packet.packet import PACKET_SIZE, SPAN_FLOATS, packet_of
+from reference_rt.accel.single_ray import enter, slab_ray_of
 from reference_rt.core.ray import Ray
-from reference_rt.core.scaled_ray import is_told, scaled
+from reference_rt.core.scaled_ray import is_representable, scaled
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, local_floats
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.rendering import query
 from reference_rt.scene import build_hierarchies
 
@@ -28,7 +28,7 @@ def _alone(geometry, o, d, t, codes, uv):
         if not valid:
             continue
         hit = closest_hit(geometry, ray)
-        if hit.kind < 0 or not is_told(hit.t * unit, ray.o + ray.d * hit.t):
+        if hit.kind < 0 or not is_representable(hit.t * unit, ray.o + ray.d * hit.t):
             continue
         t[i], codes[i, 0], codes[i, 1] = hit.t * unit, hit.kind, hit.row
         uv[i, 0], uv[i, 1] = hit.u, hit.v
@@ -38,23 +38,23 @@ def _alone(geometry, o, d, t, codes, uv):
 def _go_together(bvh, o, d, together):
     span = local_floats(SPAN_FLOATS)
     for i in range(len(together)):
-        together[i] = bundle_of(bvh, o, d, i * BUNDLE, span).is_coherent
+        together[i] = packet_of(bvh, o, d, i * PACKET_SIZE, span).is_coherent
 
 
 @entry_kernel
 def _entered(bvh, o, d, together, for_all, for_each, distances):
     """The children of each node that a bundle enters, and those that its rays enter."""
-    span, own = local_floats(SPAN_FLOATS), local_floats(LANES)
-    bundle = bundle_of(bvh, o, d, 0, span)
+    span, own = local_floats(SPAN_FLOATS), local_floats(VECTOR_WIDTH)
+    bundle = packet_of(bvh, o, d, 0, span)
     together[0] = bundle.is_coherent
     for node in range(len(for_all)):
-        for_all[node] = enter_together(bvh, node, bundle, math.inf, own)
-        for lane in range(LANES):
+        for_all[node] = enter_packet(bvh, node, bundle, math.inf, own)
+        for lane in range(VECTOR_WIDTH):
             distances[node, 0, lane] = own[lane]
-        for j in range(BUNDLE):
-            view = view_of(bvh, 0, Ray(row(o, j), row(d, j), math.inf))
+        for j in range(PACKET_SIZE):
+            view = slab_ray_of(bvh, 0, Ray(row(o, j), row(d, j), math.inf))
             for_each[node, j] = enter(bvh, node, view, math.inf, own)
-            for lane in range(LANES):
+            for lane in range(VECTOR_WIDTH):
                 distances[node, 1 + j, lane] = own[lane]
 
 
@@ -65,14 +65,14 @@ def mesh_scene(folder, mesh, *others):
 
 def cones(rng, count, aims, width, apart=0.0):
     """`count` bundles: each from around a point outside, towards one of `aims` and around it."""
-    o = np.repeat(3.0 * unit_vectors(rng, count), BUNDLE, axis=0)
-    aim = np.repeat(aims[rng.integers(0, len(aims), count)], BUNDLE, axis=0)
+    o = np.repeat(3.0 * unit_vectors(rng, count), PACKET_SIZE, axis=0)
+    aim = np.repeat(aims[rng.integers(0, len(aims), count)], PACKET_SIZE, axis=0)
     o += apart * rng.uniform(-1, 1, o.shape)
     return o, aim + width * rng.uniform(-1, 1, o.shape) - o
 
 
 def share_together(tables, o, d):
-    together = np.zeros(len(o) // BUNDLE, bool)
+    together = np.zeros(len(o) // PACKET_SIZE, bool)
     _go_together(tables.geometry.bvh, o, d, together)
     return together.mean()
 
@@ -108,7 +108,7 @@ def test_rays_through_vertices_and_edges(mesh, tmp_path):
     rng = np.random.default_rng(6)
     count = 1500
     o, _ = cones(rng, count, corners[:, 0], 0.0)
-    face = np.repeat(rng.integers(0, len(faces), count), BUNDLE)
+    face = np.repeat(rng.integers(0, len(faces), count), PACKET_SIZE)
     share = rng.integers(0, 3, (len(o), 1)) / 2.0
     of = corners[face, rng.integers(0, 3, len(o))], corners[face, rng.integers(0, 3, len(o))]
     d = of[0] * share + of[1] * (1.0 - share) - o
@@ -146,12 +146,12 @@ def test_rays_that_do_not_belong(tmp_path):
     k = rng.integers(0, len(d), 500)
     d[k] = unit_vectors(rng, len(k))
     d[rng.integers(0, len(d), 200)] = 0.0
-    length = np.repeat(2.0 ** rng.integers(-80, 80, 4000), BUNDLE)
+    length = np.repeat(2.0 ** rng.integers(-80, 80, 4000), PACKET_SIZE)
     with np.errstate(all="ignore"):
         d *= length[:, None]
     assert 0.1 < share_together(tables, o, d) < together - 0.2
     assert_same(tables, o, d)
-    for n in (0, 1, BUNDLE - 1, BUNDLE + 1, 3 * BUNDLE + 5):
+    for n in (0, 1, PACKET_SIZE - 1, PACKET_SIZE + 1, 3 * PACKET_SIZE + 5):
         assert_same(tables, o[:n], d[:n])
 
 
@@ -189,8 +189,8 @@ def test_a_bundle_enters_what_its_rays_enter(width, tmp_path):
     for _ in range(60):
         o, d = cones(rng, 1, rng.uniform(-1, 1, (1, 3)), width, width)
         together, for_all = np.zeros(1, bool), np.zeros(nodes, np.int64)
-        for_each = np.zeros((nodes, BUNDLE), np.int64)
-        distances = np.zeros((nodes, 1 + BUNDLE, LANES))
+        for_each = np.zeros((nodes, PACKET_SIZE), np.int64)
+        distances = np.zeros((nodes, 1 + PACKET_SIZE, VECTOR_WIDTH))
         with np.errstate(all="ignore"):
             _entered(bvh, o, d, together, for_all, for_each, distances)
         if not together[0]:
@@ -198,7 +198,7 @@ def test_a_bundle_enters_what_its_rays_enter(width, tmp_path):
         bundles += 1
         any_ray = np.bitwise_or.reduce(for_each, axis=1)
         assert (any_ray & ~for_all == 0).all()
-        by_lane = for_each[:, :, None] >> np.arange(LANES) & 1 == 1
+        by_lane = for_each[:, :, None] >> np.arange(VECTOR_WIDTH) & 1 == 1
         nearer = distances[:, :1] <= distances[:, 1:]
         assert nearer[by_lane].all()
         entered += sum(int(bits).bit_count() for bits in for_all)

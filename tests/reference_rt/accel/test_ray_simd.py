@@ -10,17 +10,24 @@ import reference_rt as rt
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
 from reference_rt.accel.geometry import closest_hit, occluded
 from reference_rt.core.ray import BLOCK, Ray
-from reference_rt.core.ray_block import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, Hits, Rays, ray_of
+from reference_rt.core.ray_block import (
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    HitBlock,
+    RayBlock,
+    ray_of,
+)
 from reference_rt.core.vec3 import Vec3
 from reference_rt.integrators import radiance
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.rendering import tiles
 from reference_rt.sampling import start_sample
 from reference_rt.shapes import box
 from reference_rt.shapes.curved import sphere
 from reference_rt.shapes.flat import rectangle
-from reference_rt.shapes.ray_simd import nearer_plainly
+from reference_rt.shapes.ray_simd import make_plain_nearer
 
 
 def scene(kinds, rng):
@@ -62,7 +69,7 @@ def _alone(geometry, o, d, t_max, found, blocked):
 
 @entry_kernel
 def _together(geometry, numbers, hits, n, found, blocked):
-    rays = Rays(numbers)
+    rays = RayBlock(numbers)
     closest_hits(geometry, rays, hits, n)
     for j in range(n):
         hit = hit_of(geometry, ray_of(rays, j), hits, j)
@@ -80,7 +87,7 @@ def test_rays_side_by_side_find_what_each_finds(kinds):
     rng = np.random.default_rng(71)
     geometry = scene(kinds, rng).tables.geometry
     assert geometry.bvh is None
-    hits = Hits(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
+    hits = HitBlock(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
     any_found = 0
     for n in [*range(1, BLOCK + 1)] * 40:
         o, d, t_max = rays_for(rng, n)
@@ -138,12 +145,12 @@ def test_vector_code_gives_the_bits_of_the_plain_kernel(kind):
         shape = tuple(Vec3(*map(np.float64, v)) for v in values)
         if kind == "sphere":
             shape = (*shape, np.float64(rng.uniform(0.5, 3)))
-        at = int(rng.choice([0, LANES]))
-        t, codes = np.full(LANES, rng.choice([math.inf, 2.0])), np.full(LANES, -1)
+        at = int(rng.choice([0, VECTOR_WIDTH]))
+        t, codes = np.full(VECTOR_WIDTH, rng.choice([math.inf, 2.0])), np.full(VECTOR_WIDTH, -1)
         plain_t, plain_codes = t.copy(), codes.copy()
         NEARER[kind](numbers, at, shape, t, codes)
         with np.errstate(all="ignore"):
-            nearer_plainly(module.distance)(numbers, at, shape, 5, plain_t, plain_codes)
+            make_plain_nearer(module.distance)(numbers, at, shape, 5, plain_t, plain_codes)
         assert t.tobytes() == plain_t.tobytes()
         assert np.array_equal(codes, plain_codes)
         finite += (codes == 5).sum()

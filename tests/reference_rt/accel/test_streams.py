@@ -10,7 +10,14 @@ import reference_rt as rt
 from reference_rt.accel.block_query import any_hits, closest_hits
 from reference_rt.accel.geometry import closest_hit, occluded
 from reference_rt.core.ray import BLOCK, Ray
-from reference_rt.core.ray_block import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, Hits, Rays, hit_of
+from reference_rt.core.ray_block import (
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    HitBlock,
+    RayBlock,
+    hit_of,
+)
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering import query
@@ -33,18 +40,18 @@ def _alone(geometry, numbers, n, found, blocked):
 
 @entry_kernel
 def _together(geometry, numbers, n, hits, found, blocked):
-    closest_hits(geometry, Rays(numbers), hits, n)
+    closest_hits(geometry, RayBlock(numbers), hits, n)
     for j in range(n):
         hit = hit_of(hits, j)
         found[j, 0], found[j, 1], found[j, 2] = hit.t, hit.u, hit.v
         found[j, 3], found[j, 4], found[j, 5] = hit.kind, hit.row, hit.instance
-    any_hits(geometry, Rays(numbers), hits, n)
+    any_hits(geometry, RayBlock(numbers), hits, n)
     for j in range(n):
         blocked[j] = hits.codes[j] >= 0
 
 
 def block(o, d, t_max):
-    """As `streams.Rays`; what nobody asks for is NaN."""
+    """As `streams.RayBlock`; what nobody asks for is NaN."""
     numbers = np.full(RAY_FLOATS, np.nan)
     numbers.reshape(7, BLOCK)[:, : len(o)] = [*o.T, *d.T, t_max]
     return numbers
@@ -54,7 +61,7 @@ def assert_same(tables, o, d, t_max):
     """In blocks of all sizes; the share of rays that meet something."""
     geometry = tables.geometry
     assert geometry.bvh is not None
-    hits = Hits(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
+    hits = HitBlock(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
     begin, met, rng = 0, 0, np.random.default_rng(1)
     while begin < len(o):
         n = min(int(rng.integers(1, BLOCK + 1)), len(o) - begin)
@@ -170,7 +177,7 @@ def test_what_lies_on_arrays_of_rays(tmp_path):
 def write_hits(folder, file):
     tables = rt.build_tables(rt.Scene(shapes=(mesh(folder, icosphere(2)),)))
     numbers = block(*rays(np.random.default_rng(8), 40))
-    hits = Hits(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
+    hits = HitBlock(np.empty(HIT_FLOATS), np.empty(HIT_INTEGERS, np.int64))
     found, blocked = np.empty((40, COLUMNS)), np.empty(40, bool)
     with np.errstate(all="ignore"):
         _together(tables.geometry, numbers, 40, hits, found, blocked)

@@ -14,7 +14,7 @@ from reference_rt.accel.bvh.wide import (
     codes_of,
     leaf_code,
 )
-from reference_rt.jit.simd import LANES
+from reference_rt.jit.simd import VECTOR_WIDTH
 
 
 def _walk(tree):
@@ -22,11 +22,11 @@ def _walk(tree):
     leaves, jobs = [], [(0, [], 0)]
     while jobs:
         node, boxes, depth = jobs.pop()
-        for lane in range(LANES):
+        for lane in range(VECTOR_WIDTH):
             code = int(codes_of(tree)[node, lane])
             if code == bvh.NOTHING:
                 continue
-            own = tree.boxes[node, :CHILDREN].reshape(6, LANES)[:, lane].astype(float)
+            own = tree.boxes[node, :CHILDREN].reshape(6, VECTOR_WIDTH)[:, lane].astype(float)
             if code >= 0:
                 assert code > node  # no cycles
                 jobs.append((code, [*boxes, own], depth + 1))
@@ -58,8 +58,8 @@ def test_holds_what_the_binary_tree_holds(method, n, offset):
         assert 1 <= size <= LEAF_SHARE
         rows = tree.references[first : first + size, 1]
         seen[first : first + size] += 1
-        assert bvh.is_packet(code) == is_triangle[rows].all()
-        if bvh.is_packet(code):
+        assert bvh.is_triangle_leaf(code) == is_triangle[rows].all()
+        if bvh.is_triangle_leaf(code):
             lanes = tree.corners[9 * first : 9 * (first + size)].reshape(9, size)
             assert np.array_equal(lanes.T, corners[rows])
         if method != "spatial":  # which cuts what it holds
@@ -73,7 +73,7 @@ def test_holds_what_the_binary_tree_holds(method, n, offset):
     assert found.references == len(references)
     assert found.leaves == len(_walk(tree))
     assert found.depth == max(depth for _, _, depth in _walk(tree))
-    assert found.depth * (LANES - 1) <= WIDE_STACK
+    assert found.depth * (VECTOR_WIDTH - 1) <= WIDE_STACK
     assert found.nodes == len(tree.boxes)
 
 
@@ -88,16 +88,16 @@ def test_boxes_are_tight_far_from_the_origin():
 
 
 def test_codes():
-    for first, size, is_packet in (
+    for first, size, is_triangle_leaf in (
         (0, 0, False),
         (0, 1, True),
         (2**26 - 1, 8, True),
         (77, 5, False),
     ):
-        code = leaf_code(first, size, is_packet)
+        code = leaf_code(first, size, is_triangle_leaf)
         assert -(2**31) <= code < 0
         assert (bvh.first_of(code), bvh.size_of(code)) == (first, size)
-        assert bvh.is_packet(code) == is_packet
+        assert bvh.is_triangle_leaf(code) == is_triangle_leaf
     assert leaf_code(0, 0, False) == bvh.NOTHING
 
 
@@ -127,7 +127,7 @@ def _cheapest(nodes, is_triangle, references):
             sum(map(child, a + b))
             for a in cuts(left)
             for b in cuts(left + 1)
-            if len(a) + len(b) <= LANES
+            if len(a) + len(b) <= VECTOR_WIDTH
         )
 
     def cuts(node):
@@ -136,7 +136,7 @@ def _cheapest(nodes, is_triangle, references):
         if nodes.size[node] == 0:
             left = nodes.first[node]
             found += [a + b for a in cuts(left) for b in cuts(left + 1)]
-        return [cut for cut in found if len(cut) < LANES]
+        return [cut for cut in found if len(cut) < VECTOR_WIDTH]
 
     return opened(0)
 
@@ -149,7 +149,7 @@ def test_is_the_cheapest_of_all(seed):
     nodes, references, tree = _joined(corners, "sah", is_triangle)
     cost = 0.0
     for row in range(len(tree.boxes)):
-        planes = tree.boxes[row, :CHILDREN].reshape(6, LANES).astype(float)
+        planes = tree.boxes[row, :CHILDREN].reshape(6, VECTOR_WIDTH).astype(float)
         x, y, z = planes[3:] - planes[:3]
         for lane, code in enumerate(codes_of(tree)[row].tolist()):
             if code != bvh.NOTHING:

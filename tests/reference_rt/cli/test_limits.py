@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from reference_rt.cli.limits import LAW, Limit, limits_of, told
+from reference_rt.cli.limits import LAW, Limit, in_words, limits_of
 from reference_rt.cli.main import app
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
@@ -43,7 +43,7 @@ def test_a_shape_whose_products_overflow_is_reported() -> None:
         ball = f"shapes:\n  - {{type: sphere, radius: {2.0**exponent!r}}}\n"
         (found,) = [limit for limit in limits(ball) if limit.law == "range"]
         assert beyond(ball) == law
-        assert "reaches" in told(found)
+        assert "reaches" in in_words(found)
         # What is told is so: at the lower size rays from inside hit.
     scene = build_tables(Scene.parse(ball))
     assert query.intersect(scene, [[0.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]]).t[0] == 2.0**506
@@ -99,8 +99,11 @@ shapes:
 
 
 def test_it_is_reported_in_words() -> None:
-    assert told(Limit("gap", "a and b", 2e-16, 1e-15)) == "a and b: 2e-16, float64's error is 1e-15"
-    assert "2 times" in told(Limit("gap", "a and b", 2e-15, 1e-15))
+    assert (
+        in_words(Limit("gap", "a and b", 2e-16, 1e-15))
+        == "a and b: 2e-16, float64's error is 1e-15"
+    )
+    assert "2 times" in in_words(Limit("gap", "a and b", 2e-15, 1e-15))
 
 
 @pytest.mark.parametrize("name", STIFF)

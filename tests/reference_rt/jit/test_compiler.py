@@ -18,7 +18,7 @@ from reference_rt.core.exr import read_exr
 from reference_rt.jit import compiler, function_pointer, numba_pipeline
 from reference_rt.jit import kernel as kernel_module
 from reference_rt.jit.compiler import CHOICE, INLINING, STOCK, SUPPORTED
-from reference_rt.jit.function_pointer import address_of, call_at
+from reference_rt.jit.function_pointer import call_pointer, pointer_to
 from reference_rt.jit.kernel import entry_kernel, precompile, signature_of
 
 ROOT = Path(__file__).parents[3]
@@ -191,7 +191,7 @@ def _add(x, pair, out):
 
 
 def _add_at(address, x, pair, out):
-    call_at(address[0], (x, pair, out))
+    call_pointer(address[0], (x, pair, out))
 
 
 @needs_jit
@@ -204,5 +204,5 @@ def test_the_stock_compiler_calls_at_an_address(monkeypatch):
     signature = signature_of(*arguments)
     called = entry_kernel(_add)
     precompile(called, signature)
-    entry_kernel(_add_at)(np.array([address_of(called, signature)], np.intp), *arguments)
+    entry_kernel(_add_at)(np.array([pointer_to(called, signature)], np.intp), *arguments)
     assert out[0] == 6.5

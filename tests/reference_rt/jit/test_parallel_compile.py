@@ -12,7 +12,7 @@ import pytest
 
 from reference_rt import Scene, Sphere, render
 from reference_rt.jit import parallel_compile
-from reference_rt.jit.function_pointer import address_of, call_at
+from reference_rt.jit.function_pointer import call_pointer, pointer_to
 from reference_rt.jit.kernel import entry_kernel, is_compiled, precompile, signature_of
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
@@ -157,14 +157,14 @@ def weigh(pair: Pair, nothing: None, offset: int, negative: bool, out: Any) -> N
 
 @entry_kernel
 def weigh_at(address: Any, pair: Pair, out: Any) -> None:
-    call_at(address[0], (pair, None, len(out), True, out))
+    call_pointer(address[0], (pair, None, len(out), True, out))
 
 
 def test_a_kernel_is_called_at_its_address():
     pair, out = Pair(np.array([1.0, 2.0, 4.0]), 0.5), np.zeros(3)
     signature = signature_of(pair, None, 0, False, out)
     precompile(weigh, signature)
-    weigh_at(np.array([address_of(weigh, signature)], np.intp), pair, out)
+    weigh_at(np.array([pointer_to(weigh, signature)], np.intp), pair, out)
     assert out.tolist() == [-3.5, -4.0, -5.0]
 
 

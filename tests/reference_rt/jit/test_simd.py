@@ -8,8 +8,8 @@ import pytest
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, local_floats
-from reference_rt.jit.simd import LANES, larger, least, smaller
-from reference_rt.jit.simd_kernels import lane_kernel, lowest, plain
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, least, smaller
+from reference_rt.jit.simd_kernels import lowest, plain, simd_kernel
 from reference_rt.shapes.meshes import watertight
 from reference_rt.shapes.meshes.watertight import shear_of
 
@@ -24,7 +24,7 @@ def _text(doubles, singles, start, factor, out):
     return (c <= a) | ((b > 0.0) & ~(c >= factor))
 
 
-_emitted = lane_kernel(_text)
+_emitted = simd_kernel(_text)
 
 
 @entry_kernel
@@ -45,7 +45,7 @@ def test_emitted_code_gives_the_bits_of_numpy(seed):
             singles = rng.permutation(np.resize(doubles, 80)).astype(np.float32)
         factor = float(rng.choice([*SPECIAL, rng.normal()]))
         start = int(rng.integers(0, 32))
-        there, here = np.empty(LANES), np.empty(LANES)
+        there, here = np.empty(VECTOR_WIDTH), np.empty(VECTOR_WIDTH)
         with np.errstate(all="ignore"):
             assert _run(doubles, singles, start, factor, there) == plain(_text)(
                 doubles, singles, start, factor, here
@@ -56,9 +56,9 @@ def test_emitted_code_gives_the_bits_of_numpy(seed):
 
 
 def test_comparisons_say_which_lane():
-    doubles = np.arange(LANES) - 3.0
-    singles = np.zeros(2 * LANES + 1, np.float32)
-    out = np.empty(LANES)
+    doubles = np.arange(VECTOR_WIDTH) - 3.0
+    singles = np.zeros(2 * VECTOR_WIDTH + 1, np.float32)
+    out = np.empty(VECTOR_WIDTH)
     # b = -a, c = 1 - min(a, max(-a, 1/2)) - a².
     a = doubles
     c = 1.0 - np.minimum(a, np.maximum(-a, 0.5)) - a * a
@@ -75,7 +75,7 @@ def _several(doubles, out):
     return a <= least(a), a > doubles.everywhere(3), a < 0.0
 
 
-_run_several = lane_kernel(_several)
+_run_several = simd_kernel(_several)
 
 
 @entry_kernel
@@ -86,10 +86,13 @@ def _both(doubles, out):
 def test_several_conditions_and_the_least_number():
     rng = np.random.default_rng(3)
     for _ in range(200):
-        doubles, out, plainly = rng.integers(-3, 4, LANES).astype(float), *np.empty((2, LANES))
+        doubles, out, plainly = (
+            rng.integers(-3, 4, VECTOR_WIDTH).astype(float),
+            *np.empty((2, VECTOR_WIDTH)),
+        )
         found = _both(doubles, out)
         assert found == plain(_several)(doubles, plainly)
-        assert out.tobytes() == plainly.tobytes() == np.full(LANES, doubles.min()).tobytes()
+        assert out.tobytes() == plainly.tobytes() == np.full(VECTOR_WIDTH, doubles.min()).tobytes()
         conditions = doubles == doubles.min(), doubles > doubles[3], doubles < 0.0
         assert found == sum(int(b) << k for k, b in enumerate(np.concatenate(conditions)))
 
@@ -109,10 +112,10 @@ def test_lowest_bit():
 
 @entry_kernel
 def _met(corners, size, origins, directions, maybe, met, seen_now, seen_again):
-    seen = local_floats(watertight.SEEN_FLOATS)
+    seen = local_floats(watertight.PROJECTION_FLOATS)
     for i in range(len(origins)):
         shear = shear_of(Ray(row(origins, i), row(directions, i), math.inf))
-        maybe[i] = watertight.see(corners, 0, size, shear, seen)
+        maybe[i] = watertight.project_leaf(corners, 0, size, shear, seen)
         for lane in range(size):
             alone = watertight._project(corners, lane, size, shear)
             if alone.side != 0:
@@ -145,7 +148,7 @@ def test_a_leaf_is_seen_as_its_triangles_are(size, kind):
         targets = of[:, :3] * share + of[:, 3:6] * (1.0 - share) + 1e-5 * targets
     d = targets - o
     d[~d.any(axis=1)] = 1.0
-    corners = np.zeros(9 * size + LANES)
+    corners = np.zeros(9 * size + VECTOR_WIDTH)
     corners[: 9 * size] = vertices.T.reshape(-1)
     maybe, met = np.zeros((2, n), np.int64)
     seen = np.zeros((2, n, size, 7))

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference_rt.core.vec3 import Vec3, dot
-from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, both, sample
+from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, eval_pdf, sample
 from reference_rt.materials.microfacet.fresnel import MOST_INDEX, fresnel, relative_index
-from reference_rt.materials.microfacet.ggx_and_smith import bend, half_vector, refract
+from reference_rt.materials.microfacet.ggx_and_smith import half_vector, refract, refraction_half
 from reference_rt.sampling.warp import uniform_sphere
 from reference_rt.textures import NO_TEXTURES, At
 
@@ -72,8 +72,8 @@ def test_no_index_breaks_it(n, cosine):
 def test_bending_is_the_same_from_either_side(up, phi, down, psi, n):
     """The same bits; of the spread, which counts solid angle, n² more from inside."""
     a, b = towards(up, phi), -towards(down, psi)
-    there = bend(a, b, n, True)
-    back = bend(-b, -a, n, False)  # upside down, so that wo is above
+    there = refraction_half(a, b, n, True)
+    back = refraction_half(-b, -a, n, False)  # upside down, so that wo is above
     assert there.refraction == back.refraction
     assert (there.h == back.h) or (there.h == -back.h)
     assert back.spread == pytest.approx(there.spread * n * n, rel=4 * U)
@@ -104,7 +104,7 @@ def test_refracted_directions_are_unit_and_obey_snell(up, phi, n, side):
 @pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
 def test_glass_that_hardly_bends(index, distribution):
     """Directions pass as good as straight, with a weight that only the masking takes from; and
-    samples are found again by `both`."""
+    samples are found again by `eval_pdf`."""
     material = RoughDielectric.model_validate(
         {
             "type": "rough_dielectric",
@@ -123,7 +123,7 @@ def test_glass_that_hardly_bends(index, distribution):
             assert found.pdf > 0.0
             assert dot(found.wi, -wo) > 1.0 - 1e-7
             assert 0.9 < found.weight.x <= 1.0 + abs(index - 1.0) * 4.0
-            value = both(table, 0, AT, wo, found.wi).value.x
+            value = eval_pdf(table, 0, AT, wo, found.wi).value.x
             # A direction tells the half vector's slope to u / |n - 1|, D to 14 / alpha of it.
             off = 4 * 14.0 / 0.2 * U / abs(index - 1.0)
             assert value == pytest.approx(found.weight.x * found.pdf, rel=32 * U + off)

@@ -11,7 +11,7 @@ from reference_rt import materials as any_material
 from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import Frame, Vec3, length
 from reference_rt.materials import Shading
-from reference_rt.materials.textured import look
+from reference_rt.materials.textured import evaluate_textures
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At
 from reference_rt.textures.lookup import lookup
@@ -39,7 +39,7 @@ def tables_of(**materials):
 def shading(tables, m, wo, u=0.1, v=0.1):
     point = SurfacePoint(Vec3(0.0, 0.0, 0.0), Z, Z, 0.0, m, -1)
     at = At(tables.textures, u, v, Vec3(-1.0, -1.0, -1.0))
-    kept = np.zeros(any_material.kept_floats(tables.materials))
+    kept = np.zeros(any_material.scratch_floats(tables.materials))
     place = Shading(point, Frame(X, Y, Z), wo, at, Tangents(X, Y), kept)
     any_material.prepare(tables.materials, place, at)
     return place
@@ -248,7 +248,7 @@ def test_a_materials_textures_are_those_of_all_that_it_is_made_of():
     # Of heights, slopes are asked instead of colours.
     assert found == [[], [2], [2], [0, 2], [0, 2, 3]]
     at, colours = At(tables.textures, 0.3, 0.6, Vec3(-1.0, -1.0, -1.0)), np.full(12, np.nan)
-    looked = look(textured, 4, at, colours)
+    looked = evaluate_textures(textured, 4, at, colours)
     for k in (0, 2, 3):
         assert lookup(k, looked) == lookup(k, at)
     assert np.isnan(colours[3:6]).all()

@@ -102,7 +102,7 @@ def test_diffuse_sample_evaluate_and_pdf_agree(cosine, u0, u1):
     table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate(NO_TEXTURES)
     wo = towards(cosine, 0.3)
     drawn = diffuse.sample(table, 0, AT, wo, 0.5, u0, u1)
-    value, density = diffuse.both(table, 0, AT, wo, drawn.wi)
+    value, density = diffuse.eval_pdf(table, 0, AT, wo, drawn.wi)
     assert drawn.pdf == density
     assert not drawn.is_delta
     for k in range(3):
@@ -115,12 +115,12 @@ def test_diffuse_is_one_sided_and_reciprocal(a, b):
     table = rt.Diffuse().tabulate(NO_TEXTURES)
     wo, wi = towards(a, 0.3), towards(b, 2.0)
     below = Vec3(wi.x, wi.y, -wi.z)
-    assert diffuse.both(table, 0, AT, wo, below) == ((0.0, 0.0, 0.0), 0.0)
-    assert diffuse.both(table, 0, AT, below, wo) == ((0.0, 0.0, 0.0), 0.0)
+    assert diffuse.eval_pdf(table, 0, AT, wo, below) == ((0.0, 0.0, 0.0), 0.0)
+    assert diffuse.eval_pdf(table, 0, AT, below, wo) == ((0.0, 0.0, 0.0), 0.0)
     assert diffuse.sample(table, 0, AT, below, 0.5, 0.5, 0.5).pdf == 0.0
     there, back = (
-        diffuse.both(table, 0, AT, wo, wi).value.x,
-        diffuse.both(table, 0, AT, wi, wo).value.x,
+        diffuse.eval_pdf(table, 0, AT, wo, wi).value.x,
+        diffuse.eval_pdf(table, 0, AT, wi, wo).value.x,
     )
     assert there / wi.z == pytest.approx(back / wo.z, rel=4 * U)
 
@@ -129,7 +129,7 @@ def test_diffuse_reflects_its_reflectance():
     """The integral of f cos over the hemisphere, by the midpoint rule in cos and phi."""
     table = rt.Diffuse(reflectance=(0.1, 0.5, 0.9)).tabulate(NO_TEXTURES)
     ticks = (np.arange(64) + 0.5) / 64
-    values = [diffuse.both(table, 0, AT, Vec3(0, 0, 1), towards(c, 0.0)).value for c in ticks]
+    values = [diffuse.eval_pdf(table, 0, AT, Vec3(0, 0, 1), towards(c, 0.0)).value for c in ticks]
     # Linear in the cosine: the midpoint rule is exact.
     assert 2 * math.pi * np.mean(values, axis=0) == pytest.approx((0.1, 0.5, 0.9), rel=1e-14)
 
@@ -143,13 +143,13 @@ def test_what_all_materials_share_is_said_by_absence():
     """So that nothing is asked where there is nothing to choose."""
     diffuse, mirror, lamp = rt.Diffuse(), rt.Mirror(), rt.Emissive(radiance=1.0)
     alike = tables_of(a=diffuse, b=diffuse)
-    assert alike.kind is alike.smooth is alike.chooses is alike.behind is None
+    assert alike.kind is alike.smooth is alike.uses_u_lobe is alike.behind is None
     assert any_smooth(alike)
     # A lamp scatters nothing: it is of no table.
     lit = tables_of(a=diffuse, lamp=lamp)
     assert lit.kind.tolist() == [DIFFUSE, BLACK]
     assert lit.smooth.tolist() == [1, 0]
-    assert lit.chooses is lit.behind is None
+    assert lit.uses_u_lobe is lit.behind is None
     mirrors = tables_of(a=mirror)
     assert mirrors.kind is None
     assert mirrors.smooth.tolist() == [0]
@@ -157,7 +157,7 @@ def test_what_all_materials_share_is_said_by_absence():
     mixed = tables_of(a=diffuse, b=rt.RoughDielectric(), c=rt.TwoSided(base="a"))
     assert mixed.kind is not None
     assert mixed.smooth is None
-    assert mixed.chooses.tolist() == [0, 1, 0]
+    assert mixed.uses_u_lobe.tolist() == [0, 1, 0]
     assert mixed.behind.tolist() == [0, 1, 1]
 
 

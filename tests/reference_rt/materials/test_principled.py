@@ -102,7 +102,7 @@ def test_glass_is_the_rough_dielectric():
     found = evaluate(glass.tabulate(NO_TEXTURES), wo, wi)[0]
     table = twin.tabulate(NO_TEXTURES)
     for k in range(len(wo)):
-        expected = rough_dielectric.both(table, 0, AT, Vec3(*wo[k]), Vec3(*wi[k])).value
+        expected = rough_dielectric.eval_pdf(table, 0, AT, Vec3(*wo[k]), Vec3(*wi[k])).value
         assert found[k] == pytest.approx(np.array(expected), rel=1e-11)
 
 

@@ -84,7 +84,7 @@ def test_an_interrupt_while_bands_are_handed_out(monkeypatch):
 
     monkeypatch.setattr(module, "ThreadPoolExecutor", Pool)
     with pytest.raises(KeyboardInterrupt):
-        module.run_bands(band, (), 1000, module.SAMPLES_PER_TILE, 1, lambda what, fraction: None)
+        module.run_tiles(band, (), 1000, module.SAMPLES_PER_TILE, 1, lambda what, fraction: None)
     assert len(ran) < 50
 
 

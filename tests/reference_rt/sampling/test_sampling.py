@@ -108,10 +108,10 @@ def _fill_both(order, x_seed, y_seed, place, first, fast, plain):
 
 def test_vector_code_gives_the_bits_of_the_plain_kernel():
     rng = np.random.default_rng(63)
-    fast, plain = np.empty((2, 2 * blocks.TOGETHER))
+    fast, plain = np.empty((2, 2 * blocks.BLOCK_SAMPLES))
     for k in range(300):
         seeds = rng.integers(0, 2**32, 3, dtype=np.uint64)
-        first, place = int(rng.integers(0, 2**27)) * blocks.TOGETHER, k % GROUP
+        first, place = int(rng.integers(0, 2**27)) * blocks.BLOCK_SAMPLES, k % GROUP
         _fill_both(*seeds, place, first, fast, plain)
         assert np.array_equal(fast, plain)
     # And of Python's.
@@ -120,7 +120,7 @@ def test_vector_code_gives_the_bits_of_the_plain_kernel():
     assert np.array_equal(fast, plain)
     assert [tuple(p) for p in plain.reshape(2, -1).T] == [
         sobol.pair(tuple(seeds), place, sobol.reverse_bits(np.uint64(first + k)))
-        for k in range(blocks.TOGETHER)
+        for k in range(blocks.BLOCK_SAMPLES)
     ]
 
 

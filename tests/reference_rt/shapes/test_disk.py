@@ -25,7 +25,7 @@ from reference_rt.core.vec3 import Vec3
 from reference_rt.rendering import query
 from reference_rt.shapes import DISK
 from reference_rt.shapes.flat import disk
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 CHI2_199 = 308.60
 """The quantile 1 - 1e-6 of chi-square with 199 degrees of freedom: scipy.stats.chi2.ppf."""
@@ -109,7 +109,7 @@ def test_uv_along_the_axes():
 def test_bounds_touch_the_rim():
     rng = np.random.default_rng(4)
     for _ in range(30):
-        table = rt.Disk(transform=(random_map(rng, 2.0, 3.0),)).tabulate(Place())
+        table = rt.Disk(transform=(random_map(rng, 2.0, 3.0),)).tabulate(TabulationContext())
         phi = np.linspace(0, 2 * math.pi, 100_001)
         points = plane_points(table, np.zeros(len(phi), int), np.cos(phi), np.sin(phi))
         (lower,), (upper,) = disk.bounds(table)
@@ -150,7 +150,7 @@ FACING_DOWN = transform.Rotate(rotate=transform.Turn(axis=(1, 0, 0), degrees=180
 def test_points_are_uniform():
     """Over 10 x 20 cells of equal area of the local disk, under a map with shear."""
     step = random_map(np.random.default_rng(5), 0.5, 3.0)
-    table = rt.Disk(transform=(step,)).tabulate(Place())
+    table = rt.Disk(transform=(step,)).tabulate(TabulationContext())
     u = np.random.default_rng(6).uniform(0, 1, (20_000, 2))
     far = Vec3(1e3, 0.0, 0.0)
     p = np.array([disk.sample(table, 0, 1.0, far, *k).p for k in u.tolist()]) - table.center[0]

@@ -10,8 +10,8 @@ from builders import U, unit_vectors
 import reference_rt as rt
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.jit.simd import LANES, product_error
-from reference_rt.jit.simd_kernels import lane_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, product_error
+from reference_rt.jit.simd_kernels import simd_kernel
 from reference_rt.shapes.rounding import along_from, difference_error
 
 SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, 1e-160, 1.7e308, -1.7e308, 1.0, 3.0]
@@ -29,7 +29,7 @@ def _side_by_side(x, y, out):
     return a <= a
 
 
-_emitted = lane_kernel(_side_by_side)
+_emitted = simd_kernel(_side_by_side)
 
 
 @entry_kernel
@@ -48,10 +48,10 @@ def test_product_error_is_the_same_bits_compiled_in_lanes_and_plainly():
         compiled = np.empty(len(x))
         _products(x, y, compiled)
         assert np.array_equal(compiled, expected, equal_nan=True)
-        for k in range(0, len(x) - LANES, LANES):
-            out = np.empty(LANES)
-            _lanes(x[k : k + LANES].copy(), y[k : k + LANES].copy(), out)
-            assert np.array_equal(out, expected[k : k + LANES], equal_nan=True)
+        for k in range(0, len(x) - VECTOR_WIDTH, VECTOR_WIDTH):
+            out = np.empty(VECTOR_WIDTH)
+            _lanes(x[k : k + VECTOR_WIDTH].copy(), y[k : k + VECTOR_WIDTH].copy(), out)
+            assert np.array_equal(out, expected[k : k + VECTOR_WIDTH], equal_nan=True)
     with np.errstate(all="ignore"):
         both = np.isfinite(expected) & (np.abs(x * y) > 1e-290)
     for a, b, e in zip(x[both].tolist(), y[both].tolist(), expected[both].tolist(), strict=True):

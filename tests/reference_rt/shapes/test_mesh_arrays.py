@@ -9,7 +9,7 @@ from builders import icosphere
 from mesh_writers import ply
 
 import reference_rt as rt
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 
 def ball():
@@ -68,7 +68,7 @@ def test_tables_are_those_of_the_file(tmp_path, names, more):
     """Bit for bit, under a transform too."""
     arrays = some_of(names)
     more = more | {"transform": [{"scale": [1, -2, 3]}, {"translate": [1, 2, 3]}]}
-    place = Place(folder=tmp_path)
+    place = TabulationContext(folder=tmp_path)
     ours = rt.Mesh(**arrays, **more).tabulate(place)
     theirs = rt.Mesh(file=as_file(arrays, tmp_path), **more).tabulate(place)
     for name, column, expected in zip(ours._fields, ours, theirs, strict=True):

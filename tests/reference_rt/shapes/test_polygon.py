@@ -22,7 +22,7 @@ import reference_rt as rt
 from reference_rt.core import transform
 from reference_rt.shapes import POLYGON
 from reference_rt.shapes.flat import polygon
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 # ---- against exact arithmetic -------------------------------------------------------------------
 
@@ -100,7 +100,7 @@ def test_the_plane_is_that_of_the_points(flat):
     for _ in range(50):
         rings = random_rings(rng, flat)
         shape = rt.Polygon(rings=rings, transform=(random_map(rng, 1.0, 3.0),))
-        table = shape.tabulate(Place())
+        table = shape.tabulate(TabulationContext())
         local = np.array([(*p, 0.0)[:3] for r in rings for p in r])
         m = transform.affine(shape.transform)
         expected = local @ m[:, :3].T + m[:, 3]

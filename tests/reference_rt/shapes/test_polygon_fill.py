@@ -12,7 +12,7 @@ from polygon_checks import EIGHT, PENTAGRAM, regular, seen_from_above, square
 
 import reference_rt as rt
 from reference_rt.core import transform
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 # ---- fill rules ---------------------------------------------------------------------------------
 
@@ -83,7 +83,7 @@ def test_many_points():
 
 
 def normal_of(rings, *steps):
-    return rt.Polygon(rings=rings, transform=steps).tabulate(Place()).normal[0].tolist()
+    return rt.Polygon(rings=rings, transform=steps).tabulate(TabulationContext()).normal[0].tolist()
 
 
 def test_the_normal_is_by_the_winding():
@@ -209,11 +209,11 @@ def test_points_off_the_plane_by_their_rounding():
     for _ in range(100):
         rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         points = np.array(regular(12)) @ rotation[:, :2].T + rng.uniform(-1, 1, 3) * 100
-        table = rt.Polygon(rings=(points.tolist(),)).tabulate(Place())
+        table = rt.Polygon(rings=(points.tolist(),)).tabulate(TabulationContext())
         assert abs(abs(table.normal[0] @ rotation[:, 2]) - 1) < 1e-12
         points[7] += 64_000 * U * np.abs(points).max() * rotation[:, 2]
         with pytest.raises(ValueError, match=r"ring 0: point \d+ is .* off the plane"):
-            rt.Polygon(rings=(points.tolist(),)).tabulate(Place())
+            rt.Polygon(rings=(points.tolist(),)).tabulate(TabulationContext())
 
 
 def test_no_solid():

@@ -9,7 +9,7 @@ import reference_rt as rt
 from reference_rt.core import transform
 from reference_rt.shapes.meshes.triangle_table import geometric_normals
 from reference_rt.shapes.meshes.vertex_normals import smooth_normals
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 EPS = np.finfo(float).eps
 ROUNDED = 16 * EPS
@@ -146,7 +146,7 @@ def test_every_reader(tmp_path, name):
         soup = vertices[faces].astype(np.float32)
         content = binary_stl(soup, attribute=0) if "bin" in name else ascii_stl(soup).encode()
         (tmp_path / name).write_bytes(content)
-    place = Place(folder=tmp_path)
+    place = TabulationContext(folder=tmp_path)
     source = {"vertices": vertices, "faces": faces} if name == "memory" else {"file": name}
     table = rt.Mesh(**source, smooth=True).tabulate(place)
     # The transform, of which there is none here, makes them unit again.
@@ -165,8 +165,8 @@ def test_as_if_the_file_had_them():
     given = np.zeros_like(vertices)
     given[faces.ravel()] = corner.reshape(-1, 3)
     fields = {"vertices": vertices, "faces": faces, "transform": STEPS}
-    made = rt.Mesh(**fields, smooth=True).tabulate(Place())
-    with_given = rt.Mesh(**fields, normals=given).tabulate(Place())
+    made = rt.Mesh(**fields, smooth=True).tabulate(TabulationContext())
+    with_given = rt.Mesh(**fields, normals=given).tabulate(TabulationContext())
     assert np.array_equal(made.vertices, with_given.vertices)
     # Made unit twice, and products of matrices may add in another order.
     assert np.allclose(made.normals, with_given.normals, rtol=0, atol=8 * EPS)
@@ -178,8 +178,8 @@ def test_as_if_the_file_had_them():
 def test_own_normals_stay():
     vertices, faces = uneven_ball()
     fields = {"vertices": vertices, "faces": faces, "normals": np.roll(vertices, 1, axis=1)}
-    smooth = rt.Mesh(**fields, smooth=True).tabulate(Place())
-    assert np.array_equal(smooth.normals, rt.Mesh(**fields).tabulate(Place()).normals)
+    smooth = rt.Mesh(**fields, smooth=True).tabulate(TabulationContext())
+    assert np.array_equal(smooth.normals, rt.Mesh(**fields).tabulate(TabulationContext()).normals)
     with pytest.raises(rt.SceneError, match=r"^smooth: beside face_normals; expected one"):
         rt.Mesh(**fields, smooth=True, face_normals=True)
 
@@ -189,8 +189,8 @@ def test_tiny_meshes_that_a_transform_enlarges():
     vertices, faces = uneven_ball()
     tiny = rt.Mesh(
         vertices=vertices * 2.0**-500, faces=faces, smooth=True, transform=[{"scale": 2.0**500}]
-    ).tabulate(Place())
-    usual = rt.Mesh(vertices=vertices, faces=faces, smooth=True).tabulate(Place())
+    ).tabulate(TabulationContext())
+    usual = rt.Mesh(vertices=vertices, faces=faces, smooth=True).tabulate(TabulationContext())
     assert np.array_equal(tiny.vertices, usual.vertices)
     assert np.allclose(tiny.normals, usual.normals, rtol=0, atol=4 * EPS)
     assert len(tiny.face) == len(faces)

@@ -13,16 +13,16 @@ import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import MAKES, on_threads, over
 from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
-from reference_rt.rendering.tiles import render_band
+from reference_rt.rendering.tiles import render_tile
 from reference_rt.util.child_processes import tied
 
 Outcomes = dict[str, Outcome]
 
-_band: Any = render_band
+_band: Any = render_tile
 
 
 def _job(scene: rt.Scene) -> tuple[Any, FloatArray]:
-    """All of `render_band`'s arguments but the last four, and the sums (n, 3) that it writes."""
+    """All of `render_tile`'s arguments but the last four, and the sums (n, 3) that it writes."""
     film, sampler, integrator = scene.film, scene.resolved_sampler, scene.integrator
     assert not isinstance(integrator, rt.RayCast)
     shape = (film.width, film.height)

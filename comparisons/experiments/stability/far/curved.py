@@ -26,7 +26,7 @@ from reference_rt.shapes import Cone, Cylinder, Quadric, Sphere, Torus
 from reference_rt.shapes.brute_force import intersect_row
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.curved.torus import Tori
-from reference_rt.shapes.shape import Place, Shape
+from reference_rt.shapes.shape import Shape, TabulationContext
 from reference_rt.textbook.method import ray_of
 
 MINOR = 0.25
@@ -172,7 +172,7 @@ def draw_rays(
 
 def _columns(shapes: list[Shape], which: IntArray) -> dict[str, Any]:
     """The columns of a table, of whose row i shape number which[i] is."""
-    rows = [shape.tabulate(Place())._asdict() for shape in shapes]
+    rows = [shape.tabulate(TabulationContext())._asdict() for shape in shapes]
     return {key: np.concatenate([row[key] for row in rows])[which] for key in rows[0]}
 
 

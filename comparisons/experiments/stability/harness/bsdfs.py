@@ -63,8 +63,9 @@ def _evaluate(table: Any, kind: int, wo: Any, wi: Any, values: Any, densities: A
     at = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
     for i in range(len(wo)):
         a, b = row(wo, i), row(wi, i)
-        values[i, 0], values[i, 1], values[i, 2] = tables.evaluate(table, kind, 0, at, a, b)
-        densities[i] = tables.pdf(table, kind, 0, at, a, b)
+        scattered = tables.eval_pdf(table, kind, 0, at, a, b)
+        values[i, 0], values[i, 1], values[i, 2] = scattered.value
+        densities[i] = scattered.density
 
 
 @entry_kernel

@@ -20,7 +20,7 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.query.solid_crossings import SolidCrossings, crossings
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import csg
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 from reference_rt.textbook.csg import interval_list
 from reference_rt.textbook.operands import CsgParameters
 
@@ -115,7 +115,7 @@ def truths(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> list[Truth
     exact = (Dyadic.of(o) - Dyadic.of(anchor[None]), Dyadic.of(d))
     seen = exact[0].floats()
     leaves = [
-        LeafSizes(shape, None, shape.tabulate(Place(folder=folder, outer=outer)))
+        LeafSizes(shape, None, shape.tabulate(TabulationContext(folder=folder, outer=outer)))
         for shape, outer in operands
     ]
     found = [crossings_of(leaf, (seen, d), exact) for leaf in leaves]

@@ -13,7 +13,7 @@ from reference_rt import shapes as any_shape
 from reference_rt.accel import bvh
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.ray import Hit, at
-from reference_rt.core.scaled_ray import is_told, scaled
+from reference_rt.core.scaled_ray import is_representable, scaled
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel, kernel
@@ -63,7 +63,7 @@ def _every(
                 hit = Hit(found.t, kind, number, found.u, found.v, -1)
                 if found.t < closest.t or _comes_first(shapes, hit, closest):
                     closest = hit
-        if closest.kind >= 0 and is_told(closest.t * unit, at(ray, closest.t)):
+        if closest.kind >= 0 and is_representable(closest.t * unit, at(ray, closest.t)):
             t[i], kinds[i], rows[i] = closest.t * unit, closest.kind, closest.row
             uv[i, 0], uv[i, 1] = closest.u, closest.v
 

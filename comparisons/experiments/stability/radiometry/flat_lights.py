@@ -32,7 +32,7 @@ from reference_rt.shapes.flat import rectangle
 from reference_rt.shapes.flat.rectangle import Rectangle
 from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.triangle import Triangle
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 CORNERS = ((-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0))
 """Of the triangle; it shines upwards, like the rectangle [-1, 1]²."""
@@ -154,14 +154,14 @@ def _compare(
 
 def _rectangle_densities(p: FloatArray, u: FloatArray) -> FloatArray:
     out = np.empty((len(p), len(u)))
-    _of_rectangle(Rectangle().tabulate(Place()), 4.0, p, u, out)
+    _of_rectangle(Rectangle().tabulate(TabulationContext()), 4.0, p, u, out)
     return out
 
 
 def _triangle_densities(p: FloatArray, u: FloatArray) -> FloatArray:
     out = np.empty((len(p), len(u)))
     shape = Triangle(v0=CORNERS[0], v1=CORNERS[1], v2=CORNERS[2])
-    _of_triangle(shape.tabulate(Place()), 2.0, p, u, out)
+    _of_triangle(shape.tabulate(TabulationContext()), 2.0, p, u, out)
     return out
 
 

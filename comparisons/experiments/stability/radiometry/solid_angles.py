@@ -23,7 +23,7 @@ from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes.curved import sphere
 from reference_rt.shapes.curved.sphere import Sphere
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 TEXTBOOK = "sphere.cosine"
 
@@ -67,7 +67,7 @@ def _sphere(draw: Draw, gap: FloatArray, shared: bool) -> dict[str, Outcome]:
     truth, cosine = np.array(exact), np.array(cosines)
     out = np.empty((len(p), 1))
     u = draw.rng.uniform(0.0, 1.0, (len(p), 1, 2))
-    _of_sphere(Sphere().tabulate(Place()), p, u, out)
+    _of_sphere(Sphere().tabulate(TabulationContext()), p, u, out)
     d2 = (p * p).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         naive = 2.0 * math.pi * (1.0 - np.sqrt(1.0 - 1.0 / d2))

@@ -73,7 +73,7 @@ def _(shape: Polygon, site: Site) -> list[Plugin]:
     positions[:, axis] = middle[axis] - (flat - middle[kept]) @ n[kept] / n[axis]
     soup = Soup(positions, uvs=filled, faces=faces)
     m = transform.compose(transform.affine(shape.transform), site.place.outer)
-    mesh = soup.moved(m, transform.mirrors(m)).mesh(site.parts)
+    mesh = soup.moved(m, transform.flips_orientation(m)).mesh(site.parts)
     return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv)]
 
 

@@ -17,7 +17,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.meshes.triangle import Triangles
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 MOST_TRIANGLES = 4_000_000
 """Most triangles of all copies of a mesh together, 0.3 kB each.  With more Mitsuba gets instances,
@@ -98,7 +98,7 @@ class Soup:
 def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
     key = ("triangles", id(shape))
     if key not in site.shared:
-        site.shared[key] = _soup(shape.tabulate(Place(folder=site.place.folder)))
+        site.shared[key] = _soup(shape.tabulate(TabulationContext(folder=site.place.folder)))
     soup: Soup = site.shared[key]
     if soup.colours is not None and (soup.colours < 0.0).any() and site.coloured is not site.parts:
         raise UntranslatableError("Mesh with colours of some of its vertices", "shape")

@@ -9,7 +9,7 @@ from comparisons.mitsuba.stand_ins import Plugin, ShapeGroup
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine
-from reference_rt.shapes.shape import Place
+from reference_rt.shapes.shape import TabulationContext
 
 
 class Site(NamedTuple):
@@ -23,7 +23,7 @@ class Site(NamedTuple):
     key (a group, the triangles of a file);  reach: about the largest coordinate of the scene.
     """
 
-    place: Place
+    place: TabulationContext
     mirrored: bool
     parts: dict[str, Any]
     coloured: dict[str, Any]
