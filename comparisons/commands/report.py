@@ -26,14 +26,14 @@ def report(
     with compare_extra():
         from comparisons.report import write_report, write_results
         from comparisons.results.case import how_many
-        from comparisons.suites.archive import check_archive, read_archive
+        from comparisons.suites.stored_results import check_stored_results, read_stored_results
     from reference_rt.util.files import check_writable
 
     page = out or folder / "report.html"
     results = folder / "results.json"
-    check_archive(folder)
+    check_stored_results(folder)
     check_writable(results, page)
-    cases, provenance, suite, not_run, missing = read_archive(folder)
+    cases, provenance, suite, not_run, missing = read_stored_results(folder)
     write_results(results, cases, provenance, suite, not_run, missing)
     write_report(page, cases, provenance, missing=missing)
     say(f"{how_many(len(cases), len(missing))}: {results}, {page}", err=True)

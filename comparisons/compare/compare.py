@@ -4,16 +4,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from comparisons import rungs as tiers
+from comparisons import rungs as ladder
 from comparisons.compare import pictures
 from comparisons.compare.budget import Budget
 from comparisons.compare.control import control
 from comparisons.compare.judge import Evidence, Rendered, judge
 from comparisons.compare.single_lights import single_lights
-from comparisons.mitsuba.counterpart import Twin
+from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.translate import UntranslatableError, load
-from comparisons.results.case import Case, Tier
+from comparisons.results.case import Case, RungResult
 from reference_rt.cameras.filters import BoxFilter, Filter
 from reference_rt.cli.explain import explain
 from reference_rt.integrators import RayCast, Whitted
@@ -90,24 +90,27 @@ def gather(
     judged_by = budgeted(subject.reference or subject.scene, budget)
     clock = time.perf_counter()
     try:
-        twin = load(judged_by)
+        counterpart = load(judged_by)
     except UntranslatableError as error:
-        tier = Tier("geometry", "not-comparable", str(error))
-        return Evidence(scene.name, (tier,), None, seconds, left_out=left_out)
+        rung = RungResult("geometry", "not-comparable", str(error))
+        return Evidence(scene.name, (rung,), None, seconds, left_out=left_out)
     seconds["reference"] = {"load": time.perf_counter() - clock}
 
-    notes = [*twin.notes(), *notes_of(scene)]
+    notes = [*counterpart.notes(), *notes_of(scene)]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
     film_filters = (subject.scene.film.filter, (subject.reference or subject.scene).film.filter)
-    found = _deterministic_rungs(scene, tables, twin, film_filters, budget, only, say)
+    found = _deterministic_rungs(scene, tables, counterpart, film_filters, budget, only, say)
     pictured = not only or not {"statistics", "images"}.isdisjoint(only)
-    if twin.lacking and not isinstance(scene.integrator, RayCast):
-        found += [Tier(name, "not-comparable", twin.lacking) for name in ("statistics", "images")]
+    if counterpart.no_light_reason and not isinstance(scene.integrator, RayCast):
+        found += [
+            RungResult(name, "not-comparable", counterpart.no_light_reason)
+            for name in ("statistics", "images")
+        ]
         pictured = False
     if not pictured:
         return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
-    rendered = _pictures(scene, tables, twin, budget, threads, say)
+    rendered = _pictures(scene, tables, counterpart, budget, threads, say)
     for side, times in rendered.seconds.items():
         seconds[side] = seconds[side] | times
     notes.extend(rendered.notes)
@@ -135,56 +138,56 @@ def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:
 def _deterministic_rungs(
     scene: Scene,
     tables: SceneTables,
-    twin: Twin,
+    counterpart: Counterpart,
     film_filters: tuple[Filter, Filter],
     budget: Budget,
     only: tuple[str, ...],
     say: Say,
-) -> list[Tier]:
+) -> list[RungResult]:
     """Film, geometry, then light; each only if the rungs below it hold: a wrong convention must not
     be reported as wrong light."""
-    climbs: dict[str, Callable[[], Tier]] = {
-        "geometry": lambda: tiers.geometry(scene, tables, twin, budget.pixels),
-        "direct": lambda: tiers.direct(scene, tables, twin, budget.light_pixels),
-        "whitted": lambda: tiers.whitted(scene, tables, twin, budget.pixels),
+    climbs: dict[str, Callable[[], RungResult]] = {
+        "geometry": lambda: ladder.geometry(scene, tables, counterpart, budget.pixels),
+        "direct": lambda: ladder.direct(scene, tables, counterpart, budget.light_pixels),
+        "whitted": lambda: ladder.whitted(scene, tables, counterpart, budget.pixels),
     }
     if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):
-        climbs = {"film": lambda: tiers.film(*film_filters), **climbs}
-    found: list[Tier] = []
+        climbs = {"film": lambda: ladder.film(*film_filters), **climbs}
+    found: list[RungResult] = []
     for name, climb in climbs.items():
         if only and name not in only:
             continue
         broken = next((t for t in found if t.status == "differ"), None)
         of_light = name in ("direct", "whitted")
         if broken is not None:
-            tier = Tier(name, "not-applicable", f"the {broken.name} rung below is broken")
+            rung = RungResult(name, "not-applicable", f"the {broken.name} rung below is broken")
         elif of_light and isinstance(scene.integrator, RayCast):
-            tier = Tier(name, "not-applicable", _NO_LIGHT)
-        elif of_light and twin.lacking:
-            tier = Tier(name, "not-comparable", twin.lacking)
+            rung = RungResult(name, "not-applicable", _NO_LIGHT)
+        elif of_light and counterpart.no_light_reason:
+            rung = RungResult(name, "not-comparable", counterpart.no_light_reason)
         else:
             start = time.perf_counter()
-            tier = climb()
-            say(f"{name}: {tier.status} ({time.perf_counter() - start:.1f} s)")
-        found.append(tier)
+            rung = climb()
+            say(f"{name}: {rung.status} ({time.perf_counter() - start:.1f} s)")
+        found.append(rung)
     return found
 
 
 def _pictures(
     scene: Scene,
     tables: SceneTables,
-    twin: Twin,
+    counterpart: Counterpart,
     budget: Budget,
     threads: int | None,
     say: Say,
 ) -> Rendered:
     if isinstance(scene.integrator, RayCast):
-        return pictures.cast(scene, tables, twin)
+        return pictures.cast(scene, tables, counterpart)
     if isinstance(scene.integrator, Whitted):
-        return pictures.whitted(scene, tables, twin)
+        return pictures.whitted(scene, tables, counterpart)
     start = time.perf_counter()
     rendered = pictures.replicates(
-        scene, tables, twin, budget.replicates, budget.reference_spp, threads
+        scene, tables, counterpart, budget.replicates, budget.reference_spp, threads
     )
     say(f"{budget.replicates} + {budget.replicates} pictures ({time.perf_counter() - start:.1f} s)")
     return rendered

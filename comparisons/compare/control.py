@@ -15,7 +15,7 @@ from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates
 from comparisons.mitsuba import backend
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.translate import UntranslatableError, load
-from comparisons.results.case import Case, FloatArray, Images, Tier
+from comparisons.results.case import Case, FloatArray, Images, RungResult
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
@@ -35,7 +35,7 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
     found: list[FloatArray] = []
     seconds: dict[str, dict[str, float]] = {}
     sides = (f"Mitsuba's {backend.SCALAR}", f"Mitsuba's {chosen}")
-    rungs: tuple[Tier, ...] = ()
+    rungs: tuple[RungResult, ...] = ()
     rendered = None
     try:
         for number, (side, variant) in enumerate(variants.items()):
@@ -45,8 +45,8 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
                 found.append(_pictures(scene, budget, (1 - number) * 100_000))
             seconds[side] = {"render": time.perf_counter() - start}
             say(f"{variant}: {seconds[side]['render']:.1f} s")
-    except (UntranslatableError, _LackingError) as error:
-        rungs = (Tier("statistics", "not-comparable", str(error)),)
+    except (UntranslatableError, _NoLightError) as error:
+        rungs = (RungResult("statistics", "not-comparable", str(error)),)
     else:
         if scene.integrator.deterministic:
             rendered = Rendered(Images(found[0][0], found[1][0]))
@@ -65,20 +65,20 @@ def _smaller(scene: Scene) -> Scene:
     return scene.changed(film=film.model_copy(update=sides))
 
 
-class _LackingError(Exception):
+class _NoLightError(Exception):
     """The scene has no counterpart in Mitsuba that can be lit."""
 
 
 def _pictures(scene: Scene, budget: Budget, seed: int) -> FloatArray:
     """(replicates, height, width, 3) by the active variant; one replicate if deterministic."""
-    twin = load(scene)
+    counterpart = load(scene)
     if isinstance(scene.integrator, RayCast):
         tables = build_tables(scene)
         ours = render(scene, tables=tables)
-        return pictures.mitsuba_cast(scene, tables, twin, ours)[0][np.newaxis]
-    if twin.lacking:
-        raise _LackingError(twin.lacking)
+        return pictures.mitsuba_cast(scene, tables, counterpart, ours)[0][np.newaxis]
+    if counterpart.no_light_reason:
+        raise _NoLightError(counterpart.no_light_reason)
     if isinstance(scene.integrator, Whitted):
-        return pictures.mitsuba_whitted(scene, build_tables(scene), twin)[np.newaxis]
+        return pictures.mitsuba_whitted(scene, build_tables(scene), counterpart)[np.newaxis]
     spp = scene.resolved_sampler.spp
-    return mitsuba_scene.render(twin.mi_scene, budget.replicates, spp, seed).pictures
+    return mitsuba_scene.render(counterpart.mi_scene, budget.replicates, spp, seed).pictures

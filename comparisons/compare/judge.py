@@ -7,10 +7,10 @@ import numpy as np
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
-from comparisons.results.case import RUNGS, Case, Cause, FloatArray, Images, Place, Tier
+from comparisons.results.case import RUNGS, Case, Cause, FloatArray, ImageRegion, Images, RungResult
 from comparisons.results.verdict import decide
-from comparisons.rungs.images import images_tier
-from comparisons.rungs.input import input_tier
+from comparisons.rungs.images import images_rung
+from comparisons.rungs.input import input_rung
 from comparisons.rungs.limited import limited
 from comparisons.statistics.metrics import image_metrics
 
@@ -48,7 +48,7 @@ class Evidence:
     pictures of both sides, if any;  lights: for the diagnosis;  the rest as in `Case`."""
 
     name: str
-    rungs: tuple[Tier, ...]
+    rungs: tuple[RungResult, ...]
     rendered: Rendered | None
     seconds: Mapping[str, Mapping[str, float]]
     notes: tuple[str, ...] = ()
@@ -67,13 +67,13 @@ def judge(evidence: Evidence, limit: float) -> Case:
     if rendered is not None:
         rungs += picture_rungs(rendered, limit)
         images = rendered.images
-        if not any(tier.status == "invalid" for tier in rungs):
+        if not any(rung.status == "invalid" for rung in rungs):
             metrics = image_metrics(images)
-            rungs.append(images_tier(images, metrics, rendered.replicates))
+            rungs.append(images_rung(images, metrics, rendered.replicates))
     rungs = limited(rungs)
     verdict, reason = decide(rungs, metrics)
     cause: Cause | None = None
-    worst: tuple[Place, ...] = ()
+    worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":
         cause = diagnosis.of_rungs(rungs)
         if rendered is not None and metrics is not None:
@@ -83,7 +83,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
         scene=evidence.name,
         verdict=verdict,
         reason=reason,
-        tiers=tuple(sorted(rungs, key=lambda tier: RUNGS.index(tier.name))),
+        rungs=tuple(sorted(rungs, key=lambda rung: RUNGS.index(rung.name))),
         metrics=metrics,
         seconds={side: dict(times) for side, times in evidence.seconds.items()},
         images=images,
@@ -95,13 +95,16 @@ def judge(evidence: Evidence, limit: float) -> Case:
     )
 
 
-def picture_rungs(rendered: Rendered, limit: float) -> list[Tier]:
+def picture_rungs(rendered: Rendered, limit: float) -> list[RungResult]:
     """The rungs `input` and, for noisy pictures that are valid, `statistics`."""
     if rendered.replicates is None:
         images = rendered.images
-        checked = input_tier(images.candidate, images.reference)
-        return [checked, Tier("statistics", "not-applicable", "deterministic: there is no noise")]
-    checked = input_tier(*rendered.replicates)
+        checked = input_rung(images.candidate, images.reference)
+        return [
+            checked,
+            RungResult("statistics", "not-applicable", "deterministic: there is no noise"),
+        ]
+    checked = input_rung(*rendered.replicates)
     if checked.status == "invalid":
         return [checked]
     return [checked, statistics.compare(*rendered.replicates, limit=limit)]
@@ -120,8 +123,8 @@ SURE = 0.98
 tried."""
 
 
-def _places(rendered: Rendered) -> tuple[Place, ...]:
+def _places(rendered: Rendered) -> tuple[ImageRegion, ...]:
     if rendered.replicates is not None:
-        return statistics.worst_places(*rendered.replicates)
+        return statistics.worst_regions(*rendered.replicates)
     images = rendered.images
-    return statistics.worst_places(images.candidate[np.newaxis], images.reference[np.newaxis])
+    return statistics.worst_regions(images.candidate[np.newaxis], images.reference[np.newaxis])

@@ -7,8 +7,8 @@ import numpy as np
 from comparisons.compare.judge import Rendered, of_replicates
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba import scene as mitsuba_scene
-from comparisons.mitsuba.counterpart import Twin, trace
-from comparisons.mitsuba.hits import Answers
+from comparisons.mitsuba.counterpart import Counterpart, trace
+from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.results.case import Images
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.rays import Rays
@@ -24,24 +24,24 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.textures import At, colour_at
 
 
-def cast(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
+def cast(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendered:
     """Ray casting: the displayed layer; Mitsuba's is made from its own hits of the same rays."""
     ours = render(scene, tables=tables)
     start = time.perf_counter()
-    theirs, notes = mitsuba_cast(scene, tables, twin, ours)
+    theirs, notes = mitsuba_cast(scene, tables, counterpart, ours)
     seconds = _seconds(ours, time.perf_counter() - start)
     return Rendered(Images(display(ours), theirs), seconds, notes=notes)
 
 
 def mitsuba_cast(
-    scene: Scene, tables: SceneTables, twin: Twin, ours: Picture
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, ours: Picture
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """The layer that `ours` shows, as displayed (height, width, 3), made from Mitsuba's hits of the
     rays through the pixel centres; and notes for the reader."""
     film = scene.film
     y, x = np.mgrid[0 : film.height, 0 : film.width]
     o, d = camera_rays(scene, x.ravel() + 0.5, y.ravel() + 0.5)
-    hits = trace(twin, o, d)
+    hits = trace(counterpart, o, d)
     notes = [f"the pictures show the layer '{ours.shown}' in display values, not radiance"]
     uv = np.where(hits.has_uv[:, None], hits.uv, ours.layers["uv"].reshape(-1, 2))
     if ours.shown == "uv" and not hits.has_uv[hits.shape >= 0].all():
@@ -59,7 +59,7 @@ def mitsuba_cast(
     return display(Picture(shaped, ours.shown)), tuple(notes)
 
 
-def _colours(scene: Scene, tables: SceneTables, hits: Answers, uv: FloatArray) -> FloatArray:
+def _colours(scene: Scene, tables: SceneTables, hits: MitsubaHits, uv: FloatArray) -> FloatArray:
     """The colours (n, 3) at hits: the material's, or interpolated from a mesh's vertex colours."""
     sizes = ShapeSizes(scene)
     names = [*scene.materials, None]
@@ -100,15 +100,15 @@ def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
     return np.asarray(np.stack(areas, axis=1) / np.sum(normal * normal, axis=1)[:, None])
 
 
-def whitted(scene: Scene, tables: SceneTables, twin: Twin) -> Rendered:
+def whitted(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendered:
     """Recursive ray tracing: our plugin for Mitsuba traces the rays of our grid of samples."""
     ours = render(scene, tables=tables)
     start = time.perf_counter()
-    theirs = mitsuba_whitted(scene, tables, twin)
+    theirs = mitsuba_whitted(scene, tables, counterpart)
     return Rendered(Images(ours.colour, theirs), _seconds(ours, time.perf_counter() - start))
 
 
-def mitsuba_whitted(scene: Scene, tables: SceneTables, twin: Twin) -> FloatArray:
+def mitsuba_whitted(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> FloatArray:
     """The picture (height, width, 3) by our plugin for Mitsuba."""
     assert isinstance(scene.integrator, Whitted)
     n = round(scene.resolved_sampler.spp**0.5)
@@ -116,7 +116,7 @@ def mitsuba_whitted(scene: Scene, tables: SceneTables, twin: Twin) -> FloatArray
     y, x = np.mgrid[0 : height * n, 0 : width * n]
     rays = Rays(*camera_rays(scene, (x.ravel() + 0.5) / n, (y.ravel() + 0.5) / n))
     # Few large pieces: Dr.Jit traces the plugin anew for each.
-    radiance = plugin_radiance(scene, tables, twin, scene.integrator)
+    radiance = plugin_radiance(scene, tables, counterpart, scene.integrator)
     pieces = [
         radiance(Rays(rays.o[k : k + AT_ONCE], rays.d[k : k + AT_ONCE]))
         for k in range(0, len(rays.o), AT_ONCE)
@@ -132,7 +132,7 @@ AT_ONCE = 1 << 18
 def replicates(
     scene: Scene,
     tables: SceneTables,
-    twin: Twin,
+    counterpart: Counterpart,
     count: int,
     reference_spp: int | None,
     threads: int | None,
@@ -147,7 +147,7 @@ def replicates(
         picture = render(seeded, tables=tables, threads=threads)
         ours.append(picture.colour)
         times.append(picture.seconds)
-    theirs = mitsuba_scene.render(twin.mi_scene, count, reference_spp or sampler.spp, first)
+    theirs = mitsuba_scene.render(counterpart.mi_scene, count, reference_spp or sampler.spp, first)
     seconds = {
         "candidate": {
             "compile": times[0]["compile"],

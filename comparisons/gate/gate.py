@@ -10,10 +10,19 @@ from comparisons.compare import diagnosis
 from comparisons.compare.judge import Lights, likeliest_cause
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
-from comparisons.results.case import Case, Cause, FloatArray, Images, Metrics, Place, Status, Tier
+from comparisons.results.case import (
+    Case,
+    Cause,
+    FloatArray,
+    ImageRegion,
+    Images,
+    Metrics,
+    RungResult,
+    Status,
+)
 from comparisons.results.verdict import decide
-from comparisons.rungs.images import images_tier
-from comparisons.rungs.input import input_tier
+from comparisons.rungs.images import images_rung
+from comparisons.rungs.input import input_rung
 from comparisons.statistics.metrics import image_metrics
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
@@ -63,15 +72,15 @@ def gate_pictures(
         ]
     verdict, reason = decide(rungs, metrics)
     cause: Cause | None = None
-    worst: tuple[Place, ...] = ()
+    worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":
         cause = diagnosis.of_rungs(rungs) or likeliest_cause(images, lights)
-        worst = statistics.worst_places(pictures, _judged_by(reference))
+        worst = statistics.worst_regions(pictures, _judged_by(reference))
     return Case(
         scene=name,
         verdict=verdict,
         reason=reason,
-        tiers=tuple(rungs),
+        rungs=tuple(rungs),
         metrics=metrics,
         seconds={},
         images=images,
@@ -85,9 +94,9 @@ def gate_pictures(
 def not_run(name: str, error: Exception) -> Case:
     """A case for the outputs that says why the gate could not run."""
     status: Status = "invalid" if isinstance(error, ImageError) else "not-comparable"
-    tier = Tier("run", status, str(error))
+    rung = RungResult("run", status, str(error))
     return Case(
-        name, status, f"run: {error}", (tier,), None, {}, sides=("candidate's", "reference")
+        name, status, f"run: {error}", (rung,), None, {}, sides=("candidate's", "reference")
     )
 
 
@@ -106,36 +115,36 @@ def _judged_by(reference: Reference) -> "FloatArray | statistics.Known":
     return statistics.Known(reference.pictures.mean(axis=0), reference.variance)
 
 
-def _input(candidates: Sequence[Picture], pictures: FloatArray, reference: Reference) -> Tier:
+def _input(candidates: Sequence[Picture], pictures: FloatArray, reference: Reference) -> RungResult:
     for picture in candidates:
         if picture.opacity is not None and not picture.opacity.any():
             reason = f"{picture.name} is transparent throughout; expected an opaque picture"
-            return Tier("input", "invalid", reason)
+            return RungResult("input", "invalid", reason)
     opacity = None
     if any(picture.opacity is not None for picture in candidates):
         opaque = np.ones(pictures.shape[1:3])
         opacity = np.stack([opaque if p.opacity is None else p.opacity for p in candidates])
     if reference.noise_free:
-        return input_tier(pictures[0], reference.pictures[0], opacity)
+        return input_rung(pictures[0], reference.pictures[0], opacity)
     judges = reference.pictures if reference.variance is None else reference.pictures[0]
-    return input_tier(pictures, judges, opacity)
+    return input_rung(pictures, judges, opacity)
 
 
-def _statistics(pictures: FloatArray, reference: Reference, limit: float) -> Tier:
+def _statistics(pictures: FloatArray, reference: Reference, limit: float) -> RungResult:
     if reference.noise_free:
-        return Tier("statistics", "not-applicable", _NO_NOISE)
+        return RungResult("statistics", "not-applicable", _NO_NOISE)
     return statistics.compare(pictures, _judged_by(reference), limit=limit)
 
 
 def _images_rung(
     images: Images, metrics: Metrics, pictures: FloatArray, reference: Reference
-) -> Tier:
+) -> RungResult:
     if reference.noise_free:
-        return images_tier(images, metrics, None)
+        return images_rung(images, metrics, None)
     replicates = _replicates(reference)
     if replicates is None or len(pictures) < 2:
-        return Tier("images", "not-applicable", _UNKNOWN_NOISE)
-    return images_tier(images, metrics, (pictures, replicates))
+        return RungResult("images", "not-applicable", _UNKNOWN_NOISE)
+    return images_rung(images, metrics, (pictures, replicates))
 
 
 def _replicates(reference: Reference) -> FloatArray | None:

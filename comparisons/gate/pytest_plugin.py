@@ -131,7 +131,7 @@ class ImageGate:
     def _write(self, case: "Case", folder: Path, baseline: str) -> bool:
         """Write results.json, for a failure also the page and the pictures; whether it passes."""
         from comparisons.gate import outputs
-        from comparisons.results.record import write_case
+        from comparisons.results.stored_case import write_case
 
         passed = outputs.code_of(case) == 0
         outputs.write(case, folder, {"baseline": baseline} if baseline else {}, page=not passed)

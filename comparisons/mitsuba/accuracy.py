@@ -12,7 +12,7 @@ from comparisons.geometry.float32 import UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials import Emissive, Material, Principled, RoughPlastic, Wrapper
@@ -94,7 +94,7 @@ def both_sides(
     if not theirs:
         return np.array(ours), np.zeros(0)
     mi = mitsuba()
-    bsdf = mi.load_dict(translate_material(material, Surroundings({}, {}, Path())))
+    bsdf = mi.load_dict(translate_material(material, TranslationContext({}, {}, Path())))
     context = mi.BSDFContext()
 
     def value(o: Any, i: Any) -> tuple[Any, ...]:

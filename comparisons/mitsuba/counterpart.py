@@ -9,7 +9,7 @@ import numpy as np
 from comparisons.geometry.frame import OURS, Frame
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.csg import SLIGHT, SolidCounterpart
-from comparisons.mitsuba.hits import Answers, assign_nearer, misses, read
+from comparisons.mitsuba.hits import MitsubaHits, assign_nearer, misses, read
 from comparisons.mitsuba.scene import first_hits
 from comparisons.mitsuba.stand_ins import Extent, MitsubaShape, StandIn
 from reference_rt.core.arrays import FloatArray
@@ -23,11 +23,11 @@ class InstancedGroup(NamedTuple):
     """
 
     mi_scene: Any
-    pieces: Mapping[str, MitsubaShape]
+    mi_shapes: Mapping[str, MitsubaShape]
 
 
 @dataclass(frozen=True)
-class Twin:
+class Counterpart:
     """A scene's counterpart in Mitsuba.
 
     mi_scene: Mitsuba's scene, without solids and instanced group;  pieces: the primitives that its
@@ -36,9 +36,9 @@ class Twin:
     """
 
     mi_scene: Any
-    pieces: Mapping[str, MitsubaShape]
+    mi_shapes: Mapping[str, MitsubaShape]
     solids: tuple[SolidCounterpart, ...] = ()
-    crowd: InstancedGroup | None = None
+    instanced_group: InstancedGroup | None = None
     frame: Frame = OURS
 
     def sensors(self) -> Any:
@@ -46,15 +46,15 @@ class Twin:
         return self.mi_scene.sensors()
 
     @property
-    def lacking(self) -> str:
+    def no_light_reason(self) -> str:
         """Why light cannot be compared; empty if it can."""
         if self.solids:
             return (
                 "Mitsuba has no set operations (CSG): its hits of the operands are combined ray by "
                 "ray, but its integrators cannot render solids"
             )
-        if self.crowd is not None:
-            count = len(self.crowd.pieces)
+        if self.instanced_group is not None:
+            count = len(self.instanced_group.mi_shapes)
             return f"{count} instances: Mitsuba takes minutes to compile its integrators for them"
         return ""
 
@@ -79,12 +79,12 @@ class Twin:
 
     def all_mi_shapes(self) -> list[MitsubaShape]:
         """The Mitsuba shapes of all scenes, operands of solids included."""
-        found = list(self.pieces.values())
-        if self.crowd is not None:
-            found += self.crowd.pieces.values()
+        found = list(self.mi_shapes.values())
+        if self.instanced_group is not None:
+            found += self.instanced_group.mi_shapes.values()
         for solid in self.solids:
             for operand in solid.operands:
-                found += operand.pieces.values()
+                found += operand.mi_shapes.values()
         return found
 
     def extents(self) -> dict[int, Extent]:
@@ -93,7 +93,7 @@ class Twin:
             p.shape: Extent(
                 self.frame.out(p.plugin.extent.middle), p.plugin.extent.radius / self.frame.scale
             )
-            for p in self.pieces.values()
+            for p in self.mi_shapes.values()
             if p.plugin.extent
         }
 
@@ -109,29 +109,40 @@ class Twin:
         return found
 
 
-def trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -> Answers:
+def trace(
+    counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT
+) -> MitsubaHits:
     """Mitsuba's first hits, in the same form as `reference_rt.query.intersect` returns ours.
 
     Mitsuba gets the rays in the counterpart's frame, rounded to float32.  `tolerance`: see
     `SolidCounterpart.trace`.
     """
-    if twin.frame.is_ours:
-        return _trace(twin, o, d, tolerance)
-    found = _trace(twin, twin.frame.into(o), d, tolerance)
-    scale = twin.frame.scale
+    if counterpart.frame.is_ours:
+        return _trace(counterpart, o, d, tolerance)
+    found = _trace(counterpart, counterpart.frame.into(o), d, tolerance)
+    scale = counterpart.frame.scale
     met = found.shape >= 0
-    found.p[met] = twin.frame.out(found.p[met])
+    found.p[met] = counterpart.frame.out(found.p[met])
     return replace(found, t=found.t / scale, sag=found.sag / scale)
 
 
-def _trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float) -> Answers:
+def _trace(counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: float) -> MitsubaHits:
     """The same in the counterpart's coordinates."""
-    found = _hits(twin.mi_scene, twin.pieces, o, d)
+    found = _hits(counterpart.mi_scene, counterpart.mi_shapes, o, d)
     everything = np.arange(len(o))
-    if twin.crowd is not None and len(o) > 0:
+    if counterpart.instanced_group is not None and len(o) > 0:
         with scalar():
-            assign_nearer(found, everything, _hits(twin.crowd.mi_scene, twin.crowd.pieces, o, d))
-    for solid in twin.solids:
+            assign_nearer(
+                found,
+                everything,
+                _hits(
+                    counterpart.instanced_group.mi_scene,
+                    counterpart.instanced_group.mi_shapes,
+                    o,
+                    d,
+                ),
+            )
+    for solid in counterpart.solids:
         near = solid.near(o, d)
         if len(near) == 0:
             continue
@@ -140,9 +151,9 @@ def _trace(twin: Twin, o: FloatArray, d: FloatArray, tolerance: float) -> Answer
 
 
 def _hits(
-    mi_scene: Any, pieces: Mapping[str, MitsubaShape], o: FloatArray, d: FloatArray
-) -> Answers:
-    if not pieces or len(o) == 0:  # Dr.Jit does not accept empty arrays
+    mi_scene: Any, mi_shapes: Mapping[str, MitsubaShape], o: FloatArray, d: FloatArray
+) -> MitsubaHits:
+    if not mi_shapes or len(o) == 0:  # Dr.Jit does not accept empty arrays
         return misses(len(o))
-    ids = {name: k for k, name in enumerate(pieces)}
-    return read(first_hits(mi_scene, ids, o, d), list(pieces.values()), o)
+    ids = {name: k for k, name in enumerate(mi_shapes)}
+    return read(first_hits(mi_scene, ids, o, d), list(mi_shapes.values()), o)

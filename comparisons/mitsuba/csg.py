@@ -13,7 +13,7 @@ import numpy as np
 
 from comparisons.geometry.flatten import Leaf, Tree
 from comparisons.geometry.float32 import delta, round32
-from comparisons.mitsuba.hits import Answers, BoolArray, assign, misses, read, rows_of
+from comparisons.mitsuba.hits import BoolArray, MitsubaHits, assign, misses, read, rows_of
 from comparisons.mitsuba.scene import first_hits
 from comparisons.mitsuba.stand_ins import MitsubaShape
 from reference_rt.core import transform
@@ -44,7 +44,7 @@ class Crossings(NamedTuple):
     rays: IntArray
     enters: BoolArray
     slack: FloatArray
-    at: Answers
+    at: MitsubaHits
 
 
 class Operand(NamedTuple):
@@ -52,14 +52,14 @@ class Operand(NamedTuple):
     primitive and its placement."""
 
     mi_scene: Any
-    pieces: Mapping[str, MitsubaShape]
+    mi_shapes: Mapping[str, MitsubaShape]
     leaf: Leaf
     place: TabulationContext
 
     def walk(self, o: FloatArray, d: FloatArray) -> tuple[BoolArray, list[Crossings]]:
         """Whether rays start inside (n,), and all their crossings in order."""
-        ids = {name: k for k, name in enumerate(self.pieces)}
-        pieces = list(self.pieces.values())
+        ids = {name: k for k, name in enumerate(self.mi_shapes)}
+        mi_shapes = list(self.mi_shapes.values())
         box = self.mi_scene.bbox()
         reach = float(np.abs([np.array(box.min), np.array(box.max)]).max())
         if isinstance(self.leaf.shape, Plane):
@@ -67,12 +67,12 @@ class Operand(NamedTuple):
         rays, origin = np.arange(len(o)), o.copy()
         length2 = np.sum(d * d, axis=1)
         found: list[Crossings] = []
-        inside = self._inside(ids, pieces, o, d)
+        inside = self._inside(ids, mi_shapes, o, d)
         within = inside.copy()
         for _ in range(MOST_CROSSINGS):
             if len(rays) == 0:
                 break
-            hits = read(first_hits(self.mi_scene, ids, origin, d[rays]), pieces, origin)
+            hits = read(first_hits(self.mi_scene, ids, origin, d[rays]), mi_shapes, origin)
             met = hits.shape >= 0
             rays, origin, hits = rays[met], origin[met], rows_of(hits, met)
             way = np.sum(hits.n * d[rays], axis=1)
@@ -90,7 +90,7 @@ class Operand(NamedTuple):
         return inside, found
 
     def _inside(
-        self, ids: Mapping[str, int], pieces: list[MitsubaShape], o: FloatArray, d: FloatArray
+        self, ids: Mapping[str, int], mi_shapes: list[MitsubaShape], o: FloatArray, d: FloatArray
     ) -> BoolArray:
         """(n,): whether rays start inside: a ray traced backwards then leaves the operand.
 
@@ -99,7 +99,7 @@ class Operand(NamedTuple):
         if isinstance(self.leaf.shape, Plane):
             to_local = transform.invert(self.leaf.shape.map_in(self.place))
             return transform.apply_points(to_local, o)[:, 2] < 0.0
-        behind = read(first_hits(self.mi_scene, ids, o, -d), pieces, o)
+        behind = read(first_hits(self.mi_scene, ids, o, -d), mi_shapes, o)
         return np.asarray((behind.shape >= 0) & (np.sum(behind.n * d, axis=1) < 0.0))
 
 
@@ -113,7 +113,7 @@ class SolidCounterpart:
     @property
     def place(self) -> tuple[int, int]:
         """(shape, instance) of the solid."""
-        mi_shape = next(iter(self.operands[0].pieces.values()))
+        mi_shape = next(iter(self.operands[0].mi_shapes.values()))
         return mi_shape.shape, mi_shape.instance
 
     def near(self, o: FloatArray, d: FloatArray) -> IntArray:
@@ -131,7 +131,7 @@ class SolidCounterpart:
         t_out = np.nan_to_num(np.maximum(a, b), nan=np.inf).min(axis=1)
         return np.flatnonzero((t_in <= t_out) & (t_out > 0.0))
 
-    def trace(self, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -> Answers:
+    def trace(self, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -> MitsubaHits:
         """The first hits of the solid's surface.
 
         Crossings closer together than `tolerance` times float32's bound count as one, so that
@@ -222,7 +222,7 @@ class SolidCounterpart:
             began = np.where(ends, inside, began)
         return changed
 
-    def _facing(self, hits: Answers, d: FloatArray, inside: BoolArray) -> Answers:
+    def _facing(self, hits: MitsubaHits, d: FloatArray, inside: BoolArray) -> MitsubaHits:
         """The hits with outward normals of the solid: against the ray where it enters."""
         away = np.sum(hits.n * d, axis=1) > 0.0
         turned = away != inside

@@ -19,7 +19,7 @@ AnyHits = TypeVar("AnyHits", bound=Intersections)
 
 
 @dataclass(frozen=True)
-class Answers(Intersections):
+class MitsubaHits(Intersections):
     """Mitsuba's hit records in our terms: `Intersections`, and for each hit:
 
     has_uv (n,): whether uv can be compared;  sag, turn (n,): the distance in scene units, and the
@@ -41,8 +41,8 @@ of radius r at the distance D: the discriminant is off by some u D².  Measured 
 better conditioned."""
 
 
-def read(hits: RawHits, pieces: Sequence[MitsubaShape], o: FloatArray) -> Answers:
-    """The hits of rays from o in our terms; `hits.which` is an index of `pieces`."""
+def read(hits: RawHits, mi_shapes: Sequence[MitsubaShape], o: FloatArray) -> MitsubaHits:
+    """The hits of rays from o in our terms; `hits.which` is an index of `mi_shapes`."""
     found = misses(len(hits.t))
     met = hits.which >= 0
     for name in ("t", "p", "n", "ns"):
@@ -53,7 +53,7 @@ def read(hits: RawHits, pieces: Sequence[MitsubaShape], o: FloatArray) -> Answer
     for number, rows in zip(numbers.tolist(), np.split(order, starts[1:]), strict=True):
         if number < 0:
             continue
-        mi_shape = pieces[number]
+        mi_shape = mi_shapes[number]
         plugin = mi_shape.plugin
         found.shape[rows], found.part[rows] = mi_shape.shape, mi_shape.part
         found.instance[rows] = mi_shape.instance
@@ -73,10 +73,10 @@ def read(hits: RawHits, pieces: Sequence[MitsubaShape], o: FloatArray) -> Answer
     return found
 
 
-def misses(n: int) -> Answers:
+def misses(n: int) -> MitsubaHits:
     """n misses."""
     none = [np.full(n, -1) for _ in range(4)]
-    return Answers(
+    return MitsubaHits(
         t=np.full(n, np.inf),
         shape=none[0],
         primitive=none[1],
@@ -104,7 +104,7 @@ def assign(hits: AnyHits, rows: Any, some: AnyHits) -> None:
         getattr(hits, name)[rows] = array
 
 
-def assign_nearer(hits: Answers, rows: IntArray, some: Answers) -> None:
+def assign_nearer(hits: MitsubaHits, rows: IntArray, some: MitsubaHits) -> None:
     """Overwrite those hits of `rows` for which `some` is nearer."""
     nearer = some.t < hits.t[rows]
     assign(hits, rows[nearer], rows_of(some, nearer))

@@ -5,7 +5,7 @@ from typing import Any
 
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.plastic_error import base_error
-from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.mitsuba.translate.wrappers import has_delta
 from reference_rt.materials import (
     Blend,
@@ -24,8 +24,8 @@ from reference_rt.rendering.scene import Scene
 
 def notes_of(scene: Scene) -> list[str]:
     """The notes on a scene's materials, each text once."""
-    around = Surroundings.of(scene)
-    found = [note_of(material, around) for material in scene.materials.values()]
+    context = TranslationContext.of(scene)
+    found = [note_of(material, context) for material in scene.materials.values()]
     for name in scene.materials:
         off = accuracy(scene, name)
         if off > 0.0:
@@ -37,14 +37,14 @@ def notes_of(scene: Scene) -> list[str]:
 
 
 @singledispatch
-def note_of(material: Any, around: Surroundings) -> str:
+def note_of(material: Any, context: TranslationContext) -> str:
     """The note on a material; empty if Mitsuba's own material is its exact counterpart."""
     return ""
 
 
 @note_of.register(RoughConductor)
 @note_of.register(RoughDielectric)
-def _(material: RoughConductor | RoughDielectric, around: Surroundings) -> str:
+def _(material: RoughConductor | RoughDielectric, context: TranslationContext) -> str:
     if material.distribution == "ggx":
         return ""
     return (
@@ -54,7 +54,7 @@ def _(material: RoughConductor | RoughDielectric, around: Surroundings) -> str:
 
 
 @note_of.register(Plastic)
-def _(material: Plastic, around: Surroundings) -> str:
+def _(material: Plastic, context: TranslationContext) -> str:
     eta = material.interior_ior / material.exterior_ior
     return (
         f"Mitsuba's fit of a coat's internal reflectance, which makes the base {_off(eta)} at a "
@@ -63,7 +63,7 @@ def _(material: Plastic, around: Surroundings) -> str:
 
 
 @note_of.register(RoughPlastic)
-def _(material: RoughPlastic, around: Surroundings) -> str:
+def _(material: RoughPlastic, context: TranslationContext) -> str:
     eta = material.interior_ior / material.exterior_ior
     alpha = max(material.alpha, MIN_ALPHA)
     return (
@@ -83,13 +83,13 @@ def _off(eta: float, distribution: str = "", alpha: float = 0.0) -> str:
 
 
 @note_of.register(Phong)
-def _(material: Phong, around: Surroundings) -> str:
+def _(material: Phong, context: TranslationContext) -> str:
     return "Mitsuba has no Phong material: our plugin is used instead"
 
 
 @note_of.register(Blend)
-def _(material: Blend, around: Surroundings) -> str:
-    if not has_delta(material, around):
+def _(material: Blend, context: TranslationContext) -> str:
+    if not has_delta(material, context):
         return ""
     return (
         "Mitsuba's blend is wrong if one of the two is a perfect mirror: with the weight w it "
@@ -99,13 +99,13 @@ def _(material: Blend, around: Surroundings) -> str:
 
 
 @note_of.register(Mask)
-def _(material: Mask, around: Surroundings) -> str:
+def _(material: Mask, context: TranslationContext) -> str:
     return "shadow rays treat masks as opaque, in both renderers"
 
 
 @note_of.register(Bump)
 @note_of.register(NormalMap)
-def _(material: Bump | NormalMap, around: Surroundings) -> str:
+def _(material: Bump | NormalMap, context: TranslationContext) -> str:
     return (
         "Mitsuba's bump and normal maps run with flip_invalid_normals and use_shadowing_function "
         "off"

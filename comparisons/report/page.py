@@ -125,7 +125,7 @@ def _view(case: Case) -> dict[str, Any]:
     pictures = _thumbnails(case)
     return {
         "case": case,
-        "tiers": sorted(case.tiers, key=lambda tier: _rung(tier.name)),
+        "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
         "figures": _figures(case, pictures) if pictures else [],
         "metrics": _metric_rows(case.metrics) if case.metrics else [],

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.results.case import Case, Tier
+from comparisons.results.case import Case, RungResult
 from reference_rt.util.files import replacing
 
 SCHEMA = 2
@@ -64,15 +64,15 @@ def write_results(
 
 
 def _case(case: Case) -> dict[str, Any]:
-    tiers = {tier.name: _tier(tier) for tier in case.tiers}
-    if len(tiers) < len(case.tiers):
+    rungs = {rung.name: _rung(rung) for rung in case.rungs}
+    if len(rungs) < len(case.rungs):
         raise ValueError(f"{case.scene}: two rungs have the same name")
     return {
         "scene": case.scene,
         "verdict": case.verdict,
         "reason": case.reason,
         "sides": dict(zip(("candidate", "reference"), case.sides, strict=True)),
-        "tiers": tiers,
+        "tiers": rungs,
         "metrics": plain(asdict(case.metrics)) if case.metrics else None,
         "cause": plain(asdict(case.cause)) if case.cause else None,
         "worst": [plain(asdict(place)) for place in case.worst],
@@ -83,11 +83,11 @@ def _case(case: Case) -> dict[str, Any]:
     }
 
 
-def _tier(tier: Tier) -> dict[str, Any]:
-    numbers: dict[str, Any] = plain(tier.numbers)
+def _rung(rung: RungResult) -> dict[str, Any]:
+    numbers: dict[str, Any] = plain(rung.numbers)
     if clash := {"status", "reason"} & numbers.keys():
-        raise ValueError(f"{tier.name}: a number may not be called {', '.join(sorted(clash))}")
-    return {"status": tier.status, "reason": tier.reason, **numbers}
+        raise ValueError(f"{rung.name}: a number may not be called {', '.join(sorted(clash))}")
+    return {"status": rung.status, "reason": rung.reason, **numbers}
 
 
 def plain(value: Any) -> Any:

@@ -3,9 +3,9 @@
 - `case`: `Case`, the result for one scene: a verdict, one `RungResult` for each rung, the pictures,
   image metrics, the likeliest cause.  Radiance is in W/sr/m², times in seconds, places in pixels.
 - `verdict`: from rungs to the verdict of a case, from verdicts to the exit code of a run.
-- `record`: a stored case, `case.json` and `pictures.exr`, read back exactly or refused.
+- `stored_case`: one case, `case.json` and `pictures.exr`, read back exactly or refused.
 - `sealed`: files with checksums for anything else that a later run continues from.
 
 None means that a case does not have the item; NaN that a metric is undefined.  To add a field to
-`Case`: give it a default, and raise `record.SCHEMA` if older files would be misread.
+`Case`: give it a default, and raise `stored_case.SCHEMA` if older files would be misread.
 """

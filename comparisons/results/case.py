@@ -28,7 +28,7 @@ COMPARED = RUNGS[3:]
 
 
 @dataclass(frozen=True)
-class Tier:
+class RungResult:
     """The result of one rung for one scene: a name of RUNGS, the status, the reason in one
     sentence, and the numbers behind it."""
 
@@ -65,7 +65,7 @@ class Images:
 
 
 @dataclass(frozen=True)
-class Place:
+class ImageRegion:
     """A region of the pictures that differs: its left and upper edge and its size in pixels, and
     how it differs."""
 
@@ -97,7 +97,7 @@ class Case:
     scene: str
     verdict: Status
     reason: str
-    tiers: tuple[Tier, ...]
+    rungs: tuple[RungResult, ...]
     metrics: Metrics | None
     seconds: dict[str, dict[str, float]]
     """Wall clock by side and step: "load" (files, arrays, hierarchy), "compile", "render"."""
@@ -107,7 +107,7 @@ class Case:
     sides: tuple[str, str] = ("ours", "Mitsuba's")
     """Whose pictures the candidate and the reference are."""
     cause: Cause | None = None
-    worst: tuple[Place, ...] = ()
+    worst: tuple[ImageRegion, ...] = ()
     """The regions where the pictures differ most, the worst first."""
     left_out: tuple[str, ...] = ()
     """Features that the scene does not use, which were compiled out."""

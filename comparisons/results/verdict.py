@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from comparisons.results.case import RUNGS, Case, Metrics, Status, Tier
+from comparisons.results.case import RUNGS, Case, Metrics, RungResult, Status
 
 _FAILURES: tuple[Status, ...] = (
     "invalid",  # makes every other result meaningless
@@ -16,7 +16,7 @@ _FAILURES: tuple[Status, ...] = (
 PASSING: tuple[Status, ...] = ("agree", "reference-limited")
 
 
-def decide(results: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, str]:
+def decide(results: Sequence[RungResult], metrics: Metrics | None) -> tuple[Status, str]:
     """The verdict on one scene and the reason, which names the first rung that gives it.
 
     The gravest status of any rung decides: `invalid` (also by pixels not finite in the pictures),
@@ -24,22 +24,22 @@ def decide(results: Sequence[Tier], metrics: Metrics | None) -> tuple[Status, st
     first one of RUNGS gives the reason. Otherwise the scene agrees if at least one rung other than
     `input` agrees; if none does it is `not-comparable`. Raises ValueError for a name not in RUNGS.
     """
-    if unknown := {tier.name for tier in results} - set(RUNGS):
+    if unknown := {result.name for result in results} - set(RUNGS):
         raise ValueError(f"not a rung: {', '.join(sorted(unknown))}; the rungs are {RUNGS}")
-    ladder = sorted(results, key=lambda tier: RUNGS.index(tier.name))
+    ladder = sorted(results, key=lambda result: RUNGS.index(result.name))
     pixels = metrics.nonfinite if metrics else 0
-    if pixels and not any(tier.status == "invalid" for tier in ladder):
+    if pixels and not any(result.status == "invalid" for result in ladder):
         return "invalid", f"images: {pixels} pixel{'s' if pixels > 1 else ''} not finite"
     for status in _FAILURES:
-        for tier in ladder:
-            if tier.status == status:
-                return status, f"{tier.name}: {tier.reason}"
-    agreed = [tier for tier in ladder if tier.status == "agree"]
-    if not any(tier.name != "input" for tier in agreed):
+        for result in ladder:
+            if result.status == status:
+                return status, f"{result.name}: {result.reason}"
+    agreed = [result for result in ladder if result.status == "agree"]
+    if not any(result.name != "input" for result in agreed):
         return "not-comparable", "no rung applies to this scene"
-    rungs = ", ".join(tier.name for tier in agreed)
+    rungs = ", ".join(result.name for result in agreed)
     # The statistics' reason states the smallest detectable bias: how much the agreement is worth.
-    summary = next((tier for tier in agreed if tier.name == "statistics"), agreed[-1])
+    summary = next((result for result in agreed if result.name == "statistics"), agreed[-1])
     return "agree", f"{rungs}: {summary.reason}"
 
 
@@ -50,7 +50,7 @@ def exit_code(cases: Sequence[Case], missing: Sequence[str] = ()) -> int:
     - 3: a scene, or one of its files, is invalid;
     - 1: any other case does not pass, or cases are `missing` because the run was interrupted.
     """
-    failed = {tier.name for case in cases for tier in case.tiers} & {"scene", "run"}
+    failed = {result.name for case in cases for result in case.rungs} & {"scene", "run"}
     if not cases or "run" in failed:
         return 4
     if failed:

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.counterpart import Twin
+from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import rows_of
-from comparisons.results.case import Tier
+from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext
 from comparisons.rungs.rays.light_error import bounds, slopes_of, stand_ins
@@ -54,8 +54,8 @@ class Outcome(NamedTuple):
 
 
 def direct(
-    scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS, seed: int = 0
-) -> Tier:
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, pixels: int = PIXELS, seed: int = 0
+) -> RungResult:
     """Compare f cos L of single lights where camera, random and secondary rays hit.
 
     At most LIGHTS of the scene's lights, at POINTS each.  Where only one renderer sees the light,
@@ -63,16 +63,16 @@ def direct(
     """
     choice = tables.lights.choice
     if choice is None:
-        return Tier("direct", "not-applicable", "the scene has no light")
-    if twin.lacking:
-        return Tier("direct", "not-comparable", twin.lacking)
+        return RungResult("direct", "not-applicable", "the scene has no light")
+    if counterpart.no_light_reason:
+        return RungResult("direct", "not-comparable", counterpart.no_light_reason)
     if not any_smooth(tables.materials):
         reason = "no material has a diffuse or glossy lobe, so that lights are not sampled"
-        return Tier("direct", "not-applicable", reason)
-    sizes = ShapeSizes(scene, twin.frame)
+        return RungResult("direct", "not-applicable", reason)
+    sizes = ShapeSizes(scene, counterpart.frame)
     rays = mixed_rays(scene, tables, sizes, pixels, seed)
     hits = query.intersect(tables, rays.o, rays.d)
-    context = LightContext(scene, tables, twin, rays, hits, sizes)
+    context = LightContext(scene, tables, counterpart, rays, hits, sizes)
     lights = np.flatnonzero(choice.probability > 0.0)
     count = len(lights)
     tested = lights[np.unique(np.linspace(0, count - 1, min(count, LIGHTS)).round().astype(int))]
@@ -107,18 +107,18 @@ def direct(
                 f"light {light}, point u = {u}, the ray from {rays.o[k].tolist()} along "
                 f"{rays.d[k].tolist()}"
             )
-            return Tier("direct", "differ", reason, numbers)
+            return RungResult("direct", "differ", reason, numbers)
     shadows = (
         f"{explained} of {total} values are not resolved by Mitsuba: at edges, or within its "
         "shadow epsilon"
     )
     if arbiter.too_many(explained, total):
-        return Tier("direct", "reference-limited", shadows, numbers)
+        return RungResult("direct", "reference-limited", shadows, numbers)
     reason = (
         f"{len(tested)} of {count} lights compared; the largest error is "
         f"{numbers['max_error_over_bound']:.2g} times float32's bound; {shadows}"
     )
-    return Tier("direct", "agree", reason, numbers)
+    return RungResult("direct", "agree", reason, numbers)
 
 
 def _ratios(outcomes: Sequence[Outcome]) -> dict[str, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.film import translate_filter
-from comparisons.results.case import Tier
+from comparisons.results.case import RungResult
 from reference_rt.cameras.filters import Filter, GaussianFilter
 
 POINTS = 1000
@@ -30,7 +30,7 @@ GAUSSIAN = 5e-4
 (src/rfilters/gaussian.cpp)."""
 
 
-def film(ours: Filter, reference: Filter) -> Tier:
+def film(ours: Filter, reference: Filter) -> RungResult:
     """Compare our filter with Mitsuba's version of `reference`, usually the same filter; both are
     normalised by their integrals."""
     plugin = mitsuba().load_dict(translate_filter(reference))
@@ -48,4 +48,4 @@ def film(ours: Filter, reference: Filter) -> Tier:
     bound = GAUSSIAN if isinstance(reference, GaussianFilter) else TOLERANCE
     numbers = {"points": POINTS, "max_error": error, "max_error_over_bound": error / bound}
     text = f"the filters differ by at most {error:.2g} of their peak"
-    return Tier("film", "agree" if error <= bound else "differ", text, numbers)
+    return RungResult("film", "agree" if error <= bound else "differ", text, numbers)

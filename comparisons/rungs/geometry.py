@@ -8,9 +8,9 @@ import numpy as np
 
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.counterpart import Twin, trace
-from comparisons.mitsuba.hits import Answers, BoolArray, rows_of
-from comparisons.results.case import Status, Tier
+from comparisons.mitsuba.counterpart import Counterpart, trace
+from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
+from comparisons.results.case import RungResult, Status
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.adversarial_rays import aimed_rays
 from comparisons.rungs.rays.camera import compare_camera
@@ -37,14 +37,14 @@ class TracedRays(NamedTuple):
 
     rays: Rays
     ours: Intersections
-    theirs: Answers
+    theirs: MitsubaHits
     ratios: FloatArray
     radius: FloatArray
 
 
 def geometry(
-    scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS, seed: int = 0
-) -> Tier:
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, pixels: int = PIXELS, seed: int = 0
+) -> RungResult:
     """Compare the cameras, and the first hits of rays: 3 `pixels` of the camera, at random and from
     hits, and as many that are aimed at edges, drawn with `seed`.
 
@@ -52,18 +52,18 @@ def geometry(
     normals and uv to be within float32's bound, or the arbiter to find that float32 cannot resolve
     the ray.  For what remains exact arithmetic decides which tracer is wrong.
     """
-    camera = compare_camera(scene, twin, pixels)
-    sizes = ShapeSizes(scene, twin.frame)
+    camera = compare_camera(scene, counterpart, pixels)
+    sizes = ShapeSizes(scene, counterpart.frame)
     unaimed = mixed_rays(scene, tables, sizes, pixels, seed)
     aimed = aimed_rays(tables, sizes, len(unaimed.o), seed)
     rays = joined(unaimed, aimed)
     is_aimed = np.arange(len(rays.o)) >= len(unaimed.o)
     comparer = Comparer(sizes)
-    traced, beyond = _traced(tables, twin, comparer, rays)
+    traced, beyond = _traced(tables, counterpart, comparer, rays)
     wrong = np.flatnonzero((traced.ratios > 1.0).any(axis=1))
     settled = _explained(tables, comparer, traced, wrong)
     left = wrong[~settled]
-    together = coincident(scene, twin, comparer, traced, left)
+    together = coincident(scene, counterpart, comparer, traced, left)
     mismatches = left[~together]
     # What the arbiter explained may lie in one place too.
     apart = wrong[settled][~in_one_place(comparer, traced, wrong[settled])]
@@ -96,16 +96,16 @@ def geometry(
         "mitsuba_wrong": [_describe(traced, k) for k in verdict.mitsuba[:LISTED].tolist()],
         "stand_ins": {
             f"shape_{shape}": [s._asdict() for s in found]
-            for shape, found in twin.stand_ins().items()
+            for shape, found in counterpart.stand_ins().items()
         },
         **camera.numbers,
     }
     if not isinstance(scene.integrator, RayCast):
-        numbers["resolution"] = resolution(scene, tables, twin, seed)._asdict()
+        numbers["resolution"] = resolution(scene, tables, counterpart, seed)._asdict()
     if camera.problem:
-        return Tier("geometry", "differ", camera.problem, numbers)
+        return RungResult("geometry", "differ", camera.problem, numbers)
     status, reason = _outcome(traced, verdict, is_aimed, numbers)
-    return Tier("geometry", status, reason, numbers)
+    return RungResult("geometry", status, reason, numbers)
 
 
 LISTED = 20
@@ -169,27 +169,27 @@ def _is_rest(traced: TracedRays, verdict: Judgement, is_aimed: BoolArray) -> boo
 
 
 def _traced(
-    tables: SceneTables, twin: Twin, comparer: Comparer, rays: Rays
+    tables: SceneTables, counterpart: Counterpart, comparer: Comparer, rays: Rays
 ) -> tuple[TracedRays, int]:
     """The hits of both tracers, and how many rays are left out: those that hit an infinite plane
     beyond the finite mesh that stands in for it."""
-    ours, theirs = query.intersect(tables, rays.o, rays.d), trace(twin, rays.o, rays.d)
+    ours, theirs = query.intersect(tables, rays.o, rays.d), trace(counterpart, rays.o, rays.d)
     ratios = comparer.ratios(rays, ours, theirs)
-    beyond = _beyond(twin, ours)
+    beyond = _beyond(counterpart, ours)
     ratios[beyond] = 0.0
     sizes = comparer.sizes
     reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))
     sag = np.zeros(len(sizes.reach) + 1)
-    for shape, found in twin.stand_ins().items():
+    for shape, found in counterpart.stand_ins().items():
         sag[shape] = max(s.sag for s in found)
     radius = sizes.frame.delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
     radius += np.maximum(sag[ours.shape], sag[theirs.shape])
     return TracedRays(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
 
 
-def _beyond(twin: Twin, ours: Intersections) -> BoolArray:
+def _beyond(counterpart: Counterpart, ours: Intersections) -> BoolArray:
     beyond = np.zeros(len(ours.t), bool)
-    for shape, extent in twin.extents().items():
+    for shape, extent in counterpart.extents().items():
         far = np.linalg.norm(ours.p - extent.middle, axis=1) > extent.radius
         beyond |= (ours.shape == shape) & far
     return beyond

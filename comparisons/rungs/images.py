@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
-from comparisons.results.case import FloatArray, Images, Metrics, Tier
+from comparisons.results.case import FloatArray, Images, Metrics, RungResult
 from comparisons.statistics.metric_null import (
     LEVEL,
     NOISE_LIMIT,
@@ -72,9 +72,9 @@ class Gate(NamedTuple):
         return {name: _finite(value) for name, value in self._asdict().items()}
 
 
-def images_tier(
+def images_rung(
     images: Images, metrics: Metrics, replicates: tuple[FloatArray, FloatArray] | None
-) -> Tier:
+) -> RungResult:
     """Compare the two pictures by metrics, which see errors that average out in the rungs below.
 
     replicates: the noisy pictures (replicates, height, width, 3) of the candidate and the
@@ -82,9 +82,11 @@ def images_tier(
     The pictures differ if any one metric is beyond its threshold.
     """
     if metrics.nonfinite:
-        return Tier("images", "invalid", f"{metrics.nonfinite} pixels are not finite")
+        return RungResult("images", "invalid", f"{metrics.nonfinite} pixels are not finite")
     if np.array_equal(images.candidate, images.reference):
-        return Tier("images", "agree", "the pictures are equal", {"noisy": replicates is not None})
+        return RungResult(
+            "images", "agree", "the pictures are equal", {"noisy": replicates is not None}
+        )
     numbers: dict[str, Any] = {"noisy": replicates is not None}
     facts, failed = [], []
     if replicates is not None:
@@ -106,9 +108,9 @@ def images_tier(
         if not gate.passed:
             failed.append(f"{LABEL[name]} {gate.value:.4g}, expected {_expected(name, gate)}")
     if failed:
-        return Tier("images", "differ", "; ".join(failed), numbers)
+        return RungResult("images", "differ", "; ".join(failed), numbers)
     facts.append(", ".join(f"{LABEL[name]} {gate.value:.4g}" for name, gate in gates.items()))
-    return Tier("images", "agree", "; ".join(facts), numbers)
+    return RungResult("images", "agree", "; ".join(facts), numbers)
 
 
 LABEL = {

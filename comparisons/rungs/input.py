@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.results.case import FloatArray, Status, Tier
+from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.metrics import nonfinite_pixels, white_level
 from comparisons.statistics.shared_noise import common_noise, largest_correlation
 
@@ -37,9 +37,9 @@ FEWEST_CLAMPED = 16
 lamp."""
 
 
-def input_tier(
+def input_rung(
     candidate: npt.ArrayLike, reference: npt.ArrayLike, opacity: npt.ArrayLike | None = None
-) -> Tier:
+) -> RungResult:
     """Report the first problem of the pictures; `agree` if there is none.
 
     candidate: (R, height, width, 3) replicates, or one picture (height, width, 3) without noise;
@@ -50,7 +50,7 @@ def input_tier(
     a, b = np.asarray(candidate, dtype=np.float64), np.asarray(reference, dtype=np.float64)
     alone = a.ndim == 3
     if problem := _of_shapes(a, b) or _of_sizes(a, b):
-        return _tier("invalid", problem)
+        return _result("invalid", problem)
     a, b = (x[None] if x.ndim == 3 else x for x in (a, b))
     numbers: dict[str, Any] = {
         "width": a.shape[2],
@@ -71,18 +71,18 @@ def input_tier(
         or _quantised(a, b)
     )
     if problem is not None:
-        return _tier("invalid", problem, numbers)
+        return _result("invalid", problem, numbers)
     problem = _clamped(a, b)
     if problem is not None:
-        return _tier("differ", problem, numbers)
+        return _result("differ", problem, numbers)
     text = f"{a.shape[2]} x {a.shape[1]} pixels, all finite"
     if numbers["negative_values"]:
         text += f"; {numbers['negative_values']} negative values, where the reference has none"
-    return _tier("agree", text, numbers)
+    return _result("agree", text, numbers)
 
 
-def _tier(status: Status, reason: str, numbers: dict[str, Any] | None = None) -> Tier:
-    return Tier("input", status, reason, numbers or {})
+def _result(status: Status, reason: str, numbers: dict[str, Any] | None = None) -> RungResult:
+    return RungResult("input", status, reason, numbers or {})
 
 
 def _of_shapes(a: FloatArray, b: FloatArray) -> str | None:

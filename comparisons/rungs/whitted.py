@@ -10,11 +10,11 @@ from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF, round32
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.counterpart import Twin
+from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import ambient_of
-from comparisons.results.case import Tier
+from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays, pixel_rays
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
@@ -45,7 +45,9 @@ each. Points closer to a light, and rays that curved mirrors spread, are left to
 Measured on the project's scenes: 0.6e-5."""
 
 
-def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS) -> Tier:
+def whitted(
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, pixels: int = PIXELS
+) -> RungResult:
     """Compare the radiance through pixel centres with that of our Whitted plugin in Mitsuba.
 
     The depth is the scene's if its integrator is Whitted, else the default.  Outliers go to the
@@ -53,18 +55,18 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
     """
     choice = tables.lights.choice
     if choice is None:
-        return Tier("whitted", "not-applicable", "the scene has no light")
+        return RungResult("whitted", "not-applicable", "the scene has no light")
     lights = int(np.count_nonzero(choice.kind != ENVIRONMENT))
     if lights > MOST_LIGHTS:
         reason = f"{lights} lights: with more than {MOST_LIGHTS} shadow rays take too long"
-        return Tier("whitted", "not-applicable", reason)
-    if twin.lacking:
-        return Tier("whitted", "not-comparable", twin.lacking)
+        return RungResult("whitted", "not-applicable", reason)
+    if counterpart.no_light_reason:
+        return RungResult("whitted", "not-comparable", counterpart.no_light_reason)
     integrator = scene.integrator if isinstance(scene.integrator, Whitted) else Whitted()
-    rays = pixel_rays(scene, twin.frame, pixels)
+    rays = pixel_rays(scene, counterpart.frame, pixels)
     setup = integrator.setup()
     ours = query.radiance_without_noise(tables, setup, rays.o, rays.d)
-    theirs_at = plugin_radiance(scene, tables, twin, integrator)
+    theirs_at = plugin_radiance(scene, tables, counterpart, integrator)
     theirs = theirs_at(rays)
     size = np.maximum(np.abs(ours), np.abs(theirs)).max(axis=1)
     lit = size[np.isfinite(size) & (size > 0.0)]
@@ -72,7 +74,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
     tables_off = max((accuracy(scene, name) for name in scene.materials), default=0.0)
     bound += tables_off * size
     error = np.abs(theirs - ours).max(axis=1)
-    sizes = ShapeSizes(scene, twin.frame)
+    sizes = ShapeSizes(scene, counterpart.frame)
     if is_steep(scene):
         over = np.flatnonzero(~(error <= bound))
         few = rays.rows(over)
@@ -87,7 +89,7 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
         return query.radiance_without_noise(tables, setup, o, d)
 
     def theirs_along(o: FloatArray, d: FloatArray) -> FloatArray:
-        return theirs_at(Rays(twin.frame.rounded(o), round32(d)))
+        return theirs_at(Rays(counterpart.frame.rounded(o), round32(d)))
 
     some = rays.rows(outliers)
     settled = _explained(
@@ -114,15 +116,15 @@ def whitted(scene: Scene, tables: SceneTables, twin: Twin, pixels: int = PIXELS)
             f"largest error, of the ray from {rays.o[k].tolist()} along {rays.d[k].tolist()}: "
             f"ours {ours[k]}, Mitsuba's {theirs[k]}"
         )
-        return Tier("whitted", "differ", reason, numbers)
+        return RungResult("whitted", "differ", reason, numbers)
     edges = (
         f"{numbers['explained']} of {len(rays.o)} pixels lie at edges that Mitsuba does not "
         "resolve (float32, its ray epsilon)"
     )
     if arbiter.too_many(numbers["explained"], len(rays.o)):
-        return Tier("whitted", "reference-limited", edges, numbers)
+        return RungResult("whitted", "reference-limited", edges, numbers)
     reason = f"pixels agree within {numbers['max_error']:.2g} W/sr/m²; {edges}"
-    return Tier("whitted", "agree", reason, numbers)
+    return RungResult("whitted", "agree", reason, numbers)
 
 
 def _radii(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> tuple[FloatArray, FloatArray]:
@@ -138,13 +140,13 @@ light nothing in Whitted ray tracing."""
 
 
 def plugin_radiance(
-    scene: Scene, tables: SceneTables, twin: Twin, integrator: Whitted
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, integrator: Whitted
 ) -> Callable[[Rays], FloatArray]:
     """Mitsuba's Whitted ray tracing: rays -> radiance (n, 3)."""
     mi = mitsuba()
     unlit = [
         name
-        for name, mi_shape in twin.pieces.items()
+        for name, mi_shape in counterpart.mi_shapes.items()
         if mi_shape.instance >= 0 or not isinstance(mi_shape.leaf, SAMPLED)
     ]
     ambient = dict(
@@ -161,9 +163,9 @@ def plugin_radiance(
     def radiance(o: Any, d: Any) -> tuple[Any, ...]:
         # Loaded for each call: Dr.Jit makes the lights' data as wide as the first call's rays.
         plugin = mi.load_dict(described)
-        return (plugin.sample(twin.mi_scene, None, mi.Ray3f(mi.Point3f(o), d))[0],)
+        return (plugin.sample(counterpart.mi_scene, None, mi.Ray3f(mi.Point3f(o), d))[0],)
 
-    return lambda rays: for_rays(radiance, twin.frame.into(rays.o), rays.d)[0]
+    return lambda rays: for_rays(radiance, counterpart.frame.into(rays.o), rays.d)[0]
 
 
 Radiance = Callable[[FloatArray, FloatArray], FloatArray]

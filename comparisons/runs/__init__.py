@@ -2,8 +2,8 @@
 
 - `processes`: worker processes that may crash or hang without ending the run.
 - `provenance`: versions, machine and date, which a reader needs to repeat a run.
-- `sources`: the code fingerprint, part of the cache key of every stored result.
-- `settling`: waits until idle threads stop spinning, before a time is measured.
+- `fingerprint`: the code fingerprint, part of the cache key of every stored result.
+- `cooldown`: waits until idle threads stop spinning, before a time is measured.
 
 Times are wall-clock seconds.  To add one: a module without knowledge of what the run compares.
 """

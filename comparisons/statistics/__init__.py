@@ -53,8 +53,8 @@ add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3
 """
 
 from comparisons.statistics.decide import compare
-from comparisons.statistics.places import standard_error, worst_places
+from comparisons.statistics.places import standard_error, worst_regions
 from comparisons.statistics.scales import Margins
 from comparisons.statistics.sides import Known
 
-__all__ = ["Known", "Margins", "compare", "standard_error", "worst_places"]
+__all__ = ["Known", "Margins", "compare", "standard_error", "worst_regions"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.results.case import FloatArray, Status, Tier
+from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.metrics import count_nonfinite
 from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
 from comparisons.statistics.sides import Known, known_side, picture_array, side_of
@@ -56,7 +56,7 @@ def compare(
     limit: float = 0.005,
     tile: int = TILE,
     margins: Margins | None = None,
-) -> Tier:
+) -> RungResult:
     """Decide whether two sets of replicates have the same mean, by the rule of this package.
 
     candidate, reference: linear radiance, (R, height, width, 3); R may differ between them, and
@@ -72,14 +72,16 @@ def compare(
     b, variance = _reference(reference)
     if a.shape[1:] != b.shape[1:]:
         reason = f"candidate is {_size(a)}, reference {_size(b)} pixels (width x height)"
-        return Tier("statistics", "invalid", reason)
+        return RungResult("statistics", "invalid", reason)
     if count_nonfinite(a) or count_nonfinite(b):
         bad = f"{count_nonfinite(a)} of the candidate, {count_nonfinite(b)} of the reference"
-        return Tier("statistics", "invalid", f"pixels not finite: {bad}")
+        return RungResult("statistics", "invalid", f"pixels not finite: {bad}")
     if variance is not None and not (np.isfinite(variance).all() and variance.min() >= 0.0):
-        return Tier("statistics", "invalid", "the reference's variance is negative or not finite")
+        return RungResult(
+            "statistics", "invalid", "the reference's variance is negative or not finite"
+        )
     if not a.any() and not b.any():
-        return Tier("statistics", "not-applicable", "every picture of either side is black")
+        return RungResult("statistics", "not-applicable", "every picture of either side is black")
     known = None if variance is None else Known(b[0], variance)
     return _verdict(findings(a, known or b, tile, margins), a, b, limit)
 
@@ -131,7 +133,7 @@ def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray
     return mean[None], variance
 
 
-def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Tier:
+def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> RungResult:
     status, finding = _decide(found, limit)
     image = found.image
     reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
@@ -159,7 +161,7 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Tie
         "pixels": cell_numbers(found.pixels, 1),
         "uniformity": uniformity_numbers(found.uniformity),
     }
-    return Tier("statistics", status, reason, numbers)
+    return RungResult("statistics", status, reason, numbers)
 
 
 def _decide(found: Findings, limit: float) -> tuple[Status, str]:

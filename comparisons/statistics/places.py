@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.results.case import FloatArray, Place
+from comparisons.results.case import FloatArray, ImageRegion
 from comparisons.statistics.decide import findings, read
 from comparisons.statistics.metrics import ratio
 from comparisons.statistics.scales import CHANNELS, DARK, ROUNDING, TILE, Margins, cell_means
@@ -35,9 +35,9 @@ def standard_error(candidate: npt.ArrayLike, reference: npt.ArrayLike | Known) -
     return np.sqrt(np.maximum(variance, (ROUNDING * mean) ** 2))
 
 
-def worst_places(
+def worst_regions(
     candidate: npt.ArrayLike, reference: npt.ArrayLike | Known, *, tile: int = TILE, most: int = 6
-) -> tuple[Place, ...]:
+) -> tuple[ImageRegion, ...]:
     """The tiles that differ most beyond their noise, or hold pixels that do, the worst first.
 
     Tiles below NOTABLE are left out.  For two single pictures: the tiles with the largest squared
@@ -65,7 +65,9 @@ def worst_places(
     return tuple(places)
 
 
-def _of_single_pictures(a: FloatArray, b: FloatArray, tile: int, most: int) -> tuple[Place, ...]:
+def _of_single_pictures(
+    a: FloatArray, b: FloatArray, tile: int, most: int
+) -> tuple[ImageRegion, ...]:
     rms = np.sqrt(cell_means((a - b) ** 2, tile))
     bias = cell_means(a - b, tile)
     scale = np.maximum(np.abs(cell_means(b, tile)), DARK * abs(float(b.mean())))
@@ -100,5 +102,5 @@ def _cell_maxima(values: FloatArray, tile: int) -> FloatArray:
     return np.asarray(np.maximum.reduceat(rows, np.arange(0, values.shape[1], tile), axis=1))
 
 
-def _place(shape: tuple[int, ...], x: int, y: int, side: int, what: str) -> Place:
-    return Place(x, y, min(side, shape[2] - x), min(side, shape[1] - y), what)
+def _place(shape: tuple[int, ...], x: int, y: int, side: int, what: str) -> ImageRegion:
+    return ImageRegion(x, y, min(side, shape[2] - x), min(side, shape[1] - y), what)

@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 from comparisons.compare.budget import Budget
 from comparisons.mitsuba.backend import Backend
-from comparisons.runs import sources
+from comparisons.runs import fingerprint
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_input, read_text
 
@@ -29,7 +29,7 @@ def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Back
         "files": files_digest(scene),
         "budget": budget.model_dump(),
         "rungs": rungs,
-        "sources": sources_digest(),
+        "sources": code_fingerprint(),
         "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
         "variant": backend.variant,
         "llvm": backend.llvm_path,
@@ -76,6 +76,6 @@ def _with_parts(path: Path) -> list[Path]:
     return [path, *(path.parent / unquote(u) for u in uris if not u.startswith("data:"))]
 
 
-def sources_digest() -> str:
+def code_fingerprint() -> str:
     """The hash of the sources that verdicts depend on."""
-    return sources.sources_digest(*_APART)
+    return fingerprint.code_fingerprint(*_APART)

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from comparisons.mitsuba.backend import Backend, backend
 from comparisons.report import write_report, write_results
-from comparisons.results.case import Case, Tier
-from comparisons.results.record import read_case, read_record, write_case
+from comparisons.results.case import Case, RungResult
+from comparisons.results.stored_case import read_case, read_stored_case, write_case
 from comparisons.runs.processes import pool
 from comparisons.runs.provenance import provenance
 from comparisons.suites.display import Display
@@ -188,7 +188,7 @@ def _begun(work: Work, options: Options, chosen: Backend) -> tuple[Request, _Don
 
 def _has_one_of(case: Case, rungs: tuple[str, ...]) -> bool:
     """Whether the case could not be run, or any of these rungs applies to it."""
-    said = {tier.name for tier in case.tiers if tier.status != "not-applicable"}
+    said = {result.name for result in case.rungs if result.status != "not-applicable"}
     return bool(said & {"scene", "run", "input", *rungs})
 
 
@@ -204,7 +204,7 @@ def _again(work: Work, source: Source, options: Options) -> str:
 def _done(request: Request) -> _Done | None:
     """The stored case, if its key is the request's."""
     try:
-        record = read_record(request.folder)
+        record = read_stored_case(request.folder)
         if record.key != request.key:
             return None
         return _Done(read_case(request.folder), record.wall, "done before")
@@ -245,9 +245,9 @@ def _case(outcome: pool.Outcome[Request]) -> Case:
 
 def _without_result(request: Request, rung: str, reason: str, wall: float = 0.0) -> Case:
     """Store an invalid case without a key, so that it is run again next time."""
-    tier = Tier(rung, "invalid", reason)
+    result = RungResult(rung, "invalid", reason)
     reason = f"{rung}: {reason}"
-    case = Case(request.name, "invalid", reason, (tier,), None, {}, again=request.again)
+    case = Case(request.name, "invalid", reason, (result,), None, {}, again=request.again)
     write_case(request.folder, case, wall=wall)
     return case
 

@@ -21,7 +21,7 @@ from pydantic import BaseModel, ConfigDict
 
 from comparisons.compare.budget import Budget
 from comparisons.results.case import WARNING, Case
-from comparisons.results.record import write_case
+from comparisons.results.stored_case import write_case
 from comparisons.runs.processes.protocol import carry_out, private_stdout, tell
 from comparisons.suites.work import Changes
 from reference_rt.cli.main import scene_warnings

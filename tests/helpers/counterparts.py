@@ -128,6 +128,6 @@ def every_material(folder: Path) -> Scene:
     return Scene.parse(EVERY_MATERIAL, folder=folder)
 
 
-def counterpart(scene: Scene) -> Any:
+def counterpart_of(scene: Scene) -> Any:
     """Standing where the scene does."""
     return load(scene, OURS)

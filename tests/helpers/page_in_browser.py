@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.results.case import Case, Metrics, Tier
+from comparisons.results.case import Case, Metrics, RungResult
 from comparisons.statistics.metrics import encode
 
 SIZE = 12, 8
@@ -10,8 +10,8 @@ SIZE = 12, 8
 
 def case(images, scene="box", verdict="differ", reason="why", **more):
     metrics = Metrics(0.9, 0.1, 30.0, 0.5, 0.25, (0.0, 0.0, -0.01), 0)
-    tiers = (Tier("geometry", "agree", "holds", {"rays": 7}),)
-    return Case(scene, verdict, reason, tiers, metrics, {"ours": {"load": 1.0}}, images, **more)
+    rungs = (RungResult("geometry", "agree", "holds", {"rays": 7}),)
+    return Case(scene, verdict, reason, rungs, metrics, {"ours": {"load": 1.0}}, images, **more)
 
 
 def grey(value, size=SIZE):

@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 from PIL import Image
 
-from comparisons.results.case import Case, Metrics, Tier
+from comparisons.results.case import Case, Metrics, RungResult
 
 NASTY = "<script>alert('x')</script>&\"glass\"<!-- ]]> </style>"
 PROVENANCE = {"date": "2025-11-20", "mitsuba": "3.9.1 llvm_ad_rgb", "versions": {"numpy": "2.4"}}
@@ -17,11 +17,11 @@ PROVENANCE = {"date": "2025-11-20", "mitsuba": "3.9.1 llvm_ad_rgb", "versions": 
 
 def case(verdict, scene=None, images=None, numbers=None, **more):
     metrics = Metrics(math.nan, 0.0625, math.inf, 0.5, 0.25, (0.0, math.inf, -0.01), 0)
-    tier = Tier("geometry", verdict, f"why {verdict}", numbers or {})
+    rung = RungResult("geometry", verdict, f"why {verdict}", numbers or {})
     seconds = {"ours": {"load": 0.5, "render": 1.5}, "mitsuba": {"render": 2.0}}
     name = scene or f"scene-{verdict}"
     told = f"geometry: {verdict}"
-    return Case(name, verdict, told, (tier,), metrics, seconds, images, ("note",), **more)
+    return Case(name, verdict, told, (rung,), metrics, seconds, images, ("note",), **more)
 
 
 def noise(shape, seed=0):

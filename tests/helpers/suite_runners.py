@@ -10,7 +10,7 @@ import time
 import numpy as np
 
 from comparisons.compare.budget import Budget
-from comparisons.results.case import Case, Images, Tier
+from comparisons.results.case import Case, Images, RungResult
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError
 
 
@@ -46,10 +46,10 @@ def by_name(scene, budget: Budget, say, threads, rungs) -> Case:
         time.sleep(1.5)
     status = "differ" if name.startswith("differ") else "agree"
     # As of a ray-cast scene, which has no light.
-    tiers = (
-        Tier("geometry", status, "rays", {"process": os.getpid(), "threads": threads}),
-        Tier("whitted", "not-applicable", "no light"),
+    rungs = (
+        RungResult("geometry", status, "rays", {"process": os.getpid(), "threads": threads}),
+        RungResult("whitted", "not-applicable", "no light"),
     )
     images = Images(np.full((2, 3, 3), 0.5), np.full((2, 3, 3), 0.25))
     seconds = {"candidate": {"render": 0.5}, "reference": {}}
-    return Case(name, status, f"geometry: {status}", tiers, None, seconds, images)
+    return Case(name, status, f"geometry: {status}", rungs, None, seconds, images)

@@ -30,4 +30,4 @@ def run_in(out: Path, folder: Path, text: str = "about: a test\n", only=(), **op
 
 
 def processes(found) -> dict[str, int]:
-    return {case.scene: case.tiers[0].numbers["process"] for case in found.cases}
+    return {case.scene: case.rungs[0].numbers["process"] for case in found.cases}

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from comparisons.results.case import Cause, Tier
+from comparisons.results.case import Cause, RungResult
 
 ALMOST_ALL = 0.95
 """The fraction of mismatches of one kind from which that kind names the cause."""
@@ -26,9 +26,9 @@ OF_KIND = {
 that applies is used."""
 
 
-def of_rungs(tiers: Sequence[Tier]) -> Cause | None:
+def of_rungs(rungs: Sequence[RungResult]) -> Cause | None:
     """The cause that the first broken rung shows; None if it shows none."""
-    broken = next((tier for tier in tiers if tier.status == "differ"), None)
+    broken = next((rung for rung in rungs if rung.status == "differ"), None)
     if broken is None:
         return None
     if broken.name == "film":

@@ -35,14 +35,14 @@ def _row(name: str, setting: Setting) -> Row:
     scene = cornell_box(setting)
     size = scene.film.width
     with variant(mitsuba_variant):
-        twin = load(scene)
+        counterpart = load(scene)
         seeds = iter(range(1, 1000))
 
         def ours() -> object:
             return render(scene, tables=scene.tables, threads=setting.threads)
 
         def theirs() -> object:
-            return mitsuba_scene.picture(twin.mi_scene, SPP, next(seeds))
+            return mitsuba_scene.picture(counterpart.mi_scene, SPP, next(seeds))
 
         ours(), theirs()  # compile
         times = alternate(

@@ -15,7 +15,7 @@ from comparisons.experiments.bench.machine import machine
 from comparisons.experiments.bench.row import Row, row_from
 from comparisons.experiments.bench.setting import Setting
 from comparisons.experiments.bench.table import markdown
-from comparisons.runs.sources import sources_digest
+from comparisons.runs.fingerprint import code_fingerprint
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.files import check_writable, read_text, replacing
 
@@ -79,7 +79,7 @@ def run(
 
 def key_of(setting: Setting, facts: dict[str, Any]) -> str:
     """A hash of all that rows depend on; stored rows with another key are not used."""
-    digest = hashlib.sha256(sources_digest().encode())
+    digest = hashlib.sha256(code_fingerprint().encode())
     for path in sorted(p for p in setting.scenes.rglob("*") if p.is_file()):
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     if setting.mesh is not None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.runs.settling import settle
+from comparisons.runs.cooldown import cool_down
 
 ROUNDS = 7
 """Default number of rounds: one or two disturbances do not move the median far."""
@@ -55,7 +55,7 @@ def alternate(
     for k in range(rounds):
         for name in list(measures)[:: 1 if k % 2 == 0 else -1]:
             say(name, done / total)
-            settle()
+            cool_down()
             found[name].append(measures[name]())
             done += 1
     return found

@@ -119,17 +119,19 @@ def _mitsubas(scene: Scene) -> GridPoint:
     casts = isinstance(scene.integrator, RayCast)
     sampler = Grid(spp=1) if casts else scene.resolved_sampler
     scene = scene.changed(sampler=sampler)
-    twin = load(scene)
-    if twin.lacking and not casts:
-        raise UntranslatableError(f"scene, in which {twin.lacking},", "integrator for the")
+    counterpart = load(scene)
+    if counterpart.no_light_reason and not casts:
+        raise UntranslatableError(
+            f"scene, in which {counterpart.no_light_reason},", "integrator for the"
+        )
     ours = render(scene, tables=scene.tables)
     seconds = []
     for _ in range(REPEATS):  # the first compiles
         start = time.perf_counter()
         if casts:
-            picture = pictures.mitsuba_cast(scene, scene.tables, twin, ours)[0]
+            picture = pictures.mitsuba_cast(scene, scene.tables, counterpart, ours)[0]
         else:
-            picture = pictures.mitsuba_whitted(scene, scene.tables, twin)
+            picture = pictures.mitsuba_whitted(scene, scene.tables, counterpart)
         seconds.append(time.perf_counter() - start)
     mse, relmse = differences(picture, display(ours) if casts else ours.colour)
     warm = float(np.median(seconds[1:]))

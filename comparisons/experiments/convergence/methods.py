@@ -11,8 +11,8 @@ import numpy as np
 from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba.backend import LLVM, SCALAR, backend, mitsuba, variant
 from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.translate import FEW, UntranslatableError, to_mitsuba
-from comparisons.runs.settling import settle
+from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, to_mitsuba
+from comparisons.runs.cooldown import cool_down
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
@@ -165,7 +165,7 @@ class Stable:
 
         def shot(spp: int, replicate: int) -> Shot:
             seeded = scene.changed(sampler=make(spp=spp, seed=first + replicate))
-            settle()
+            cool_down()
             start = time.perf_counter()
             picture = render(seeded, tables=tables).colour
             return Shot(picture, spp, time.perf_counter() - start)
@@ -180,7 +180,7 @@ class Stable:
         description["sensor"]["sampler"] = {"type": method.sampler}
         parts = [part for part in description.values() if isinstance(part, dict)]
         instances = sum(part.get("type") == "instance" for part in parts)
-        if method.side == LLVM and instances > FEW:
+        if method.side == LLVM and instances > MOST_INSTANCES:
             raise AbsentError(
                 f"{instances} instances, for which Mitsuba's llvm variant takes minutes to compile"
             )
@@ -190,7 +190,7 @@ class Stable:
 
         def shot(spp: int, replicate: int) -> Shot:
             mi = self._in(method.side)
-            settle()
+            cool_down()
             start = time.perf_counter()
             with failing(f"Mitsuba cannot render {spp} samples per pixel"):
                 # The array is what forces the lazy rendering to happen.

@@ -16,7 +16,7 @@ from comparisons.experiments.convergence.data import Rung
 from comparisons.experiments.convergence.reference import key_of
 from comparisons.mitsuba.backend import backend
 from comparisons.results.sealed import read_arrays, sealed, unsealed, write_arrays
-from comparisons.suites.keys import files_digest, sources_digest
+from comparisons.suites.keys import code_fingerprint, files_digest
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_text, replacing
 
@@ -37,7 +37,7 @@ def run_key(scene: Scene, replicates: int) -> str:
         "schema": SCHEMA,
         "scene": scene.digest(),
         "files": files_digest(scene),
-        "sources": sources_digest(),
+        "sources": code_fingerprint(),
         "reference": key_of(scene),
         "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
         "mitsuba": (chosen.variant, chosen.llvm_path),

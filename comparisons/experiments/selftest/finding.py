@@ -32,7 +32,7 @@ class Finding:
 def finding(fault: Fault, suite: str, case: Case) -> Finding:
     """The finding from the case with the fault."""
     gravest = "invalid" if case.verdict == "invalid" else "differ"
-    by_name = {tier.name: tier for tier in case.tiers}
+    by_name = {result.name: result for result in case.rungs}
     rung = next((n for n in RUNGS if n in by_name and by_name[n].status == gravest), "")
     strength = _strength(rung, by_name[rung].numbers, by_name[rung].reason) if rung else case.reason
     kind = {PictureFault: "picture", SceneFault: "scene"}.get(type(fault), "source")

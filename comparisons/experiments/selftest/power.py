@@ -20,7 +20,7 @@ from comparisons.experiments.selftest.of_pictures import (
     gain,
     shifted,
 )
-from comparisons.rungs.images import images_tier
+from comparisons.rungs.images import images_rung
 from comparisons.statistics.metrics import image_metrics
 from reference_rt.rendering.scene import Scene
 
@@ -77,7 +77,7 @@ def _caught(pool: Evidence, fault: PictureFault, budget: Budget, rng: np.random.
         for side in pool.rendered.replicates
     )
     rendered = of_replicates(fault.change(ours), reference, {})
-    if any(tier.status in CAUGHT for tier in picture_rungs(rendered, budget.limit)):
+    if any(rung.status in CAUGHT for rung in picture_rungs(rendered, budget.limit)):
         return True
     metrics = image_metrics(rendered.images)
-    return images_tier(rendered.images, metrics, rendered.replicates).status in CAUGHT
+    return images_rung(rendered.images, metrics, rendered.replicates).status in CAUGHT

@@ -58,7 +58,7 @@ def specificity(runs: int, scenes: Path, say: Say) -> Sequence[Alarms]:
 
 def _of_scene(path: Path, budget: Budget, runs: int, say: Say) -> Alarms:
     scene = budgeted(Scene.load(path), budget)
-    tables, twin = build_tables(scene), load(scene)
+    tables, counterpart = build_tables(scene), load(scene)
     sampler, count = scene.resolved_sampler, budget.replicates
     found: Counter[str] = Counter()
     for run in range(runs):
@@ -72,7 +72,7 @@ def _of_scene(path: Path, budget: Budget, runs: int, say: Say) -> Alarms:
             ]
         )
         reference = np.stack(
-            [mitsuba_scene.picture(twin.mi_scene, sampler.spp, seed) for seed in seeds]
+            [mitsuba_scene.picture(counterpart.mi_scene, sampler.spp, seed) for seed in seeds]
         )
         case = judge(Evidence(scene.name, (), of_replicates(ours, reference, {}), {}), budget.limit)
         if case.verdict in CAUGHT:

@@ -15,7 +15,7 @@ import numpy as np
 from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
 from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.backend import mitsuba, scalar
-from comparisons.mitsuba.counterpart import InstancedGroup, Twin
+from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
 from comparisons.mitsuba.csg import Operand, SolidCounterpart
 from comparisons.mitsuba.scene import light_id, shape_id
 from comparisons.mitsuba.stand_ins import MitsubaShape, Plugin, same_uv
@@ -26,7 +26,7 @@ from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import translate_light
 from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
-from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.mitsuba.translate.wrappers import coloured_parts_of, is_textured, parts_of
 from reference_rt.rendering.scene import Scene
 
@@ -36,7 +36,7 @@ ROBUST = {"embree_use_robust_intersections": True}
 
 class _Translated(NamedTuple):
     plain: dict[str, Any]
-    pieces: dict[str, MitsubaShape]
+    mi_shapes: dict[str, MitsubaShape]
     solids: list[SolidCounterpart]
 
 
@@ -50,40 +50,42 @@ def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
     cannot be used, ReferenceUnavailableError without Mitsuba.
     """
     found = _translated(scene, native)
-    return {**_groups(found.pieces), **found.plain}
+    return {**_groups(found.mi_shapes), **found.plain}
 
 
-def load(scene: Scene, frame: Frame | None = None) -> Twin:
+def load(scene: Scene, frame: Frame | None = None) -> Counterpart:
     """The scene's counterpart in Mitsuba, its shapes not merged, in the coordinates that suit
     float32 best, or in `frame`.  Raises as `to_mitsuba` does."""
     frame = frame_of(scene) if frame is None else frame
     found = _translated(moved(scene, frame))
-    crowd = _instanced_group(found)
-    plain = {**_groups(found.pieces), **found.plain}
+    instanced_group = _instanced_group(found)
+    plain = {**_groups(found.mi_shapes), **found.plain}
     mi_scene = mitsuba().load_dict(plain, optimize=False)
-    return Twin(mi_scene, found.pieces, tuple(found.solids), crowd, frame)
+    return Counterpart(mi_scene, found.mi_shapes, tuple(found.solids), instanced_group, frame)
 
 
-FEW = 32
+MOST_INSTANCES = 32
 """Most instances in a scene of Mitsuba's fast variants: see `InstancedGroup`."""
 
 
 def _instanced_group(found: _Translated) -> InstancedGroup | None:
     """Move the instances out of what is translated, if there are more than FEW."""
-    names = [name for name, mi_shape in found.pieces.items() if mi_shape.plugin.group is not None]
-    if len(names) <= FEW:
+    names = [
+        name for name, mi_shape in found.mi_shapes.items() if mi_shape.plugin.group is not None
+    ]
+    if len(names) <= MOST_INSTANCES:
         return None
-    pieces = {name: found.pieces.pop(name) for name in names}
+    mi_shapes = {name: found.mi_shapes.pop(name) for name in names}
     instances = {name: found.plain.pop(name) for name in names}
     with scalar() as mi:
-        groups = _groups(pieces)
+        groups = _groups(mi_shapes)
         mi_scene = mi.load_dict({"type": "scene", **ROBUST, **groups, **instances}, optimize=False)
-    return InstancedGroup(mi_scene, pieces)
+    return InstancedGroup(mi_scene, mi_shapes)
 
 
-def _groups(pieces: Mapping[str, MitsubaShape]) -> dict[str, Any]:
+def _groups(mi_shapes: Mapping[str, MitsubaShape]) -> dict[str, Any]:
     """The shape groups of these instances, in the current variant."""
-    groups = {p.plugin.group.name: p.plugin.group for p in pieces.values() if p.plugin.group}
+    groups = {p.plugin.group.name: p.plugin.group for p in mi_shapes.values() if p.plugin.group}
     return {
         name: {"type": "shapegroup", "member": g.member() if callable(g.member) else g.member}
         for name, g in groups.items()
@@ -102,16 +104,16 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
     copies = copies_of(scene)
     count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
     shared: dict[Any, Any] = {}
-    around = Surroundings.of(scene, native)
+    context = TranslationContext.of(scene, native)
     reach = _reach(scene, copies)
     for copy in copies:
         try:
             of_group = count[copy.group] if copy.group else 1
-            _add(result, scene, copy, of_group, shared, around, reach)
+            _add(result, scene, copy, of_group, shared, context, reach)
         except ValueError as error:
             raise scene.error(str(error), "shapes", copy.shape) from None
     for i, light in enumerate(scene.lights):
-        emitter = translate_light(light, around)
+        emitter = translate_light(light, context)
         if emitter is not None:
             plain[light_id(i)] = emitter
     return result
@@ -133,7 +135,7 @@ def _add(
     copy: Copy,
     count: int,
     shared: dict[Any, Any],
-    around: Surroundings,
+    context: TranslationContext,
     reach: float,
 ) -> None:
     """Add the shapes of one copy to the result;  count: how many copies its group has."""
@@ -145,13 +147,13 @@ def _add(
         operands = []
         for leaf in member.leaves:
             place = place_of(scene, leaf, copy.outer)
-            parts = parts_of(leaf.material, around)
+            parts = parts_of(leaf.material, context)
             site = Site(
                 place=place,
                 mirrored=mirrored,
                 parts=parts,
-                coloured=coloured_parts_of(leaf.material, around) or parts,
-                textured=is_textured(leaf.material, around),
+                coloured=coloured_parts_of(leaf.material, context) or parts,
+                textured=is_textured(leaf.material, context),
                 material=leaf.material,
                 copies=count,
                 shared=shared,
@@ -162,16 +164,16 @@ def _add(
                 kind = type(leaf.shape).__name__
                 raise UntranslatableError(f"{kind} under a texture, with other uv,", "shape")
             if member.tree is None:
-                values, pieces = _named(plugins, name, copy, leaf)
+                values, mi_shapes = _named(plugins, name, copy, leaf)
                 result.plain.update(values)
-                result.pieces.update(pieces)
+                result.mi_shapes.update(mi_shapes)
             else:
-                values, pieces = _named(plugins, f"{name}_part{leaf.part}", copy, leaf)
-                groups = _groups(pieces)
+                values, mi_shapes = _named(plugins, f"{name}_part{leaf.part}", copy, leaf)
+                groups = _groups(mi_shapes)
                 mi_scene = mitsuba().load_dict(
                     {"type": "scene", **ROBUST, **groups, **values}, optimize=False
                 )
-                operands.append(Operand(mi_scene, pieces, leaf, place))
+                operands.append(Operand(mi_scene, mi_shapes, leaf, place))
         if member.tree is not None:
             result.solids.append(SolidCounterpart(tuple(operands), member.tree))
 
@@ -179,14 +181,14 @@ def _add(
 def _named(
     plugins: list[Plugin], name: str, copy: Copy, leaf: Leaf
 ) -> tuple[dict[str, Any], dict[str, MitsubaShape]]:
-    values, pieces = {}, {}
+    values, mi_shapes = {}, {}
     for plugin in plugins:
         key = name + plugin.suffix
         values[key] = plugin.value
-        pieces[key] = MitsubaShape(
+        mi_shapes[key] = MitsubaShape(
             copy.shape, leaf.part, copy.instance, leaf.shape, plugin._replace(value=None)
         )
-    return values, pieces
+    return values, mi_shapes
 
 
 __all__ = ["UntranslatableError", "load", "to_mitsuba"]

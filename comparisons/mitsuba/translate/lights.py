@@ -7,12 +7,12 @@ import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.textures import Surroundings, rgb
+from comparisons.mitsuba.translate.textures import TranslationContext, rgb
 from reference_rt.lights import Ambient, Constant, Directional, EnvironmentMap, Point, Spot
 
 
 @singledispatch
-def translate_light(light: Any, around: Surroundings) -> dict[str, Any] | None:
+def translate_light(light: Any, context: TranslationContext) -> dict[str, Any] | None:
     """An emitter's dict; None for ambient light, see `ambient_of`.
 
     Raises UntranslatableError, ValueError for a file that cannot be used.
@@ -21,7 +21,7 @@ def translate_light(light: Any, around: Surroundings) -> dict[str, Any] | None:
 
 
 @translate_light.register
-def _(light: Point, around: Surroundings) -> dict[str, Any]:
+def _(light: Point, context: TranslationContext) -> dict[str, Any]:
     return {
         "type": "point",
         "position": list(light.position),
@@ -30,7 +30,7 @@ def _(light: Point, around: Surroundings) -> dict[str, Any]:
 
 
 @translate_light.register
-def _(light: Spot, around: Surroundings) -> dict[str, Any]:
+def _(light: Spot, context: TranslationContext) -> dict[str, Any]:
     beam = 0.75 * light.cutoff_angle if light.beam_width is None else light.beam_width
     axis = np.subtract(light.target, light.origin)
     # Any vector that is not parallel to the axis: the light is rotationally symmetric.
@@ -47,7 +47,7 @@ def _(light: Spot, around: Surroundings) -> dict[str, Any]:
 
 
 @translate_light.register
-def _(light: Directional, around: Surroundings) -> dict[str, Any]:
+def _(light: Directional, context: TranslationContext) -> dict[str, Any]:
     return {
         "type": "directional",
         "direction": list(light.direction),
@@ -56,14 +56,14 @@ def _(light: Directional, around: Surroundings) -> dict[str, Any]:
 
 
 @translate_light.register
-def _(light: Constant, around: Surroundings) -> dict[str, Any]:
+def _(light: Constant, context: TranslationContext) -> dict[str, Any]:
     return {"type": "constant", "radiance": rgb(light.radiance)}
 
 
 @translate_light.register
-def _(light: EnvironmentMap, around: Surroundings) -> dict[str, Any]:
+def _(light: EnvironmentMap, context: TranslationContext) -> dict[str, Any]:
     """From the texels of our table, scale included."""
-    table = light.tabulate(around.folder)
+    table = light.tabulate(context.folder)
     to_world = np.eye(4)
     to_world[:3, :3] = table.to_map.reshape(3, 3).T
     return {
@@ -74,7 +74,7 @@ def _(light: EnvironmentMap, around: Surroundings) -> dict[str, Any]:
 
 
 @translate_light.register
-def _(light: Ambient, around: Surroundings) -> None:
+def _(light: Ambient, context: TranslationContext) -> None:
     """None: only our Whitted plugin has ambient light, as a parameter."""
 
 

@@ -4,7 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.textures import Surroundings, colour, number, rgb
+from comparisons.mitsuba.translate.textures import TranslationContext, colour, number, rgb
 from reference_rt.materials import (
     Conductor,
     Dielectric,
@@ -21,62 +21,62 @@ from reference_rt.materials import (
 
 
 @singledispatch
-def translate_material(material: Any, around: Surroundings) -> dict[str, Any]:
+def translate_material(material: Any, context: TranslationContext) -> dict[str, Any]:
     """A BSDF's dict.  Raises UntranslatableError, ValueError for a file that cannot be used."""
     raise UntranslatableError(material, "material")
 
 
 @translate_material.register
-def _(material: Diffuse, around: Surroundings) -> dict[str, Any]:
-    return {"type": "diffuse", "reflectance": colour(material.reflectance, around)}
+def _(material: Diffuse, context: TranslationContext) -> dict[str, Any]:
+    return {"type": "diffuse", "reflectance": colour(material.reflectance, context)}
 
 
 @translate_material.register
-def _(material: Mirror, around: Surroundings) -> dict[str, Any]:
+def _(material: Mirror, context: TranslationContext) -> dict[str, Any]:
     # Without a material Mitsuba's conductor has eta = 0, k = 1, and reflects everything.
-    return {"type": "conductor", "specular_reflectance": colour(material.reflectance, around)}
+    return {"type": "conductor", "specular_reflectance": colour(material.reflectance, context)}
 
 
 @translate_material.register
-def _(material: Conductor, around: Surroundings) -> dict[str, Any]:
-    return {"type": "conductor", **_metal(material, around)}
+def _(material: Conductor, context: TranslationContext) -> dict[str, Any]:
+    return {"type": "conductor", **_metal(material, context)}
 
 
 @translate_material.register
-def _(material: RoughConductor, around: Surroundings) -> dict[str, Any]:
-    return _rough("roughconductor", material, _metal(material, around), around)
+def _(material: RoughConductor, context: TranslationContext) -> dict[str, Any]:
+    return _rough("roughconductor", material, _metal(material, context), context)
 
 
-def _metal(material: Conductor | RoughConductor, around: Surroundings) -> dict[str, Any]:
+def _metal(material: Conductor | RoughConductor, context: TranslationContext) -> dict[str, Any]:
     return {
         "eta": rgb(material.eta),
         "k": rgb(material.k),
-        "specular_reflectance": colour(material.reflectance, around),
+        "specular_reflectance": colour(material.reflectance, context),
     }
 
 
 @translate_material.register
-def _(material: Dielectric, around: Surroundings) -> dict[str, Any]:
-    return {"type": "dielectric", **_glass(material, around)}
+def _(material: Dielectric, context: TranslationContext) -> dict[str, Any]:
+    return {"type": "dielectric", **_glass(material, context)}
 
 
 @translate_material.register
-def _(material: ThinDielectric, around: Surroundings) -> dict[str, Any]:
-    return {"type": "thindielectric", **_glass(material, around)}
+def _(material: ThinDielectric, context: TranslationContext) -> dict[str, Any]:
+    return {"type": "thindielectric", **_glass(material, context)}
 
 
 @translate_material.register
-def _(material: RoughDielectric, around: Surroundings) -> dict[str, Any]:
-    return _rough("roughdielectric", material, _glass(material, around), around)
+def _(material: RoughDielectric, context: TranslationContext) -> dict[str, Any]:
+    return _rough("roughdielectric", material, _glass(material, context), context)
 
 
 def _glass(
-    material: Dielectric | ThinDielectric | RoughDielectric, around: Surroundings
+    material: Dielectric | ThinDielectric | RoughDielectric, context: TranslationContext
 ) -> dict[str, Any]:
     return {
         **_indices(material),
-        "specular_reflectance": colour(material.reflectance, around),
-        "specular_transmittance": colour(material.transmittance, around),
+        "specular_reflectance": colour(material.reflectance, context),
+        "specular_transmittance": colour(material.transmittance, context),
     }
 
 
@@ -89,43 +89,46 @@ def _rough(
     plugin: str,
     material: RoughConductor | RoughDielectric,
     values: dict[str, Any],
-    around: Surroundings,
+    context: TranslationContext,
 ) -> dict[str, Any]:
     alpha = material.alpha
     along_u, along_v = (alpha, alpha) if isinstance(alpha, str) else alpha
-    alphas = {"alpha_u": number(along_u, around), "alpha_v": number(along_v, around)}
+    alphas = {"alpha_u": number(along_u, context), "alpha_v": number(along_v, context)}
     bsdf = {"type": plugin, "distribution": material.distribution, **alphas, **values}
-    if material.distribution == "ggx" or around.native:
+    if material.distribution == "ggx" or context.native:
         return bsdf
     # The plugin says why visible normals are not sampled.
     return {"type": "exact_beckmann", "nested": {**bsdf, "sample_visible": False}, **alphas}
 
 
 @translate_material.register
-def _(material: Plastic, around: Surroundings) -> dict[str, Any]:
-    return _coated("plastic", material, around, {})
+def _(material: Plastic, context: TranslationContext) -> dict[str, Any]:
+    return _coated("plastic", material, context, {})
 
 
 @translate_material.register
-def _(material: RoughPlastic, around: Surroundings) -> dict[str, Any]:
+def _(material: RoughPlastic, context: TranslationContext) -> dict[str, Any]:
     rough = {"distribution": material.distribution, "alpha": material.alpha}
-    return _coated("roughplastic", material, around, rough)
+    return _coated("roughplastic", material, context, rough)
 
 
 def _coated(
-    plugin: str, material: Plastic | RoughPlastic, around: Surroundings, rough: dict[str, Any]
+    plugin: str,
+    material: Plastic | RoughPlastic,
+    context: TranslationContext,
+    rough: dict[str, Any],
 ) -> dict[str, Any]:
     """Mitsuba's own material, wrapped in `exact_coat`, which corrects its tables."""
-    base = colour(material.reflectance, around)
+    base = colour(material.reflectance, context)
     nested = {
         "type": plugin,
         "diffuse_reflectance": base,
-        "specular_reflectance": colour(material.specular, around),
+        "specular_reflectance": colour(material.specular, context),
         "nonlinear": material.nonlinear,
         **_indices(material),
         **rough,
     }
-    if around.native:
+    if context.native:
         return nested
     if rough:
         nested["sample_visible"] = rough["distribution"] == "ggx"
@@ -140,7 +143,7 @@ def _coated(
 
 
 @translate_material.register
-def _(material: Principled, around: Surroundings) -> dict[str, Any]:
+def _(material: Principled, context: TranslationContext) -> dict[str, Any]:
     numbers = (
         "roughness", "metallic", "spec_tint", "anisotropic", "sheen", "sheen_tint", "clearcoat",
         "clearcoat_gloss", "spec_trans", "flatness",
@@ -151,19 +154,19 @@ def _(material: Principled, around: Surroundings) -> dict[str, Any]:
         index = {"specular": 0.5 if material.specular is None else material.specular}
     return {
         "type": "principled",
-        "base_color": colour(material.base_colour, around),
+        "base_color": colour(material.base_colour, context),
         **index,
-        **{name: number(getattr(material, name), around) for name in numbers},
+        **{name: number(getattr(material, name), context) for name in numbers},
     }
 
 
 @translate_material.register
-def _(material: Phong, around: Surroundings) -> dict[str, Any]:
+def _(material: Phong, context: TranslationContext) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.phong`."""
     colours = ("ambient", "diffuse", "specular", "mirror")
     return {
         "type": "textbook_phong",
-        **{name: colour(getattr(material, name), around) for name in colours},
+        **{name: colour(getattr(material, name), context) for name in colours},
         "exponent": material.exponent,
         "half_vector": material.half_vector,
     }

@@ -22,7 +22,7 @@ VERTEX_COLOUR, VERTEX_LUMINANCE = "vertex_color", "vertex_luminance"
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class TranslationContext:
     """The context of a translation: the scene's materials and textures, by name; the folder of its
     files;  has_colours: whether the material belongs to a mesh with vertex colours;  native: use
     Mitsuba's own materials even where our plugins are more exact;  images: cache of Mitsuba's
@@ -45,35 +45,35 @@ def rgb(colour: tuple[float, float, float]) -> dict[str, Any]:
     return {"type": "rgb", "value": list(colour)}
 
 
-def colour(value: tuple[float, float, float] | str, around: Surroundings) -> dict[str, Any]:
+def colour(value: tuple[float, float, float] | str, context: TranslationContext) -> dict[str, Any]:
     """A colour, or the texture with that name.  Raises UntranslatableError, ValueError for a file
     that cannot be used."""
     if isinstance(value, str):
-        return translate_texture(around.textures[value], value, around, False)
+        return translate_texture(context.textures[value], value, context, False)
     return rgb(value)
 
 
-def number(value: float | str, around: Surroundings) -> float | dict[str, Any]:
+def number(value: float | str, context: TranslationContext) -> float | dict[str, Any]:
     """A number, or the luminance of the texture with that name.
 
     Mitsuba gets one channel with our luminance: its own weights have other digits (0.212671 for
     0.2126).  Raises as `colour` does.
     """
     if isinstance(value, str):
-        return translate_texture(around.textures[value], value, around, True)
+        return translate_texture(context.textures[value], value, context, True)
     return value
 
 
 @singledispatch
 def translate_texture(
-    texture: Any, name: str, around: Surroundings, as_number: bool
+    texture: Any, name: str, context: TranslationContext, as_number: bool
 ) -> dict[str, Any]:
     """A texture's dict, of colours or of numbers.  Raises as `colour` does."""
     raise UntranslatableError(texture, "texture")
 
 
 @translate_texture.register
-def _(texture: Checker, name: str, around: Surroundings, as_number: bool) -> dict[str, Any]:
+def _(texture: Checker, name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
     first, second = texture.first, texture.second
     if max(*first, *second) > 1.0:
         # Mitsuba's checkerboard limits its colours to reflectances; an image of four texels is the
@@ -93,19 +93,21 @@ def _(texture: Checker, name: str, around: Surroundings, as_number: bool) -> dic
 
 
 @translate_texture.register
-def _(texture: Bitmap, name: str, around: Surroundings, as_number: bool) -> dict[str, Any]:
+def _(texture: Bitmap, name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
     """From our own linear texels: the decoding of files is not compared."""
     key = (name, as_number)
-    if key not in around.images:
-        table = texture.tabulate(around.folder)
+    if key not in context.images:
+        table = texture.tabulate(context.folder)
         shape = (int(table.height[0]), int(table.width[0]), 3)
-        around.images[key] = _image(table.texels.reshape(shape), as_number)
-    return _lookup(around.images[key], texture.filter, texture.wrap, texture.uv)
+        context.images[key] = _image(table.texels.reshape(shape), as_number)
+    return _lookup(context.images[key], texture.filter, texture.wrap, texture.uv)
 
 
 @translate_texture.register
-def _(texture: VertexColours, name: str, around: Surroundings, as_number: bool) -> dict[str, Any]:
-    if not around.has_colours:
+def _(
+    texture: VertexColours, name: str, context: TranslationContext, as_number: bool
+) -> dict[str, Any]:
+    if not context.has_colours:
         if as_number:
             return {"type": "uniform", "value": float(luminance(Vec3(*texture.without)))}
         return rgb(texture.without)

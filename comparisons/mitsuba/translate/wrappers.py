@@ -5,7 +5,13 @@ from typing import Any
 
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import Surroundings, colour, depends_on_uv, number, rgb
+from comparisons.mitsuba.translate.textures import (
+    TranslationContext,
+    colour,
+    depends_on_uv,
+    number,
+    rgb,
+)
 from reference_rt.materials import (
     Blend,
     Bump,
@@ -20,53 +26,53 @@ from reference_rt.materials import (
 from reference_rt.textures import Bitmap, VertexColours, texture_names
 
 
-def _named(name: str, around: Surroundings) -> dict[str, Any]:
-    return translate_material(around.materials[name], around)
+def _named(name: str, context: TranslationContext) -> dict[str, Any]:
+    return translate_material(context.materials[name], context)
 
 
 @translate_material.register
-def _(material: Emissive, around: Surroundings) -> dict[str, Any]:
+def _(material: Emissive, context: TranslationContext) -> dict[str, Any]:
     """Only the BSDF: the emission is the shape's emitter, see `parts_of`."""
     if material.base is None:
         return {"type": "diffuse", "reflectance": rgb((0.0, 0.0, 0.0))}
-    return _named(material.base, around)
+    return _named(material.base, context)
 
 
 @translate_material.register
-def _(material: Mask, around: Surroundings) -> dict[str, Any]:
-    base = _named(material.base, around)
-    name = "mask" if around.native else "mixture_mask"
-    return {"type": name, "opacity": number(material.opacity, around), "base": base}
+def _(material: Mask, context: TranslationContext) -> dict[str, Any]:
+    base = _named(material.base, context)
+    name = "mask" if context.native else "mixture_mask"
+    return {"type": name, "opacity": number(material.opacity, context), "base": base}
 
 
 @translate_material.register
-def _(material: Blend, around: Surroundings) -> dict[str, Any]:
-    first, second = _named(material.first, around), _named(material.second, around)
-    weight = number(material.weight, around)
-    if has_delta(material, around) and not around.native:
+def _(material: Blend, context: TranslationContext) -> dict[str, Any]:
+    first, second = _named(material.first, context), _named(material.second, context)
+    weight = number(material.weight, context)
+    if has_delta(material, context) and not context.native:
         return {"type": "mixture_blend", "weight": weight, "first": first, "second": second}
     return {"type": "blendbsdf", "weight": weight, "0_first": first, "1_second": second}
 
 
-def has_delta(material: Material, around: Surroundings) -> bool:
+def has_delta(material: Material, context: TranslationContext) -> bool:
     """Whether a material has a delta lobe: perfect reflection, refraction or transparency."""
     if isinstance(material, Mask):
         return True
     if isinstance(material, Wrapper):
-        return any(has_delta(base, around) for base in _bases(material, around))
+        return any(has_delta(base, context) for base in _bases(material, context))
     return material.delta
 
 
-def _bases(material: Wrapper, around: Surroundings) -> list[Material]:
+def _bases(material: Wrapper, context: TranslationContext) -> list[Material]:
     names = (getattr(material, field) for field in material.bases)
-    return [around.materials[name] for name in names if name is not None]
+    return [context.materials[name] for name in names if name is not None]
 
 
 @translate_material.register
-def _(material: TwoSided, around: Surroundings) -> dict[str, Any]:
-    bsdf = {"type": "twosided", "0_front": _named(material.base, around)}
+def _(material: TwoSided, context: TranslationContext) -> dict[str, Any]:
+    bsdf = {"type": "twosided", "0_front": _named(material.base, context)}
     if material.back is not None:
-        bsdf["1_back"] = _named(material.back, around)
+        bsdf["1_back"] = _named(material.back, context)
     return bsdf
 
 
@@ -75,15 +81,15 @@ _PLAIN = {"flip_invalid_normals": False, "use_shadowing_function": False}
 
 
 @translate_material.register
-def _(material: Bump, around: Surroundings) -> dict[str, Any]:
-    base = _named(material.base, around)
-    texture = around.textures[material.height]
+def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
+    base = _named(material.base, context)
+    texture = context.textures[material.height]
     if not isinstance(texture, Bitmap) or texture.filter != "bilinear":
         return base  # no slopes
-    if any(leaf.oriented for leaf in _leaves(material, around)):
+    if any(leaf.oriented for leaf in _leaves(material, context)):
         # Mitsuba mixes a local normal with a world-space tangent (src/bsdfs/bumpmap.cpp).
         raise UntranslatableError("Bump over a material with a grain", "material")
-    height = number(material.height, around)
+    height = number(material.height, context)
     m = texture.uv.matrix()
     if (m[1] != 0.0 or m[3] != 0.0) and not _is_square(height):
         # Mitsuba rotates the gradient before it multiplies by width and height
@@ -97,54 +103,54 @@ def _is_square(height: Any) -> bool:
     return bool(size[0] == size[1])
 
 
-def _leaves(material: Material, around: Surroundings) -> list[Material]:
+def _leaves(material: Material, context: TranslationContext) -> list[Material]:
     """The BSDF leaves of a material."""
     if isinstance(material, Wrapper):
-        return [leaf for base in _bases(material, around) for leaf in _leaves(base, around)]
+        return [leaf for base in _bases(material, context) for leaf in _leaves(base, context)]
     return [material]
 
 
 @translate_material.register
-def _(material: NormalMap, around: Surroundings) -> dict[str, Any]:
-    base = _named(material.base, around)
-    texture = around.textures[material.normals]
+def _(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
+    base = _named(material.base, context)
+    texture = context.textures[material.normals]
     if not isinstance(texture, Bitmap):
         raise UntranslatableError("NormalMap of a texture that is no image", "material")
-    normals = colour(material.normals, around)
+    normals = colour(material.normals, context)
     return {"type": "normalmap", "normalmap": normals, "bsdf": base, **_PLAIN}
 
 
-def parts_of(name: str | None, around: Surroundings) -> dict[str, Any]:
+def parts_of(name: str | None, context: TranslationContext) -> dict[str, Any]:
     """The parts of a shape with material `name`: "bsdf" and, if it is emissive, "emitter".
 
     Raises as `translate_material` does.
     """
-    material: Material = Diffuse() if name is None else around.materials[name]
-    parts = {"bsdf": translate_material(material, around)}
+    material: Material = Diffuse() if name is None else context.materials[name]
+    parts = {"bsdf": translate_material(material, context)}
     if isinstance(material, Emissive):
-        radiance = colour(material.radiance, around)
+        radiance = colour(material.radiance, context)
         parts["emitter"] = {"type": "area", "radiance": radiance}
     return parts
 
 
-def coloured_parts_of(name: str | None, around: Surroundings) -> dict[str, Any] | None:
+def coloured_parts_of(name: str | None, context: TranslationContext) -> dict[str, Any] | None:
     """The same for a mesh with vertex colours; None if no texture uses them."""
-    if not any(isinstance(texture, VertexColours) for texture in around.textures.values()):
+    if not any(isinstance(texture, VertexColours) for texture in context.textures.values()):
         return None
-    return parts_of(name, replace(around, has_colours=True))
+    return parts_of(name, replace(context, has_colours=True))
 
 
-def is_textured(name: str | None, around: Surroundings) -> bool:
+def is_textured(name: str | None, context: TranslationContext) -> bool:
     """Whether material `name` depends on a surface's uv or tangents."""
     if name is None:
         return False
-    material = around.materials[name]
-    if any(leaf.oriented for leaf in _leaves(material, around)):
+    material = context.materials[name]
+    if any(leaf.oriented for leaf in _leaves(material, context)):
         return True
-    if any(depends_on_uv(around.textures[t]) for t in texture_names(material).values()):
+    if any(depends_on_uv(context.textures[t]) for t in texture_names(material).values()):
         return True
-    bases = _bases(material, around) if isinstance(material, Wrapper) else []
+    bases = _bases(material, context) if isinstance(material, Wrapper) else []
     if isinstance(material, Emissive) and material.base is not None:
-        bases = [around.materials[material.base]]
-    names = {id(m): n for n, m in around.materials.items()}
-    return any(is_textured(names[id(base)], around) for base in bases)
+        bases = [context.materials[material.base]]
+    names = {id(m): n for n, m in context.materials.items()}
+    return any(is_textured(names[id(base)], context) for base in bases)

@@ -66,7 +66,7 @@ def _test(case: Case, suite: str, seconds: float) -> TestCase:
 def _details(case: Case) -> list[str]:
     """The text of a case's test, line by line."""
     lines = [f"{case.scene}: {case.verdict}: {case.reason}"]
-    lines += [f"{tier.name}: {tier.status}: {tier.reason}" for tier in case.tiers]
+    lines += [f"{rung.name}: {rung.status}: {rung.reason}" for rung in case.rungs]
     if case.cause:
         lines.append(f"likeliest cause: {case.cause.name}: {case.cause.evidence}")
     lines += [

@@ -24,6 +24,6 @@ def ranked(cases: Sequence[Case]) -> list[Case]:
 def _first_rung(case: Case) -> int:
     """The index in RUNGS of the first rung that has the verdict of the case."""
     return min(
-        (RUNGS.index(t.name) for t in case.tiers if t.status == case.verdict and t.name in RUNGS),
+        (RUNGS.index(t.name) for t in case.rungs if t.status == case.verdict and t.name in RUNGS),
         default=len(RUNGS),
     )

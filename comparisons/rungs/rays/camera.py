@@ -8,7 +8,7 @@ import numpy as np
 
 from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.counterpart import Twin
+from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import for_rays
 from reference_rt.cameras import LENS_CENTRE, ThinLens
 from reference_rt.cameras.film import Film
@@ -67,7 +67,7 @@ def sensor_rays(
     return o, d
 
 
-def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
+def compare_camera(scene: Scene, counterpart: Counterpart, most: int) -> CameraComparison:
     """Compare ray directions, and the distances of Mitsuba's origins from our rays, at pixel
     centres; for a lens through several of its points.
 
@@ -79,8 +79,8 @@ def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
     x, y = pixel_centres(film, most)
     samples = LENS_SAMPLES if isinstance(camera, ThinLens) else (LENS_CENTRE,)
     o, d = _stacked(camera_rays(scene, x, y, lens) for lens in samples)
-    their_o, their_d = _stacked(sensor_rays(twin, x, y, lens) for lens in samples)
-    their_o = twin.frame.out(their_o)
+    their_o, their_d = _stacked(sensor_rays(counterpart, x, y, lens) for lens in samples)
+    their_o = counterpart.frame.out(their_o)
     forward = -camera.basis[2]
     # Before normalisation a direction is 1 along the axis and tan(angle) across: its rounding
     # errors are as large as in the picture's farthest corner, 1 / cos there, and are then scaled by
@@ -97,7 +97,7 @@ def compare_camera(scene: Scene, twin: Twin, most: int) -> CameraComparison:
     eye = np.array([camera.eye], dtype=np.float64)
     # Mitsuba's origin lies on the near plane, along its own direction.
     near = np.linalg.norm(shift, axis=1) * direction_bound
-    origin_bound = twin.frame.delta(o, eye, np.zeros(1)).max() + near
+    origin_bound = counterpart.frame.delta(o, eye, np.zeros(1)).max() + near
     numbers = {
         "max_camera_direction_error": float(direction.max()),
         "max_camera_direction_error_over_bound": float((direction / direction_bound).max()),

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.mitsuba.counterpart import Twin, trace
-from comparisons.mitsuba.hits import Answers, BoolArray, rows_of
+from comparisons.mitsuba.counterpart import Counterpart, trace
+from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
 from comparisons.rungs.rays.bounds import slide
 from comparisons.rungs.rays.comparer import DISCRETE, Comparer
 from comparisons.rungs.rays.rays import Rays
@@ -21,7 +21,7 @@ COINCIDENCES = 8
 
 
 def coincident(
-    scene: Scene, twin: Twin, comparer: Comparer, traced: Any, numbers: IntArray
+    scene: Scene, counterpart: Counterpart, comparer: Comparer, traced: Any, numbers: IntArray
 ) -> BoolArray:
     """Which of the rays with the indices `numbers` (m,) hit two coincident surfaces, of which we
     report one and Mitsuba the other.
@@ -34,15 +34,15 @@ def coincident(
     if len(numbers) == 0:
         return found
     rays, ours, theirs = traced.rays, traced.ours, traced.theirs
-    if twin.solids:
+    if counterpart.solids:
         for tolerance in (None, 0.0, 1.0):
             rest = np.flatnonzero(~found)
             k = numbers[rest]
             some, mine = rays.rows(k), rows_of(ours, k)
             again = rows_of(theirs, k)
             if tolerance is not None:
-                again = trace(twin, some.o, some.d, tolerance)
-            _as_one_part(twin, some, mine, again)
+                again = trace(counterpart, some.o, some.d, tolerance)
+            _as_one_part(counterpart, some, mine, again)
             found[rest] = (comparer.ratios(some, mine, again) <= 1.0).all(axis=1)
     left = ours.shape[numbers][~found]
     for shape in np.unique(left[left >= 0])[:COINCIDENCES].tolist():
@@ -72,9 +72,11 @@ def in_one_place(comparer: Comparer, traced: Any, numbers: IntArray) -> BoolArra
     return np.asarray(near & parallel & other & (ours.shape >= 0) & (theirs.shape >= 0))
 
 
-def _as_one_part(twin: Twin, rays: Rays, ours: Intersections, theirs: Answers) -> None:
+def _as_one_part(
+    counterpart: Counterpart, rays: Rays, ours: Intersections, theirs: MitsubaHits
+) -> None:
     """Replace Mitsuba's operand by ours where Mitsuba crosses our operand at the same t too."""
-    for solid in twin.solids:
+    for solid in counterpart.solids:
         shape, instance = solid.place
         rows = (theirs.shape == shape) & (theirs.instance == instance)
         rows &= (ours.shape == shape) & (ours.instance == instance)
@@ -83,7 +85,7 @@ def _as_one_part(twin: Twin, rays: Rays, ours: Intersections, theirs: Answers) -
         if len(some) == 0:
             continue
         part, primitive = ours.part[some], ours.primitive[some]
-        o, t = twin.frame.into(rays.o[some]), ours.t[some] * twin.frame.scale
+        o, t = counterpart.frame.into(rays.o[some]), ours.t[some] * counterpart.frame.scale
         met = solid.meets(o, rays.d[some], part, t, primitive)
         theirs.part[some[met]], theirs.primitive[some[met]] = part[met], primitive[met]
         theirs.has_uv[some[met]] = False

@@ -3,7 +3,7 @@
 import numpy as np
 
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.hits import Answers
+from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.rungs.rays.bounds import slide
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray
@@ -37,7 +37,7 @@ class Comparer:
         self._disk = np.array([isinstance(s, Disk) for s in shapes_and_none])
         self._tube = np.array([isinstance(s, Cylinder | Cone) for s in shapes_and_none])
 
-    def ratios(self, rays: Rays, ours: Intersections, theirs: Answers) -> FloatArray:
+    def ratios(self, rays: Rays, ours: Intersections, theirs: MitsubaHits) -> FloatArray:
         """(n, len(KINDS)): error over bound, infinite for a different shape, part or face.
 
         e = (delta + sag) / cos is how far the point may slide along the surface.  The bound of t is

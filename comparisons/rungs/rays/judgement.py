@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from comparisons.geometry.exact.referee import Referee
-from comparisons.mitsuba.hits import Answers
+from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.rendering.query import Intersections
@@ -35,7 +35,7 @@ class Judgement(NamedTuple):
 
 
 def judged(
-    referee: Referee, rays: Rays, ours: Intersections, theirs: Answers, mismatches: IntArray
+    referee: Referee, rays: Rays, ours: Intersections, theirs: MitsubaHits, mismatches: IntArray
 ) -> Judgement:
     """Judge the rays with the indices `mismatches`, in their order."""
     some = mismatches[:MOST_JUDGED]

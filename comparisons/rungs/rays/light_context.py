@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.counterpart import Twin
+from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import DIRECTIONAL, POINT, SPOT, Directional, Point, Spot
@@ -20,7 +20,7 @@ class LightContext(NamedTuple):
 
     scene: Scene
     tables: SceneTables
-    twin: Twin
+    counterpart: Counterpart
     rays: Rays
     hits: Intersections
     sizes: ShapeSizes

@@ -128,6 +128,6 @@ def stand_ins(context: LightContext, hits: Intersections) -> tuple[FloatArray, F
     """(n,) each: the distance and the normal's angle between the shape that was hit and the mesh
     that stands in for it; 0 without such a mesh."""
     sag, turn = np.zeros((2, len(context.scene.shapes) + 1))
-    for shape, found in context.twin.stand_ins().items():
+    for shape, found in context.counterpart.stand_ins().items():
         sag[shape], turn[shape] = max(s.sag for s in found), max(s.turn for s in found)
     return sag[hits.shape], turn[hits.shape]

@@ -24,7 +24,7 @@ def mitsuba_direct(
     emitter."""
     import drjit as dr
 
-    mi, scene, kind = mitsuba(), context.twin.mi_scene, kind_of(context, light)
+    mi, scene, kind = mitsuba(), context.counterpart.mi_scene, kind_of(context, light)
     emitter = _point_emitter(context, light) if kind in POINT_LIKE else None
     is_far = kind in (ENVIRONMENT, DIRECTIONAL)
 
@@ -48,7 +48,7 @@ def mitsuba_direct(
         f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
         return dr.select(visible, f_cos * radiance, 0.0), local.z
 
-    frame = context.twin.frame
+    frame = context.counterpart.frame
     there = target if is_far else frame.into(target)
     contribution, cosine = for_rays(value, frame.into(rays.o), rays.d, there)
     return contribution, cosine
@@ -57,7 +57,7 @@ def mitsuba_direct(
 def _point_emitter(context: LightContext, light: int) -> Any:
     """Mitsuba's emitter of a point, spot or directional light."""
     wanted = light_id(number_of(context, light))
-    for emitter in context.twin.mi_scene.emitters():
+    for emitter in context.counterpart.mi_scene.emitters():
         if emitter.id() == wanted:
             return emitter
     raise LookupError(f"Mitsuba's scene has no emitter {wanted}")
@@ -71,7 +71,7 @@ def is_dark(
     is_far = kind in (ENVIRONMENT, DIRECTIONAL)
     w = target if is_far else target - hits.p
     side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
-    height = side * context.twin.frame.epsilon(hits.p)
+    height = side * context.counterpart.frame.epsilon(hits.p)
     o = hits.p + hits.n * height[:, None] + offsets
     if is_far:
         return query.occluded(context.tables, o, w)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.counterpart import Twin, trace
+from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, rows_of
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays, mixed_rays
@@ -71,17 +71,19 @@ class Resolution(NamedTuple):
         )
 
 
-def resolution(scene: Scene, tables: SceneTables, twin: Twin, seed: int = 0) -> Resolution:
+def resolution(
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, seed: int = 0
+) -> Resolution:
     """Trace rays from the hits of camera, random and secondary rays, and from those behind
     transparent surfaces: towards lights, at random, and straight through glass."""
-    sizes = ShapeSizes(scene, twin.frame)
+    sizes = ShapeSizes(scene, counterpart.frame)
     rays = mixed_rays(scene, tables, sizes, RAYS, seed)
     d = rays.d
-    ours, theirs = query.intersect(tables, rays.o, d), trace(twin, rays.o, d)
+    ours, theirs = query.intersect(tables, rays.o, d), trace(counterpart, rays.o, d)
     # Only hits on which the tracers agree are starting points.
-    slack = STEEPEST * twin.frame.delta(rays.o, ours.p, sizes.reach_of(ours.shape))
+    slack = STEEPEST * counterpart.frame.delta(rays.o, ours.p, sizes.reach_of(ours.shape))
     same = np.flatnonzero((ours.shape >= 0) & ~_differs(ours, theirs, slack))
-    leavings = [_left_behind(tables, twin, sizes, rays.rows(same),
+    leavings = [_left_behind(tables, counterpart, sizes, rays.rows(same),
                              rows_of(ours, same), rows_of(theirs, same), seed, scene)]  # fmt: skip
     hits, d = rows_of(ours, same), d[same]
     for _ in range(STRAIGHT_ON):
@@ -93,7 +95,9 @@ def resolution(scene: Scene, tables: SceneTables, twin: Twin, seed: int = 0) -> 
         o, d, hits = o[met], d[met], rows_of(hits, met)
         if len(hits.t) == 0:
             break
-        leavings.append(_left_behind(tables, twin, sizes, Rays(o, d), hits, hits, seed, scene))
+        leavings.append(
+            _left_behind(tables, counterpart, sizes, Rays(o, d), hits, hits, seed, scene)
+        )
     columns = [np.concatenate(column) for column in zip(*leavings, strict=True)]
     foretold, found, missed, height, rounding = columns
     counts = (int(np.count_nonzero(some)) for some in (foretold, found, missed))
@@ -104,7 +108,7 @@ def resolution(scene: Scene, tables: SceneTables, twin: Twin, seed: int = 0) -> 
 
 def _left_behind(
     tables: SceneTables,
-    twin: Twin,
+    counterpart: Counterpart,
     sizes: ShapeSizes,
     rays: Rays,
     ours: Intersections,
@@ -135,7 +139,7 @@ def _left_behind(
             o = hits.p + _side(hits, w) * start[leaves, None]
             expected |= _differs(right, query.intersect(tables, o, w), slack)
         o = met.p + _side(met, w) * frame.epsilon(met.p)[:, None]
-        there = _differs(right, trace(twin, o, w), slack)
+        there = _differs(right, trace(counterpart, o, w), slack)
         foretold[leaves] |= expected
         found[leaves] |= there
         missed[leaves] |= there & ~expected

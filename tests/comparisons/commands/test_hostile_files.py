@@ -18,9 +18,9 @@ from comparisons.gate.baselines import used_in
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.pictures_in import read_candidate, variance_of
 from comparisons.report.marker_block import around
-from comparisons.results.record import CASE, read_record
-from comparisons.suites.archive import read_archive
+from comparisons.results.stored_case import CASE, read_stored_case
 from comparisons.suites.keys import files_digest
+from comparisons.suites.stored_results import read_stored_results
 from comparisons.suites.suite import load_suite
 from reference_rt.cli.main import app
 from reference_rt.core.exr import read_exr
@@ -51,12 +51,12 @@ def buffer_of_mesh(path: Path) -> None:
 
 def record_of_case(path: Path) -> None:
     (path.parent / CASE).symlink_to(path)
-    read_record(path.parent)
+    read_stored_case(path.parent)
 
 
 def results_of_suite(path: Path) -> None:
     (path.parent / "results.json").symlink_to(path)
-    read_archive(path.parent)
+    read_stored_results(path.parent)
 
 
 READERS = {
@@ -251,7 +251,7 @@ def test_a_picture_of_any_name(tmp_path, name):
 def test_deep_and_foreign_json(tmp_path):
     """Where records are expected: nested without end, of other types, not text."""
     for content in (b"[" * 100_000, b"[]", b"1", b"null", b'{"cases": 3}', b"\xff\xfe", b'"a"'):
-        for name, read in ((CASE, read_record), ("results.json", read_archive)):
+        for name, read in ((CASE, read_stored_case), ("results.json", read_stored_results)):
             (tmp_path / name).write_bytes(content)
             with pytest.raises(ReferenceRtError):
                 read(tmp_path)

@@ -81,7 +81,7 @@ def test_wrong_light_differs_at_its_rung(monkeypatch: pytest.MonkeyPatch) -> Non
     case = compared_here(Budget(size=(48, 32)))
     assert case.verdict == "differ"
     assert case.reason.startswith("direct:")
-    status = {tier.name: tier.status for tier in case.tiers}
+    status = {rung.name: rung.status for rung in case.rungs}
     assert status["geometry"] == "agree"
     assert status["whitted"] == "not-applicable"
     assert exit_code([case]) == 1

@@ -45,7 +45,7 @@ def test_mitsuba_agrees_with_itself(scene: Scene) -> None:
     assert case.verdict == "agree", case.reason
     assert case.scene.endswith("(control)")
     assert case.sides[0] != case.sides[1]
-    assert [tier.name for tier in case.tiers] == ["input", "statistics", "images"]
+    assert [rung.name for rung in case.rungs] == ["input", "statistics", "images"]
 
 
 @pytest.mark.parametrize("show", ["normal", "id"])
@@ -81,7 +81,7 @@ def test_a_lost_light_is_reported_with_its_place(scene: Scene) -> None:
 
 def test_only_the_rungs_asked_for(scene: Scene) -> None:
     case = compare_scene(Subject(scene), Budget(pixels=100), silent, rungs=("geometry",))
-    assert [tier.name for tier in case.tiers] == ["geometry"]
+    assert [rung.name for rung in case.rungs] == ["geometry"]
     assert case.images is None
 
 

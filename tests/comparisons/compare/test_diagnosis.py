@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 
 from comparisons.compare.diagnosis import likeliest, of_rungs
-from comparisons.results.case import FloatArray, Images, Tier
+from comparisons.results.case import FloatArray, Images, RungResult
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
@@ -201,13 +201,13 @@ def test_pictures_that_cannot_be_compared() -> None:
     assert found is None  # of one colour it may be a gain as well as an offset
 
 
-def geometry(mismatches: int, **kinds: int) -> Tier:
+def geometry(mismatches: int, **kinds: int) -> RungResult:
     numbers = {"mismatches": mismatches, "mismatches_by_kind": kinds}
-    return Tier("geometry", "differ", "some rays differ", numbers)
+    return RungResult("geometry", "differ", "some rays differ", numbers)
 
 
 @pytest.mark.parametrize(
-    ("tier", "name"),
+    ("rung", "name"),
     [
         (geometry(50, hit=0, t=0, normal=50, shading_normal=50), "wrong normal"),
         (geometry(50, hit=0, t=0, normal=0, shading_normal=50), "wrong shading normal"),
@@ -215,26 +215,26 @@ def geometry(mismatches: int, **kinds: int) -> Tier:
         (geometry(50, hit=2, t=49, normal=50, uv=50), "moved or resized surface"),
         (geometry(50, hit=49, t=1), "missing or additional surface"),
         (geometry(50, hit=20, t=10, uv=20), None),
-        (Tier("film", "differ", "the filters differ by 0.1"), "wrong filter or filter width"),
+        (RungResult("film", "differ", "the filters differ by 0.1"), "wrong filter or filter width"),
         (
-            Tier("direct", "differ", "", {"ratio_median": 1.7, "ratio_spread": 0.5,
+            RungResult("direct", "differ", "", {"ratio_median": 1.7, "ratio_spread": 0.5,
                                           "ratio_times_cosine_spread": 0.001}),
             "missing cosine",
         ),
         (
-            Tier("direct", "differ", "", {"ratio_median": 3.14159, "ratio_spread": 1e-4}),
+            RungResult("direct", "differ", "", {"ratio_median": 3.14159, "ratio_spread": 1e-4}),
             "direct light times 3.142",
         ),
-        (Tier("direct", "differ", "", {}), None),
-        (Tier("whitted", "differ", ""), None),
+        (RungResult("direct", "differ", "", {}), None),
+        (RungResult("whitted", "differ", ""), None),
     ],
 )  # fmt: skip
-def test_of_rungs(tier: Tier, name: str | None) -> None:
-    found = of_rungs([Tier("input", "agree", ""), tier, Tier("images", "differ", "")])
+def test_of_rungs(rung: RungResult, name: str | None) -> None:
+    found = of_rungs([RungResult("input", "agree", ""), rung, RungResult("images", "differ", "")])
     assert (found.name if found else None) == name
 
 
 def test_no_broken_rung_has_no_cause() -> None:
-    assert of_rungs([Tier("geometry", "agree", "", {})]) is None
-    camera = Tier("geometry", "differ", "the camera: 5 of 9 rays differ", {})
+    assert of_rungs([RungResult("geometry", "agree", "", {})]) is None
+    camera = RungResult("geometry", "differ", "the camera: 5 of 9 rays differ", {})
     assert of_rungs([camera]) is None

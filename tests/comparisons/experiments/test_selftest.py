@@ -11,7 +11,7 @@ from comparisons.experiments.selftest.finding import Finding, finding
 from comparisons.experiments.selftest.run import Outcome, markdown
 from comparisons.experiments.selftest.sensitivity import StaleFaultError, patched_text
 from comparisons.experiments.selftest.specificity import Alarms
-from comparisons.results.case import Case, Tier
+from comparisons.results.case import Case, RungResult
 from reference_rt.rendering.scene import Scene
 
 SCENES = Path(__file__).parents[3] / "scenes"
@@ -58,20 +58,20 @@ def test_picture_fault_changes_pictures_and_leaves_the_right_ones(fault: Picture
 
 
 def test_finding_names_the_first_rung_that_broke() -> None:
-    tiers = (
-        Tier("geometry", "agree", ""),
-        Tier("direct", "differ", "told", {"rays": 1000, "unexplained": 12}),
-        Tier("images", "differ", "later"),
+    rungs = (
+        RungResult("geometry", "agree", ""),
+        RungResult("direct", "differ", "told", {"rays": 1000, "unexplained": 12}),
+        RungResult("images", "differ", "later"),
     )
-    case = Case("scene", "differ", "direct: told", tiers, None, {})
+    case = Case("scene", "differ", "direct: told", rungs, None, {})
     found = finding(SceneFault("f", "scene", lambda scene: scene), "smoke", case)
     assert (found.caught, found.rung, found.strength) == (True, "direct", "12 of 1,000 values")
     assert found.kind == "scene"
 
 
 def test_too_much_noise_is_not_a_catch() -> None:
-    tiers = (Tier("statistics", "inconclusive", "too noisy"),)
-    case = Case("scene", "inconclusive", "statistics: too noisy", tiers, None, {})
+    rungs = (RungResult("statistics", "inconclusive", "too noisy"),)
+    case = Case("scene", "inconclusive", "statistics: too noisy", rungs, None, {})
     assert not finding(PictureFault("f", "scene", np.zeros_like), "smoke", case).caught
 
 

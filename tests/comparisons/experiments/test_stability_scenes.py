@@ -9,7 +9,7 @@ import pytest
 
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.moved import frame_of, moved
-from comparisons.results.case import Tier
+from comparisons.results.case import RungResult
 from comparisons.rungs import direct
 from comparisons.rungs.limited import limited
 from comparisons.rungs.rays.camera import camera_rays
@@ -158,9 +158,9 @@ def test_what_is_foretold_is_what_is_found(name: str) -> None:
 
 def test_pictures_that_differ_beyond_a_limit_are_limited_by_the_reference() -> None:
     resolved = Resolution(1000, 50, 48, 0, 1e-3, 1e-6)
-    below = Tier("geometry", "agree", "", {"resolution": resolved._asdict(), "rays": 1000})
-    above = Tier("images", "differ", "other")
-    statuses = [tier.status for tier in limited([above, below])]
+    below = RungResult("geometry", "agree", "", {"resolution": resolved._asdict(), "rays": 1000})
+    above = RungResult("images", "differ", "other")
+    statuses = [rung.status for rung in limited([above, below])]
     assert statuses == ["agree", "reference-limited"]
     assert "from 50 of 1000 points by prediction" in limited([below, above])[1].reason
 
@@ -173,8 +173,8 @@ def test_pictures_that_differ_beyond_a_limit_are_limited_by_the_reference() -> N
     ],
 )
 def test_without_a_limit_they_differ(resolved: Resolution) -> None:
-    below = Tier("geometry", "agree", "", {"resolution": resolved._asdict(), "rays": 1000})
-    above = Tier("images", "differ", "other")
+    below = RungResult("geometry", "agree", "", {"resolution": resolved._asdict(), "rays": 1000})
+    above = RungResult("images", "differ", "other")
     assert limited([below, above])[1].status == "differ"
     broken = replace(below, status="differ")
     assert limited([broken, above])[1].status == "differ"
@@ -183,8 +183,8 @@ def test_without_a_limit_they_differ(resolved: Resolution) -> None:
 
 def test_what_a_rung_cannot_resolve_limits_the_picture_above() -> None:
     numbers = {"pixels": 400, "explained": 40}
-    below = Tier("whitted", "reference-limited", "40 of 400", numbers)
-    above = Tier("images", "differ", "other")
+    below = RungResult("whitted", "reference-limited", "40 of 400", numbers)
+    above = RungResult("images", "differ", "other")
     assert limited([below, above])[1].status == "reference-limited"
     few = replace(below, status="agree", numbers=numbers | {"explained": 1})
     assert limited([few, above])[1].status == "differ"

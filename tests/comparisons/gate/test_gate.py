@@ -30,7 +30,7 @@ def test_right_pictures_pass(right: FloatArray, monkeypatch: pytest.MonkeyPatch)
     case = found["cases"][0]
     assert (case["scene"], case["verdict"]) == ("ball", "agree")
     assert list(case["tiers"]) == ["input", "statistics", "images"]
-    assert all(tier["status"] == "agree" for tier in case["tiers"].values())
+    assert all(rung["status"] == "agree" for rung in case["tiers"].values())
     assert case["sides"] == {"candidate": "candidate's", "reference": "reference_rt's"}
     assert found["provenance"]["candidates"] == [f"c{k}.exr" for k in range(4)]
     assert "ball" in Path("out/report.html").read_text()

@@ -113,11 +113,11 @@ lights:
 def test_far_away_agrees_when_moved_and_not_without(monkeypatch: pytest.MonkeyPatch) -> None:
     far = scene("far_origin")
     tables = build_tables(far)
-    twin = load(far)
-    assert not twin.frame.is_ours
-    assert "moved by minus" in twin.notes()[0]
-    tier = geometry(far, tables, twin, 300)
-    assert tier.status == "agree", tier.reason
+    counterpart = load(far)
+    assert not counterpart.frame.is_ours
+    assert "moved by minus" in counterpart.notes()[0]
+    rung = geometry(far, tables, counterpart, 300)
+    assert rung.status == "agree", rung.reason
     monkeypatch.setattr(comparisons.mitsuba.translate, "frame_of", lambda _: OURS)
     assert geometry(far, tables, load(far), 300).status != "agree"
 

@@ -13,7 +13,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
 from comparisons.mitsuba.plugins.exact_coat import smooth_reflectance
 from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.rungs.rays import arbiter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.materials import (
@@ -191,7 +191,7 @@ def test_counterparts_draw_what_they_say(material: Material) -> None:
     mi = mitsuba()
     if mi.variant().startswith("scalar"):
         pytest.skip("a million samples, one at a time")
-    bsdf = mi.load_dict(translate_material(material, Surroundings({}, {}, Path())))
+    bsdf = mi.load_dict(translate_material(material, TranslationContext({}, {}, Path())))
     n = 1_000_000
     sampler = mi.load_dict({"type": "independent", "sample_count": 1})
     sampler.seed(7, n)

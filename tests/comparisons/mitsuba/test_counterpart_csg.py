@@ -122,9 +122,9 @@ MIXED = (
 def test_solids_beside_shapes() -> None:
     scene = scene_of(*MIXED)
     tables = build_tables(scene)
-    tier = geometry(scene, tables, load(scene), pixels=500)
-    assert tier.status == "agree", tier.reason
-    assert tier.numbers["decided_ours"] == 0
+    rung = geometry(scene, tables, load(scene), pixels=500)
+    assert rung.status == "agree", rung.reason
+    assert rung.numbers["decided_ours"] == 0
     moved = scene_of(*MIXED[:2], MIXED[2].replace("-1]", "-1.001]"))
     turned = scene_of(MIXED[0].replace("degrees: 30", "degrees: 30.1"), *MIXED[1:])
     swapped = scene_of(solid("difference", BOX, ROD, BALL), *MIXED[1:])
@@ -133,9 +133,9 @@ def test_solids_beside_shapes() -> None:
 
 
 def test_light_has_no_counterpart() -> None:
-    twin = load(scene_of(MIXED[0]))
-    assert "set operations" in twin.lacking
-    assert load(scene_of(MIXED[2])).lacking == ""
+    counterpart = load(scene_of(MIXED[0]))
+    assert "set operations" in counterpart.no_light_reason
+    assert load(scene_of(MIXED[2])).no_light_reason == ""
 
 
 GROUPS = """
@@ -150,7 +150,7 @@ shapes:
 """
 
 
-def crowd(step: float = 1.0) -> Scene:
+def instanced_group(step: float = 1.0) -> Scene:
     def line(group: str, axis: int) -> str:
         at = [[0.0, 0.0, 0.0] for _ in range(7)]
         for k in range(7):
@@ -162,19 +162,22 @@ def crowd(step: float = 1.0) -> Scene:
 
 
 def test_a_crowd_of_instances() -> None:
-    scene = crowd()
-    twin = load(scene)
-    assert twin.crowd is not None
-    assert len(twin.crowd.pieces) == 49
-    tier = geometry(scene, build_tables(scene), twin, pixels=300)
-    assert tier.status in ("agree", "reference-limited"), tier.reason
-    assert tier.numbers["decided_ours"] == 0
+    scene = instanced_group()
+    counterpart = load(scene)
+    assert counterpart.instanced_group is not None
+    assert len(counterpart.instanced_group.mi_shapes) == 49
+    rung = geometry(scene, build_tables(scene), counterpart, pixels=300)
+    assert rung.status in ("agree", "reference-limited"), rung.reason
+    assert rung.numbers["decided_ours"] == 0
     # Numbered row by row, where they stand.
     o = np.array([[x, y, 2.0] for y in range(7) for x in range(7)], float)
-    hits = trace(twin, o, np.tile([0.0, 0.0, -1.0], (49, 1)))
+    hits = trace(counterpart, o, np.tile([0.0, 0.0, -1.0], (49, 1)))
     assert hits.instance.tolist() == list(range(49))
     np.testing.assert_allclose(hits.t, 1.8, rtol=1e-5)
-    assert geometry(scene, build_tables(scene), load(crowd(1.001)), pixels=100).status == "differ"
+    assert (
+        geometry(scene, build_tables(scene), load(instanced_group(1.001)), pixels=100).status
+        == "differ"
+    )
 
 
 @pytest.mark.usefixtures("coarse", "scalar")
@@ -189,7 +192,7 @@ def test_a_crowd_of_instances() -> None:
 )
 def test_counterparts_in_the_scalar_variant(shapes: tuple[str, ...]) -> None:
     scene = scene_of(*shapes)
-    tier = geometry(scene, build_tables(scene), load(scene), pixels=60)
-    assert tier.status in ("agree", "reference-limited"), tier.reason
-    assert tier.numbers["decided_ours"] == 0
-    assert tier.numbers["hits"] > 30
+    rung = geometry(scene, build_tables(scene), load(scene), pixels=60)
+    assert rung.status in ("agree", "reference-limited"), rung.reason
+    assert rung.numbers["decided_ours"] == 0
+    assert rung.numbers["hits"] > 30

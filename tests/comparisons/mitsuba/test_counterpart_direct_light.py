@@ -67,17 +67,17 @@ def tables(scene: Scene) -> SceneTables:
 
 
 def test_the_same_light(scene: Scene, tables: SceneTables) -> None:
-    twin = load(scene)
-    assert twin.lacking == ""
-    names = {s.name for found in twin.stand_ins().values() for s in found}
+    counterpart = load(scene)
+    assert counterpart.no_light_reason == ""
+    names = {s.name for found in counterpart.stand_ins().values() for s in found}
     assert names == {"cone", "torus", "quadric"}
-    assert len(twin.notes()) == 3
+    assert len(counterpart.notes()) == 3
     for rung, pixels in ((direct, 300), (whitted, 800)):
-        tier = rung(scene, tables, twin, pixels)
+        result = rung(scene, tables, counterpart, pixels)
         # In mirrors and glass that are meshes, edges are a little wider.
-        assert tier.status in ("agree", "reference-limited"), tier.reason
-        assert tier.numbers["explained"] < 0.03 * tier.numbers.get(
-            "pixels", tier.numbers.get("rays")
+        assert result.status in ("agree", "reference-limited"), result.reason
+        assert result.numbers["explained"] < 0.03 * result.numbers.get(
+            "pixels", result.numbers.get("rays")
         )
 
 

@@ -86,24 +86,24 @@ def coarse() -> Any:
 
 
 @pytest.fixture(scope="module")
-def twin(scene: Scene) -> Any:
+def counterpart(scene: Scene) -> Any:
     return load(scene)
 
 
-def test_the_same_light(scene: Scene, tables: Any, twin: Any) -> None:
-    for tier in (
-        geometry(scene, tables, twin, pixels=1000),
-        direct(scene, tables, twin, 500),
-        whitted(scene, tables, twin, 1000),
+def test_the_same_light(scene: Scene, tables: Any, counterpart: Any) -> None:
+    for result in (
+        geometry(scene, tables, counterpart, pixels=1000),
+        direct(scene, tables, counterpart, 500),
+        whitted(scene, tables, counterpart, 1000),
     ):
         # In a torus that is a mesh, edges are a little wider.
-        assert tier.status in ("agree", "reference-limited"), tier.reason
-        assert tier.numbers["unexplained" if tier.name != "geometry" else "decided_ours"] == 0
+        assert result.status in ("agree", "reference-limited"), result.reason
+        assert result.numbers["unexplained" if result.name != "geometry" else "decided_ours"] == 0
 
 
 @pytest.mark.slow
-def test_the_same_picture(scene: Scene, tables: Any, twin: Any) -> None:
-    images = whitted_pictures(scene, tables, twin).images
+def test_the_same_picture(scene: Scene, tables: Any, counterpart: Any) -> None:
+    images = whitted_pictures(scene, tables, counterpart).images
     off = np.abs(images.candidate - images.reference).max(axis=-1)
     assert (off > 1e-3).mean() < 0.01  # edges within float32
 

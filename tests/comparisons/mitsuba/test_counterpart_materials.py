@@ -12,7 +12,7 @@ from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.rungs.rays import arbiter
 from reference_rt import Scene
 from reference_rt.core.arrays import FloatArray
@@ -52,7 +52,7 @@ class TheirBsdf:
     """Mitsuba's BSDF of a material, at a point whose shading frame is the world's."""
 
     def __init__(self, scene: Scene, name: str) -> None:
-        around = Surroundings.of(scene)
+        around = TranslationContext.of(scene)
         self.bsdf = mitsuba().load_dict(translate_material(scene.materials[name], around))
 
     def place(self, wo: Any, u: Any, v: Any) -> Any:

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from counterparts import coarse_meshes, counterpart, every_material, every_shape
+from counterparts import coarse_meshes, counterpart_of, every_material, every_shape
 from query_scene import LIT
 
 from comparisons.geometry.float32 import UNIT_ROUNDOFF, delta, round32
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.counterpart import Twin, trace
+from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.scene import for_rays
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.whitted import plugin_radiance
@@ -31,8 +31,8 @@ def scene(image_folder: Path) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def twin(scene: Scene) -> Twin:
-    return counterpart(scene)
+def counterpart(scene: Scene) -> Counterpart:
+    return counterpart_of(scene)
 
 
 def chords(n: int, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -47,11 +47,11 @@ def chords(n: int, seed: int) -> tuple[FloatArray, FloatArray]:
 # ---- rays -------------------------------------------------------------------------------------
 
 
-def test_intersect_and_its_limits(scene: Scene, twin: Twin) -> None:
+def test_intersect_and_its_limits(scene: Scene, counterpart: Counterpart) -> None:
     """Hits of `ray_intersect` beyond t_min: of rays that Mitsuba starts there."""
     o, d = chords(4000, 1)
     for start in (0.0, 7.0):
-        ours, theirs = scene.intersect(o, d, t_min=start), trace(twin, o + start * d, d)
+        ours, theirs = scene.intersect(o, d, t_min=start), trace(counterpart, o + start * d, d)
         same = ours.shape == theirs.shape
         # Others pass an outline, or the place where Mitsuba's ray was put, within float32.
         assert same.mean() > 0.998
@@ -63,7 +63,7 @@ def test_intersect_and_its_limits(scene: Scene, twin: Twin) -> None:
         assert np.array_equal(ours.hit, scene.first_hits(o, d, t_min=start).hit)
 
 
-def test_occluded_is_ray_test(scene: Scene, twin: Twin) -> None:
+def test_occluded_is_ray_test(scene: Scene, counterpart: Counterpart) -> None:
     mi = mitsuba()
     o, d = chords(4000, 2)
     ends = np.random.default_rng(3).uniform(3.0, 12.0, len(o))
@@ -71,7 +71,7 @@ def test_occluded_is_ray_test(scene: Scene, twin: Twin) -> None:
     def test(origin: Any, direction: Any, end: Any) -> tuple[Any, ...]:
         ray = mi.Ray3f(mi.Point3f(origin), direction)
         ray.maxt = end
-        return (mi.Float(twin.mi_scene.ray_test(ray)),)
+        return (mi.Float(counterpart.mi_scene.ray_test(ray)),)
 
     theirs = for_rays(test, o, d, ends)[0] != 0.0
     ours = scene.occluded(o, d, t_max=ends)
@@ -92,7 +92,7 @@ def test_every_type_of_shape_is_compared(shapes: Scene) -> None:
 def test_crossings_are_repeated_ray_intersections(shapes: Scene) -> None:
     """Of rays whose crossings are so far apart that Mitsuba can leave each without passing two."""
     with coarse_meshes(512, 256):
-        twin = counterpart(shapes)
+        counterpart = counterpart_of(shapes)
     o, d = chords(2000, 4)
     step = 1e-3
     found = shapes.crossings(o, d)
@@ -105,7 +105,7 @@ def test_crossings_are_repeated_ray_intersections(shapes: Scene) -> None:
     clear = (gaps > 4.0 * step) & (steep > 0.05)
     t, wrong = np.zeros(len(o)), np.zeros(len(o), bool)
     for k in range(int(found.count.max()) + 1):
-        theirs = trace(twin, o + t[:, None] * d, d)
+        theirs = trace(counterpart, o + t[:, None] * d, d)
         there = found.count > k
         at = np.minimum(found.first[:-1] + k, len(found.t) - 1)
         wrong |= (theirs.shape >= 0) != there
@@ -136,7 +136,7 @@ def reference_point(p: Any) -> Any:
 POINTS = np.array([[0.3, 1.0, 1.0], [-2.0, 1.0, 3.0], [3.5, 0.5, -2.0]])
 
 
-def test_samples_of_lights_bring_the_same_light(scene: Scene, twin: Twin) -> None:
+def test_samples_of_lights_bring_the_same_light(scene: Scene, counterpart: Counterpart) -> None:
     """The irradiance of a surface that faces up, and the light from everywhere: by the means of
     `sample_emitter_direction`, whose lights are picked by other chances."""
     mi = mitsuba()
@@ -148,7 +148,7 @@ def test_samples_of_lights_bring_the_same_light(scene: Scene, twin: Twin) -> Non
         brought = np.where(kept[:, None], ours.radiance / np.where(kept, ours.pdf, 1.0)[:, None], 0)
 
         def sample(p: Any, u: Any, v: Any) -> tuple[Any, ...]:
-            drawn, weight = twin.mi_scene.sample_emitter_direction(
+            drawn, weight = counterpart.mi_scene.sample_emitter_direction(
                 reference_point(p), mi.Point2f(u, v), False
             )
             return drawn.d, weight
@@ -166,12 +166,12 @@ def test_samples_of_lights_bring_the_same_light(scene: Scene, twin: Twin) -> Non
         assert (np.abs(a - b) <= 5.0 * np.sqrt(a_error + b_error)).all()
 
 
-def test_lights_have_the_same_densities(scene: Scene, twin: Twin) -> None:
+def test_lights_have_the_same_densities(scene: Scene, counterpart: Counterpart) -> None:
     """`pdf_emitter_direction` of what rays from a point meet, the choice of the light apart."""
     mi = mitsuba()
     sources = scene.light_sources()
     emitters = len(sources.shape)
-    assert emitters == len(twin.mi_scene.emitters()) <= 8  # a few: picked by power alone
+    assert emitters == len(counterpart.mi_scene.emitters()) <= 8  # a few: picked by power alone
     rng = np.random.default_rng(8)
     n = 4000
     for p in POINTS:
@@ -182,10 +182,10 @@ def test_lights_have_the_same_densities(scene: Scene, twin: Twin) -> None:
 
         def density(o: Any, w: Any) -> tuple[Any, ...]:
             it = reference_point(o)
-            si = twin.mi_scene.ray_intersect(mi.Ray3f(it.p, w))
-            ds = mi.DirectionSample3f(twin.mi_scene, si, it)
-            is_hit = si.emitter(twin.mi_scene) != None  # noqa: E711
-            found = twin.mi_scene.pdf_emitter_direction(it, ds, is_hit)
+            si = counterpart.mi_scene.ray_intersect(mi.Ray3f(it.p, w))
+            ds = mi.DirectionSample3f(counterpart.mi_scene, si, it)
+            is_hit = si.emitter(counterpart.mi_scene) != None  # noqa: E711
+            found = counterpart.mi_scene.pdf_emitter_direction(it, ds, is_hit)
             return (found,)
 
         theirs = for_rays(density, np.tile(p, (len(d), 1)), d)[0] * emitters
@@ -212,16 +212,16 @@ def test_lights_have_the_same_densities(scene: Scene, twin: Twin) -> None:
 
 
 @pytest.fixture(scope="module")
-def lit() -> tuple[Scene, Twin]:
+def lit() -> tuple[Scene, Counterpart]:
     scene = Scene.parse(LIT)
-    return scene, counterpart(scene)
+    return scene, counterpart_of(scene)
 
 
 @pytest.mark.parametrize("integrator", [PathTracing(max_depth=4), Direct()], ids=["path", "direct"])
-def test_radiance_along_rays(lit: tuple[Scene, Twin], integrator: Any) -> None:
+def test_radiance_along_rays(lit: tuple[Scene, Counterpart], integrator: Any) -> None:
     """Means of `integrator.sample` along the same rays."""
     mi = mitsuba()
-    scene, twin = lit
+    scene, counterpart = lit
     o, d = chords(60, 9)
     spp = 256
     ours = scene.radiance(o, d, spp=spp, integrator=integrator)
@@ -234,7 +234,7 @@ def test_radiance_along_rays(lit: tuple[Scene, Twin], integrator: Any) -> None:
 
     def sample(origin: Any, direction: Any) -> tuple[Any, ...]:
         ray = mi.RayDifferential3f(mi.Point3f(origin), direction)
-        return (theirs.sample(twin.mi_scene, sampler, ray)[0],)
+        return (theirs.sample(counterpart.mi_scene, sampler, ray)[0],)
 
     found = for_rays(sample, np.repeat(o, spp, axis=0), np.repeat(d, spp, axis=0))[0]
     found = found.reshape(len(o), spp, 3)
@@ -246,11 +246,11 @@ def test_radiance_along_rays(lit: tuple[Scene, Twin], integrator: Any) -> None:
     assert (error > 0.0).mean() > 0.5
 
 
-def test_whitted_radiance_is_that_of_the_plugin(scene: Scene, twin: Twin) -> None:
+def test_whitted_radiance_is_that_of_the_plugin(scene: Scene, counterpart: Counterpart) -> None:
 
     o, d = chords(300, 10)
     ours = scene.radiance(o, d, integrator=Whitted())
-    theirs = plugin_radiance(scene, scene.tables, twin, Whitted())(Rays(o, d))
+    theirs = plugin_radiance(scene, scene.tables, counterpart, Whitted())(Rays(o, d))
     off = np.abs(ours.mean - theirs).max(axis=1)
     # Outlines, and the checks' edges, within float32.
     assert (off <= 1e-4 * np.abs(theirs).max(axis=1) + 1e-6).mean() > 0.98

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from comparisons.mitsuba.translate import load
-from comparisons.results.case import Tier
+from comparisons.results.case import RungResult
 from comparisons.rungs import geometry
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
@@ -63,7 +63,7 @@ def text_of(shape: str) -> str:
     return f"{VIEW}shapes:\n  - {shape.replace('TURN', TURN)}\n"
 
 
-def climbed(ours: str, theirs: str) -> Tier:
+def climbed(ours: str, theirs: str) -> RungResult:
     scene = Scene.parse(ours)
     return geometry(scene, build_tables(scene), load(Scene.parse(theirs)), pixels=700)
 
@@ -71,11 +71,11 @@ def climbed(ours: str, theirs: str) -> Tier:
 @pytest.mark.parametrize("name", SCENES)
 def test_a_counterpart_is_met_in_the_same_places(name: str) -> None:
     text = text_of(SCENES[name][0])
-    tier = climbed(text, text)
-    assert tier.status in ("agree", "reference-limited"), tier.reason
-    assert (tier.numbers["decided_ours"], tier.numbers["undecided"]) == (0, 0), tier.reason
-    assert tier.numbers["hits"] > 300
-    for stand_ins in tier.numbers["stand_ins"].values():
+    rung = climbed(text, text)
+    assert rung.status in ("agree", "reference-limited"), rung.reason
+    assert (rung.numbers["decided_ours"], rung.numbers["undecided"]) == (0, 0), rung.reason
+    assert rung.numbers["hits"] > 300
+    for stand_ins in rung.numbers["stand_ins"].values():
         for stand_in in stand_ins:
             # Half the fineness, four times the distance: the surface is smooth, or straight.
             assert 3.0 < stand_in["ratio"] < 5.0
@@ -96,6 +96,6 @@ def test_another_counterpart_is_distinguished(name: str) -> None:
 )
 def test_groups_of_groups(change: tuple[str, str]) -> None:
     text = VIEW + GROUPS
-    tier = climbed(text, text.replace(*change) if change[0] else text)
-    assert tier.status == ("differ" if change[0] else "agree"), tier.reason
-    assert np.isfinite(tier.numbers["max_t_error_over_bound"])
+    rung = climbed(text, text.replace(*change) if change[0] else text)
+    assert rung.status == ("differ" if change[0] else "agree"), rung.reason
+    assert np.isfinite(rung.numbers["max_t_error_over_bound"])

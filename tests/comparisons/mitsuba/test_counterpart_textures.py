@@ -9,7 +9,7 @@ import pytest
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.lights import translate_light
-from comparisons.mitsuba.translate.textures import Surroundings, translate_texture
+from comparisons.mitsuba.translate.textures import TranslationContext, translate_texture
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.lights import EnvironmentMap
 from reference_rt.lights.emitters import environment_map
@@ -47,7 +47,7 @@ def test_textures(texture: Texture, image_folder: Path) -> None:
     scene = Scene(textures={"t": texture})
     scene._folder = image_folder
     textures = build_tables(scene).textures
-    around = Surroundings.of(scene)
+    context = TranslationContext.of(scene)
     rng = np.random.default_rng(1)
     u, v = rng.uniform(-2.0, 2.0, (2, 500)).astype(np.float32).astype(np.float64)
     at = [
@@ -56,8 +56,8 @@ def test_textures(texture: Texture, image_folder: Path) -> None:
     ]
     ours = np.array([tuple(lookup(0, a)) for a in at])
     load_dict = mitsuba().load_dict
-    colours = load_dict(translate_texture(texture, "t", around, False))
-    numbers = load_dict(translate_texture(texture, "t", around, True))
+    colours = load_dict(translate_texture(texture, "t", context, False))
+    numbers = load_dict(translate_texture(texture, "t", context, True))
     theirs = for_rays(lambda a, b: (colours.eval(interaction(a, b)),), u, v)[0]
     one = for_rays(lambda a, b: (numbers.eval_1(interaction(a, b)),), u, v)[0]
     # uv round by 2^-23 each; from one texel to the next is a step of 1 at most, over 1/24.  An
@@ -74,8 +74,8 @@ def test_textures(texture: Texture, image_folder: Path) -> None:
 
 def test_vertex_colours_where_there_are_none() -> None:
     texture = VertexColours(without=(0.1, 0.2, 0.3))
-    around = Surroundings({}, {"t": texture}, Path())
-    assert translate_texture(texture, "t", around, False)["value"] == [0.1, 0.2, 0.3]
+    context = TranslationContext({}, {"t": texture}, Path())
+    assert translate_texture(texture, "t", context, False)["value"] == [0.1, 0.2, 0.3]
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_environment_maps(turn: str, image_folder: Path) -> None:
     d = rng.normal(size=(500, 3))
     d = (d / np.linalg.norm(d, axis=1)[:, None]).astype(np.float32).astype(np.float64)
     ours = np.array([tuple(environment_map.radiance(table, Vec3(*row))) for row in d.tolist()])
-    emitter = mitsuba().load_dict(translate_light(light, Surroundings.of(scene)))
+    emitter = mitsuba().load_dict(translate_light(light, TranslationContext.of(scene)))
 
     def radiance(towards: Any) -> tuple[Any, ...]:
         si = interaction(0.0, 0.0)

@@ -14,7 +14,7 @@ from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.plastic_error import COSINES, base_error
 from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
 from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.materials import Blend, Diffuse, Mirror, Plastic, RoughPlastic
 from reference_rt.rendering.scene import Scene
 
@@ -33,8 +33,8 @@ def base_of(material, native, wi, wo):
     """Values (n,) of the base of a plastic, as Mitsuba has it or as its twin does."""
     mi = mitsuba()
     scene = Scene(materials={"m": material})
-    around = Surroundings.of(scene, native=native)
-    bsdf = mi.load_dict(translate_material(material, around))
+    context = TranslationContext.of(scene, native=native)
+    bsdf = mi.load_dict(translate_material(material, context))
     context = mi.BSDFContext()
     context.component = 1
     si = dr.zeros(mi.SurfaceInteraction3f, len(wi))

@@ -48,8 +48,8 @@ def test_values(film_filter: AnyFilter) -> None:
 
 @pytest.mark.parametrize("film_filter", FILTERS, ids=str)
 def test_the_rung_of_the_film(film_filter: AnyFilter) -> None:
-    tier = film(film_filter, film_filter)
-    assert (tier.name, tier.status) == ("film", "agree"), tier.reason
+    rung = film(film_filter, film_filter)
+    assert (rung.name, rung.status) == ("film", "agree"), rung.reason
 
 
 def test_another_filter_is_distinguished() -> None:

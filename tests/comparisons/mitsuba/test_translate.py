@@ -83,14 +83,14 @@ def all_shapes(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 def test_every_shape_is_where_ours_is(all_shapes: Scene) -> None:
-    twin = load(all_shapes)
-    tier = geometry(all_shapes, build_tables(all_shapes), twin, pixels=4_000)
-    assert tier.status == "agree", tier.reason
+    counterpart = load(all_shapes)
+    rung = geometry(all_shapes, build_tables(all_shapes), counterpart, pixels=4_000)
+    assert rung.status == "agree", rung.reason
     # The outcome says something about a shape only where rays met it.
     rng = np.random.default_rng(1)
     o = rng.uniform(-4.0, 4.0, (20_000, 3))
     d = rng.uniform(-2.0, 2.0, (20_000, 3)) - o
-    seen = np.unique(trace(twin, o, d).shape)
+    seen = np.unique(trace(counterpart, o, d).shape)
     assert seen.tolist() == list(range(-1, len(all_shapes.shapes)))
 
 

@@ -128,8 +128,8 @@ def test_a_picture_of_one_pixel_is_compared() -> None:
 @pytest.mark.parametrize("camera", [FRONTAL, BOX, LENS, Orthographic(**TILTED, view=OFF_AXIS)])
 def test_what_the_cameras_see(camera: AnyCamera) -> None:
     scene = seen_by(camera)
-    tier = geometry(scene, build_tables(scene), load(scene), pixels=500)
-    assert tier.status == "agree", tier.reason
+    rung = geometry(scene, build_tables(scene), load(scene), pixels=500)
+    assert rung.status == "agree", rung.reason
 
 
 @pytest.mark.parametrize(

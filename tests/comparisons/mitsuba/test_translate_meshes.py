@@ -53,13 +53,13 @@ def test_numbers_of_triangles_agree(where: str, smooth: bool) -> None:
     scene = _scene(mesh, where)
     with pytest.warns(SceneWarning, match="5 of 325 triangles have no area"):
         tables = scene.tables
-    twin = load(scene)
-    tier = geometry(scene, tables, twin, pixels=2_000)
-    assert tier.status == "agree", tier.reason
+    counterpart = load(scene)
+    rung = geometry(scene, tables, counterpart, pixels=2_000)
+    assert rung.status == "agree", rung.reason
     rng = np.random.default_rng(6)
     o = rng.normal(size=(2_000, 3)).astype(np.float32).astype(np.float64) * 3.0
     d = (rng.normal(size=(2_000, 3)) * 0.3 - o).astype(np.float32).astype(np.float64)
-    ours, theirs = scene.intersect(o, d), trace(twin, o, d)
+    ours, theirs = scene.intersect(o, d), trace(counterpart, o, d)
     met = (ours.shape == 0) & (theirs.shape == 0) & (ours.part == theirs.part) & (ours.part == 0)
     same = ours.primitive[met] == theirs.primitive[met]
     # Rays within float32's rounding of an edge may meet the neighbour.

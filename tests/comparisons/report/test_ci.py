@@ -9,17 +9,17 @@ from junitparser import Error, Failure, JUnitXml, Skipped
 
 from comparisons.report.ci import github, junit
 from comparisons.report.ci.ranking import SEVERITY, ranked
-from comparisons.results.case import RUNGS, Case, Cause, Tier
+from comparisons.results.case import RUNGS, Case, Cause, RungResult
 from reference_rt.util.errors import ImageError
 
 NASTY = "<a href='x'>&amp;]]>\x00\x1b[31m\ud800 | `code` % \r\n::error::x,y:z *b* @me é"
 
 
 def case(verdict, name=None, reason=None, rung="geometry", **more):
-    tiers = (Tier("input", "agree", "fine"), Tier(rung, verdict, reason or "why"))
+    rungs = (RungResult("input", "agree", "fine"), RungResult(rung, verdict, reason or "why"))
     name = name or f"scene-{verdict}"
     seconds = {"candidate": {"load": 0.5}, "reference": {"render": 1.0}}
-    return Case(name, verdict, f"{rung}: {reason or 'why'}", tiers, None, seconds, **more)
+    return Case(name, verdict, f"{rung}: {reason or 'why'}", rungs, None, seconds, **more)
 
 
 EVERY = [case(verdict) for verdict in SEVERITY if verdict != "not-applicable"]
@@ -36,7 +36,7 @@ def test_the_worst_come_first():
         case("inconclusive", "g"),
     ]
     assert [c.scene for c in ranked(cases)] == list("ecdbgfa")
-    assert set(RUNGS) >= {t.name for c in cases for t in c.tiers}
+    assert set(RUNGS) >= {t.name for c in cases for t in c.rungs}
 
 
 # ---- JUnit --------------------------------------------------------------------------------------

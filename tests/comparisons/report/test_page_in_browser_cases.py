@@ -8,7 +8,7 @@ import pytest
 from page_in_browser import case, display, grey, pixel, point, shown
 
 from comparisons.report.thumbnails import MAGENTA
-from comparisons.results.case import Images, Place
+from comparisons.results.case import ImageRegion, Images
 
 
 def test_search_and_verdicts_hide_cases(show):
@@ -105,7 +105,7 @@ def test_cases_far_below_wait(show):
     ids=["one pixel", "all NaN", "black", "extreme", "unlike sizes", "empty"],
 )
 def test_odd_pictures_do_no_harm(show, images):
-    page = show(case(images, worst=(Place(0, 0, 1, 1, "here"),)))
+    page = show(case(images, worst=(ImageRegion(0, 0, 1, 1, "here"),)))
     if not images.candidate.size:
         assert page.get_by_text("No pictures.").is_visible()
         return
@@ -148,7 +148,7 @@ def test_without_a_script_tables_and_thumbnails_show(show):
 def test_hostile_names_stay_text(show):
     nasty = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028"
     images = Images(grey(0.25), grey(1.0), grey(0.1))
-    place = (Place(0, 0, 2, 2, nasty),)
+    place = (ImageRegion(0, 0, 2, 2, nasty),)
     page = show(case(images, nasty, reason=nasty, sides=(nasty, nasty), worst=place, again=nasty))
     pixel(page, "candidate", 0, 0)
     page.keyboard.press("4")
@@ -160,7 +160,9 @@ def test_hostile_names_stay_text(show):
 def test_nothing_runs_out_of_the_window(show, scheme, width):
     images = Images(grey(0.25), grey(1.0), grey(0.1))
     page = show(
-        case(images, "a_scene_with_a_rather_long_name" * 3, worst=(Place(0, 0, 2, 2, "here"),)),
+        case(
+            images, "a_scene_with_a_rather_long_name" * 3, worst=(ImageRegion(0, 0, 2, 2, "here"),)
+        ),
         viewport={"width": width, "height": 800},
         color_scheme=scheme,
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from page_in_browser import SIZE, case, centre, grey, pixel, point, read, visible_part
 
-from comparisons.results.case import Images, Place
+from comparisons.results.case import ImageRegion, Images
 
 
 def test_pixels_read_what_the_arrays_hold(show):
@@ -95,7 +95,7 @@ def test_a_worst_place_is_shown_large(show):
     candidate = grey(1.0, size)
     candidate[40:44, 20:28] = 1.5
     candidate[42, 25] = 2.0
-    worst = (Place(20, 40, 8, 4, "50 % brighter"),)
+    worst = (ImageRegion(20, 40, 8, 4, "50 % brighter"),)
     page = show(case(Images(candidate, grey(1.0, size)), worst=worst))
     pixel(page, "candidate", 0, 0)
     button = page.get_by_role("button", name=re.compile("50 % brighter"))
@@ -111,7 +111,7 @@ def test_a_worst_place_is_shown_large(show):
 def test_the_worst_pixel_is_one_that_is_no_number(show):
     candidate = grey(1.0)
     candidate[3, 5], candidate[4, 6] = 2.0, math.nan
-    page = show(case(Images(candidate, grey(1.0)), worst=(Place(4, 2, 4, 4, "here"),)))
+    page = show(case(Images(candidate, grey(1.0)), worst=(ImageRegion(4, 2, 4, 4, "here"),)))
     pixel(page, "candidate", 0, 0)
     page.get_by_role("button", name="here").click()
     assert page.locator(".place").inner_text() == "x 6, y 4"

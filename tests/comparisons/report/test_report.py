@@ -12,7 +12,7 @@ from report_page import NASTY, PROVENANCE, Page, case, noise
 from comparisons.report import write_report
 from comparisons.report.pictures_data import unpack
 from comparisons.report.values import shown
-from comparisons.results.case import Cause, Images, Place
+from comparisons.results.case import Cause, ImageRegion, Images
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def test_what_others_wrote_is_escaped(page):
         {NASTY: NASTY},
         sides=(NASTY, NASTY),
         cause=Cause(NASTY, NASTY, 0.5),
-        worst=(Place(0, 0, 1, 1, NASTY),),
+        worst=(ImageRegion(0, 0, 1, 1, NASTY),),
         left_out=(NASTY,),
         again=NASTY,
     )
@@ -87,7 +87,7 @@ def test_everything_a_case_says_is_there(page):
     told = case(
         "differ",
         cause=Cause("lost light", "r = 0.97", 0.94),
-        worst=(Place(8, 16, 4, 2, "z = 14"),),
+        worst=(ImageRegion(8, 16, 4, 2, "z = 14"),),
         left_out=("mirrors: none",),
         again="reference-rt compare x.yaml",
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from comparisons.report.results_json import SCHEMA, write_results
-from comparisons.results.case import Case, Cause, Metrics, Place, Tier
+from comparisons.results.case import Case, Cause, ImageRegion, Metrics, RungResult
 
 
 def case(**numbers):
@@ -15,14 +15,14 @@ def case(**numbers):
         "scene",
         "differ",
         "geometry: differs",
-        (Tier("geometry", "differ", "why", numbers),),
+        (RungResult("geometry", "differ", "why", numbers),),
         Metrics(math.nan, 0.25, math.inf, 0.5, 0.125, (0.0, math.inf, -0.01), 0),
         {"candidate": {"load": 0.5}, "reference": {"render": math.nan}},
         None,
         ("note",),
         ("yours", "the baseline's"),
         Cause("gain", "1.02 times", 0.99),
-        (Place(1, 2, 3, 4, "darker"),),
+        (ImageRegion(1, 2, 3, 4, "darker"),),
         ("lights: none",),
         "reference-rt gate x.exr",
     )
@@ -103,8 +103,8 @@ def test_a_number_may_not_hide_the_status(tmp_path, name):
 
 
 def test_two_rungs_of_one_name_are_a_mistake(tmp_path):
-    tier = Tier("geometry", "agree", "")
-    twice = Case("scene", "agree", "", (tier, tier), None, {})
+    rung = RungResult("geometry", "agree", "")
+    twice = Case("scene", "agree", "", (rung, rung), None, {})
     with pytest.raises(ValueError, match="two rungs"):
         write_results(tmp_path / "results.json", [twice], {})
 

@@ -10,8 +10,8 @@ from comparisons.experiments.convergence import reference as convergence_referen
 from comparisons.experiments.convergence.data import Rung
 from comparisons.experiments.convergence.store import Store
 from comparisons.gate import reference as gate_reference
-from comparisons.results.record import RecordError, read_case, write_case
 from comparisons.results.sealed import sealed, unsealed
+from comparisons.results.stored_case import StoredCaseError, read_case, write_case
 
 PICTURES = np.random.default_rng(1).random((2, 1, 2, 3))
 RUNG = Rung(4, 4, *(np.arange(2.0),) * 3, np.ones((1, 2, 3)), np.zeros((1, 2, 3)))
@@ -56,10 +56,10 @@ def reference_of_converge(folder, write):
 
 def record(folder, write):
     if write:
-        write_case(folder, case(tiers=(), metrics=None), "key", 1.25)
+        write_case(folder, case(rungs=(), metrics=None), "key", 1.25)
     try:
         return read_case(folder)
-    except RecordError:
+    except StoredCaseError:
         return None
 
 

@@ -2,14 +2,14 @@
 
 import pytest
 
-from comparisons.results.case import Case, Metrics, Tier
+from comparisons.results.case import Case, Metrics, RungResult
 from comparisons.results.verdict import decide, exit_code
 
 METRICS = Metrics(1.0, 0.0, 60.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0)
 
 
-def tiers(**statuses):
-    return [Tier(name, status, f"{name} says {status}") for name, status in statuses.items()]
+def rungs(**statuses):
+    return [RungResult(name, status, f"{name} says {status}") for name, status in statuses.items()]
 
 
 @pytest.mark.parametrize(
@@ -31,31 +31,31 @@ def tiers(**statuses):
     ],
 )
 def test_gravest_status_then_first_rung(statuses, verdict, rung):
-    assert decide(tiers(**statuses), METRICS) == (verdict, f"{rung}: {rung} says {verdict}")
+    assert decide(rungs(**statuses), METRICS) == (verdict, f"{rung}: {rung} says {verdict}")
 
 
 def test_agreement_needs_a_rung_that_agreed():
-    ladder = tiers(geometry="agree", whitted="not-applicable", statistics="agree")
+    ladder = rungs(geometry="agree", whitted="not-applicable", statistics="agree")
     assert decide(ladder, None) == ("agree", "geometry, statistics: statistics says agree")
-    assert decide(tiers(geometry="not-applicable"), METRICS)[0] == "not-comparable"
+    assert decide(rungs(geometry="not-applicable"), METRICS)[0] == "not-comparable"
     assert decide([], METRICS)[0] == "not-comparable"
 
 
 def test_pixels_not_finite_go_before_everything():
     nan = float("nan")
     metrics = Metrics(nan, nan, nan, nan, nan, (nan, nan, nan), 3)
-    verdict, reason = decide(tiers(geometry="differ", statistics="agree"), metrics)
+    verdict, reason = decide(rungs(geometry="differ", statistics="agree"), metrics)
     assert (verdict, reason) == ("invalid", "images: 3 pixels not finite")
-    assert decide(tiers(direct="invalid"), metrics)[1] == "direct: direct says invalid"
+    assert decide(rungs(direct="invalid"), metrics)[1] == "direct: direct says invalid"
 
 
 def test_a_rung_of_unknown_name_is_refused():
     with pytest.raises(ValueError, match="sheen"):
-        decide([Tier("sheen", "differ", "")], METRICS)
+        decide([RungResult("sheen", "differ", "")], METRICS)
 
 
 def case(verdict, **statuses):
-    return Case("scene", verdict, "", tuple(tiers(**statuses)), METRICS, {})
+    return Case("scene", verdict, "", tuple(rungs(**statuses)), METRICS, {})
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from comparisons.results.case import FloatArray, Images, Tier
-from comparisons.rungs.images import images_tier
+from comparisons.results.case import FloatArray, Images, RungResult
+from comparisons.rungs.images import images_rung
 from comparisons.statistics.metric_null import noise_ratio
 from comparisons.statistics.metrics import image_metrics
 
@@ -27,14 +27,14 @@ def picture() -> FloatArray:
     return image
 
 
-def judged(candidate: FloatArray, reference: FloatArray) -> Tier:
+def judged(candidate: FloatArray, reference: FloatArray) -> RungResult:
     images = Images(candidate.mean(axis=0), reference.mean(axis=0))
-    return images_tier(images, image_metrics(images), (candidate, reference))
+    return images_rung(images, image_metrics(images), (candidate, reference))
 
 
-def judged_alone(candidate: FloatArray, reference: FloatArray) -> Tier:
+def judged_alone(candidate: FloatArray, reference: FloatArray) -> RungResult:
     images = Images(candidate, reference)
-    return images_tier(images, image_metrics(images), None)
+    return images_rung(images, image_metrics(images), None)
 
 
 def test_noise_alone_has_ratio_one(picture: FloatArray) -> None:
@@ -71,8 +71,8 @@ def gaussian(rng: np.random.Generator, picture: FloatArray, count: int) -> Float
 def test_noise_alone_agrees(picture, noise, counts) -> None:
     rng = np.random.default_rng(0)
     for _ in range(5):
-        tier = judged(noise(rng, picture, counts[0]), noise(rng, picture, counts[1]))
-        assert tier.status == "agree", tier.reason
+        result = judged(noise(rng, picture, counts[0]), noise(rng, picture, counts[1]))
+        assert result.status == "agree", result.reason
 
 
 @pytest.mark.slow
@@ -81,8 +81,8 @@ def test_noise_alone_agrees(picture, noise, counts) -> None:
 def test_noise_alone_agrees_often(picture, noise, count) -> None:
     rng = np.random.default_rng(1)
     for _ in range(300):
-        tier = judged(noise(rng, picture, count), noise(rng, picture, count))
-        assert tier.status == "agree", tier.reason
+        result = judged(noise(rng, picture, count), noise(rng, picture, count))
+        assert result.status == "agree", result.reason
 
 
 def test_what_noise_gives_is_what_is_found(picture: FloatArray) -> None:
@@ -91,9 +91,9 @@ def test_what_noise_gives_is_what_is_found(picture: FloatArray) -> None:
     found = {name: [] for name in GATES[:-1]}
     for _ in range(12):
         # The sides have noise of different strength, and are of different number.
-        tier = judged(gaussian(rng, picture, 6), gaussian(rng, picture, 16))
+        result = judged(gaussian(rng, picture, 6), gaussian(rng, picture, 16))
         for name, values in found.items():
-            gate = tier.numbers[name]
+            gate = result.numbers[name]
             values.append(
                 (gate["value"] - gate["by_noise"]) / (gate["threshold"] - gate["by_noise"])
             )
@@ -126,8 +126,8 @@ def test_each_metric_has_a_threshold_that_some_fault_passes(picture, name) -> No
         judged(replicates(0, picture * 1.3), replicates(1, picture)),
     )
     expected_to_fail = {"ssim"} ^ set(GATES)
-    for tier in (clean, noisy):
-        gate = tier.numbers[name]
+    for result in (clean, noisy):
+        gate = result.numbers[name]
         assert set(gate) == {"value", "by_noise", "threshold", "passed"}
         if name in expected_to_fail:
             assert not gate["passed"]
@@ -137,10 +137,10 @@ def test_each_metric_has_a_threshold_that_some_fault_passes(picture, name) -> No
 
 
 def test_few_replicates_leave_the_metrics_unjudged(picture: FloatArray) -> None:
-    tier = judged(replicates(0, picture, count=3), replicates(1, picture, count=3))
-    assert tier.status == "agree"
-    assert tier.numbers["flip"]["threshold"] is None
-    assert tier.numbers["difference_over_noise"] == pytest.approx(1.0, abs=0.1)
+    result = judged(replicates(0, picture, count=3), replicates(1, picture, count=3))
+    assert result.status == "agree"
+    assert result.numbers["flip"]["threshold"] is None
+    assert result.numbers["difference_over_noise"] == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_reference_that_is_known(picture: FloatArray) -> None:
@@ -151,9 +151,9 @@ def test_a_reference_that_is_known(picture: FloatArray) -> None:
     for _ in range(5):
         middle = picture + deviation * rng.normal(size=picture.shape)
         known = np.stack([middle + deviation, middle - deviation])
-        tier = judged(gaussian(rng, picture, 8), known)
-        assert tier.status == "agree", tier.reason
-        assert tier.numbers["flip"]["threshold"] is not None
+        result = judged(gaussian(rng, picture, 8), known)
+        assert result.status == "agree", result.reason
+        assert result.numbers["flip"]["threshold"] is not None
     assert judged(gaussian(rng, 1.03 * picture, 8), known).status == "differ"
 
 
@@ -186,6 +186,6 @@ def test_small_pictures(shape) -> None:
 def test_black_reference() -> None:
     black = np.zeros((8, 8, 3))
     assert judged_alone(black, black).status == "agree"
-    tier = judged_alone(black + 0.5, black)
-    assert tier.status == "differ"
-    assert tier.numbers["bias"]["value"] is None
+    result = judged_alone(black + 0.5, black)
+    assert result.status == "differ"
+    assert result.numbers["bias"]["value"] is None

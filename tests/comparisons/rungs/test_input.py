@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from comparisons.results.case import FloatArray
-from comparisons.rungs.input import input_tier
+from comparisons.rungs.input import input_rung
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
 
@@ -29,15 +29,15 @@ def noisy(seed: int, count: int = 8, noise: float = 0.05) -> FloatArray:
 
 def test_independent_replicates_are_in_order() -> None:
     for seed in range(0, 40, 2):
-        tier = input_tier(noisy(seed), noisy(seed + 1, count=6))
-        assert (tier.name, tier.status) == ("input", "agree"), tier.reason
-    assert tier.numbers["replicates_candidate"] == 8
-    assert tier.numbers["negative_values"] == 0
+        result = input_rung(noisy(seed), noisy(seed + 1, count=6))
+        assert (result.name, result.status) == ("input", "agree"), result.reason
+    assert result.numbers["replicates_candidate"] == 8
+    assert result.numbers["negative_values"] == 0
 
 
 def test_a_single_picture_is_in_order() -> None:
-    assert input_tier(picture(), picture()).status == "agree"
-    assert input_tier(noisy(0, 1)[0], picture(), np.ones((HEIGHT, WIDTH))).status == "agree"
+    assert input_rung(picture(), picture()).status == "agree"
+    assert input_rung(noisy(0, 1)[0], picture(), np.ones((HEIGHT, WIDTH))).status == "agree"
 
 
 @pytest.mark.parametrize(
@@ -53,22 +53,22 @@ def test_a_single_picture_is_in_order() -> None:
     ],
 )
 def test_shapes_and_sizes(candidate: FloatArray, message: str) -> None:
-    tier = input_tier(candidate, picture())
-    assert tier.status == "invalid"
-    assert message in tier.reason
-    assert "expected" in tier.reason
+    result = input_rung(candidate, picture())
+    assert result.status == "invalid"
+    assert message in result.reason
+    assert "expected" in result.reason
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_one_number_that_is_not_finite(value: float) -> None:
     candidate = noisy(0)
     candidate[3, 7, 9, 1] = value
-    tier = input_tier(candidate, noisy(1))
-    assert tier.status == "invalid"
-    assert f"1 pixel of the candidate not finite, the first {value}" in tier.reason
-    assert "column 9, row 7 of replicate 3" in tier.reason
-    tier = input_tier(noisy(1), candidate)
-    assert "of the reference not finite" in tier.reason
+    result = input_rung(candidate, noisy(1))
+    assert result.status == "invalid"
+    assert f"1 pixel of the candidate not finite, the first {value}" in result.reason
+    assert "column 9, row 7 of replicate 3" in result.reason
+    result = input_rung(noisy(1), candidate)
+    assert "of the reference not finite" in result.reason
 
 
 def test_opacity() -> None:
@@ -79,66 +79,66 @@ def test_opacity() -> None:
         (alpha[:3], "the opacity's shape is"),
         (np.where(np.arange(WIDTH) == 5, np.nan, alpha), "not finite at column 5, row 0"),
     ):
-        tier = input_tier(candidate, reference, bad)
-        assert tier.status == "invalid"
-        assert message in tier.reason
+        result = input_rung(candidate, reference, bad)
+        assert result.status == "invalid"
+        assert message in result.reason
     alpha[20, 30] = 0.0
     # A background that a camera sees is transparent, yet has its colour.
-    assert input_tier(candidate, reference, alpha).status == "agree"
+    assert input_rung(candidate, reference, alpha).status == "agree"
     candidate[20, 30] = 0.0
-    tier = input_tier(candidate, reference, alpha)
-    assert tier.status == "invalid"
-    assert "1 pixel of the candidate transparent and black" in tier.reason
-    assert "column 30, row 20" in tier.reason
+    result = input_rung(candidate, reference, alpha)
+    assert result.status == "invalid"
+    assert "1 pixel of the candidate transparent and black" in result.reason
+    assert "column 30, row 20" in result.reason
 
 
 def test_black_and_constant() -> None:
     reference = noisy(1)
-    tier = input_tier(np.zeros_like(reference), reference)
-    assert tier.status == "invalid"
-    assert "black throughout (all replicates)" in tier.reason
+    result = input_rung(np.zeros_like(reference), reference)
+    assert result.status == "invalid"
+    assert "black throughout (all replicates)" in result.reason
     candidate = noisy(0)
     candidate[5] = 0.0
-    assert "(replicate 5 of 8)" in input_tier(candidate, reference).reason
+    assert "(replicate 5 of 8)" in input_rung(candidate, reference).reason
     candidate[5] = 0.25
-    tier = input_tier(candidate, reference)
-    assert tier.status == "invalid"
-    assert "(0.25, 0.25, 0.25) (replicate 5 of 8)" in tier.reason
+    result = input_rung(candidate, reference)
+    assert result.status == "invalid"
+    assert "(0.25, 0.25, 0.25) (replicate 5 of 8)" in result.reason
     black = np.zeros((HEIGHT, WIDTH, 3))
-    assert input_tier(black, black).status == "agree"
-    assert input_tier(black + 0.5, black + 0.4).status == "agree"
+    assert input_rung(black, black).status == "agree"
+    assert input_rung(black + 0.5, black + 0.4).status == "agree"
 
 
 def test_replicates_that_are_the_same() -> None:
     candidate = noisy(0)
     candidate[6] = candidate[2]
-    tier = input_tier(candidate, noisy(1))
-    assert tier.status == "invalid"
-    assert "replicates 2, 6 of 8 of the candidate are the same bit for bit" in tier.reason
+    result = input_rung(candidate, noisy(1))
+    assert result.status == "invalid"
+    assert "replicates 2, 6 of 8 of the candidate are the same bit for bit" in result.reason
     same = np.repeat(noisy(0, 1), 8, axis=0)
-    assert "all replicates of the candidate" in input_tier(same, noisy(1)).reason
-    assert "of the reference are the same" in input_tier(noisy(1), same).reason
+    assert "all replicates of the candidate" in input_rung(same, noisy(1)).reason
+    assert "of the reference are the same" in input_rung(noisy(1), same).reason
     # Where the reference has no noise either there is none to expect.
-    assert input_tier(same, same).status == "agree"
+    assert input_rung(same, same).status == "agree"
     # Known by its mean alone it says nothing of noise, but several candidates do.
-    assert input_tier(same, picture()).status == "invalid"
+    assert input_rung(same, picture()).status == "invalid"
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5])
 def test_noise_in_common(share: float) -> None:
     own = noisy(0, 16)
     candidate = (1.0 - share) * own + share * own[:1]
-    tier = input_tier(candidate, noisy(1, 16))
-    assert tier.status == "invalid"
-    assert "share noise" in tier.reason
+    result = input_rung(candidate, noisy(1, 16))
+    assert result.status == "invalid"
+    assert "share noise" in result.reason
 
 
 def test_two_replicates_with_overlapping_seeds() -> None:
     candidate = noisy(0, 16)
     candidate[9] = 0.5 * candidate[9] + 0.5 * candidate[4]
-    tier = input_tier(candidate, noisy(1, 16))
-    assert tier.status == "invalid"
-    assert "replicates 4 and 9 of the candidate share noise" in tier.reason
+    result = input_rung(candidate, noisy(1, 16))
+    assert result.status == "invalid"
+    assert "replicates 4 and 9 of the candidate share noise" in result.reason
 
 
 def wrong_pictures() -> dict[str, FloatArray]:
@@ -161,8 +161,8 @@ def wrong_pictures() -> dict[str, FloatArray]:
 
 @pytest.mark.parametrize("name", wrong_pictures())
 def test_a_wrong_picture_is_not_taken_for_noise(name: str) -> None:
-    tier = input_tier(wrong_pictures()[name], noisy(1, 16))
-    assert tier.status == "agree", tier.reason
+    result = input_rung(wrong_pictures()[name], noisy(1, 16))
+    assert result.status == "agree", result.reason
 
 
 @pytest.mark.parametrize("encoding", ["sRGB", "linear"])
@@ -173,37 +173,37 @@ def test_eight_bits(encoding: str) -> None:
         return np.asarray(linear(np.round(255.0 * np.clip(srgb(x), 0.0, 1.0)) / 255.0))
 
     for candidate, reference in ((noisy(0), noisy(1)), (picture(), picture())):
-        tier = input_tier(rounded(candidate), reference)
-        assert tier.status == "invalid"
-        assert f"8-bit {encoding} codes" in tier.reason
+        result = input_rung(rounded(candidate), reference)
+        assert result.status == "invalid"
+        assert f"8-bit {encoding} codes" in result.reason
         # Half floats of 8-bit values are still of 8 bits.
         half = rounded(candidate).astype(np.float16)
-        assert f"8-bit {encoding} codes" in input_tier(half, reference).reason
+        assert f"8-bit {encoding} codes" in input_rung(half, reference).reason
     # A reference of 8 bits too makes such a candidate the right one.
-    assert input_tier(rounded(picture()), rounded(picture())).status == "agree"
+    assert input_rung(rounded(picture()), rounded(picture())).status == "agree"
 
 
 def test_flat_colours_are_not_eight_bits() -> None:
     numbers = np.arange(HEIGHT * WIDTH).reshape(HEIGHT, WIDTH) // 200
     flat = np.repeat((numbers / 17.0)[..., None], 3, axis=-1)
-    assert input_tier(flat, flat * 0.999).status == "agree"
+    assert input_rung(flat, flat * 0.999).status == "agree"
 
 
 def test_clamped_highlights() -> None:
-    tier = input_tier(np.minimum(noisy(0), 1.0), noisy(1))
-    assert tier.status == "differ"
-    assert "highlights are clamped" in tier.reason
-    assert "exactly 1, its maximum" in tier.reason
+    result = input_rung(np.minimum(noisy(0), 1.0), noisy(1))
+    assert result.status == "differ"
+    assert "highlights are clamped" in result.reason
+    assert "exactly 1, its maximum" in result.reason
     # A lamp that is dimmer but as flat as the reference's is no clamped one.
     dim, bright = noisy(0), noisy(1)
     dim[:, 4:12, 8:24], bright[:, 4:12, 8:24] = 1.5, 5.0
-    assert input_tier(dim, bright).status == "agree"
+    assert input_rung(dim, bright).status == "agree"
 
 
 def test_negative_values_are_counted() -> None:
     candidate = picture()
     candidate[3, 4, 1] = -1e-3
-    tier = input_tier(candidate, picture())
-    assert tier.status == "agree"
-    assert tier.numbers["negative_values"] == 1
-    assert "1 negative value" in tier.reason
+    result = input_rung(candidate, picture())
+    assert result.status == "agree"
+    assert result.numbers["negative_values"] == 1
+    assert "1 negative value" in result.reason

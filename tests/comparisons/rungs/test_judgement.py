@@ -63,18 +63,18 @@ def test_a_fault_of_ours_is_ours(scene: Scene, right: str, wrong: str) -> None:
     assert TEXT.count(right) == 1
     faulty = Scene.parse(TEXT.replace(right, wrong))
     # Our tables are of another scene than is asked for.
-    tier = geometry(scene, build_tables(faulty), load(scene), pixels=300)
-    assert tier.status == "differ"
-    assert tier.numbers["decided_ours"] > 0
+    rung = geometry(scene, build_tables(faulty), load(scene), pixels=300)
+    assert rung.status == "differ"
+    assert rung.numbers["decided_ours"] > 0
     # But for rays at edges that Mitsuba does get wrong.
-    assert tier.numbers["decided_mitsuba"] < 0.2 * tier.numbers["decided_ours"]
-    assert "by our fault" in tier.reason
+    assert rung.numbers["decided_mitsuba"] < 0.2 * rung.numbers["decided_ours"]
+    assert "by our fault" in rung.reason
     # And the other way round it is Mitsuba's: too many rays for its rounding.
-    tier = geometry(scene, build_tables(scene), load(faulty), pixels=300)
-    assert tier.status == "differ"
-    assert tier.numbers["decided_ours"] == 0
-    assert tier.numbers["decided_mitsuba"] > 0
-    assert tier.numbers["mitsuba_wrong"]
+    rung = geometry(scene, build_tables(scene), load(faulty), pixels=300)
+    assert rung.status == "differ"
+    assert rung.numbers["decided_ours"] == 0
+    assert rung.numbers["decided_mitsuba"] > 0
+    assert rung.numbers["mitsuba_wrong"]
 
 
 def test_answers_that_are_made_up_are_seen_through(scene: Scene) -> None:

@@ -9,7 +9,7 @@ from counterparts import faulty_counterpart
 
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.translate import load
-from comparisons.results.case import Tier
+from comparisons.results.case import RungResult
 from comparisons.rungs import direct, whitted
 from comparisons.rungs import geometry as geometry_of_many
 from comparisons.rungs.rays import arbiter
@@ -50,12 +50,12 @@ lights:
   - {type: constant, radiance: [0.1, 0.2, 0.3]}
 """
 
-Rung = Callable[[Scene, SceneTables, Any], Tier]
+Rung = Callable[[Scene, SceneTables, Any], RungResult]
 
 
-def geometry(scene: Scene, tables: SceneTables, twin: Any) -> Tier:
+def geometry(scene: Scene, tables: SceneTables, counterpart: Any) -> RungResult:
     """The rung with a tenth of its rays."""
-    return geometry_of_many(scene, tables, twin, pixels=1_700)
+    return geometry_of_many(scene, tables, counterpart, pixels=1_700)
 
 
 @pytest.fixture(scope="module")
@@ -69,17 +69,19 @@ def tables(scene: Scene) -> SceneTables:
 
 
 @pytest.fixture(scope="module")
-def twin(scene: Scene) -> Any:
+def counterpart(scene: Scene) -> Any:
     return load(scene)
 
 
 @pytest.mark.parametrize("rung", [geometry, direct, whitted])
-def test_the_same_scene_agrees(rung: Rung, scene: Scene, tables: SceneTables, twin: Any) -> None:
-    tier = rung(scene, tables, twin)
-    assert tier.status == "agree", tier.reason
-    assert tier.name == rung.__name__
+def test_the_same_scene_agrees(
+    rung: Rung, scene: Scene, tables: SceneTables, counterpart: Any
+) -> None:
+    result = rung(scene, tables, counterpart)
+    assert result.status == "agree", result.reason
+    assert result.name == rung.__name__
     # Far from the bound: it is not there to hide anything.
-    bounds = {k: v for k, v in tier.numbers.items() if k.endswith("over_bound")}
+    bounds = {k: v for k, v in result.numbers.items() if k.endswith("over_bound")}
     assert bounds
     assert all(0.0 <= ratio < 1.0 for ratio in bounds.values()), bounds
 
@@ -124,9 +126,9 @@ MORE_FAULTS: tuple[tuple[Rung, str, str], ...] = (
 def test_a_planted_fault_is_seen(
     rung: Rung, right: str, wrong: str, scene: Scene, tables: SceneTables
 ) -> None:
-    tier = rung(scene, tables, faulty_counterpart(SCENE, right, wrong))
-    assert tier.status == "differ"
-    assert tier.reason
+    result = rung(scene, tables, faulty_counterpart(SCENE, right, wrong))
+    assert result.status == "differ"
+    assert result.reason
 
 
 def test_a_faint_scene_is_held_to_the_same_relative_bound(scene: Scene) -> None:
@@ -152,8 +154,8 @@ def test_rungs_that_a_scene_does_not_have(scene: Scene) -> None:
     )
     mi_dark = load(dark)
     for rung in (direct, whitted):
-        tier = rung(dark, build_tables(dark), mi_dark)
-        assert (tier.status, tier.reason) == ("not-applicable", "the scene has no light")
+        result = rung(dark, build_tables(dark), mi_dark)
+        assert (result.status, result.reason) == ("not-applicable", "the scene has no light")
 
 
 def test_coincident_surfaces_are_explained() -> None:
@@ -169,9 +171,9 @@ shapes:
   - {type: triangle, v0: [9, -9, 9], v1: [8, -9, 9], v2: [9, -8, 9]}
 """
     scene = Scene.parse(text)
-    tier = geometry(scene, build_tables(scene), load(scene))
-    assert (tier.numbers["decided_ours"], tier.numbers["undecided"]) == (0, 0), tier.reason
-    assert tier.status in ("agree", "reference-limited")
+    result = geometry(scene, build_tables(scene), load(scene))
+    assert (result.numbers["decided_ours"], result.numbers["undecided"]) == (0, 0), result.reason
+    assert result.status in ("agree", "reference-limited")
     gap = load(Scene.parse(text.replace("0.2, 1]", "0.2, 0.999]")))
     assert geometry(scene, build_tables(scene), gap).status == "differ"
 

@@ -20,7 +20,7 @@ from planted import (
     scene,
 )
 
-from comparisons.statistics import Known, Margins, compare, standard_error, worst_places
+from comparisons.statistics import Known, Margins, compare, standard_error, worst_regions
 from comparisons.statistics.decide import _decide, findings
 
 # The decision: specificity and equivalence
@@ -34,30 +34,30 @@ def test_equal_distributions_agree():
 
 
 def test_the_reason_of_agreement_states_power_and_equivalence():
-    tier = judged(scene())
-    assert tier.status == "agree"
-    assert tier.name == "statistics"
-    assert "within ±0.5 %; no tile and no pixel differs" in tier.reason
-    assert "the smallest bias of the image mean seen with 99 % power is 0." in tier.reason
-    assert "the means are equivalent within ±0." in tier.reason
-    assert tier.reason.endswith("% at 99.95 %")
-    assert max(tier.numbers["detectable_bias"].values()) <= 0.005
+    result = judged(scene())
+    assert result.status == "agree"
+    assert result.name == "statistics"
+    assert "within ±0.5 %; no tile and no pixel differs" in result.reason
+    assert "the smallest bias of the image mean seen with 99 % power is 0." in result.reason
+    assert "the means are equivalent within ±0." in result.reason
+    assert result.reason.endswith("% at 99.95 %")
+    assert max(result.numbers["detectable_bias"].values()) <= 0.005
     reach = [
-        abs(tier.numbers["relative_bias"][c]) + tier.numbers["image"]["half_width_of_bias"][c]
+        abs(result.numbers["relative_bias"][c]) + result.numbers["image"]["half_width_of_bias"][c]
         for c in "RGB"
     ]
-    assert tier.numbers["equivalent_within"] == pytest.approx(max(reach))
+    assert result.numbers["equivalent_within"] == pytest.approx(max(reach))
 
 
 def test_agreement_needs_power_and_not_only_a_narrow_interval():
     """A bias as large as the limit must be seen, or the run is not conclusive."""
     found = {}
     for noise in (0.13, 0.16, 0.2, 0.25, 0.3):
-        tier = judged(scene(), noise=noise)
-        numbers = tier.numbers
+        result = judged(scene(), noise=noise)
+        numbers = result.numbers
         sees = max(numbers["detectable_bias"].values()) <= 0.005
-        assert (tier.status == "agree") == (sees and numbers["equivalent_within"] <= 0.005)
-        found[sees, numbers["equivalent_within"] <= 0.005] = tier
+        assert (result.status == "agree") == (sees and numbers["equivalent_within"] <= 0.005)
+        found[sees, numbers["equivalent_within"] <= 0.005] = result
     hidden = found[False, True]
     assert hidden.status == "inconclusive"
     assert ", within ±0.5 %; a bias of that size could be overlooked; it takes" in hidden.reason
@@ -90,11 +90,11 @@ def test_a_wider_limit_is_met_sooner():
 def test_noise_is_inconclusive_and_the_stated_samples_decide():
     decided = 0
     for seed in range(20):
-        tier = judged(scene(), seed, noise=0.4)
-        assert tier.status == "inconclusive"
-        factor = tier.numbers["samples_factor"]
+        result = judged(scene(), seed, noise=0.4)
+        assert result.status == "inconclusive"
+        factor = result.numbers["samples_factor"]
         assert factor > 1.0
-        assert f"replicates x {factor:.{0 if factor > 10 else 1}f} or spp x" in tier.reason
+        assert f"replicates x {factor:.{0 if factor > 10 else 1}f} or spp x" in result.reason
         decided += judged(scene(), seed + 100, noise=0.4 / math.sqrt(factor)).status == "agree"
     assert decided >= 17
 
@@ -113,10 +113,10 @@ def test_a_bias_within_the_margin_is_permitted():
 def test_faults_are_found_and_named(fault):
     changed, words = FAULTS[fault]
     for seed in range(3):
-        tier = judged(changed, seed)
-        assert tier.status == "differ"
-        assert words in tier.reason
-        assert "beyond ±" in tier.reason
+        result = judged(changed, seed)
+        assert result.status == "differ"
+        assert words in result.reason
+        assert "beyond ±" in result.reason
 
 
 def test_numbers_of_the_worst_tile_and_pixel():
@@ -134,10 +134,10 @@ def test_many_small_differences_are_found_by_uniformity():
     """A pattern that no pixel and no tile can prove."""
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH] // 4
     pattern = np.where(STILL, 0.0, np.where((x + y) % 2, 0.06, -0.06)[..., None])
-    tier = judged(scene() * (1.0 + pattern), noise=0.4)
-    assert tier.status == "differ"
-    assert "small blocks differ more between the sides than within: mean p-value" in tier.reason
-    assert tier.numbers["tiles"]["differ"] == tier.numbers["pixels"]["differ"] == 0
+    result = judged(scene() * (1.0 + pattern), noise=0.4)
+    assert result.status == "differ"
+    assert "small blocks differ more between the sides than within: mean p-value" in result.reason
+    assert result.numbers["tiles"]["differ"] == result.numbers["pixels"]["differ"] == 0
 
 
 # Pixels without noise
@@ -155,8 +155,8 @@ def test_rounding_of_pixels_without_noise_is_permitted_and_no_more(count):
     ):
         changed = scene()
         changed[where] += change
-        tier = judged(changed, count=count)
-        assert (tier.status == "differ") == (status == "differ"), (where, change, tier.reason)
+        result = judged(changed, count=count)
+        assert (result.status == "differ") == (status == "differ"), (where, change, result.reason)
 
 
 def test_pictures_without_any_noise():
@@ -165,8 +165,8 @@ def test_pictures_without_any_noise():
     assert compare(still * (1.0 + 1e-7), still).status == "agree"
     tile = still.copy()
     tile[:, 16:32, :16] *= 1.5
-    tier = compare(tile, still)
-    assert tier.status == "differ"
+    result = compare(tile, still)
+    assert result.status == "differ"
     assert standard_error(still, still).max() <= 5.0 * 2.0**-24
 
 
@@ -186,16 +186,16 @@ def test_black_pictures():
     lit = replicates(rng, scene())
     assert compare(lit * 0, lit * 0).status == "not-applicable"
     for pair in ((lit * 0, lit), (lit, lit * 0), (lit[:1] * 0, lit), (lit, lit[:1] * 0)):
-        tier = compare(*pair)
-        assert tier.status == "differ"
-        json.dumps(tier.numbers, allow_nan=False)
+        result = compare(*pair)
+        assert result.status == "differ"
+        json.dumps(result.numbers, allow_nan=False)
     assert "where the reference is black" in compare(lit, lit * 0).reason
     spark = lit * 0
     spark[0, 3, 3] = 1.0  # in one replicate only: not proven
-    tier = compare(spark, lit * 0)
-    assert tier.status == "inconclusive"
-    assert "give more replicates" in tier.reason
-    json.dumps(tier.numbers, allow_nan=False)
+    result = compare(spark, lit * 0)
+    assert result.status == "inconclusive"
+    assert "give more replicates" in result.reason
+    json.dumps(result.numbers, allow_nan=False)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
@@ -203,21 +203,21 @@ def test_pixels_not_finite_are_invalid(value):
     pictures = np.ones((4, 8, 8, 3))
     bad = pictures.copy()
     bad[2, 3, 4, 0] = value
-    tier = compare(pictures, bad)
-    assert tier.status == "invalid"
-    assert "0 of the candidate, 1 of the reference" in tier.reason
+    result = compare(pictures, bad)
+    assert result.status == "invalid"
+    assert "0 of the candidate, 1 of the reference" in result.reason
     assert compare(pictures, Known(pictures[0], bad[2])).status == "invalid"
     assert compare(pictures, Known(pictures[0], -pictures[0])).status == "invalid"
     assert np.isfinite(standard_error(pictures, bad)).all()
     with pytest.raises(ValueError, match="not finite"):
-        worst_places(pictures, bad)
+        worst_regions(pictures, bad)
 
 
 def test_sizes():
     images = np.ones((2, 8, 6, 3))
-    tier = compare(images, np.ones((2, 8, 9, 3)))
-    assert tier.status == "invalid"
-    assert tier.reason == "candidate is 6 x 8, reference 9 x 8 pixels (width x height)"
+    result = compare(images, np.ones((2, 8, 9, 3)))
+    assert result.status == "invalid"
+    assert result.reason == "candidate is 6 x 8, reference 9 x 8 pixels (width x height)"
     for wrong in (np.ones((8, 6, 3)), np.ones((2, 8, 6, 4)), np.ones((0, 8, 6, 3))):
         with pytest.raises(ValueError, match=r"candidate: expected \(R, height, width, 3\)"):
             compare(wrong, images)
@@ -227,7 +227,7 @@ def test_sizes():
         compare(images, Known(images, images))
     with pytest.raises(ValueError, match="its variance"):
         compare(images, Known(images[0], images[0, :4]))
-    for function in (standard_error, worst_places):
+    for function in (standard_error, worst_regions):
         with pytest.raises(ValueError, match="candidate is 6 x 8, reference 9 x 8"):
             function(images, np.ones((2, 8, 9, 3)))
 
@@ -237,31 +237,35 @@ def test_sizes():
 def test_small_pictures(shape, counts):
     rng = np.random.default_rng(0)
     a, b = (1.0 + 0.1 * rng.standard_normal((count, *shape, 3)) for count in counts)
-    tier = compare(a, b)
-    assert tier.status == "inconclusive"
-    json.dumps(tier.numbers, allow_nan=False)
+    result = compare(a, b)
+    assert result.status == "inconclusive"
+    json.dumps(result.numbers, allow_nan=False)
     assert standard_error(a, b).shape == (*shape, 3)
     assert np.isfinite(standard_error(a, b)).all()
-    worst_places(a, b)
+    worst_regions(a, b)
     assert compare(a[:, :, :, :], Known(b[0], 0.01 * np.ones_like(b[0]))).status == "inconclusive"
 
 
 def test_negative_radiance_of_a_filter():
     rng = np.random.default_rng(0)
     pictures = 0.5 + 2.0 * rng.standard_normal((2, 16, 64, 64, 3))
-    tier = compare(*pictures)
-    assert tier.status == "inconclusive"
+    result = compare(*pictures)
+    assert result.status == "inconclusive"
     gain = compare(pictures[0] + 0.5, pictures[1])
     assert gain.status == "differ"
 
 
 def test_numbers_are_json():
     for noise in (0.05, 1.0):
-        tier = judged(scene(), noise=noise)
-        json.dumps(tier.numbers, allow_nan=False)
+        result = judged(scene(), noise=noise)
+        json.dumps(result.numbers, allow_nan=False)
         for scale in ("image", "tiles", "pixels", "uniformity"):
-            assert isinstance(tier.numbers[scale], dict)
+            assert isinstance(result.numbers[scale], dict)
         for key in ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value"):
-            assert list(tier.numbers[key]) == ["R", "G", "B"]
-        assert tier.numbers["replicates_candidate"] == tier.numbers["replicates_reference"] == 16
-        assert tier.numbers["mean_reference"]["R"] == pytest.approx(scene()[..., 0].mean(), rel=0.1)
+            assert list(result.numbers[key]) == ["R", "G", "B"]
+        assert (
+            result.numbers["replicates_candidate"] == result.numbers["replicates_reference"] == 16
+        )
+        assert result.numbers["mean_reference"]["R"] == pytest.approx(
+            scene()[..., 0].mean(), rel=0.1
+        )

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from planted import TILE, patched, replicates, scene
 
-from comparisons.statistics import standard_error, worst_places
+from comparisons.statistics import standard_error, worst_regions
 
 
 def worst_places_of(changed):
     rng = np.random.default_rng(1)
-    return worst_places(replicates(rng, changed), replicates(rng, scene()))
+    return worst_regions(replicates(rng, changed), replicates(rng, scene()))
 
 
 def test_standard_error_is_that_of_the_pixels():
@@ -50,15 +50,15 @@ def test_worst_places_name_a_pixel():
 def test_worst_places_at_the_edge_are_cut_and_limited():
     rng = np.random.default_rng(0)
     a, b = 1.0 + 0.1 * rng.standard_normal((2, 16, 40, 40, 3))
-    places = worst_places(a * 1.5, b)
+    places = worst_regions(a * 1.5, b)
     assert len(places) == 6
-    assert len(worst_places(a * 1.5, b, most=2)) == 2
+    assert len(worst_regions(a * 1.5, b, most=2)) == 2
     assert all(p.x + p.width <= 40 and p.y + p.height <= 40 for p in places)
 
 
 def test_worst_places_of_two_single_pictures():
     changed = patched((30, 41), 3.0)
-    (place,) = worst_places(changed[None], scene()[None])
+    (place,) = worst_regions(changed[None], scene()[None])
     assert (place.x, place.y) == (32, 16)
     assert "RMS" in place.what
-    assert worst_places(scene()[None], scene()[None]) == ()
+    assert worst_regions(scene()[None], scene()[None]) == ()

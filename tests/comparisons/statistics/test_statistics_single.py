@@ -20,12 +20,12 @@ from comparisons.statistics.decide import findings
 def test_a_single_picture_says_what_it_presumes():
     rng = np.random.default_rng(0)
     one, many = replicates(rng, scene(), 1), replicates(rng, scene())
-    for tier in (compare(one, many), compare(many, one), compare(one, many[:1])):
-        assert tier.status == "inconclusive"
-        assert "with a single picture on a side the noise is estimated" in tier.reason
-        assert "assuming that the noise of neighbouring blocks is independent" in tier.reason
-        assert "it takes about" in tier.reason
-        json.dumps(tier.numbers, allow_nan=False)
+    for result in (compare(one, many), compare(many, one), compare(one, many[:1])):
+        assert result.status == "inconclusive"
+        assert "with a single picture on a side the noise is estimated" in result.reason
+        assert "assuming that the noise of neighbouring blocks is independent" in result.reason
+        assert "it takes about" in result.reason
+        json.dumps(result.numbers, allow_nan=False)
     assert "single" not in compare(many, many).reason
 
 
@@ -92,8 +92,8 @@ def test_faults_against_a_known_mean(fault):
     rng = np.random.default_rng(0)
     many = replicates(rng, scene(), 64)
     known = Known(many.mean(axis=0), many.var(axis=0, ddof=1) / 64)
-    tier = compare(replicates(rng, FAULTS[fault][0]), known)
-    assert tier.status == "differ"
+    result = compare(replicates(rng, FAULTS[fault][0]), known)
+    assert result.status == "differ"
     assert compare(replicates(rng, scene()), known).status == "agree"
 
 
@@ -101,6 +101,6 @@ def test_a_known_mean_without_certainty_is_inconclusive():
     rng = np.random.default_rng(0)
     candidate = replicates(rng, scene(), noise=0.01)
     known = Known(scene(), np.where(STILL, 0.0, 0.1) * np.ones(3))
-    tier = compare(candidate, known)
-    assert tier.status == "inconclusive"
+    result = compare(candidate, known)
+    assert result.status == "inconclusive"
     assert standard_error(candidate, known)[20:].min() == pytest.approx(math.sqrt(0.1), rel=0.01)

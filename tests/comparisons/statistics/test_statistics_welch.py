@@ -198,9 +198,9 @@ def test_replicates_that_depend_on_each_other_are_too_wide():
 def test_sides_that_share_their_noise_are_invalid():
     rng = np.random.default_rng(0)
     pictures = replicates(rng, scene())
-    tier = compare(pictures, pictures)
-    assert tier.status == "invalid"
-    assert "not independent of each other: mean p-value of the blocks 0.7" in tier.reason
+    result = compare(pictures, pictures)
+    assert result.status == "invalid"
+    assert "not independent of each other: mean p-value of the blocks 0.7" in result.reason
     other = replicates(rng, scene())
     half = scene() + (pictures - scene()) * 0.9 + (other - scene()) * 0.3
     assert compare(half, pictures).status == "invalid"

@@ -157,13 +157,13 @@ def test_the_command_line_changes_each_scene(tmp_path, program):
     for more in ((), ("--spp", 8), ("--size", "8x4"), ("--seed", 5), ("--replicates", 4)):
         result = program(*common, *more)
         assert result.exit_code == 0, result.output
-        pids.add(program.found.cases[0].tiers[0].numbers["process"])
+        pids.add(program.found.cases[0].rungs[0].numbers["process"])
         result = program(*common, *more)
         assert "done before" in result.stderr
-        pids.add(program.found.cases[0].tiers[0].numbers["process"])
+        pids.add(program.found.cases[0].rungs[0].numbers["process"])
     assert len(pids) == 5
     result = program(*common, "--replicates", 4, "--fresh")
-    assert program.found.cases[0].tiers[0].numbers["process"] not in pids
+    assert program.found.cases[0].rungs[0].numbers["process"] not in pids
     assert program(*common, "--spp", 0).exit_code == 2
 
 

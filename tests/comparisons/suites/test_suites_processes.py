@@ -12,11 +12,11 @@ import pytest
 from suite_runs import processes, run_in, scenes
 
 from comparisons.compare.budget import Budget
-from comparisons.results.record import read_case, read_record
+from comparisons.results.stored_case import read_case, read_stored_case
 from comparisons.results.verdict import exit_code
 from comparisons.runs.processes import pool
 from comparisons.suites import run
-from comparisons.suites.archive import read_archive
+from comparisons.suites.stored_results import read_stored_results
 from comparisons.suites.worker import Request
 from reference_rt.util.errors import ReferenceUnavailableError
 
@@ -40,16 +40,16 @@ def test_what_fails_is_reported_and_the_others_go_on(tmp_path):
     assert exit_code(found.cases) == 4  # some could not run
     for case in found.cases:
         rung = "scene" if case.scene == "scene_error" else "run"
-        assert case.tiers[0].name == (rung if case.scene in reasons else "geometry")
+        assert case.rungs[0].name == (rung if case.scene in reasons else "geometry")
     # What could not be run is run again; the rest is not.
     again = run_in(out, folder)
     pids = processes_of(found, "agree")
     assert pids == processes_of(again, "agree")
-    assert read_record(out / "cases" / "crash").key == ""
+    assert read_stored_case(out / "cases" / "crash").key == ""
 
 
 def processes_of(found, verdict):
-    return [c.tiers[0].numbers["process"] for c in found.cases if c.verdict == verdict]
+    return [c.rungs[0].numbers["process"] for c in found.cases if c.verdict == verdict]
 
 
 def test_a_process_that_hangs_is_ended(tmp_path):
@@ -67,7 +67,7 @@ def test_processes_are_shared_out(tmp_path, monkeypatch):
     pids = list(processes(found).values())
     assert pids[0] != pids[1]
     assert max(pids.count(pid) for pid in pids) == 2
-    assert {case.tiers[0].numbers["threads"] for case in found.cases} == {3}
+    assert {case.rungs[0].numbers["threads"] for case in found.cases} == {3}
 
 
 def test_where_no_case_can_run_nothing_is_said_of_any(tmp_path):
@@ -121,4 +121,4 @@ def test_an_interruption_keeps_what_is_done(tmp_path, number):
     for worker in workers:
         with pytest.raises(ProcessLookupError):
             os.kill(int(worker), 0)
-    assert [case.scene for case in read_archive(out).cases] == ["a"]
+    assert [case.scene for case in read_stored_results(out).cases] == ["a"]

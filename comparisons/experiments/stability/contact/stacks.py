@@ -67,14 +67,14 @@ def follow_in_mitsuba(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int)
     """The same in Mitsuba, by `si.spawn_ray`."""
     out = np.full((len(o), steps), -1)
     with scalar() as mi:
-        twin = translate.load(scene, frame.OURS)
+        counterpart = translate.load(scene, frame.OURS)
         for i in range(len(o)):
             ray = mi.Ray3f(mi.Point3f(o[i].tolist()), mi.Vector3f(d[i].tolist()))
             for k in range(steps):
-                si = twin.mi_scene.ray_intersect(ray)
+                si = counterpart.mi_scene.ray_intersect(ray)
                 if not si.is_valid():
                     break
-                out[i, k] = twin.pieces[si.shape.id()].shape
+                out[i, k] = counterpart.mi_shapes[si.shape.id()].shape
                 ray = si.spawn_ray(mi.Vector3f(d[i].tolist()))
     return out
 

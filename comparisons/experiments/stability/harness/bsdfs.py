@@ -17,7 +17,7 @@ from comparisons.experiments.stability.harness.family import Sweep
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import Surroundings
+from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.materials import (
@@ -134,7 +134,7 @@ class Theirs:
 
     @staticmethod
     def of(material: Material) -> "Theirs":
-        around = Surroundings({}, {}, Path(), native=True)
+        around = TranslationContext({}, {}, Path(), native=True)
         return Theirs(mitsuba().load_dict(translate_material(material, around)))
 
     def _seen(self, wo: Any) -> Any:

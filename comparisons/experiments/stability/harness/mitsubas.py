@@ -6,7 +6,7 @@ import reference_rt as rt
 from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.geometry import frame
 from comparisons.mitsuba import counterpart, translate
-from comparisons.mitsuba.hits import Answers
+from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.mitsuba.scene import picture
 
 
@@ -15,7 +15,7 @@ def loaded(scene: rt.Scene) -> Any:
     return translate.load(scene, frame.OURS).mi_scene
 
 
-def traced(scene: rt.Scene, o: FloatArray, d: FloatArray) -> Answers:
+def traced(scene: rt.Scene, o: FloatArray, d: FloatArray) -> MitsubaHits:
     """The closest hits of rays (n, 3) in it."""
     return counterpart.trace(translate.load(scene, frame.OURS), o, d)
 

@@ -18,8 +18,8 @@ from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import contestants, summarise
 from comparisons.experiments.stability.harness.worker import Request
 from comparisons.mitsuba.backend import backend
+from comparisons.runs.fingerprint import code_fingerprint
 from comparisons.runs.processes import pool
-from comparisons.runs.sources import sources_digest
 from reference_rt.util.errors import ReferenceUnavailableError
 
 WORKER = ("comparisons.experiments.stability.harness.worker",)
@@ -95,7 +95,7 @@ def key_of(effort: Effort, seed: int) -> str:
             versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
             versions[name] = ""
-    parts = {"sources": sources_digest(), "versions": versions, "effort": effort, "seed": seed}
+    parts = {"sources": code_fingerprint(), "versions": versions, "effort": effort, "seed": seed}
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 

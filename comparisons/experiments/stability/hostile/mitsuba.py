@@ -47,11 +47,13 @@ def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
         return found
     with contextlib.redirect_stderr(io.StringIO()):
         try:
-            twin = translate.load(scene)  # which takes seconds for curved shapes, for our own part
-            if twin.lacking:
+            counterpart = translate.load(
+                scene
+            )  # which takes seconds for curved shapes, for our own part
+            if counterpart.no_light_reason:
                 return found
             clock.start()
-            pixels = picture(twin.mi_scene, SAMPLES, 0)
+            pixels = picture(counterpart.mi_scene, SAMPLES, 0)
         except UntranslatableError:
             return found
         except Exception as error:  # what Mitsuba refuses, it refuses by various classes

@@ -47,11 +47,11 @@ _CaseFields: type[BaseModel] = create_model(  # type: ignore[call-overload]
 )
 
 
-class RecordError(ImageError):
+class StoredCaseError(ImageError):
     """A stored case is missing, damaged, or not of this version."""
 
 
-class Record(BaseModel):
+class StoredCase(BaseModel):
     """The contents of `case.json`."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
@@ -101,31 +101,31 @@ def read_case(folder: Path) -> Case:
     Pictures come back rounded to float32; arrays and tuples among the numbers of a rung as lists.
     """
     path = folder / CASE
-    record = read_record(folder)
+    record = read_stored_case(folder)
     try:
         fields = _CaseFields.model_validate(_decoded(record.case))
     except ValidationError as error:
-        raise RecordError(f"{path}: is not a stored case: {_first(error)}") from None
+        raise StoredCaseError(f"{path}: is not a stored case: {_first(error)}") from None
     images = _read_pictures(folder / PICTURES, record) if record.pictures else None
     return Case(**{name: getattr(fields, key) for name, key in _KEYS.items()}, images=images)
 
 
-def read_record(folder: Path) -> Record:
+def read_stored_case(folder: Path) -> StoredCase:
     """The contents of `case.json`, without the pictures.  Raises RecordError."""
     path = folder / CASE
     try:
         data = json.loads(read_text(path))
         if isinstance(data, dict) and data.get("schema") != SCHEMA:
-            raise RecordError(f"{path}: has another schema; expected schema {SCHEMA}")
+            raise StoredCaseError(f"{path}: has another schema; expected schema {SCHEMA}")
         data = unsealed(data)
         data["pictures"] = {name: tuple(size) for name, size in data["pictures"].items()}
-        return Record.model_validate(data)
+        return StoredCase.model_validate(data)
     except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
+        raise StoredCaseError(f"{path}: cannot be read: {error.strerror}") from None
     except ValidationError as error:
-        raise RecordError(f"{path}: is not a stored case: {_first(error)}") from None
+        raise StoredCaseError(f"{path}: is not a stored case: {_first(error)}") from None
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise RecordError(f"{path}: is not a stored case") from None
+        raise StoredCaseError(f"{path}: is not a stored case") from None
 
 
 # ---- pictures -----------------------------------------------------------------------------------
@@ -152,12 +152,12 @@ def _write_pictures(
     return {name: picture.shape[:2] for name, picture in pictures.items()}
 
 
-def _read_pictures(path: Path, record: Record) -> Images:
+def _read_pictures(path: Path, record: StoredCase) -> Images:
     try:
         if _digest(path) != record.sha256:
-            raise RecordError(f"{path}: does not have the checksum in {CASE}")
+            raise StoredCaseError(f"{path}: does not have the checksum in {CASE}")
     except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
+        raise StoredCaseError(f"{path}: cannot be read: {error.strerror}") from None
     channels, _ = read_exr(path)
     try:
         pictures = {
@@ -166,7 +166,7 @@ def _read_pictures(path: Path, record: Record) -> Images:
         }
         return Images(**pictures)
     except (KeyError, TypeError):
-        raise RecordError(f"{path}: lacks a picture that {CASE} lists") from None
+        raise StoredCaseError(f"{path}: lacks a picture that {CASE} lists") from None
 
 
 def _digest(path: Path) -> str:

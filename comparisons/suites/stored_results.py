@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from comparisons.results.case import Case
-from comparisons.results.record import CASE, RecordError, read_case
+from comparisons.results.stored_case import CASE, StoredCaseError, read_case
 from comparisons.suites.work import folder_name
 from reference_rt.util.files import read_text
 
 
-class Archive(NamedTuple):
+class StoredResults(NamedTuple):
     """cases: with their pictures, in order;  provenance: versions, machine, date;  suite: its name;
     not_run: why other cases were skipped, by name;  missing: names of cases that an interrupted run
     did not reach."""
@@ -22,13 +22,13 @@ class Archive(NamedTuple):
     missing: tuple[str, ...] = ()
 
 
-def check_archive(folder: Path) -> None:
-    """Raise RecordError if the folder has nothing that `read_archive` could read."""
+def check_stored_results(folder: Path) -> None:
+    """Raise RecordError if the folder has nothing that `read_stored_results` could read."""
     if not (folder / "results.json").exists() and not (folder / "cases").is_dir():
         raise _no_case(folder)
 
 
-def read_archive(folder: Path) -> Archive:
+def read_stored_results(folder: Path) -> StoredResults:
     """The stored results of the cases that the folder's `results.json` names; without that file,
     all stored results.  Raises RecordError."""
     path = folder / "results.json"
@@ -43,16 +43,16 @@ def read_archive(folder: Path) -> Archive:
         names = sorted(record.parent.name for record in records.glob(f"*/{CASE}"))
         provenance, suite, not_run = {}, None, {}
     except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
+        raise StoredCaseError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise RecordError(f"{path}: was not written by `suite` or `compare`") from None
+        raise StoredCaseError(f"{path}: was not written by `suite` or `compare`") from None
     if not names and not missing:
         raise _no_case(folder)
     cases = tuple(read_case(records / name) for name in names)
-    return Archive(cases, provenance, suite, not_run, missing)
+    return StoredResults(cases, provenance, suite, not_run, missing)
 
 
-def _no_case(folder: Path) -> RecordError:
-    return RecordError(
+def _no_case(folder: Path) -> StoredCaseError:
+    return StoredCaseError(
         f"{folder}: has no cases; expected the output folder of `reference-rt suite` or `compare`"
     )

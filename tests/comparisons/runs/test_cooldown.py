@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from comparisons.runs.settling import settle
+from comparisons.runs.cooldown import cool_down
 
 
 class Clock:
@@ -34,17 +34,17 @@ def clock(monkeypatch):
 @pytest.mark.parametrize("threads", [0.5, 1, 2])
 def test_waits_until_all_threads_rest(clock, threads):
     now = clock(threads, rests=0.02)
-    settle()
+    cool_down()
     assert 0.02 <= now.now < 0.04
 
 
 def test_a_process_at_rest_hardly_waits(clock):
     now = clock(1, rests=0.0)
-    settle()
+    cool_down()
     assert now.now < 0.01
 
 
 def test_does_not_wait_for_ever(clock):
     now = clock(1, rests=1e9)
-    settle(longest=0.5)
+    cool_down(longest=0.5)
     assert 0.5 <= now.now < 0.52

@@ -10,7 +10,7 @@ _COMPARISONS = Path(__file__).parents[1]
 
 
 @functools.cache
-def sources_digest(*excluded: str) -> str:
+def code_fingerprint(*excluded: str) -> str:
     """SHA-256 of the sources of both packages, without the `excluded` modules and packages of
     `comparisons`."""
     digest = hashlib.sha256()

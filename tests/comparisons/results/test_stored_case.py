@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from comparisons.results.case import Case, Cause, Images, Metrics, Place, Tier
-from comparisons.results.record import (
+from comparisons.results.case import Case, Cause, ImageRegion, Images, Metrics, RungResult
+from comparisons.results.stored_case import (
     CASE,
     PICTURES,
-    RecordError,
+    StoredCaseError,
     read_case,
-    read_record,
+    read_stored_case,
     write_case,
 )
 from reference_rt.core.exr import read_exr
@@ -35,14 +35,14 @@ def case(images=None, **changes):
         "scene",
         "differ",
         "geometry: 1 ray of 3 differs",
-        (Tier("geometry", "differ", "1 ray", numbers), Tier("images", "agree", "same")),
+        (RungResult("geometry", "differ", "1 ray", numbers), RungResult("images", "agree", "same")),
         Metrics(math.nan, 0.1, math.inf, 0.5, 1e300, (0.0, -math.inf, -0.01), 0),
         {"candidate": {"load": 0.1}, "reference": {}},
         images,
         ("a note",),
         ("yours", "ours"),
         Cause("half-pixel shift", "0.5 pixels", 0.99),
-        (Place(1, 2, 3, 4, "darker"),),
+        (ImageRegion(1, 2, 3, 4, "darker"),),
         ("textures: none",),
         "reference-rt suite smoke --only scene",
     )
@@ -63,14 +63,14 @@ def test_everything_but_pictures_comes_back_exactly(tmp_path):
     write_case(tmp_path, written, "key", 1.25)
     read = read_case(tmp_path)
     for field in dataclasses.fields(Case):
-        if field.name not in ("tiers", "metrics"):
+        if field.name not in ("rungs", "metrics"):
             assert getattr(read, field.name) == getattr(written, field.name), field.name
     assert same(dataclasses.astuple(read.metrics), dataclasses.astuple(written.metrics))
-    expected = dict(written.tiers[0].numbers)
+    expected = dict(written.rungs[0].numbers)
     expected |= {"array": [0.0, 1.0, 2.0, 3.0], "numpy": 0.1, "flag": True}
-    assert same(read.tiers[0].numbers, expected)
-    assert read.tiers[1] == written.tiers[1]
-    record = read_record(tmp_path)
+    assert same(read.rungs[0].numbers, expected)
+    assert read.rungs[1] == written.rungs[1]
+    record = read_stored_case(tmp_path)
     assert (record.key, record.wall) == ("key", 1.25)
     assert not (tmp_path / PICTURES).exists()
 
@@ -125,7 +125,7 @@ def test_pictures_of_another_record_are_refused(tmp_path):
     write_case(tmp_path / "a", case(Images(np.ones((2, 2, 3)), np.ones((2, 2, 3)))))
     write_case(tmp_path / "b", case(Images(np.ones((2, 2, 3)), np.zeros((2, 2, 3)))))
     (tmp_path / "b" / PICTURES).replace(tmp_path / "a" / PICTURES)
-    with pytest.raises(RecordError, match=r"pictures\.exr: does not have the checksum"):
+    with pytest.raises(StoredCaseError, match=r"pictures\.exr: does not have the checksum"):
         read_case(tmp_path / "a")
 
 
@@ -168,7 +168,7 @@ def drop_reason(document):
         change("key", 3),
         drop_reason,
         lambda document: document["case"].update(verdict="fine"),
-        lambda document: document["case"].update(tiers=3),
+        lambda document: document["case"].update(rungs=3),
         lambda document: document["case"].update(unknown=3),
     ],
 )
@@ -177,7 +177,7 @@ def test_what_was_edited_is_refused_in_one_line(tmp_path, edit):
     document = json.loads((tmp_path / CASE).read_text())
     edit(document)
     (tmp_path / CASE).write_text(json.dumps(document))
-    with pytest.raises(RecordError) as error:
+    with pytest.raises(StoredCaseError) as error:
         read_case(tmp_path)
     assert "\n" not in str(error.value)
     assert str(tmp_path) in str(error.value)
@@ -186,7 +186,7 @@ def test_what_was_edited_is_refused_in_one_line(tmp_path, edit):
 @pytest.mark.parametrize("text", ["", "{", "[]", "3", "null", '"x"', "\udcff", "[" * 100_000])
 def test_what_is_no_record_is_refused(tmp_path, text):
     (tmp_path / CASE).write_bytes(text.encode(errors="surrogateescape"))
-    with pytest.raises(RecordError, match=r"case\.json"):
+    with pytest.raises(StoredCaseError, match=r"case\.json"):
         read_case(tmp_path)
 
 
@@ -200,9 +200,9 @@ def test_truncated_files_are_refused(tmp_path):
         (tmp_path / name).write_bytes(whole)
     read_case(tmp_path)
     (tmp_path / PICTURES).unlink()
-    with pytest.raises(RecordError, match="cannot be read: No such file"):
+    with pytest.raises(StoredCaseError, match="cannot be read: No such file"):
         read_case(tmp_path)
-    with pytest.raises(RecordError, match="cannot be read: No such file"):
+    with pytest.raises(StoredCaseError, match="cannot be read: No such file"):
         read_case(tmp_path / "nowhere")
 
 

@@ -9,7 +9,7 @@ _BUSY = 0.1
 between the checks far less."""
 
 
-def settle(longest: float = 1.0) -> None:
+def cool_down(longest: float = 1.0) -> None:
     """Wait until no thread of this process is busy, at most `longest` seconds.
 
     Dr.Jit's threads spin for 20 ms after their last task.  Kernels started in that time, with as
