@@ -108,7 +108,7 @@ def test_of_many_pictures_groups_are_kept() -> None:
 def test_one_picture_has_no_variance(files: list[str]) -> None:
     result = accepted(files[:1])
     assert result.exit_code == 0
-    assert "note: of one picture the noise is not known" in result.output
+    assert "note: the noise of a single picture is unknown" in result.output
     assert set(record()["files"]) == {"picture-00.exr"}
     assert not baselines.load(Path("baselines"), "ball").reference().noise_free
     assert "note" not in accepted(files[:1], "--noise-free").output
@@ -153,7 +153,7 @@ def test_what_is_not_accepted(files: list[str]) -> None:
             2,
             "'../x' is not a valid name of a baseline",
         ),
-        ([files[0], "--name", ".hidden", "--reason", "r"], 2, "'.hidden' is no name"),
+        ([files[0], "--name", ".hidden", "--reason", "r"], 2, "'.hidden' is not a valid name"),
         ([files[0], "--name", "ball", "--reason", "  "], 2, "--reason: is empty; expected why"),
         ([files[0], "--name", "ball"], 2, "with --name and --reason"),
         (["--name", "ball", "--reason", "r"], 2, "expected CANDIDATE..."),
@@ -196,7 +196,7 @@ def test_edited_by_hand(files: list[str], edit: str) -> None:
             del written["seal"], written["files"]
         (folder / "baseline.json").write_text(json.dumps(written))
     with pytest.raises(
-        BaselineEditedError, match=r"is not what .*accepte?d?.*; restore it, or acc"
+        BaselineEditedError, match=r"has changed since .*accepte?d?.*; restore it, or acc"
     ):
         baselines.load(Path("baselines"), "ball").reference()
     assert BaselineEditedError.exit_code == 3

@@ -86,9 +86,9 @@ def test_each_seed_has_its_picture(renderer: str, tmp_path: Path) -> None:
             "nothing",
             "ended without an error with seed 1, but wrote no file; expected candidate-00.npy",
         ),
-        ("beside", "another place with seed 1: mine.npy in the same folder; expected candidate-00"),
-        ("here", "another place with seed 1: mine.npy in the working folder; expected candidate"),
-        ("folder", "another place with seed 1: candidate-00.npy in the same folder"),
+        ("beside", "another file with seed 1: mine.npy in the same folder; expected candidate-00"),
+        ("here", "another file with seed 1: mine.npy in the working folder; expected candidate"),
+        ("folder", "another file with seed 1: candidate-00.npy in the same folder"),
     ],
 )
 def test_failures(renderer: str, tmp_path: Path, how: str, message: str) -> None:

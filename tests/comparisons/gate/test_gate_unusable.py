@@ -101,7 +101,7 @@ def test_replicates_must_be_independent(right: FloatArray) -> None:
 def test_wrong_usage(right: FloatArray) -> None:
     candidate = write("c.exr", right[0])
     for arguments, message in (
-        ([candidate], "expected a scene, a reference or a baseline"),
+        ([candidate], "expected a scene, reference or baseline"),
         (["--scene", "ball.yaml"], "expected either candidates or --command"),
         ([candidate, "--command", "x {output}"], "expected either candidates or --command"),
         ([candidate, "--scene", "ball.yaml", "--spp", "3"], "--spp: only applies to --command"),

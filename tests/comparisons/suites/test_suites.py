@@ -28,7 +28,7 @@ pytestmark = pytest.mark.usefixtures("fake_runners")
         ("about: x\ndefaults:\n  limit: -1\n", "s.yaml:3: defaults.limit: expected greater"),
         ("about: x\n\nscenes: {a: {size: [3]}}\n", "s.yaml:3: scenes.a.size"),
         ("about: x\nscenes:\n  a: {skip: ''}\n", "s.yaml:3: scenes.a.skip"),
-        ("about: x\nscenes:\n  a: {control: true}\n", "s.yaml:3: scenes.a.control: is told by"),
+        ("about: x\nscenes:\n  a: {control: true}\n", "s.yaml:3: scenes.a.control: cannot be set"),
         ("defaults: {}\n", "s.yaml:1: about: missing"),
         ("about: x\nabout: y\n", "s.yaml:2: malformed"),
         ("about: [\n", "s.yaml:2: malformed"),
