@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict
 from comparisons.compare.budget import Budget
 from comparisons.results.case import WARNING, Case
 from comparisons.results.stored_case import write_case
-from comparisons.runs.processes.protocol import carry_out, private_stdout, tell
+from comparisons.runs.processes.protocol import carry_out, private_stdout, send
 from comparisons.suites.work import Changes
 from reference_rt.cli.main import scene_warnings
 from reference_rt.rendering.scene import Scene
@@ -63,7 +63,7 @@ def main() -> None:
     try:
         runner: Runner = getattr(importlib.import_module(module), name)
     except ModuleNotFoundError as error:
-        tell(answers, unavailable=f"comparing needs {error.name}")
+        send(answers, unavailable=f"comparing needs {error.name}")
         return
     for line in sys.stdin:
         answer(Request.model_validate_json(line), runner, options.threads, answers)
@@ -79,7 +79,7 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
             case = runner(
                 request.changes.load(request.scene),
                 request.budget,
-                lambda text: tell(answers, say=text),
+                lambda text: send(answers, say=text),
                 threads=threads,
                 rungs=request.rungs,
             )

@@ -27,7 +27,7 @@ def private_stdout() -> TextIO:
     return answers
 
 
-def tell(answers: TextIO, **message: Any) -> None:
+def send(answers: TextIO, **message: Any) -> None:
     """Write one line of the protocol."""
     print(json.dumps(message), file=answers, flush=True)
 
@@ -39,13 +39,13 @@ def carry_out(task: Callable[[], None], answers: TextIO) -> None:
     except BrokenPipeError:  # nobody listens any more
         raise
     except ReferenceUnavailableError as error:
-        tell(answers, unavailable=str(error))
+        send(answers, unavailable=str(error))
     except SceneError as error:
-        tell(answers, invalid=str(error))
+        send(answers, invalid=str(error))
     except ReferenceRtError as error:
-        tell(answers, failed=str(error))
+        send(answers, failed=str(error))
     except (Exception, SystemExit) as error:
         traceback.print_exc()
-        tell(answers, failed=f"{type(error).__name__}: {' '.join(str(error).split())}")
+        send(answers, failed=f"{type(error).__name__}: {' '.join(str(error).split())}")
     else:
-        tell(answers, done=True)
+        send(answers, done=True)
