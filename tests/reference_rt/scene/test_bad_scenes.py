@@ -222,7 +222,7 @@ WRONG = {
         "",
         "malformed: unknown tag '!!python/",
     ),
-    "a list in itself": ("shapes: &a [*a]", 1, "", "malformed: the alias 'a' stands inside what"),
+    "a list in itself": ("shapes: &a [*a]", 1, "", "malformed: the alias 'a' is inside its"),
     "no number": (
         "description: !!float xyz",
         1,
