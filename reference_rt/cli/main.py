@@ -76,7 +76,7 @@ def say(text: str, err: bool = False) -> None:
 def lost_output(error: BaseException) -> str:
     """The message for a failed print."""
     reason = getattr(error, "strerror", None)
-    return f"standard output cannot be written: {reason}; expected a place with room"
+    return f"standard output cannot be written: {reason}; expected free space"
 
 
 def is_output_lost(error: BaseException) -> bool:
@@ -143,7 +143,7 @@ def render(
         err=True,
     )
     if not picture.layers[picture.shown].any():
-        description.warn("the picture is black: the camera sees nothing that shines", "camera")
+        description.warn("the picture is black: no light reaches the camera", "camera")
     bad = picture.nonfinite_pixels
     if len(bad) > 0:
         places = ", ".join(f"({x}, {y})" for x, y in bad[:4])

@@ -135,7 +135,7 @@ def _darkness(scene: SceneModel, tables: SceneTables) -> Iterator[Mistake]:
     else:
         reason = "there are no lights and no emissive materials"
     yield Mistake(
-        f"nothing shines, so the picture is black: {reason}; expected a light, or "
+        f"no light, so that the picture is black: {reason}; expected a light, or "
         "integrator 'ray_cast', which needs none",
         ("lights",) if "lights" in scene.model_fields_set else (),
     )

@@ -111,7 +111,7 @@ class SceneModel(Description):
             self._check_material(base, "materials", name, field)
             if base is not None and isinstance(self.materials[base], Emissive):
                 raise SceneError(
-                    f"'{base}' is emissive itself; expected what it scatters like",
+                    f"'{base}' is emissive itself; expected a material that only scatters",
                     ("materials", name, field),
                 )
 
@@ -120,8 +120,8 @@ class SceneModel(Description):
         if isinstance(shape, Solid):
             if path.count("of") >= MOST_NESTED:
                 raise SceneError(
-                    f"set operations in each other, deeper than {MOST_NESTED}; expected fewer: one "
-                    "may have any number of operands",
+                    f"set operations nest deeper than {MOST_NESTED}; expected fewer levels: one "
+                    "operation may have any number of operands",
                     path,
                 )
             for k, operand in enumerate(shape.of):

@@ -146,7 +146,7 @@ class _Reader:
     def alias(self, event: Any) -> Any:
         if event.anchor not in self.anchors:
             if any(part.start.anchor == event.anchor for part in self.open):
-                raise _malformed(f"the alias '{event.anchor}' stands inside what it names", event)
+                raise _malformed(f"the alias '{event.anchor}' is inside its own anchor", event)
             raise _malformed(f"found undefined alias '{event.anchor}'", event)
         value, size = self.anchors[event.anchor]
         self.read += size

@@ -1,8 +1,8 @@
 """Planar polygon of one or more rings: even-odd, winding number and angle sum (row T9).
 
 All intersect the plane, project along the largest axis of the normal, and test in two dimensions
-whether the point is inside.  There, vertices are relative to the point.  Costs are per edge, beside
-10 +, 9 *, 1 / for the plane.
+whether the point is inside.  There, vertices are relative to the point.  Costs are per edge,
+beside 10 +, 9 *, 1 / for the plane.
 """
 
 import math

@@ -63,7 +63,7 @@ def radiance(
     if isinstance(integrator, RayCast):
         if integrator.show != "colour":
             raise ValueError(
-                f"integrator: shows '{integrator.show}', which is no light; expected 'colour', or "
+                f"integrator: shows '{integrator.show}', not radiance; expected 'colour', or "
                 "see `intersect`"
             )
         mean = _colours(tables, rays, threads)

@@ -28,8 +28,7 @@ def test_a_full_disk(arguments):
             [*PROGRAM, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
     assert done.stderr == (
-        "error: standard output cannot be written: No space left on device; expected a place with "
-        "room\n"
+        "error: standard output cannot be written: No space left on device; expected free space\n"
     )
     assert done.returncode == 3
 

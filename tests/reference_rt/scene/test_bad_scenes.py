@@ -94,7 +94,7 @@ WRONG = {
     "python object": ("film: !!python/object/apply:os.system ['exit 1']", 1, "",
      "malformed: unknown tag '!!python/"),
     "python name": ("film: !!python/name:os.system", 1, "", "malformed: unknown tag '!!python/"),
-    "a list in itself": ("shapes: &a [*a]", 1, "", "malformed: the alias 'a' stands inside what"),
+    "a list in itself": ("shapes: &a [*a]", 1, "", "malformed: the alias 'a' is inside its"),
     "no number": ("description: !!float xyz", 1, "",
      "malformed: 'xyz' is no 'float', as its tag says"),
     "endless number": ("description: " + "9" * 5000, 1, "", "malformed: Exceeds the limit"),

@@ -144,4 +144,4 @@ def test_a_black_picture_is_reported(tmp_path):
     file.write_text(CAST + away + "film: {width: 2, height: 2}\n" + BALL)
     result = CliRunner().invoke(app, ["render", str(file), "-o", str(tmp_path / "out.png")])
     assert result.exit_code == 0
-    assert "the picture is black: the camera sees nothing" in result.stderr
+    assert "the picture is black: no light reaches" in result.stderr
