@@ -37,7 +37,7 @@ def in_plain_python(test_file: str, function: str, *arguments: Path) -> None:
     file = Path(test_file)
     subprocess.run(
         [sys.executable, "-c", _PLAIN, str(file.parent), file.stem, function, *map(str, arguments)],
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(HELPERS)},
         check=True,
     )
 
