@@ -1,6 +1,7 @@
 """reference_rt stands alone: no Mitsuba, no Dr.Jit, nothing of the comparisons."""
 
 import ast
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import reference_rt
+from reference_rt import textbook
 
 PACKAGE = Path(reference_rt.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
@@ -47,3 +49,17 @@ def test_public_names_exist():
     for name in reference_rt.__all__:
         assert hasattr(reference_rt, name)
     assert list(reference_rt.__all__) == sorted(reference_rt.__all__)
+
+
+def test_former_names_of_modules_work():
+    """Scripts that import the documented modules of earlier versions."""
+    from reference_rt import query, transform
+    from reference_rt.core import transform as core_transform
+    from reference_rt.rendering import query as rendering_query
+
+    assert all(getattr(query, name) is getattr(rendering_query, name) for name in query.__all__)
+    assert transform.affine is core_transform.affine
+    sys.modules.pop("reference_rt.methods", None)
+    with pytest.warns(DeprecationWarning, match=r"is now reference_rt\.textbook"):
+        methods = importlib.import_module("reference_rt.methods")
+    assert methods.METHODS is textbook.METHODS
