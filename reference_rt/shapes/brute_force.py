@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Crossing, Hit, Ray, miss, no_hit
 from reference_rt.core.ray_block import HitBlock, RayBlock, ray_of
-from reference_rt.core.vec3 import row, triple
+from reference_rt.core.vec3 import row
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
@@ -211,6 +211,4 @@ def _nearer_boxes(
 ) -> None:
     if boxes is not None:
         for i in range(len(boxes.owner)):
-            of = boxes.to_local
-            shape = (row(boxes.center, i), triple(of, i, 0), triple(of, i, 1), triple(of, i, 2))
-            box.nearer(rays.numbers, at, shape, BOX * _KIND + i, t, codes)
+            box.nearer(rays.numbers, at, box.arguments(boxes, i), BOX * _KIND + i, t, codes)

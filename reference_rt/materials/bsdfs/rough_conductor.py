@@ -11,7 +11,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, dot, reflect, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.metal import Metal
-from reference_rt.materials.material import BsdfSample, Scattered, no_sample
+from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import conductor_colour
 from reference_rt.materials.microfacet.ggx_and_smith import (
     AlphaParameter,
@@ -83,12 +83,12 @@ def sample(
 ) -> BsdfSample:
     """wo reflected at a visible microfacet: the weight is F G1(wi)."""
     if wo.z <= 0.0:
-        return no_sample()
+        return NO_SAMPLE
     m = microfacets_at(conductors.roughness, i, at)
     h = sample_visible(m, wo, u0, u1)
     wi = reflect(wo, h)
     density_of_wi = 0.25 * g1_over_cos(m, wo) * density(m, h)
     if wi.z <= 0.0 or density_of_wi == 0.0:
-        return no_sample()
+        return NO_SAMPLE
     weight = _mirrored(conductors, i, at, dot(wo, h)) * g1(m, wi)
     return BsdfSample(wi, weight, density_of_wi, 1.0, False)

@@ -20,7 +20,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.transparent import Transparent
-from reference_rt.materials.material import BsdfSample, Scattered, no_sample
+from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
 from reference_rt.materials.microfacet.ggx_and_smith import (
     AlphaParameter,
@@ -152,7 +152,7 @@ def sample(
     """wo reflected or refracted at a visible microfacet."""
     side = wo.z
     if side == 0.0:
-        return no_sample()
+        return NO_SAMPLE
     wo = _upwards(wo, side)
     m = microfacets_at(dielectrics.roughness, i, at)
     h = sample_visible(m, wo, u0, u1)
@@ -162,7 +162,7 @@ def sample(
         wi = reflect(wo, h)
         density_of_wi = facet.share * _mirrored_density(m, wo, h)
         if wi.z <= 0.0 or density_of_wi == 0.0:
-            return no_sample()
+            return NO_SAMPLE
         weight = facet.mirrored * (g1(m, wi) / facet.share)
         return BsdfSample(_upwards(wi, side), weight, density_of_wi, 1.0, False)
     eta, gap = refraction.eta, refraction.gap
@@ -170,6 +170,6 @@ def sample(
     spread = refraction.cos_t / (gap * gap)  # wo + eta wi is eta gap h
     density_of_wi = facet.passing * visible_density(m, wo, h) * spread
     if wi.z >= 0.0 or not density_of_wi > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     weight = facet.refracted * (g1(m, wi) / (facet.passing * eta * eta))
     return BsdfSample(_upwards(wi, side), weight, density_of_wi, eta, False)
