@@ -62,13 +62,7 @@ def _from_point(
 
 @kernel
 def _texture_coordinates(
-    textures: Textures | None,
-    areas: Areas,
-    i: int,
-    shapes: Shapes,
-    p: Vec3,
-    w: Vec3,
-    q: LightPoint,
+    textures: Textures | None, areas: Areas, i: int, shapes: Shapes, p: Vec3, w: Vec3, q: LightPoint
 ) -> At:
     """The texture coordinates at a point q of light i."""
     none = Vec3(-1.0, -1.0, -1.0)

@@ -11,17 +11,15 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, dot, reflect, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.metal import Metal
+from reference_rt.materials.bsdfs.rough import Rough
 from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import conductor_colour
 from reference_rt.materials.microfacet.ggx_and_smith import (
-    AlphaParameter,
-    Distribution,
     Roughnesses,
     density,
     g1,
     g1_over_cos,
     half_vector,
-    is_anisotropic,
     microfacets_at,
     roughnesses,
     sample_visible,
@@ -29,18 +27,11 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
 from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class RoughConductor(Metal):
+class RoughConductor(Rough, Metal):
     """A rough metal; its back is black."""
 
-    smooth: ClassVar[bool] = True
     uses_u_lobe: ClassVar[bool] = False
     type: Literal["rough_conductor"] = "rough_conductor"
-    distribution: Distribution = "ggx"
-    alpha: AlphaParameter = (0.1, 0.1)
-
-    @property
-    def oriented(self) -> bool:
-        return is_anisotropic(self.alpha)
 
     def tabulate(self, palette: Palette) -> "RoughConductors":
         return RoughConductors(

@@ -12,26 +12,24 @@ inside 1 %, 10 % and 58 %.
 """
 
 import math
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import model_validator
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
+from reference_rt.materials.bsdfs.rough import Rough
 from reference_rt.materials.bsdfs.transparent import Transparent
 from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
 from reference_rt.materials.microfacet.ggx_and_smith import (
-    AlphaParameter,
-    Distribution,
     Microfacets,
     Roughnesses,
     density,
     g1,
     g1_over_cos,
     half_vector,
-    is_anisotropic,
     microfacets_at,
     refract,
     refraction_half,
@@ -42,13 +40,10 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
 from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class RoughDielectric(Transparent):
+class RoughDielectric(Rough, Transparent):
     """A rough boundary of two transparent media; the normal points to the exterior."""
 
-    smooth: ClassVar[bool] = True
     type: Literal["rough_dielectric"] = "rough_dielectric"
-    distribution: Distribution = "ggx"
-    alpha: AlphaParameter = (0.1, 0.1)
 
     @model_validator(mode="after")
     def _bends(self) -> "RoughDielectric":
@@ -60,10 +55,6 @@ class RoughDielectric(Transparent):
                 "expected indices that differ by a billionth or more"
             )
         return self
-
-    @property
-    def oriented(self) -> bool:
-        return is_anisotropic(self.alpha)
 
     def tabulate(self, palette: Palette) -> "RoughDielectrics":
         return RoughDielectrics(
