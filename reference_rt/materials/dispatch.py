@@ -31,13 +31,13 @@ class Materials(NamedTuple):
     kind (n,), row (n,): the table and row of a material's BSDF, without layers; kind is None if
     there is only one table, row is None too if material m is row m of it.
     smooth (n,): whether lights can be sampled; None if all are smooth.
-    chooses (n,): whether `sample` uses `u_lobe`; None if none does.
+    uses_u_lobe (n,): whether `sample` uses `u_lobe`; None if none does.
     behind (n,): whether light from both sides of the surface counts; None if it never does.
     shown (n): the colour for ray casting.
     oriented (1,): present if any material is anisotropic, or tilted by a texture.
     asks (n,): whether a texture is used; None if all or none use one.
     textured: None if no colour is textured.
-    layers: None if no material is made of others.
+    flat_leaves: None if no material is made of others.
     leaves: the tables of BSDFs.
     """
 

@@ -23,15 +23,7 @@ from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.meshes.watertight import shear_of
 from reference_rt.shapes.ray_simd import begin, end
 from reference_rt.shapes.shape import nearest_lane
-from reference_rt.shapes.tables import (
-    BOX,
-    RECTANGLE,
-    SPHERE,
-    TABLES,
-    TRIANGLE,
-    Shapes,
-    of_table,
-)
+from reference_rt.shapes.tables import BOX, RECTANGLE, SPHERE, TABLES, TRIANGLE, Shapes, of_table
 
 
 class Packets(NamedTuple):

@@ -35,8 +35,7 @@ class RoughConductor(Rough, Metal):
 
     def tabulate(self, palette: Palette) -> "RoughConductors":
         return RoughConductors(
-            **self.columns(palette),
-            roughness=roughnesses(self.distribution, self.alpha, palette),
+            **self.columns(palette), roughness=roughnesses(self.distribution, self.alpha, palette)
         )
 
 

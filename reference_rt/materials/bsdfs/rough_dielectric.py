@@ -58,8 +58,7 @@ class RoughDielectric(Rough, Transparent):
 
     def tabulate(self, palette: Palette) -> "RoughDielectrics":
         return RoughDielectrics(
-            **self.columns(palette),
-            roughness=roughnesses(self.distribution, self.alpha, palette),
+            **self.columns(palette), roughness=roughnesses(self.distribution, self.alpha, palette)
         )
 
 
