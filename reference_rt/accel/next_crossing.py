@@ -166,17 +166,7 @@ def _of_reference(
         if kind == SOLID:
             none, no_parts = local_floats(0), local_integers(0)
             _, found = evaluate.surface_along(
-                solids,
-                shapes,
-                bvh,
-                row,
-                ray,
-                best.hit.t,
-                none,
-                none,
-                no_parts,
-                instance,
-                after,
+                solids, shapes, bvh, row, ray, best.hit.t, none, none, no_parts, instance, after
             )
             return _first(found, after, best)
     return _of_primitive(shapes, kind, row, ray, shear, instance, after, best)

@@ -49,9 +49,7 @@ Edges = Annotated[
     tuple[float, float, float, float],
     Strict(False),
     BeforeValidator(_edges),
-    WithJsonSchema(
-        {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4},
-    ),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}),
 ]
 """[l, r, b, t] in scene units, l < r and b < t; (0, 0) is where the axis of view passes."""
 

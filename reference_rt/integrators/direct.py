@@ -21,7 +21,7 @@ from reference_rt.integrators.shading import shade, texture_place
 from reference_rt.jit.kernel import kernel, local_floats
 from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
-from reference_rt.sampling import draw_pair
+from reference_rt.sampling import Sample, draw_pair
 
 _Count = Annotated[int, Field(ge=0, le=1024)]
 
@@ -58,7 +58,7 @@ class DirectSetup(NamedTuple):
 
 
 @kernel
-def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
+def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> Vec3:
     """An unbiased estimate of the radiance along `ray`, by paths of at most two edges."""
     lights = scene.lights
     hit = closest_hit(scene.geometry, ray)
@@ -79,12 +79,7 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: sampling
 
 @kernel
 def _light_sample(
-    setup: DirectSetup,
-    scene: SceneTables,
-    shading: Shading,
-    normal: Vec3,
-    sampler: sampling.Sample,
-    k: int,
+    setup: DirectSetup, scene: SceneTables, shading: Shading, normal: Vec3, sampler: Sample, k: int
 ) -> Vec3:
     """What light sample k of n adds to the estimate: its MIS-weighted f |cos| L_e / (n pdf)."""
     black = Vec3(0.0, 0.0, 0.0)
@@ -109,12 +104,7 @@ def _light_sample(
 
 @kernel
 def _bsdf_sample(
-    setup: DirectSetup,
-    scene: SceneTables,
-    shading: Shading,
-    normal: Vec3,
-    sampler: sampling.Sample,
-    k: int,
+    setup: DirectSetup, scene: SceneTables, shading: Shading, normal: Vec3, sampler: Sample, k: int
 ) -> Vec3:
     """What BSDF sample k of m adds to the estimate: its MIS-weighted f |cos| L_e / (m pdf)."""
     black = Vec3(0.0, 0.0, 0.0)

@@ -46,7 +46,7 @@ from reference_rt.jit.kernel import kernel, local_floats
 from reference_rt.lights import shadow_ray
 from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
-from reference_rt.sampling import Samplers, draw_pair, sampler_of
+from reference_rt.sampling import Sample, Samplers, draw_pair, sampler_of
 
 UNLIMITED = 2**31
 ROULETTE_CAP = 0.999
@@ -113,7 +113,7 @@ class LightConnection(NamedTuple):
 
 
 @kernel
-def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
+def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> Vec3:
     """An unbiased estimate of the radiance that arrives at the origin of `ray` from its
     direction."""
     total = Vec3(0.0, 0.0, 0.0)
@@ -228,12 +228,7 @@ def _mis_weight(only: int | None, strategy: int, pdf: float, other: float) -> fl
 
 @kernel
 def _next_event_estimation(
-    path: PathSetup,
-    scene: SceneTables,
-    state: State,
-    shading: Shading,
-    sampler: sampling.Sample,
-    depth: int,
+    path: PathSetup, scene: SceneTables, state: State, shading: Shading, sampler: Sample, depth: int
 ) -> LightConnection:
     """Direct light of one randomly selected light: throughput f |cos| L_e / pdf, MIS-weighted
     against BSDF sampling.  Random numbers that decide nothing are not drawn."""
@@ -264,12 +259,7 @@ def _next_event_estimation(
 
 @kernel
 def _scatter(
-    path: PathSetup,
-    scene: SceneTables,
-    state: State,
-    shading: Shading,
-    sampler: sampling.Sample,
-    depth: int,
+    path: PathSetup, scene: SceneTables, state: State, shading: Shading, sampler: Sample, depth: int
 ) -> Step:
     """Sample the BSDF at the surface that edge number `depth` has hit; apply Russian roulette."""
     point, dimension = shading.point, sampling.PER_BOUNCE * depth

@@ -11,7 +11,6 @@ from pydantic import Field
 
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
-from reference_rt import sampling
 from reference_rt.accel.geometry import closest_hit
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
@@ -24,6 +23,7 @@ from reference_rt.jit.kernel import kernel, local_floats
 from reference_rt.lights import ENVIRONMENT, LightSampler
 from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
+from reference_rt.sampling import Sample
 
 
 class Whitted(Description):
@@ -66,7 +66,7 @@ def _vector(stack: FloatArray, k: int) -> Vec3:
 
 
 @kernel
-def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: sampling.Sample) -> Vec3:
+def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> Vec3:
     """The radiance along `ray`: a depth-first walk of the ray tree with an explicit stack.  Each
     level leaves at most all its branches but one on the stack."""
     waiting = 2 * any_material.most_branches(scene.materials) - 1

@@ -48,6 +48,20 @@ class Mask:
         return Mask(self.builder, self.builder.not_(self.value))
 
 
+def _arithmetic(
+    instruction: str, is_reflected: bool = False
+) -> Callable[["SimdVector", Any], "SimdVector"]:
+    """The method of an operator: it emits `self` op `other`, or, reflected, `other` op `self`."""
+
+    def emit(self: "SimdVector", other: Any) -> "SimdVector":
+        a, b = self.value, self.of(other)
+        if is_reflected:
+            a, b = b, a
+        return SimdVector(self.builder, getattr(self.builder, instruction)(a, b))
+
+    return emit
+
+
 class SimdVector:
     """A vector of VECTOR_WIDTH float64 in the code that is being generated."""
 
@@ -81,23 +95,9 @@ class SimdVector:
     def compared(self, how: str, other: Any) -> Mask:
         return Mask(self.builder, self.builder.fcmp_ordered(how, self.value, self.of(other)))
 
-    def __add__(self, other: Any) -> "SimdVector":
-        return SimdVector(self.builder, self.builder.fadd(self.value, self.of(other)))
-
-    def __sub__(self, other: Any) -> "SimdVector":
-        return SimdVector(self.builder, self.builder.fsub(self.value, self.of(other)))
-
-    def __rsub__(self, other: Any) -> "SimdVector":
-        return SimdVector(self.builder, self.builder.fsub(self.of(other), self.value))
-
-    def __mul__(self, other: Any) -> "SimdVector":
-        return SimdVector(self.builder, self.builder.fmul(self.value, self.of(other)))
-
-    def __truediv__(self, other: Any) -> "SimdVector":
-        return SimdVector(self.builder, self.builder.fdiv(self.value, self.of(other)))
-
-    def __rtruediv__(self, other: Any) -> "SimdVector":
-        return SimdVector(self.builder, self.builder.fdiv(self.of(other), self.value))
+    __add__, __mul__ = _arithmetic("fadd"), _arithmetic("fmul")
+    __sub__, __rsub__ = _arithmetic("fsub"), _arithmetic("fsub", is_reflected=True)
+    __truediv__, __rtruediv__ = _arithmetic("fdiv"), _arithmetic("fdiv", is_reflected=True)
 
     def __neg__(self) -> "SimdVector":
         return SimdVector(self.builder, self.builder.fneg(self.value))

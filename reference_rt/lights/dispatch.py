@@ -18,7 +18,7 @@ from reference_rt.lights.emitters.directional import Directionals
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.lights.emitters.point import Points
 from reference_rt.lights.emitters.spot import Spots
-from reference_rt.lights.light import AREA, DIRECTIONAL, POINT, SPOT, LightSample, no_light
+from reference_rt.lights.light import AREA, DIRECTIONAL, NO_LIGHT, POINT, SPOT, LightSample
 from reference_rt.lights.selection import choice
 from reference_rt.lights.selection.choice import LightSampler
 from reference_rt.lights.selection.tree import LightTree, Pick
@@ -56,7 +56,7 @@ def _never(environment: None, d: Vec3) -> float:
 
 @kernel
 def _nothing(environment: None, u0: float, u1: float) -> LightSample:
-    return no_light()
+    return NO_LIGHT
 
 
 def _of_environment(name: str, without: Any) -> Any:
@@ -158,7 +158,7 @@ def _sample_one(
     u1: float,
 ) -> LightSample:
     if entries is None:
-        return no_light()
+        return NO_LIGHT
     return _sample(lights, entries.kind[k], entries.row[k], shapes, textures, p, u0, u1)
 
 
@@ -195,7 +195,7 @@ def _middle_of_one(
     p: Vec3,
 ) -> LightSample:
     if entries is None:
-        return no_light()
+        return NO_LIGHT
     return _middle(lights, entries.kind[k], entries.row[k], shapes, textures, p)
 
 

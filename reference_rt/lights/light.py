@@ -28,10 +28,10 @@ class LightSample(NamedTuple):
     is_delta: bool
 
 
-@kernel
-def no_light() -> LightSample:
-    zero = Vec3(0.0, 0.0, 0.0)
-    return LightSample(zero, zero, 0.0, zero, 0.0, False)
+_ZERO = Vec3(0.0, 0.0, 0.0)
+
+NO_LIGHT = LightSample(_ZERO, _ZERO, 0.0, _ZERO, 0.0, False)
+"""Nothing arrives."""
 
 
 @kernel
@@ -41,7 +41,7 @@ def from_position(position: Vec3, intensity: Vec3, falloff: float, p: Vec3) -> L
     w = position - p
     distance2 = dot(w, w)
     if distance2 == 0.0:
-        return no_light()  # no direction leads there
+        return NO_LIGHT  # no direction leads there
     distance = math.sqrt(distance2)
     pdf = 1.0 if falloff > 0.0 else 0.0
     radiance = intensity * (falloff / distance2)

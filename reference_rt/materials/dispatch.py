@@ -12,7 +12,7 @@ from reference_rt.core.vec3 import Vec3, to_local, to_world
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs import tables as bsdf
 from reference_rt.materials.bsdfs.tables import Leaves
-from reference_rt.materials.material import Branches, BsdfSample, Scattered, no_sample
+from reference_rt.materials.material import NO_SAMPLE, Branches, BsdfSample, Scattered
 from reference_rt.materials.nested import flattened
 from reference_rt.materials.nested.flattened import (
     FlattenedLeaf,
@@ -31,13 +31,13 @@ class Materials(NamedTuple):
     kind (n,), row (n,): the table and row of a material's BSDF, without layers; kind is None if
     there is only one table, row is None too if material m is row m of it.
     smooth (n,): whether lights can be sampled; None if all are smooth.
-    chooses (n,): whether `sample` uses `u_lobe`; None if none does.
+    uses_u_lobe (n,): whether `sample` uses `u_lobe`; None if none does.
     behind (n,): whether light from both sides of the surface counts; None if it never does.
     shown (n): the colour for ray casting.
     oriented (1,): present if any material is anisotropic, or tilted by a texture.
     asks (n,): whether a texture is used; None if all or none use one.
     textured: None if no colour is textured.
-    layers: None if no material is made of others.
+    flat_leaves: None if no material is made of others.
     leaves: the tables of BSDFs.
     """
 
@@ -179,7 +179,7 @@ def _sample(
     for k in range(count):
         total += leaf_at(shading, k).weight
     if not total > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     # Choose a layer with probability weight / total; u_lobe, rescaled within the layer's interval,
     # is the random number for the layer's own choice.
     rest, chosen = u_lobe * total, 0
@@ -189,17 +189,17 @@ def _sample(
         chosen += 1
         leaf = leaf_at(shading, chosen)
     if not leaf.weight > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     u_inner = min(rest / leaf.weight, 1.0 - 2.0**-53)
     wo_in = to_local(leaf.basis, shading.wo)
     kind, i = flat_leaves.kind[first + chosen], flat_leaves.row[first + chosen]
     drawn = bsdf.sample(materials.leaves, kind, i, shading.at, wo_in, u_inner, u0, u1)
     wi = to_world(leaf.basis, drawn.wi)
     if drawn.pdf == 0.0:
-        return no_sample()
+        return NO_SAMPLE
     if drawn.is_delta or count == 1:
         if not scatters_from(leaf, wi):
-            return no_sample()
+            return NO_SAMPLE
     if drawn.is_delta:
         # weight / total is the probability of the layer, by which its contribution is divided.
         probability = drawn.pdf * (leaf.weight / total)
@@ -209,7 +209,7 @@ def _sample(
     # Any of the layers could have sampled this direction: use the sum of their densities.
     found = _eval_pdf(flat_leaves, materials, shading, wi)
     if not found.density > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     return BsdfSample(wi, found.value * (1.0 / found.density), found.density, drawn.eta, False)
 
 

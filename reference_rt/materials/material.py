@@ -63,10 +63,10 @@ class BsdfSample(NamedTuple):
     is_delta: bool
 
 
-@kernel
-def no_sample() -> BsdfSample:
-    zero = Vec3(0.0, 0.0, 0.0)
-    return BsdfSample(zero, zero, 0.0, 1.0, False)
+_BLACK = Vec3(0.0, 0.0, 0.0)
+
+NO_SAMPLE = BsdfSample(_BLACK, _BLACK, 0.0, 1.0, False)
+"""Nothing is scattered, or sampling failed."""
 
 
 class Scattered(NamedTuple):
@@ -93,10 +93,7 @@ class Branches(NamedTuple):
     eta: float
 
 
-@kernel
-def no_branches() -> Branches:
-    zero = Vec3(0.0, 0.0, 0.0)
-    return Branches(zero, zero, zero, zero, 1.0, 0.0, 1.0)
+NO_BRANCHES = Branches(_BLACK, _BLACK, _BLACK, _BLACK, 1.0, 0.0, 1.0)
 
 
 @kernel
@@ -118,11 +115,11 @@ def sample_branch(branches: Branches, u: float) -> BsdfSample:
     """One of the two directions, with a probability equal to its fraction of the power."""
     if u < branches.share:
         if is_black(branches.reflectance):
-            return no_sample()
+            return NO_SAMPLE
         weight = branches.reflectance * (1.0 / branches.share)
         return BsdfSample(branches.reflected, weight, branches.share, 1.0, True)
     if branches.passing == 0.0:
-        return no_sample()
+        return NO_SAMPLE
     weight = branches.transmittance * (1.0 / branches.passing)
     return BsdfSample(branches.refracted, weight, branches.passing, branches.eta, True)
 

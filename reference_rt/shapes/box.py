@@ -19,7 +19,7 @@ from reference_rt.shapes.shape import (
     Spans,
     TabulationContext,
     Tangents,
-    lane_vector,
+    lane_vectors,
     lift,
     no_spans,
     one_span,
@@ -134,14 +134,10 @@ nearer = make_nearer(distance)
 
 
 @kernel
-def slabs_of(boxes: Boxes, i: int, ray: Ray) -> Slabs:
-    return slabs(
-        ray,
-        row(boxes.center, i),
-        triple(boxes.to_local, i, 0),
-        triple(boxes.to_local, i, 1),
-        triple(boxes.to_local, i, 2),
-    )
+def arguments(boxes: Boxes, i: int) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+    """What `slabs` and `distance` take after the ray."""
+    m = boxes.to_local
+    return row(boxes.center, i), triple(m, i, 0), triple(m, i, 1), triple(m, i, 2)
 
 
 @kernel
@@ -167,14 +163,14 @@ def face_left(s: Slabs, t: float) -> float:
 @kernel
 def found(boxes: Boxes, i: int, ray: Ray, t: float) -> Crossing:
     """The crossing of box i at t; its u is the face: axis, + 3 on the positive side."""
-    s = slabs_of(boxes, i, ray)
+    s = slabs(ray, *arguments(boxes, i))
     t_in, _ = inside(s)
     return Crossing(t, face_entered(s, t) if t == t_in else face_left(s, t), 0.0)
 
 
 @kernel
 def spans(boxes: Boxes, i: int, ray: Ray) -> Spans:
-    s = slabs_of(boxes, i, ray)
+    s = slabs(ray, *arguments(boxes, i))
     t_in, t_out = inside(s)
     if t_in <= t_out:
         return one_span(t_in, face_entered(s, t_in), t_out, face_left(s, t_out))
@@ -184,26 +180,13 @@ def spans(boxes: Boxes, i: int, ray: Ray) -> Spans:
 @kernel
 def intersect(boxes: Boxes, i: int, ray: Ray) -> Crossing:
     """Where the ray meets box i."""
-    t = distance(
-        ray,
-        row(boxes.center, i),
-        triple(boxes.to_local, i, 0),
-        triple(boxes.to_local, i, 1),
-        triple(boxes.to_local, i, 2),
-    )
-    return found(boxes, i, ray, t)
+    return found(boxes, i, ray, distance(ray, *arguments(boxes, i)))
 
 
 @kernel
 def lane_distance(boxes: Boxes, packets: FloatArray, k: int, lane: int, ray: Ray) -> float:
     """`distance` for one lane of packet k of `pack_all`."""
-    return distance(
-        ray,
-        lane_vector(packets, k, 0, lane),
-        lane_vector(packets, k, 3, lane),
-        lane_vector(packets, k, 6, lane),
-        lane_vector(packets, k, 9, lane),
-    )
+    return distance(ray, *lane_vectors(packets, k, lane))
 
 
 @kernel

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Crossing, Hit, Ray, miss, no_hit
 from reference_rt.core.ray_block import HitBlock, RayBlock, ray_of
-from reference_rt.core.vec3 import row, triple
+from reference_rt.core.vec3 import row
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
@@ -23,15 +23,7 @@ from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.meshes.watertight import shear_of
 from reference_rt.shapes.ray_simd import begin, end
 from reference_rt.shapes.shape import nearest_lane
-from reference_rt.shapes.tables import (
-    BOX,
-    RECTANGLE,
-    SPHERE,
-    TABLES,
-    TRIANGLE,
-    Shapes,
-    of_table,
-)
+from reference_rt.shapes.tables import BOX, RECTANGLE, SPHERE, TABLES, TRIANGLE, Shapes, of_table
 
 
 class Packets(NamedTuple):
@@ -211,6 +203,4 @@ def _nearer_boxes(
 ) -> None:
     if boxes is not None:
         for i in range(len(boxes.owner)):
-            of = boxes.to_local
-            shape = (row(boxes.center, i), triple(of, i, 0), triple(of, i, 1), triple(of, i, 2))
-            box.nearer(rays.numbers, at, shape, BOX * _KIND + i, t, codes)
+            box.nearer(rays.numbers, at, box.arguments(boxes, i), BOX * _KIND + i, t, codes)

@@ -11,7 +11,7 @@ from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.meshes.watertight import Shear
-from reference_rt.shapes.shape import LightPoint, Spans, Tangents, no_light_point, no_spans
+from reference_rt.shapes.shape import NO_LIGHT_POINT, LightPoint, Spans, Tangents, no_spans
 from reference_rt.shapes.tables import Shapes, by_code
 
 
@@ -70,7 +70,7 @@ def sample(
 ) -> LightPoint:
     """A point sampled on one primitive as a light for `p`; `pdf` returns its density.  area: of the
     primitive."""
-    return no_light_point()
+    return NO_LIGHT_POINT
 
 
 @by_code("middle")

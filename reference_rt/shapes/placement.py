@@ -89,23 +89,21 @@ def world_point(table: Any, i: int, q: Vec3) -> Vec3:
 
 
 @kernel
+def _combination(vectors: FloatArray, i: int, v: Vec3) -> Vec3:
+    """The linear combination of the three vectors in row i."""
+    return triple(vectors, i, 0) * v.x + triple(vectors, i, 1) * v.y + triple(vectors, i, 2) * v.z
+
+
+@kernel
 def world_vector(table: Any, i: int, v: Vec3) -> Vec3:
     """A v."""
-    return (
-        triple(table.edges, i, 0) * v.x
-        + triple(table.edges, i, 1) * v.y
-        + triple(table.edges, i, 2) * v.z
-    )
+    return _combination(table.edges, i, v)
 
 
 @kernel
 def world_covector(table: Any, i: int, n: Vec3) -> Vec3:
     """M^T n: a normal of any length, by the inverse transpose."""
-    return (
-        triple(table.to_local, i, 0) * n.x
-        + triple(table.to_local, i, 1) * n.y
-        + triple(table.to_local, i, 2) * n.z
-    )
+    return _combination(table.to_local, i, n)
 
 
 @kernel

@@ -123,6 +123,17 @@ def lane_vector(packets: FloatArray, packet: int, column: int, lane: int) -> Vec
 
 
 @kernel
+def lane_vectors(packets: FloatArray, packet: int, lane: int) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+    """The first twelve columns of one lane of a packet."""
+    return (
+        lane_vector(packets, packet, 0, lane),
+        lane_vector(packets, packet, 3, lane),
+        lane_vector(packets, packet, 6, lane),
+        lane_vector(packets, packet, 9, lane),
+    )
+
+
+@kernel
 def nearest_lane(d: FloatArray, packet: int, best: int, t: float) -> tuple[int, float]:
     """Updates (row, distance) of the nearest so far with the distances of a packet's lanes."""
     for lane in range(VECTOR_WIDTH):
@@ -145,10 +156,8 @@ class LightPoint(NamedTuple):
     v: float
 
 
-@kernel
-def no_light_point() -> LightPoint:
-    zero = Vec3(0.0, 0.0, 0.0)
-    return LightPoint(zero, zero, 0.0, 0.0, 0.0, 0.0)
+NO_LIGHT_POINT = LightPoint(Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
+"""No light arrives."""
 
 
 @kernel

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from reference_rt.core.ray import Ray, at
 from reference_rt.core.vec3 import Vec3, component
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.textbook.method import FloatArray, Method, ray_of, vector
+from reference_rt.textbook.method import FloatArray, family, ray_of, vector
 
 
 class BoxParameters(NamedTuple):
@@ -138,32 +138,20 @@ def _slabs_ieee(box: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> N
         t[i] = slabs_ieee(ray_of(o, d, i), *box)
 
 
+_method = family("box", "T8", BoxParameters, prepare)
+
 METHODS = (
-    Method(
-        "box.six_planes",
-        "T8",
-        "six faces, each a plane and a rectangle",
-        "elementary",
-        BoxParameters,
-        prepare,
-        _six_planes,
-    ),
-    Method(
-        "box.slabs_parallel_test",
-        "T8",
+    _method("six_planes", "six faces, each a plane and a rectangle", "elementary", _six_planes),
+    _method(
+        "slabs_parallel_test",
         "three slabs, with a test for parallel rays",
         "Kay & Kajiya 1986, SIGGRAPH; Haines 1989, in Glassner (ed.), ch. 2",
-        BoxParameters,
-        prepare,
         _slabs_parallel_test,
     ),
-    Method(
-        "box.slabs_ieee",
-        "T8",
+    _method(
+        "slabs_ieee",
         "three slabs by reciprocals and IEEE infinities",
         "Williams, Barrus, Morley & Shirley 2005, Journal of Graphics Tools 10(1)",
-        BoxParameters,
-        prepare,
         _slabs_ieee,
     ),
 )

@@ -9,7 +9,6 @@ that rounding cannot separate.
 
 import functools
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import apply_points
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.textbook.inside import INSIDE, BoolArray, in_closed_mesh
-from reference_rt.textbook.method import FloatArray, Method
+from reference_rt.textbook.method import FloatArray, family
 from reference_rt.textbook.operands import (
     INTERSECTION,
     UNION,
@@ -155,9 +154,7 @@ def _contains_at(
     return contains(tree, o[rays] + t[:, None] * d[rays])
 
 
-def _method(name: str, summary: str, source: str, run: Callable[..., None]) -> Method:
-    return Method(f"csg.{name}", "T12", summary, source, CsgParameters, prepare, run)
-
+_method = family("csg", "T12", CsgParameters, prepare)
 
 METHODS = (
     _method(

@@ -14,6 +14,9 @@ from reference_rt.jit.kernel import kernel
 
 FloatArray = npt.NDArray[np.float64]
 
+Run = Callable[[Any, FloatArray, FloatArray, FloatArray], None]
+"""`Method.run`."""
+
 
 @dataclass(frozen=True)
 class Method:
@@ -31,7 +34,7 @@ class Method:
     source: str
     parameters: type
     prepare: Callable[[Any], Any]
-    run: Callable[[Any, FloatArray, FloatArray, FloatArray], None]
+    run: Run
 
     def intersect(
         self, parameters: Any, origins: npt.ArrayLike, directions: npt.ArrayLike
@@ -49,6 +52,18 @@ class Method:
         with np.errstate(all="ignore"):
             self.run(self.prepare(parameters), o, d, t)
         return t
+
+
+def family(
+    name: str, row: str, parameters: type, prepare: Callable[[Any], Any]
+) -> Callable[[str, str, str, Run], Method]:
+    """What the methods of a family share: a function of a method's name, summary, source and `run`
+    that makes the `Method`."""
+
+    def method(of_method: str, summary: str, source: str, run: Run) -> Method:
+        return Method(f"{name}.{of_method}", row, summary, source, parameters, prepare, run)
+
+    return method
 
 
 def rays(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

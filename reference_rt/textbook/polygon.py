@@ -15,7 +15,7 @@ import numpy.typing as npt
 from reference_rt.core.ray import UNIT_ROUNDOFF, Ray, at
 from reference_rt.core.vec3 import Vec3, component, dot
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.textbook.method import FloatArray, Method, points, ray_of, vector
+from reference_rt.textbook.method import FloatArray, family, points, ray_of, vector
 
 
 class PolygonParameters(NamedTuple):
@@ -173,32 +173,25 @@ def _angle_sum(polygon: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -
         t[i] = angle_sum(ray_of(o, d, i), *polygon)
 
 
+_method = family("polygon", "T9", PolygonParameters, prepare)
+
 METHODS = (
-    Method(
-        "polygon.even_odd",
-        "T9",
+    _method(
+        "even_odd",
         "an odd number of edges crossed, with the half-open vertex rule",
         "Shimrat 1962, Algorithm 112; Haines 1994, Point in Polygon Strategies, Graphics Gems IV",
-        PolygonParameters,
-        prepare,
         _even_odd,
     ),
-    Method(
-        "polygon.winding",
-        "T9",
+    _method(
+        "winding",
         "a signed count of crossings",
         "Hormann & Agathos 2001, Computational Geometry 20(3)",
-        PolygonParameters,
-        prepare,
         _winding,
     ),
-    Method(
-        "polygon.angle_sum",
-        "T9",
+    _method(
+        "angle_sum",
         "the sum of signed angles",
         "Haines 1994, Point in Polygon Strategies, Graphics Gems IV",
-        PolygonParameters,
-        prepare,
         _angle_sum,
     ),
 )

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.textbook.method import FloatArray, Method, ray_of, vector
+from reference_rt.textbook.method import FloatArray, family, ray_of, vector
 
 
 class SphereParameters(NamedTuple):
@@ -137,32 +137,25 @@ def _robust(sphere: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> No
         t[i] = robust(ray_of(o, d, i), *sphere)
 
 
+_method = family("sphere", "T5", SphereParameters, prepare)
+
 METHODS = (
-    Method(
-        "sphere.algebraic",
-        "T5",
+    _method(
+        "algebraic",
         "the quadratic and its three discriminant cases",
         "Haines 1989, in Glassner (ed.), An Introduction to Ray Tracing, ch. 2",
-        SphereParameters,
-        prepare,
         _algebraic,
     ),
-    Method(
-        "sphere.geometric",
-        "T5",
+    _method(
+        "geometric",
         "closest approach and half chord, with early rejections",
         "Haines 1989, in Glassner (ed.), An Introduction to Ray Tracing, ch. 2",
-        SphereParameters,
-        prepare,
         _geometric,
     ),
-    Method(
-        "sphere.robust",
-        "T5",
+    _method(
+        "robust",
         "the quadratic without cancellation",
         "Haines, Günther & Akenine-Möller 2019, Ray Tracing Gems, ch. 7",
-        SphereParameters,
-        prepare,
         _robust,
     ),
 )

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from reference_rt.core.ray import Ray, at
 from reference_rt.core.vec3 import Vec3, component, cross, dot
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.textbook.method import FloatArray, Method, ray_of, vector
+from reference_rt.textbook.method import FloatArray, family, ray_of, vector
 
 
 class TriangleParameters(NamedTuple):
@@ -219,50 +219,37 @@ def _watertight(triangle: Prepared, o: FloatArray, d: FloatArray, t: FloatArray)
         t[i] = watertight(ray_of(o, d, i), *triangle)
 
 
+_method = family("triangle", "T7", TriangleParameters, prepare)
+
 METHODS = (
-    Method(
-        "triangle.two_step",
-        "T7",
+    _method(
+        "two_step",
         "the plane, then three inside tests",
         "Haines 1989, in Glassner (ed.), An Introduction to Ray Tracing, ch. 2",
-        TriangleParameters,
-        prepare,
         _two_step,
     ),
-    Method(
-        "triangle.cramer",
-        "T7",
+    _method(
+        "cramer",
         "barycentrics by Cramer's rule",
         "Shirley & Marschner 2009, Fundamentals of Computer Graphics, 4.4.2",
-        TriangleParameters,
-        prepare,
         _cramer,
     ),
-    Method(
-        "triangle.lu",
-        "T7",
+    _method(
+        "lu",
         "barycentrics by LU with partial pivoting",
         "Golub & Van Loan 2013, Matrix Computations, 3.4",
-        TriangleParameters,
-        prepare,
         _lu,
     ),
-    Method(
-        "triangle.moller_trumbore",
-        "T7",
+    _method(
+        "moller_trumbore",
         "Cramer's rule with shared cross products",
         "Möller & Trumbore 1997, Journal of Graphics Tools 2(1)",
-        TriangleParameters,
-        prepare,
         _moller_trumbore,
     ),
-    Method(
-        "triangle.watertight",
-        "T7",
+    _method(
+        "watertight",
         "sheared space and edge functions: no gap between neighbours",
         "Woop, Benthin & Wald 2013, JCGT 2(1)",
-        TriangleParameters,
-        prepare,
         _watertight,
     ),
 )

@@ -79,15 +79,23 @@ def replacing(path: Path) -> Iterator[Path]:
     old file is unchanged and the temporary one is removed.  Creates parent folders.  Raises
     ImageError where the file cannot be written.
     """
-    # The same folder, since a rename is atomic within one file system only; the same suffix, since
-    # writers choose the format by it.
-    temporary = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
-    try:
+    with _temporary_beside(path) as temporary:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         with temporary.open("rb") as file:
             os.fsync(file.fileno())
         temporary.replace(path)
+
+
+@contextmanager
+def _temporary_beside(path: Path) -> Iterator[Path]:
+    """Yields a temporary file name beside `path`, and removes the file afterwards; turns OSErrors
+    into an ImageError."""
+    # The same folder, since a rename is atomic within one file system only; the same suffix, since
+    # writers choose the format by it.
+    temporary = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
+    try:
+        yield temporary
     except OSError as error:
         raise ImageError(
             f"{path}: cannot be written: {error.strerror or error}; expected a writable place"
@@ -108,23 +116,17 @@ def check_writable(*paths: Path) -> None:
 
 
 def _check_writable(path: Path) -> None:
-    probe = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
     made: list[Path] = []
     try:
-        if path.is_dir():
-            raise ImageError(f"{path}: is a folder; expected the name of a file")
-        if (file := next((p for p in path.parents if p.is_file()), None)) is not None:
-            raise ImageError(f"{path}: cannot be written: {file} is a file; expected a folder")
-        made = [parent for parent in path.parents if not parent.exists()]
-        path.parent.mkdir(parents=True, exist_ok=True)
-        probe.touch()
-    except OSError as error:
-        raise ImageError(
-            f"{path}: cannot be written: {error.strerror}; expected a writable place"
-        ) from None
+        with _temporary_beside(path) as probe:
+            if path.is_dir():
+                raise ImageError(f"{path}: is a folder; expected the name of a file")
+            if (file := next((p for p in path.parents if p.is_file()), None)) is not None:
+                raise ImageError(f"{path}: cannot be written: {file} is a file; expected a folder")
+            made = [parent for parent in path.parents if not parent.exists()]
+            path.parent.mkdir(parents=True, exist_ok=True)
+            probe.touch()
     finally:
-        with suppress(OSError):
-            probe.unlink(missing_ok=True)
         for parent in made:  # the deepest first; one that somebody else fills stays
             with suppress(OSError):
                 parent.rmdir()

@@ -69,10 +69,7 @@ Method = Literal["sah", "median", "spatial", "none"]
 
 
 def build(
-    lower: FloatArray,
-    upper: FloatArray,
-    method: Method = "sah",
-    corners: FloatArray | None = None,
+    lower: FloatArray, upper: FloatArray, method: Method = "sah", corners: FloatArray | None = None
 ) -> tuple[Nodes, IntArray]:
     """A binary BVH over n >= 1 primitives with finite bounds lower (n, 3), upper (n, 3).
 

@@ -236,13 +236,7 @@ def _pop_rays_any(bvh: Bvh, state: StreamState, waiting: Naturals, lengths: Leng
 
 @kernel
 def _go_to_any(
-    bvh: Bvh,
-    state: StreamState,
-    waiting: Naturals,
-    j: int,
-    level: int,
-    met: int,
-    lengths: Lengths,
+    bvh: Bvh, state: StreamState, waiting: Naturals, j: int, level: int, met: int, lengths: Lengths
 ) -> Lengths:
     """Moves ray j from the node at `level` of its stack to one of the children `met`, if any; the
     others stay on the stack."""

@@ -9,7 +9,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.light import LightSample, no_light
+from reference_rt.lights.light import NO_LIGHT, LightSample
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import LightPoint
 from reference_rt.textures import At, Colours, Textures, colour_at
@@ -46,7 +46,7 @@ def _from_point(
     areas: Areas, i: int, shapes: Shapes, textures: Textures | None, p: Vec3, q: LightPoint
 ) -> LightSample:
     if q.pdf == 0.0:
-        return no_light()
+        return NO_LIGHT
     w = q.p - p
     distance = math.sqrt(dot(w, w))
     at = _texture_coordinates(textures, areas, i, shapes, p, w, q)
@@ -62,13 +62,7 @@ def _from_point(
 
 @kernel
 def _texture_coordinates(
-    textures: Textures | None,
-    areas: Areas,
-    i: int,
-    shapes: Shapes,
-    p: Vec3,
-    w: Vec3,
-    q: LightPoint,
+    textures: Textures | None, areas: Areas, i: int, shapes: Shapes, p: Vec3, w: Vec3, q: LightPoint
 ) -> At:
     """The texture coordinates at a point q of light i."""
     none = Vec3(-1.0, -1.0, -1.0)

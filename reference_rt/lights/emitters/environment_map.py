@@ -11,7 +11,7 @@ from reference_rt.core.model import Description, Positive
 from reference_rt.core.transform import Transform, affine
 from reference_rt.core.vec3 import Vec3, dot, luminance, triple
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.light import LightSample, no_light
+from reference_rt.lights.light import NO_LIGHT, LightSample
 from reference_rt.sampling.distribution import (
     blended,
     blended_cell_of,
@@ -164,7 +164,7 @@ def sample(table: EnvironmentMaps, u0: float, u1: float) -> LightSample:
     before = blended(table.row_sums, y, t, x)
     cell = blended(table.row_sums, y, t, x + 1) - before
     if cell <= 0.0:
-        return no_light()
+        return NO_LIGHT
     beside = (x + 1) % width
     a = luminance(texel(table, y, x)) * (1.0 - t) + luminance(texel(table, y + 1, x)) * t
     b = luminance(texel(table, y, beside)) * (1.0 - t) + luminance(texel(table, y + 1, beside)) * t

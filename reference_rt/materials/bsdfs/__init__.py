@@ -4,7 +4,7 @@ A file has a description (a `Material`), its table (a NamedTuple of arrays, a ro
 of this type), and kernels that take the table, a row i, texture coordinates `at`, and directions as
 in the contract of `materials`:
 
-- `both(table, i, at, wo, wi) -> Scattered`: f(wo, wi) |cos wi| and the density of `sample` per
+- `eval_pdf(table, i, at, wo, wi) -> Scattered`: f(wo, wi) |cos wi| and the density of `sample` per
   solid angle; needed by a material whose class says `smooth`;
 - `sample(table, i, at, wo, u_lobe, u0, u1) -> BsdfSample`: pdf = 0 means that sampling failed; its
   weight and pdf agree with `eval_pdf`; needed like `eval_pdf`;
@@ -16,6 +16,6 @@ that they return is NaN or infinite for unit directions.  A material that does n
 `transmits` is black behind.
 
 To add one: its file; in `tables.py` a code, a field of `Leaves` and a line in `TABLES`.  What
-several files share has a file too: `transparent.py`, `metal.py`, `coated.py`,
-`principled_lobes.py`.
+several files share has a file too: `transparent.py`, `metal.py`, `rough.py`,
+`coated.py`, `principled_lobes.py`.
 """

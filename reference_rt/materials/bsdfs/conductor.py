@@ -6,7 +6,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.metal import Metal
-from reference_rt.materials.material import Branches, no_branches, reflection
+from reference_rt.materials.material import NO_BRANCHES, Branches, reflection
 from reference_rt.materials.microfacet.fresnel import conductor_colour
 from reference_rt.textures import At, Colours, Palette, colour_at
 
@@ -33,6 +33,6 @@ class Conductors(NamedTuple):
 def branches(conductors: Conductors, i: int, at: At, wo: Vec3) -> Branches:
     """The one mirrored direction."""
     if wo.z <= 0.0:
-        return no_branches()
+        return NO_BRANCHES
     f = conductor_colour(wo.z, row(conductors.eta, i), row(conductors.k, i))
     return reflection(wo, f * colour_at(conductors.reflectance, i, at))

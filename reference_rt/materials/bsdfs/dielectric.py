@@ -1,14 +1,13 @@
 """Dielectric: smooth glass or water, by Snell's and Fresnel's laws."""
 
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal
 
-from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs.transparent import Transparent
+from reference_rt.materials.bsdfs.transparent import Transparent, Transparents
 from reference_rt.materials.material import Branches
 from reference_rt.materials.microfacet.fresnel import fresnel
-from reference_rt.textures import At, Colours, Palette, colour_at
+from reference_rt.textures import At, colour_at
 
 
 class Dielectric(Transparent):
@@ -17,20 +16,9 @@ class Dielectric(Transparent):
     delta: ClassVar[bool] = True
     type: Literal["dielectric"] = "dielectric"
 
-    def tabulate(self, palette: Palette) -> "Dielectrics":
-        return Dielectrics(**self.columns(palette))
-
-
-class Dielectrics(NamedTuple):
-    """eta (n,): interior over exterior index of refraction;  reflectance, transmittance (n)."""
-
-    eta: FloatArray
-    reflectance: Colours
-    transmittance: Colours
-
 
 @kernel
-def branches(dielectrics: Dielectrics, i: int, at: At, wo: Vec3) -> Branches:
+def branches(dielectrics: Transparents, i: int, at: At, wo: Vec3) -> Branches:
     """Factor F for the reflection and T / eta² for the refraction: the radiance of refracted light
     scales with the square of the index."""
     refraction = fresnel(wo.z, dielectrics.eta[i])

@@ -4,7 +4,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
+from reference_rt.materials.material import INV_PI, NO_SAMPLE, BsdfSample, Material, Scattered
 from reference_rt.sampling.warp import cosine_hemisphere
 from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
 
@@ -46,6 +46,6 @@ def sample(
 ) -> BsdfSample:
     """A direction with density cos / pi: the weight is the reflectance."""
     if wo.z <= 0.0:
-        return no_sample()
+        return NO_SAMPLE
     wi = cosine_hemisphere(u0, u1)
     return BsdfSample(wi, colour_at(diffuses.reflectance, i, at), wi.z * INV_PI, 1.0, False)

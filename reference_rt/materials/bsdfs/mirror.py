@@ -4,7 +4,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.material import Branches, Material, no_branches, reflection
+from reference_rt.materials.material import NO_BRANCHES, Branches, Material, reflection
 from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
 
 
@@ -33,5 +33,5 @@ class Mirrors(NamedTuple):
 def branches(mirrors: Mirrors, i: int, at: At, wo: Vec3) -> Branches:
     """The one mirrored direction."""
     if wo.z <= 0.0:
-        return no_branches()
+        return NO_BRANCHES
     return reflection(wo, colour_at(mirrors.reflectance, i, at))

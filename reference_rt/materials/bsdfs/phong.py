@@ -28,12 +28,12 @@ from reference_rt.core.vec3 import (
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.material import (
     INV_PI,
+    NO_BRANCHES,
+    NO_SAMPLE,
     Branches,
     BsdfSample,
     Material,
     Scattered,
-    no_branches,
-    no_sample,
     reflection,
 )
 from reference_rt.sampling.warp import cosine_hemisphere, on_circle
@@ -173,7 +173,7 @@ def sample(
     Sampling fails where the lobe's direction points below the surface."""
     shares = _shares(phongs, i, at)
     if wo.z <= 0.0 or shares.diffuse + shares.specular + shares.mirror == 0.0:
-        return no_sample()
+        return NO_SAMPLE
     mirrored = Vec3(-wo.x, -wo.y, wo.z)
     if u_lobe < shares.mirror:
         weight = colour_at(phongs.mirror, i, at) * (1.0 / shares.mirror)
@@ -190,7 +190,7 @@ def sample(
         wi = cosine_hemisphere(u0, u1)
     value, density = eval_pdf(phongs, i, at, wo, wi)
     if not density > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     weight = value * (1.0 / density)
     return BsdfSample(wi, weight, density, 1.0, False)
 
@@ -199,7 +199,7 @@ def sample(
 def branches(phongs: Phongs, i: int, at: At, wo: Vec3) -> Branches:
     """The mirrored direction."""
     if wo.z <= 0.0:
-        return no_branches()
+        return NO_BRANCHES
     return reflection(wo, colour_at(phongs.mirror, i, at))
 
 

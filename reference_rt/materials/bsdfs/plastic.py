@@ -22,11 +22,11 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.coated import Coated, base_albedo
 from reference_rt.materials.material import (
     INV_PI,
+    NO_BRANCHES,
+    NO_SAMPLE,
     Branches,
     BsdfSample,
     Scattered,
-    no_branches,
-    no_sample,
     reflection,
 )
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
@@ -139,7 +139,7 @@ def sample(
 ) -> BsdfSample:
     """The mirrored direction or a cosine-distributed one."""
     if wo.z <= 0.0:
-        return no_sample()
+        return NO_SAMPLE
     shares = _shares(plastics, i, at, wo)
     if u_lobe < shares.p:
         weight = shares.specular * (shares.f_o / shares.p)
@@ -147,7 +147,7 @@ def sample(
     wi = cosine_hemisphere(u0, u1)
     density = (1.0 - shares.p) * (wi.z * INV_PI)
     if not density > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     return BsdfSample(wi, _diffuse(plastics, i, shares, wi) * (1.0 / density), density, 1.0, False)
 
 
@@ -155,6 +155,6 @@ def sample(
 def branches(plastics: Plastics, i: int, at: At, wo: Vec3) -> Branches:
     """The mirrored direction."""
     if wo.z <= 0.0:
-        return no_branches()
+        return NO_BRANCHES
     f = fresnel(wo.z, plastics.eta[i]).reflectance
     return reflection(wo, colour_at(plastics.specular, i, at) * f)

@@ -37,7 +37,7 @@ from reference_rt.materials.bsdfs.principled_lobes import (
     sheen_colour,
     visible_normals,
 )
-from reference_rt.materials.material import INV_PI, BsdfSample, Material, Scattered, no_sample
+from reference_rt.materials.material import INV_PI, NO_SAMPLE, BsdfSample, Material, Scattered
 from reference_rt.materials.microfacet.fresnel import Refraction, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import (
     GGX,
@@ -271,7 +271,7 @@ def sample(
     side."""
     side = wo.z
     if side == 0.0:
-        return no_sample()
+        return NO_SAMPLE
     s, wo = _surface(table, i, at, side), _upwards(wo, side)
     shares = _shares(s, wo)
     u = u_lobe * (shares.cosine + shares.coat + shares.main)
@@ -282,7 +282,7 @@ def sample(
         wi = reflect(wo, sample_coat(s, u0, u1))
     else:
         if not shares.main > 0.0:
-            return no_sample()
+            return NO_SAMPLE
         h = sample_visible(s.m, wo, u0, u1)
         refraction = fresnel_at(s, max(0.0, dot(wo, h)))
         f = facet(s, refraction)
@@ -290,9 +290,9 @@ def sample(
         wi = _main(f, refraction, wo, h, u)
         is_through = u >= f.share
     if wi.z == 0.0 or (wi.z < 0.0) != is_through:
-        return no_sample()
+        return NO_SAMPLE
     value, density = _scattered(s, shares, wo, wi)
     if not density > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     weight = value * (1.0 / density)
     return BsdfSample(_upwards(wi, side), weight, density, s.eta if is_through else 1.0, False)

@@ -11,17 +11,15 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, dot, reflect, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.metal import Metal
-from reference_rt.materials.material import BsdfSample, Scattered, no_sample
+from reference_rt.materials.bsdfs.rough import Rough
+from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import conductor_colour
 from reference_rt.materials.microfacet.ggx_and_smith import (
-    AlphaParameter,
-    Distribution,
     Roughnesses,
     density,
     g1,
     g1_over_cos,
     half_vector,
-    is_anisotropic,
     microfacets_at,
     roughnesses,
     sample_visible,
@@ -29,23 +27,15 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
 from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class RoughConductor(Metal):
+class RoughConductor(Rough, Metal):
     """A rough metal; its back is black."""
 
-    smooth: ClassVar[bool] = True
     uses_u_lobe: ClassVar[bool] = False
     type: Literal["rough_conductor"] = "rough_conductor"
-    distribution: Distribution = "ggx"
-    alpha: AlphaParameter = (0.1, 0.1)
-
-    @property
-    def oriented(self) -> bool:
-        return is_anisotropic(self.alpha)
 
     def tabulate(self, palette: Palette) -> "RoughConductors":
         return RoughConductors(
-            **self.columns(palette),
-            roughness=roughnesses(self.distribution, self.alpha, palette),
+            **self.columns(palette), roughness=roughnesses(self.distribution, self.alpha, palette)
         )
 
 
@@ -83,12 +73,12 @@ def sample(
 ) -> BsdfSample:
     """wo reflected at a visible microfacet: the weight is F G1(wi)."""
     if wo.z <= 0.0:
-        return no_sample()
+        return NO_SAMPLE
     m = microfacets_at(conductors.roughness, i, at)
     h = sample_visible(m, wo, u0, u1)
     wi = reflect(wo, h)
     density_of_wi = 0.25 * g1_over_cos(m, wo) * density(m, h)
     if wi.z <= 0.0 or density_of_wi == 0.0:
-        return no_sample()
+        return NO_SAMPLE
     weight = _mirrored(conductors, i, at, dot(wo, h)) * g1(m, wi)
     return BsdfSample(wi, weight, density_of_wi, 1.0, False)

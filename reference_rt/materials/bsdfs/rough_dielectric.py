@@ -12,26 +12,24 @@ inside 1 %, 10 % and 58 %.
 """
 
 import math
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import model_validator
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
+from reference_rt.materials.bsdfs.rough import Rough
 from reference_rt.materials.bsdfs.transparent import Transparent
-from reference_rt.materials.material import BsdfSample, Scattered, no_sample
+from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
 from reference_rt.materials.microfacet.ggx_and_smith import (
-    AlphaParameter,
-    Distribution,
     Microfacets,
     Roughnesses,
     density,
     g1,
     g1_over_cos,
     half_vector,
-    is_anisotropic,
     microfacets_at,
     refract,
     refraction_half,
@@ -42,13 +40,10 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
 from reference_rt.textures import At, Colours, Palette, colour_at
 
 
-class RoughDielectric(Transparent):
+class RoughDielectric(Rough, Transparent):
     """A rough boundary of two transparent media; the normal points to the exterior."""
 
-    smooth: ClassVar[bool] = True
     type: Literal["rough_dielectric"] = "rough_dielectric"
-    distribution: Distribution = "ggx"
-    alpha: AlphaParameter = (0.1, 0.1)
 
     @model_validator(mode="after")
     def _bends(self) -> "RoughDielectric":
@@ -61,14 +56,9 @@ class RoughDielectric(Transparent):
             )
         return self
 
-    @property
-    def oriented(self) -> bool:
-        return is_anisotropic(self.alpha)
-
     def tabulate(self, palette: Palette) -> "RoughDielectrics":
         return RoughDielectrics(
-            **self.columns(palette),
-            roughness=roughnesses(self.distribution, self.alpha, palette),
+            **self.columns(palette), roughness=roughnesses(self.distribution, self.alpha, palette)
         )
 
 
@@ -152,7 +142,7 @@ def sample(
     """wo reflected or refracted at a visible microfacet."""
     side = wo.z
     if side == 0.0:
-        return no_sample()
+        return NO_SAMPLE
     wo = _upwards(wo, side)
     m = microfacets_at(dielectrics.roughness, i, at)
     h = sample_visible(m, wo, u0, u1)
@@ -162,7 +152,7 @@ def sample(
         wi = reflect(wo, h)
         density_of_wi = facet.share * _mirrored_density(m, wo, h)
         if wi.z <= 0.0 or density_of_wi == 0.0:
-            return no_sample()
+            return NO_SAMPLE
         weight = facet.mirrored * (g1(m, wi) / facet.share)
         return BsdfSample(_upwards(wi, side), weight, density_of_wi, 1.0, False)
     eta, gap = refraction.eta, refraction.gap
@@ -170,6 +160,6 @@ def sample(
     spread = refraction.cos_t / (gap * gap)  # wo + eta wi is eta gap h
     density_of_wi = facet.passing * visible_density(m, wo, h) * spread
     if wi.z >= 0.0 or not density_of_wi > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     weight = facet.refracted * (g1(m, wi) / (facet.passing * eta * eta))
     return BsdfSample(_upwards(wi, side), weight, density_of_wi, eta, False)

@@ -27,7 +27,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.materials.bsdfs.coated import Coated, base_albedo
-from reference_rt.materials.material import INV_PI, BsdfSample, Scattered, no_sample
+from reference_rt.materials.material import INV_PI, NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import (
     MAX_ALPHA,
@@ -195,16 +195,16 @@ def sample(
 ) -> BsdfSample:
     """wo reflected at a visible microfacet, or a cosine-distributed direction."""
     if wo.z <= 0.0:
-        return no_sample()
+        return NO_SAMPLE
     lobes = _lobes(plastics, i, at, wo)
     if u_lobe < lobes.p:
         wi = reflect(wo, sample_visible(lobes.m, wo, u0, u1))
     else:
         wi = cosine_hemisphere(u0, u1)
     if wi.z <= 0.0:
-        return no_sample()
+        return NO_SAMPLE
     value, density_of_wi = _scattered(plastics, i, lobes, wo, wi)
     if not density_of_wi > 0.0:
-        return no_sample()
+        return NO_SAMPLE
     weight = value * (1.0 / density_of_wi)
     return BsdfSample(wi, weight, density_of_wi, 1.0, False)

@@ -25,7 +25,7 @@ from reference_rt.materials.bsdfs import (
     thin_dielectric,
 )
 from reference_rt.materials.bsdfs.conductor import Conductor, Conductors
-from reference_rt.materials.bsdfs.dielectric import Dielectric, Dielectrics
+from reference_rt.materials.bsdfs.dielectric import Dielectric
 from reference_rt.materials.bsdfs.diffuse import Diffuse, Diffuses
 from reference_rt.materials.bsdfs.mirror import Mirror, Mirrors
 from reference_rt.materials.bsdfs.phong import Phong, Phongs
@@ -34,13 +34,14 @@ from reference_rt.materials.bsdfs.principled import Principled, Principleds
 from reference_rt.materials.bsdfs.rough_conductor import RoughConductor, RoughConductors
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, RoughDielectrics
 from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic, RoughPlastics
-from reference_rt.materials.bsdfs.thin_dielectric import ThinDielectric, ThinDielectrics
+from reference_rt.materials.bsdfs.thin_dielectric import ThinDielectric
+from reference_rt.materials.bsdfs.transparent import Transparents
 from reference_rt.materials.material import (
+    NO_BRANCHES,
     Branches,
     BsdfSample,
     Material,
     Scattered,
-    no_branches,
     sample_branch,
     straight_on,
 )
@@ -68,9 +69,9 @@ class Leaves(NamedTuple):
 
     diffuses: Diffuses | None
     mirrors: Mirrors | None
-    dielectrics: Dielectrics | None
+    dielectrics: Transparents | None
     conductors: Conductors | None
-    thin_dielectrics: ThinDielectrics | None
+    thin_dielectrics: Transparents | None
     rough_conductors: RoughConductors | None
     rough_dielectrics: RoughDielectrics | None
     plastics: Plastics | None
@@ -82,9 +83,9 @@ class Leaves(NamedTuple):
 TABLES: tuple[tuple[int, str, type[Material], type, Any], ...] = (
     (DIFFUSE, "diffuses", Diffuse, Diffuses, diffuse),
     (MIRROR, "mirrors", Mirror, Mirrors, mirror),
-    (DIELECTRIC, "dielectrics", Dielectric, Dielectrics, dielectric),
+    (DIELECTRIC, "dielectrics", Dielectric, Transparents, dielectric),
     (CONDUCTOR, "conductors", Conductor, Conductors, conductor),
-    (THIN_DIELECTRIC, "thin_dielectrics", ThinDielectric, ThinDielectrics, thin_dielectric),
+    (THIN_DIELECTRIC, "thin_dielectrics", ThinDielectric, Transparents, thin_dielectric),
     (ROUGH_CONDUCTOR, "rough_conductors", RoughConductor, RoughConductors, rough_conductor),
     (ROUGH_DIELECTRIC, "rough_dielectrics", RoughDielectric, RoughDielectrics, rough_dielectric),
     (PLASTIC, "plastics", Plastic, Plastics, plastic),
@@ -122,7 +123,7 @@ def eval_pdf(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3, wi: Vec3) -> S
 @by_code("branches")
 def branches(leaves: Leaves, kind: int, i: int, at: At, wo: Vec3) -> Branches:
     """The perfectly reflected and refracted directions; factors of 0 if there are none."""
-    return straight_on(wo) if kind == CLEAR else no_branches()
+    return straight_on(wo) if kind == CLEAR else NO_BRANCHES
 
 
 @by_code("sample")

@@ -1,15 +1,14 @@
 """Thin dielectric: a pane of glass as one surface, with all reflections between its faces."""
 
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal
 
-from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs.transparent import Transparent
+from reference_rt.materials.bsdfs.transparent import Transparent, Transparents
 from reference_rt.materials.material import Branches
 from reference_rt.materials.microfacet.fresnel import fresnel
-from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+from reference_rt.textures import At, ReflectanceParameter, colour_at
 
 
 class ThinDielectric(Transparent):
@@ -24,20 +23,9 @@ class ThinDielectric(Transparent):
     transmittance: ReflectanceParameter = (1.0, 1.0, 1.0)
     """What the light that passes is multiplied with."""
 
-    def tabulate(self, palette: Palette) -> "ThinDielectrics":
-        return ThinDielectrics(**self.columns(palette))
-
-
-class ThinDielectrics(NamedTuple):
-    """eta (n,): index of the pane over that around it;  reflectance, transmittance (n)."""
-
-    eta: FloatArray
-    reflectance: Colours
-    transmittance: Colours
-
 
 @kernel
-def branches(panes: ThinDielectrics, i: int, at: At, wo: Vec3) -> Branches:
+def branches(panes: Transparents, i: int, at: At, wo: Vec3) -> Branches:
     """With R the reflectance of one face, the two together reflect R + T R T + T R R R T + ... =
     2 R / (1 + R).  The rest, T / (1 + R), passes undeviated, its radiance unchanged (PBR 4ed,
     9.5.3)."""

@@ -1,13 +1,14 @@
-"""The description that smooth, thin and rough dielectrics share."""
+"""The description of smooth, thin and rough dielectrics, and the table of the first two."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Positive
 from reference_rt.materials.material import Material
 from reference_rt.materials.microfacet.fresnel import relative_index
-from reference_rt.textures import Palette, ReflectanceParameter
+from reference_rt.textures import Colours, Palette, ReflectanceParameter
 
 
 class Transparent(Material):
@@ -31,6 +32,9 @@ class Transparent(Material):
     def transmits(self) -> bool:
         return True
 
+    def tabulate(self, palette: Palette) -> Any:
+        return Transparents(**self.columns(palette))
+
     def columns(self, palette: Palette) -> dict[str, Any]:
         """The columns that the tables share, one row: eta, reflectance, transmittance."""
         return {
@@ -38,3 +42,12 @@ class Transparent(Material):
             "reflectance": palette.colours(self.reflectance),
             "transmittance": palette.colours(self.transmittance),
         }
+
+
+class Transparents(NamedTuple):
+    """eta (n,): index of refraction of the interior (of a pane) over that of the exterior;
+    reflectance, transmittance (n)."""
+
+    eta: FloatArray
+    reflectance: Colours
+    transmittance: Colours

@@ -96,10 +96,6 @@ def roughnesses(
     )
 
 
-def is_anisotropic(alpha: tuple[float, float] | str) -> bool:
-    return not isinstance(alpha, str) and alpha[0] != alpha[1]
-
-
 class Microfacets(NamedTuple):
     """The distribution at one point: kind, GGX or BECKMANN; roughness along x and along y."""
 

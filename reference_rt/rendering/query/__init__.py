@@ -45,6 +45,11 @@ from reference_rt.rendering.query.light import (
 from reference_rt.rendering.query.radiance import Radiance, radiance, radiance_without_noise
 
 
+def _warn(message: str) -> None:
+    """A DeprecationWarning for the caller of the function that calls this."""
+    warnings.warn(message, DeprecationWarning, stacklevel=3)
+
+
 def closest(
     scene: SceneTables,
     origins: npt.ArrayLike,
@@ -52,11 +57,7 @@ def closest(
     threads: int | None = None,
 ) -> Closest:
     """Deprecated: use `first_hits`, which returns shape indices instead of internal codes."""
-    warnings.warn(
-        "query.closest returns internal codes; use Scene.first_hits or query.first_hits",
-        DeprecationWarning,
-        stacklevel=2,
-    )
+    _warn("query.closest returns internal codes; use Scene.first_hits or query.first_hits")
     return closest_primitives(scene, origins, directions, threads)
 
 
@@ -64,11 +65,7 @@ def whitted_radiance(
     scene: SceneTables, integrator: Any, origins: npt.ArrayLike, directions: npt.ArrayLike
 ) -> FloatArray:
     """Deprecated: the old name of `radiance_without_noise`."""
-    warnings.warn(
-        "query.whitted_radiance is now query.radiance_without_noise; see also Scene.radiance",
-        DeprecationWarning,
-        stacklevel=2,
-    )
+    _warn("query.whitted_radiance is now query.radiance_without_noise; see also Scene.radiance")
     return radiance_without_noise(scene, integrator, origins, directions)
 
 

@@ -27,9 +27,7 @@ def numbers(name: str, values: npt.ArrayLike, *tail: int) -> FloatArray:
     return np.asarray(array, np.float64)
 
 
-def broadcast(
-    *arrays: tuple[str, FloatArray, int],
-) -> tuple[tuple[int, ...], list[FloatArray]]:
+def broadcast(*arrays: tuple[str, FloatArray, int]) -> tuple[tuple[int, ...], list[FloatArray]]:
     """Broadcast arrays (name, array, number of trailing dimensions of an entry) to one leading
     shape: that shape, and each array as (n, ...).  Raises ValueError.
 

@@ -19,6 +19,7 @@ from reference_rt.shapes.placement import local_vector, owners, world_covector
 from reference_rt.shapes.ray_simd import make_nearer
 from reference_rt.shapes.rounding import along_from
 from reference_rt.shapes.shape import (
+    NO_LIGHT_POINT,
     LightPoint,
     Shape,
     Spans,
@@ -26,7 +27,6 @@ from reference_rt.shapes.shape import (
     Tangents,
     any_tangents,
     lane_vector,
-    no_light_point,
     no_spans,
     one_span,
     outward,
@@ -215,7 +215,7 @@ def sample(spheres: Spheres, i: int, area: float, p: Vec3, u0: float, u1: float)
     to_center = center - p
     distance2 = dot(to_center, to_center)
     if not is_outside(p, center, r):
-        return no_light_point()
+        return NO_LIGHT_POINT
     one_minus_cos_max = cone_of_sight(distance2, r)
     one_minus_cos = u0 * one_minus_cos_max
     cos_theta = 1.0 - one_minus_cos

@@ -6,12 +6,12 @@ has the same coordinates, also under a map that shears.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss, surface_error
 from reference_rt.core.transform import FLAT, Affine
 from reference_rt.core.vec3 import Vec3, dot, max_abs, row
@@ -28,6 +28,21 @@ def integers(a: FloatArray) -> tuple[Integers, int]:
     denominator = max(d for _, d in ratios)
     numerators = np.array([n * (denominator // d) for n, d in ratios], dtype=object)
     return numerators.reshape(a.shape), denominator
+
+
+class Flats(NamedTuple):
+    """n flat shapes without columns of their own: those that all have, and `placement.owners`."""
+
+    center: FloatArray
+    normal: FloatArray
+    x_of: FloatArray
+    y_of: FloatArray
+    x_edge: FloatArray
+    y_edge: FloatArray
+    owner: IntArray
+    material: IntArray
+    light: IntArray
+    face: IntArray
 
 
 def columns(

@@ -1,11 +1,11 @@
 """Disk: the unit disk in the plane z = 0, normal +z, under an affine map: any ellipse."""
 
 import math
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
-from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.arrays import Bounds, FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
@@ -33,20 +33,8 @@ class Disk(Shape):
         return disks
 
 
-class Disks(NamedTuple):
-    """n ellipses: the columns of `flat.base`, with x_edge and y_edge as conjugate radii, and of
-    `placement.owners`."""
-
-    center: FloatArray
-    normal: FloatArray
-    x_of: FloatArray
-    y_of: FloatArray
-    x_edge: FloatArray
-    y_edge: FloatArray
-    owner: IntArray
-    material: IntArray
-    light: IntArray
-    face: IntArray
+class Disks(base.Flats):
+    """n ellipses, with x_edge and y_edge as conjugate radii."""
 
 
 def bounds(disks: Disks) -> Bounds:

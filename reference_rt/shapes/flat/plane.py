@@ -1,11 +1,11 @@
 """Plane: z = 0 without end, normal +z, under an affine map."""
 
 import math
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
-from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.arrays import Bounds
 from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import dot, row
 from reference_rt.jit.kernel import kernel
@@ -23,19 +23,8 @@ class Plane(Shape):
         return Planes(**base.facing_z(self.map_in(context), context))
 
 
-class Planes(NamedTuple):
-    """n planes: the columns of `flat.base` and of `placement.owners`."""
-
-    center: FloatArray
-    normal: FloatArray
-    x_of: FloatArray
-    y_of: FloatArray
-    x_edge: FloatArray
-    y_edge: FloatArray
-    owner: IntArray
-    material: IntArray
-    light: IntArray
-    face: IntArray
+class Planes(base.Flats):
+    """n planes."""
 
 
 def bounds(planes: Planes) -> Bounds:

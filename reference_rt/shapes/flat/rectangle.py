@@ -18,7 +18,7 @@ from reference_rt.shapes.shape import (
     Shape,
     TabulationContext,
     Tangents,
-    lane_vector,
+    lane_vectors,
     outward,
     pack,
     solid_angle_pdf,
@@ -130,13 +130,7 @@ def lane_distance(
     rectangles: Rectangles, packets: FloatArray, k: int, lane: int, ray: Ray
 ) -> float:
     """`distance` for one lane of packet k of `pack_all`."""
-    return distance(
-        ray,
-        lane_vector(packets, k, 0, lane),
-        lane_vector(packets, k, 3, lane),
-        lane_vector(packets, k, 6, lane),
-        lane_vector(packets, k, 9, lane),
-    )
+    return distance(ray, *lane_vectors(packets, k, lane))
 
 
 surface = base.surface

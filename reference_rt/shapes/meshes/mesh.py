@@ -13,12 +13,7 @@ from reference_rt.core.numpy_fields import AS_DIGEST, Floats2, Floats3, Integers
 from reference_rt.core.transform import IDENTITY, Affine
 from reference_rt.shapes.meshes.files import MeshData, read_mesh
 from reference_rt.shapes.meshes.files.data import RawMesh, checked
-from reference_rt.shapes.meshes.triangle_table import (
-    Triangles,
-    facing,
-    geometric_normals,
-    soup,
-)
+from reference_rt.shapes.meshes.triangle_table import Triangles, facing, geometric_normals, soup
 from reference_rt.shapes.meshes.vertex_normals import smooth_normals
 from reference_rt.shapes.shape import Shape, TabulationContext
 

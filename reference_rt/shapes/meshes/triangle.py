@@ -19,14 +19,7 @@ from reference_rt.core.ray import (
 )
 from reference_rt.core.vec3 import Vec3, cross, dot, max_abs, normalize, triple
 from reference_rt.jit.kernel import kernel
-from reference_rt.shapes.meshes.triangle_table import (
-    Triangles,
-    align,
-    areas,
-    bounds,
-    facing,
-    soup,
-)
+from reference_rt.shapes.meshes.triangle_table import Triangles, align, areas, bounds, facing, soup
 from reference_rt.shapes.meshes.watertight import (
     Projection,
     Shear,

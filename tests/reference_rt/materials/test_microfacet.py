@@ -12,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import entry_kernel
+from reference_rt.materials.bsdfs.rough import Rough
 from reference_rt.materials.microfacet import beckmann
 from reference_rt.materials.microfacet.beckmann import _slope_across, _slope_seen
 from reference_rt.materials.microfacet.ggx_and_smith import (
@@ -24,7 +25,6 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     g1,
     g1_over_cos,
     half_vector,
-    is_anisotropic,
     microfacets_at,
     roughnesses,
     sample_visible,
@@ -240,9 +240,9 @@ def test_alpha_of_a_description():
     assert alpha(0.1) == (0.1, 0.1)
     assert alpha([0.1, 1]) == (0.1, 1.0)
     assert alpha("worn") == "worn"
-    assert is_anisotropic((0.1, 0.2))
-    assert not is_anisotropic((0.1, 0.1))
-    assert not is_anisotropic("worn")
+    assert Rough(alpha=(0.1, 0.2)).oriented
+    assert not Rough(alpha=(0.1, 0.1)).oriented
+    assert not Rough(alpha="worn").oriented
 
 
 @pytest.mark.parametrize(
