@@ -12,7 +12,7 @@ from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.findings import Findings, Target
 from comparisons.experiments.convergence.fits import Line
-from comparisons.report.results_json import plain
+from comparisons.results.json_values import plain
 from reference_rt.util.files import replacing
 
 SCHEMA = 1

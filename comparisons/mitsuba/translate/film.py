@@ -4,15 +4,8 @@ from functools import singledispatch
 from typing import Any
 
 from comparisons.mitsuba.translate.errors import UntranslatableError
+from reference_rt.cameras import filters
 from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import (
-    BoxFilter,
-    CatmullRomFilter,
-    GaussianFilter,
-    LanczosFilter,
-    MitchellFilter,
-    TentFilter,
-)
 from reference_rt.sampling import Grid, Independent, Sobol
 
 
@@ -27,7 +20,7 @@ def translate_film(film: Film) -> dict[str, Any]:
         "rfilter": translate_filter(film.filter),
         # Our pixels sample the whole filter, also beyond the picture's edge; without a border
         # Mitsuba's edge pixels would lack the samples outside.
-        "sample_border": not isinstance(film.filter, BoxFilter),
+        "sample_border": not isinstance(film.filter, filters.BoxFilter),
     }
 
 
@@ -38,32 +31,32 @@ def translate_filter(film_filter: Any) -> dict[str, Any]:
 
 
 @translate_filter.register
-def _(film_filter: BoxFilter) -> dict[str, Any]:
+def _(film_filter: filters.BoxFilter) -> dict[str, Any]:
     return {"type": "box"}
 
 
 @translate_filter.register
-def _(film_filter: TentFilter) -> dict[str, Any]:
+def _(film_filter: filters.TentFilter) -> dict[str, Any]:
     return {"type": "tent", "radius": film_filter.radius}
 
 
 @translate_filter.register
-def _(film_filter: GaussianFilter) -> dict[str, Any]:
+def _(film_filter: filters.GaussianFilter) -> dict[str, Any]:
     return {"type": "gaussian", "stddev": film_filter.stddev}
 
 
 @translate_filter.register
-def _(film_filter: MitchellFilter) -> dict[str, Any]:
+def _(film_filter: filters.MitchellFilter) -> dict[str, Any]:
     return {"type": "mitchell", "B": film_filter.b, "C": film_filter.c}
 
 
 @translate_filter.register
-def _(film_filter: CatmullRomFilter) -> dict[str, Any]:
+def _(film_filter: filters.CatmullRomFilter) -> dict[str, Any]:
     return {"type": "catmullrom"}
 
 
 @translate_filter.register
-def _(film_filter: LanczosFilter) -> dict[str, Any]:
+def _(film_filter: filters.LanczosFilter) -> dict[str, Any]:
     return {"type": "lanczos", "lobes": film_filter.lobes}
 
 

@@ -32,10 +32,10 @@ def test_samples_have_their_density_and_the_weights_their_mean(materials, seed, 
     ("materials", "seed", "condition"),
     [
         # Both are of the same direction: it is rounded once.
-        (random_phong(16, 68), 67, 1.0),
-        (random_plastic(16, 44), 43, 1.0),
+        (list(random_phong(16, 68)), 67, 1.0),
+        (list(random_plastic(16, 44)), 43, 1.0),
         # Refracted directions are as long as their half vector is exact.
-        (random_principled(24, 84, least=0.0), 83, 16.0),
+        (list(random_principled(24, 84, least=0.0)), 83, 16.0),
     ],
     ids=["phong", "plastic", "principled"],
 )
