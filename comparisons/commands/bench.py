@@ -6,16 +6,14 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh, Scenes
+from comparisons.commands.options import Fresh, Scenes, out_folder, table_in
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import UsageError
 
 
 @guarded
 def bench(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder for results.json and bench.md.")
-    ] = Path("out/bench"),
+    out: Annotated[Path, out_folder("results.json and bench.md")] = Path("out/bench"),
     only: Annotated[
         list[str] | None,
         typer.Option(metavar="ROW", help="Only these rows, and those measured together with them."),
@@ -28,13 +26,7 @@ def bench(
         bool, typer.Option("--quick", help="Smaller pictures and fewer scenes.")
     ] = False,
     fresh: Fresh = False,
-    markdown: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Also write the table between '<!-- bench -->' and '<!-- end -->' of this file.",
-        ),
-    ] = None,
+    markdown: Annotated[Path | None, table_in("bench")] = None,
     scenes: Scenes = Path("scenes"),
 ) -> None:
     """Measure the renderer's speed against Mitsuba's; takes about half an hour."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh, Threads
+from comparisons.commands.options import Fresh, Threads, out_folder
 from reference_rt.cli.main import guarded
 
 if TYPE_CHECKING:
@@ -18,9 +18,7 @@ def compare(
     scenes: Annotated[
         list[Path], typer.Argument(metavar="SCENE...", help="Scene files: .yaml or .json.")
     ],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder for results.json and report.html.")
-    ] = Path("out"),
+    out: Annotated[Path, out_folder("results.json and report.html")] = Path("out"),
     spp: Annotated[
         int | None,
         typer.Option(help="Samples per pixel of each replicate. (default: the scene's)"),

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh
+from comparisons.commands.options import Fresh, out_folder
 from reference_rt.cli.main import guarded, say
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.console import ProgressLine
@@ -19,12 +19,9 @@ def converge(
     scenes: Annotated[
         list[Path], typer.Argument(metavar="SCENE...", help="Scene files: .yaml or .json.")
     ],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", metavar="DIR", help="Folder for results.json, .csv and report.html."
-        ),
-    ] = Path("out/converge"),
+    out: Annotated[Path, out_folder("results.json, .csv and report.html", "DIR")] = Path(
+        "out/converge"
+    ),
     time_limit: Annotated[
         float,
         typer.Option(

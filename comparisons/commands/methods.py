@@ -8,15 +8,14 @@ import typer
 from rich.console import Console
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import out_folder
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import UsageError
 
 
 @guarded
 def methods(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for results and the page.")
-    ] = Path("out/methods"),
+    out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/methods"),
     family: Annotated[
         list[str] | None,
         typer.Option(help="Only these: sphere, triangle, box, polygon, csg, hierarchy."),

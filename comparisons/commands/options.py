@@ -1,7 +1,7 @@
 """Options that several commands have, with one help text each."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -32,3 +32,16 @@ NoiseFree = Annotated[
 Scenes = Annotated[Path, typer.Option(metavar="DIR", help="The folder of scene files.")]
 
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads. (default: all cores)")]
+
+
+def out_folder(what: str, metavar: str | None = None) -> Any:
+    """`--out`, the folder for `what`."""
+    return typer.Option("--out", "-o", metavar=metavar, help=f"Folder for {what}.")
+
+
+def table_in(name: str) -> Any:
+    """`--markdown`, a file in which the table between two comments is rewritten."""
+    comments = f"'<!-- {name} -->' and '<!-- end -->'"
+    return typer.Option(
+        metavar="FILE", help=f"Also write the table between {comments} of this file."
+    )

@@ -7,16 +7,14 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from comparisons.commands.options import Scenes
+from comparisons.commands.options import Scenes, out_folder
 from reference_rt.cli.main import guarded
 from reference_rt.util.errors import UsageError
 
 
 @guarded
 def selftest(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder for selftest.json and selftest.md.")
-    ] = Path("out"),
+    out: Annotated[Path, out_folder("selftest.json and selftest.md")] = Path("out"),
     only: Annotated[
         list[str] | None, typer.Option(help="Only faults whose names match this pattern.")
     ] = None,

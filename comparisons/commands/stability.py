@@ -8,16 +8,14 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh
+from comparisons.commands.options import Fresh, out_folder, table_in
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import UsageError
 
 
 @guarded
 def stability(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for results and the page.")
-    ] = Path("out/stability"),
+    out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/stability"),
     family: Annotated[
         list[str] | None, typer.Option(help="Only this family, F1 to F14: repeat for several.")
     ] = None,
@@ -38,14 +36,7 @@ def stability(
         bool, typer.Option("--mitsuba/--no-mitsuba", help="Measure Mitsuba too.")
     ] = True,
     fresh: Fresh = False,
-    markdown: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Also write the table between '<!-- stability -->' and '<!-- end -->' of this "
-            "file.",
-        ),
-    ] = None,
+    markdown: Annotated[Path | None, table_in("stability")] = None,
 ) -> None:
     """Find where reference_rt and Mitsuba fail as scenes become extreme.
 

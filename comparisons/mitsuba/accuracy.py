@@ -88,7 +88,7 @@ def both_sides(
     table = material.tabulate(NO_TEXTURES)
     at = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
     ours = [
-        tuple(kernels.evaluate(table, 0, at, Vec3(*o), Vec3(*i)))
+        tuple(kernels.eval_pdf(table, 0, at, Vec3(*o), Vec3(*i)).value)
         for o, i in zip(wo.tolist(), wi.tolist(), strict=True)
     ]
     if not theirs:

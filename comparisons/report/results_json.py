@@ -1,16 +1,13 @@
 """`results.json`: the results of a run for machines; the page shows the same data."""
 
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from comparisons.results.case import Case, RungResult
+from comparisons.results.json_values import plain
 from reference_rt.util.files import replacing
 
 SCHEMA = 2
@@ -73,9 +70,9 @@ def _case(case: Case) -> dict[str, Any]:
         "reason": case.reason,
         "sides": dict(zip(("candidate", "reference"), case.sides, strict=True)),
         "tiers": rungs,
-        "metrics": plain(asdict(case.metrics)) if case.metrics else None,
-        "cause": plain(asdict(case.cause)) if case.cause else None,
-        "worst": [plain(asdict(place)) for place in case.worst],
+        "metrics": plain(case.metrics),
+        "cause": plain(case.cause),
+        "worst": plain(case.worst),
         "seconds": plain(case.seconds),
         "notes": list(case.notes),
         "left_out": list(case.left_out),
@@ -88,16 +85,3 @@ def _rung(rung: RungResult) -> dict[str, Any]:
     if clash := {"status", "reason"} & numbers.keys():
         raise ValueError(f"{rung.name}: a number may not be called {', '.join(sorted(clash))}")
     return {"status": rung.status, "reason": rung.reason, **numbers}
-
-
-def plain(value: Any) -> Any:
-    """`value` in JSON's types: NumPy types become Python's, numbers that are not finite None."""
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

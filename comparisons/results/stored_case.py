@@ -7,7 +7,6 @@ Stored cases let a report be rendered again, and a run continue without repeatin
 import dataclasses
 import hashlib
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -16,6 +15,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from comparisons.results.case import Case, FloatArray, Images
+from comparisons.results.json_values import plain
 from comparisons.results.sealed import sealed, unsealed
 from reference_rt.core.exr import read_exr, write_exr
 from reference_rt.util.errors import ImageError
@@ -79,7 +79,10 @@ def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> No
         "schema": SCHEMA,
         "key": key,
         "wall": wall,
-        "case": _encoded({key: getattr(case, name) for name, key in _KEYS.items()}),
+        "case": plain(
+            {key: getattr(case, name) for name, key in _KEYS.items()},
+            not_finite=lambda value: {_NUMBER: str(value)},
+        ),
         "pictures": {},
         "sha256": "",
     }
@@ -174,21 +177,6 @@ def _digest(path: Path) -> str:
 
 
 # ---- values -------------------------------------------------------------------------------------
-
-
-def _encoded(value: Any) -> Any:
-    """`value` in the types of strict JSON."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: _encoded(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, np.ndarray | np.generic):
-        return _encoded(value.tolist())
-    if isinstance(value, Mapping):
-        return {str(key): _encoded(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_encoded(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return {_NUMBER: str(value)}
-    return value
 
 
 def _decoded(value: Any) -> Any:

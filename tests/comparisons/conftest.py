@@ -20,9 +20,27 @@ from comparisons.commands.report import report
 from comparisons.commands.suite import suite
 from comparisons.gate import reference
 from comparisons.mitsuba.backend import Backend
+from comparisons.mitsuba.translate import load
 from comparisons.report import write_report
 from comparisons.suites import run
 from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+
+# ---- scenes and their counterparts --------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tables(scene: Scene) -> SceneTables:
+    """Those of the module's own fixture `scene`."""
+    return build_tables(scene)
+
+
+@pytest.fixture(scope="module")
+def counterpart(scene: Scene) -> Any:
+    return load(scene)
+
 
 # ---- images that textures and skies are made of ------------------------------------------------
 

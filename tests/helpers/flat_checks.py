@@ -4,7 +4,7 @@ import itertools
 from fractions import Fraction as Q
 
 import numpy as np
-from builders import U, unit_vectors
+from builders import U, shapes_in_order, unit_vectors
 from drivers import probe
 from rational import cross, dot, q
 
@@ -36,6 +36,11 @@ def plane_points(table, rows, x, y):
         + table.x_edge[rows] * np.asarray(x)[:, None]
         + table.y_edge[rows] * np.asarray(y)[:, None]
     )
+
+
+def rays_at_plane(rng, table, rows, x, y, distance):
+    """Rays towards points of each row's plane."""
+    return rays_at(rng, plane_points(table, rows, x, y), distance)
 
 
 def rays_at(rng, points, distance):
@@ -92,6 +97,21 @@ def lattice_rays(reach=2):
     origins = np.array(list(itertools.product(range(-reach, reach + 1), repeat=3)), float)
     directions = [w for w in itertools.product((-1.0, 0.0, -0.0, 1.0), repeat=3) if any(w)]
     return np.repeat(origins, len(directions), axis=0), np.tile(directions, (len(origins), 1))
+
+
+def lattice_hits(shape, kind):
+    """Of one shape: the origins and directions of `lattice_rays`, and their hits."""
+    o, d = lattice_rays()
+    tables, _ = shapes_in_order([shape])
+    return o, d, probe(tables, kind, np.zeros(len(o)), o, d)
+
+
+def check_normal(n, shape, table, i):
+    """The hit's normal n against the exact one (3,), which is returned, and its side."""
+    normal, side = exact_normal(table, i)
+    assert side == (-1 if mirrors(shape) else 1)
+    assert np.abs(n - side * normal).max() <= 4 * U
+    return normal
 
 
 def exact_normal(table, i):

@@ -14,6 +14,13 @@ from reference_rt.core.exr import write_exr
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 
+BALL = """\
+camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 40}
+materials: {grey: {type: diffuse, reflectance: 0.5}}
+shapes: [{type: sphere, radius: 1, material: grey}]
+"""
+"""A scene without film, sampler and lights."""
+
 SCENE = """\
 film: {width: 32, height: 32}
 camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 40}

@@ -9,14 +9,7 @@ from chi_square import chi_square, integrate
 
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import ByClass, entry_kernel
-from reference_rt.materials.bsdfs import (
-    phong,
-    plastic,
-    principled,
-    rough_conductor,
-    rough_dielectric,
-    rough_plastic,
-)
+from reference_rt.materials.bsdfs.tables import TABLES
 from reference_rt.textures import NO_TEXTURES, At
 
 NOWHERE = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
@@ -24,18 +17,11 @@ NOWHERE = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
 MIXTURE = np.array([0.5, 0.3, 0.2])
 """Of the three channels: what is wrong with one is wrong with it."""
 
-_MODULES = {
-    phong.Phongs: phong,
-    plastic.Plastics: plastic,
-    principled.Principleds: principled,
-    rough_conductor.RoughConductors: rough_conductor,
-    rough_dielectric.RoughDielectrics: rough_dielectric,
-    rough_plastic.RoughPlastics: rough_plastic,
-}
 _eval_pdf, _sample = ByClass("eval_pdf"), ByClass("sample")
-for _table, _module in _MODULES.items():
-    _eval_pdf.register(_table, _module.eval_pdf)
-    _sample.register(_table, _module.sample)
+for *_, _table, _module in TABLES:
+    if hasattr(_module, "eval_pdf"):
+        _eval_pdf.register(_table, _module.eval_pdf)
+        _sample.register(_table, _module.sample)
 _eval_pdf_one, _sample_one = _eval_pdf.function, _sample.function
 
 

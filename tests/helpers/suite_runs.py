@@ -1,6 +1,10 @@
 """Suites whose workers run what `suite_runners` does in the place of `compare`."""
 
+import subprocess
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from comparisons.suites.run import Options, run_suite
 from comparisons.suites.suite import Source, parse_suite, plan
@@ -27,6 +31,22 @@ def run_in(out: Path, folder: Path, text: str = "about: a test\n", only=(), **op
     rungs = options.get("rungs", ())
     planned = plan(source, folder, only, rungs)
     return run_suite(source, planned, Options(out, runner=RUNNER, **options))
+
+
+def signal_in_the_next_case(
+    process: subprocess.Popen[Any], number: int, is_first_done: Callable[[], bool]
+) -> list[str]:
+    """Send a program a signal in its second case: the ids of its workers."""
+    deadline = time.monotonic() + 120.0
+    while not is_first_done():
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.05)
+    time.sleep(0.5)  # until the next case has begun
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    workers = children.read_text().split() if children.exists() else []
+    process.send_signal(number)
+    return workers
 
 
 def processes(found) -> dict[str, int]:

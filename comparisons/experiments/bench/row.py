@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from comparisons.experiments.bench.timing import Spread, ratios, spread
-from comparisons.report.results_json import plain
+from comparisons.results.json_values import plain
 
 Better = Literal["lower", "higher"]
 

@@ -12,7 +12,8 @@ from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.findings import Findings, Target
 from comparisons.experiments.convergence.fits import Line
-from comparisons.report.results_json import plain
+from comparisons.results.files import csv_file
+from comparisons.results.json_values import plain
 from reference_rt.util.files import replacing
 
 SCHEMA = 1
@@ -77,7 +78,7 @@ def write_results(
 
 def write_table(path: Path, curves: Sequence[Curves]) -> None:
     """Write `results.csv`, of COLUMNS, at once or not at all; what is undefined is empty."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with csv_file(path) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for one in curves:

@@ -1,14 +1,13 @@
 """The rows for machines: `results.json` and `results.csv`, which hold the same columns."""
 
 import csv
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from comparisons.experiments.methods.errors import CONFIDENCE, MOVES, NEIGHBOURS, PIXEL
 from comparisons.experiments.methods.run import Effort, Row
-from reference_rt.util.files import replacing
+from comparisons.results.files import csv_file, write_json
 
 SCHEMA = 1
 """Increased whenever a reader of the former layout would misread the new one."""
@@ -94,13 +93,8 @@ def write(
         "meaning": MEANING,
         "rows": flat,
     }
-    with replacing(folder / "results.json") as temporary:
-        text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
-    with (
-        replacing(folder / "results.csv") as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
+    write_json(folder / "results.json", document)
+    with csv_file(folder / "results.csv") as file:
         writer = csv.DictWriter(file, list(flat[0]) if flat else [], lineterminator="\n")
         writer.writeheader()
         writer.writerows(flat)

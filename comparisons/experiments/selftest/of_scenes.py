@@ -23,24 +23,13 @@ def material(name: str, **fields: Any) -> Callable[[Scene], Scene]:
     return change
 
 
-def shape(index: int, **fields: Any) -> Callable[[Scene], Scene]:
-    """Change fields of a shape."""
+def entry(of: str, index: int, **fields: Any) -> Callable[[Scene], Scene]:
+    """Change fields of an entry of the "shapes" or "lights"."""
 
     def change(scene: Scene) -> Scene:
-        shapes = list(scene.shapes)
-        shapes[index] = shapes[index].model_copy(update=fields)
-        return scene.changed(shapes=tuple(shapes))
-
-    return change
-
-
-def light(index: int, **fields: Any) -> Callable[[Scene], Scene]:
-    """Change fields of an entry of the lights."""
-
-    def change(scene: Scene) -> Scene:
-        lights = list(scene.lights)
-        lights[index] = lights[index].model_copy(update=fields)
-        return scene.changed(lights=tuple(lights))
+        entries = list(getattr(scene, of))
+        entries[index] = entries[index].model_copy(update=fields)
+        return scene.changed(**{of: tuple(entries)})
 
     return change
 
@@ -95,7 +84,7 @@ def _one_face_flipped(scene: Scene) -> Scene:
     lines[flipped] = " ".join([head, *reversed(corners)])
     file = Path(_folder().name) / "one_face_flipped.obj"
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return shape(0, file=str(file))(scene)
+    return entry("shapes", 0, file=str(file))(scene)
 
 
 FAULTS = (
@@ -111,7 +100,7 @@ FAULTS = (
         "eta swapped", "caustic_glass", material("glass", interior_ior=1.0, exterior_ior=1.5)
     ),
     SceneFault("glass of 1.52", "caustic_glass", material("glass", interior_ior=1.52)),
-    SceneFault("radius +0.1 %", "caustic_glass", shape(0, radius=0.7007)),
+    SceneFault("radius +0.1 %", "caustic_glass", entry("shapes", 0, radius=0.7007)),
     SceneFault("field of view +0.1 degrees", "colour_bleeding", part("camera", fov=40.1)),
     SceneFault(
         "roughness +5 %", "material_rough_conductor", material("sample", alpha=(0.0525, 0.315))
@@ -120,7 +109,7 @@ FAULTS = (
         "anisotropy turned", "material_rough_conductor", material("sample", alpha=(0.3, 0.05))
     ),
     SceneFault("texture turned", "material_rough_conductor", _texture_turned),
-    SceneFault("sky +1 %", "environment", light(0, scale=0.808)),
+    SceneFault("sky +1 %", "environment", entry("lights", 0, scale=0.808)),
     SceneFault(
         "filter of another width", "filter_tent", part("film", filter=TentFilter(radius=1.1))
     ),

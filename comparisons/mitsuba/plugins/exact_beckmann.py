@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.mitsuba.plugins import parameters
+from comparisons.mitsuba.plugins.base import base_class
 from reference_rt.core.arrays import FloatArray
 
 
@@ -50,16 +51,13 @@ def register(mi: Any) -> None:
     """Define the material for the current variant, and register it."""
     import drjit as dr
 
-    class ExactBeckmann(mi.BSDF):  # type: ignore[misc]
+    class ExactBeckmann(base_class(mi)):  # type: ignore[misc]
         """Parameters: nested; alpha_u and alpha_v, its own."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
-            self.nested = properties["nested"]
+            self.wrap(properties["nested"])
             self.alphas = [parameters.number(mi, properties[f"alpha_{c}"]) for c in "uv"]
-            count = self.nested.component_count()
-            self.m_components = [self.nested.flags(k) for k in range(count)]
-            self.m_flags = self.nested.flags()
 
         def correction(self, si: Any, v: Any, active: Any) -> Any:
             alpha_u, alpha_v = (dr.maximum(alpha(si, active), 1e-4) for alpha in self.alphas)
@@ -75,14 +73,5 @@ def register(mi: Any) -> None:
         def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
             factor = self.correction(si, si.wi, active) * self.correction(si, wo, active)
             return self.nested.eval(context, si, wo, active) * factor
-
-        def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.nested.pdf(context, si, wo, active)
-
-        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
-
-        def to_string(self) -> str:
-            return f"ExactBeckmann[{self.nested}]"
 
     mi.register_bsdf("exact_beckmann", ExactBeckmann)

@@ -16,6 +16,7 @@ import numpy as np
 from scipy import special
 
 from comparisons.mitsuba.plugins import exact_beckmann, parameters
+from comparisons.mitsuba.plugins.base import base_class
 from reference_rt.core.arrays import FloatArray
 
 CELLS = 512
@@ -136,13 +137,13 @@ def register(mi: Any) -> None:
     everything = 0xFFFFFFFF
     diffuse = int(mi.BSDFFlags.DiffuseReflection)
 
-    class ExactCoat(mi.BSDF):  # type: ignore[misc]
+    class ExactCoat(base_class(mi)):  # type: ignore[misc]
         """Parameters: nested, Mitsuba's own material; its reflectance, nonlinear, eta; distribution
         and alpha if it is rough."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
-            self.nested = properties["nested"]
+            self.wrap(properties["nested"])
             self.base = parameters.colour(mi, properties["reflectance"])
             self.nonlinear = properties["nonlinear"]
             self.eta = float(properties["eta"])
@@ -156,9 +157,6 @@ def register(mi: Any) -> None:
                 )
             else:
                 self.r = smooth_reflectance(self.eta)
-            count = self.nested.component_count()
-            self.m_components = [self.nested.flags(k) for k in range(count)]
-            self.m_flags = self.nested.flags()
 
         def passing(self, cosine: Any) -> Any:
             """T at a cosine above 0."""
@@ -204,14 +202,5 @@ def register(mi: Any) -> None:
             if context.component in (everything, 1) and context.type_mask & diffuse == diffuse:
                 total += self.scattered(si, wo, active)
             return total
-
-        def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.nested.pdf(context, si, wo, active)
-
-        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
-
-        def to_string(self) -> str:
-            return f"ExactCoat[{self.nested}]"
 
     mi.register_bsdf("exact_coat", ExactCoat)

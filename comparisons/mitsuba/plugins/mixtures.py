@@ -10,6 +10,7 @@ Everything else here is Mitsuba's.
 from typing import Any
 
 from comparisons.mitsuba.plugins import parameters
+from comparisons.mitsuba.plugins.base import base_class
 
 
 def register(mi: Any) -> None:
@@ -25,7 +26,7 @@ def register(mi: Any) -> None:
         found.type_mask, found.component = context.type_mask, component
         return found
 
-    class MixtureBlend(mi.BSDF):  # type: ignore[misc]
+    class MixtureBlend(base_class(mi)):  # type: ignore[misc]
         """(1 - weight) first + weight second."""
 
         def __init__(self, properties: Any) -> None:
@@ -89,36 +90,29 @@ def register(mi: Any) -> None:
             first, second = (bsdf.pdf(context, si, wo, active) for bsdf in self.nested)
             return first * shares[0] + second * shares[1]
 
-        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
-
         def to_string(self) -> str:
             return f"MixtureBlend[{self.nested[0]}, {self.nested[1]}]"
 
-    class MixtureMask(mi.BSDF):  # type: ignore[misc]
+    class MixtureMask(base_class(mi)):  # type: ignore[misc]
         """Mitsuba's own mask, with the right single components."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
-            self.nested = properties["base"]
+            self.base = properties["base"]
             self.opacity = share(properties["opacity"])
-            self.own = mi.load_dict(
-                {"type": "mask", "opacity": properties["opacity"], "base": self.nested}
-            )
-            count = self.own.component_count()
-            self.m_components = [self.own.flags(k) for k in range(count)]
-            self.m_flags = self.own.flags()
+            mask = {"type": "mask", "opacity": properties["opacity"], "base": self.base}
+            self.wrap(mi.load_dict(mask))
 
         def sample(
             self, context: Any, si: Any, sample1: Any, sample2: Any, active: Any = True
         ) -> tuple[Any, Any]:
             if context.component == 0xFFFFFFFF:
-                drawn, value = self.own.sample(context, si, sample1, sample2, active)
+                drawn, value = self.nested.sample(context, si, sample1, sample2, active)
                 return drawn, value
             opacity = self.opacity(si, active)
             last = len(self.m_components) - 1
             if context.component != last:
-                drawn, value = self.nested.sample(context, si, sample1, sample2, active)
+                drawn, value = self.base.sample(context, si, sample1, sample2, active)
                 return drawn, value * opacity
             drawn = dr.zeros(mi.BSDFSample3f)
             drawn.wo, drawn.eta, drawn.pdf = -si.wi, 1.0, 1.0
@@ -126,16 +120,7 @@ def register(mi: Any) -> None:
             return drawn, mi.Color3f(1.0 - opacity)
 
         def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.own.eval(context, si, wo, active)
-
-        def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.own.pdf(context, si, wo, active)
-
-        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
-
-        def to_string(self) -> str:
-            return f"MixtureMask[{self.own}]"
+            return self.nested.eval(context, si, wo, active)
 
     mi.register_bsdf("mixture_blend", MixtureBlend)
     mi.register_bsdf("mixture_mask", MixtureMask)

@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 from comparisons.mitsuba.plugins import parameters
+from comparisons.mitsuba.plugins.base import base_class
 
 AMBIENT = 0x80000000
 """A bit of `BSDFContext.type_mask` that Mitsuba does not use."""
@@ -28,7 +29,7 @@ def register(mi: Any) -> None:
     front = flags.FrontSide
     everything = 0xFFFFFFFF
 
-    class TextbookPhong(mi.BSDF):  # type: ignore[misc]
+    class TextbookPhong(base_class(mi)):  # type: ignore[misc]
         """Parameters: ambient, diffuse, specular, mirror (textures); exponent; half_vector."""
 
         def __init__(self, properties: Any) -> None:
@@ -141,9 +142,6 @@ def register(mi: Any) -> None:
                 share = dr.select(lit, 1.0 / 3.0, 0.0)
             front_side = dr.select(si.wi.z > 0.0, wo.z > 0.0, False)
             return dr.select(front_side, self.density(si.wi, wo) * (1.0 - share), 0.0)
-
-        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
 
         def to_string(self) -> str:
             return f"TextbookPhong[exponent={self.exponent}]"

@@ -1,18 +1,10 @@
 """Film, filters and samplers -> Mitsuba."""
 
-from functools import singledispatch
 from typing import Any
 
 from comparisons.mitsuba.translate.errors import UntranslatableError
+from reference_rt.cameras import filters
 from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import (
-    BoxFilter,
-    CatmullRomFilter,
-    GaussianFilter,
-    LanczosFilter,
-    MitchellFilter,
-    TentFilter,
-)
 from reference_rt.sampling import Grid, Independent, Sobol
 
 
@@ -27,59 +19,34 @@ def translate_film(film: Film) -> dict[str, Any]:
         "rfilter": translate_filter(film.filter),
         # Our pixels sample the whole filter, also beyond the picture's edge; without a border
         # Mitsuba's edge pixels would lack the samples outside.
-        "sample_border": not isinstance(film.filter, BoxFilter),
+        "sample_border": not isinstance(film.filter, filters.BoxFilter),
     }
 
 
-@singledispatch
 def translate_filter(film_filter: Any) -> dict[str, Any]:
     """A reconstruction filter's dict.  Raises UntranslatableError."""
+    match film_filter:
+        case filters.BoxFilter():
+            return {"type": "box"}
+        case filters.TentFilter(radius=radius):
+            return {"type": "tent", "radius": radius}
+        case filters.GaussianFilter(stddev=stddev):
+            return {"type": "gaussian", "stddev": stddev}
+        case filters.MitchellFilter(b=b, c=c):
+            return {"type": "mitchell", "B": b, "C": c}
+        case filters.CatmullRomFilter():
+            return {"type": "catmullrom"}
+        case filters.LanczosFilter(lobes=lobes):
+            return {"type": "lanczos", "lobes": lobes}
     raise UntranslatableError(film_filter, "filter")
 
 
-@translate_filter.register
-def _(film_filter: BoxFilter) -> dict[str, Any]:
-    return {"type": "box"}
-
-
-@translate_filter.register
-def _(film_filter: TentFilter) -> dict[str, Any]:
-    return {"type": "tent", "radius": film_filter.radius}
-
-
-@translate_filter.register
-def _(film_filter: GaussianFilter) -> dict[str, Any]:
-    return {"type": "gaussian", "stddev": film_filter.stddev}
-
-
-@translate_filter.register
-def _(film_filter: MitchellFilter) -> dict[str, Any]:
-    return {"type": "mitchell", "B": film_filter.b, "C": film_filter.c}
-
-
-@translate_filter.register
-def _(film_filter: CatmullRomFilter) -> dict[str, Any]:
-    return {"type": "catmullrom"}
-
-
-@translate_filter.register
-def _(film_filter: LanczosFilter) -> dict[str, Any]:
-    return {"type": "lanczos", "lobes": film_filter.lobes}
-
-
-@singledispatch
 def translate_sampler(sampler: Any) -> dict[str, Any]:
     """A sampler's dict.  Raises UntranslatableError."""
+    match sampler:
+        case Sobol(spp=spp) | Independent(spp=spp):
+            # For both: the statistics of a comparison need independent samples.
+            return {"type": "independent", "sample_count": spp}
+        case Grid(spp=spp):
+            return {"type": "stratified", "jitter": False, "sample_count": spp}
     raise UntranslatableError(sampler, "sampler")
-
-
-@translate_sampler.register(Sobol)
-@translate_sampler.register(Independent)
-def _(sampler: Sobol | Independent) -> dict[str, Any]:
-    """Independent numbers for both: the statistics of a comparison need independent samples."""
-    return {"type": "independent", "sample_count": sampler.spp}
-
-
-@translate_sampler.register
-def _(sampler: Grid) -> dict[str, Any]:
-    return {"type": "stratified", "jitter": False, "sample_count": sampler.spp}

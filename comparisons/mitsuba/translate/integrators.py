@@ -19,20 +19,14 @@ def translate_integrator(integrator: Any) -> dict[str, Any] | None:
 @translate_integrator.register
 def _(integrator: Path) -> dict[str, Any]:
     """The sampling strategy of ours does not change the mean."""
-    return {
-        "type": "path",
-        "max_depth": -1 if integrator.max_depth is None else integrator.max_depth,
-        "rr_depth": integrator.rr_depth,
-    }
+    depth = -1 if integrator.max_depth is None else integrator.max_depth
+    return {"type": "path", "max_depth": depth, "rr_depth": integrator.rr_depth}
 
 
 @translate_integrator.register
 def _(integrator: Direct) -> dict[str, Any]:
-    return {
-        "type": "direct",
-        "emitter_samples": integrator.light_samples,
-        "bsdf_samples": integrator.bsdf_samples,
-    }
+    lights, bsdfs = integrator.light_samples, integrator.bsdf_samples
+    return {"type": "direct", "emitter_samples": lights, "bsdf_samples": bsdfs}
 
 
 @translate_integrator.register

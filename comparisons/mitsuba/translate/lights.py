@@ -22,11 +22,7 @@ def translate_light(light: Any, context: TranslationContext) -> dict[str, Any] |
 
 @translate_light.register
 def _(light: Point, context: TranslationContext) -> dict[str, Any]:
-    return {
-        "type": "point",
-        "position": list(light.position),
-        "intensity": rgb(light.intensity),
-    }
+    return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
 
 
 @translate_light.register

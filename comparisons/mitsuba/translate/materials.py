@@ -3,21 +3,9 @@
 from functools import singledispatch
 from typing import Any
 
+import reference_rt as rt
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.textures import TranslationContext, colour, number, rgb
-from reference_rt.materials import (
-    Conductor,
-    Dielectric,
-    Diffuse,
-    Mirror,
-    Phong,
-    Plastic,
-    Principled,
-    RoughConductor,
-    RoughDielectric,
-    RoughPlastic,
-    ThinDielectric,
-)
 
 
 @singledispatch
@@ -27,27 +15,29 @@ def translate_material(material: Any, context: TranslationContext) -> dict[str, 
 
 
 @translate_material.register
-def _(material: Diffuse, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.Diffuse, context: TranslationContext) -> dict[str, Any]:
     return {"type": "diffuse", "reflectance": colour(material.reflectance, context)}
 
 
 @translate_material.register
-def _(material: Mirror, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.Mirror, context: TranslationContext) -> dict[str, Any]:
     # Without a material Mitsuba's conductor has eta = 0, k = 1, and reflects everything.
     return {"type": "conductor", "specular_reflectance": colour(material.reflectance, context)}
 
 
 @translate_material.register
-def _(material: Conductor, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.Conductor, context: TranslationContext) -> dict[str, Any]:
     return {"type": "conductor", **_metal(material, context)}
 
 
 @translate_material.register
-def _(material: RoughConductor, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.RoughConductor, context: TranslationContext) -> dict[str, Any]:
     return _rough("roughconductor", material, _metal(material, context), context)
 
 
-def _metal(material: Conductor | RoughConductor, context: TranslationContext) -> dict[str, Any]:
+def _metal(
+    material: rt.Conductor | rt.RoughConductor, context: TranslationContext
+) -> dict[str, Any]:
     return {
         "eta": rgb(material.eta),
         "k": rgb(material.k),
@@ -56,22 +46,22 @@ def _metal(material: Conductor | RoughConductor, context: TranslationContext) ->
 
 
 @translate_material.register
-def _(material: Dielectric, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.Dielectric, context: TranslationContext) -> dict[str, Any]:
     return {"type": "dielectric", **_glass(material, context)}
 
 
 @translate_material.register
-def _(material: ThinDielectric, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.ThinDielectric, context: TranslationContext) -> dict[str, Any]:
     return {"type": "thindielectric", **_glass(material, context)}
 
 
 @translate_material.register
-def _(material: RoughDielectric, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.RoughDielectric, context: TranslationContext) -> dict[str, Any]:
     return _rough("roughdielectric", material, _glass(material, context), context)
 
 
 def _glass(
-    material: Dielectric | ThinDielectric | RoughDielectric, context: TranslationContext
+    material: rt.Dielectric | rt.ThinDielectric | rt.RoughDielectric, context: TranslationContext
 ) -> dict[str, Any]:
     return {
         **_indices(material),
@@ -87,7 +77,7 @@ def _indices(material: Any) -> dict[str, Any]:
 
 def _rough(
     plugin: str,
-    material: RoughConductor | RoughDielectric,
+    material: rt.RoughConductor | rt.RoughDielectric,
     values: dict[str, Any],
     context: TranslationContext,
 ) -> dict[str, Any]:
@@ -102,19 +92,19 @@ def _rough(
 
 
 @translate_material.register
-def _(material: Plastic, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.Plastic, context: TranslationContext) -> dict[str, Any]:
     return _coated("plastic", material, context, {})
 
 
 @translate_material.register
-def _(material: RoughPlastic, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.RoughPlastic, context: TranslationContext) -> dict[str, Any]:
     rough = {"distribution": material.distribution, "alpha": material.alpha}
     return _coated("roughplastic", material, context, rough)
 
 
 def _coated(
     plugin: str,
-    material: Plastic | RoughPlastic,
+    material: rt.Plastic | rt.RoughPlastic,
     context: TranslationContext,
     rough: dict[str, Any],
 ) -> dict[str, Any]:
@@ -143,7 +133,7 @@ def _coated(
 
 
 @translate_material.register
-def _(material: Principled, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.Principled, context: TranslationContext) -> dict[str, Any]:
     numbers = (
         "roughness", "metallic", "spec_tint", "anisotropic", "sheen", "sheen_tint", "clearcoat",
         "clearcoat_gloss", "spec_trans", "flatness",
@@ -161,7 +151,7 @@ def _(material: Principled, context: TranslationContext) -> dict[str, Any]:
 
 
 @translate_material.register
-def _(material: Phong, context: TranslationContext) -> dict[str, Any]:
+def _(material: rt.Phong, context: TranslationContext) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.phong`."""
     colours = ("ambient", "diffuse", "specular", "mirror")
     return {

@@ -1,11 +1,11 @@
 """The stiff scenes are right by closed forms, and Mitsuba's limits on them are told."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from stiff_scenes import FOLDER, STIFF, scene
 
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.moved import frame_of, moved
@@ -21,17 +21,6 @@ from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
-
-FOLDER = Path(__file__).parents[3] / "scenes"
-STIFF = (
-    *("planet", "needle", "far_origin", "tiny", "slivers", "grazing", "nested_glass"),
-    *("csg_coincident", "index_matched", "bright_and_dim", "deep_mirrors", "near_delta"),
-    "tiny_light",
-)
-
-
-def scene(name: str) -> Scene:
-    return Scene.load(FOLDER / f"{name}.yaml")
 
 
 def camera_hits(

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gate_checks import BALL
 
 from comparisons.gate import reference
 from comparisons.gate.pictures_in import from_array
@@ -12,14 +13,14 @@ from reference_rt.core.exr import write_exr
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ImageError, UsageError
 
-SCENE = """\
+SCENE = (
+    BALL
+    + """\
 film: {width: 16, height: 12}
-camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 40}
 sampler: {type: independent, spp: 4}
-materials: {grey: {type: diffuse, reflectance: 0.5}}
-shapes: [{type: sphere, radius: 1, material: grey}]
 lights: [{type: constant, radiance: [1, 0.5, 0.001]}]
 """
+)
 LIMIT = 0.01
 
 

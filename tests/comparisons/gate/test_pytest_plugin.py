@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from gate_checks import BALL
 from typer import Typer
 from typer.testing import CliRunner
 
@@ -23,14 +24,14 @@ PLUGIN = (
     else ("-p", "comparisons.gate.pytest_plugin")
 )
 
-SCENE = """\
+SCENE = (
+    BALL
+    + """\
 film: {width: 32, height: 32}
-camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 40}
 sampler: {type: independent, spp: 16}
-materials: {grey: {type: diffuse, reflectance: 0.5}}
-shapes: [{type: sphere, radius: 1, material: grey}]
 lights: [{type: constant, radiance: [1, 0.5, 0.25]}]
 """
+)
 
 MODULE = """
 import numpy as np

@@ -1,9 +1,8 @@
 """The frame of Mitsuba's copy of a scene: moved and scaled where float32 needs it, only there."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from stiff_scenes import FOLDER, STIFF, scene
 
 import comparisons.mitsuba.translate
 from comparisons.geometry.frame import OURS, RAY_EPSILON, SHARE, Frame, frame_for
@@ -13,30 +12,10 @@ from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.rungs import geometry
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.rays import mixed_rays
-from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
 from reference_rt.rendering import query
-from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
-
-FOLDER = Path(__file__).parents[3] / "scenes"
-STIFF = (
-    *("planet", "needle", "far_origin", "tiny", "slivers", "grazing", "nested_glass"),
-    *("csg_coincident", "index_matched", "bright_and_dim", "deep_mirrors", "near_delta"),
-    "tiny_light",
-)
-
-
-def scene(name: str) -> Scene:
-    return Scene.load(FOLDER / f"{name}.yaml")
-
-
-def camera_hits(
-    of: Scene, x: FloatArray, y: FloatArray
-) -> tuple[FloatArray, FloatArray, Intersections]:
-    o, d = camera_rays(of, x, y)
-    return o, d, of.intersect(o, d)
 
 
 def test_only_what_lies_far_away_or_is_small_is_moved() -> None:

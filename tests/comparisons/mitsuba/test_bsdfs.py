@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import reference_rt as rt
 from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba import accuracy
 from comparisons.mitsuba.accuracy import both_sides, clearcoat_error, directions, table_error
@@ -16,16 +17,7 @@ from comparisons.mitsuba.translate.materials import translate_material
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.rungs.rays import arbiter
 from reference_rt.core.arrays import FloatArray
-from reference_rt.materials import (
-    Diffuse,
-    Material,
-    Phong,
-    Plastic,
-    Principled,
-    RoughConductor,
-    RoughDielectric,
-    RoughPlastic,
-)
+from reference_rt.materials import Material
 
 PAIRS = 60
 
@@ -38,14 +30,14 @@ COLOURS: dict[str, Any] = {"reflectance": (0.9, 0.5, 0.1), "specular": (0.9, 1.0
 PHONG: dict[str, Any] = {"diffuse": (0.2, 0.1, 0.05), "specular": (0.3, 1.2, 0.1)}
 
 MATERIALS: tuple[Material, ...] = (
-    Diffuse(reflectance=(0.3, 0.5, 1.0)),
+    rt.Diffuse(reflectance=(0.3, 0.5, 1.0)),
     *(
-        RoughConductor(**GOLD, alpha=alpha, distribution=distribution)
+        rt.RoughConductor(**GOLD, alpha=alpha, distribution=distribution)
         for alpha in ((0.02, 0.02), (0.3, 0.3), (0.1, 0.6), (1.3, 1.3))
         for distribution in ("ggx", "beckmann")
     ),
     *(
-        RoughDielectric(
+        rt.RoughDielectric(
             interior_ior=inside,
             exterior_ior=outside,
             alpha=(alpha, alpha),
@@ -57,21 +49,23 @@ MATERIALS: tuple[Material, ...] = (
         for distribution in ("ggx", "beckmann")
     ),
     *(
-        Plastic(**COLOURS, interior_ior=index, nonlinear=nonlinear)
+        rt.Plastic(**COLOURS, interior_ior=index, nonlinear=nonlinear)
         for index in (1.2, 1.5, 2.4)
         for nonlinear in (False, True)
     ),
-    RoughPlastic(**COLOURS, alpha=0.15),
-    RoughPlastic(**COLOURS, alpha=0.4, distribution="beckmann", nonlinear=True),
-    Principled(base_colour=(0.8, 0.5, 0.2)),
-    Principled(base_colour=(0.8, 0.5, 0.2), metallic=1.0, roughness=0.3, anisotropic=0.7),
-    Principled(base_colour=(0.8, 0.5, 0.2), metallic=0.4, roughness=0.6, spec_tint=0.7),
-    Principled(base_colour=(0.8, 0.5, 0.2), sheen=0.8, sheen_tint=0.5, flatness=0.6, specular=0.2),
-    Principled(base_colour=(0.8, 0.5, 0.2), clearcoat=0.9, clearcoat_gloss=0.7, eta=1.4),
-    Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=0.7, roughness=0.4, metallic=0.1),
-    Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=1.0, roughness=0.2, eta=1.6),
-    Phong(**PHONG, exponent=40.0),
-    Phong(**PHONG, exponent=7.5, half_vector=True),
+    rt.RoughPlastic(**COLOURS, alpha=0.15),
+    rt.RoughPlastic(**COLOURS, alpha=0.4, distribution="beckmann", nonlinear=True),
+    rt.Principled(base_colour=(0.8, 0.5, 0.2)),
+    rt.Principled(base_colour=(0.8, 0.5, 0.2), metallic=1.0, roughness=0.3, anisotropic=0.7),
+    rt.Principled(base_colour=(0.8, 0.5, 0.2), metallic=0.4, roughness=0.6, spec_tint=0.7),
+    rt.Principled(
+        base_colour=(0.8, 0.5, 0.2), sheen=0.8, sheen_tint=0.5, flatness=0.6, specular=0.2
+    ),
+    rt.Principled(base_colour=(0.8, 0.5, 0.2), clearcoat=0.9, clearcoat_gloss=0.7, eta=1.4),
+    rt.Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=0.7, roughness=0.4, metallic=0.1),
+    rt.Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=1.0, roughness=0.2, eta=1.6),
+    rt.Phong(**PHONG, exponent=40.0),
+    rt.Phong(**PHONG, exponent=7.5, half_vector=True),
 )
 
 
@@ -92,7 +86,7 @@ def float32_bound(material: Material, wo: FloatArray, wi: FloatArray, ours: Floa
         step = ROUNDINGS * UNIT_ROUNDOFF * move
         moved = both_sides(material, wo + step, wi - step, theirs=False)[0]
         found += np.abs(moved - ours).max(axis=1)
-    if isinstance(material, Principled) and material.clearcoat != 0.0:
+    if isinstance(material, rt.Principled) and material.clearcoat != 0.0:
         found += clearcoat_error(material) * np.abs(ours).max(axis=1)
     # Mitsuba's microfacets end where fewer than 1e-20 face a direction.
     return found + 1e-18
@@ -103,7 +97,7 @@ def test_the_same_is_scattered(material: Material) -> None:
     wo, wi = pairs(material)
     ours, theirs = both_sides(material, wo, wi)
     bound = float32_bound(material, wo, wi, ours)
-    if isinstance(material, RoughPlastic):
+    if isinstance(material, rt.RoughPlastic):
         white = {"reflectance": (1.0, 1.0, 1.0), "specular": (0.0, 0.0, 0.0)}
         bound += 1.5 * table_error(material.model_copy(update=white)) * ours.max(axis=1)
     assert (ours.max(axis=1) > 0.0).sum() > PAIRS // 4
@@ -113,15 +107,15 @@ def test_the_same_is_scattered(material: Material) -> None:
 @pytest.mark.parametrize(
     ("material", "wrong"),
     [
-        (RoughConductor(**GOLD, alpha=(0.1, 0.3)), {"alpha": (0.3, 0.1)}),
-        (RoughConductor(**GOLD, alpha=(0.3, 0.3)), {"alpha": (0.3001, 0.3001)}),
-        (RoughConductor(**GOLD), {"k": (3.0, 2.0, 2.501)}),
-        (RoughDielectric(alpha=(0.3, 0.3)), {"interior_ior": 1.501}),
-        (Plastic(**COLOURS), {"nonlinear": True}),
-        (Plastic(**COLOURS), {"interior_ior": 1.501}),
-        (Principled(sheen=0.5), {"sheen": 0.501}),
-        (Principled(clearcoat=0.5), {"clearcoat_gloss": 0.01}),
-        (Phong(**PHONG), {"exponent": 32.01}),
+        (rt.RoughConductor(**GOLD, alpha=(0.1, 0.3)), {"alpha": (0.3, 0.1)}),
+        (rt.RoughConductor(**GOLD, alpha=(0.3, 0.3)), {"alpha": (0.3001, 0.3001)}),
+        (rt.RoughConductor(**GOLD), {"k": (3.0, 2.0, 2.501)}),
+        (rt.RoughDielectric(alpha=(0.3, 0.3)), {"interior_ior": 1.501}),
+        (rt.Plastic(**COLOURS), {"nonlinear": True}),
+        (rt.Plastic(**COLOURS), {"interior_ior": 1.501}),
+        (rt.Principled(sheen=0.5), {"sheen": 0.501}),
+        (rt.Principled(clearcoat=0.5), {"clearcoat_gloss": 0.01}),
+        (rt.Phong(**PHONG), {"exponent": 32.01}),
     ],
     ids=lambda x: x.type if isinstance(x, Material) else "",
 )
@@ -139,7 +133,7 @@ def test_tables_of_rough_plastic_are_off_by_little() -> None:
     """The bound that comparisons allow for is far from what they call wrong."""
     worst = max(
         table_error(
-            RoughPlastic(
+            rt.RoughPlastic(
                 reflectance=(1.0, 1.0, 1.0), specular=(0.0, 0.0, 0.0), alpha=a, interior_ior=n
             )
         )
@@ -173,13 +167,13 @@ def test_how_far_mitsubas_fit_of_the_coat_is_off(eta: float, off: float) -> None
 
 
 SAMPLED: tuple[Material, ...] = (
-    RoughConductor(**GOLD, alpha=(0.4, 0.4), distribution="beckmann"),
-    RoughDielectric(alpha=(0.4, 0.4), distribution="beckmann"),
-    Plastic(**COLOURS),
-    RoughPlastic(**COLOURS, alpha=0.3),
-    RoughPlastic(**COLOURS, alpha=0.3, distribution="beckmann"),
-    Phong(**PHONG, exponent=20.0, mirror=(0.1, 0.2, 0.3)),
-    Phong(**PHONG, exponent=20.0, half_vector=True),
+    rt.RoughConductor(**GOLD, alpha=(0.4, 0.4), distribution="beckmann"),
+    rt.RoughDielectric(alpha=(0.4, 0.4), distribution="beckmann"),
+    rt.Plastic(**COLOURS),
+    rt.RoughPlastic(**COLOURS, alpha=0.3),
+    rt.RoughPlastic(**COLOURS, alpha=0.3, distribution="beckmann"),
+    rt.Phong(**PHONG, exponent=20.0, mirror=(0.1, 0.2, 0.3)),
+    rt.Phong(**PHONG, exponent=20.0, half_vector=True),
 )
 
 

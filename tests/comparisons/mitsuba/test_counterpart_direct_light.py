@@ -9,7 +9,6 @@ from comparisons.mitsuba.translate import load
 from comparisons.rungs import direct, whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.scene import Scene
-from reference_rt.scene.build import build_tables
 
 TEXT = """
 camera: {type: perspective, eye: [0.3, 2.2, 8], target: [0, 0.5, 0], fov: 40}
@@ -59,11 +58,6 @@ def coarse() -> Any:
 @pytest.fixture(scope="module")
 def scene() -> Scene:
     return Scene.parse(TEXT)
-
-
-@pytest.fixture(scope="module")
-def tables(scene: Scene) -> SceneTables:
-    return build_tables(scene)
 
 
 def test_the_same_light(scene: Scene, tables: SceneTables) -> None:

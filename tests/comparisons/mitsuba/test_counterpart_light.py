@@ -10,10 +10,9 @@ from counterparts import coarse_meshes, faulty_counterpart
 from comparisons.compare.pictures import whitted as whitted_pictures
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
+from comparisons.mitsuba.translate import UntranslatableError, to_mitsuba
 from comparisons.rungs import direct, geometry, whitted
 from reference_rt.rendering.scene import Scene
-from reference_rt.scene.build import build_tables
 
 SCENE = """
 camera: {type: perspective, eye: [0, 5, 8], target: [0, 0, 0], fov: 40}
@@ -74,20 +73,10 @@ def scene(image_folder: Path) -> Scene:
     return Scene.parse(SCENE, folder=image_folder)
 
 
-@pytest.fixture(scope="module")
-def tables(scene: Scene) -> Any:
-    return build_tables(scene)
-
-
 @pytest.fixture(scope="module", autouse=True)
 def coarse() -> Any:
     with coarse_meshes(256, 128):
         yield
-
-
-@pytest.fixture(scope="module")
-def counterpart(scene: Scene) -> Any:
-    return load(scene)
 
 
 def test_the_same_light(scene: Scene, tables: Any, counterpart: Any) -> None:

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from test_record import case
+from test_stored_case import case
 
 from comparisons.experiments.convergence import reference as convergence_reference
 from comparisons.experiments.convergence.data import Rung

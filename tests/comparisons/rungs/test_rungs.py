@@ -63,16 +63,6 @@ def scene() -> Scene:
     return Scene.parse(SCENE)
 
 
-@pytest.fixture(scope="module")
-def tables(scene: Scene) -> SceneTables:
-    return build_tables(scene)
-
-
-@pytest.fixture(scope="module")
-def counterpart(scene: Scene) -> Any:
-    return load(scene)
-
-
 @pytest.mark.parametrize("rung", [geometry, direct, whitted])
 def test_the_same_scene_agrees(
     rung: Rung, scene: Scene, tables: SceneTables, counterpart: Any

@@ -6,13 +6,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 from junitparser import JUnitXml
-from suite_runs import processes, run_in, scenes
+from suite_runs import processes, run_in, scenes, signal_in_the_next_case
 from test_ci import case
 
 from comparisons.report import write_report
@@ -112,16 +110,10 @@ def interrupted(number, out, *arguments):
         process = subprocess.Popen(command, stderr=stream)
     workers = []
     try:
-        deadline = time.monotonic() + 120.0
         results = out / "results.json"
-        while not (results.exists() and json.loads(results.read_text())["cases"]):
-            assert time.monotonic() < deadline
-            assert process.poll() is None
-            time.sleep(0.05)
-        time.sleep(0.5)  # until the next case has begun
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        workers = children.read_text().split() if children.exists() else []
-        process.send_signal(number)
+        workers = signal_in_the_next_case(
+            process, number, lambda: results.exists() and json.loads(results.read_text())["cases"]
+        )
         process.wait(timeout=120.0)
     finally:
         process.kill()

@@ -5,11 +5,9 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
-from suite_runs import processes, run_in, scenes
+from suite_runs import processes, run_in, scenes, signal_in_the_next_case
 
 from comparisons.compare.budget import Budget
 from comparisons.results.stored_case import read_case, read_stored_case
@@ -101,14 +99,8 @@ def test_an_interruption_keeps_what_is_done(tmp_path, number):
     command = [sys.executable, "-c", INTERRUPTED, str(folder), str(out)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
-        deadline = time.monotonic() + 60.0
-        while not (out / "cases" / "a" / "case.json").exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        time.sleep(0.5)  # until the next case has begun
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        workers = children.read_text().split() if children.exists() else []
-        process.send_signal(number)
+        first = out / "cases" / "a" / "case.json"
+        workers = signal_in_the_next_case(process, number, first.exists)
         process.communicate(timeout=120.0)
     finally:
         process.kill()

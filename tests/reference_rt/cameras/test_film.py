@@ -6,44 +6,35 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
-from reference_rt.cameras.film import (
-    BoxFilter,
-    CatmullRomFilter,
-    Film,
-    GaussianFilter,
-    LanczosFilter,
-    MitchellFilter,
-    TentFilter,
-)
 from reference_rt.cameras.filters import film_offset
 from reference_rt.core import transform
 
 EVERY = [
-    BoxFilter(),
-    TentFilter(),
-    TentFilter(radius=2.5),
-    GaussianFilter(),
-    GaussianFilter(stddev=1.5),
-    MitchellFilter(),
-    MitchellFilter(b=1.0, c=0.0),
-    MitchellFilter(b=0.0, c=0.0),
-    CatmullRomFilter(),
-    LanczosFilter(),
-    LanczosFilter(lobes=1),
-    LanczosFilter(lobes=6),
+    rt.BoxFilter(),
+    rt.TentFilter(),
+    rt.TentFilter(radius=2.5),
+    rt.GaussianFilter(),
+    rt.GaussianFilter(stddev=1.5),
+    rt.MitchellFilter(),
+    rt.MitchellFilter(b=1.0, c=0.0),
+    rt.MitchellFilter(b=0.0, c=0.0),
+    rt.CatmullRomFilter(),
+    rt.LanczosFilter(),
+    rt.LanczosFilter(lobes=1),
+    rt.LanczosFilter(lobes=6),
 ]
 
 
 def radius(description):
     """The end of the filter's support, in pixels."""
     match description:
-        case BoxFilter():
+        case rt.BoxFilter():
             return 0.5
-        case TentFilter():
+        case rt.TentFilter():
             return description.radius
-        case GaussianFilter():
+        case rt.GaussianFilter():
             return 4.0 * description.stddev
-        case LanczosFilter():
+        case rt.LanczosFilter():
             return float(description.lobes)
     return 2.0
 
@@ -91,12 +82,12 @@ def cubic(b, c):
 @pytest.mark.parametrize(
     ("description", "formula"),
     [
-        (BoxFilter(), lambda x: float(-0.5 <= x < 0.5)),
-        (TentFilter(radius=2.5), lambda x: max(0.0, 2.5 - abs(x)) / 2.5**2),
-        (MitchellFilter(), cubic(1 / 3, 1 / 3)),
-        (MitchellFilter(b=1.0, c=0.0), cubic(1, 0)),
-        (MitchellFilter(b=0.25, c=0.75), cubic(0.25, 0.75)),
-        (CatmullRomFilter(), cubic(0, 0.5)),
+        (rt.BoxFilter(), lambda x: float(-0.5 <= x < 0.5)),
+        (rt.TentFilter(radius=2.5), lambda x: max(0.0, 2.5 - abs(x)) / 2.5**2),
+        (rt.MitchellFilter(), cubic(1 / 3, 1 / 3)),
+        (rt.MitchellFilter(b=1.0, c=0.0), cubic(1, 0)),
+        (rt.MitchellFilter(b=0.25, c=0.75), cubic(0.25, 0.75)),
+        (rt.CatmullRomFilter(), cubic(0, 0.5)),
     ],
     ids=["box", "tent", "mitchell", "b-spline", "mitchell-quarter", "catmull-rom"],
 )
@@ -115,8 +106,8 @@ def test_integral_is_one(description):
 
 def test_ratios_of_gaussian_and_lanczos():
     """Their formulas, up to the integral."""
-    gaussian, s = GaussianFilter(stddev=0.7), 0.7
-    lanczos = LanczosFilter(lobes=3)
+    gaussian, s = rt.GaussianFilter(stddev=0.7), 0.7
+    lanczos = rt.LanczosFilter(lobes=3)
     for x in np.linspace(-2.7, 2.7, 101):
         expected = (np.exp(-(x**2) / (2 * s * s)) - np.exp(-8)) / (1 - np.exp(-8))
         # Rounding beside 1.
@@ -136,8 +127,8 @@ def test_even(description):
 
 @pytest.mark.parametrize(
     "description",
-    [BoxFilter(), TentFilter(), TentFilter(radius=2.0), MitchellFilter(), CatmullRomFilter(),
-     MitchellFilter(b=0.9, c=0.3)],
+    [rt.BoxFilter(), rt.TentFilter(), rt.TentFilter(radius=2.0), rt.MitchellFilter(),
+     rt.CatmullRomFilter(), rt.MitchellFilter(b=0.9, c=0.3)],
     ids=str,
 )  # fmt: skip
 def test_partition_of_unity(description):
@@ -196,7 +187,7 @@ def test_weights_are_even_but_for_the_sign(description):
 
 @pytest.mark.parametrize(
     "description",
-    [EVERY[0], EVERY[1], EVERY[3], MitchellFilter(), CatmullRomFilter(), LanczosFilter()],
+    [EVERY[0], EVERY[1], EVERY[3], rt.MitchellFilter(), rt.CatmullRomFilter(), rt.LanczosFilter()],
     ids=str,
 )
 def test_a_step(description):
@@ -205,7 +196,7 @@ def test_a_step(description):
     half = transform.Translate(translate=(-100 + edge * 2 / width, 0, 0))
     scene = rt.Scene(
         camera=rt.Orthographic(eye=(0, 0, 1), width=2),
-        film=Film(width=width, height=32, filter=description),
+        film=rt.Film(width=width, height=32, filter=description),
         sampler=rt.Independent(spp=4096, seed=6),
         integrator=rt.Whitted(),
         materials={"lamp": rt.Emissive(radiance=(1, 1, 1))},
@@ -226,20 +217,20 @@ def test_a_step(description):
 @pytest.mark.parametrize(
     ("cls", "fields"),
     [
-        (TentFilter, {"radius": 0.0}),
-        (TentFilter, {"radius": -1.0}),
-        (GaussianFilter, {"stddev": 0.0}),
-        (GaussianFilter, {"stddev": math.nan}),
-        (MitchellFilter, {"b": -0.1}),
-        (MitchellFilter, {"c": 1.1}),
-        (MitchellFilter, {"radius": 2.0}),
-        (CatmullRomFilter, {"b": 0.5}),
-        (LanczosFilter, {"lobes": 0}),
-        (LanczosFilter, {"lobes": 2.5}),
-        (LanczosFilter, {"lobes": 65}),
-        (Film, {"layers": ("colour",)}),
-        (Film, {"layers": ("id", "id")}),
-        (Film, {"layers": "albedo"}),
+        (rt.TentFilter, {"radius": 0.0}),
+        (rt.TentFilter, {"radius": -1.0}),
+        (rt.GaussianFilter, {"stddev": 0.0}),
+        (rt.GaussianFilter, {"stddev": math.nan}),
+        (rt.MitchellFilter, {"b": -0.1}),
+        (rt.MitchellFilter, {"c": 1.1}),
+        (rt.MitchellFilter, {"radius": 2.0}),
+        (rt.CatmullRomFilter, {"b": 0.5}),
+        (rt.LanczosFilter, {"lobes": 0}),
+        (rt.LanczosFilter, {"lobes": 2.5}),
+        (rt.LanczosFilter, {"lobes": 65}),
+        (rt.Film, {"layers": ("colour",)}),
+        (rt.Film, {"layers": ("id", "id")}),
+        (rt.Film, {"layers": "albedo"}),
     ],
     ids=str,
 )

@@ -6,18 +6,9 @@ import math
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from chi_square import integrate, sidak
-from leaf_checks import (
-    NOWHERE,
-    albedo,
-    check_same_bits,
-    check_weights,
-    evaluate,
-    p_values,
-    random_direction,
-    sample,
-    towards,
-)
+from chi_square import integrate
+from leaf_checks import NOWHERE, albedo, check_same_bits, evaluate, sample, towards
+from random_bsdfs import random_phong
 
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs import phong
@@ -25,27 +16,11 @@ from reference_rt.materials.bsdfs.phong import Phong, power
 from reference_rt.textures import NO_TEXTURES, Palette
 
 
-def random_materials(n, seed):
-    """(description, wo): both forms of highlight, exponents from 0.5 to 1000."""
-    rng = np.random.default_rng(seed)
-    for k in range(n):
-        yield (
-            Phong(
-                diffuse=rng.uniform(0, 0.3, 3).tolist(),
-                specular=rng.uniform(0, 3, 3).tolist(),
-                mirror=(rng.uniform(0, 0.5, 3) * (k // 2 % 2)).tolist(),
-                exponent=10.0 ** rng.uniform(-0.3, 3),
-                half_vector=bool(k % 2),
-            ),
-            random_direction(rng, k),
-        )
-
-
 def test_the_formula():
     """T16, term by term, with NumPy's vectors."""
     rng = np.random.default_rng(61)
     n = np.array([0, 0, 1])
-    for material, _ in random_materials(20, 62):
+    for material, _ in random_phong(20, 62):
         table = material.tabulate(NO_TEXTURES)
         e, light = unit_vectors(rng, 300), unit_vectors(rng, 300)
         e[:, 2], light[:, 2] = abs(e[:, 2]), abs(light[:, 2])
@@ -72,7 +47,7 @@ def test_powers():
 
 
 def test_black_behind_and_below():
-    for material, _ in random_materials(4, 63):
+    for material, _ in random_phong(4, 63):
         table = material.tabulate(NO_TEXTURES)
         up, down = towards(0.5, 1.0), towards(0.6, 2.0) * (1, 1, -1)
         for a, b in ((down, up), (up, down), (down, down)):
@@ -111,22 +86,9 @@ def test_integral_of_the_highlight_at_normal_incidence(p):
         assert expected <= material.energy_bound(NO_TEXTURES)
 
 
-@pytest.mark.parametrize("cases", [10, pytest.param(200, marks=pytest.mark.slow)])
-def test_samples_have_their_density_and_the_weights_their_mean(cases):
-    rng = np.random.default_rng(65)
-    found = [p for case in random_materials(cases, 66) for p in p_values(*case, rng)]
-    assert min(found) > sidak(len(found))
-
-
-def test_weight_times_density_is_the_value():
-    rng = np.random.default_rng(67)
-    for material, wo in random_materials(16, 68):
-        check_weights(material, wo, rng, 1.0)
-
-
 def test_the_mirrored_direction_is_drawn_for_its_share():
     rng = np.random.default_rng(69)
-    for material, wo in random_materials(16, 70):
+    for material, wo in random_phong(16, 70):
         table = material.tabulate(NO_TEXTURES)
         wi, weights, probability, _, is_delta = sample(table, wo, rng.uniform(0, 1, (2000, 3)))
         assert is_delta.any() == any(material.mirror)
@@ -152,7 +114,7 @@ def test_symmetry():
 
 def test_energy_is_within_its_bound():
     rng = np.random.default_rng(72)
-    for material, wo in random_materials(24, 73):
+    for material, wo in random_phong(24, 73):
         bound = material.energy_bound(NO_TEXTURES)
         total, error = albedo(material.tabulate(NO_TEXTURES), wo, rng, n=5000)
         assert total.max() <= bound + 5 * error.max()
@@ -170,7 +132,7 @@ def test_energy_bound():
 
 
 def test_compiled_is_plain():
-    materials = [material for material, _ in random_materials(4, 74)]
+    materials = [material for material, _ in random_phong(4, 74)]
     extremes = (
         Phong(diffuse=0),
         Phong(diffuse=0.1, specular=1e6, exponent=1e300),

@@ -7,18 +7,9 @@ import mpmath
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from chi_square import integrate, sidak
-from leaf_checks import (
-    NOWHERE,
-    albedo,
-    check_same_bits,
-    check_weights,
-    evaluate,
-    p_values,
-    random_direction,
-    sample,
-    towards,
-)
+from chi_square import integrate
+from leaf_checks import NOWHERE, albedo, check_same_bits, evaluate, sample, towards
+from random_bsdfs import random_plastic
 
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs import plastic, rough_plastic
@@ -74,41 +65,9 @@ def test_hemispherical_fresnel_within_by_quadrature():
     assert hemispherical_fresnel(1 / n) == pytest.approx(total, abs=1e-8)
 
 
-def random_materials(n, seed):
-    """(description, wo): every other one rough."""
-    rng = np.random.default_rng(seed)
-    for k in range(n):
-        fields = {
-            "reflectance": rng.uniform(0, 1, 3).tolist(),
-            "specular": rng.uniform(0.1, 1, 3).tolist(),
-            "interior_ior": float(rng.uniform(1.05, 2.5)),
-            "nonlinear": bool(k // 2 % 2),
-        }
-        if k % 2 == 0:
-            yield Plastic(**fields), random_direction(rng, k)
-            continue
-        fields["distribution"] = ("ggx", "beckmann")[k // 4 % 2]
-        fields["alpha"] = 10.0 ** rng.uniform(-1.5, 0)
-        yield RoughPlastic(**fields), random_direction(rng, k)
-
-
-@pytest.mark.parametrize("cases", [10, pytest.param(200, marks=pytest.mark.slow)])
-def test_samples_have_their_density_and_the_weights_their_mean(cases):
-    rng = np.random.default_rng(41)
-    found = [p for case in random_materials(cases, 42) for p in p_values(*case, rng)]
-    assert min(found) > sidak(len(found))
-
-
-def test_weight_times_density_is_the_value():
-    rng = np.random.default_rng(43)
-    for material, wo in random_materials(16, 44):
-        # Both are of the same direction: it is rounded once.
-        check_weights(material, wo, rng, 1.0)
-
-
 def test_the_mirrored_direction_is_drawn_for_its_share():
     rng = np.random.default_rng(45)
-    for material, wo in list(random_materials(20, 46))[::2]:
+    for material, wo in list(random_plastic(20, 46))[::2]:
         table = material.tabulate(NO_TEXTURES)
         _, weights, probabilities, _, is_delta = sample(table, wo, rng.uniform(0, 1, (4000, 3)))
         branch = plastic.branches(table, 0, NOWHERE, Vec3(*wo))
@@ -128,7 +87,7 @@ def test_the_mirrored_direction_is_drawn_for_its_share():
 
 def test_reciprocity():
     rng = np.random.default_rng(47)
-    for material, _ in random_materials(16, 48):
+    for material, _ in random_plastic(16, 48):
         wo, wi = unit_vectors(rng, 500), unit_vectors(rng, 500)
         wo[:, 2], wi[:, 2] = abs(wo[:, 2]), abs(wi[:, 2])
         table = material.tabulate(NO_TEXTURES)
@@ -139,7 +98,7 @@ def test_reciprocity():
 
 
 def test_one_sided():
-    for material, wo in random_materials(4, 49):
+    for material, wo in random_plastic(4, 49):
         table = material.tabulate(NO_TEXTURES)
         below, up = -wo, towards(0.5, 1.0)
         for a, b in ((below, up), (up, below), (below, below)):
@@ -240,7 +199,7 @@ def test_nonlinear_is_more_saturated():
 
 def test_compiled_is_plain():
     black = {"reflectance": 0.0, "specular": 0.0}
-    materials = [material for material, _ in random_materials(3, 52)]
+    materials = [material for material, _ in random_plastic(3, 52)]
     extremes = (
         Plastic(**black),
         Plastic(reflectance=1.0, interior_ior=1e4, nonlinear=True),

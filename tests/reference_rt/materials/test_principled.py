@@ -6,18 +6,9 @@ import math
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from chi_square import UNIT_SQUARE, integrate, sidak
-from leaf_checks import (
-    albedo,
-    check_same_bits,
-    check_weights,
-    evaluate,
-    p_values,
-    random_direction,
-    rows,
-    sample,
-    towards,
-)
+from chi_square import UNIT_SQUARE, integrate
+from leaf_checks import albedo, check_same_bits, evaluate, random_direction, rows, sample, towards
+from random_bsdfs import NUMBERS, random_principled
 
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs import principled, principled_lobes, rough_dielectric
@@ -26,28 +17,7 @@ from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric
 from reference_rt.textures import NO_TEXTURES, At
 from reference_rt.util.errors import SceneError
 
-NUMBERS = (
-    *("roughness", "metallic", "spec_tint", "anisotropic", "sheen", "sheen_tint"),
-    *("clearcoat", "clearcoat_gloss", "spec_trans", "flatness"),
-)
 AT = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
-
-
-def random_materials(n, seed, least=0.2):
-    """(description, wo): a third of the numbers 0 and a sixth 1; roughness from `least`; wo from
-    behind, too, where light is transmitted."""
-    rng = np.random.default_rng(seed)
-    for k in range(n):
-        fields = {name: float(np.clip(rng.uniform(-0.67, 1.33), 0, 1)) for name in NUMBERS}
-        fields["roughness"] = rng.uniform(least, 1)
-        fields["anisotropic"] *= 0.8
-        fields["clearcoat_gloss"] *= 0.7
-        if k % 2 == 0:
-            fields["eta"] = float(rng.uniform(1.1, 2.5))
-        if k % 11 == 10:
-            fields["eta"] = 0.7
-        wo = random_direction(rng, k, front=fields["spec_trans"] == 0 or fields["metallic"] == 1)
-        yield Principled(base_colour=rng.uniform(0, 1, 3).tolist(), **fields), wo
 
 
 def surface(side=1.0, **fields):
@@ -55,26 +25,12 @@ def surface(side=1.0, **fields):
     return principled._surface(table, 0, AT, side)
 
 
-@pytest.mark.parametrize("cases", [14, pytest.param(300, marks=pytest.mark.slow)])
-def test_samples_have_their_density_and_the_weights_their_mean(cases):
-    rng = np.random.default_rng(81)
-    found = [p for case in random_materials(cases, 82) for p in p_values(*case, rng)]
-    assert min(found) > sidak(len(found))
-
-
-def test_weight_times_density_is_the_value():
-    rng = np.random.default_rng(83)
-    for material, wo in random_materials(24, 84, least=0.0):
-        # Both are of the same direction; refracted ones are as long as their half vector is exact.
-        check_weights(material, wo, rng, 16.0)
-
-
 def test_reciprocity():
     """f(wo, wi) = f(wi, wo); through the surface f(wo, wi) eta² = f(wi, wo), eta the index on wi's
     side over that on wo's."""
     rng = np.random.default_rng(85)
     wo, wi = unit_vectors(rng, 800), unit_vectors(rng, 800)
-    for material, _ in random_materials(24, 86):
+    for material, _ in random_principled(24, 86):
         # Fresnel's equations are steep beyond the critical angle of a thinner inside.
         if material.eta is not None and material.eta < 1:
             continue
@@ -219,7 +175,7 @@ def test_the_law_creates_energy_at_grazing_angles(fields, least, most):
 
 
 def test_compiled_is_plain():
-    materials = [material for material, _ in random_materials(8, 92, least=0.0)]
+    materials = [material for material, _ in random_principled(8, 92, least=0.0)]
     ones = dict.fromkeys(NUMBERS, 1.0) | {"metallic": 0.0}
     extremes = (
         Principled(base_colour=0.0, metallic=1.0),

@@ -7,6 +7,7 @@ from reference_rt.scene import yaml_text
 
 SHAPE = "shapes:\n  - type: sphere\n    "
 BOX = "shapes:\n  - type: box\n    transform: "
+STEP = "expected one of 'translate', 'scale', 'rotate', 'matrix'"
 LIGHT = "lights:\n  - type: point\n    position: [0, 0, 0]\n    intensity: "
 
 # (scene, the line that is told, keys, and the beginning of the rest)
@@ -43,14 +44,10 @@ WRONG = {
     "flat scale": (BOX + "[{scale: [1, 0, 1]}]", 2, "shapes[0]", "the transform is singular"),
     "flat matrix": (BOX + "[{matrix: [[1, 2, 0, 0], [2, 4, 0, 0], [0, 0, 1, 0]]}]", 2, "shapes[0]",
      "the transform is singular"),
-    "transform of numbers": (BOX + "[1]", 3, "shapes[0].transform[0]",
-     "expected one of 'translate', 'scale', 'rotate', 'matrix'"),
-    "transform of lists": (BOX + "[[1, 2]]", 3, "shapes[0].transform[0]",
-     "expected one of 'translate', 'scale', 'rotate', 'matrix'"),
-    "transform of nothing": (BOX + "[null]", 3, "shapes[0].transform[0]",
-     "expected one of 'translate', 'scale', 'rotate', 'matrix'"),
-    "unknown step": (BOX + "[{skew: 1}]", 3, "shapes[0].transform[0]",
-     "expected one of 'translate', 'scale', 'rotate', 'matrix'"),
+    "transform of numbers": (BOX + "[1]", 3, "shapes[0].transform[0]", STEP),
+    "transform of lists": (BOX + "[[1, 2]]", 3, "shapes[0].transform[0]", STEP),
+    "transform of nothing": (BOX + "[null]", 3, "shapes[0].transform[0]", STEP),
+    "unknown step": (BOX + "[{skew: 1}]", 3, "shapes[0].transform[0]", STEP),
     "steps as keys": (BOX + "{scale: 2}", 3, "shapes[0].transform", "expected a list"),
     "no axis": (BOX + "[{rotate: {axis: [0, 0, 0], degrees: 3}}]", 3,
      "shapes[0].transform[0].rotate.axis", "expected a direction"),

@@ -108,6 +108,15 @@ AIMED = np.array([[k % SIDE + 0.125, k // SIDE + 0.125, 5.0] for k in range(COUN
 DOWN = np.tile([0.0, 0.0, -1.0], (COUNT, 1))
 
 
+def check_numbers(scene, flat):
+    """Rays find the triangles' numbers in the mesh and in its copy, 10 above it."""
+    for k, by in enumerate((0.0, 10.0)):
+        hits = scene.intersect(AIMED + np.array([0, by, 0]), DOWN)
+        expected = np.where(np.isin(np.arange(COUNT), flat), -1, np.arange(COUNT))
+        assert hits.primitive.tolist() == expected.tolist()
+        assert set(hits.shape[hits.shape >= 0]) == {k}
+
+
 @pytest.mark.parametrize("hierarchy", ["auto", "none"])
 def test_rays_find_the_number_of_the_file(tmp_path, hierarchy):
     flat = PLACES["everywhere"]
@@ -116,11 +125,7 @@ def test_rays_find_the_number_of_the_file(tmp_path, hierarchy):
     away = mesh_of("memory", vertices, faces, tmp_path, transform=[{"translate": [0, 10, 0]}])
     scene = placed(tmp_path, one, away, hierarchy=hierarchy)
     tables_of(scene, flat)
-    for k, by in enumerate((0.0, 10.0)):
-        hits = scene.intersect(AIMED + np.array([0, by, 0]), DOWN)
-        expected = np.where(np.isin(np.arange(COUNT), flat), -1, np.arange(COUNT))
-        assert hits.primitive.tolist() == expected.tolist()
-        assert set(hits.shape[hits.shape >= 0]) == {k}
+    check_numbers(scene, flat)
 
 
 def test_in_groups(tmp_path):
@@ -130,11 +135,7 @@ def test_in_groups(tmp_path):
     scene = placed(tmp_path, *copies, groups={"g": (rt.Sphere(center=(50, 0, 0)), mesh)})
     with pytest.warns(rt.SceneWarning, match=r"groups\.g\[1\]: mesh .*" + told(flat)):
         scene.tables  # noqa: B018
-    for k, by in enumerate((0.0, 10.0)):
-        hits = scene.intersect(AIMED + np.array([0, by, 0]), DOWN)
-        expected = np.where(np.isin(np.arange(COUNT), flat), -1, np.arange(COUNT))
-        assert hits.primitive.tolist() == expected.tolist()
-        assert set(hits.shape[hits.shape >= 0]) == {k}
+    check_numbers(scene, flat)
 
 
 def test_in_solids(tmp_path):

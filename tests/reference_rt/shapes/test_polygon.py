@@ -15,6 +15,7 @@ from flat_checks import (
     plane_points,
     random_map,
     rays_at,
+    rays_at_plane,
 )
 from polygon_checks import count, edges_of, regular, seen_from_above, square, winding
 
@@ -57,7 +58,7 @@ def test_against_rational_arithmetic(flat, stretch, offset, distance):
     table = tables.polygons
     lower, upper = table.lower[rows].T, table.upper[rows].T
     x, y = lower + (upper - lower) * rng.uniform(-0.1, 1.1, (2, n))
-    o, d = rays_at(rng, plane_points(table, rows, x, y), distance * rng.uniform(0.1, 2, n))
+    o, d = rays_at_plane(rng, table, rows, x, y, distance * rng.uniform(0.1, 2, n))
     found, right = probe(tables, POLYGON, rows, o, d), ExactHits(table, rows, o, d)
     hits = misses = 0
     for i in range(n):
@@ -125,7 +126,7 @@ def test_distances_are_within_16_ulp_of_size():
     tables, rows = shapes_in_order(shapes)
     table = tables.polygons
     x, y = 0.3 * rng.uniform(-1, 1, (2, n))
-    o, d = rays_at(rng, plane_points(table, rows, x, y), rng.uniform(0.1, 10, n))
+    o, d = rays_at_plane(rng, table, rows, x, y, rng.uniform(0.1, 10, n))
     check_distances(tables, POLYGON, rows, o, d)
 
 
