@@ -62,8 +62,9 @@ def trace_packet(
     numbers: IntArray,
     filled: int,
 ) -> tuple[int, int]:
-    """Closest hits of the BUNDLE rays begin, begin + 1, ... with origins o (n, 3) and directions
-    d (n, 3): as a packet where they are coherent, else queued until there is a block of them.
+    """Closest hits of the PACKET_SIZE rays begin, begin + 1, ... with origins o (n, 3) and
+    directions d (n, 3): as a packet where they are coherent, else queued until there is a block of
+    them.
 
     waiting: rays in the queue;  filled: hits in `found`, whose rays' indices are in `numbers`.
     Returns both as they are afterwards.  Hits come in any order; the call for the last of the n

@@ -32,7 +32,7 @@ def nearest_of_leaf(
     hits: HitBlock,
 ) -> Hit:
     """The closest of hit j and all hits of ray j of a block in a leaf without instances; it becomes
-    hit j.  seen (SEEN_FLOATS,) is scratch."""
+    hit j.  seen (PROJECTION_FLOATS,) is scratch."""
     closest = hit_of(hits, j)
     if is_triangle_leaf(leaf):
         closest = nearest_of_triangle_leaf(bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest)
@@ -79,7 +79,7 @@ def nearest_of_triangle_leaf(
     closest: Hit,
 ) -> Hit:
     """The closest of `closest` and the hits with a leaf of triangles, tested VECTOR_WIDTH at once.
-    seen (SEEN_FLOATS,) is scratch."""
+    seen (PROJECTION_FLOATS,) is scratch."""
     if corners is None:
         return closest
     first, size = first_of(node), size_of(node)

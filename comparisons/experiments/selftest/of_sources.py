@@ -49,8 +49,8 @@ FAULTS = (
     ),
     SourceFault(
         "one leaf missing from the hierarchy", KNOT, "accel/leaf.py",
-        "    met = see(corners, first, size, shear, seen)\n",
-        "    met = see(corners, first, size, shear, seen)\n"
+        "    met = project_leaf(corners, first, size, shear, seen)\n",
+        "    met = project_leaf(corners, first, size, shear, seen)\n"
         "    if first <= 5000 < first + size:\n        met = 0\n",
     ),
     SourceFault(

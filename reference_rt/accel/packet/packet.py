@@ -63,7 +63,8 @@ def may_be_coherent(first: Vec3, last: Vec3) -> bool:
 
 @simd_kernel
 def _span(o: Any, d: Any, first: Any, boxes: Any, span: Any) -> Any:
-    """Componentwise bounds of BUNDLE origins and directions, from float `first` of their arrays on.
+    """Componentwise bounds of PACKET_SIZE origins and directions, from float `first` of their
+    arrays on.
 
     Into span (SPAN_FLOATS,): the smallest numbers of o and d, then the largest, each as 3
     VECTOR_WIDTH numbers that are x, y, z in turn and still to be reduced; then how far each child
@@ -105,7 +106,7 @@ def _highest(span: FloatArray, place: int) -> Vec3:
 
 @kernel
 def packet_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArray) -> RayPacket:
-    """The packet of the BUNDLE rays begin, begin + 1, ...; span (SPAN_FLOATS,) is scratch."""
+    """The packet of the PACKET_SIZE rays begin, begin + 1, ...; span (SPAN_FLOATS,) is scratch."""
     is_coherent = _span(o, d, 3 * begin, bvh.boxes, span) == (1 << VECTOR_WIDTH) - 1
     o_low, d_low = _lowest(span, 0), _lowest(span, _TURNS)
     o_high, d_high = _highest(span, 2 * _TURNS), _highest(span, 3 * _TURNS)

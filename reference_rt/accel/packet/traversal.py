@@ -37,8 +37,8 @@ INCOHERENT, MISSED, FOUND = -1, 0, 1
 def closest_of_packet(
     geometry: Geometry, o: FloatArray, d: FloatArray, begin: int, rays: RayBlock, hits: HitBlock
 ) -> int:
-    """`closest_hit` of the BUNDLE rays begin, begin + 1, ... with origins o (n, 3) and directions
-    d (n, 3).
+    """`closest_hit` of the PACKET_SIZE rays begin, begin + 1, ... with origins o (n, 3) and
+    directions d (n, 3).
 
     Returns INCOHERENT: nothing is done (they are not coherent, or the scene has no BVH or has
     instances);  MISSED: no ray hits anything;  FOUND: the rays and their hits, some of them misses,

@@ -161,7 +161,11 @@ def test_what_is_not_accepted(files: list[str]) -> None:
         (["black.exr", "--name", "ball", "--reason", "r"], 3, "is black throughout"),
         ([*files, "other.exr", "--name", "b", "--reason", "r"], 3, "is 9 x 6 pixels; expected 8"),
         (["other.exr", "--scene", "scene.yaml", "--name", "b", "--reason", "r"], 3, "size of the"),
-        ([*files, "--noise-free", "--name", "ball", "--reason", "r"], 2, "4 candidates of a pict"),
+        (
+            [*files, "--noise-free", "--name", "ball", "--reason", "r"],
+            2,
+            "4 candidates without noise",
+        ),
         (["none.exr", "--name", "ball", "--reason", "r"], 3, "there is no such file"),
         (["--list", "--name", "ball"], 2, "--list and --unused accept nothing"),
     ):

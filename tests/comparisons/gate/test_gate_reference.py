@@ -147,7 +147,7 @@ def test_references_from_files(tmp_path: Path) -> None:
     one = of_files(from_array(pictures[:1]), variance, False)
     assert one.variance is not None
     assert (one.variance == 0.25).all()
-    with pytest.raises(UsageError, match="--variance: of one reference"):
+    with pytest.raises(UsageError, match="--variance: only applies to one reference"):
         of_files(from_array(pictures), variance, False)
     with pytest.raises(ImageError, match="is 16 x 12 pixels; expected 16 x 11, as array"):
         of_files(from_array(pictures[:1, 1:]), variance, False)

@@ -43,7 +43,7 @@ def test_the_page(tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "<title>2 of 4 cases run: 2 agree" in page
     assert '<span class="missing">2 of 4 cases run</span>' in page
-    assert "The run was interrupted. Not run: &lt;c&gt;, d." in page
+    assert "The run was interrupted before these cases: &lt;c&gt;, d." in page
     write_report(tmp_path / "page.html", RAN, {})
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "<span>2 cases</span>" in page

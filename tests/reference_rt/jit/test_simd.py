@@ -121,7 +121,7 @@ def _met(corners, size, origins, directions, maybe, met, seen_now, seen_again):
             if alone.side != 0:
                 met[i] |= 1 << lane
             if maybe[i] >> lane & 1 != 0:
-                again = watertight.project_lane(corners, 0, size, lane, shear, seen)
+                again = watertight.load_projection(corners, 0, size, lane, shear, seen)
                 for now, found in ((seen_now, alone), (seen_again, again)):
                     now[i, lane, 0], now[i, lane, 1], now[i, lane, 2] = found.e0, found.e1, found.e2
                     now[i, lane, 3], now[i, lane, 4] = found.a_z, found.b_z

@@ -1,7 +1,6 @@
 """The results for machines: `results.json` and `results.csv`."""
 
 import csv
-import json
 import math
 import shlex
 from collections.abc import Mapping, Sequence
@@ -18,7 +17,7 @@ from comparisons.experiments.stability.harness.summary import (
     summarise,
     total,
 )
-from reference_rt.util.files import replacing
+from comparisons.results.files import csv_file, write_json
 
 SCHEMA = 1
 """Raised whenever a reader of the former layout would misread the new one."""
@@ -65,13 +64,8 @@ def write(
             for name in dict.fromkeys(f.family for f in found)
         ],
     }
-    with replacing(folder / "results.json") as temporary:
-        text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
-    with (
-        replacing(folder / "results.csv") as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
+    write_json(folder / "results.json", document)
+    with csv_file(folder / "results.csv") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for f in found:
