@@ -2,10 +2,9 @@
 
 All four find the same hits, to the last bit; only their speed differs:
 
-- brute force (no BVH), `shapes/brute_force.py`: one ray against VECTOR_WIDTH = 8 shapes at once,
-or, by
-  `shapes/ray_simd.py`, VECTOR_WIDTH rays against one shape at once (spheres, rectangles and boxes;
-  all other shapes one ray and one primitive at a time);
+- brute force (no BVH), `shapes/brute_force.py`: one ray against VECTOR_WIDTH = 8 shapes at once;
+  or, by `shapes/ray_simd.py`, VECTOR_WIDTH rays against one shape at once (spheres, rectangles and
+  boxes; all other shapes one ray and one primitive at a time);
 - single-ray traversal: the loop is in `geometry.py`, its steps are in `single_ray.py`;
 - stream traversal, `stream/`: a block of up to BLOCK = 64 rays, each one step at a time;
 - packet traversal, `packet/`: 16 coherent rays that share their box tests.
@@ -50,9 +49,8 @@ Why all ways find the same bits:
 1. They test a primitive by the same IEEE operations in the same order.  Scalar and SIMD code are
    generated from one function (`jit/simd.py`) or tested to agree (triangles: `test_simd`).
 2. No traversal misses a hit: boxes only cull, and rounding only enlarges them (`slab_ray_of`,
-float32
-   planes rounded outwards, FAR_SLACK).  A box that the ray meets is skipped only where it begins
-   beyond the closest hit so far, never at the same t.
+   float32 planes rounded outwards, FAR_SLACK).  A box that the ray meets is skipped only where it
+   begins beyond the closest hit so far, never at the same t.
 3. Of the hits found the choice does not depend on their order: the smallest t, and at equal t the
    first by `crossing_order.precedes`, a total order (instance, kind, shape, face).  Finding a
    primitive twice, in two leaves, changes nothing.  Brute force visits primitives in that order
