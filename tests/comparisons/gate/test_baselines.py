@@ -167,7 +167,7 @@ def test_what_is_not_accepted(files: list[str]) -> None:
             "4 candidates without noise",
         ),
         (["none.exr", "--name", "ball", "--reason", "r"], 3, "there is no such file"),
-        (["--list", "--name", "ball"], 2, "--list and --unused accept nothing"),
+        (["--list", "--name", "ball"], 2, "--list and --unused write no baseline"),
     ):
         result = run(*arguments)
         assert (result.exit_code, message in result.output) == (code, True), result.output

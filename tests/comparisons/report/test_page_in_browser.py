@@ -193,7 +193,7 @@ def test_a_single_view_says_what_a_case_lacks(show):
     page.keyboard.press("5")
     page.locator("#which").select_option("difference")
     assert shown(page) == []
-    assert page.get_by_text("This case has no such picture").is_visible()
+    assert page.get_by_text("This case has no picture of this kind").is_visible()
 
 
 def test_the_slider(show):
