@@ -34,8 +34,7 @@ of replicates is unreliable, and Student's t fails. Four rules keep the level:
 - The side with fewer replicates counts as at least as noisy as the other: it has seen fewer of the
   rare paths.
 - A pixel with two possible values may differ without any spread by chance; such pixels count only
-  if
-  there are more than chance produces.
+  if there are more than chance produces.
 
 With as many replicates on both sides and noise of one distribution the difference is symmetric, and
 heavy tails make the tests less sensitive, but not wrong. The ranks assume no distribution at all.

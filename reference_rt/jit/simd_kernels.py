@@ -109,9 +109,9 @@ def simd_kernel(function: Callable[..., Any]) -> Callable[..., int]:
     lane; the first condition's bits are the lowest.  Arguments of `function`:
 
     - C-contiguous arrays of float64 or float32: load(i) is the vector of VECTOR_WIDTH numbers from
-    number
-      i on, everywhere(i) is number i in every lane, store(i, lanes) (float64 only) stores a vector;
-    - C-contiguous arrays of uint32: natural(i) is number i, an integer;
+      number i on, everywhere(i) is number i in every lane, store(i, lanes) (float64 only) stores a
+      vector;
+    - C-contiguous arrays of uint32: load_index(i) is number i, an integer;
     - float64 numbers: the same number in every lane;
     - integers, which may be added and multiplied.
     """

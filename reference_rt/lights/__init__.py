@@ -9,12 +9,10 @@ units for distances; colours are linear sRGB.  Lights that can be sampled are nu
 
 - `pick(lights, p, n, u)` returns a light's number and the probability of picking it;
 - `sample_one(lights, k, shapes, textures, p, u0, u1) -> LightSample` returns a direction from `p`
-to
-  light k and the radiance from there, without testing visibility; its pdf does not include the
+  to light k and the radiance from there, without testing visibility; its pdf does not include the
   probability of picking k; pdf = 0 means that nothing arrives;
 - `area_pdf` and `environment_pdf` return the density with which these two find a point that was
-hit,
-  or a direction in which nothing is hit: per solid angle, picking included;
+  hit, or a direction in which nothing is hit: per solid angle, picking included;
 - `background` returns the radiance of a ray that hits nothing.
 
 Shapes whose material is `emissive` are lights too (`emitters/area.py`).

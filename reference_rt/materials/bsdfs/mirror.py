@@ -9,7 +9,7 @@ from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, co
 
 
 class Mirror(Material):
-    """A perfect mirror with a colour (the text-book's k_r); its back is black."""
+    """A perfect mirror with a colour (the textbook's k_r); its back is black."""
 
     delta: ClassVar[bool] = True
     type: Literal["mirror"] = "mirror"

@@ -141,6 +141,6 @@ FAMILY = Family(
             _kinds_at,
         ),
     ),
-    anchors="pbrt and Mitsuba test no such range; measured, the text-book's quadratic in float64"
+    anchors="pbrt and Mitsuba test no such range; measured, the textbook's quadratic in float64"
     " is wrong for 1.3 % of the rays at 1e7 radii and for 33 % at 1e8.",
 )

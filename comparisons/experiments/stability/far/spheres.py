@@ -80,7 +80,7 @@ def tangent_gaps(rng: np.random.Generator, n: int) -> FloatArray:
 
 
 def answers(rays: Rays) -> dict[str, FloatArray]:
-    """t (n,) by our kernel and by the text-book's methods, inf for a miss."""
+    """t (n,) by our kernel and by the textbook's methods, inf for a miss."""
     found = {}
     with np.errstate(all="ignore"):
         for number, name in enumerate(WHO):

@@ -10,7 +10,7 @@ SIZE = (4.8, 3.7)
 
 LEAST, MOST = 1e-2, 1e30
 """Limits of the axis of worst errors, in the series' unit: a logarithmic axis has no zero, and
-where a text-book's 1 - R gives 1e-16 in place of 0, the error is some 1e297."""
+where a textbook's 1 - R gives 1e-16 in place of 0, the error is some 1e297."""
 
 
 def of_series(one: SeriesSummary) -> list[str]:

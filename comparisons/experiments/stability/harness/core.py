@@ -13,7 +13,7 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 OURS, MITSUBA = "ours", "mitsuba"
-"""Names of contestants; text-book methods go by theirs: "sphere.algebraic"."""
+"""Names of contestants; textbook methods go by theirs: "sphere.algebraic"."""
 
 EXAMPLES = 3
 """Failures of a contestant at a sweep point that are kept word for word."""

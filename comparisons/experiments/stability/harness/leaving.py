@@ -19,7 +19,7 @@ PIXELS = 160
 """Across a picture."""
 
 EPSILON = 1e-4
-"""Of the text-book's offset."""
+"""Of the textbook's offset."""
 
 CONTACT = 4.0
 """Bounds B: a shape that is thicker must not be lost, nor a neighbour that is farther away."""
@@ -35,7 +35,7 @@ def bound(largest: float, size: float) -> float:
 
 @kernel
 def ray_leaving(ray: Ray, t: float, point: SurfacePoint, w: Vec3, epsilon: float) -> Ray:
-    """Ours, or for an epsilon above 0 the text-book's ray: it begins at o + t d, and what is nearer
+    """Ours, or for an epsilon above 0 the textbook's ray: it begins at o + t d, and what is nearer
     than epsilon does not count, so that it might as well begin there."""
     if epsilon > 0.0:
         return Ray(at(ray, t) + w * epsilon, w, math.inf)

@@ -1,4 +1,4 @@
-"""Where rays go in and out of a solid: by ours, by the text-book's methods, and exactly."""
+"""Where rays go in and out of a solid: by ours, by the textbook's methods, and exactly."""
 
 from collections.abc import Callable, Mapping
 from itertools import pairwise
@@ -57,7 +57,7 @@ def _lists(found: SolidCrossings) -> Lists:
 
 
 def intervals(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> FloatArray:
-    """The whole list of the text-book's intervals: (n, k)."""
+    """The whole list of the textbook's intervals: (n, k)."""
     tree = textbook.METHODS[INTERVALS].prepare(CsgParameters(solid, folder))
     with np.errstate(all="ignore"):
         found = interval_list(tree, o, d)

@@ -28,7 +28,7 @@ Mitsuba leaves by `si.spawn_ray(w)`: an offset of (1 + max |p|) RayEpsilon along
 RayEpsilon is 8.9e-5 in its float32.  It is judged by the size in place of B: a ray that begins more
 than s / 100 off has lost neighbours that are as near, as predicted from |c| = 112 s on, and for
 shapes smaller than 8.9e-3.  While it takes part, all numbers of shapes and rays are rounded to
-float32 first, for everyone.  The text-book's ray, which begins at o + t d + 1e-4 w, is judged in
+float32 first, for everyone.  The textbook's ray, which begins at o + t d + 1e-4 w, is judged in
 the same way.
 
 `shapes` places shapes and aims rays; `tracer` and `mitsuba` trace; `judge` decides; `shots`.

@@ -20,7 +20,7 @@ from comparisons.experiments.stability.leaving.tracer import Ways, depart, subje
 from comparisons.mitsuba.backend import scalar
 
 FIXED = "fixed epsilon"
-"""The text-book's."""
+"""The textbook's."""
 
 RAYS = 1000
 """From one shape, in the full run."""

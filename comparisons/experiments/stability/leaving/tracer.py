@@ -152,7 +152,7 @@ def scene_of(placed: Placed) -> rt.Scene:
 
 
 def depart(subject: Subject, rays: Rays, ways: Ways, epsilon: float = 0.0) -> Departures:
-    """Rays meet the shape and leave it; with an epsilon above 0, as text-books do."""
+    """Rays meet the shape and leave it; with an epsilon above 0, as textbooks do."""
     out = np.zeros((len(rays.o), COLUMNS))
     rows = np.full(len(rays.o), subject.row)
     with np.errstate(all="ignore"):

@@ -207,7 +207,7 @@ FAMILY = Family(
         _series(
             "far",
             Sweep("distance / size", decades(0, 12), (1.0, 1e4, 1e8, 1e12), 200, 2000),
-            "Lines through a torus from 2 to 10 times this far away; the text-book's coefficients"
+            "Lines through a torus from 2 to 10 times this far away; the textbook's coefficients"
             " are those seen from the origin.",
             _far,
         ),
@@ -224,6 +224,6 @@ FAMILY = Family(
             _unlike,
         ),
     ),
-    anchors="The text-book's closed forms and companion matrices are the anchors themselves; no"
+    anchors="The textbook's closed forms and companion matrices are the anchors themselves; no"
     " renderer's tests were found that certify roots.",
 )

@@ -1,4 +1,4 @@
-"""Solvers of F8's polynomials: the renderer's and the text-book's.
+"""Solvers of F8's polynomials: the renderer's and the textbook's.
 
 Roots come as (n, 4) or (n, 2), real ones in order, inf for missing ones.
 """

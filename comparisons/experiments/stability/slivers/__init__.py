@@ -14,7 +14,7 @@ Counts.  8 shapes a point, quick 2,000 rays, full 40,000.
 Passes.  No failure, up to the end of every range.
 
 Every other shape and its rays are rounded to float32, and Mitsuba gets the very same numbers as
-ours and the text-book's methods; the others are for these alone.  Mitsuba is judged by the same
+ours and the textbook's methods; the others are for these alone.  Mitsuba is judged by the same
 law: what its rounding turns into a miss or a hit is wrong.
 
 `drawn` draws shapes and rays; `judge` decides; `shots`: maps of a triangle.

@@ -37,7 +37,7 @@ COUNTED = 10
 TESTS = {"quick": 3_000_000, "full": 60_000_000}
 
 BY_METHOD = 100
-"""One in so many is put to the text-book's methods, at most MOST: each tests all triangles."""
+"""One in so many is put to the textbook's methods, at most MOST: each tests all triangles."""
 MOST = 2_000
 
 

@@ -1,4 +1,4 @@
-"""Rays in a closed mesh: ours counted by triangles, Mitsuba in three ways, text-book methods."""
+"""Rays in a closed mesh: ours counted by triangles, Mitsuba in three ways, textbook methods."""
 
 from collections.abc import Callable
 from typing import Any
@@ -86,7 +86,7 @@ def _tracer(mi: Any, scene: Any) -> Tracer:
 
 
 def by_method(name: str, mesh: Closed) -> Tracer:
-    """One of the text-book's tests of a triangle, of all of a mesh's."""
+    """One of the textbook's tests of a triangle, of all of a mesh's."""
 
     def trace(o: FloatArray, d: FloatArray) -> BoolArray:
         met = np.zeros(len(o), np.bool_)
