@@ -6,7 +6,7 @@ import numpy as np
 
 from reference_rt import shapes as any_shape
 from reference_rt.accel.bvh import Bvh
-from reference_rt.accel.geometry import Geometry, closest_hit, occluded
+from reference_rt.accel.geometry import Geometry, closest_hit, geometries, occluded
 from reference_rt.accel.stream.traversal import any_of_block, closest_of_block, trace_block
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.core.ray_block import (
@@ -20,7 +20,8 @@ from reference_rt.core.ray_block import (
 )
 from reference_rt.core.ray_block import hit_of as hit_in_block
 from reference_rt.jit.function_pointer import FunctionPointer, call_pointer
-from reference_rt.jit.kernel import kernel, signature_of
+from reference_rt.jit.kernel import ByClass, kernel, signature_of
+from reference_rt.jit.links import Link
 from reference_rt.jit.parallel_compile import Call
 from reference_rt.shapes.instances import Instances
 
@@ -40,13 +41,13 @@ def tracer_of(geometry: Geometry) -> Call | None:
     return trace_block, signature_of(bvh, shapes, solids, rays, hits, 0, False)
 
 
-@kernel
+@geometries.operation
 def closest_hits(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int) -> None:
     """`closest_hit` of the first n rays; read the hits with `hit_of`."""
     _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, False)
 
 
-@kernel
+@geometries.operation
 def any_hits(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int) -> None:
     """`occluded` of the first n rays: hits.codes[j] >= 0 for those that are; the rest of the hits
     means nothing."""
@@ -86,9 +87,20 @@ def _trace(
 
 
 @kernel
-def hit_of(geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
-    """The hit of ray j after `closest_hits`."""
+def _hit_in_geometry(geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
     return _hit_of(geometry.bvh, geometry, ray, hits, j)
+
+
+@kernel
+def _hit_through_link(geometry: Link, ray: Ray, hits: HitBlock, j: int) -> Hit:
+    return hit_in_block(hits, j)
+
+
+_choice = ByClass("hit_of")
+_choice.register(Geometry, _hit_in_geometry)
+_choice.register(Link, _hit_through_link)
+hit_of = _choice.function
+"""hit_of(geometry, ray, hits, j): the hit of ray j after `closest_hits`."""
 
 
 @kernel

@@ -27,12 +27,12 @@ from reference_rt.core.ray import Hit, Ray, SurfacePoint, no_hit
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.function_pointer import FunctionPointer
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
+from reference_rt.jit.links import Linkable
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes import TRIANGLE, Packets, Shapes
+from reference_rt.shapes import Packets, Shapes
 from reference_rt.shapes.csg.anchor import out_of_solid, ray_near
 from reference_rt.shapes.csg.tables import Parts, Solids
 from reference_rt.shapes.instances import Instances, out_of, ray_in, tangents_out_of
-from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS, Shear, shear_of
 from reference_rt.shapes.shape import Tangents
 
@@ -56,13 +56,17 @@ class Geometry(NamedTuple):
     tracer: FunctionPointer | None = None
 
 
-@kernel
+geometries = Linkable("geometries")
+"""The operations below, on a geometry or on a link to one."""
+
+
+@geometries.operation
 def closest_hit(geometry: Geometry, ray: Ray) -> Hit:
     """The intersection with the smallest t in (0, t_max); `kind` is -1 for none."""
     return _trace(geometry.bvh, geometry, ray, False)
 
 
-@kernel
+@geometries.operation
 def occluded(geometry: Geometry, ray: Ray) -> bool:
     """Whether anything is hit at t in (0, t_max); the traversal ends at the first hit."""
     return _trace(geometry.bvh, geometry, ray, True).kind >= 0
@@ -160,7 +164,7 @@ def _traverse(
                 local = local_ray(bvh, instances, instance, ray)
 
 
-@kernel
+@geometries.operation
 def surface(geometry: Geometry, ray: Ray, hit: Hit) -> SurfacePoint:
     """The surface point, in world space, of a hit with `hit.kind >= 0`."""
     local, seen, solid = _in_primitive_space(geometry, ray, hit)
@@ -213,7 +217,7 @@ class HitIds(NamedTuple):
     v: float
 
 
-@kernel
+@geometries.operation
 def owner(geometry: Geometry, ray: Ray, hit: Hit) -> HitIds:
     """The ids and surface coordinates of a hit, for layers and queries; path tracing needs none."""
     local, seen, _ = _in_primitive_space(geometry, ray, hit)
@@ -234,7 +238,7 @@ class Coordinates(NamedTuple):
     colour: Vec3
 
 
-@kernel
+@geometries.operation
 def coordinates(geometry: Geometry, ray: Ray, hit: Hit) -> Coordinates:
     """The surface coordinates and the vertex colour of a hit."""
     local, seen, _ = _in_primitive_space(geometry, ray, hit)
@@ -242,7 +246,7 @@ def coordinates(geometry: Geometry, ray: Ray, hit: Hit) -> Coordinates:
     return Coordinates(u, v, colour(geometry.shapes, hit, Vec3(-1.0, -1.0, -1.0)))
 
 
-@kernel
+@geometries.operation
 def tangents(geometry: Geometry, ray: Ray, hit: Hit) -> Tangents:
     """dp/du and dp/dv at a hit, with u and v as in `coordinates`.  A solid flips the normals of
     some operands, but never their tangents."""
@@ -273,6 +277,5 @@ def _in_scene(instances: Instances | None, i: int, shape: int) -> tuple[int, int
 @kernel
 def colour(shapes: Shapes, hit: Hit, without: Vec3) -> Vec3:
     """The interpolated vertex colour of a mesh; `without` for hits that have none."""
-    if hit.kind == TRIANGLE:
-        return triangle.colour(shapes.triangles, hit, without)
-    return without
+    found: Vec3 = any_shape.colour(shapes, hit, without)
+    return found

@@ -10,7 +10,7 @@ To add a camera: its module; `AnyCamera` and the registrations below; a translat
 `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
 """
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -20,7 +20,9 @@ from reference_rt.cameras.orthographic import Orthographic, OrthographicView
 from reference_rt.cameras.perspective import Perspective, PerspectiveView
 from reference_rt.cameras.pinhole import Pinhole
 from reference_rt.cameras.thin_lens import ThinLens, ThinLensView
+from reference_rt.core.ray import Ray
 from reference_rt.jit.kernel import ByClass
+from reference_rt.jit.links import Linkable
 
 AnyCamera = Annotated[Perspective | Orthographic | Pinhole | ThinLens, Field(discriminator="type")]
 
@@ -32,10 +34,20 @@ _ray = ByClass("camera_ray")
 _ray.register(PerspectiveView, perspective.camera_ray)
 _ray.register(OrthographicView, orthographic.camera_ray)
 _ray.register(ThinLensView, thin_lens.camera_ray)
-camera_ray = _ray.function
-"""camera_ray(view, x, y, lens) -> the ray of the film point (x, y), x to the right and y down, each
-from 0 to 1 across the picture, through the lens point for `lens`, a pair in [0, 1); LENS_CENTRE
-gives the centre of the lens."""
+_ray_of = _ray.function
+
+views = Linkable("views")
+"""The operation `camera_ray`, on a view or on a link to one."""
+
+
+@views.operation
+def camera_ray(view: Any, x: float, y: float, lens: tuple[float, float]) -> Ray:
+    """The ray of the film point (x, y), x to the right and y down, each from 0 to 1 across the
+    picture, through the lens point for `lens`, a pair in [0, 1); LENS_CENTRE gives the centre of
+    the lens."""
+    ray: Ray = _ray_of(view, x, y, lens)
+    return ray
+
 
 _lens = ByClass("lens_sample")
 _lens.register(PerspectiveView, no_lens)

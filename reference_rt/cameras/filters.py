@@ -20,6 +20,7 @@ from pydantic import Field
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description, Positive
 from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.links import Linkable
 from reference_rt.sampling.distribution import cell_of
 
 
@@ -239,6 +240,15 @@ _offset = ByClass("film_offset")
 _offset.register(BoxSetup, _box_offset)
 _offset.register(TentSetup, _tent_offset)
 _offset.register(Tabulated, _tabulated_offset)
-film_offset = _offset.function
-"""film_offset(setup, u) -> (offset from the pixel's centre in pixels, weight), along one axis; the
-expectation of weight * g(offset) is the filter's integral of g."""
+_offset_by = _offset.function
+
+film_filters = Linkable("filters")
+"""The operation `film_offset`, on a filter's setup or on a link to one."""
+
+
+@film_filters.operation
+def film_offset(setup: Any, u: float) -> tuple[float, float]:
+    """(offset from the pixel's centre in pixels, weight), along one axis; the expectation of
+    weight * g(offset) is the filter's integral of g."""
+    dx, weight = _offset_by(setup, u)
+    return dx, weight

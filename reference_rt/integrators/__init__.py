@@ -29,6 +29,9 @@ from reference_rt.sampling import Samplers, sampler_of
 
 AnyIntegrator = Annotated[RayCast | Whitted | Direct | Path, Field(discriminator="type")]
 
+INTEGRATORS: dict[type, str] = {PathSetup: "path", DirectSetup: "direct", WhittedSetup: "whitted"}
+"""The names of the integrators, by the classes of their setups."""
+
 _radiance = ByClass("radiance")
 _radiance.register(PathSetup, path.radiance)
 _radiance.register(DirectSetup, direct.radiance)

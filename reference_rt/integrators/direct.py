@@ -11,16 +11,17 @@ from pydantic import Field, model_validator
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt.accel.geometry import closest_hit, surface
+from reference_rt.accel.geometry import closest_hit
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
 from reference_rt.integrators.direct_light import direct, light_selection_normal, power_heuristic
-from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.integrators.shading import shade, texture_place
+from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
+from reference_rt.integrators.shading import place, shade
 from reference_rt.jit.kernel import kernel, local_floats
-from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
+from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.sampling import Sample, draw_pair
 
 _Count = Annotated[int, Field(ge=0, le=1024)]
@@ -63,17 +64,18 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: Sample) 
     lights = scene.lights
     hit = closest_hit(scene.geometry, ray)
     if hit.kind < 0:
-        behind: Vec3 = any_light.background(lights.environment, ray.d)
+        behind: Vec3 = any_light.background(lights, ray.d)
         return behind
     kept = local_floats(any_material.scratch_floats(scene.materials))
     shading = shade(scene, ray, hit, kept)
-    total = area.emitted(lights.areas, shading.point, shading.at, -ray.d)
+    total = any_light.emitted(lights, shading.point, shading.at, -ray.d)
     normal = light_selection_normal(scene, shading)
     if any_material.is_smooth(scene.materials, shading.point.material):
         for k in range(setup.light_samples):
             total = total + _light_sample(setup, scene, shading, normal, sampler, k)
+    elsewhere = local_floats(lookup_cache_size(scene.materials.textured))
     for k in range(setup.bsdf_samples):
-        total = total + _bsdf_sample(setup, scene, shading, normal, sampler, k)
+        total = total + _bsdf_sample(setup, scene, shading, normal, sampler, k, elsewhere)
     return total
 
 
@@ -104,7 +106,13 @@ def _light_sample(
 
 @kernel
 def _bsdf_sample(
-    setup: DirectSetup, scene: SceneTables, shading: Shading, normal: Vec3, sampler: Sample, k: int
+    setup: DirectSetup,
+    scene: SceneTables,
+    shading: Shading,
+    normal: Vec3,
+    sampler: Sample,
+    k: int,
+    kept: FloatArray,
 ) -> Vec3:
     """What BSDF sample k of m adds to the estimate: its MIS-weighted f |cos| L_e / (m pdf)."""
     black = Vec3(0.0, 0.0, 0.0)
@@ -119,13 +127,14 @@ def _bsdf_sample(
     hit = closest_hit(scene.geometry, ray)
     p = shading.point.p
     if hit.kind < 0:
-        arriving: Vec3 = any_light.background(lights.environment, ray.d)
+        arriving: Vec3 = any_light.background(lights, ray.d)
         light_pdf = any_light.environment_pdf(lights, p, normal, ray.d)
     else:
-        there = surface(scene.geometry, ray, hit)
-        at = texture_place(scene.textures, scene.geometry, ray, hit)
-        arriving = area.emitted(lights.areas, there, at, -ray.d)
-        light_pdf = any_light.area_pdf(lights, scene.geometry.shapes, p, normal, there)
+        there = surface(scene, ray, hit)
+        here = place(scene, there.material, ray, hit)
+        at = evaluate_textures(scene.materials.textured, there.material, here, kept)
+        arriving = any_light.emitted(lights, there, at, -ray.d)
+        light_pdf = any_light.area_pdf(lights, shapes_of(scene), p, normal, there)
     weight = 1.0
     m = float(setup.bsdf_samples)
     if not scattered.is_delta:

@@ -6,7 +6,7 @@ from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt.accel.geometry import occluded
 from reference_rt.core.vec3 import Vec3, is_black, to_local
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import SceneTables, shapes_of
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights import LightSample, shadow_ray
 from reference_rt.materials import Shading
@@ -28,7 +28,7 @@ class Direct(NamedTuple):
 @kernel
 def direct(scene: SceneTables, shading: Shading, k: int, u0: float, u1: float) -> Direct:
     """A sample of light number k at a surface, tested for visibility."""
-    shapes, p = scene.geometry.shapes, shading.point.p
+    shapes, p = shapes_of(scene), shading.point.p
     light = any_light.sample_one(scene.lights, k, shapes, scene.textures, p, u0, u1)
     return direct_from(scene, shading, light)
 

@@ -39,12 +39,11 @@ from reference_rt.integrators.direct_light import (
     unshadowed,
 )
 from reference_rt.integrators.path_state import State, put_state, start, state_of
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import SceneTables, shapes_of
 from reference_rt.integrators.scratch import Scratch
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import kernel, local_floats
 from reference_rt.lights import shadow_ray
-from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
 from reference_rt.sampling import Sample, Samplers, draw_pair, sampler_of
 
@@ -58,7 +57,7 @@ is infinite from albedo² = cap on.  Mitsuba's cap of 0.95 reaches that at an al
 mean does not depend on the cap.
 """
 
-_LIGHT_SAMPLING, _BSDF_SAMPLING = range(2)
+_LIGHT_SAMPLING, _BSDF_SAMPLING, _BOTH = range(3)
 _STRATEGIES = {"lights": _LIGHT_SAMPLING, "bsdf": _BSDF_SAMPLING}
 
 
@@ -89,11 +88,16 @@ class Path(Description):
 
 class PathSetup(NamedTuple):
     """strategy: the only sampling strategy for direct light, `_LIGHT_SAMPLING` or `_BSDF_SAMPLING`;
-    None for both with multiple importance sampling, which compiles to no branch."""
+    None for both with multiple importance sampling, which compiles to no branch;  `_BOTH` for both
+    in kernels that do not depend on it."""
 
     max_depth: int
     rr_depth: int
     strategy: int | None
+
+    def linked(self) -> "PathSetup":
+        """The same for linked kernels: of one type for all strategies."""
+        return self._replace(strategy=_BOTH) if self.strategy is None else self
 
 
 class Step(NamedTuple):
@@ -124,7 +128,7 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> 
         if hit.kind < 0:
             return total + _environment_emission(path, scene, state, ray)
         shading = shade(scene, ray, hit, kept)
-        if any_light.is_area(scene.lights.areas, shading.point):
+        if any_light.is_area(scene.lights, shading.point):
             total = total + _hit_emission(path, scene, state, ray, shading)
         if depth + 1 >= path.max_depth:
             break
@@ -166,7 +170,7 @@ def radiances(
                 add_vector(scratch.totals, 0, k, _environment_emission(path, scene, state, ray))
                 continue
             shading = shade(scene, ray, hit, scratch.kept)
-            if any_light.is_area(scene.lights.areas, shading.point):
+            if any_light.is_area(scene.lights, shading.point):
                 add_vector(scratch.totals, 0, k, _hit_emission(path, scene, state, ray, shading))
             if depth + 1 >= path.max_depth:
                 continue
@@ -196,7 +200,7 @@ def _environment_emission(path: PathSetup, scene: SceneTables, state: State, ray
     if state.bsdf_pdf > 0.0:
         light_pdf = any_light.environment_pdf(lights, state.previous, state.normal, ray.d)
         weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
-    emitted: Vec3 = any_light.background(lights.environment, ray.d)
+    emitted: Vec3 = any_light.background(lights, ray.d)
     return state.throughput * emitted * weight
 
 
@@ -207,10 +211,10 @@ def _hit_emission(
     """Emission of the area light that the ray has hit: throughput L_e, MIS-weighted."""
     lights, point, weight = scene.lights, shading.point, 1.0
     if state.bsdf_pdf > 0.0:
-        shapes = scene.geometry.shapes
+        shapes = shapes_of(scene)
         light_pdf = any_light.area_pdf(lights, shapes, state.previous, state.normal, point)
         weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
-    return state.throughput * area.emitted(lights.areas, point, shading.at, -ray.d) * weight
+    return state.throughput * any_light.emitted(lights, point, shading.at, -ray.d) * weight
 
 
 @kernel
@@ -222,6 +226,8 @@ def _mis_weight(only: int | None, strategy: int, pdf: float, other: float) -> fl
     one cannot draw them (other = 0).
     """
     if only is None:
+        return power_heuristic(pdf, other)
+    if only == _BOTH:
         return power_heuristic(pdf, other)
     return 1.0 if only == strategy or other == 0.0 else 0.0
 
@@ -244,7 +250,7 @@ def _next_event_estimation(
     if picked.probability == 0.0:
         return nothing
     u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
-    shapes, textures = scene.geometry.shapes, scene.textures
+    shapes, textures = shapes_of(scene), scene.textures
     light = any_light.sample_one(scene.lights, picked.light, shapes, textures, point.p, u0, u1)
     sample = unshadowed(scene, shading, light)
     if is_black(sample.contribution):

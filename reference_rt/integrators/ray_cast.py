@@ -2,11 +2,11 @@
 
 from typing import ClassVar, Literal, NamedTuple
 
-from reference_rt.accel.geometry import closest_hit, colour, owner, surface
+from reference_rt.accel.geometry import closest_hit, colour, owner
 from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3, length
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import texture_place
 from reference_rt.jit.kernel import kernel
 from reference_rt.textures import colour_at
@@ -45,9 +45,9 @@ def cast(scene: SceneTables, ray: Ray) -> Cast:
     hit = closest_hit(scene.geometry, ray)
     if hit.kind < 0:
         return Cast(nothing, hit.t, nothing, -1, 0.0, 0.0)
-    point = surface(scene.geometry, ray, hit)
+    point = surface(scene, ray, hit)
     whose = owner(scene.geometry, ray, hit)
     at = texture_place(scene.textures, scene.geometry, ray, hit)
     own = colour_at(scene.materials.shown, point.material, at)
-    shown = colour(scene.geometry.shapes, hit, own)
+    shown = colour(shapes_of(scene), hit, own)
     return Cast(shown, hit.t * length(ray.d), point.n, whose.shape, whose.u, whose.v)

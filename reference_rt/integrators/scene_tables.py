@@ -1,10 +1,16 @@
 """`SceneTables`: the arrays of a scene, which `reference_rt.scene.build` makes for the kernels."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from reference_rt.accel.geometry import Geometry
-from reference_rt.lights import Lights
+from reference_rt.accel.geometry import surface as surface_in_geometry
+from reference_rt.core.ray import Hit, Ray, SurfacePoint
+from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.links import Link
+from reference_rt.lights import Lights, LinkedLights
 from reference_rt.materials import Materials
+from reference_rt.shapes import Shapes
+from reference_rt import shapes as any_shape
 from reference_rt.textures import Textures
 
 
@@ -16,3 +22,53 @@ class SceneTables(NamedTuple):
     materials: Materials
     lights: Lights
     textures: Textures | None
+
+
+class LinkedScene(NamedTuple):
+    """A scene behind links: all scenes have this one type.  is_placed: whether there are instances
+    or solids, whose surfaces take more than the shape's own table;  materials: all their arrays are
+    present, `flat_leaves` and `leaves` are links."""
+
+    geometry: Link
+    shapes: Link
+    is_placed: int
+    materials: Materials
+    lights: LinkedLights
+    textures: Link
+
+
+def _for(name: str, of_tables: Any, of_linked: Any) -> Any:
+    choice = ByClass(name)
+    choice.register(SceneTables, of_tables)
+    choice.register(LinkedScene, of_linked)
+    return choice.function
+
+
+@kernel
+def _own_shapes(scene: SceneTables) -> Shapes:
+    return scene.geometry.shapes
+
+
+@kernel
+def _linked_shapes(scene: LinkedScene) -> Link:
+    return scene.shapes
+
+
+shapes_of = _for("shapes_of", _own_shapes, _linked_shapes)
+"""shapes_of(scene): the tables of shapes, or the link to them."""
+
+
+@kernel
+def _surface_in_tables(scene: SceneTables, ray: Ray, hit: Hit) -> SurfacePoint:
+    return surface_in_geometry(scene.geometry, ray, hit)
+
+
+@kernel
+def _surface_through_link(scene: LinkedScene, ray: Ray, hit: Hit) -> SurfacePoint:
+    if scene.is_placed != 0:
+        return surface_in_geometry(scene.geometry, ray, hit)
+    return any_shape.surface(scene.shapes, ray, hit)
+
+
+surface = _for("surface", _surface_in_tables, _surface_through_link)
+"""surface(scene, ray, hit): the surface point, in world space, of a hit."""

@@ -1,11 +1,12 @@
 """From a hit to the input of the BSDF: the point, its shading frame, its texture lookups."""
 
-from reference_rt.accel.geometry import Geometry, coordinates, surface, tangents
+from reference_rt.accel.geometry import Geometry, coordinates, tangents
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.core.vec3 import Frame, Vec3, frame_from_normal, to_local
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import SceneTables, surface
 from reference_rt.jit.kernel import kernel
+from reference_rt.jit.links import is_absent
 from reference_rt.materials import Shading, prepare, uses_textures
 from reference_rt.materials.frame import oriented_frame
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
@@ -22,11 +23,11 @@ def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
     kept (`materials.scratch_floats`,): buffer for texture values and layers; the result refers to
     it.
     """
-    point = surface(scene.geometry, ray, hit)
+    point = surface(scene, ray, hit)
     world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
     frame = _frame(scene.materials.oriented, point.ns, world)
     local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))
-    at = _place(scene, point.material, ray, hit)
+    at = place(scene, point.material, ray, hit)
     looked = evaluate_textures(scene.materials.textured, point.material, at, kept)
     flat_leaves = kept[lookup_cache_size(scene.materials.textured) :]
     shading = Shading(point, frame, to_local(frame, -ray.d), looked, local, flat_leaves)
@@ -35,7 +36,7 @@ def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
 
 
 @kernel
-def _place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
+def place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
     """Texture coordinates at a hit for material m; any, if it has no textures."""
     if not uses_textures(scene.materials, m):
         return At(scene.textures, 0.0, 0.0, _NO_COLOUR)
@@ -47,6 +48,8 @@ def texture_place(textures: Textures | None, geometry: Geometry, ray: Ray, hit: 
     """Texture coordinates at a hit; computed only if the scene has textures."""
     if textures is None:
         return At(textures, 0.0, 0.0, _NO_COLOUR)
+    if is_absent(textures):
+        return At(textures, 0.0, 0.0, _NO_COLOUR)
     found = coordinates(geometry, ray, hit)
     return At(textures, found.u, found.v, found.colour)
 
@@ -56,11 +59,16 @@ def _tangents(oriented: IntArray | None, geometry: Geometry, ray: Ray, hit: Hit)
     if oriented is None:
         zero = Vec3(0.0, 0.0, 0.0)
         return Tangents(zero, zero)
+    if oriented[0] == 0:
+        zero = Vec3(0.0, 0.0, 0.0)
+        return Tangents(zero, zero)
     return tangents(geometry, ray, hit)
 
 
 @kernel
 def _frame(oriented: IntArray | None, ns: Vec3, world: Tangents) -> Frame:
     if oriented is None:
+        return frame_from_normal(ns)
+    if oriented[0] == 0:
         return frame_from_normal(ns)
     return oriented_frame(ns, world)

@@ -17,11 +17,10 @@ from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
 from reference_rt.integrators.direct_light import direct_from
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import SceneTables, shapes_of
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import kernel, local_floats
 from reference_rt.lights import ENVIRONMENT, LightSampler
-from reference_rt.lights.emitters import area
 from reference_rt.materials import Shading
 from reference_rt.sampling import Sample
 
@@ -82,12 +81,12 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
         weight, depth = _vector(stack, k + 6), int(stack[k + 9])
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
-            background = any_light.background(scene.lights.environment, ray.d)
+            background = any_light.background(scene.lights, ray.d)
             total = total + weight * background
             continue
         shading = shade(scene, ray, hit, kept)
         point = shading.point
-        total = total + weight * area.emitted(scene.lights.areas, point, shading.at, -ray.d)
+        total = total + weight * any_light.emitted(scene.lights, point, shading.at, -ray.d)
         ambient = any_material.ambient(scene.materials, shading) * any_light.ambient(scene.lights)
         total = total + weight * ambient
         if any_material.is_smooth(scene.materials, point.material):
@@ -116,7 +115,7 @@ def _direct_light(scene: SceneTables, choice: LightSampler | None, shading: Shad
     total = Vec3(0.0, 0.0, 0.0)
     if choice is None:
         return total
-    shapes = scene.geometry.shapes
+    shapes = shapes_of(scene)
     for k in range(len(choice.kind)):
         if choice.kind[k] != ENVIRONMENT and choice.probability[k] > 0.0:
             light = any_light.middle(scene.lights, k, shapes, scene.textures, shading.point.p)

@@ -29,12 +29,11 @@ from typing import Any, TypeVar
 
 from numba import types
 
-from reference_rt.jit.kernel import kernel, overload_kernel
+from reference_rt.jit.kernel import is_named_tuple, kernel, overload_kernel
+from reference_rt.jit.links import STRIDE, Link, Operation, Row, executed, stop, word
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_Row = tuple[int, str, Callable[..., Any]]
-"""A type: its code, the field of its table, its kernel."""
 
 
 class ByCode:
@@ -43,6 +42,7 @@ class ByCode:
 
     def __init__(self, rows: Iterable[tuple[int, str, Any]]) -> None:
         self._rows = tuple(rows)
+        self.operations: dict[str, Operation] = {}
 
     def __call__(
         self, name: str | Callable[[Any], Callable[..., Any] | None], code: str = "kind"
@@ -58,7 +58,7 @@ class ByCode:
             (number, field, name(m) if callable(name) else getattr(m, name, None))
             for number, field, m in self._rows
         ]
-        rows = [(number, field, of_row) for number, field, of_row in found if of_row is not None]
+        rows = [Row(number, field, of_row) for number, field, of_row in found if of_row is not None]
 
         def decorate(otherwise: F) -> F:
             parameters = _parameters(otherwise)
@@ -70,14 +70,19 @@ class ByCode:
                         f"are none of those of {otherwise.__module__}.{otherwise.__name__}"
                     )
 
-            def lines(present: Sequence[_Row]) -> Iterable[str]:
+            def lines(present: Sequence[Row]) -> Iterable[str]:
                 for number, field, of_row in present:
                     given = [f"{parameters[0]}.{field}", *_parameters(of_row)[1:]]
                     yield f"if {code} == {number}:"
                     yield f"    return {field}({', '.join(given)})"
                 yield f"return otherwise({', '.join(parameters)})"
 
-            return _generated(otherwise, parameters, rows, lines, otherwise=kernel(otherwise))
+            number = len(self.operations) + 1
+            operation = Operation(otherwise, number, rows, otherwise.__module__)
+            self.operations[otherwise.__name__] = operation
+            body = kernel(otherwise)
+            linked = functools.partial(_linked, operation, parameters[0], code, body)
+            return _generated(otherwise, parameters, rows, lines, linked, otherwise=body)
 
         return decorate
 
@@ -89,12 +94,12 @@ class ByCode:
         given, result = ", ".join(others), others[-1]
         rows = [(number, field, step) for number, field, _ in self._rows]
 
-        def lines(present: Sequence[_Row]) -> Iterable[str]:
+        def lines(present: Sequence[Row]) -> Iterable[str]:
             for number, field, _ in present:
                 yield f"{result} = {field}({number}, tables.{field}, {given})"
             yield f"return {result}"
 
-        return _generated(step, ["tables", *others], rows, lines)
+        return _generated(step, ["tables", *others], rows, lines, None)
 
 
 def _parameters(function: Callable[..., Any]) -> list[str]:
@@ -104,8 +109,9 @@ def _parameters(function: Callable[..., Any]) -> list[str]:
 def _generated(
     function: F,
     parameters: Sequence[str],
-    rows: Sequence[_Row],
-    lines: Callable[[Sequence[_Row]], Iterable[str]],
+    rows: Sequence[Row],
+    lines: Callable[[Sequence[Row]], Iterable[str]],
+    linked: Callable[[], Callable[..., Any]] | None,
     **names: Any,
 ) -> F:
     """The kernel that runs, for tables of which some are None, the text `lines` of the others.
@@ -135,8 +141,29 @@ def _generated(
         return write(lambda field: getattr(tables, field) is not None)(tables, *rest)
 
     @overload_kernel(choose)
-    def _compiled(tables: Any, *rest: Any) -> Callable[..., Any]:
+    def _compiled(tables: Any, *rest: Any) -> Callable[..., Any] | None:
+        if is_named_tuple(tables, Link):
+            return None if linked is None else linked()
         type_of = dict(zip(tables.fields, tables.types, strict=True))
         return write(lambda field: not isinstance(type_of[field], types.NoneType))
 
     return choose  # type: ignore[return-value]
+
+
+def _linked(operation: Operation, tables: str, code: str, otherwise: Any) -> Callable[..., Any]:
+    """The kernel for a link: it calls the operation of the type through its function pointer."""
+    given = ", ".join(operation.parameters)
+    comma = "," if len(operation.parameters) == 1 else ""
+    most = max(operation.rows, default=-1)
+    text = f"""def {operation.name}({tables}, {given}):
+    code = {code}
+    if 0 <= code <= {most}:
+        pointer = word({tables}.address, {STRIDE} * code + {operation.number})
+        if pointer < 0:
+            stop()
+        if pointer != 0:
+            table = word({tables}.address, {STRIDE} * code)
+            return call(pointer, table, ({given}{comma}))
+    return otherwise({tables}, {given})
+"""
+    return executed(text, operation, call=operation.caller(), word=word, stop=stop, otherwise=otherwise)

@@ -64,8 +64,9 @@ def entry_kernel(function: F) -> F:
     return compiled
 
 
-Signature = tuple[Any, ...]
-"""The types of a kernel's arguments."""
+Signature = Any
+"""The types of a kernel's arguments: a tuple, or Numba's signature, which has that of the result
+too."""
 
 
 def signature_of(*args: Any) -> Signature:
@@ -88,7 +89,10 @@ def precompile(compiled: Callable[..., Any], signature: Signature) -> Callable[.
 
 def is_compiled(compiled: Callable[..., Any], signature: Signature) -> bool:
     """Whether an entry kernel is compiled for these types, in this process or in the cache."""
-    if numba.config.DISABLE_JIT or signature in compiled.overloads:  # type: ignore[attr-defined]
+    if numba.config.DISABLE_JIT:
+        return True
+    types_of = signature if isinstance(signature, tuple) else signature.args
+    if types_of in compiled.overloads:  # type: ignore[attr-defined]
         return True
     cache, codegen = compiled._cache, compiled.targetctx.codegen()  # type: ignore[attr-defined]
     return isinstance(cache, KernelCache) and cache.has(signature, codegen)

@@ -110,13 +110,14 @@ class KernelCache:
     of it could not be detected.
     """
 
-    def __init__(self, function: Callable[..., Any], folder: str) -> None:
+    def __init__(self, function: Callable[..., Any], folder: str, name: str = "") -> None:
+        """name: of what is made of the function, if it is not the function itself."""
         self._function, self._folder = function, Path(folder)
         code = function.__code__
         self._name = f"{Path(code.co_filename).stem}.{code.co_name.strip('<>')}"
         # The folder's name covers the sources of this package only; functions may be outside.
         source = hashlib.blake2b(Path(code.co_filename).read_bytes()).digest()
-        self._identity = code.co_filename, function.__qualname__, code.co_firstlineno, source
+        self._identity = code.co_filename, function.__qualname__, code.co_firstlineno, source, name
         self._head = _MAGIC + self._folder.name.encode()
 
     @property
@@ -166,6 +167,8 @@ class KernelCache:
         cells = tuple(cell.cell_contents for cell in self._function.__closure__ or ())
         function = (*self._identity, self._function.__code__.co_code, dumps(cells))
         digest = hashlib.blake2b(repr(function).encode()).hexdigest()
+        if not isinstance(signature, tuple):
+            signature = signature.return_type, *signature.args
         return tuple(signature), codegen.magic_tuple(), digest
 
     def _path(self, key: tuple[Any, ...]) -> Path:

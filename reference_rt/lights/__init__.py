@@ -28,6 +28,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from reference_rt.lights.dispatch import (
+    LinkedLights,
     Lights,
     ambient,
     area_pdf,
@@ -35,6 +36,7 @@ from reference_rt.lights.dispatch import (
     count,
     depends_on_normal,
     depends_on_point,
+    emitted,
     environment_pdf,
     is_area,
     middle,
@@ -91,6 +93,7 @@ __all__ = [
     "LightSample",
     "LightSampler",
     "Lights",
+    "LinkedLights",
     "Pick",
     "Point",
     "Spot",
@@ -100,6 +103,7 @@ __all__ = [
     "count",
     "depends_on_normal",
     "depends_on_point",
+    "emitted",
     "environment_pdf",
     "is_area",
     "middle",

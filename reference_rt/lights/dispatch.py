@@ -11,6 +11,7 @@ from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.links import LINK, Link, declare
 from reference_rt.lights.emitters import area, constant, directional, environment_map, point, spot
 from reference_rt.lights.emitters.area import Areas
 from reference_rt.lights.emitters.constant import Environment
@@ -18,12 +19,20 @@ from reference_rt.lights.emitters.directional import Directionals
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.lights.emitters.point import Points
 from reference_rt.lights.emitters.spot import Spots
-from reference_rt.lights.light import AREA, DIRECTIONAL, NO_LIGHT, POINT, SPOT, LightSample
+from reference_rt.lights.light import (
+    AREA,
+    DIRECTIONAL,
+    ENVIRONMENT,
+    NO_LIGHT,
+    POINT,
+    SPOT,
+    LightSample,
+)
 from reference_rt.lights.selection import choice
 from reference_rt.lights.selection.choice import LightSampler
 from reference_rt.lights.selection.tree import LightTree, Pick
 from reference_rt.shapes import Shapes
-from reference_rt.textures import Textures
+from reference_rt.textures import At, Textures
 
 
 class Lights(NamedTuple):
@@ -44,44 +53,128 @@ class Lights(NamedTuple):
     tree: LightTree | None
 
 
-@kernel
-def _black(environment: None, d: Vec3) -> Vec3:
-    return Vec3(0.0, 0.0, 0.0)
-
-
-@kernel
-def _never(environment: None, d: Vec3) -> float:
-    return 0.0
-
-
-@kernel
-def _nothing(environment: None, u0: float, u1: float) -> LightSample:
-    return NO_LIGHT
-
-
-def _of_environment(name: str, without: Any) -> Any:
+def _of_environment(name: str) -> Any:
     kernels = ByClass(name)
-    kernels.register(type(None), without)
     kernels.register(Environment, getattr(constant, name))
     kernels.register(EnvironmentMaps, getattr(environment_map, name))
     return kernels.function
 
 
-_by_code = ByCode(
+_radiance_of = _of_environment("radiance")
+_density_of = _of_environment("pdf")
+_sample_of = _of_environment("sample")
+
+
+class _Surroundings:
+    """The kernels of the environment, of either class."""
+
+    @staticmethod
+    @kernel
+    def background(environment: Any, d: Vec3) -> Vec3:
+        found: Vec3 = _radiance_of(environment, d)
+        return found
+
+    @staticmethod
+    @kernel
+    def environment_density(environment: Any, d: Vec3) -> float:
+        found: float = _density_of(environment, d)
+        return found
+
+    @staticmethod
+    @kernel
+    def sample(environment: Any, u0: float, u1: float) -> LightSample:
+        found: LightSample = _sample_of(environment, u0, u1)
+        return found
+
+
+declare(Lights, LINK)
+
+by_code = ByCode(
     [
         (AREA, "areas", area),
         (POINT, "points", point),
         (SPOT, "spots", spot),
         (DIRECTIONAL, "directionals", directional),
+        (ENVIRONMENT, "environment", _Surroundings),
     ]
 )
-"""The bodies of the functions below are for the environment, of which there is only one."""
 
-background = _of_environment("radiance", _black)
-"""background(environment, d): the radiance from direction d."""
 
-_environment_pdf = _of_environment("pdf", _never)
-_environment_sample = _of_environment("sample", _nothing)
+CODES = (
+    (AREA, "areas"),
+    (POINT, "points"),
+    (SPOT, "spots"),
+    (DIRECTIONAL, "directionals"),
+    (ENVIRONMENT, "environment"),
+)
+"""(code, field of Lights)."""
+
+
+class LinkedLights(NamedTuple):
+    """`Lights` behind links.  emitters: to the tables of all types;  choice: without lights, of
+    arrays of length 0;  tree: to the light tree, or to nothing;  ambient (1, 3)."""
+
+    emitters: Link
+    choice: LightSampler
+    tree: Link
+    ambient: FloatArray
+
+
+def _for(name: str, of_lights: Any, of_linked: Any) -> Any:
+    chosen = ByClass(name)
+    chosen.register(Lights, of_lights)
+    chosen.register(LinkedLights, of_linked)
+    return chosen.function
+
+
+@kernel
+def _themselves(lights: Any) -> Any:
+    return lights
+
+
+@kernel
+def _emitters_of(lights: LinkedLights) -> Link:
+    return lights.emitters
+
+
+emitters = _for("emitters", _themselves, _emitters_of)
+"""emitters(lights): the tables, or the link to them."""
+
+
+@kernel
+def background(lights: Any, d: Vec3) -> Vec3:
+    """The radiance of the environment from direction d; black without one."""
+    found: Vec3 = _background(emitters(lights), d)
+    return found
+
+
+@by_code("background", code=str(ENVIRONMENT))
+def _background(lights: Lights, d: Vec3) -> Vec3:
+    return Vec3(0.0, 0.0, 0.0)
+
+
+@by_code("environment_density", code=str(ENVIRONMENT))
+def _environment_density(lights: Lights, d: Vec3) -> float:
+    return 0.0
+
+
+@kernel
+def emitted(lights: Any, q: SurfacePoint, at: At, w: Vec3) -> Vec3:
+    """The radiance that the surface at `q` emits towards `w`: see `area.emitted`."""
+    if not is_area(lights, q):
+        return Vec3(0.0, 0.0, 0.0)
+    found: Vec3 = _emitted(emitters(lights), q, at, w)
+    return found
+
+
+@by_code("emitted", code=str(AREA))
+def _emitted(lights: Lights, q: SurfacePoint, at: At, w: Vec3) -> Vec3:
+    return Vec3(0.0, 0.0, 0.0)
+
+
+@by_code(lambda module: area.pdf if module is area else None, code=str(AREA))
+def _area_density(lights: Lights, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> float:
+    return 0.0
 
 
 @kernel
@@ -114,15 +207,26 @@ def _pick_probability(
 
 
 @kernel
-def depends_on_point(lights: Lights) -> bool:
-    """Whether any probability or density depends on the point p: a constant."""
+def _point_matters(lights: Lights) -> bool:
     return lights.areas is not None or lights.tree is not None
 
 
 @kernel
-def depends_on_normal(lights: Lights) -> bool:
-    """Whether any probability depends on the normal n: a constant."""
+def _normal_matters(lights: Lights) -> bool:
     return lights.tree is not None
+
+
+@kernel
+def _always(lights: LinkedLights) -> bool:
+    return True
+
+
+depends_on_point = _for("depends_on_point", _point_matters, _always)
+"""depends_on_point(lights): whether any probability or density depends on the point p: a
+constant."""
+
+depends_on_normal = _for("depends_on_normal", _normal_matters, _always)
+"""depends_on_normal(lights): whether any probability depends on the normal n: a constant."""
 
 
 @kernel
@@ -159,10 +263,12 @@ def _sample_one(
 ) -> LightSample:
     if entries is None:
         return NO_LIGHT
-    return _sample(lights, entries.kind[k], entries.row[k], shapes, textures, p, u0, u1)
+    kind, i = entries.kind[k], entries.row[k]
+    found: LightSample = _sample(emitters(lights), kind, i, shapes, textures, p, u0, u1)
+    return found
 
 
-@_by_code("sample")
+@by_code("sample")
 def _sample(
     lights: Lights,
     kind: int,
@@ -173,8 +279,7 @@ def _sample(
     u0: float,
     u1: float,
 ) -> LightSample:
-    found: LightSample = _environment_sample(lights.environment, u0, u1)
-    return found
+    return NO_LIGHT
 
 
 @kernel
@@ -196,10 +301,12 @@ def _middle_of_one(
 ) -> LightSample:
     if entries is None:
         return NO_LIGHT
-    return _middle(lights, entries.kind[k], entries.row[k], shapes, textures, p)
+    kind, i = entries.kind[k], entries.row[k]
+    found: LightSample = _middle(emitters(lights), kind, i, shapes, textures, p)
+    return found
 
 
-@_by_code("middle")
+@by_code("middle")
 def _middle(
     lights: Lights, kind: int, i: int, shapes: Shapes, textures: Textures | None, p: Vec3
 ) -> LightSample:
@@ -207,9 +314,17 @@ def _middle(
 
 
 @kernel
-def is_area(areas: Areas | None, q: SurfacePoint) -> bool:
+def _any_areas(lights: Lights) -> bool:
+    return lights.areas is not None
+
+
+_has_areas = _for("has_areas", _any_areas, _always)
+
+
+@kernel
+def is_area(lights: Any, q: SurfacePoint) -> bool:
     """Whether a surface is an area light."""
-    if areas is None:
+    if not _has_areas(lights):
         return False
     return q.light >= 0
 
@@ -218,36 +333,20 @@ def is_area(areas: Areas | None, q: SurfacePoint) -> bool:
 def area_pdf(lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint) -> float:
     """The density per solid angle of `pick` and `sample_one` together, for a surface at `p` with
     normal `n`, at the point `q` of an area light; 0 for other points."""
-    return _area_pdf(lights.areas, lights, shapes, p, n, q)
-
-
-@kernel
-def _area_pdf(
-    areas: Areas | None, lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint
-) -> float:
-    if areas is None:
-        return 0.0
-    if not is_area(areas, q):
+    if not is_area(lights, q):
         return 0.0
     chance = pick_probability(lights, p, n, q.light)
-    return area.pdf(areas, q.light, shapes, p, q) * chance
+    density: float = _area_density(emitters(lights), q.light, shapes, p, q)
+    return density * chance
 
 
 @kernel
 def environment_pdf(lights: Lights, p: Vec3, n: Vec3, d: Vec3) -> float:
     """The same for a direction `d` to the environment."""
-    return _surrounding_pdf(lights.environment, lights, p, n, d)
-
-
-@kernel
-def _surrounding_pdf(
-    environment: Environment | EnvironmentMaps | None, lights: Lights, p: Vec3, n: Vec3, d: Vec3
-) -> float:
-    if environment is None:
+    density: float = _environment_density(emitters(lights), d)
+    if density == 0.0:
         return 0.0
-    chance = pick_probability(lights, p, n, count(lights) - 1)
-    density: float = _environment_pdf(environment, d)
-    return density * chance
+    return density * pick_probability(lights, p, n, count(lights) - 1)
 
 
 @kernel

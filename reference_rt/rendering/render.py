@@ -9,18 +9,15 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from reference_rt.accel.block_query import tracer_of
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.integrators import Path, RayCast
+from reference_rt.integrators import INTEGRATORS, RayCast
 from reference_rt.integrators.path import PathSetup
-from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.jit.function_pointer import pointer_to
-from reference_rt.jit.kernel import signature_of
-from reference_rt.jit.parallel_compile import Call, precompile_all
+from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
+from reference_rt.rendering.kernels import Job, Running
 from reference_rt.rendering.tiles import aov_tile, first_hits_tile, render_tile
 from reference_rt.scene.build import BuiltScene, build_tables
 from reference_rt.scene.likely_mistakes import likely_mistakes
@@ -71,26 +68,20 @@ class Picture:
         return len(self.nonfinite_pixels)
 
 
-class _Job(NamedTuple):
-    """A kernel of `tiles`, its arguments except the last four (begin, end, first, last), and its
-    samples per pixel."""
-
-    kernel: Any
-    arguments: tuple[Any, ...]
-    spp: int
-
-
 def render(
     scene: BuiltScene,
     *,
     threads: int | None = None,
     tables: SceneTables | None = None,
     progress: Progress | None = None,
+    specialised: bool | None = None,
 ) -> Picture:
     """Render a scene.
 
     threads: default all cores; their number changes no bit.  tables: the scene's tables, if they
-    are built already.  progress: called as the render goes on.  Ctrl-C stops it within a tile.
+    are built already.  progress: called as the render goes on.  specialised: whether kernels are
+    compiled for this kind of scene, for the highest speed, or linked; None: see `kernels`; no bit
+    changes.  Ctrl-C stops it within a tile.
     Raises SceneError; issues a SceneWarning for each of `likely_mistakes`.
     """
     say = progress or (lambda what, fraction: None)
@@ -100,59 +91,43 @@ def render(
     clock.append(time.perf_counter())
     for mistake in likely_mistakes(scene, tables):
         scene.warn(mistake.message, *mistake.path)
-    integrator = scene.integrator
-    tables, tracer = with_tracer(tables, integrator)
+    film, integrator = scene.film, scene.integrator
     if isinstance(integrator, RayCast):
-        shown, (jobs, layers) = integrator.show, _aov_jobs(scene, tables)
+        shown, (jobs, layers) = integrator.show, _aov_jobs(scene)
     else:
-        shown, (jobs, layers) = "colour", _render_jobs(scene, integrator.setup(), tables)
-    say("compile", 0.0)
+        shown, (jobs, layers) = "colour", _render_jobs(scene, integrator)
+    view = scene.camera.setup(film.width, film.height)
     threads = threads or os.cpu_count() or 1
-    calls = [(job.kernel, signature_of(*job.arguments, 0, 0, 0, 0)) for job in jobs]
-    kernels = compile_tile_kernels(calls, tables, tracer, threads)
+
+    def say_compiled(done: int, total: int) -> None:
+        say("compile", done / total)
+
+    running = Running(jobs, tables, view, film.filter.setup(), threads, say_compiled, specialised)
     say("compile", 1.0)
     clock.append(time.perf_counter())
-    pixels = scene.film.width * scene.film.height
-    for k, (kernel, job) in enumerate(zip(kernels, jobs, strict=True)):
+    pixels = film.width * film.height
+    with running:
+        for k, job in enumerate(jobs):
 
-        def say_part(what: str, fraction: float, k: int = k) -> None:
-            say(what, (k + fraction) / len(jobs))
+            def say_part(what: str, fraction: float, k: int = k) -> None:
+                say(what, (k + fraction) / len(jobs))
+                running.progress((k + fraction) / len(jobs))
 
-        run_tiles(kernel, job.arguments, pixels, job.spp, threads, say_part)
+            run_tiles(running.run(k), (), pixels, job.spp, threads, say_part)
     clock.append(time.perf_counter())
     seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
     return Picture(layers, shown, seconds)
 
 
-def with_tracer(tables: SceneTables, integrator: Any) -> tuple[SceneTables, Call | None]:
-    """The tables with a slot for the function pointer of the kernel that traces the rays of path
-    tracing, and that kernel's compile call; None if the kernel is inlined."""
-    tracer = tracer_of(tables.geometry) if isinstance(integrator, Path | PathSetup) else None
-    if tracer is not None:
-        geometry = tables.geometry._replace(tracer=np.zeros(1, np.intp))
-        tables = tables._replace(geometry=geometry)
-    return tables, tracer
-
-
-def compile_tile_kernels(
-    calls: Sequence[Call], tables: SceneTables, tracer: Call | None, threads: int
-) -> Sequence[Callable[..., Any]]:
-    """Compile kernels, in parallel with the tracer; write the tracer's function pointer into the
-    tables.  The kernels, ready to be called."""
-    if tracer is None:
-        return precompile_all(calls, threads)
-    *kernels, _ = precompile_all([*calls, tracer], threads)
-    address: Any = tables.geometry.tracer
-    address[0] = pointer_to(*tracer)
-    return kernels
-
-
-def _aov_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict[str, FloatArray]]:
+def _aov_jobs(scene: BuiltScene) -> tuple[list[Job], dict[str, FloatArray]]:
     """The AOV pass (one ray through each pixel's centre), and the layers that it writes."""
     film = scene.film
     out = np.zeros((film.height, film.width, 10))
-    view = scene.camera.setup(film.width, film.height)
-    job = _Job(aov_tile, (tables, view, (film.width, film.height), out.reshape(-1, 10)), 1)
+    shape, rows = (film.width, film.height), out.reshape(-1, 10)
+
+    def arguments(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
+        return tables, view, shape, rows
+
     layers = {
         "colour": out[..., 0:3],
         "distance": out[..., 3],
@@ -160,33 +135,60 @@ def _aov_jobs(scene: BuiltScene, tables: SceneTables) -> tuple[list[_Job], dict[
         "id": out[..., 7],
         "uv": out[..., 8:10],
     }
-    return [job], layers
+    return [Job(aov_tile, "ray_cast", 1, arguments)], layers
 
 
-def _render_jobs(
-    scene: BuiltScene, integrator: Any, tables: SceneTables
-) -> tuple[list[_Job], dict[str, FloatArray]]:
+def _render_jobs(scene: BuiltScene, integrator: Any) -> tuple[list[Job], dict[str, FloatArray]]:
     """The jobs that compute the picture and the film's layers, and these layers."""
     film, sampler = scene.film, scene.resolved_sampler
     shape, spp = (film.width, film.height), sampler.spp
     out = np.zeros((film.height, film.width, 3))
     variance = np.zeros_like(out) if "variance" in film.layers else None
-    rows = None if variance is None else variance.reshape(-1, 3)
-    view = scene.camera.setup(*shape)
-    setups = (tables, view, film.filter.setup(), sampler.setup(), shape, spp)
-    arguments = (integrator, *setups, out.reshape(-1, 3), rows)
-    jobs, layers = [_Job(render_tile, arguments, spp)], {"colour": out}
+    jobs, layers = [radiance_job(integrator.setup(), sampler, shape, out, variance)], {"colour": out}
     if variance is not None:
         layers["variance"] = variance
     if {"albedo", "normal"} & set(film.layers):
         layers |= {"albedo": np.zeros_like(out), "normal": np.zeros_like(out)}
         hits = [layers[name].reshape(-1, 3) for name in ("albedo", "normal")]
-        jobs.append(_Job(first_hits_tile, (*setups, *hits), spp))
+        random_numbers = sampler.setup()
+
+        def arguments(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
+            return tables, view, film_filter, random_numbers, shape, spp, *hits
+
+        jobs.append(Job(first_hits_tile, "first_hits", spp, arguments))
     if {"depth", "id"} & set(film.layers):
-        centres, cast = _aov_jobs(scene, tables)
+        centres, cast = _aov_jobs(scene)
         jobs += centres
         layers |= {"depth": cast["distance"], "id": cast["id"]}
     return jobs, {name: layers[name] for name in ("colour", *film.layers)}
+
+
+_NONE = np.zeros((0, 3))
+
+
+def radiance_job(
+    setup: Any,
+    sampler: Any,
+    shape: tuple[int, int],
+    out: FloatArray,
+    variance: FloatArray | None,
+) -> Job:
+    """Radiance by the `setup()` of an integrator, into out (height, width, 3), and its variance
+    likewise."""
+    random_numbers = sampler.setup()
+    rows, squares = (None if a is None else a.reshape(-1, 3) for a in (out, variance))
+
+    def arguments(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
+        own, of_squares = setup, squares
+        if isinstance(tables, LinkedScene):  # of one type for all scenes
+            own = setup.linked() if isinstance(setup, PathSetup) else setup
+            of_squares = _NONE if squares is None else squares
+        return (
+            *(own, tables, view, film_filter, random_numbers, shape, sampler.spp),
+            *(rows, of_squares),
+        )
+
+    return Job(render_tile, INTEGRATORS[type(setup)], sampler.spp, arguments)
 
 
 def _check(scene: BuiltScene) -> None:

@@ -8,7 +8,7 @@ import math
 from typing import Any, NamedTuple
 
 from reference_rt import sampling
-from reference_rt.accel.geometry import closest_hit, surface
+from reference_rt.accel.geometry import closest_hit
 from reference_rt.cameras import LENS_CENTRE, VIEWS, camera_ray, lens_sample
 from reference_rt.cameras.filters import film_offset
 from reference_rt.core.arrays import FloatArray
@@ -25,10 +25,11 @@ from reference_rt.core.ray_block import (
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.integrators import radiances
 from reference_rt.integrators.ray_cast import cast
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import SceneTables, surface
 from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.integrators.shading import texture_place
 from reference_rt.jit.kernel import ByClass, entry_kernel, kernel, local_floats, local_integers
+from reference_rt.jit.links import Link
 from reference_rt.materials import scratch_floats
 from reference_rt.sampling import (
     PAIR_FLOATS,
@@ -77,7 +78,34 @@ def _camera_film_ray(
     return FilmRay(ray, weight_x * weight_y)
 
 
+class LinkedView(NamedTuple):
+    """A camera's view behind a link;  has_lens: whether lens points are drawn;  given: the rays in
+    place of a camera's, of length 0 for a camera."""
+
+    link: Link
+    has_lens: int
+    given: GivenRays
+
+
+@kernel
+def _linked_film_ray(
+    view: LinkedView, film_filter: Link, sampler: Any, shape: tuple[int, int], x: int, y: int
+) -> FilmRay:
+    if len(view.given.o) > 0:
+        return _given_ray(view.given, None, sampler, shape, x, y)
+    width, height = shape
+    u0, u1 = draw_pair(sampler, sampling.FILM)
+    dx, weight_x = film_offset(film_filter, u0)
+    dy, weight_y = film_offset(film_filter, u1)
+    lens = LENS_CENTRE
+    if view.has_lens != 0:
+        lens = draw_pair(sampler, sampling.LENS)
+    ray = camera_ray(view.link, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
+    return FilmRay(ray, weight_x * weight_y)
+
+
 _film_rays = ByClass("film_ray")
+_film_rays.register(LinkedView, _linked_film_ray)
 _film_rays.register(GivenRays, _given_ray)
 for _view in VIEWS:
     _film_rays.register(_view, _camera_film_ray)
@@ -154,6 +182,8 @@ def _add_to_m2(m2: FloatArray | None, pixel: int, sample: int, one: Vec3, total:
     that nothing cancels."""
     if m2 is None:
         return
+    if len(m2) == 0:
+        return
     if sample > 0:
         count = sample + 1.0
         off = one * count - total
@@ -167,6 +197,8 @@ def _add_to_m2(m2: FloatArray | None, pixel: int, sample: int, one: Vec3, total:
 def _m2_to_variance(m2: FloatArray | None, pixel: int, spp: int) -> None:
     """Turn M2 into the variance of the mean of spp samples; a single sample has no estimate."""
     if m2 is None:
+        return
+    if len(m2) == 0:
         return
     if spp < 2:
         return
@@ -200,7 +232,7 @@ def first_hits_tile(
             seen = _film_ray(view, film_filter, sampler, shape, x, y)
             hit = closest_hit(scene.geometry, seen.ray)
             if hit.kind >= 0:
-                point = surface(scene.geometry, seen.ray, hit)
+                point = surface(scene, seen.ray, hit)
                 at = texture_place(scene.textures, scene.geometry, seen.ray, hit)
                 own = colour_at(scene.materials.shown, point.material, at)
                 albedo = albedo + own * seen.weight
@@ -209,6 +241,23 @@ def first_hits_tile(
             albedo, normal = albedo / spp, normal / spp
         albedos[pixel, 0], albedos[pixel, 1], albedos[pixel, 2] = albedo
         normals[pixel, 0], normals[pixel, 1], normals[pixel, 2] = normal
+
+
+@kernel
+def _itself(view: Any) -> Any:
+    return view
+
+
+@kernel
+def _linked_view(view: LinkedView) -> Link:
+    return view.link
+
+
+_views = ByClass("view_of")
+_views.register(LinkedView, _linked_view)
+for _view in VIEWS:
+    _views.register(_view, _itself)
+_view_of = _views.function
 
 
 @entry_kernel
@@ -227,7 +276,7 @@ def aov_tile(
     width, height = shape
     for pixel in range(begin, end):
         y, x = pixel // width, pixel % width
-        ray = camera_ray(view, (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
+        ray = camera_ray(_view_of(view), (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
         found = cast(scene, ray)
         out[pixel, 0], out[pixel, 1], out[pixel, 2] = found.colour
         out[pixel, 3] = found.distance

@@ -69,7 +69,7 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
         uses_u_lobe=uses_u_lobe if uses_u_lobe.any() else None,
         behind=behind if behind.any() else None,
         shown=join(shown),
-        oriented=np.zeros(1, np.int64) if oriented else None,
+        oriented=np.ones(1, np.int64) if oriented else None,
         asks=asks if asks.any() and not asks.all() else None,
         textured=textured_table(materials, palette),
         flat_leaves=flat_leaves.tables(),

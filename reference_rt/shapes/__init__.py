@@ -32,6 +32,8 @@ from reference_rt.shapes.curved.quadric import Quadric
 from reference_rt.shapes.curved.sphere import Sphere
 from reference_rt.shapes.curved.torus import Torus
 from reference_rt.shapes.dispatch import (
+    colour,
+    enters,
     face,
     intersect,
     middle,

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 from reference_rt.core.ray import Ray
 from reference_rt.jit.kernel import kernel
-from reference_rt.shapes.curved.quadrics import Quadrics, crossings
 from reference_rt.shapes.dispatch import intersect, spans
 from reference_rt.shapes.meshes.watertight import Shear
 from reference_rt.shapes.shape import Spans, no_spans, one_span
@@ -29,16 +28,14 @@ def along(shapes: Shapes, kind: int, i: int, ray: Ray, shear: Shear) -> Along:
     if kind in (SPHERE, BOX, TORUS):
         return Along(spans(shapes, kind, i, ray), 0.0)
     if kind == QUADRIC:
-        return Along(_of_quadric(shapes.quadrics, i, ray), 0.0)
+        return Along(_of_quadric(shapes, kind, i, ray), 0.0)
     found = intersect(shapes, kind, i, ray, shear)
     return Along(one_span(found.t, found.u, math.inf, 0.0), found.v)
 
 
-@kernel
-def _of_quadric(quadrics: Quadrics | None, i: int, ray: Ray) -> Spans:
-    if quadrics is None:
-        return no_spans()
-    return crossings(quadrics, i, ray)
+@by_code("crossings")
+def _of_quadric(shapes: Shapes, kind: int, i: int, ray: Ray) -> Spans:
+    return no_spans()
 
 
 @kernel

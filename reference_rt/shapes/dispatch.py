@@ -47,6 +47,19 @@ def face(shapes: Shapes, hit: Hit) -> int:
     return 0
 
 
+@by_code("colour", code="hit.kind")
+def colour(shapes: Shapes, hit: Hit, without: Vec3) -> Vec3:
+    """The interpolated vertex colour of a mesh; `without` for hits that have none."""
+    return without
+
+
+@by_code("enters")
+def enters(shapes: Shapes, kind: int, i: int, shear: Shear) -> int:
+    """+1 if the ray comes to a triangle from the front, -1 if it comes from behind, 0 for a
+    miss."""
+    return 0
+
+
 @kernel
 def _owner_of_row(table: Any, i: int) -> int:
     return int(table.owner[i])

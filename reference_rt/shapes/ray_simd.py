@@ -118,6 +118,13 @@ def _begin(rays: FloatArray, at: int, t: FloatArray, codes: IntArray) -> None:
     t[:], codes[:] = rays[6 * BLOCK + at : 6 * BLOCK + at + VECTOR_WIDTH], -1
 
 
+def _resume(
+    from_t: FloatArray, from_codes: IntArray, at: int, t: FloatArray, codes: IntArray
+) -> None:
+    """Load the results so far of VECTOR_WIDTH rays from number `at` on."""
+    t[:], codes[:] = from_t[at : at + VECTOR_WIDTH], from_codes[at : at + VECTOR_WIDTH]
+
+
 def _end(t: FloatArray, codes: IntArray, at: int, to: FloatArray, to_codes: IntArray) -> None:
     """Store t and codes of VECTOR_WIDTH rays to the results of the rays from number `at` on."""
     to[at : at + VECTOR_WIDTH], to_codes[at : at + VECTOR_WIDTH] = t, codes
@@ -135,6 +142,20 @@ def _begin_lanes(typing_context: Any, rays: Any, at: Any, t: Any, codes: Any) ->
 
 
 @intrinsic  # type: ignore[untyped-decorator]
+def _resume_lanes(
+    typing_context: Any, from_t: Any, from_codes: Any, at: Any, t: Any, codes: Any
+) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        writer = _Writer(context, builder)
+        found = writer.load(from_t, values[0], F64_VECTOR, values[2])
+        writer.store(t, values[3], found)
+        writer.store(codes, values[4], writer.load(from_codes, values[1], _WORDS, values[2]))
+        return context.get_dummy_value()
+
+    return types.void(from_t, from_codes, types.int64, t, codes), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
 def _end_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_codes: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         writer = _Writer(context, builder)
@@ -146,4 +167,5 @@ def _end_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_cod
 
 
 begin: Callable[..., None] = _begin if numba.config.DISABLE_JIT else _begin_lanes
+resume: Callable[..., None] = _resume if numba.config.DISABLE_JIT else _resume_lanes
 end: Callable[..., None] = _end if numba.config.DISABLE_JIT else _end_lanes

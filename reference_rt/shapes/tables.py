@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass
+from reference_rt.jit.links import LINK, declare
 from reference_rt.shapes import box
 from reference_rt.shapes.box import Box, Boxes
 from reference_rt.shapes.curved import quadrics, sphere, torus
@@ -74,6 +75,8 @@ TABLES: tuple[tuple[int, str, type, Any], ...] = (
 )
 """(code, field of Shapes, table, module with its kernels), in the order of the codes."""
 
+
+declare(Shapes, LINK)
 
 by_code = ByCode((code, field, module) for code, field, _, module in TABLES)
 """Decorates kernels that choose among the shapes; see `jit/by_code.py`."""

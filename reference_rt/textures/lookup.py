@@ -1,11 +1,12 @@
 """Texture lookup: the colour of a texture at a place of a surface."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.links import LINK, Link, Linkable, declare, type_of
 from reference_rt.textures import bitmap, checker, vertex_colours
 from reference_rt.textures.bitmap import Bitmaps
 from reference_rt.textures.checker import Checkers
@@ -30,6 +31,14 @@ class CachedLookups(NamedTuple):
     all n textures that its material uses."""
 
     values: FloatArray
+
+
+# Operations on a link get textures as a link, and places for BSDFs with cached lookups.
+declare(Textures | None, LINK)
+declare(Textures | CachedLookups | None, type_of(CachedLookups))
+
+_textures = Linkable("textures")
+textures_operations = _textures.operations
 
 
 class At(NamedTuple):
@@ -86,17 +95,24 @@ def _looked(looked: CachedLookups, k: int, at: At) -> Vec3:
     return Vec3(values[3 * k], values[3 * k + 1], values[3 * k + 2])
 
 
-@kernel
-def _ask(textures: Textures, k: int, at: At) -> Vec3:
+@_textures.operation
+def evaluate(textures: Textures, k: int, u: float, v: float, colour: Vec3) -> Vec3:
+    """The colour of texture k at surface coordinates u, v."""
     kind, i = textures.kind[k], textures.row[k]
-    u, v = map_uv(textures.uv, k, at.u, at.v)
-    return _lookup_in_table(textures, kind, i, u, v, at.colour)
+    u, v = map_uv(textures.uv, k, u, v)
+    return _lookup_in_table(textures, kind, i, u, v, colour)
+
+
+@kernel
+def _ask(textures: Any, k: int, at: At) -> Vec3:
+    return evaluate(textures, k, at.u, at.v, at.colour)
 
 
 _choice = ByClass("lookup")
 _choice.register(type(None), _no_colour)
 _choice.register(CachedLookups, _looked)
 _choice.register(Textures, _ask)
+_choice.register(Link, _ask)
 _lookup = _choice.function
 
 
@@ -113,18 +129,25 @@ def _flat(textures: None, k: int, at: At) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-@kernel
-def _gradient(textures: Textures, k: int, at: At) -> tuple[float, float]:
+@_textures.operation
+def gradient(textures: Textures, k: int, u: float, v: float) -> tuple[float, float]:
+    """The derivatives of texture k's luminance by u and v."""
     kind, i = textures.kind[k], textures.row[k]
     if kind != BITMAP:
         return 0.0, 0.0
     m = textures.uv[k]
-    u, v = map_uv(textures.uv, k, at.u, at.v)
+    u, v = map_uv(textures.uv, k, u, v)
     along_u, along_v = _gradient_in_table(textures, kind, i, u, v)
     return m[0] * along_u + m[3] * along_v, m[1] * along_u + m[4] * along_v
+
+
+@kernel
+def _gradient(textures: Any, k: int, at: At) -> tuple[float, float]:
+    return gradient(textures, k, at.u, at.v)
 
 
 _by_class = ByClass("lookup_gradient")
 _by_class.register(type(None), _flat)
 _by_class.register(Textures, _gradient)
+_by_class.register(Link, _gradient)
 _slopes = _by_class.function

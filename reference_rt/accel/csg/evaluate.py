@@ -88,9 +88,9 @@ def _begin(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, w
     walk.passed[k] = 0
     if solids.row[o] < 0:
         _store_mesh_crossing(
-            walk, k, next_mesh_crossing(shapes.triangles, bvh, solids.root[o], ray, 0.0, -1)
+            walk, k, next_mesh_crossing(shapes, bvh, solids.root[o], ray, 0.0, -1)
         )
-        walk.state[k] = winding(shapes.triangles, bvh, solids.root[o], ray)
+        walk.state[k] = winding(shapes, bvh, solids.root[o], ray)
         return
     spans = any_shape.spans(shapes, solids.kind[o], solids.row[o], ray)
     j = CROSSINGS * k
@@ -121,7 +121,7 @@ def _pass(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, wa
     if solids.row[o] < 0:
         walk.state[k] += walk.sign[k]
         t, row = walk.t[CROSSINGS * k], walk.row[k]
-        step = next_mesh_crossing(shapes.triangles, bvh, solids.root[o], ray, t, row)
+        step = next_mesh_crossing(shapes, bvh, solids.root[o], ray, t, row)
         _store_mesh_crossing(walk, k, step)
     else:
         walk.passed[k] += 1

@@ -9,6 +9,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import kernel
+from reference_rt.jit.links import is_absent
 from reference_rt.lights.light import NO_LIGHT, LightSample
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import LightPoint
@@ -67,6 +68,8 @@ def _texture_coordinates(
     """The texture coordinates at a point q of light i."""
     none = Vec3(-1.0, -1.0, -1.0)
     if textures is None:
+        return At(textures, 0.0, 0.0, none)
+    if is_absent(textures):
         return At(textures, 0.0, 0.0, none)
     hit = Hit(1.0, areas.kind[i], areas.row[i], q.u, q.v, -1)
     u, v = any_shape.uv(shapes, Ray(p, w, math.inf), hit)

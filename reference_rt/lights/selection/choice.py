@@ -62,9 +62,11 @@ def _by_power(cumulative: FloatArray | None, choice: LightSampler, u: float) -> 
 @kernel
 def probability(choice: LightSampler, tree: LightTree | None, p: Vec3, n: Vec3, k: int) -> float:
     """The probability that `pick` returns light k."""
+    if len(choice.kind) == 0:
+        return 0.0
     if tree is None:
         return _power_of(choice.cumulative, choice, k)
-    if choice.bounded[0] > 0.0 and tree.leaf[k] >= 0:
+    if choice.bounded[0] > 0.0 and light_tree.holds(tree, k):
         return light_tree.probability(tree, p, n, k) * float(choice.bounded[0])
     return _power_of(choice.cumulative, choice, k)
 

@@ -13,6 +13,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.core.vec3 import Vec3, cross, dot, length
 from reference_rt.jit.kernel import kernel
+from reference_rt.jit.links import Linkable
 
 SLACK = 2.0**-40
 """Added to angles, radii (relative) and cosines, whose errors are a few dozen u = 2^-53, so that
@@ -106,7 +107,17 @@ def child_probabilities(tree: LightTree, i: int, p: Vec3, n: Vec3) -> tuple[floa
     return left / total, right / total
 
 
-@kernel
+light_trees = Linkable("light trees")
+"""The operations on a light tree, or on a link to one."""
+
+
+@light_trees.operation
+def holds(tree: LightTree, k: int) -> bool:
+    """Whether light k is in the tree."""
+    return bool(tree.leaf[k] >= 0)
+
+
+@light_trees.operation
 def pick(tree: LightTree, p: Vec3, n: Vec3, u: float) -> Pick:
     """A light for a surface at `p`;  n: its unit normal on the side that light may come from, 0 for
     both sides.  `u` is rescaled and used again at each step."""
@@ -127,7 +138,7 @@ def pick(tree: LightTree, p: Vec3, n: Vec3, u: float) -> Pick:
     return Pick(tree.light[i], probability)
 
 
-@kernel
+@light_trees.operation
 def probability(tree: LightTree, p: Vec3, n: Vec3, k: int) -> float:
     """The probability that `pick` returns light k: the product of the same factors, to the last
     bit."""

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel
+from reference_rt.jit.links import LINK, declare
 from reference_rt.materials.bsdfs import (
     conductor,
     dielectric,
@@ -95,6 +96,8 @@ TABLES: tuple[tuple[int, str, type[Material], type, Any], ...] = (
 )
 """(code, field of Leaves, description, table, module with its kernels)."""
 
+
+declare(Leaves, LINK)
 
 by_code = ByCode((code, field, module) for code, field, _, _, module in TABLES)
 

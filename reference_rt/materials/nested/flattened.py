@@ -12,6 +12,7 @@ import numpy as np
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.vec3 import Frame, Vec3, to_local, to_world
 from reference_rt.jit.kernel import kernel
+from reference_rt.jit.links import Linkable, is_absent
 from reference_rt.materials.material import Material
 from reference_rt.materials.nested import bump, normal_map
 from reference_rt.materials.nested.bump import Bumps
@@ -27,7 +28,7 @@ from reference_rt.materials.nested.paths import (
 )
 from reference_rt.materials.shading import Shading
 from reference_rt.shapes.shape import Tangents
-from reference_rt.textures import At, Numbers, Palette, number_at
+from reference_rt.textures import At, Numbers, Palette, Textures, number_at
 from reference_rt.textures.parameter import join
 
 
@@ -126,11 +127,22 @@ SIZE = 11
 """Floats of a flattened leaf in the scratch buffer: weight, s, t and n of the basis, side."""
 
 
+flattened_materials = Linkable("flattened materials")
+"""The operations on `FlattenedMaterials`, here and in `materials.dispatch`."""
+
+
 @kernel
 def most(flat_leaves: FlattenedMaterials | None) -> int:
     """The largest number of flattened leaves of any material."""
     if flat_leaves is None:
         return 0
+    if is_absent(flat_leaves):
+        return 0
+    return _most(flat_leaves)
+
+
+@flattened_materials.operation
+def _most(flat_leaves: FlattenedMaterials) -> int:
     found = 0
     for m in range(len(flat_leaves.number)):
         found = max(found, flat_leaves.number[m])
@@ -146,6 +158,21 @@ def prepare(flat_leaves: FlattenedMaterials | None, shading: Shading, at: At) ->
     """
     if flat_leaves is None:
         return
+    if is_absent(flat_leaves):
+        return
+    _prepare(flat_leaves, shading, at.textures, at.u, at.v, at.colour)
+
+
+@flattened_materials.operation
+def _prepare(
+    flat_leaves: FlattenedMaterials,
+    shading: Shading,
+    textures: Textures | None,
+    u: float,
+    v: float,
+    colour: Vec3,
+) -> None:
+    at = At(textures, u, v, colour)
     m = shading.point.material
     for k in range(flat_leaves.number[m]):
         found = _leaf_at_hit(flat_leaves, flat_leaves.first[m] + k, shading, at)

@@ -13,10 +13,11 @@ from reference_rt.core.vec3 import row
 from reference_rt.integrators import AnyIntegrator, Path, RayCast
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.jit.kernel import entry_kernel, signature_of
+from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
-from reference_rt.rendering.render import compile_tile_kernels, run_tiles, with_tracer
-from reference_rt.rendering.tiles import GivenRays, render_tile
+from reference_rt.rendering.kernels import Running
+from reference_rt.rendering.render import radiance_job, run_tiles
+from reference_rt.rendering.tiles import GivenRays
 from reference_rt.sampling import Independent
 from reference_rt.scene.build import BuiltScene
 
@@ -136,14 +137,9 @@ def estimate(
     mean, variance = np.zeros((n, 3)), np.zeros((n, 3))
     threads = threads or os.cpu_count() or 1
     if n > 0:
-        tables, tracer = with_tracer(tables, setup)
-        arguments = (
-            *(setup, tables, GivenRays(o, d), None, sampler.setup(), (n, 1), spp),
-            *(mean, variance),
-        )
-        call = render_tile, signature_of(*arguments, 0, 0, 0, 0)
-        (kernel,) = compile_tile_kernels([call], tables, tracer, threads)
-        run_tiles(kernel, arguments, n, spp, threads, lambda what, fraction: None)
+        job = radiance_job(setup, sampler, (n, 1), mean, variance)
+        with Running([job], tables, GivenRays(o, d), None, threads) as running:
+            run_tiles(running.run(0), (), n, spp, threads, _silent)
     if spp == 1:
         variance[:] = math.inf
     mean[~valid], variance[~valid] = 0.0, 0.0

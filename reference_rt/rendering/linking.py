@@ -1,0 +1,220 @@
+"""The links of a scene: which operations a kernel needs, on which of the scene's tables."""
+
+from typing import Any
+
+import numpy as np
+
+from reference_rt.accel.geometry import Geometry, geometries
+from reference_rt.cameras import views
+from reference_rt.cameras.filters import film_filters
+from reference_rt.cameras.thin_lens import ThinLensView
+from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
+from reference_rt.jit.links import Link, Linker
+from reference_rt.lights import LinkedLights, Lights, LightSampler
+from reference_rt.lights import dispatch as light_dispatch
+from reference_rt.lights.selection.tree import light_trees
+from reference_rt.materials import Materials
+from reference_rt.materials.bsdfs import tables as bsdfs
+from reference_rt.materials.nested.flattened import flattened_materials
+from reference_rt.materials.textured import Textured
+from reference_rt.rendering.tiles import GivenRays, LinkedView
+from reference_rt.shapes import TABLES as SHAPES
+from reference_rt.shapes import Packets
+from reference_rt.shapes import tables as shape_tables
+from reference_rt.textures.lookup import textures_operations
+from reference_rt.textures.parameter import Colours, Numbers
+
+_NO_INTEGERS = np.zeros(0, np.int64)
+_NO_FLOATS = np.zeros(0)
+
+
+def linked_view(linker: Linker, view: Any) -> LinkedView:
+    """A camera's view, or `GivenRays`, behind a link."""
+    if isinstance(view, GivenRays):
+        return LinkedView(Link(0), 0, view)
+    link = linker.link(views.operations, views.operations, {0: view})
+    nothing: Any = np.zeros((0, 3))
+    return LinkedView(link, int(isinstance(view, ThinLensView)), GivenRays(nothing, nothing))
+
+
+def linked_filter(linker: Linker, setup: Any) -> Link:
+    """A filter's setup behind a link; None has a link to nothing."""
+    if setup is None:
+        return Link(0)
+    return linker.link(film_filters.operations, film_filters.operations, {0: setup})
+
+
+def linked_scene(linker: Linker, tables: SceneTables, integrator: str) -> LinkedScene:
+    """A scene behind links.  integrator: `path`, `direct`, `whitted`, `first_hits` or `ray_cast`:
+    whose kernel takes it."""
+    geometry, materials, lights = tables.geometry, tables.materials, tables.lights
+    is_textured, is_oriented = tables.textures is not None, materials.oriented is not None
+    textures = _textures(linker, tables)
+    shapes = _shapes(linker, tables, integrator)
+    return LinkedScene(
+        geometry=_geometry(linker, geometry, shapes, integrator, is_textured, is_oriented),
+        shapes=shapes,
+        is_placed=int(geometry.parts is not None or geometry.instances is not None),
+        materials=_materials(linker, materials, integrator, is_textured),
+        lights=_lights(linker, lights, integrator),
+        textures=textures,
+    )
+
+
+def _textures(linker: Linker, tables: SceneTables) -> Link:
+    if tables.textures is None:
+        return Link(0)
+    return linker.link(textures_operations, textures_operations, {0: tables.textures})
+
+
+def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
+    geometry = tables.geometry
+    blocks = integrator == "path"
+    wanted = {"surface"}
+    if geometry.bvh is None:
+        wanted |= {"nearest_of_block", "complete_block"} if blocks else {"nearest_of_type"}
+    else:
+        wanted |= {"intersect", "owner", "face"}
+    if geometry.parts is not None:
+        wanted |= {"owner"}
+    if geometry.solids is not None:
+        wanted |= {"spans", "enters", "intersect"}
+    if tables.textures is not None or integrator == "ray_cast":
+        wanted |= {"uv", "colour"}
+    if integrator == "ray_cast":
+        wanted |= {"owner", "face"}
+    if tables.materials.oriented is not None:
+        wanted |= {"tangents"}
+    found = {
+        code: table
+        for code, field, _, _ in SHAPES
+        if (table := getattr(geometry.shapes, field)) is not None
+    }
+    if tables.lights.areas is not None:
+        wanted |= {"whitted": {"middle", "sample"}, "ray_cast": set(), "first_hits": set()}.get(
+            integrator, {"sample", "pdf"}
+        )
+    return linker.link(
+        shape_tables.by_code.operations,
+        wanted,
+        found,
+    )
+
+
+def _geometry(
+    linker: Linker,
+    geometry: Geometry,
+    shapes: Link,
+    integrator: str,
+    is_textured: bool,
+    is_oriented: bool,
+) -> Link:
+    wanted = {"closest_hits", "any_hits"} if integrator == "path" else {"closest_hit"}
+    if integrator in ("direct", "whitted"):
+        wanted |= {"occluded"}
+    if integrator == "ray_cast":
+        wanted |= {"owner"}
+    if geometry.parts is not None or geometry.instances is not None:
+        wanted |= {"surface"}
+    if is_textured:
+        wanted |= {"coordinates"}
+    if is_oriented:
+        wanted |= {"tangents"}
+    nothing: Any = np.zeros((0, 1, 8))
+    packets = Packets(*(nothing if p is None else p for p in geometry.packets))
+    table = geometry._replace(shapes=shapes, packets=packets, tracer=None)
+    return linker.link(
+        geometries.operations,
+        wanted,
+        {0: table},
+    )
+
+
+def _present(array: Any, n: int, value: int) -> Any:
+    return np.full(n, value, np.int64) if array is None else array
+
+
+def _always_textured(table: Any) -> Any:
+    """A table whose columns of parameters all have `texture`."""
+    if not isinstance(table, tuple):
+        return table
+    if isinstance(table, Colours | Numbers):
+        return table._replace(texture=_present(table.texture, len(table.value), -1))
+    return type(table)(*(_always_textured(part) for part in table))
+
+
+def _materials(
+    linker: Linker, materials: Materials, integrator: str, is_textured: bool
+) -> Materials:
+    n = len(materials.shown.value)
+    tables = {
+        code: _always_textured(table)
+        for code, field, _, _, _ in bsdfs.TABLES
+        if (table := getattr(materials.leaves, field)) is not None
+    }
+    wanted = {
+        "path": {"eval_pdf", "sample", "branches"},
+        "direct": {"eval_pdf", "sample", "branches"},
+        "whitted": {"eval_pdf", "branches", "ambient"},
+    }.get(integrator, set())
+    leaves = linker.link(bsdfs.by_code.operations, wanted, tables)
+    flat = Link(0)
+    if materials.flat_leaves is not None and wanted:
+        nested = {
+            "path": {"_eval_pdf_nested", "_sample_nested"},
+            "direct": {"_eval_pdf_nested", "_sample_nested"},
+            "whitted": {"_eval_pdf_nested", "_branches_nested", "_ambient_nested", "_number"},
+        }[integrator] | {"_most", "_prepare"}
+        flat = linker.link(
+            flattened_materials.operations,
+            nested,
+            {0: _always_textured(materials.flat_leaves)},
+        )
+    only = [code for code in tables]
+    kind = materials.kind if materials.kind is not None else np.full(n, only[0] if only else -1)
+    row = materials.row if materials.row is not None else np.arange(n)
+    textured = materials.textured
+    if textured is None:
+        textured = Textured(np.zeros(n, np.int64), np.zeros(n, np.int64), _NO_INTEGERS, 0)
+    return Materials(
+        kind=kind,
+        row=row,
+        smooth=_present(materials.smooth, n, 1),
+        uses_u_lobe=_present(materials.uses_u_lobe, n, 0),
+        behind=_present(materials.behind, n, 0),
+        shown=_always_textured(materials.shown),
+        oriented=np.array([int(materials.oriented is not None)]),
+        asks=_present(materials.asks, n, int(is_textured)),
+        textured=textured,
+        flat_leaves=flat,
+        leaves=leaves,
+    )
+
+
+def _lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLights:
+    wanted = {
+        "path": {"_background", "_environment_density", "_emitted", "_area_density", "_sample"},
+        "direct": {"_background", "_environment_density", "_emitted", "_area_density", "_sample"},
+        "whitted": {"_background", "_emitted", "_middle", "_sample"},
+    }.get(integrator, set())
+    emitters = linker.link(
+        light_dispatch.by_code.operations,
+        wanted,
+        {
+            code: _always_textured(table)
+            for code, field in light_dispatch.CODES
+            if (table := getattr(lights, field)) is not None
+        },
+    )
+    choice = lights.choice
+    if choice is None:
+        choice = LightSampler(_NO_INTEGERS, _NO_INTEGERS, _NO_FLOATS, _NO_FLOATS, np.zeros(1))
+    if choice.cumulative is None:
+        choice = choice._replace(cumulative=np.ones(1))
+    tree = Link(0)
+    if lights.tree is None:
+        choice = choice._replace(bounded=np.zeros(1))
+    else:
+        tree = linker.link(light_trees.operations, light_trees.operations, {0: lights.tree})
+    ambient = np.zeros((1, 3)) if lights.ambient is None else lights.ambient
+    return LinkedLights(emitters, choice, tree, ambient)
