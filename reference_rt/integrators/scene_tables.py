@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from reference_rt import shapes as any_shape
 from reference_rt.accel.geometry import Geometry
 from reference_rt.accel.geometry import surface as surface_in_geometry
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
@@ -10,7 +11,6 @@ from reference_rt.jit.links import Link
 from reference_rt.lights import Lights, LinkedLights
 from reference_rt.materials import Materials
 from reference_rt.shapes import Shapes
-from reference_rt import shapes as any_shape
 from reference_rt.textures import Textures
 
 

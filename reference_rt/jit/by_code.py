@@ -35,7 +35,6 @@ from reference_rt.jit.links import STRIDE, Link, Operation, Row, executed, stop,
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-
 class ByCode:
     """rows: the code of each type, the field of its table, and the module that has its kernels, in
     the order in which codes are compared."""
@@ -166,4 +165,6 @@ def _linked(operation: Operation, tables: str, code: str, otherwise: Any) -> Cal
             return call(pointer, table, ({given}{comma}))
     return otherwise({tables}, {given})
 """
-    return executed(text, operation, call=operation.caller(), word=word, stop=stop, otherwise=otherwise)
+    return executed(
+        text, operation, call=operation.caller(), word=word, stop=stop, otherwise=otherwise
+    )

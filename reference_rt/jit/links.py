@@ -54,8 +54,7 @@ the type has none, or there is no table of the type."""
 
 
 class Link(NamedTuple):
-    """The address of a list of tables and operations; 0 for none, on which nothing may be called.
-    """
+    """The address of a list of tables and operations; 0 for none, on which nothing may be called."""
 
     address: int
 

@@ -2,6 +2,7 @@
 
 - `emitters/`: the types of lights, one file each;
 - `selection/`: the light sampler, by power or by a light tree;
+- `tables.py`: the tables of all types;
 - `dispatch.py`: the kernels that integrators call, for any light of a scene.
 
 Contract: all positions and directions are in the world; units are W sr^-1 m^-2 for radiance, scene
@@ -17,8 +18,8 @@ units for distances; colours are linear sRGB.  Lights that can be sampled are nu
 
 Shapes whose material is `emissive` are lights too (`emitters/area.py`).
 
-To add a light: a file in `emitters/`; a code in `light.py`; in `dispatch.py` a field of `Lights`
-and a line in `_by_code`; below, a member of `AnyLight` and a line in `TABLES`; a translator in
+To add a light: a file in `emitters/`; a code in `light.py`; in `tables.py` a field of `Lights`
+and a line in `TABLES`; below, a member of `AnyLight` and a line in `TABLES`; a translator in
 `comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.  Step by step:
 docs/extending.md.
 """
@@ -28,14 +29,10 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from reference_rt.lights.dispatch import (
-    LinkedLights,
-    Lights,
     ambient,
     area_pdf,
     background,
     count,
-    depends_on_normal,
-    depends_on_point,
     emitted,
     environment_pdf,
     is_area,
@@ -63,6 +60,12 @@ from reference_rt.lights.light import (
 )
 from reference_rt.lights.selection.choice import LightSampler
 from reference_rt.lights.selection.tree import Pick
+from reference_rt.lights.tables import (
+    Lights,
+    LinkedLights,
+    depends_on_normal,
+    depends_on_point,
+)
 
 AnyLight = Annotated[
     Point | Spot | Directional | Constant | EnvironmentMap | Ambient, Field(discriminator="type")

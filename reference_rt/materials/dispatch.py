@@ -8,19 +8,20 @@ weight and a frame (`nested/flattened.py`).
 from typing import NamedTuple
 
 from reference_rt.core.arrays import IntArray
-from reference_rt.core.vec3 import Vec3, to_local, to_world
+from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import is_absent
 from reference_rt.materials.bsdfs import tables as bsdf
 from reference_rt.materials.bsdfs.tables import Leaves
-from reference_rt.materials.material import NO_SAMPLE, Branches, BsdfSample, Scattered
+from reference_rt.materials.material import Branches, BsdfSample, Scattered
 from reference_rt.materials.nested import flattened
-from reference_rt.materials.nested.flattened import (
-    FlattenedLeaf,
-    FlattenedMaterials,
-    flattened_materials,
-    leaf_at,
-    scatters_from,
+from reference_rt.materials.nested.flattened import FlattenedMaterials
+from reference_rt.materials.nested.weighted_sum import (
+    ambient_nested,
+    branches_nested,
+    eval_pdf_nested,
+    leaf_count,
+    sample_nested,
 )
 from reference_rt.materials.shading import Shading
 from reference_rt.materials.textured import Textured, lookup_cache_size
@@ -141,29 +142,7 @@ def _eval_pdf(
     if is_absent(flat_leaves):
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.eval_pdf(materials.leaves, kind, i, shading.at, shading.wo, wi)
-    return _eval_pdf_nested(flat_leaves, materials.leaves, shading, wi)
-
-
-@flattened_materials.operation
-def _eval_pdf_nested(
-    flat_leaves: FlattenedMaterials, leaves: Leaves, shading: Shading, wi: Vec3
-) -> Scattered:
-    m = shading.point.material
-    value, density, total = Vec3(0.0, 0.0, 0.0), 0.0, 0.0
-    first = flat_leaves.first[m]
-    for k in range(flat_leaves.number[m]):
-        leaf = leaf_at(shading, k)
-        if leaf.weight > 0.0:
-            total += leaf.weight
-            wo_in, wi_in = to_local(leaf.basis, shading.wo), to_local(leaf.basis, wi)
-            kind, i = flat_leaves.kind[first + k], flat_leaves.row[first + k]
-            one = bsdf.eval_pdf(leaves, kind, i, shading.at, wo_in, wi_in)
-            if scatters_from(leaf, wi):
-                value = value + one.value * leaf.weight
-            elif flat_leaves.number[m] == 1:  # `sample` rejects such directions
-                continue
-            density += one.density * leaf.weight
-    return Scattered(value, density / total if total > 0.0 else 0.0)
+    return eval_pdf_nested(flat_leaves, materials.leaves, shading, wi)
 
 
 @kernel
@@ -190,56 +169,7 @@ def _sample(
     if is_absent(flat_leaves):
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
-    return _sample_nested(flat_leaves, materials.leaves, shading, u_lobe, u0, u1)
-
-
-@flattened_materials.operation
-def _sample_nested(
-    flat_leaves: FlattenedMaterials,
-    leaves: Leaves,
-    shading: Shading,
-    u_lobe: float,
-    u0: float,
-    u1: float,
-) -> BsdfSample:
-    m = shading.point.material
-    first, count = flat_leaves.first[m], flat_leaves.number[m]
-    total = 0.0
-    for k in range(count):
-        total += leaf_at(shading, k).weight
-    if not total > 0.0:
-        return NO_SAMPLE
-    # Choose a layer with probability weight / total; u_lobe, rescaled within the layer's interval,
-    # is the random number for the layer's own choice.
-    rest, chosen = u_lobe * total, 0
-    leaf = leaf_at(shading, 0)
-    while rest >= leaf.weight and chosen + 1 < count:
-        rest -= leaf.weight
-        chosen += 1
-        leaf = leaf_at(shading, chosen)
-    if not leaf.weight > 0.0:
-        return NO_SAMPLE
-    u_inner = min(rest / leaf.weight, 1.0 - 2.0**-53)
-    wo_in = to_local(leaf.basis, shading.wo)
-    kind, i = flat_leaves.kind[first + chosen], flat_leaves.row[first + chosen]
-    drawn = bsdf.sample(leaves, kind, i, shading.at, wo_in, u_inner, u0, u1)
-    wi = to_world(leaf.basis, drawn.wi)
-    if drawn.pdf == 0.0:
-        return NO_SAMPLE
-    if drawn.is_delta or count == 1:
-        if not scatters_from(leaf, wi):
-            return NO_SAMPLE
-    if drawn.is_delta:
-        # weight / total is the probability of the layer, by which its contribution is divided.
-        probability = drawn.pdf * (leaf.weight / total)
-        return BsdfSample(wi, drawn.weight * total, probability, drawn.eta, True)
-    if count == 1:
-        return BsdfSample(wi, drawn.weight * total, drawn.pdf, drawn.eta, False)
-    # Any of the layers could have sampled this direction: use the sum of their densities.
-    found = _eval_pdf_nested(flat_leaves, leaves, shading, wi)
-    if not found.density > 0.0:
-        return NO_SAMPLE
-    return BsdfSample(wi, found.value * (1.0 / found.density), found.density, drawn.eta, False)
+    return sample_nested(flat_leaves, materials.leaves, shading, u_lobe, u0, u1)
 
 
 @kernel
@@ -254,12 +184,7 @@ def _branch_count(flat_leaves: FlattenedMaterials | None, m: int) -> int:
         return 1
     if is_absent(flat_leaves):
         return 1
-    return _number(flat_leaves, m)
-
-
-@flattened_materials.operation
-def _number(flat_leaves: FlattenedMaterials, m: int) -> int:
-    return int(flat_leaves.number[m])
+    return leaf_count(flat_leaves, m)
 
 
 @kernel
@@ -299,20 +224,7 @@ def _ambient(
     if is_absent(flat_leaves):
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.ambient(materials.leaves, kind, i, shading.at)
-    return _ambient_nested(flat_leaves, materials.leaves, shading)
-
-
-@flattened_materials.operation
-def _ambient_nested(flat_leaves: FlattenedMaterials, leaves: Leaves, shading: Shading) -> Vec3:
-    m = shading.point.material
-    total = Vec3(0.0, 0.0, 0.0)
-    first = flat_leaves.first[m]
-    for k in range(flat_leaves.number[m]):
-        weight = leaf_at(shading, k).weight
-        kind, i = flat_leaves.kind[first + k], flat_leaves.row[first + k]
-        value = bsdf.ambient(leaves, kind, i, shading.at)
-        total = total + value * weight
-    return total
+    return ambient_nested(flat_leaves, materials.leaves, shading)
 
 
 @kernel
@@ -332,34 +244,4 @@ def _branches(
     if is_absent(flat_leaves):
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.branches(materials.leaves, kind, i, shading.at, shading.wo)
-    return _branches_nested(flat_leaves, materials.leaves, shading, k)
-
-
-@flattened_materials.operation
-def _branches_nested(
-    flat_leaves: FlattenedMaterials, leaves: Leaves, shading: Shading, k: int
-) -> Branches:
-    m = shading.point.material
-    leaf = leaf_at(shading, k)
-    k += flat_leaves.first[m]
-    wo_in = to_local(leaf.basis, shading.wo)
-    kind, i = flat_leaves.kind[k], flat_leaves.row[k]
-    found = bsdf.branches(leaves, kind, i, shading.at, wo_in)
-    reflected = to_world(leaf.basis, found.reflected)
-    refracted = to_world(leaf.basis, found.refracted)
-    return Branches(
-        reflected,
-        _let(leaf, reflected, found.reflectance),
-        refracted,
-        _let(leaf, refracted, found.transmittance),
-        found.share,
-        found.passing,
-        found.eta,
-    )
-
-
-@kernel
-def _let(leaf: FlattenedLeaf, wi: Vec3, factor: Vec3) -> Vec3:
-    if not scatters_from(leaf, wi):
-        return Vec3(0.0, 0.0, 0.0)
-    return factor * leaf.weight
+    return branches_nested(flat_leaves, materials.leaves, shading, k)

@@ -10,8 +10,8 @@ from reference_rt.cameras.filters import film_filters
 from reference_rt.cameras.thin_lens import ThinLensView
 from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
 from reference_rt.jit.links import Link, Linker
-from reference_rt.lights import LinkedLights, Lights, LightSampler
-from reference_rt.lights import dispatch as light_dispatch
+from reference_rt.lights import Lights, LightSampler, LinkedLights
+from reference_rt.lights import tables as light_tables
 from reference_rt.lights.selection.tree import light_trees
 from reference_rt.materials import Materials
 from reference_rt.materials.bsdfs import tables as bsdfs
@@ -161,16 +161,16 @@ def _materials(
     flat = Link(0)
     if materials.flat_leaves is not None and wanted:
         nested = {
-            "path": {"_eval_pdf_nested", "_sample_nested"},
-            "direct": {"_eval_pdf_nested", "_sample_nested"},
-            "whitted": {"_eval_pdf_nested", "_branches_nested", "_ambient_nested", "_number"},
+            "path": {"eval_pdf_nested", "sample_nested"},
+            "direct": {"eval_pdf_nested", "sample_nested"},
+            "whitted": {"eval_pdf_nested", "branches_nested", "ambient_nested", "leaf_count"},
         }[integrator] | {"_most", "_prepare"}
         flat = linker.link(
             flattened_materials.operations,
             nested,
             {0: _always_textured(materials.flat_leaves)},
         )
-    only = [code for code in tables]
+    only = list(tables)
     kind = materials.kind if materials.kind is not None else np.full(n, only[0] if only else -1)
     row = materials.row if materials.row is not None else np.arange(n)
     textured = materials.textured
@@ -198,11 +198,11 @@ def _lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLights:
         "whitted": {"_background", "_emitted", "_middle", "_sample"},
     }.get(integrator, set())
     emitters = linker.link(
-        light_dispatch.by_code.operations,
+        light_tables.by_code.operations,
         wanted,
         {
             code: _always_textured(table)
-            for code, field in light_dispatch.CODES
+            for code, field, _ in light_tables.TABLES
             if (table := getattr(lights, field)) is not None
         },
     )

@@ -144,7 +144,8 @@ def _render_jobs(scene: BuiltScene, integrator: Any) -> tuple[list[Job], dict[st
     shape, spp = (film.width, film.height), sampler.spp
     out = np.zeros((film.height, film.width, 3))
     variance = np.zeros_like(out) if "variance" in film.layers else None
-    jobs, layers = [radiance_job(integrator.setup(), sampler, shape, out, variance)], {"colour": out}
+    jobs = [radiance_job(integrator.setup(), sampler, shape, out, variance)]
+    layers = {"colour": out}
     if variance is not None:
         layers["variance"] = variance
     if {"albedo", "normal"} & set(film.layers):

@@ -73,8 +73,8 @@ def _camera_film_ray(
     u0, u1 = draw_pair(sampler, sampling.FILM)
     dx, weight_x = film_offset(film_filter, u0)
     dy, weight_y = film_offset(film_filter, u1)
-    lens = lens_sample(view, sampler)
-    ray = camera_ray(view, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
+    lens = _lens_of(view, sampler)
+    ray = camera_ray(_view_of(view), (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
     return FilmRay(ray, weight_x * weight_y)
 
 
@@ -93,15 +93,34 @@ def _linked_film_ray(
 ) -> FilmRay:
     if len(view.given.o) > 0:
         return _given_ray(view.given, None, sampler, shape, x, y)
-    width, height = shape
-    u0, u1 = draw_pair(sampler, sampling.FILM)
-    dx, weight_x = film_offset(film_filter, u0)
-    dy, weight_y = film_offset(film_filter, u1)
-    lens = LENS_CENTRE
+    return _camera_film_ray(view, film_filter, sampler, shape, x, y)
+
+
+@kernel
+def _linked_lens(view: LinkedView, sampler: Any) -> tuple[float, float]:
     if view.has_lens != 0:
-        lens = draw_pair(sampler, sampling.LENS)
-    ray = camera_ray(view.link, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
-    return FilmRay(ray, weight_x * weight_y)
+        u0, u1 = draw_pair(sampler, sampling.LENS)
+        return u0, u1
+    return LENS_CENTRE
+
+
+@kernel
+def _itself(view: Any) -> Any:
+    return view
+
+
+@kernel
+def _linked_view(view: LinkedView) -> Link:
+    return view.link
+
+
+_views, _lenses = ByClass("view_of"), ByClass("lens_of")
+_views.register(LinkedView, _linked_view)
+_lenses.register(LinkedView, _linked_lens)
+for _view in VIEWS:
+    _views.register(_view, _itself)
+    _lenses.register(_view, lens_sample)
+_view_of, _lens_of = _views.function, _lenses.function
 
 
 _film_rays = ByClass("film_ray")
@@ -241,23 +260,6 @@ def first_hits_tile(
             albedo, normal = albedo / spp, normal / spp
         albedos[pixel, 0], albedos[pixel, 1], albedos[pixel, 2] = albedo
         normals[pixel, 0], normals[pixel, 1], normals[pixel, 2] = normal
-
-
-@kernel
-def _itself(view: Any) -> Any:
-    return view
-
-
-@kernel
-def _linked_view(view: LinkedView) -> Link:
-    return view.link
-
-
-_views = ByClass("view_of")
-_views.register(LinkedView, _linked_view)
-for _view in VIEWS:
-    _views.register(_view, _itself)
-_view_of = _views.function
 
 
 @entry_kernel

@@ -95,6 +95,8 @@ __all__ = [
     "Sphere",
     "Torus",
     "Triangle",
+    "colour",
+    "enters",
     "face",
     "intersect",
     "middle",

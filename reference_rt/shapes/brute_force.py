@@ -8,8 +8,7 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.ray import Crossing, Hit, Ray, miss, no_hit
-from reference_rt.core.ray import BLOCK
+from reference_rt.core.ray import BLOCK, Crossing, Hit, Ray, miss, no_hit
 from reference_rt.core.ray_block import HitBlock, RayBlock, hit_of, put_hit, ray_of
 from reference_rt.core.vec3 import row
 from reference_rt.jit.by_code import ByCode
@@ -36,7 +35,6 @@ from reference_rt.shapes.tables import (
     by_code,
     of_table,
 )
-
 
 Packed = Annotated[FloatArray, 3]
 """The SoA layout of the shapes of one type: packets (k, columns, VECTOR_WIDTH)."""

@@ -13,8 +13,8 @@ FAULTS = (
     SourceFault(
         "direct light counted twice", BOX, "integrators/path.py",
         "        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)\n"
-        "    return state.throughput * area",
-        "    return state.throughput * area",
+        "    return state.throughput * any_light.emitted",
+        "    return state.throughput * any_light.emitted",
     ),
     SourceFault(
         "cosine missing after the first bounce", BOX, "integrators/path.py",

@@ -87,9 +87,7 @@ def _begin(solids: Solids, shapes: Shapes, bvh: Bvh, o: int, k: int, ray: Ray, w
     """The state of operand k of a solid, row o of the operands, at the ray's origin."""
     walk.passed[k] = 0
     if solids.row[o] < 0:
-        _store_mesh_crossing(
-            walk, k, next_mesh_crossing(shapes, bvh, solids.root[o], ray, 0.0, -1)
-        )
+        _store_mesh_crossing(walk, k, next_mesh_crossing(shapes, bvh, solids.root[o], ray, 0.0, -1))
         walk.state[k] = winding(shapes, bvh, solids.root[o], ray)
         return
     spans = any_shape.spans(shapes, solids.kind[o], solids.row[o], ray)

@@ -1,0 +1,155 @@
+"""The tables of all types of lights, themselves or behind links."""
+
+from typing import Any, NamedTuple
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.by_code import ByCode
+from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.links import LINK, Link, declare
+from reference_rt.lights.emitters import area, constant, directional, environment_map, point, spot
+from reference_rt.lights.emitters.area import Areas
+from reference_rt.lights.emitters.constant import Environment
+from reference_rt.lights.emitters.directional import Directionals
+from reference_rt.lights.emitters.environment_map import EnvironmentMaps
+from reference_rt.lights.emitters.point import Points
+from reference_rt.lights.emitters.spot import Spots
+from reference_rt.lights.light import (
+    AREA,
+    DIRECTIONAL,
+    ENVIRONMENT,
+    POINT,
+    SPOT,
+    LightSample,
+)
+from reference_rt.lights.selection.choice import LightSampler
+from reference_rt.lights.selection.tree import LightTree
+
+
+class Lights(NamedTuple):
+    """The table of each type, None for types that the scene lacks.
+
+    ambient (1, 3): the ambient radiance;  choice: the entries of the light sampler, None if no
+    light can be picked;  tree: the light tree, None for few lights.  Entries are in this order: all
+    areas, points, spots, directional lights, the environment.  So area light i is entry i.
+    """
+
+    points: Points | None
+    spots: Spots | None
+    directionals: Directionals | None
+    areas: Areas | None
+    environment: Environment | EnvironmentMaps | None
+    ambient: FloatArray | None
+    choice: LightSampler | None
+    tree: LightTree | None
+
+
+def _of_environment(name: str) -> Any:
+    kernels = ByClass(name)
+    kernels.register(Environment, getattr(constant, name))
+    kernels.register(EnvironmentMaps, getattr(environment_map, name))
+    return kernels.function
+
+
+_radiance_of = _of_environment("radiance")
+_density_of = _of_environment("pdf")
+_sample_of = _of_environment("sample")
+
+
+class _Surroundings:
+    """The kernels of the environment, of either class."""
+
+    @staticmethod
+    @kernel
+    def background(environment: Any, d: Vec3) -> Vec3:
+        found: Vec3 = _radiance_of(environment, d)
+        return found
+
+    @staticmethod
+    @kernel
+    def environment_density(environment: Any, d: Vec3) -> float:
+        found: float = _density_of(environment, d)
+        return found
+
+    @staticmethod
+    @kernel
+    def sample(environment: Any, u0: float, u1: float) -> LightSample:
+        found: LightSample = _sample_of(environment, u0, u1)
+        return found
+
+
+declare(Lights, LINK)
+
+TABLES: tuple[tuple[int, str, Any], ...] = (
+    (AREA, "areas", area),
+    (POINT, "points", point),
+    (SPOT, "spots", spot),
+    (DIRECTIONAL, "directionals", directional),
+    (ENVIRONMENT, "environment", _Surroundings),
+)
+"""(code, field of Lights, module with its kernels)."""
+
+by_code = ByCode(TABLES)
+
+
+class LinkedLights(NamedTuple):
+    """`Lights` behind links.  emitters: to the tables of all types;  choice: without lights, of
+    arrays of length 0;  tree: to the light tree, or to nothing;  ambient (1, 3)."""
+
+    emitters: Link
+    choice: LightSampler
+    tree: Link
+    ambient: FloatArray
+
+
+def _for(name: str, of_lights: Any, of_linked: Any) -> Any:
+    chosen = ByClass(name)
+    chosen.register(Lights, of_lights)
+    chosen.register(LinkedLights, of_linked)
+    return chosen.function
+
+
+@kernel
+def _themselves(lights: Any) -> Any:
+    return lights
+
+
+@kernel
+def _emitters_of(lights: LinkedLights) -> Link:
+    return lights.emitters
+
+
+emitters = _for("emitters", _themselves, _emitters_of)
+"""emitters(lights): the tables, or the link to them."""
+
+
+@kernel
+def _point_matters(lights: Lights) -> bool:
+    return lights.areas is not None or lights.tree is not None
+
+
+@kernel
+def _normal_matters(lights: Lights) -> bool:
+    return lights.tree is not None
+
+
+@kernel
+def _always(lights: LinkedLights) -> bool:
+    return True
+
+
+depends_on_point = _for("depends_on_point", _point_matters, _always)
+"""depends_on_point(lights): whether any probability or density depends on the point p: a
+constant."""
+
+depends_on_normal = _for("depends_on_normal", _normal_matters, _always)
+"""depends_on_normal(lights): whether any probability depends on the normal n: a constant."""
+
+
+@kernel
+def _any_areas(lights: Lights) -> bool:
+    return lights.areas is not None
+
+
+has_areas = _for("has_areas", _any_areas, _always)
+"""has_areas(lights): whether a surface may be a light: a constant."""
