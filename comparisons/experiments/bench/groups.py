@@ -10,9 +10,11 @@ from typing import NamedTuple
 from comparisons.experiments.bench import (
     equal_error,
     equal_samples,
+    first_renders,
     mesh_rays,
     million,
     program,
+    smoke,
     threads,
     unused,
 )
@@ -40,7 +42,10 @@ GROUPS = (
         "mesh_rays", (*(f"rays_{kind}" for kind in mesh_rays.GOALS), "any_hit"), mesh_rays.measure
     ),
     Group("threads", ("threads",), threads.measure),
-    Group("cold", ("cold",), program.measure_cold),
+    Group("cold", ("cold", "cold_median"), first_renders.measure_ever),
+    Group("new_kind", ("new_kind", "new_kind_median"), first_renders.measure_new),
+    Group("warm_up", ("warm_up", "after_warm_up"), first_renders.measure_warmed),
+    Group("smoke", ("smoke",), smoke.measure),
     Group("warm", ("warm",), program.measure_warm),
     Group("unused", ("unused",), unused.measure),
     Group("million", ("million_build", "million_memory"), million.measure),

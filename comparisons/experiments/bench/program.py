@@ -8,7 +8,6 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ SIZE, SPP = "64x64", 16
 PICTURE = f"{SIZE}, {SPP} samples per pixel"
 """A picture that renders in almost no time, so that everything else is measured."""
 
-COLD_SECONDS, WARM_SECONDS = 15.0, 1.5
+WARM_SECONDS = 1.5
 
 WARM = ("cornell_box", "mesh_knot", "textured_room", "material_principled", "whitted_classic")
 """Scenes of the row `warm`: few shapes, many triangles, textures, a complex material, and no random
@@ -65,6 +64,12 @@ class Program:
             found |= dict(zip(names, map(float, match.groups()), strict=True))
         return found
 
+    def warm_up(self, cache: str) -> float:
+        """Seconds of `reference-rt warm-up`."""
+        start = time.perf_counter()
+        self._run(["warm-up"], cache)
+        return time.perf_counter() - start
+
     def _run(self, arguments: Sequence[str], cache: str | None) -> str:
         own = {} if cache is None else {"REFERENCE_RT_CACHE": str(self.folder / cache)}
         run = subprocess.run(
@@ -80,31 +85,6 @@ class Program:
             last = (run.stderr.strip().splitlines() or ["no message"])[-1]
             raise ReferenceRtError(f"reference-rt {' '.join(arguments)}: {last}")
         return str(run.stderr)
-
-
-def measure_cold(setting: Setting) -> list[Row]:
-    """The row `cold`: every scene once, each with an empty cache.  Compiling takes so long that one
-    run is enough."""
-    names = [n for n in setting.names() if not setting.quick or n in QUICK]
-    found: dict[str, dict[str, float]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        program = Program(Path(folder))
-        program.prepare()
-        for k, name in enumerate(names):
-            setting.say(f"{name}, no kernels", k / len(names))
-            found[name] = program.render(setting.file(name), f"cold-{k}")
-    walls = {name: times["wall"] for name, times in found.items()}
-    worst = max(walls, key=lambda name: walls[name])
-    over = [name for name, wall in walls.items() if wall > COLD_SECONDS]
-    details: dict[str, Any] = {
-        "scenes": len(walls),
-        "worst": worst,
-        "median": float(np.median(list(walls.values()))),
-        "over_the_limit": over,
-        "seconds": found,
-    }
-    title = f"first render ever, no kernels compiled, {PICTURE}: worst of {len(walls)} scenes"
-    return [within("cold", title, [walls[worst]], COLD_SECONDS, details=details)]
 
 
 def measure_warm(setting: Setting) -> list[Row]:

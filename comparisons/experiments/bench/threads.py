@@ -21,7 +21,7 @@ def measure(setting: Setting) -> list[Row]:
     def rate(threads: int) -> float:
         return samples / seconds(lambda: render(scene, tables=scene.tables, threads=threads))
 
-    rate(2)  # compile
+    render(scene, tables=scene.tables, specialised=True)  # compile
     rates = alternate({"2 threads": lambda: rate(2), "1 thread": lambda: rate(1)}, say=setting.say)
     return [
         against(

@@ -140,13 +140,15 @@ def measure(setting: Setting) -> list[Row]:
     everything = with_everything(scene)
     runs: dict[str, Callable[[], float]] = {
         "ours": lambda: seconds(
-            lambda: render(scene, tables=scene.tables, threads=setting.threads)
+            lambda: render(scene, tables=scene.tables, threads=setting.threads, specialised=True)
         ),
         "by hand": lambda: seconds(lambda: render_pruned(scene, setting.threads)),
     }
     with_all: dict[str, Callable[[], float]] = {
         "nothing pruned": lambda: seconds(
-            lambda: render(everything, tables=everything.tables, threads=setting.threads)
+            lambda: render(
+                everything, tables=everything.tables, threads=setting.threads, specialised=True
+            )
         ),
         "by hand": runs["by hand"],
     }

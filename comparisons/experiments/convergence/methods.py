@@ -171,7 +171,8 @@ class Stable:
             return Shot(picture, spp, time.perf_counter() - start)
 
         small = scene.changed(sampler=make(spp=1, seed=first))
-        render(small, tables=tables, progress=progress)
+        # From now on the specialised kernels are in the cache, and `shot` uses them.
+        render(small, tables=tables, progress=progress, specialised=True)
         return shot
 
     def _mitsubas(self, method: Method) -> Renderer:
