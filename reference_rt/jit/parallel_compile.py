@@ -67,7 +67,7 @@ def _compile_in_parallel(missing: Sequence[Call], children: int, tell: Report) -
         os.close(numbers)
         numbers = -1
         os.set_blocking(finished, False)
-        for _ in range(children):
+        while len(started) < children:
             started.append(_fork(missing, waiting, reports))
         done = 0
         while (taken := os.read(waiting, _NUMBER.size)) != b"":
