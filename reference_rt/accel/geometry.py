@@ -56,7 +56,7 @@ class Geometry(NamedTuple):
     tracer: FunctionPointer | None = None
 
 
-geometries = Linkable("geometries")
+geometries = Linkable()
 """The operations below, on a geometry or on a link to one."""
 
 

@@ -36,7 +36,7 @@ _ray.register(OrthographicView, orthographic.camera_ray)
 _ray.register(ThinLensView, thin_lens.camera_ray)
 _ray_of = _ray.function
 
-views = Linkable("views")
+views = Linkable()
 """The operation `camera_ray`, on a view or on a link to one."""
 
 

@@ -242,7 +242,7 @@ _offset.register(TentSetup, _tent_offset)
 _offset.register(Tabulated, _tabulated_offset)
 _offset_by = _offset.function
 
-film_filters = Linkable("filters")
+film_filters = Linkable()
 """The operation `film_offset`, on a filter's setup or on a link to one."""
 
 

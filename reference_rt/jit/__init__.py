@@ -1,10 +1,16 @@
 """Compilation with Numba: the decorators, the compiler pipeline, the kernel cache, SIMD.
 
-- `kernel.py`: `@kernel` and `@entry_kernel`, the only decorators that compile; `ByClass`.
-- `by_code.py`: `ByCode`, which generates the kernels that choose among shapes, materials, ...
+- `kernel.py`: `@kernel` and `@entry_kernel`, the only decorators that compile; `ByClass`, a choice
+  by the class of a table.
+- `by_code.py`: `ByCode`, a choice by a number among shapes, materials, ..., as generated kernels.
+- `links.py`: `Link`, through which a kernel reaches tables and operations without being compiled
+  for their types; `Linkable`, operations on one table.
+- `table_words.py`, `operation_types.py`, `function_pointer.py`, `generated.py`: what these are made
+  of, that is tables in memory, types of annotations, calls through function pointers, generated
+  text.
 - `compiler.py`, `numba_pipeline.py`: our pipeline, and the fallback to Numba's own.
 - `kernel_cache.py`: compiled kernels on disk.
-- `function_pointer.py`, `parallel_compile.py`: kernels that are compiled separately, in parallel.
+- `parallel_compile.py`: kernels compiled in several processes.
 - `simd.py`, `simd_kernels.py`: functions that become vector instructions.
 
 With NUMBA_DISABLE_JIT=1 all kernels run as plain Python, with the same bits.  `kernel.py` says what

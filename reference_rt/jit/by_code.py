@@ -19,29 +19,42 @@ becomes, for scenes of spheres and boxes,
         return otherwise(shapes, ray, hit)  # the function as it was decorated
 
 Compiled code and plain Python run this text, and tracebacks show it.
+
+For a link to tables (`links.py`) the text depends on no scene.  A list has, for each code, the
+address of the table and the function pointers of the operations, 32 words (`STRIDE`) in all, of
+which `uv` has number 3:
+
+    def uv(shapes, ray, hit):
+        code = hit.kind
+        if 0 <= code <= 8:  # the last code of all types that have `uv`
+            pointer = word_at(shapes.address, 32 * code + 3)
+            if pointer < 0:  # the table is there, but `Linker` was not asked for this operation
+                stop()
+            if pointer != 0:
+                return call(pointer, word_at(shapes.address, 32 * code + 0), (ray, hit))
+        return otherwise(shapes, ray, hit)
 """
 
 import functools
-import inspect
-import linecache
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from numba import types
 
+from reference_rt.jit.generated import define, parameters_of
 from reference_rt.jit.kernel import is_named_tuple, kernel, overload_kernel
-from reference_rt.jit.links import STRIDE, Link, Operation, Row, executed, stop, word
+from reference_rt.jit.links import Group, Link, Row
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-class ByCode:
+class ByCode(Group):
     """rows: the code of each type, the field of its table, and the module that has its kernels, in
     the order in which codes are compared."""
 
     def __init__(self, rows: Iterable[tuple[int, str, Any]]) -> None:
+        super().__init__()
         self._rows = tuple(rows)
-        self.operations: dict[str, Operation] = {}
 
     def __call__(
         self, name: str | Callable[[Any], Callable[..., Any] | None], code: str = "kind"
@@ -60,9 +73,9 @@ class ByCode:
         rows = [Row(number, field, of_row) for number, field, of_row in found if of_row is not None]
 
         def decorate(otherwise: F) -> F:
-            parameters = _parameters(otherwise)
+            tables, *others = parameters_of(otherwise)
             for _, field, of_row in rows:
-                unknown = set(_parameters(of_row)[1:]) - set(parameters[1:])
+                unknown = set(parameters_of(of_row)[1:]) - set(others)
                 if unknown:
                     raise TypeError(
                         f"{of_row.__module__}.{of_row.__name__}, for {field}: parameters {unknown} "
@@ -71,41 +84,34 @@ class ByCode:
 
             def lines(present: Sequence[Row]) -> Iterable[str]:
                 for number, field, of_row in present:
-                    given = [f"{parameters[0]}.{field}", *_parameters(of_row)[1:]]
+                    given = [f"{tables}.{field}", *parameters_of(of_row)[1:]]
                     yield f"if {code} == {number}:"
                     yield f"    return {field}({', '.join(given)})"
-                yield f"return otherwise({', '.join(parameters)})"
+                yield f"return otherwise({', '.join([tables, *others])})"
 
-            number = len(self.operations) + 1
-            operation = Operation(otherwise, number, rows, otherwise.__module__)
-            self.operations[otherwise.__name__] = operation
-            body = kernel(otherwise)
-            linked = functools.partial(_linked, operation, parameters[0], code, body)
-            return _generated(otherwise, parameters, rows, lines, linked, otherwise=body)
+            operation, body = self._add(otherwise, rows), kernel(otherwise)
+            linked = functools.partial(operation.through_link, tables, code, body)
+            return _chosen(otherwise, [tables, *others], rows, lines, linked, otherwise=body)
 
         return decorate
 
     def in_turn(self, step: Callable[..., Any]) -> Callable[..., Any]:
         """f(tables, ..., result): what step(code, table, ..., result) returns for the last table
         that is present, the result of each being passed to the next; no loop, so that the code and
-        the type of the table are constants in each step."""
-        _, _, *others = _parameters(step)
+        the type of the table are constants in each step.  Not for links."""
+        _, _, *others = parameters_of(step)
         given, result = ", ".join(others), others[-1]
-        rows = [(number, field, step) for number, field, _ in self._rows]
+        rows = [Row(number, field, step) for number, field, _ in self._rows]
 
         def lines(present: Sequence[Row]) -> Iterable[str]:
             for number, field, _ in present:
                 yield f"{result} = {field}({number}, tables.{field}, {given})"
             yield f"return {result}"
 
-        return _generated(step, ["tables", *others], rows, lines, None)
+        return _chosen(step, ["tables", *others], rows, lines, None)
 
 
-def _parameters(function: Callable[..., Any]) -> list[str]:
-    return [*inspect.signature(function).parameters]
-
-
-def _generated(
+def _chosen(
     function: F,
     parameters: Sequence[str],
     rows: Sequence[Row],
@@ -113,7 +119,8 @@ def _generated(
     linked: Callable[[], Callable[..., Any]] | None,
     **names: Any,
 ) -> F:
-    """The kernel that runs, for tables of which some are None, the text `lines` of the others.
+    """The kernel that runs, for tables of which some are None, the text `lines` of the others; for
+    a link, what `linked` returns.
 
     function: of which it has the name, the module and the docstring;  names: what the text uses
     beside the parameters and a kernel for each field.
@@ -121,18 +128,15 @@ def _generated(
     written: dict[tuple[str, ...], Callable[..., Any]] = {}
 
     def write(is_present: Callable[[str], bool]) -> Callable[..., Any]:
-        present = [row for row in rows if is_present(row[1])]
-        fields = tuple(field for _, field, _ in present)
+        present = [row for row in rows if is_present(row.field)]
+        fields = tuple(row.field for row in present)
         if fields not in written:
-            name = function.__name__
+            module, name = function.__module__, function.__name__
             text = f"def {name}({', '.join(parameters)}):\n"
             text += "".join(f"    {line}\n" for line in lines(present))
-            file = f"<{function.__module__}.{name} for {', '.join(fields) or 'no tables'}>"
-            linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file
-            known = {"__name__": function.__module__, **names}
-            known |= {field: of_row for _, field, of_row in present}
-            exec(compile(text, file, "exec"), known)
-            written[fields] = known[name]
+            known = names | {row.field: row.kernel for row in present}
+            label = f"for {', '.join(fields) or 'no tables'}"
+            written[fields] = define(text, module, name, label, known)
         return written[fields]
 
     @functools.wraps(function)
@@ -147,24 +151,3 @@ def _generated(
         return write(lambda field: not isinstance(type_of[field], types.NoneType))
 
     return choose  # type: ignore[return-value]
-
-
-def _linked(operation: Operation, tables: str, code: str, otherwise: Any) -> Callable[..., Any]:
-    """The kernel for a link: it calls the operation of the type through its function pointer."""
-    given = ", ".join(operation.parameters)
-    comma = "," if len(operation.parameters) == 1 else ""
-    most = max(operation.rows, default=-1)
-    text = f"""def {operation.name}({tables}, {given}):
-    code = {code}
-    if 0 <= code <= {most}:
-        pointer = word({tables}.address, {STRIDE} * code + {operation.number})
-        if pointer < 0:
-            stop()
-        if pointer != 0:
-            table = word({tables}.address, {STRIDE} * code)
-            return call(pointer, table, ({given}{comma}))
-    return otherwise({tables}, {given})
-"""
-    return executed(
-        text, operation, call=operation.caller(), word=word, stop=stop, otherwise=otherwise
-    )

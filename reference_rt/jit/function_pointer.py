@@ -4,7 +4,7 @@ The caller is compiled without the callee's code.  So the two can be compiled in
 (`parallel_compile.py`), and the callee's cached code serves all callers with its argument types.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,8 @@ FunctionPointer = npt.NDArray[np.intp]
 
 def pointer_to(compiled: Callable[..., Any], signature: Signature) -> int:
     """The function pointer of an entry kernel that is compiled for arguments of these types."""
-    found = compiled.overloads[signature]  # type: ignore[attr-defined]
+    taken = signature if isinstance(signature, tuple) else signature.args
+    found = compiled.overloads[taken]  # type: ignore[attr-defined]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
@@ -31,17 +32,30 @@ def call_pointer(typing_context: Any, address: Any, arguments: Any) -> Any:
 
     The arguments must have the types for which it was compiled.
     """
-    declared = types.Tuple([types.unliteral(t) for t in arguments])
+    declared = [types.unliteral(t) for t in arguments]
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        function_type = context.call_conv.get_function_type(types.none, declared.types)
-        function = builder.inttoptr(values[0], function_type.as_pointer())
-        given = [
-            context.cast(builder, value, a, b)
-            for value, a, b in zip(
-                cgutils.unpack_tuple(builder, values[1]), arguments, declared, strict=True
-            )
-        ]
-        return COMPILER.invoke(context, builder, function, types.none, declared.types, given)
+        given = cgutils.unpack_tuple(builder, values[1])
+        return emit_call(context, builder, values[0], types.none, declared, arguments, given)
 
     return types.none(types.intp, arguments), generate
+
+
+def emit_call(
+    context: Any,
+    builder: Any,
+    address: Any,
+    returns: Any,
+    declared: Sequence[Any],
+    given: Sequence[Any],
+    values: Sequence[Any],
+) -> Any:
+    """Emit a call of the entry kernel at an address.  returns, declared: the types for which it was
+    compiled;  given, values: the types and values of the arguments, which are cast."""
+    function_type = context.call_conv.get_function_type(returns, declared)
+    function = builder.inttoptr(address, function_type.as_pointer())
+    arguments = [
+        context.cast(builder, value, a, b)
+        for value, a, b in zip(values, given, declared, strict=True)
+    ]
+    return COMPILER.invoke(context, builder, function, returns, declared, arguments)

@@ -58,10 +58,25 @@ def entry_kernel(function: F) -> F:
     """Compile `function`, which Python calls with arrays, at the first call for each set of
     argument types, and cache the result on disk.  Runs without the GIL."""
     compiled: F = njit(**COMPILER.entry)(function)
+    _cache(compiled, function)
+    return compiled
+
+
+def callee_kernel(function: Callable[..., Any], of: Callable[..., Any], name: str) -> Any:
+    """An entry kernel that only compiled code calls, through its function pointer.
+
+    of: the kernel of which `function`, a generated one, is made;  name: what tells it apart from
+    others that are made of the same kernel.
+    """
+    compiled = njit(**COMPILER.callee)(function)
+    _cache(compiled, of, name)
+    return compiled
+
+
+def _cache(compiled: Any, function: Callable[..., Any], name: str = "") -> None:
     if CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
         with suppress(OSError):  # without a source file
-            compiled._cache = KernelCache(function, CACHE_FOLDER)  # type: ignore[attr-defined]
-    return compiled
+            compiled._cache = KernelCache(function, CACHE_FOLDER, name)
 
 
 Signature = Any

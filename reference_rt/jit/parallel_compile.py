@@ -32,8 +32,42 @@ Report = Callable[[int, int], None]
 _NUMBER = struct.Struct("<i")
 
 
+class Ahead:
+    """Kernels that a child compiles while this process does something else: those of `calls` that
+    are not in the cache, if there are several threads and a child can be forked.  A context
+    manager: afterwards there is no child."""
+
+    def __init__(self, calls: Sequence[Call], threads: int) -> None:
+        self.calls = [call for call in calls if not is_compiled(*call)]
+        self._child = 0
+        if not self.calls or threads < 2 or not may_fork():
+            self.calls = []
+            return
+        self._child = fork_with_compiler()
+        if self._child == 0:
+            try:
+                for call in self.calls:
+                    precompile(*call)
+            finally:
+                os._exit(0)
+
+    def __enter__(self) -> "Ahead":
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        if self._child:
+            _end(self._child)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there is nothing to wait for."""
+        if self._child and has_ended(self._child):
+            self._child = 0
+        return self._child == 0
+
+
 def precompile_all(
-    calls: Sequence[Call], threads: int, say: Report | None = None
+    calls: Sequence[Call], threads: int, say: Report | None = None, ahead: Ahead | None = None
 ) -> list[Callable[..., Any]]:
     """`kernel.precompile` of several entry kernels, in parallel where possible.
 
@@ -41,22 +75,30 @@ def precompile_all(
     all, each of which takes the next when it has finished one: so the longest should come first.
     Children store their kernels in the cache.  Without children (threads = 1, no `fork`, no cache,
     not in the main thread), or if they fail, this process compiles all.  say(done, total): called
-    after each kernel that had to be compiled, and before the first.
+    after each kernel that had to be compiled, and before the first.  ahead: those that a child
+    compiles already.
     """
-    missing = [call for call in calls if not is_compiled(*call)]
-    if missing:
+    begun = [] if ahead is None or ahead.is_done else ahead.calls
+    missing = [call for call in calls if call not in begun and not is_compiled(*call)]
+    total = len(missing) + len(begun)
+    if total > 0:
         tell = say or (lambda done, total: None)
-        tell(0, len(missing))
-        if threads > 1 and len(missing) > 1 and may_fork():
-            _compile_in_parallel(missing, min(threads, len(missing)) - 1, tell)
+        tell(0, total)
+        own = threads - 1 if begun else threads
+        if own > 1 and len(missing) > 1 and may_fork():
+            _compile_in_parallel(missing, min(own, len(missing)) - 1, total, tell)
         else:
             for k, call in enumerate(missing):
                 precompile(*call)
-                tell(k + 1, len(missing))
+                tell(k + 1, total)
+        end = time.monotonic() + PATIENCE
+        while ahead is not None and not ahead.is_done and time.monotonic() < end:
+            time.sleep(0.002)
+        tell(total, total)
     return [precompile(*call) for call in calls]
 
 
-def _compile_in_parallel(missing: Sequence[Call], children: int, tell: Report) -> None:
+def _compile_in_parallel(missing: Sequence[Call], children: int, total: int, tell: Report) -> None:
     """Compile these here and in children: whoever is free takes the next number from a pipe."""
     waiting, numbers = os.pipe()
     finished, reports = os.pipe()
@@ -67,19 +109,19 @@ def _compile_in_parallel(missing: Sequence[Call], children: int, tell: Report) -
         os.close(numbers)
         numbers = -1
         os.set_blocking(finished, False)
-        for _ in range(children):
+        while len(started) < children:
             started.append(_fork(missing, waiting, reports))
         done = 0
         while (taken := os.read(waiting, _NUMBER.size)) != b"":
             precompile(*missing[_NUMBER.unpack(taken)[0]])
             done += 1 + _count(finished)
-            tell(done, len(missing))
+            tell(done, total)
         end = time.monotonic() + PATIENCE
         for child in started:
             while not has_ended(child) and time.monotonic() < end:
                 if (more := _count(finished)) > 0:
                     done += more
-                    tell(done, len(missing))
+                    tell(done, total)
                 time.sleep(0.002)
     finally:
         for child in started:

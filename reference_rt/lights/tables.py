@@ -6,7 +6,8 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.jit.links import LINK, Link, declare
+from reference_rt.jit.links import LINK, Link
+from reference_rt.jit.operation_types import declare
 from reference_rt.lights.emitters import area, constant, directional, environment_map, point, spot
 from reference_rt.lights.emitters.area import Areas
 from reference_rt.lights.emitters.constant import Environment

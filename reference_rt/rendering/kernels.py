@@ -25,8 +25,9 @@ from reference_rt.accel.block_query import tracer_of
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.function_pointer import pointer_to
 from reference_rt.jit.kernel import is_compiled, precompile, signature_of
-from reference_rt.jit.links import Linker
+from reference_rt.jit.links import Link, Linker
 from reference_rt.jit.parallel_compile import (
+    Ahead,
     Call,
     Report,
     fork_with_compiler,
@@ -34,7 +35,13 @@ from reference_rt.jit.parallel_compile import (
     may_fork,
     precompile_all,
 )
-from reference_rt.rendering.linking import linked_filter, linked_scene, linked_view
+from reference_rt.rendering.linking import (
+    EMPTY_SCENE,
+    EMPTY_VIEW,
+    linked_filter,
+    linked_scene,
+    linked_view,
+)
 
 WAIT = 2.0
 """Seconds of rendering after which the rest of the time is estimated."""
@@ -62,6 +69,17 @@ class Job:
     arguments: Callable[[Any, Any, Any], tuple[Any, ...]]
 
 
+def compile_ahead(jobs: Sequence[Job], threads: int) -> Ahead:
+    """Begins to compile the linked kernels of some jobs, which do not depend on the tables, so that
+    these can be built meanwhile."""
+    if numba.config.DISABLE_JIT:
+        return Ahead([], threads)
+    given = [job.arguments(EMPTY_SCENE, EMPTY_VIEW, Link(0)) for job in jobs]
+    signatures = [signature_of(*arguments, 0, 0, 0, 0) for arguments in given]
+    calls = [(job.kernel, one) for job, one in zip(jobs, signatures, strict=True)]
+    return Ahead(calls, threads)
+
+
 class Running:
     """The kernels of some jobs, ready to be run, as functions of (begin, end, first, last)."""
 
@@ -74,8 +92,9 @@ class Running:
         threads: int,
         say: Report | None = None,
         specialised: bool | None = None,
+        ahead: Ahead | None = None,
     ) -> None:
-        """specialised: which kernels are used; None: see above.  say: see `precompile_all`."""
+        """specialised: which kernels are used; None: see above.  say, ahead: see `precompile_all`."""
         own = _Specialised(jobs, tables, view, film_filter)
         if specialised is None:
             specialised = own.are_compiled()
@@ -87,7 +106,7 @@ class Running:
             precompile_all(own.calls, threads, say)
             self.kernels = own.kernels()
         else:
-            self.kernels = self._linked(jobs, tables, view, film_filter, threads, say)
+            self.kernels = self._linked(jobs, tables, view, film_filter, threads, say, ahead)
 
     def _linked(
         self,
@@ -97,6 +116,7 @@ class Running:
         film_filter: Any,
         threads: int,
         say: Report | None,
+        ahead: Ahead | None,
     ) -> list[Callable[..., None]]:
         self._linker = linker = Linker()
         calls, arguments = [], []
@@ -107,7 +127,7 @@ class Running:
             )
             arguments.append(given)
             calls.append((job.kernel, signature_of(*given, 0, 0, 0, 0)))
-        kernels = precompile_all([*calls, *linker.calls], threads, say)
+        kernels = precompile_all([*calls, *linker.calls], threads, say, ahead)
         linker.resolve()
         return [_bound(*one) for one in zip(kernels[: len(jobs)], arguments, strict=True)]
 

@@ -26,6 +26,27 @@ from reference_rt.textures.parameter import Colours, Numbers
 
 _NO_INTEGERS = np.zeros(0, np.int64)
 _NO_FLOATS = np.zeros(0)
+_NO_LIGHTS = LightSampler(_NO_INTEGERS, _NO_INTEGERS, _NO_FLOATS, _NO_FLOATS, np.zeros(1))
+
+EMPTY_VIEW = LinkedView(Link(0), 0, GivenRays(np.zeros((0, 3)), np.zeros((0, 3))))
+
+EMPTY_SCENE = LinkedScene(
+    geometry=Link(0),
+    shapes=Link(0),
+    is_placed=0,
+    materials=Materials(
+        *(_NO_INTEGERS for _ in range(5)),
+        shown=Colours(np.zeros((0, 3)), _NO_INTEGERS),
+        oriented=_NO_INTEGERS,
+        asks=_NO_INTEGERS,
+        textured=Textured(_NO_INTEGERS, _NO_INTEGERS, _NO_INTEGERS, 0),
+        flat_leaves=Link(0),
+        leaves=Link(0),
+    ),
+    lights=LinkedLights(Link(0), _NO_LIGHTS, Link(0), np.zeros((1, 3))),
+    textures=Link(0),
+)
+"""Nothing, of the type of every linked scene."""
 
 
 def linked_view(linker: Linker, view: Any) -> LinkedView:
@@ -208,7 +229,7 @@ def _lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLights:
     )
     choice = lights.choice
     if choice is None:
-        choice = LightSampler(_NO_INTEGERS, _NO_INTEGERS, _NO_FLOATS, _NO_FLOATS, np.zeros(1))
+        choice = _NO_LIGHTS
     if choice.cumulative is None:
         choice = choice._replace(cumulative=np.ones(1))
     tree = Link(0)

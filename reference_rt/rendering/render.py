@@ -17,7 +17,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import INTEGRATORS, RayCast
 from reference_rt.integrators.path import PathSetup
 from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
-from reference_rt.rendering.kernels import Job, Running
+from reference_rt.rendering.kernels import Job, Running, compile_ahead
 from reference_rt.rendering.tiles import aov_tile, first_hits_tile, render_tile
 from reference_rt.scene.build import BuiltScene, build_tables
 from reference_rt.scene.likely_mistakes import likely_mistakes
@@ -86,11 +86,6 @@ def render(
     """
     say = progress or (lambda what, fraction: None)
     _check(scene)
-    clock = [time.perf_counter()]
-    tables = build_tables(scene) if tables is None else tables
-    clock.append(time.perf_counter())
-    for mistake in likely_mistakes(scene, tables):
-        scene.warn(mistake.message, *mistake.path)
     film, integrator = scene.film, scene.integrator
     if isinstance(integrator, RayCast):
         shown, (jobs, layers) = integrator.show, _aov_jobs(scene)
@@ -98,11 +93,19 @@ def render(
         shown, (jobs, layers) = "colour", _render_jobs(scene, integrator)
     view = scene.camera.setup(film.width, film.height)
     threads = threads or os.cpu_count() or 1
+    clock = [time.perf_counter()]
+    with compile_ahead(jobs, threads if specialised is not True else 1) as ahead:
+        tables = build_tables(scene) if tables is None else tables
+        clock.append(time.perf_counter())
+        for mistake in likely_mistakes(scene, tables):
+            scene.warn(mistake.message, *mistake.path)
 
-    def say_compiled(done: int, total: int) -> None:
-        say("compile", done / total)
+        def say_compiled(done: int, total: int) -> None:
+            say("compile", done / total)
 
-    running = Running(jobs, tables, view, film.filter.setup(), threads, say_compiled, specialised)
+        running = Running(
+            jobs, tables, view, film.filter.setup(), threads, say_compiled, specialised, ahead
+        )
     say("compile", 1.0)
     clock.append(time.perf_counter())
     pixels = film.width * film.height

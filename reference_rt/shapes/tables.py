@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass
-from reference_rt.jit.links import LINK, declare
+from reference_rt.jit.links import LINK
+from reference_rt.jit.operation_types import declare
 from reference_rt.shapes import box
 from reference_rt.shapes.box import Box, Boxes
 from reference_rt.shapes.curved import quadrics, sphere, torus

@@ -6,7 +6,8 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.jit.links import LINK, Link, Linkable, declare, type_of
+from reference_rt.jit.links import LINK, Link, Linkable
+from reference_rt.jit.operation_types import declare, type_of
 from reference_rt.textures import bitmap, checker, vertex_colours
 from reference_rt.textures.bitmap import Bitmaps
 from reference_rt.textures.checker import Checkers
@@ -37,7 +38,7 @@ class CachedLookups(NamedTuple):
 declare(Textures | None, LINK)
 declare(Textures | CachedLookups | None, type_of(CachedLookups))
 
-_textures = Linkable("textures")
+_textures = Linkable()
 textures_operations = _textures.operations
 
 

@@ -107,7 +107,7 @@ def child_probabilities(tree: LightTree, i: int, p: Vec3, n: Vec3) -> tuple[floa
     return left / total, right / total
 
 
-light_trees = Linkable("light trees")
+light_trees = Linkable()
 """The operations on a light tree, or on a link to one."""
 
 

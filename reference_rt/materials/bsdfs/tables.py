@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.links import LINK, declare
+from reference_rt.jit.links import LINK
+from reference_rt.jit.operation_types import declare
 from reference_rt.materials.bsdfs import (
     conductor,
     dielectric,

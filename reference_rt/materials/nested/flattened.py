@@ -127,7 +127,7 @@ SIZE = 11
 """Floats of a flattened leaf in the scratch buffer: weight, s, t and n of the basis, side."""
 
 
-flattened_materials = Linkable("flattened materials")
+flattened_materials = Linkable()
 """The operations on `FlattenedMaterials`, here and in `materials.dispatch`."""
 
 
