@@ -106,5 +106,6 @@ hit_of = _choice.function
 @kernel
 def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
     if bvh is None:
-        return any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
+        found: Hit = any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
+        return found
     return hit_in_block(hits, j)

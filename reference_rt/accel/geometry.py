@@ -76,7 +76,8 @@ def occluded(geometry: Geometry, ray: Ray) -> bool:
 def _trace(bvh: Bvh | None, geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
     if bvh is None:
         # For a few shapes an early exit of any-hit rays would cost more than it saves.
-        return any_shape.nearest(geometry.shapes, geometry.packets, ray)
+        found: Hit = any_shape.nearest(geometry.shapes, geometry.packets, ray)
+        return found
     return _traverse(bvh, geometry.shapes, geometry.solids, geometry.instances, ray, any_hit)
 
 

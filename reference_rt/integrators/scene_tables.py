@@ -7,7 +7,6 @@ from reference_rt.accel.geometry import Geometry
 from reference_rt.accel.geometry import surface as surface_in_geometry
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.jit.links import Link
 from reference_rt.lights import Lights, LinkedLights
 from reference_rt.materials import Materials
 from reference_rt.shapes import Shapes
@@ -25,16 +24,17 @@ class SceneTables(NamedTuple):
 
 
 class LinkedScene(NamedTuple):
-    """A scene behind links: all scenes have this one type.  is_placed: whether there are instances
+    """A scene behind links: all scenes have this one type.  geometry, shapes, textures: `Link`s,
+    which kernels take in place of tables;  is_placed: whether there are instances
     or solids, whose surfaces take more than the shape's own table;  materials: all their arrays are
     present, `flat_leaves` and `leaves` are links."""
 
-    geometry: Link
-    shapes: Link
+    geometry: Any
+    shapes: Any
     is_placed: int
     materials: Materials
     lights: LinkedLights
-    textures: Link
+    textures: Any
 
 
 def _for(name: str, of_tables: Any, of_linked: Any) -> Any:
@@ -50,7 +50,7 @@ def _own_shapes(scene: SceneTables) -> Shapes:
 
 
 @kernel
-def _linked_shapes(scene: LinkedScene) -> Link:
+def _linked_shapes(scene: LinkedScene) -> Any:
     return scene.shapes
 
 

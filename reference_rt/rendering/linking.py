@@ -26,6 +26,7 @@ from reference_rt.textures.parameter import Colours, Numbers
 
 _NO_INTEGERS = np.zeros(0, np.int64)
 _NO_FLOATS = np.zeros(0)
+_NOTHING: Any = Link(0)
 _NO_LIGHTS = LightSampler(_NO_INTEGERS, _NO_INTEGERS, _NO_FLOATS, _NO_FLOATS, np.zeros(1))
 
 EMPTY_VIEW = LinkedView(Link(0), 0, GivenRays(np.zeros((0, 3)), np.zeros((0, 3))))
@@ -35,13 +36,17 @@ EMPTY_SCENE = LinkedScene(
     shapes=Link(0),
     is_placed=0,
     materials=Materials(
-        *(_NO_INTEGERS for _ in range(5)),
+        kind=_NO_INTEGERS,
+        row=_NO_INTEGERS,
+        smooth=_NO_INTEGERS,
+        uses_u_lobe=_NO_INTEGERS,
+        behind=_NO_INTEGERS,
         shown=Colours(np.zeros((0, 3)), _NO_INTEGERS),
         oriented=_NO_INTEGERS,
         asks=_NO_INTEGERS,
         textured=Textured(_NO_INTEGERS, _NO_INTEGERS, _NO_INTEGERS, 0),
-        flat_leaves=Link(0),
-        leaves=Link(0),
+        flat_leaves=_NOTHING,
+        leaves=_NOTHING,
     ),
     lights=LinkedLights(Link(0), _NO_LIGHTS, Link(0), np.zeros((1, 3))),
     textures=Link(0),
@@ -143,7 +148,8 @@ def _geometry(
         wanted |= {"tangents"}
     nothing: Any = np.zeros((0, 1, 8))
     packets = Packets(*(nothing if p is None else p for p in geometry.packets))
-    table = geometry._replace(shapes=shapes, packets=packets, tracer=None)
+    of_shapes: Any = shapes
+    table = geometry._replace(shapes=of_shapes, packets=packets, tracer=None)
     return linker.link(
         geometries.operations,
         wanted,
@@ -178,8 +184,8 @@ def _materials(
         "direct": {"eval_pdf", "sample", "branches"},
         "whitted": {"eval_pdf", "branches", "ambient"},
     }.get(integrator, set())
-    leaves = linker.link(bsdfs.by_code.operations, wanted, tables)
-    flat = Link(0)
+    leaves: Any = linker.link(bsdfs.by_code.operations, wanted, tables)
+    flat = _NOTHING
     if materials.flat_leaves is not None and wanted:
         nested = {
             "path": {"eval_pdf_nested", "sample_nested"},

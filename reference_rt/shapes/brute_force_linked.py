@@ -7,7 +7,6 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import BLOCK, Crossing, Hit, Ray, no_hit
 from reference_rt.core.ray_block import HitBlock, RayBlock, hit_of, put_hit, ray_of
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
-from reference_rt.jit.links import Link
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes.brute_force_table import (
     KIND,
@@ -69,7 +68,7 @@ def nearest_of_type(shapes: Shapes, kind: int, packets: Packed, ray: Ray, closes
 
 
 @kernel
-def nearest(shapes: Link, packets: Packets, ray: Ray) -> Hit:
+def nearest(shapes: Any, packets: Packets, ray: Ray) -> Hit:
     """`brute_force.nearest` through a link."""
     closest = no_hit(ray)
     closest = nearest_of_type(shapes, SPHERE, packets.spheres, ray, closest)
@@ -149,7 +148,7 @@ def complete_block(shapes: Shapes, kind: int, rays: RayBlock, hits: HitBlock, n:
 
 
 @kernel
-def nearest_of_rays(shapes: Link, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
+def nearest_of_rays(shapes: Any, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
     """`brute_force.nearest_of_rays` through a link; it completes the hits too."""
     for j in range(min(BLOCK, n + VECTOR_WIDTH - 1)):
         hits.numbers[j], hits.codes[j] = rays.numbers[6 * BLOCK + j], -1
@@ -163,6 +162,6 @@ def nearest_of_rays(shapes: Link, rays: RayBlock, hits: HitBlock, n: int, any_hi
 
 
 @kernel
-def nearest_of_ray(shapes: Link, ray: Ray, hits: HitBlock, j: int) -> Hit:
+def nearest_of_ray(shapes: Any, ray: Ray, hits: HitBlock, j: int) -> Hit:
     """`brute_force.nearest_of_ray` through a link."""
     return hit_of(hits, j)

@@ -160,7 +160,8 @@ def prepare(flat_leaves: FlattenedMaterials | None, shading: Shading, at: At) ->
         return
     if is_absent(flat_leaves):
         return
-    _prepare(flat_leaves, shading, at.textures, at.u, at.v, at.colour)
+    textures: Any = at.textures
+    _prepare(flat_leaves, shading, textures, at.u, at.v, at.colour)
 
 
 @flattened_materials.operation
