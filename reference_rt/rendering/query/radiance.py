@@ -14,8 +14,9 @@ from reference_rt.integrators import AnyIntegrator, Path, RayCast
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.kernels import Running
+from reference_rt.rendering.query.linked import link_to_scene
+from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.render import radiance_job, run_tiles
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.sampling import Independent
@@ -118,9 +119,10 @@ def _unit(rays: Rays) -> _UnitRays:
 def _colours(tables: SceneTables, rays: Rays, threads: int | None) -> FloatArray:
     o, d, valid = _unit(rays)
     out = np.empty_like(o)
+    found = link_to_scene(tables, "ray_cast")
 
     def trace(k: slice) -> None:
-        _cast(tables, o[k], d[k], out[k])
+        _cast(found.tables, o[k], d[k], out[k])
 
     in_blocks(trace, len(o), threads)
     out[~valid] = 0.0
@@ -139,7 +141,7 @@ def estimate(
     if n > 0:
         job = radiance_job(setup, sampler, (n, 1), mean, variance)
         with Running([job], tables, GivenRays(o, d), None, threads) as running:
-            run_tiles(running.run(0), (), n, spp, threads, _silent)
+            run_tiles(running.run(0), (), n, spp, threads, lambda what, fraction: None)
     if spp == 1:
         variance[:] = math.inf
     mean[~valid], variance[~valid] = 0.0, 0.0
