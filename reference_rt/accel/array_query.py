@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
-from reference_rt.accel.geometry import Geometry, closest_hit
+from reference_rt.accel.geometry import Geometry, closest_hit, occluded
 from reference_rt.accel.packet.packet import PACKET_SIZE
 from reference_rt.accel.packet.traversal import FOUND, INCOHERENT, closest_of_packet
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -100,7 +100,8 @@ def trace_packet(
 
 @kernel
 def closest_one_by_one(geometry: Geometry, o: FloatArray, d: FloatArray, found: Primitives) -> None:
-    """Closest hits by `closest_hit`: the same bits, slower, but much faster to compile."""
+    """Closest hits by `closest_hit`: the same bits as by `trace_packet`, slower, but much faster to
+    compile."""
     for i in range(len(o)):
         ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
         hit = Hit(math.inf, -1, -1, 0.0, 0.0, -1)
@@ -113,6 +114,16 @@ def closest_one_by_one(geometry: Geometry, o: FloatArray, d: FloatArray, found: 
 def _put_hit(found: Primitives, i: int, hit: Hit) -> None:
     found.t[i], found.uv[i, 0], found.uv[i, 1] = hit.t, hit.u, hit.v
     found.codes[i, 0], found.codes[i, 1], found.codes[i, 2] = hit.kind, hit.row, hit.instance
+
+
+@kernel
+def occluded_one_by_one(
+    geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
+) -> None:
+    """`occluded_rays` by `occluded`: slower, but much faster to compile."""
+    for i in range(len(o)):
+        ray, _, valid = scaled(row(o, i), row(d, i), t_max[i])
+        out[i] = valid and occluded(geometry, ray)
 
 
 @kernel

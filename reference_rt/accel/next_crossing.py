@@ -2,18 +2,21 @@
 only the closest hit."""
 
 import math
+from typing import Any
 
 from reference_rt.accel.bvh import NOTHING, Bvh, first_of, kind_of, row_of, size_of
 from reference_rt.accel.crossing_order import (
+    FROM_THE_START,
     OrderedCrossing,
     comes_after,
     nothing_at,
     ordered_crossing,
 )
 from reference_rt.accel.csg import evaluate
-from reference_rt.accel.geometry import STACK, Geometry, local_ray
+from reference_rt.accel.geometry import STACK, Geometry, geometries, local_ray
 from reference_rt.accel.leaf import INSTANCE, SOLID
 from reference_rt.accel.single_ray import can_be_nearer, enter, nearest_child
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
@@ -26,7 +29,7 @@ from reference_rt.shapes.meshes.watertight import Shear, shear_of
 KINDS = len(TABLES)
 
 
-@kernel
+@geometries.operation
 def next_crossing(geometry: Geometry, ray: Ray, after: OrderedCrossing) -> OrderedCrossing:
     """The first crossing in (0, t_max) that comes after `after`; `kind` is -1 for none.
 
@@ -34,6 +37,20 @@ def next_crossing(geometry: Geometry, ray: Ray, after: OrderedCrossing) -> Order
     and each has the t that `closest_hit` would have found.
     """
     return _next(geometry.bvh, geometry, ray, after)
+
+
+@geometries.operation
+def crossings_of_solid(
+    geometry: Geometry, s: int, ray: Ray, t: FloatArray, widths: FloatArray, part: IntArray
+) -> int:
+    """How many crossings a ray has with solid s of a geometry that has solids; t, resolution and
+    operand of as many as the arrays have room for, in order: see `evaluate.surface_along`."""
+    solids: Any = geometry.solids
+    bvh: Any = geometry.bvh
+    count, _ = evaluate.surface_along(
+        solids, geometry.shapes, bvh, s, ray, math.inf, t, widths, part, -1, FROM_THE_START
+    )
+    return count
 
 
 @kernel

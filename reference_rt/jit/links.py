@@ -22,6 +22,7 @@ neither knows the other.  `by_code.py` shows the caller's side.
 import functools
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numba
@@ -78,13 +79,13 @@ class Operation:
         self._function = function
         self._entries: dict[int, Any] = {}
 
-    @property
+    @cached_property
     def arguments(self) -> tuple[Any, ...]:
         """The types of the arguments after the table."""
         hints = typing.get_type_hints(self._function, include_extras=True)
         return tuple(type_of(hints[name]) for name in self.parameters)
 
-    @property
+    @cached_property
     def returns(self) -> Any:
         """The type of the result."""
         return type_of(typing.get_type_hints(self._function, include_extras=True)["return"])

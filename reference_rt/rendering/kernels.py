@@ -94,7 +94,7 @@ class Running:
         specialised: bool | None = None,
         ahead: Ahead | None = None,
     ) -> None:
-        """specialised: which kernels are used; None: see above.  say, ahead: of `precompile_all`."""
+        """specialised: which kernels to use; None: see above.  say, ahead: see `precompile_all`."""
         own = _Specialised(jobs, tables, view, film_filter)
         if specialised is None:
             specialised = own.are_compiled()

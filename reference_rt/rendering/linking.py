@@ -1,5 +1,6 @@
 """The links of a scene: which operations a kernel needs, on which of the scene's tables."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,9 @@ from reference_rt.materials.nested.flattened import flattened_materials
 from reference_rt.materials.textured import Textured
 from reference_rt.rendering.tiles import GivenRays, LinkedView
 from reference_rt.shapes import TABLES as SHAPES
-from reference_rt.shapes import Packets
+from reference_rt.shapes import Packets, Shapes
 from reference_rt.shapes import tables as shape_tables
+from reference_rt.textures import Textures
 from reference_rt.textures.lookup import textures_operations
 from reference_rt.textures.parameter import Colours, Numbers
 
@@ -75,22 +77,23 @@ def linked_scene(linker: Linker, tables: SceneTables, integrator: str) -> Linked
     whose kernel takes it."""
     geometry, materials, lights = tables.geometry, tables.materials, tables.lights
     is_textured, is_oriented = tables.textures is not None, materials.oriented is not None
-    textures = _textures(linker, tables)
+    textures = linked_textures(linker, tables.textures)
     shapes = _shapes(linker, tables, integrator)
     return LinkedScene(
         geometry=_geometry(linker, geometry, shapes, integrator, is_textured, is_oriented),
         shapes=shapes,
         is_placed=int(geometry.parts is not None or geometry.instances is not None),
-        materials=_materials(linker, materials, integrator, is_textured),
-        lights=_lights(linker, lights, integrator),
+        materials=linked_materials(linker, materials, integrator, is_textured),
+        lights=linked_lights(linker, lights, integrator),
         textures=textures,
     )
 
 
-def _textures(linker: Linker, tables: SceneTables) -> Link:
-    if tables.textures is None:
+def linked_textures(linker: Linker, textures: Textures | None) -> Link:
+    """Textures behind a link; None has a link to nothing."""
+    if textures is None:
         return Link(0)
-    return linker.link(textures_operations, textures_operations, {0: tables.textures})
+    return linker.link(textures_operations, textures_operations, {0: textures})
 
 
 def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
@@ -111,20 +114,19 @@ def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
         wanted |= {"owner", "face"}
     if tables.materials.oriented is not None:
         wanted |= {"tangents"}
-    found = {
-        code: table
-        for code, field, _, _ in SHAPES
-        if (table := getattr(geometry.shapes, field)) is not None
-    }
     if tables.lights.areas is not None:
         wanted |= {"whitted": {"middle", "sample"}, "ray_cast": set(), "first_hits": set()}.get(
             integrator, {"sample", "pdf"}
         )
-    return linker.link(
-        shape_tables.by_code.operations,
-        wanted,
-        found,
-    )
+    return linked_shapes(linker, geometry.shapes, wanted)
+
+
+def linked_shapes(linker: Linker, shapes: Shapes, wanted: Iterable[str]) -> Link:
+    """Shapes behind a link, with the operations `wanted`."""
+    found = {
+        code: table for code, field, _, _ in SHAPES if (table := getattr(shapes, field)) is not None
+    }
+    return linker.link(shape_tables.by_code.operations, wanted, found)
 
 
 def _geometry(
@@ -146,15 +148,15 @@ def _geometry(
         wanted |= {"coordinates"}
     if is_oriented:
         wanted |= {"tangents"}
+    return linked_geometry(linker, geometry, shapes, wanted)
+
+
+def linked_geometry(linker: Linker, geometry: Geometry, shapes: Any, wanted: Iterable[str]) -> Link:
+    """A geometry behind a link, with the operations `wanted`.  shapes: the link to its shapes."""
     nothing: Any = np.zeros((0, 1, 8))
     packets = Packets(*(nothing if p is None else p for p in geometry.packets))
-    of_shapes: Any = shapes
-    table = geometry._replace(shapes=of_shapes, packets=packets, tracer=None)
-    return linker.link(
-        geometries.operations,
-        wanted,
-        {0: table},
-    )
+    table = geometry._replace(shapes=shapes, packets=packets, tracer=None)
+    return linker.link(geometries.operations, wanted, {0: table})
 
 
 def _present(array: Any, n: int, value: int) -> Any:
@@ -170,9 +172,10 @@ def _always_textured(table: Any) -> Any:
     return type(table)(*(_always_textured(part) for part in table))
 
 
-def _materials(
+def linked_materials(
     linker: Linker, materials: Materials, integrator: str, is_textured: bool
 ) -> Materials:
+    """Materials whose tables are behind links.  integrator: see `linked_scene`."""
     n = len(materials.shown.value)
     tables = {
         code: _always_textured(table)
@@ -218,7 +221,8 @@ def _materials(
     )
 
 
-def _lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLights:
+def linked_lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLights:
+    """Lights behind links.  integrator: see `linked_scene`."""
     wanted = {
         "path": {"_background", "_environment_density", "_emitted", "_area_density", "_sample"},
         "direct": {"_background", "_environment_density", "_emitted", "_area_density", "_sample"},

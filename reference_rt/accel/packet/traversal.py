@@ -1,9 +1,10 @@
 """Packet traversal: the closest hits of PACKET_SIZE coherent rays."""
 
 import math
+from typing import Annotated
 
 from reference_rt.accel.bvh import NOTHING, Bvh, child_of
-from reference_rt.accel.geometry import STACK, Geometry
+from reference_rt.accel.geometry import STACK, Geometry, geometries
 from reference_rt.accel.leaf import nearest_of_leaf
 from reference_rt.accel.packet.nodes import (
     PER_RAY_FLOATS,
@@ -32,10 +33,12 @@ from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS
 
 INCOHERENT, MISSED, FOUND = -1, 0, 1
 
+Vectors = Annotated[FloatArray, 2]
 
-@kernel
+
+@geometries.operation
 def closest_of_packet(
-    geometry: Geometry, o: FloatArray, d: FloatArray, begin: int, rays: RayBlock, hits: HitBlock
+    geometry: Geometry, o: Vectors, d: Vectors, begin: int, rays: RayBlock, hits: HitBlock
 ) -> int:
     """`closest_hit` of the PACKET_SIZE rays begin, begin + 1, ... with origins o (n, 3) and
     directions d (n, 3).

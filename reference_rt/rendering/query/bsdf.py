@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +13,12 @@ from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.scaled_ray import scaled
 from reference_rt.core.vec3 import Frame, Vec3, normalize, row
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
+from reference_rt.jit.links import Linker
 from reference_rt.materials import Materials, Shading, scratch_floats
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
+from reference_rt.rendering.linking import linked_materials, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
+from reference_rt.rendering.query.linked import Linked, linked
 from reference_rt.rendering.query.rays import (
     broadcast,
     check_in_unit_cube,
@@ -65,7 +69,6 @@ def _shading(
     return shading
 
 
-# It takes only materials and textures, so that scenes with other shapes and lights share it.
 @entry_kernel
 def _scatter(
     materials: Materials,
@@ -133,6 +136,16 @@ class Bsdf:
             raise SceneError(no_such("material", name, scene.materials))
         self._tables, self._number = scene.tables, number
 
+    def _linked(self) -> Linked:
+        """(materials, textures)."""
+        materials, textures = self._tables.materials, self._tables.textures
+
+        def link(linker: Linker) -> Any:
+            of_materials = linked_materials(linker, materials, "path", textures is not None)
+            return of_materials, linked_textures(linker, textures)
+
+        return linked(self._tables, "bsdf", link, (materials, textures))
+
     def evaluate(
         self,
         wo: npt.ArrayLike,
@@ -198,11 +211,11 @@ class Bsdf:
             check_in_unit_cube(other)
         where = np.concatenate(at, axis=1)
         out = np.empty((len(back), 4 if u is None else 9))
-        materials, textures = self._tables.materials, self._tables.textures
+        found = self._linked()
 
         def scatter(k: slice) -> None:
             wi_of, u_of = (other[k], NOTHING) if u is None else (NOTHING, other[k])
-            _scatter(materials, textures, self._number, back[k], wi_of, u_of, where[k], out[k])
+            _scatter(*found.tables, self._number, back[k], wi_of, u_of, where[k], out[k])
 
         in_blocks(scatter, len(back), threads)
         return out, shape

@@ -10,8 +10,10 @@ import numpy.typing as npt
 from reference_rt.core.arrays import IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.query.hits import Intersections
+from reference_rt.rendering.query.linked import link_to_geometry
 from reference_rt.rendering.query.rays import in_blocks, rays_of
 from reference_rt.rendering.query.tracing import (
+    CROSSING,
     NO_LIMIT,
     HitArrays,
     cross,
@@ -65,10 +67,11 @@ def crossings(
     starts = np.zeros(n) if rays.t_min is None else rays.t_min
     ends = np.full(n, math.inf) if rays.t_max is None else rays.t_max
     counts = np.zeros(n, np.int64)
+    crossed = link_to_geometry(scene, *CROSSING)
     parts: dict[int, list[tuple[IntArray, HitArrays]]] = {}
 
     def trace(k: slice) -> None:
-        arguments = scene.geometry, rays.o[k], rays.d[k], starts[k], ends[k]
+        arguments = crossed.tables, rays.o[k], rays.d[k], starts[k], ends[k]
         n, begin = len(counts[k]), 0
         found: list[tuple[IntArray, HitArrays]] = []
         room = EXPECTED * n

@@ -7,20 +7,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.accel.array_query import occluded_rays
+from reference_rt.accel.array_query import occluded_one_by_one, occluded_rays
 from reference_rt.accel.geometry import Geometry
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
+from reference_rt.rendering.query.batches import FirstHits, first_beyond, trace_in_ray_order
+from reference_rt.rendering.query.linked import link_to_geometry
 from reference_rt.rendering.query.rays import Rays, checked_rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.query.tracing import (
+    BLOCKS,
+    CROSSING,
+    FEW,
     NO_LIMIT,
     empty_hits,
     empty_primitives,
-    first_beyond,
     rows_of,
-    trace_first_hits,
-    trace_in_ray_order,
 )
 
 BoolArray = npt.NDArray[np.bool_]
@@ -71,20 +73,25 @@ def _occluded(
     occluded_rays(geometry, o, d, t_max, out)
 
 
+@entry_kernel
+def _occluded_of_few(
+    geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: BoolArray
+) -> None:
+    occluded_one_by_one(geometry, o, d, t_max, out)
+
+
 def _trace(scene: SceneTables, rays: Rays, threads: int | None, surfaces: bool) -> list[Any]:
     """The columns of `HitArrays`, in the shape of the given rays."""
     low, high, n = rays.t_min, rays.t_max, len(rays.o)
-    out = empty_hits(n, surfaces)
+    out, query = empty_hits(n, surfaces), FirstHits(scene, n)
 
     def trace(k: slice) -> None:
-        trace_first_hits(
-            scene.geometry,
+        query.trace(
             rays.o[k],
             rays.d[k],
             None if low is None else low[k],
             NO_LIMIT if high is None else high[k],
             rows_of(out, k),
-            n,
         )
 
     in_blocks(trace, n, threads)
@@ -139,14 +146,18 @@ def occluded(
     low, high, n = rays.t_min, rays.t_max, len(rays.o)
     ends = np.full(n, math.inf) if high is None else high
     out = np.zeros(n, np.bool_)
+    few = n <= FEW
+    kernel = _occluded_of_few if few else _occluded
+    found = link_to_geometry(scene, "occluded" if few else "any_hits")
 
     def trace(k: slice) -> None:
         o, d, end = rays.o[k], rays.d[k], ends[k]
-        _occluded(scene.geometry, o, d, end, out[k])
+        kernel(found.tables, o, d, end, out[k])
         if low is not None:
             again = np.flatnonzero(out[k] & (low[k] > 0.0))
-            found = first_beyond(scene.geometry, o[again], d[again], low[k][again], end[again])
-            out[k][again] = found.codes[:, 0] >= 0
+            crossed = link_to_geometry(scene, *CROSSING)
+            beyond = first_beyond(crossed, o[again], d[again], low[k][again], end[again])
+            out[k][again] = beyond.codes[:, 0] >= 0
 
     in_blocks(trace, n, threads)
     return shaped(out, rays.shape)  # type: ignore[no-any-return]
@@ -176,9 +187,10 @@ def closest_primitives(
     """See `Closest`."""
     o, d = checked_rays(origins, directions)
     found, out = empty_primitives(len(o)), empty_hits(len(o), surfaces=False)
+    traced = link_to_geometry(scene, *BLOCKS)
 
     def trace(k: slice) -> None:
-        met = trace_in_ray_order(scene.geometry, o[k], d[k], NO_LIMIT, rows_of(out, k))
+        met = trace_in_ray_order(traced.tables, o[k], d[k], NO_LIMIT, rows_of(out, k))
         for whole, part in zip(found, met, strict=True):
             whole[k] = part
 

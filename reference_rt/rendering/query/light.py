@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +18,18 @@ from reference_rt.integrators.direct_light import direct
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import entry_kernel, local_floats
+from reference_rt.jit.links import Linker
 from reference_rt.lights import TABLES, Constant, EnvironmentMap, Lights
 from reference_rt.materials import scratch_floats
+from reference_rt.rendering.linking import linked_lights, linked_shapes, linked_textures
+from reference_rt.rendering.query.batches import FirstHits
 from reference_rt.rendering.query.hits import BoolArray
+from reference_rt.rendering.query.linked import (
+    Linked,
+    link_to_geometry,
+    link_to_scene,
+    linked,
+)
 from reference_rt.rendering.query.rays import (
     broadcast,
     check_in_unit_cube,
@@ -29,7 +39,7 @@ from reference_rt.rendering.query.rays import (
     rays_of,
     shaped,
 )
-from reference_rt.rendering.query.tracing import NO_LIMIT, empty_hits, hit_of, trace_first_hits
+from reference_rt.rendering.query.tracing import NO_LIMIT, empty_hits, hit_of
 from reference_rt.scene.build import BuiltScene
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Shapes
@@ -72,7 +82,6 @@ class DirectLight:
     contribution: FloatArray
 
 
-# They take only lights, shapes and textures, so that scenes with other materials share them.
 @entry_kernel
 def _sample(
     lights: Lights,
@@ -108,6 +117,7 @@ def _sample(
 def _pdf(
     geometry: Geometry,
     lights: Lights,
+    shapes: Shapes,
     p: FloatArray,
     n: FloatArray,
     d: FloatArray,
@@ -123,7 +133,7 @@ def _pdf(
             out[i] = any_light.environment_pdf(lights, ray.o, row(n, i), normalize(ray.d))
             continue
         q = surface(geometry, ray, hit_of(found, i))
-        out[i] = any_light.area_pdf(lights, geometry.shapes, ray.o, row(n, i), q)
+        out[i] = any_light.area_pdf(lights, shapes, ray.o, row(n, i), q)
 
 
 @entry_kernel
@@ -179,6 +189,21 @@ def light_sources(scene: BuiltScene) -> LightSources:
     )
 
 
+def _linked_lights(scene: SceneTables) -> Linked:
+    """(lights, shapes, textures)."""
+    lights, shapes, textures = scene.lights, scene.geometry.shapes, scene.textures
+
+    def link(linker: Linker) -> Any:
+        wanted = {"sample", "pdf", "uv", "colour"} if lights.areas is not None else set()
+        return (
+            linked_lights(linker, lights, "path"),
+            linked_shapes(linker, shapes, wanted),
+            linked_textures(linker, textures),
+        )
+
+    return linked(scene, "lights", link, (lights, shapes, textures))
+
+
 def sample_lights(
     scene: SceneTables,
     points: npt.ArrayLike,
@@ -201,9 +226,10 @@ def sample_lights(
     check_in_unit_cube(u)
     light, out = np.empty(len(p), np.int64), np.empty((len(p), 12))
 
+    found = _linked_lights(scene)
+
     def sample(k: slice) -> None:
-        shapes = scene.geometry.shapes
-        _sample(scene.lights, shapes, scene.textures, p[k], n[k], u[k], light[k], out[k])
+        _sample(*found.tables, p[k], n[k], u[k], light[k], out[k])
 
     in_blocks(sample, len(p), threads)
     columns = (out[:, 0:3], out[:, 3], out[:, 4:7], out[:, 7:10], out[:, 10], out[:, 11] != 0.0)
@@ -231,15 +257,15 @@ def light_pdf(
         ("t_min", numbers("t_min", t_min), 0),
     )
     rays = rays_of(p, d, low if low.any() else 0.0)
-    out = np.empty(len(p))
+    out, query = np.empty(len(p)), FirstHits(scene, len(p))
+    surfaces, sources = link_to_geometry(scene, "surface"), _linked_lights(scene)
 
     def density(k: slice) -> None:
         answers = empty_hits(len(p[k]), surfaces=False)
         begin = None if rays.t_min is None else rays.t_min[k]
-        found = trace_first_hits(
-            scene.geometry, p[k], d[k], begin, NO_LIMIT, answers, len(p), rows=True
-        )
-        _pdf(scene.geometry, scene.lights, p[k], n[k], d[k], found, out[k])
+        found = query.trace(p[k], d[k], begin, NO_LIMIT, answers, rows=True)
+        lights, shapes, _ = sources.tables
+        _pdf(surfaces.tables, lights, shapes, p[k], n[k], d[k], found, out[k])
 
     in_blocks(density, len(p), threads)
     return shaped(out, shape)  # type: ignore[no-any-return]
@@ -257,7 +283,7 @@ def direct_light(
     choice = scene.lights.choice
     if choice is None or choice.probability[light] == 0.0:
         raise ValueError(f"light {light} cannot be sampled; expected one that can be picked")
-    out = np.zeros((len(o), 7))
+    out, found = np.zeros((len(o), 7)), link_to_scene(scene, "direct")
     with np.errstate(all="ignore"):
-        _direct(scene, o, d, light, u[0], u[1], out)
+        _direct(found.tables, o, d, light, u[0], u[1], out)
     return DirectLight(target=out[:, 0:3], pdf=out[:, 3], contribution=out[:, 4:7])

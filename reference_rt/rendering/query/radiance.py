@@ -15,6 +15,7 @@ from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.kernels import Running
+from reference_rt.rendering.query.linked import link_to_scene
 from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.render import radiance_job, run_tiles
 from reference_rt.rendering.tiles import GivenRays
@@ -118,9 +119,10 @@ def _unit(rays: Rays) -> _UnitRays:
 def _colours(tables: SceneTables, rays: Rays, threads: int | None) -> FloatArray:
     o, d, valid = _unit(rays)
     out = np.empty_like(o)
+    found = link_to_scene(tables, "ray_cast")
 
     def trace(k: slice) -> None:
-        _cast(tables, o[k], d[k], out[k])
+        _cast(found.tables, o[k], d[k], out[k])
 
     in_blocks(trace, len(o), threads)
     out[~valid] = 0.0

@@ -2,19 +2,18 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.accel.crossing_order import FROM_THE_START
-from reference_rt.accel.csg.evaluate import surface_along
 from reference_rt.accel.geometry import Geometry
+from reference_rt.accel.next_crossing import crossings_of_solid
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
+from reference_rt.rendering.query.linked import link_to_geometry
 from reference_rt.rendering.query.rays import checked_rays
 
 
@@ -44,23 +43,9 @@ def _crossings(
     part: IntArray,
     count: IntArray,
 ) -> None:
-    solids: Any = geometry.solids
-    bvh: Any = geometry.bvh
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
-        count[i], _ = surface_along(
-            solids,
-            geometry.shapes,
-            bvh,
-            solid,
-            ray,
-            math.inf,
-            t[i],
-            widths[i],
-            part[i],
-            -1,
-            FROM_THE_START,
-        )
+        count[i] = crossings_of_solid(geometry, solid, ray, t[i], widths[i], part[i])
 
 
 def crossings(
@@ -80,6 +65,7 @@ def crossings(
     t, widths = np.full((2, len(o), most), math.inf)
     part = np.full((len(o), most), -1)
     count = np.zeros(len(o), np.int64)
+    crossed = link_to_geometry(scene, "crossings_of_solid")
     with np.errstate(all="ignore"):
-        _crossings(scene.geometry, solid, o, d, t, widths, part, count)
+        _crossings(crossed.tables, solid, o, d, t, widths, part, count)
     return SolidCrossings(t, widths, part, count)

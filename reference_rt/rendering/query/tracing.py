@@ -1,4 +1,7 @@
-"""Entry kernels of array queries: first hits and crossings of arrays of rays."""
+"""Entry kernels of array queries: first hits and crossings of arrays of rays.
+
+They take a geometry, or a link to one with the operations that are named here (`linked.py`).
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -63,7 +66,16 @@ NO_LIMIT = np.empty(0)
 """In place of t_max for each ray: no limit."""
 
 
-# The kernels take only the geometry, so that scenes with other materials and lights share them.
+BLOCKS = ("closest_hits", "closest_of_packet", "surface", "owner")
+"""The operations of `closest`."""
+
+ONE_BY_ONE = ("closest_hit", "surface", "owner")
+"""Those of `closest_of_few` and `describe`."""
+
+CROSSING = ("next_crossing", "surface", "owner")
+"""Those of `cross` and `describe`."""
+
+
 @entry_kernel
 def closest(
     geometry: Geometry,
@@ -107,7 +119,7 @@ BUFFER = 256
 
 FEW = 1 << 12
 """Up to this many rays are traced one by one: `closest` has the same result some milliseconds
-earlier, but takes 3 to 5 s longer to compile for a kind of scene (measured)."""
+earlier, but what it calls takes longer to compile."""
 
 
 @entry_kernel
@@ -227,68 +239,3 @@ def cross(
             filled += 1
         counts[i] = filled - first
     return len(o)
-
-
-def trace_in_ray_order(
-    geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: HitArrays
-) -> Primitives:
-    """First hits, into `out`; also as primitives, in the order of the rays."""
-    size = len(o) + MOST_ADDED
-    unordered, numbers = empty_primitives(size), np.empty(size, np.int64)
-    closest(geometry, o, d, t_max, unordered, numbers, out)
-    found = empty_primitives(len(o))
-    for ordered, values in zip(found, unordered, strict=True):
-        ordered[numbers[: len(o)]] = values[: len(o)]
-    return found
-
-
-def trace_first_hits(
-    geometry: Geometry,
-    o: FloatArray,
-    d: FloatArray,
-    t_min: FloatArray | None,
-    t_max: FloatArray,
-    out: HitArrays,
-    total: int,
-    rows: bool = False,
-) -> Primitives:
-    """First hits of a block of rays, of `total` in all blocks, at t_min < t < t_max, into `out`;
-    with `rows` (or few rays) also as primitives."""
-    found = empty_primitives(0)
-    if total <= FEW:
-        found = empty_primitives(len(o))
-        closest_of_few(geometry, o, d, found)
-        describe(geometry, o, d, EVERY_RAY, t_max, found, out)
-    elif rows:
-        found = trace_in_ray_order(geometry, o, d, t_max, out)
-    else:
-        buffer = empty_primitives(BUFFER), np.empty(BUFFER, np.int64)
-        closest(geometry, o, d, t_max, *buffer, out)
-    if t_min is None:
-        return found
-    again = np.flatnonzero(out.t <= t_min)
-    if len(again) > 0:
-        n, o, d, t_min = len(again), o[again], d[again], t_min[again]
-        t_max = np.full(n, math.inf) if t_max is NO_LIMIT else t_max[again]
-        beyond = first_beyond(geometry, o, d, t_min, t_max)
-        hits = empty_hits(n, len(out.p) > 0)
-        describe(geometry, o, d, EVERY_RAY, t_max, beyond, hits)
-        for whole, part in zip((*found, *out), (*beyond, *hits), strict=True):
-            if len(whole) > 0:
-                whole[again] = part
-    return found
-
-
-def first_beyond(
-    geometry: Geometry, o: FloatArray, d: FloatArray, t_min: FloatArray, t_max: FloatArray
-) -> Primitives:
-    """The first crossing of each ray at t_min < t < t_max."""
-    n = len(o)
-    met, rays, counts = empty_primitives(n), np.empty(n, np.int64), np.empty(n, np.int64)
-    cross(geometry, o, d, t_min, t_max, 0, 1, counts, rays, met)
-    m = int(counts.sum())
-    found = empty_primitives(n)
-    found.codes[:] = -1
-    for whole, part in zip(found, met, strict=True):
-        whole[rays[:m]] = part[:m]
-    return found
