@@ -39,7 +39,8 @@ def type_of(annotation: Any) -> Any:
             return _TYPE_OF[annotation]
     if typing.get_origin(annotation) is Annotated:
         of, dimensions = typing.get_args(annotation)
-        return type_of(of).copy(ndim=dimensions)
+        if isinstance(array := type_of(of), types.Array):
+            return array.copy(ndim=dimensions)
     if typing.get_origin(annotation) is tuple:
         parts = [type_of(part) for part in typing.get_args(annotation)]
         return types.BaseTuple.from_types(parts)

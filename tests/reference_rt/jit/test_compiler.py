@@ -85,6 +85,15 @@ def test_a_method_that_is_gone_is_found_when_ours_is_imported(owner, name, monke
         runpy.run_path(str(numba_pipeline.__file__))
 
 
+@pytest.mark.parametrize(("owner", "name"), compiler.NEEDED, ids=[n for _, n in compiler.NEEDED])
+def test_a_part_that_links_need_and_that_is_gone_is_named_in_one_line(owner, name, monkeypatch):
+    for cls in getattr(owner, "__mro__", [owner]):
+        if name in vars(cls):
+            monkeypatch.delattr(cls, name)
+    with pytest.raises(ImportError, match=rf"^Numba {numba.__version__}: .*{name}; expected: .*$"):
+        runpy.run_path(str(compiler.__file__))
+
+
 def test_options_that_numba_does_not_know_are_left_out(monkeypatch):
     """Numba refuses to compile with one it does not know."""
 
@@ -93,10 +102,8 @@ def test_options_that_numba_does_not_know_are_left_out(monkeypatch):
 
     monkeypatch.setattr(compiler.cpu_target, "options", Options)
     stock = compiler._stock()
-    assert (stock.kernel, stock.entry.keys()) == (
-        {"error_model": "numpy"},
-        {"error_model", "nogil"},
-    )
+    assert stock.kernel == stock.callee == {"error_model": "numpy"}
+    assert stock.entry.keys() == {"error_model", "nogil"}
 
 
 # ---- the same bits ------------------------------------------------------------------------------
