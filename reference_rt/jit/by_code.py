@@ -43,7 +43,7 @@ from numba import types
 
 from reference_rt.jit.generated import define, parameters_of
 from reference_rt.jit.kernel import is_named_tuple, kernel, overload_kernel
-from reference_rt.jit.links import Group, Link, Row
+from reference_rt.jit.links import Group, Link, Row, stop
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -98,7 +98,8 @@ class ByCode(Group):
     def in_turn(self, step: Callable[..., Any]) -> Callable[..., Any]:
         """f(tables, ..., result): what step(code, table, ..., result) returns for the last table
         that is present, the result of each being passed to the next; no loop, so that the code and
-        the type of the table are constants in each step.  Not for links."""
+        the type of the table are constants in each step.  Given a link, it stops the process:
+        Numba's own compiler compiles calls that are never made."""
         _, _, *others = parameters_of(step)
         given, result = ", ".join(others), others[-1]
         rows = [Row(number, field, step) for number, field, _ in self._rows]
@@ -108,7 +109,12 @@ class ByCode(Group):
                 yield f"{result} = {field}({number}, tables.{field}, {given})"
             yield f"return {result}"
 
-        return _chosen(step, ["tables", *others], rows, lines, None)
+        def linked() -> Callable[..., Any]:
+            name = step.__name__
+            text = f"def {name}(tables, {given}):\n    stop()\n    return {result}\n"
+            return define(text, step.__module__, name, "for a link", {"stop": stop})
+
+        return _chosen(step, ["tables", *others], rows, lines, linked)
 
 
 def _chosen(
@@ -116,7 +122,7 @@ def _chosen(
     parameters: Sequence[str],
     rows: Sequence[Row],
     lines: Callable[[Sequence[Row]], Iterable[str]],
-    linked: Callable[[], Callable[..., Any]] | None,
+    linked: Callable[[], Callable[..., Any]],
     **names: Any,
 ) -> F:
     """The kernel that runs, for tables of which some are None, the text `lines` of the others; for
@@ -144,9 +150,9 @@ def _chosen(
         return write(lambda field: getattr(tables, field) is not None)(tables, *rest)
 
     @overload_kernel(choose)
-    def _compiled(tables: Any, *rest: Any) -> Callable[..., Any] | None:
+    def _compiled(tables: Any, *rest: Any) -> Callable[..., Any]:
         if is_named_tuple(tables, Link):
-            return None if linked is None else linked()
+            return linked()
         type_of = dict(zip(tables.fields, tables.types, strict=True))
         return write(lambda field: not isinstance(type_of[field], types.NoneType))
 

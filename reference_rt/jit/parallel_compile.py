@@ -164,16 +164,23 @@ def _fork(calls: Sequence[Call], waiting: int, reports: int) -> int:
 
 
 def fork_with_compiler() -> int:
-    """`os.fork` of a child that can compile, and that ends with this process."""
+    """`os.fork` of a child that can compile, and that ends with this process, not by Ctrl-C."""
     # Holding the compiler's lock, so that no other thread does: the child has this thread only, and
     # a lock held by another would stay locked in it for ever.
     parent = os.getpid()
     with global_compiler_lock, warnings.catch_warnings():
         # Python 3.12 warns of a fork in a process with threads.
         warnings.simplefilter("ignore", DeprecationWarning)
-        child = os.fork()
-    if child == 0:
-        end_with_parent(parent)
+        # A terminal sends Ctrl-C to the child too.  Raised there before it is known to be a child,
+        # it would end it as the program ends, with a message and exit handlers.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            child = os.fork()
+            if child == 0:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+                end_with_parent(parent)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return child
 
 

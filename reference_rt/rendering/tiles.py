@@ -105,6 +105,12 @@ def _linked_lens(view: LinkedView, sampler: Any) -> tuple[float, float]:
 
 
 @kernel
+def _own_lens(view: Any, sampler: Any) -> tuple[float, float]:
+    x, y = lens_sample(view, sampler)
+    return x, y
+
+
+@kernel
 def _itself(view: Any) -> Any:
     return view
 
@@ -119,7 +125,7 @@ _views.register(LinkedView, _linked_view)
 _lenses.register(LinkedView, _linked_lens)
 for _view in VIEWS:
     _views.register(_view, _itself)
-    _lenses.register(_view, lens_sample)
+    _lenses.register(_view, _own_lens)
 _view_of, _lens_of = _views.function, _lenses.function
 
 

@@ -106,3 +106,57 @@ def test_processes_write_and_read_at_the_same_time(start):
     together = [start(code) for code in (_WRITES, _READS, _WRITES)]
     assert [_done(process) for process in together] == [(0, "")] * 3
     assert _done(start("print(run())")) == (0, "1")
+
+
+_TWO = """
+import os
+import time
+from pathlib import Path
+import numpy as np
+from reference_rt.jit import parallel_compile
+from reference_rt.jit.kernel import entry_kernel, is_compiled, signature_of
+
+@entry_kernel
+def double(x):
+    x[0] *= 2.0
+
+@entry_kernel
+def negate(x):
+    x[0] = -x[0]
+
+here, taken, precompile = os.getpid(), Path("taken"), parallel_compile.precompile
+
+def one_for_the_child(kernel, signature):
+    if os.getpid() != here:
+        taken.touch()
+    while not taken.exists():
+        time.sleep(0.01)
+    return precompile(kernel, signature)
+
+def main():
+    parallel_compile.precompile = one_for_the_child
+    x = np.array([3.0])
+    calls = [(kernel, signature_of(x)) for kernel in (double, negate)]
+    before = [is_compiled(*call) for call in calls]
+    parallel_compile.precompile_all(calls, threads=2)
+    double(x)
+    negate(x)
+    hits = sum(sum(k.stats.cache_hits.values()) for k in (double, negate))
+    print(before, "some" if hits > 0 else "none", x)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is one process")
+def test_what_others_compile_is_found_in_the_cache(tmp_path):
+    """By this process; the next one finds all."""
+    (tmp_path / "two.py").write_text(_TWO)
+    for before in (False, True):
+        done = subprocess.run(
+            [sys.executable, "-c", "import two; two.main()"],
+            env=os.environ | {"REFERENCE_RT_CACHE": str(tmp_path / "cache")},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.strip() == f"{[before] * 2} some [-6.]"

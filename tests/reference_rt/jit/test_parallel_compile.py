@@ -1,8 +1,7 @@
-"""Kernels compiled in several processes, and kernels called through function pointers."""
+"""Kernels compiled in several processes, some of which fail."""
 
 import os
-import subprocess
-import sys
+import signal
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -12,67 +11,11 @@ import numba
 import numpy as np
 import pytest
 
-from reference_rt import Scene, Sphere
 from reference_rt.jit import parallel_compile
-from reference_rt.jit.function_pointer import call_pointer, pointer_to
 from reference_rt.jit.kernel import entry_kernel, is_compiled, precompile, signature_of
-from reference_rt.rendering import kernels
-from reference_rt.rendering import render as rendering
+from reference_rt.jit.parallel_compile import Ahead
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-
-_TWO = """
-import os
-import time
-from pathlib import Path
-import numpy as np
-from reference_rt.jit import parallel_compile
-from reference_rt.jit.kernel import entry_kernel, is_compiled, signature_of
-
-@entry_kernel
-def double(x):
-    x[0] *= 2.0
-
-@entry_kernel
-def negate(x):
-    x[0] = -x[0]
-
-here, taken, precompile = os.getpid(), Path("taken"), parallel_compile.precompile
-
-def one_for_the_child(kernel, signature):
-    if os.getpid() != here:
-        taken.touch()
-    while not taken.exists():
-        time.sleep(0.01)
-    return precompile(kernel, signature)
-
-def main():
-    parallel_compile.precompile = one_for_the_child
-    x = np.array([3.0])
-    calls = [(kernel, signature_of(x)) for kernel in (double, negate)]
-    before = [is_compiled(*call) for call in calls]
-    parallel_compile.precompile_all(calls, threads=2)
-    double(x)
-    negate(x)
-    hits = sum(sum(k.stats.cache_hits.values()) for k in (double, negate))
-    print(before, "some" if hits > 0 else "none", x)
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is one process")
-def test_what_others_compile_is_found_in_the_cache(tmp_path):
-    """By this process; the next one finds all."""
-    (tmp_path / "two.py").write_text(_TWO)
-    for before in (False, True):
-        done = subprocess.run(
-            [sys.executable, "-c", "import two; two.main()"],
-            env=os.environ | {"REFERENCE_RT_CACHE": str(tmp_path / "cache")},
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        assert done.stdout.strip() == f"{[before] * 2} some [-6.]"
 
 
 @entry_kernel
@@ -175,7 +118,7 @@ def test_one_process_says_what_is_done_too(threads, cold, monkeypatch):
     monkeypatch.setattr(parallel_compile, "may_fork", lambda: False)
     told = []
     parallel_compile.precompile_all(cold.calls, threads, lambda *now: told.append(now))
-    assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    assert told == [(0, 3), (1, 3), (2, 3), (3, 3), (3, 3)]
     assert cold.children == []
 
 
@@ -211,7 +154,7 @@ def test_what_comes_to_nothing_elsewhere_is_compiled_here(fault, cold, monkeypat
     assert len(cold.compiled(False)) == 1
     assert all(is_compiled(*call) for call in cold.calls)
     assert cold.children_have_ended()
-    assert told == [(0, 3), (1, 3), (2, 3)]  # never more than there are
+    assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
 
 
 @forks
@@ -243,6 +186,23 @@ def test_an_interrupt_ends_the_other_processes_too(when, cold, monkeypatch):
 
 
 @forks
+def test_a_child_is_deaf_to_an_interrupt(cold, monkeypatch):
+    """Ctrl-C in a terminal goes to it too; this process ends it."""
+
+    def compiling(kernel, signature):
+        if os.getpid() != cold.here:
+            os.kill(os.getpid(), signal.SIGINT)
+            cold.note(kernel)
+        while cold.compiled(False) == []:
+            time.sleep(0.01)
+
+    monkeypatch.setattr(parallel_compile, "precompile", compiling)
+    parallel_compile.precompile_all(cold.calls, 2)
+    assert cold.compiled(False)
+    assert signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+
+
+@forks
 def test_an_error_here_ends_the_other_processes_too(cold, monkeypatch):
     def compiling(kernel, signature):
         if os.getpid() != cold.here:
@@ -255,50 +215,65 @@ def test_an_error_here_ends_the_other_processes_too(cold, monkeypatch):
     assert cold.children_have_ended()
 
 
-class Pair(NamedTuple):
-    numbers: Any
-    factor: float
+# ---- ahead --------------------------------------------------------------------------------------
 
 
-@entry_kernel
-def weigh(pair: Pair, nothing: None, offset: int, negative: bool, out: Any) -> None:
-    for i in range(len(out)):
-        value = pair.numbers[i] * pair.factor + offset
-        out[i] = -value if negative else value
+@pytest.fixture
+def noting(cold, monkeypatch):
+    def one(kernel, signature):
+        cold.note(kernel)
+        return precompile(kernel, signature)
+
+    monkeypatch.setattr(parallel_compile, "precompile", one)
+    return cold
 
 
-@entry_kernel
-def weigh_at(address: Any, pair: Pair, out: Any) -> None:
-    call_pointer(address[0], (pair, None, len(out), True, out))
+@forks
+def test_what_is_begun_ahead_is_not_begun_again(noting):
+    """This process compiles the rest meanwhile, and loads all in the end."""
+    told = []
+    with Ahead(noting.calls[:2], 2) as ahead:
+        parallel_compile.precompile_all(noting.calls, 2, lambda *now: told.append(now), ahead)
+    assert noting.compiled(False) == ["increase", "decrease"]
+    assert noting.compiled(True) == ["scale", "increase", "decrease", "scale"]
+    assert len(noting.children) == 1
+    assert noting.children_have_ended()
+    assert (told[0], told[-1]) == ((0, 3), (3, 3))
 
 
-def test_a_kernel_is_called_at_its_address():
-    pair, out = Pair(np.array([1.0, 2.0, 4.0]), 0.5), np.zeros(3)
-    signature = signature_of(pair, None, 0, False, out)
-    precompile(weigh, signature)
-    weigh_at(np.array([pointer_to(weigh, signature)], np.intp), pair, out)
-    assert out.tolist() == [-3.5, -4.0, -5.0]
+@forks
+@pytest.mark.parametrize("fault", ["stands still", "fails", "is killed"])
+def test_what_comes_to_nothing_ahead_is_compiled_here(fault, cold, monkeypatch):
+    def one_that_ends(kernel, signature):
+        if os.getpid() == cold.here:
+            return precompile(kernel, signature)
+        if fault == "stands still":
+            time.sleep(1000.0)
+        if fault == "fails":
+            raise OSError("no space left on device")
+        return os.kill(os.getpid(), 9)
+
+    monkeypatch.setattr(parallel_compile, "precompile", one_that_ends)
+    monkeypatch.setattr(parallel_compile, "PATIENCE", 0.5)
+    with Ahead(cold.calls, 2) as ahead:
+        done = parallel_compile.precompile_all(cold.calls, 2, None, ahead)
+    assert len(done) == 3
+    assert all(is_compiled(*call) for call in cold.calls)
+    assert cold.children_have_ended()
 
 
-def test_paths_are_the_same_with_their_tracer_apart(monkeypatch):
-    """Enough spheres for a hierarchy, one in the other's light."""
-    rng = np.random.default_rng(7)
-    spheres = tuple(Sphere(center=tuple(rng.uniform(-2.0, 2.0, 3)), radius=0.4) for _ in range(60))
-    scene = Scene.model_validate(
-        {
-            "shapes": [s.model_dump() for s in spheres],
-            "camera": {"type": "perspective", "eye": [0.5, 1.0, 5.0]},
-            "lights": [{"type": "constant", "radiance": 1.0}],
-            "film": {"width": 16, "height": 16},
-            "sampler": {"type": "sobol", "spp": 4},
-            "integrator": {"type": "path", "max_depth": 3},
-        }
-    )
-    asked = []
-    tracer_of = kernels.tracer_of
-    monkeypatch.setattr(kernels, "tracer_of", lambda g: asked.append(tracer_of(g)) or asked[-1])
-    apart = rendering.render(scene, specialised=True)
-    assert asked[0] is not None
-    monkeypatch.setattr(kernels, "tracer_of", lambda geometry: None)
-    assert np.array_equal(apart.colour, rendering.render(scene, specialised=True).colour)
-    assert len(np.unique(apart.colour)) > 100
+@forks
+def test_an_error_ends_what_was_begun_ahead(cold, monkeypatch):
+    monkeypatch.setattr(parallel_compile, "precompile", lambda *call: time.sleep(1000.0))
+    with pytest.raises(OSError, match="the scene's mesh"), Ahead(cold.calls, 2):
+        raise OSError("the scene's mesh")
+    assert len(cold.children) == 1
+    assert cold.children_have_ended()
+
+
+def test_nothing_is_begun_ahead_by_one_thread_or_without_need(cold, monkeypatch):
+    Ahead(cold.calls, 1)
+    Ahead([], 2)
+    monkeypatch.setattr(parallel_compile, "is_compiled", lambda *call: True)
+    Ahead(cold.calls, 2)
+    assert cold.children == []

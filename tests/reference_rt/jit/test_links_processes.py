@@ -1,0 +1,153 @@
+"""Links in several processes: what is not linked ends one; another loads what one has compiled."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from builders import HELPERS
+from linked_tables import (
+    ADDER,
+    CODES,
+    OTHER,
+    by_code,
+    by_codes,
+    linked,
+    of_pair,
+    pairs,
+    tables_of,
+    values,
+)
+
+from reference_rt.jit.kernel import precompile
+from reference_rt.jit.links import Linker
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+
+
+def call(case):
+    """In a process of its own."""
+    tables = by_codes(tables_of(True, True, True))
+    out = np.zeros((2, 1))
+    if case == "one of several tables":
+        _, link = linked(by_code, tables, "count")
+        code = ADDER
+    elif case == "a type without the kernel":  # whose call is the function's own body
+        _, link = linked(by_code, tables, "count")
+        code = OTHER
+    elif case == "not resolved":
+        linker = Linker()
+        link, code = linker.link(by_code.operations, ["value", "count"], tables), ADDER
+    else:
+        _, link = linked(pairs, {0: (1.0, 2.0)}, "product")
+        print("before", flush=True)
+        of_pair(link, out[:, 0])
+        print("after")
+        return
+    precompile(values, (numba.typeof(link), numba.typeof(CODES), numba.typeof(out)))
+    print("before", flush=True)
+    values(link, np.array([code]), out)
+    print("after")
+
+
+def process_that_calls(case):
+    run = f"import test_links_processes as t; t.call({case!r})"
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join((str(Path(__file__).parent), str(HELPERS)))
+    }
+    return subprocess.run(
+        [sys.executable, "-c", run], env=environment, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals")
+@pytest.mark.parametrize("case", ["one of several tables", "one table", "not resolved"])
+def test_an_operation_that_is_not_linked_stops_the_process(case):
+    done = process_that_calls(case)
+    # x86's trap is an illegal instruction, ARM's a breakpoint.
+    assert done.returncode in (-signal.SIGILL, -signal.SIGTRAP), done.stderr
+    assert done.stdout == "before\n"
+
+
+def test_a_type_without_the_kernel_needs_no_link():
+    done = process_that_calls("a type without the kernel")
+    assert (done.returncode, done.stdout) == (0, "before\nafter\n")
+
+
+# Two types whose tables have one class, as glass and thin glass have.
+_TWINS = """
+from types import SimpleNamespace
+from typing import NamedTuple
+import numpy as np
+from reference_rt.core.arrays import FloatArray
+from reference_rt.jit.by_code import ByCode
+from reference_rt.jit.kernel import entry_kernel, is_compiled, kernel, precompile
+from reference_rt.jit.links import Linker
+
+class Table(NamedTuple):
+    numbers: FloatArray
+
+class Tables(NamedTuple):
+    adders: Table | None
+    scalers: Table | None
+
+@kernel
+def add(table: Table, x: float) -> float:
+    return table.numbers[0] + x
+
+@kernel
+def scale(table: Table, x: float) -> float:
+    return table.numbers[0] * x
+
+by_code = ByCode(
+    [(0, "adders", SimpleNamespace(value=add)), (1, "scalers", SimpleNamespace(value=scale))]
+)
+
+@by_code("value")
+def value(tables: Tables, kind: int, x: float) -> float:
+    return -x
+
+@entry_kernel
+def run(link, kind, x, out):
+    out[0] = value(link, kind, x)
+
+def main(*codes):
+    linker, table, out = Linker(), Table(np.array([3.0])), np.zeros(1)
+    link = linker.link(by_code.operations, ["value"], {code: table for code in codes})
+    before = [is_compiled(*call) for call in linker.calls]
+    for call in linker.calls:
+        precompile(*call)
+    linker.resolve()
+    found = []
+    for code in codes:
+        run(link, code, 5.0, out)
+        found.append(float(out[0]))
+    print(before, found)
+"""
+
+
+def test_operations_come_from_the_cache_each_as_itself(tmp_path):
+    """All code of a process has one table of symbols.  Two processes number the functions that they
+    compile from 1 on, so that the kernels of both types had the same symbol: a third process then
+    ran one of them for both."""
+    (tmp_path / "twins.py").write_text(_TWINS)
+    expected = {
+        "0": "[False] [8.0]",
+        "1": "[False] [15.0]",
+        "0, 1": "[True, True] [8.0, 15.0]",
+        "1, 0": "[True, True] [15.0, 8.0]",
+    }
+    for codes, line in expected.items():
+        done = subprocess.run(
+            [sys.executable, "-c", f"import twins; twins.main({codes})"],
+            env=os.environ | {"REFERENCE_RT_CACHE": str(tmp_path / "cache")},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.strip() == line
