@@ -18,7 +18,8 @@ Who calls what, and which way it takes:
                                         | rays that are not coherent, instances, no BVH
     query.intersect, first_hits,        |
       more than FEW = 4096 rays     array_query.trace_packet --------> else:      packet
-      at most FEW rays              array_query.closest_one_by_one
+      at most FEW rays,             array_query.closest_one_by_one
+      and of query.occluded         array_query.occluded_one_by_one
                                         v
     direct, whitted, ray_cast,      geometry.closest_hit ----------+-> no BVH:    brute force
       layers, other queries         geometry.occluded -------------'   else:      single ray
@@ -34,7 +35,8 @@ Who decides:
   for ONE_BY_ONE = 10); with the other methods there always is.
 - `block_query.py`, `array_query.py`: block, packet or single ray, as in the diagram.  What a scene
   lacks is None, so all but "coherent" is decided while the caller is compiled.
-- `rendering/query/tracing.py`: FEW, because packets and streams take seconds longer to compile.
+- `rendering/query/tracing.py`: FEW, because packets and streams take longer to compile.  All
+  queries call operations on a geometry through a link (`rendering/query/linked.py`).
 - `rendering/render.py`: whether the stream traversal is compiled separately and called through the
   function pointer `Geometry.tracer` (path, with a BVH, without instances) or is inlined.
 

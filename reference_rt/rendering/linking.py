@@ -155,7 +155,10 @@ def linked_geometry(linker: Linker, geometry: Geometry, shapes: Any, wanted: Ite
     """A geometry behind a link, with the operations `wanted`.  shapes: the link to its shapes."""
     nothing: Any = np.zeros((0, 1, 8))
     packets = Packets(*(nothing if p is None else p for p in geometry.packets))
-    table = geometry._replace(shapes=shapes, packets=packets, tracer=None)
+    bvh = geometry.bvh
+    if bvh is not None and bvh.corners is None:  # one type less: without triangles none are read
+        bvh = bvh._replace(corners=_NO_FLOATS)
+    table = geometry._replace(shapes=shapes, packets=packets, bvh=bvh, tracer=None)
     return linker.link(geometries.operations, wanted, {0: table})
 
 

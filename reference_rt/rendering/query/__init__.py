@@ -2,7 +2,8 @@
 
 `hits`: first hits and occlusion;  `crossings`: all hits along a ray;  `camera`: camera rays;
 `bsdf`: evaluate and sample a material;  `light`: light samples and densities;  `radiance`: any
-integrator along given rays;  `tracing`: the entry kernels;  `rays`: checks, broadcasting, threads.
+integrator along given rays;  `tracing`: the entry kernels;  `batches`: which of them traces how
+many rays;  `linked`: a scene's tables behind links;  `rays`: checks, broadcasting, threads.
 `Scene` has the queries as methods; most functions here take the scene's tables instead.
 
 Contract: all arrays are float64 or int64.  Origins and directions are (..., 3) in world coordinates
@@ -11,7 +12,9 @@ misses if one of its numbers is not finite, if its direction is 0, or if its hit
 or t beyond float64's range.  Arrays of other shapes, and arrays that are not numeric, raise
 ValueError.
 
-To add a query: a function here with its entry kernel, exported below; a line in `Scene`.
+To add a query: a function here with its entry kernel, exported below; a line in `Scene`.  The
+kernel takes links with the operations that it calls (`link_to_geometry`, `link_to_scene` or
+`linked.linked`), so that all scenes share it.
 """
 
 import warnings

@@ -215,7 +215,8 @@ class Bsdf:
 
         def scatter(k: slice) -> None:
             wi_of, u_of = (other[k], NOTHING) if u is None else (NOTHING, other[k])
-            _scatter(*found.tables, self._number, back[k], wi_of, u_of, where[k], out[k])
+            materials, textures = found.tables
+            _scatter(materials, textures, self._number, back[k], wi_of, u_of, where[k], out[k])
 
         in_blocks(scatter, len(back), threads)
         return out, shape

@@ -226,10 +226,11 @@ def sample_lights(
     check_in_unit_cube(u)
     light, out = np.empty(len(p), np.int64), np.empty((len(p), 12))
 
-    found = _linked_lights(scene)
+    sources = _linked_lights(scene)
 
     def sample(k: slice) -> None:
-        _sample(*found.tables, p[k], n[k], u[k], light[k], out[k])
+        lights, shapes, textures = sources.tables
+        _sample(lights, shapes, textures, p[k], n[k], u[k], light[k], out[k])
 
     in_blocks(sample, len(p), threads)
     columns = (out[:, 0:3], out[:, 3], out[:, 4:7], out[:, 7:10], out[:, 10], out[:, 11] != 0.0)
