@@ -26,7 +26,7 @@ from reference_rt.util.errors import (
     UsageError,
     printable,
 )
-from reference_rt.util.signals import catch_signals, exit_code_of
+from reference_rt.util.signals import catch_signals, dropped, exit_code_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -38,6 +38,8 @@ app = typer.Typer(
     "1 difference, 2 usage, 3 invalid scene or image, 4 reference missing or could not run, "
     "5 internal error, 130 interrupted (by SIGTERM 143, by SIGHUP 129).",
 )
+
+_INTERRUPTED = "interrupted; nothing unfinished was written"
 
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
 
@@ -55,11 +57,12 @@ def guarded(command: F) -> F:
         except typer.Exit:
             raise
         except KeyboardInterrupt as error:
-            code = exit_code_of(error)
-            _fail("interrupted; nothing unfinished was written", code)
+            _fail(_INTERRUPTED, exit_code_of(error))
         except BrokenPipeError:
             raise
         except Exception as error:
+            if (signal := dropped()) is not None:
+                _fail(_INTERRUPTED, exit_code_of(signal))
             if is_output_lost(error):
                 _fail(lost_output(error), ImageError.exit_code)
             message = " ".join(str(error).split())
