@@ -1,4 +1,4 @@
-"""`reference-rt`: render, explain, schema, and the commands that other packages register."""
+"""`reference-rt`: render, explain, warm-up, schema, and the commands of other packages."""
 
 import errno
 import functools
@@ -26,7 +26,7 @@ from reference_rt.util.errors import (
     UsageError,
     printable,
 )
-from reference_rt.util.signals import catch_signals, exit_code_of
+from reference_rt.util.signals import catch_signals, dropped, exit_code_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -38,6 +38,8 @@ app = typer.Typer(
     "1 difference, 2 usage, 3 invalid scene or image, 4 reference missing or could not run, "
     "5 internal error, 130 interrupted (by SIGTERM 143, by SIGHUP 129).",
 )
+
+_INTERRUPTED = "interrupted; nothing unfinished was written"
 
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
 
@@ -55,11 +57,12 @@ def guarded(command: F) -> F:
         except typer.Exit:
             raise
         except KeyboardInterrupt as error:
-            code = exit_code_of(error)
-            _fail("interrupted; nothing unfinished was written", code)
+            _fail(_INTERRUPTED, exit_code_of(error))
         except BrokenPipeError:
             raise
         except Exception as error:
+            if (signal := dropped()) is not None:
+                _fail(_INTERRUPTED, exit_code_of(signal))
             if is_output_lost(error):
                 _fail(lost_output(error), ImageError.exit_code)
             message = " ".join(str(error).split())
@@ -133,7 +136,9 @@ def render(
     description = adjusted(Scene.load(scene), spp, size, integrator, seed)
     check_writable(output)
     with ProgressLine() as progress, _without_blas():
-        picture = render_scene(description, threads=threads, progress=progress)
+        picture = render_scene(
+            description, threads=threads, progress=progress, compiling=progress.compiling
+        )
     image.write(output, picture, provenance(description))
     seconds = picture.seconds
     say(
@@ -156,39 +161,34 @@ def render(
 @app.command()
 @guarded
 def explain(scene: SceneArgument) -> None:
-    """Print what a scene uses, what is specialised away and why, and its distance from float64's
-    limits."""
-    from rich.console import Console
-    from rich.table import Table
+    """Print what a scene uses, what is specialised away and why, its distance from float64's
+    limits, and its kernels."""
+    from reference_rt.cli.explain_page import print_page
 
-    from reference_rt.cli.explain import explain as explain_scene
-    from reference_rt.cli.explain import margins
-    from reference_rt.scene.build import build_tables
-    from reference_rt.scene.likely_mistakes import likely_mistakes
+    print_page(Scene.load(scene))
 
-    description = Scene.load(scene)
-    tables = build_tables(description)
-    used, pruned = explain_scene(description, tables)
-    near, beyond = margins(description)
-    mistakes = [
-        (str(description.error("", *mistake.path)), mistake.message)
-        for mistake in likely_mistakes(description, tables)
-    ]
-    console = Console()
-    for title, lines in (
-        ("used", used),
-        ("specialised away", pruned),
-        ("nearest to float64's limits", near),
-        ("warning: beyond float64", beyond),
-        ("warning: probably a mistake", mistakes),
-    ):
-        if not lines:
-            continue
-        table = Table(title=title, title_justify="left", show_header=False, box=None)
-        for what, why in lines:
-            table.add_row(printable(what), printable(why))
-        console.print(table)
-        console.print()
+
+@app.command("warm-up")
+@guarded
+def warm_up(
+    scenes: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[SCENE]...", help="Whose specialised kernels are compiled, too."),
+    ] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+) -> None:
+    """Compile all kernels that scenes share, so that no render waits for them.
+
+    If it is interrupted, the kernels that are compiled by then are kept.
+    """
+    from reference_rt.cli.warm_up import warm_up as compile_kernels
+
+    with _without_blas():
+        done = compile_kernels([Scene.load(scene) for scene in scenes or ()], threads)
+    say(
+        f"{done.folder}: {done.compiled} kernels compiled, {done.cached} were in the cache, "
+        f"{done.seconds:.1f} s"
+    )
 
 
 @app.command()

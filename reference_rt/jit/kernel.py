@@ -107,8 +107,11 @@ def is_compiled(compiled: Callable[..., Any], signature: Signature) -> bool:
     if numba.config.DISABLE_JIT:
         return True
     types_of = signature if isinstance(signature, tuple) else signature.args
-    if types_of in compiled.overloads:  # type: ignore[attr-defined]
-        return True
+    return types_of in compiled.overloads or is_cached(compiled, signature)  # type: ignore[attr-defined]
+
+
+def is_cached(compiled: Callable[..., Any], signature: Signature) -> bool:
+    """Whether the cache has an entry kernel for these types."""
     cache, codegen = compiled._cache, compiled.targetctx.codegen()  # type: ignore[attr-defined]
     return isinstance(cache, KernelCache) and cache.has(signature, codegen)
 

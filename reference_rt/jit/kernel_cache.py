@@ -57,14 +57,19 @@ def _sources_digest(compiler: str) -> str:
     return digest.hexdigest()[:20]
 
 
+def cache_root() -> Path:
+    """The folder of all that is cached; prepare_folder makes one in it for kernels."""
+    root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
+    return Path(root)
+
+
 def prepare_folder(compiler: str) -> str | None:
     """Create the folder for kernels of exactly these sources and versions; None if it cannot be
     written.  Deletes folders that are no longer used.
 
     compiler: the name of the compiler, part of the key.
     """
-    root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
-    folder = Path(root) / "kernels" / _sources_digest(compiler)
+    folder = cache_root() / "kernels" / _sources_digest(compiler)
     try:
         _make(folder)
         os.utime(folder)

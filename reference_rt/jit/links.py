@@ -91,10 +91,11 @@ class Operation:
         return type_of(typing.get_type_hints(self._function, include_extras=True)["return"])
 
     def call_for(self, code: int, table: Any) -> tuple[Any, Any]:
-        """The entry kernel for a type of table, and the signature to compile it for."""
+        """The entry kernel for a type of table, and the signature to compile it for.  table:
+        Numba's type of it."""
         if code not in self._entries:
             self._entries[code] = self._entry(code)
-        pointer = types.CPointer(numba.typeof(table))
+        pointer = types.CPointer(table)
         return self._entries[code], numba_typing.signature(self.returns, pointer, *self.arguments)
 
     def _entry(self, code: int) -> Any:
@@ -228,9 +229,10 @@ class Linker:
             content = np.array(words_of(table), np.int64)
             self._kept += [table, content]
             words[STRIDE * code] = content.ctypes.data
+            of_table = numba.typeof(table)  # once: it takes up to 1 ms
             for operation in found:
                 if code in operation.rows:
-                    call = operation.call_for(code, table)
+                    call = operation.call_for(code, of_table)
                     place = words, STRIDE * code + operation.number
                     self.calls.setdefault(call, []).append(place)
         self._kept.append(words)

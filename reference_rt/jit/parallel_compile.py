@@ -69,33 +69,49 @@ class Ahead:
 def precompile_all(
     calls: Sequence[Call], threads: int, say: Report | None = None, ahead: Ahead | None = None
 ) -> list[Callable[..., Any]]:
-    """`kernel.precompile` of several entry kernels, in parallel where possible.
+    """`kernel.precompile` of several entry kernels, in parallel where possible: see `compile_all`.
 
-    Those that are not in the cache are divided among this process and forked children, threads in
-    all, each of which takes the next when it has finished one: so the longest should come first.
-    Children store their kernels in the cache.  Without children (threads = 1, no `fork`, no cache,
-    not in the main thread), or if they fail, this process compiles all.  say(done, total): called
-    after each kernel that had to be compiled, and before the first.  ahead: those that a child
-    compiles already.
+    ahead: kernels that a child compiles already.
     """
     begun = [] if ahead is None or ahead.is_done else ahead.calls
     missing = [call for call in calls if call not in begun and not is_compiled(*call)]
-    total = len(missing) + len(begun)
-    if total > 0:
-        tell = say or (lambda done, total: None)
-        tell(0, total)
-        own = threads - 1 if begun else threads
-        if own > 1 and len(missing) > 1 and may_fork():
-            _compile_in_parallel(missing, min(own, len(missing)) - 1, total, tell)
-        else:
-            for k, call in enumerate(missing):
-                precompile(*call)
-                tell(k + 1, total)
+    compile_all(missing, threads, say, ahead)
+    return [precompile(*call) for call in calls]
+
+
+def compile_all(
+    missing: Sequence[Call],
+    threads: int,
+    say: Report | None = None,
+    ahead: Ahead | None = None,
+) -> None:
+    """Compile entry kernels that are not in the cache.
+
+    They are divided among this process and forked children, `threads` in all, each of which takes
+    the next when it has finished one: so the longest should come first.  Children store their
+    kernels in the cache.  Without children (threads = 1, no `fork`, no cache, not in the main
+    thread) this process compiles all; of those that children fail at, none.  say(done, total):
+    called after each kernel, and before the first.  ahead: a child that compiles others, for which
+    this waits.
+    """
+    begun = 0 if ahead is None or ahead.is_done else len(ahead.calls)
+    total = len(missing) + begun
+    if total == 0:
+        return
+    tell = say or (lambda done, total: None)
+    tell(0, total)
+    free = threads - 1 if begun else threads
+    if free > 1 and len(missing) > 1 and may_fork():
+        _compile_in_parallel(missing, min(free, len(missing)) - 1, total, tell)
+    else:
+        for k, call in enumerate(missing):
+            precompile(*call)
+            tell(k + 1, total)
+    if begun:
         end = time.monotonic() + PATIENCE
         while ahead is not None and not ahead.is_done and time.monotonic() < end:
             time.sleep(0.002)
         tell(total, total)
-    return [precompile(*call) for call in calls]
 
 
 def _compile_in_parallel(missing: Sequence[Call], children: int, total: int, tell: Report) -> None:

@@ -47,9 +47,9 @@ WAIT = 2.0
 """Seconds of rendering after which the rest of the time is estimated."""
 
 WORTHWHILE = 30.0
-"""Seconds left to render from which on specialised kernels are compiled meanwhile.  On two cores the
-8 s of compiling cost 4 s of rendering, and what is left then takes 0.7 of the time: that pays from
-22 s on."""
+"""Seconds left to render from which on specialised kernels are compiled meanwhile.  On two cores
+the 8 s of compiling cost 4 s of rendering, and what is left then takes 0.7 of the time: that pays
+from 22 s on."""
 
 
 @dataclass(frozen=True)
@@ -93,41 +93,16 @@ class Running:
         ahead: Ahead | None = None,
     ) -> None:
         """specialised: which kernels to use; None: see above.  say, ahead: see `precompile_all`."""
-        own = _Specialised(jobs, tables, view, film_filter)
+        own = Specialised(jobs, tables, view, film_filter)
         if specialised is None:
             specialised = own.are_compiled()
         if numba.config.DISABLE_JIT:
             specialised = True
         self._specialised, self._child, self._began = own, 0, math.nan
         self._is_final = specialised
-        if specialised:
-            precompile_all(own.calls, threads, say)
-            self.kernels = own.kernels()
-        else:
-            self.kernels = self._linked(jobs, tables, view, film_filter, threads, say, ahead)
-
-    def _linked(
-        self,
-        jobs: Sequence[Job],
-        tables: SceneTables,
-        view: Any,
-        film_filter: Any,
-        threads: int,
-        say: Report | None,
-        ahead: Ahead | None,
-    ) -> list[Callable[..., None]]:
-        self._linker = linker = Linker()
-        calls, arguments = [], []
-        for job in jobs:
-            scene = linked_scene(linker, tables, job.integrator)
-            given = job.arguments(
-                scene, linked_view(linker, view), linked_filter(linker, film_filter)
-            )
-            arguments.append(given)
-            calls.append((job.kernel, signature_of(*given, 0, 0, 0, 0)))
-        kernels = precompile_all([*calls, *linker.calls], threads, say, ahead)
-        linker.resolve()
-        return [_bound(*one) for one in zip(kernels[: len(jobs)], arguments, strict=True)]
+        used = own if specialised else Linked(jobs, tables, view, film_filter)
+        precompile_all(used.calls, threads, say, None if specialised else ahead)
+        self._used, self.kernels = used, used.kernels()
 
     def __enter__(self) -> "Running":
         self._began = time.monotonic()
@@ -170,7 +145,34 @@ class Running:
         self._child = child
 
 
-class _Specialised:
+class Linked:
+    """The linked kernels of some jobs.  calls: those to be compiled, the jobs' own first."""
+
+    def __init__(
+        self, jobs: Sequence[Job], tables: SceneTables, view: Any, film_filter: Any
+    ) -> None:
+        self._linker = linker = Linker()
+        self._arguments = []
+        self.calls: list[Call] = []
+        for job in jobs:
+            given = job.arguments(
+                linked_scene(linker, tables, job.integrator),
+                linked_view(linker, view),
+                linked_filter(linker, film_filter),
+            )
+            self._arguments.append(given)
+            self.calls.append((job.kernel, signature_of(*given, 0, 0, 0, 0)))
+        self._count = len(jobs)
+        self.calls += linker.calls
+
+    def kernels(self) -> list[Callable[..., None]]:
+        """The jobs' kernels, once all calls are compiled.  They are valid as long as this lives."""
+        compiled = [precompile(*call) for call in self.calls[: self._count]]
+        self._linker.resolve()
+        return [_bound(*one) for one in zip(compiled, self._arguments, strict=True)]
+
+
+class Specialised:
     """The specialised kernels of some jobs.  The kernel that traces the rays of path tracing is
     called through a function pointer (`Geometry.tracer`), so that scenes share it."""
 

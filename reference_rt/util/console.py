@@ -17,10 +17,7 @@ from rich.progress import (
 
 from reference_rt.util.errors import printable
 
-_WORDS = {
-    "compile": "compiling kernels (once for each kind of scene; kept for later)",
-    "render": "rendering",
-}
+_WORDS = {"compile": "compiling kernels", "render": "rendering"}
 _PATIENCE = 0.4
 """Seconds before compiling is mentioned: kernels from the cache load faster than that."""
 
@@ -42,7 +39,7 @@ class Bar:
         )
 
     def __enter__(self) -> Self:
-        if self._console.is_terminal:
+        if self.is_terminal:
             self._bar.start()
         return self
 
@@ -52,8 +49,12 @@ class Bar:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._console.is_terminal:
+        if self.is_terminal:
             self._bar.stop()
+
+    @property
+    def is_terminal(self) -> bool:
+        return self._console.is_terminal
 
     def line(self, text: str) -> None:
         """Prints a line that remains when the bar disappears."""
@@ -72,15 +73,23 @@ class ProgressLine(Bar):
     def __call__(self, what: str, fraction: float) -> None:
         words = _WORDS.get(what, what)
         if what not in self._tasks:
-            # A bar without a total pulses: the compiler does not report how far it is.
-            total = None if what == "compile" else 1.0
-            self._tasks[what] = self._bar.add_task(words, total=total)
+            if fraction >= 1.0:  # there was nothing to do
+                return
+            # A bar without a total pulses, until something is done.
+            self._tasks[what] = self._bar.add_task(words, total=None)
             self._started[what] = time.perf_counter()
-            return
         task = self._tasks[what]
-        self._bar.update(task, completed=fraction)
+        if fraction > 0.0:
+            self._bar.update(task, completed=fraction, total=1.0)
         if fraction >= 1.0:
-            self._bar.update(task, visible=False)
+            self._bar.remove_task(self._tasks.pop(what))
             seconds = time.perf_counter() - self._started[what]
-            if not self._console.is_terminal and seconds > _PATIENCE:
+            if not self.is_terminal and seconds > _PATIENCE:
                 self.line(f"{words}: {seconds:.1f} s")
+
+    def compiling(self, done: int, total: int) -> None:
+        """The step "compile", by the numbers of kernels that are compiled, and of all."""
+        self("compile", done / total)
+        if done < total:
+            words = f"{_WORDS['compile']}: {done} of {total}"
+            self._bar.update(self._tasks["compile"], description=words)

@@ -12,16 +12,25 @@ class Terminated(KeyboardInterrupt):
     written.  Its argument is the signal's number."""
 
 
+_received: list[int] = []
+
 _AGAIN = 2.0
 """Seconds after which the signal is sent again if the command has not ended."""
 
 
 def _terminate(number: int, frame: Any) -> None:
+    _received.append(number)
     # Python drops the exception if the signal arrives in a callback, of LLVM or of a fork.
     again = threading.Timer(_AGAIN, os.kill, (os.getpid(), number))
     again.daemon = True
     again.start()
     raise Terminated(number)
+
+
+def dropped() -> Terminated | None:
+    """The signal that this process has received, if any: the reason for errors after it.  LLVM, for
+    example, fails where its callback was interrupted, and the interruption itself is lost."""
+    return Terminated(_received[-1]) if _received else None
 
 
 def exit_code_of(error: KeyboardInterrupt) -> int:

@@ -1,6 +1,8 @@
 """The program: exit codes, options, and the files that it writes."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -150,3 +152,28 @@ def test_an_internal_error_is_one_line(refused, monkeypatch, tmp_path):
 
 def test_schema_is_json():
     assert json.loads(run("schema").stdout)["title"] == "Scene"
+
+
+def test_an_error_that_an_interruption_causes():
+    """LLVM drops Python's exception, and fails for want of what its callback should have made."""
+    code = """
+import os, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from reference_rt.cli import main as program
+
+@program.app.command()
+@program.guarded
+def fail():
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except KeyboardInterrupt:
+        pass
+    raise RuntimeError("no compiled object yet")
+
+program.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, "fail"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 130
+    assert done.stderr == "error: interrupted; nothing unfinished was written\n"

@@ -1,0 +1,92 @@
+"""The finite set of all linked kernels, to be compiled ahead of time.
+
+Linked kernels (`kernels.py`) are compiled for types of tables, not for scenes, so that a few small
+scenes which together have every type reach all of them (`warm_up_scenes.py`).  These scenes are
+never rendered: their tables are linked, and what the linker asks for is collected.  To build the
+tables compiles the few kernels that build hierarchies and light trees.
+
+To add kernels of another kind, such as those of a query: a function that returns the calls of one
+scene, and its place in `_CALLS`.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from reference_rt.integrators import Direct, RayCast, Whitted
+from reference_rt.integrators import Path as PathTracing
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit.kernel import is_named_tuple
+from reference_rt.jit.parallel_compile import Call
+from reference_rt.rendering.kernels import Job, Linked, Specialised
+from reference_rt.rendering.render import jobs_of
+from reference_rt.rendering.warm_up_scenes import scenes
+from reference_rt.sampling import Grid
+from reference_rt.scene.build import BuiltScene
+
+
+def picture_calls(scene: BuiltScene) -> list[Call]:
+    """The linked kernels of a scene's picture."""
+    return Linked(*_picture(scene)).calls
+
+
+def specialised_calls(scene: BuiltScene) -> list[Call]:
+    """The specialised kernels of a scene's picture."""
+    return Specialised(*_picture(scene)).calls
+
+
+def _picture(scene: BuiltScene) -> tuple[list[Job], SceneTables, Any, Any]:
+    # Of one pixel: the number of pixels changes no type.
+    film = scene.film.model_copy(update={"width": 1, "height": 1})
+    jobs, _ = jobs_of(scene.model_copy(update={"film": film}))
+    return jobs, scene.tables, scene.camera.setup(1, 1), film.filter.setup()
+
+
+_INTEGRATORS = PathTracing(), Direct(), Whitted(), RayCast()
+
+
+def _pictures(scene: BuiltScene) -> Iterator[Call]:
+    """The linked kernels of its pictures by all integrators, with its sampler where that fits."""
+    for integrator in _INTEGRATORS:
+        fits = integrator.deterministic or not isinstance(scene.sampler, Grid)
+        changes = {"integrator": integrator, "sampler": scene.sampler if fits else None}
+        yield from picture_calls(scene.model_copy(update=changes))
+
+
+_CALLS: tuple[Callable[[BuiltScene], Iterable[Call]], ...] = (_pictures,)
+"""From a scene to the linked kernels that some work on it needs."""
+
+
+def linked_calls() -> list[Call]:
+    """All linked kernels, without duplicates, those that take longest to compile first."""
+    found: dict[Call, None] = {}
+    for scene in scenes():
+        for calls in _CALLS:
+            found |= dict.fromkeys(calls(scene))
+    return sorted(found, key=cost, reverse=True)
+
+
+_COSTS = {
+    "trace_block": 4.0,  # of specialised kernels only
+    "render_tile": 1.6,
+    "closest_hits": 1.3,
+    "any_hits": 0.9,
+    "closest_hit": 0.8,
+    "occluded": 0.6,
+    "first_hits_tile": 0.4,
+    "aov_tile": 0.4,
+}
+_COST = 0.13
+_COST_SPECIALISED = 8.0
+
+
+def cost(call: Call) -> float:
+    """About how many seconds it takes to compile a kernel (measured: means; others take _COST),
+    for the order and for progress bars."""
+    compiled, signature = call
+    arguments = signature if isinstance(signature, tuple) else signature.args
+    if any(is_named_tuple(of, SceneTables) for of in arguments):
+        return _COST_SPECIALISED
+    return _COSTS.get(compiled.__name__, _COST)
+
+
+__all__ = ["cost", "linked_calls", "picture_calls", "specialised_calls"]

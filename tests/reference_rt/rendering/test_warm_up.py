@@ -1,0 +1,199 @@
+"""The set of all linked kernels: every picture's linked kernels are in it."""
+
+import itertools
+import typing
+
+import numba
+import numpy as np
+import pytest
+from builders import SCENES, every_law, every_light, every_shape
+
+import reference_rt as rt
+from reference_rt.accel.geometry import Geometry, geometries
+from reference_rt.cameras import views
+from reference_rt.cameras.filters import film_filters
+from reference_rt.integrators import INTEGRATORS
+from reference_rt.lights.dispatch import by_code as lights
+from reference_rt.lights.selection.tree import light_trees
+from reference_rt.materials.bsdfs.tables import by_code as bsdfs
+from reference_rt.materials.nested.flattened import FlattenedMaterials, flattened_materials
+from reference_rt.rendering import kernels
+from reference_rt.rendering.kernels import Linked
+from reference_rt.rendering.render import radiance_job
+from reference_rt.rendering.tiles import GivenRays
+from reference_rt.rendering.warm_up import cost, linked_calls, picture_calls, specialised_calls
+from reference_rt.shapes.meshes.triangle_table import Triangles
+from reference_rt.shapes.tables import by_code as shapes
+from reference_rt.textures.lookup import Textures, textures_operations
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+
+INTEGRATORS_OF = (rt.Path(), rt.Direct(), rt.Whitted(), rt.RayCast())
+OF_QUERIES = {"_of_quadric", "primitive_count"}
+"""Operations that no linked kernel calls as long as queries are not linked."""
+FILES = sorted(SCENES.glob("*.yaml"))
+
+
+@pytest.fixture(scope="module")
+def known():
+    return linked_calls()
+
+
+def described(calls):
+    """Of kernels, for messages: the source that is compiled, and for which types."""
+    return {(kernel.py_func.__code__.co_filename, kernel.__name__, str(s)) for kernel, s in calls}
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_every_scene(file, known):
+    """By its own integrator, and by all others that may render it."""
+    scene = rt.Scene.load(file)
+    assert described(set(picture_calls(scene)) - set(known)) == set()
+    assert len(picture_calls(scene)) > 3
+    film = rt.Film(layers=("albedo", "normal", "depth", "id", "variance"))
+    for integrator in INTEGRATORS_OF:
+        try:
+            other = scene.changed(integrator=integrator, sampler=None, film=film)
+            calls = picture_calls(other)
+        except rt.SceneError:  # a Phong material that path tracing refuses
+            assert "phong" in file.read_text()
+            continue
+        assert described(set(calls) - set(known)) == set()
+
+
+@pytest.mark.parametrize("write", [every_shape, every_law, every_light])
+def test_what_the_tests_have_for_every_type(write, known, tmp_path):
+    scene = rt.Scene.load(write(tmp_path))
+    assert described(set(picture_calls(scene)) - set(known)) == set()
+
+
+@pytest.mark.parametrize("integrator", [rt.Path(), rt.Direct(), rt.Whitted()])
+def test_radiance_along_given_rays(integrator, known):
+    """By the same drivers: the rays are in the place of the camera's."""
+    tables = rt.Scene(shapes=(rt.Sphere(),), integrator=integrator).tables
+    out, rays = np.zeros((4, 3)), GivenRays(np.zeros((4, 3)), np.ones((4, 3)))
+    job = radiance_job(integrator.setup(), rt.Independent(spp=2), (4, 1), out, np.zeros((4, 3)))
+    assert described(set(Linked([job], tables, rays, None).calls) - set(known)) == set()
+
+
+@pytest.mark.parametrize(
+    "group",
+    [
+        shapes.operations,
+        bsdfs.operations,
+        lights.operations,
+        geometries.operations,
+        flattened_materials.operations,
+        light_trees.operations,
+        textures_operations,
+        views.operations,
+        film_filters.operations,
+    ],
+    ids=lambda group: next(iter(group)),
+)
+def test_every_type_of_every_operation(group, known):
+    """A type that is added to a group must be added to a scene of the warm-up, too."""
+    compiled = {kernel for kernel, _ in known}
+    for operation in group.values():
+        needed = {operation.call_for(code, numba.types.int64)[0] for code in operation.rows}
+        assert needed <= compiled or (operation.name in OF_QUERIES and not needed & compiled)
+
+
+def optional(table):
+    """The fields of a table that a scene may lack."""
+    hints = typing.get_type_hints(table, include_extras=True)
+    return [name for name in table._fields if type(None) in typing.get_args(hints[name])]
+
+
+def present(table, calls):
+    """The sets of optional fields that the tables of a class have, in the kernels' types."""
+    types_of = {
+        signature.args[0].dtype
+        for _, signature in calls
+        if not isinstance(signature, tuple)
+        and getattr(signature.args[0].dtype, "instance_class", None) is table
+    }
+    names = optional(table)
+    assert names
+    return {
+        tuple(
+            name
+            for name in names
+            if not isinstance(of.types[of.fields.index(name)], numba.types.NoneType)
+        )
+        for of in types_of
+    }
+
+
+def subsets(names):
+    return {c for n in range(len(names) + 1) for c in itertools.combinations(names, n)}
+
+
+@pytest.mark.parametrize("table", [Triangles, FlattenedMaterials, Textures])
+def test_every_combination_of_optional_columns(table, known):
+    # A scene without textures has no such table.
+    nothing = {()} if table is Textures else set()
+    assert present(table, known) == subsets(optional(table)) - nothing
+
+
+def test_every_combination_of_geometry(known):
+    """Solids, instances and parts are in hierarchies only, and what has parts is one of them."""
+    names = ("bvh", "solids", "instances", "parts")
+    expected = {()} | {
+        tuple(name for name in names if name in ("bvh", *chosen, *(("parts",) if chosen else ())))
+        for chosen in subsets(("solids", "instances"))
+    }
+    assert present(Geometry, known) == expected
+    corners = {
+        signature.args[0].dtype.types[Geometry._fields.index("bvh")]
+        for kernel, signature in known
+        if kernel.__name__ == "any_hits"
+    }
+    assert len(corners) == 3  # no hierarchy, one with triangles, one without
+
+
+def test_every_integrator_with_every_sampler(known):
+    drivers = {
+        tuple(of.instance_class.__name__ for of in arguments if hasattr(of, "instance_class"))
+        for kernel, arguments in known
+        if kernel.__name__ == "render_tile"
+    }
+    expected = {
+        (setup.__name__, "LinkedScene", "LinkedView", "Link", sampler)
+        for setup in INTEGRATORS
+        for sampler in ("SobolSetup", "IndependentSetup", "GridSetup")
+        if setup.__name__ == "WhittedSetup" or sampler != "GridSetup"
+    }
+    assert drivers == expected
+
+
+def test_the_longest_come_first_and_each_once(known):
+    costs = [cost(call) for call in known]
+    assert costs == sorted(costs, reverse=True)
+    assert len(set(known)) == len(known)
+    assert known[0][0].__name__ == "render_tile"
+    (tile, *others) = specialised_calls(rt.Scene.load(SCENES / "mesh_knot.yaml"))
+    assert others  # the kernel that traces rays
+    assert min(cost(tile), *map(cost, others)) > costs[0]
+
+
+def test_a_render_reports_the_kernels_that_it_compiles(monkeypatch):
+    """By their numbers, in place of the fraction."""
+    compile_all = kernels.precompile_all
+
+    def slowly(calls, threads, say):
+        say(0, 2)
+        say(2, 2)
+        return compile_all(calls, threads)
+
+    monkeypatch.setattr(kernels, "precompile_all", slowly)
+    scene = rt.Scene(
+        shapes=(rt.Sphere(),), integrator=rt.RayCast(), film=rt.Film(width=4, height=4)
+    )
+    counted, said = [], []
+    rt.render(scene, compiling=lambda *n: counted.append(n), progress=lambda *n: said.append(n))
+    assert counted == [(0, 2), (2, 2)]
+    assert said[0] == ("compile", 1.0)
+    said.clear()
+    rt.render(scene, progress=lambda *n: said.append(n))
+    assert said[:3] == [("compile", 0.0), ("compile", 1.0), ("compile", 1.0)]
