@@ -4,7 +4,8 @@ All four find the same hits, to the last bit; only their speed differs:
 
 - brute force (no BVH), `shapes/brute_force.py`: one ray against VECTOR_WIDTH = 8 shapes at once;
   or, by `shapes/ray_simd.py`, VECTOR_WIDTH rays against one shape at once (spheres, rectangles and
-  boxes; all other shapes one ray and one primitive at a time);
+  boxes; all other shapes one ray and one primitive at a time); through a link to shapes, one type
+  of shape after another (`shapes/brute_force_linked.py`);
 - single-ray traversal: the loop is in `geometry.py`, its steps are in `single_ray.py`;
 - stream traversal, `stream/`: a block of up to BLOCK = 64 rays, each one step at a time;
 - packet traversal, `packet/`: 16 coherent rays that share their box tests.
@@ -28,6 +29,11 @@ Who calls what, and which way it takes:
                                                                        else:      single ray
     query.solid_crossings           csg.evaluate.surface_along         only one solid, no search
 
+`closest_hit`, `closest_hits`, `occluded`, `any_hits` and `next_crossing` are operations: their
+callers have the tables of a geometry, or a link to it (`geometries` in `geometry.py`).  A linked
+operation is compiled once for all geometries with the same types of BVH, solids and instances.  In
+it the shapes are behind a link too, so each primitive of a leaf, except triangles, is a call.
+
 Who decides:
 
 - `scene/build_hierarchies.py`: whether there is a BVH.  With `hierarchy: auto` there is none below
@@ -37,8 +43,10 @@ Who decides:
   lacks is None, so all but "coherent" is decided while the caller is compiled.
 - `rendering/query/tracing.py`: FEW, because packets and streams take longer to compile.  All
   queries call operations on a geometry through a link (`rendering/query/linked.py`).
-- `rendering/render.py`: whether the stream traversal is compiled separately and called through the
-  function pointer `Geometry.tracer` (path, with a BVH, without instances) or is inlined.
+- `rendering/kernels.py`: whether a picture's kernels are linked, or specialised for its tables; in
+  the latter, whether the stream traversal is compiled separately and called through the function
+  pointer `Geometry.tracer` (path, with a BVH, without instances) or is inlined.
+- `rendering/linking.py`: which operations are linked; a call of another one stops the process.
 
 Solids and instances are references in leaves of the BVH (kinds SOLID and INSTANCE, see `leaf.py`).
 A solid is evaluated in its leaf, whichever traversal reaches it; its mesh operands have BVHs of

@@ -12,7 +12,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
-from numba.core import cgutils, types
+from numba import types
+from numba.core import cgutils
 from numba.core.base import BaseContext
 from numba.core.callconv import CPUCallConv
 from numba.core.codegen import JITCodeLibrary

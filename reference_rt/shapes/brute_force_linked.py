@@ -10,7 +10,6 @@ from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes.brute_force_table import (
     KIND,
-    Packets,
     found_at,
     nearer_boxes,
     nearer_rectangles,
@@ -33,7 +32,11 @@ from reference_rt.shapes.tables import (
 Packed = Annotated[FloatArray, 3]
 """The SoA layout of the shapes of one type: packets (k, columns, VECTOR_WIDTH)."""
 
-_NEARER = {SPHERE: nearer_spheres, RECTANGLE: nearer_rectangles, BOX: nearer_boxes}
+_NEARER: dict[int, Callable[..., None]] = {
+    SPHERE: nearer_spheres,
+    RECTANGLE: nearer_rectangles,
+    BOX: nearer_boxes,
+}
 """The types with SIMD kernels."""
 
 _CODES = {module: code for code, _, _, module in TABLES}
