@@ -71,8 +71,8 @@ def nearest_of_type(shapes: Shapes, kind: int, packets: Packed, ray: Ray, closes
 
 
 @kernel
-def nearest(shapes: Any, packets: Packets, ray: Ray) -> Hit:
-    """`brute_force.nearest` through a link."""
+def nearest(shapes: Any, packets: Any, ray: Ray) -> Hit:
+    """`brute_force.nearest` through a link.  packets: `Packets` without None."""
     closest = no_hit(ray)
     closest = nearest_of_type(shapes, SPHERE, packets.spheres, ray, closest)
     closest = nearest_of_type(shapes, RECTANGLE, packets.rectangles, ray, closest)
