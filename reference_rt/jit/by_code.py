@@ -31,7 +31,7 @@ which `uv` has number 3:
             if pointer < 0:  # the table is there, but `Linker` was not asked for this operation
                 stop()
             if pointer != 0:
-                return call(pointer, word_at(shapes.address, 32 * code + 0), (ray, hit))
+                return call(pointer, word_at(shapes.address, 32 * code + 0), (ray, hit, ))
         return otherwise(shapes, ray, hit)
 """
 

@@ -61,6 +61,20 @@ LINK = types.NamedUniTuple(types.int64, 1, Link)
 """Numba's type of a `Link`."""
 
 
+_IN_TEXTS = {
+    "call",
+    "code",
+    "kernel",
+    "otherwise",
+    "pointer",
+    "stop",
+    "table",
+    "table_at",
+    "word_at",
+}
+"""Names that generated text uses."""
+
+
 class Row(NamedTuple):
     """A type of table in a group: its code, the field of its table, its kernel."""
 
@@ -119,10 +133,11 @@ class Operation:
         tables: the name of its first parameter;  code: an expression of its parameters, and
         otherwise: the kernel for codes without table or operation;  neither in a group of one type.
         """
-        given = "".join(f"{name}, " for name in self.parameters)
+        given = ", ".join([tables, *self.parameters])
         at = f"{STRIDE} * code + " if code else ""
         pointer = f"word_at({tables}.address, {at}{self.number})"
-        call = f"call(pointer, word_at({tables}.address, {at}0), ({given}))"
+        arguments = "".join(f"{name}, " for name in self.parameters)
+        call = f"call(pointer, word_at({tables}.address, {at}0), ({arguments}))"
         if code:
             lines = [
                 f"code = {code}",
@@ -132,11 +147,11 @@ class Operation:
                 "        stop()",
                 "    if pointer != 0:",
                 f"        return {call}",
-                f"return otherwise({tables}, {given})",
+                f"return otherwise({given})",
             ]
         else:
             lines = [f"pointer = {pointer}", "if pointer <= 0:", "    stop()", f"return {call}"]
-        text = f"def {self.name}({tables}, {given}):\n"
+        text = f"def {self.name}({given}):\n"
         text += "".join(f"    {line}\n" for line in lines)
         known = {"word_at": word_at, "stop": stop, "call": self._call(), "otherwise": otherwise}
         return define(text, self.module, self.name, "through a link", known)
@@ -170,6 +185,8 @@ class Group:
         where = f"{operation.module}.{operation.name}"
         if operation.name in self.operations:
             raise TypeError(f"{where}: an operation of this name exists; expected another name")
+        if taken := _IN_TEXTS & {*operation.parameters}:
+            raise TypeError(f"{where}: parameters {taken} have names of the generated text")
         if number >= STRIDE:
             raise TypeError(f"{where}: too many operations; expected at most {STRIDE - 1}")
         self.operations[operation.name] = operation

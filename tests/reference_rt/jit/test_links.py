@@ -133,6 +133,15 @@ def test_too_many_operations_are_refused():
         add()
 
 
+@pytest.mark.parametrize("name", ["code", "pointer", "table", "call"])
+def test_parameters_with_names_of_the_generated_text_are_refused(name):
+    """`code = kind` would change the argument."""
+    names: dict[str, Any] = {}
+    exec(f"def operation(first, kind, {name}): return 0.0", names)
+    with pytest.raises(TypeError, match=rf"parameters \{{'{name}'\}} have names of the"):
+        Linkable().operation(names["operation"])
+
+
 def test_names_and_docstrings_are_kept():
     assert (product.__name__, product.__module__) == ("product", "linked_tables")
     assert product.__doc__ == "The product."
@@ -163,4 +172,4 @@ def test_tracebacks_name_the_operation_of_a_link():
     through = by_code.operations["value"].through_link("tables", "kind", kernel(values_of))
     assert through.__code__.co_filename == "<linked_tables.value through a link>"
     shown = linecache.getlines(through.__code__.co_filename)
-    assert shown[:2] == ["def value(tables, kind, i, x, ):\n", "    code = kind\n"]
+    assert shown[:2] == ["def value(tables, kind, i, x):\n", "    code = kind\n"]

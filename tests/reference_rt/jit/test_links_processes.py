@@ -12,8 +12,8 @@ import pytest
 from builders import HELPERS
 from linked_tables import (
     ADDER,
-    CODES,
     OTHER,
+    Adders,
     by_code,
     by_codes,
     linked,
@@ -23,7 +23,7 @@ from linked_tables import (
     values,
 )
 
-from reference_rt.jit.kernel import precompile
+from reference_rt.jit.compiler import CHOICE, INLINING, STOCK
 from reference_rt.jit.links import Linker
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
@@ -31,36 +31,34 @@ pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is com
 
 def call(case):
     """In a process of its own."""
-    tables = by_codes(tables_of(True, True, True))
-    out = np.zeros((2, 1))
-    if case == "one of several tables":
-        _, link = linked(by_code, tables, "count")
-        code = ADDER
-    elif case == "a type without the kernel":  # whose call is the function's own body
-        _, link = linked(by_code, tables, "count")
-        code = OTHER
-    elif case == "not resolved":
-        linker = Linker()
-        link, code = linker.link(by_code.operations, ["value", "count"], tables), ADDER
+    tables, codes = by_codes(tables_of(True, True, True)), np.array([ADDER])
+    linker = Linker()
+    if case == "not resolved":
+        link = linker.link(by_code.operations, ["value", "count"], tables)
+    elif case == "one table":
+        linker, link = linked(pairs, {0: (1.0, 2.0)}, "product")
+    elif case == "out of bounds":
+        linker, link = linked(by_code, {ADDER: Adders(np.zeros(1))})
     else:
-        _, link = linked(pairs, {0: (1.0, 2.0)}, "product")
-        print("before", flush=True)
-        of_pair(link, out[:, 0])
-        print("after")
-        return
-    precompile(values, (numba.typeof(link), numba.typeof(CODES), numba.typeof(out)))
+        linker, link = linked(by_code, tables, "count")
+    if case == "a type without the kernel":  # whose call is the function's own body
+        codes[0] = OTHER
     print("before", flush=True)
-    values(link, np.array([code]), out)
+    if case == "one table":
+        of_pair(link, np.zeros(4))
+    else:
+        values(link, codes, np.zeros((2, 1)))
     print("after")
 
 
-def process_that_calls(case):
-    run = f"import test_links_processes as t; t.call({case!r})"
-    environment = os.environ | {
-        "PYTHONPATH": os.pathsep.join((str(Path(__file__).parent), str(HELPERS)))
-    }
+def process_that_calls(case, **environment):
+    folders = os.pathsep.join((str(Path(__file__).parent), str(HELPERS)))
     return subprocess.run(
-        [sys.executable, "-c", run], env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-c", f"import test_links_processes as t; t.call({case!r})"],
+        env=os.environ | {"PYTHONPATH": folders} | environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 
@@ -76,6 +74,14 @@ def test_an_operation_that_is_not_linked_stops_the_process(case):
 def test_a_type_without_the_kernel_needs_no_link():
     done = process_that_calls("a type without the kernel")
     assert (done.returncode, done.stdout) == (0, "before\nafter\n")
+
+
+@pytest.mark.parametrize("compiler", [INLINING, STOCK])
+def test_errors_come_back_through_links(compiler):
+    """Kernels raise none, except with Numba's check of indices."""
+    done = process_that_calls("out of bounds", NUMBA_BOUNDSCHECK="1", **{CHOICE: compiler})
+    assert (done.returncode, done.stdout) == (1, "before\n")
+    assert done.stderr.splitlines()[-1] == "IndexError: index is out of bounds"
 
 
 # Two types whose tables have one class, as glass and thin glass have.

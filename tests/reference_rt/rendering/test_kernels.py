@@ -15,7 +15,10 @@ from builders import HELPERS, SCENES, same_in_plain_python
 from small_scenes import LAYERS, same, small
 
 import reference_rt as rt
+from reference_rt.jit.kernel import is_compiled
+from reference_rt.jit.links import Linker
 from reference_rt.rendering import kernels
+from reference_rt.rendering.linking import linked_scene
 from reference_rt.rendering.render import render
 
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
@@ -88,6 +91,12 @@ def test_linking_asks_for_all_that_is_called(names):
     )
     last = done.stdout.splitlines()[-1:]
     assert (done.returncode, last) == (0, ["done"]), done.stderr
+    # All is in the cache now: nothing depends on the process.
+    for name in names:
+        linker, scene = Linker(), small(name)
+        linked_scene(linker, scene.tables, scene.integrator.type)
+        assert all(is_compiled(*call) for call in linker.calls)
+        assert linker.calls
 
 
 # ---- the same bits ------------------------------------------------------------------------------
