@@ -134,8 +134,10 @@ def _compile_in_parallel(missing: Sequence[Call], children: int, total: int, tel
             tell(done, total)
         end = time.monotonic() + PATIENCE
         for child in started:
-            while not has_ended(child) and time.monotonic() < end:
-                if (more := _count(finished)) > 0:
+            has_child = True
+            while has_child:
+                has_child = not has_ended(child) and time.monotonic() < end
+                if (more := _count(finished)) > 0:  # also what it reported last
                     done += more
                     tell(done, total)
                 time.sleep(0.002)

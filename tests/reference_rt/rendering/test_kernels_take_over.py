@@ -69,13 +69,13 @@ class Watched:
 def as_if_not_compiled(monkeypatch, often=1):
     """As if the specialised kernels were not in the cache, the first `often` times that is asked
     for."""
-    asked, compiled = [], kernels._Specialised.are_compiled
+    asked, compiled = [], kernels.Specialised.are_compiled
 
     def are_compiled(specialised):
         asked.append(specialised)
         return len(asked) > often and compiled(specialised)
 
-    monkeypatch.setattr(kernels._Specialised, "are_compiled", are_compiled)
+    monkeypatch.setattr(kernels.Specialised, "are_compiled", are_compiled)
 
 
 def slow_children(monkeypatch):
