@@ -20,6 +20,7 @@ import struct
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from functools import cached_property
 from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numba
@@ -122,13 +123,13 @@ class Operation:
         if not 1 <= number < STRIDE:
             raise TypeError(f"{module}: too many operations; expected at most {STRIDE - 1}")
 
-    @property
+    @cached_property
     def arguments(self) -> tuple[Any, ...]:
         """The types of the arguments after the table."""
         hints = typing.get_type_hints(self._function, include_extras=True)
         return tuple(type_of(hints[name]) for name in self.parameters)
 
-    @property
+    @cached_property
     def returns(self) -> Any:
         return type_of(typing.get_type_hints(self._function, include_extras=True)["return"])
 
