@@ -172,6 +172,8 @@ def fail():
 
 program.main()
 """
-    done = subprocess.run([sys.executable, "-c", code, "fail"], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code, "fail"], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 130
     assert done.stderr == "error: interrupted; nothing unfinished was written\n"
