@@ -11,9 +11,9 @@ import numba
 from rich.console import Console
 from rich.progress import TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from reference_rt.jit.kernel import CACHE_FOLDER, is_cached
+from reference_rt.jit.kernel import CACHE_FOLDER, is_cached, precompile
 from reference_rt.jit.kernel_cache import cache_root
-from reference_rt.jit.parallel_compile import Call, precompile_all
+from reference_rt.jit.parallel_compile import Call, compile_all
 from reference_rt.rendering.scene import Scene
 from reference_rt.rendering.warm_up import cost, linked_calls, picture_calls, specialised_calls
 from reference_rt.util.console import Bar
@@ -46,7 +46,7 @@ def warm_up(scenes: Sequence[Scene], threads: int | None) -> Warmed:
         calls = [*dict.fromkeys((*specialised, *linked))]
         missing = [call for call in calls if not is_cached(*call)]
         progress.begin(missing)
-        precompile_all(missing, threads or os.cpu_count() or 1, progress)
+        compile_all(missing, threads or os.cpu_count() or 1, progress)
     _check_kept(missing, folder)
     seconds = time.monotonic() - began
     return Warmed(len(missing), len(calls) - len(missing), seconds, folder)
@@ -69,12 +69,15 @@ def _folder() -> str:
 
 
 def _check_kept(calls: Sequence[Call], folder: str) -> None:
-    """Raise ImageError unless all of these kernels are in the cache now."""
-    lost = sum(not is_cached(*call) for call in calls)
-    if lost:
-        raise ImageError(
-            f"{folder}: {lost} of {len(calls)} kernels could not be written; expected free space"
-        )
+    """Raise what prevents kernels from being in the cache now."""
+    lost = [call for call in calls if not is_cached(*call)]
+    for call in lost:
+        precompile(*call)  # again, in this process: an error in a child is not seen
+        if not is_cached(*call):
+            raise ImageError(
+                f"{folder}: {len(lost)} of {len(calls)} kernels cannot be written; expected free "
+                "space"
+            )
 
 
 class CountBar(Bar):

@@ -15,6 +15,7 @@ Both sides of a call take the types of arguments and result from the operation's
 neither knows the other.
 """
 
+import functools
 import inspect
 import struct
 import typing
@@ -122,22 +123,23 @@ class Operation:
         if not 1 <= number < STRIDE:
             raise TypeError(f"{module}: too many operations; expected at most {STRIDE - 1}")
 
-    @property
+    @functools.cached_property
     def arguments(self) -> tuple[Any, ...]:
         """The types of the arguments after the table."""
         hints = typing.get_type_hints(self._function, include_extras=True)
         return tuple(type_of(hints[name]) for name in self.parameters)
 
-    @property
+    @functools.cached_property
     def returns(self) -> Any:
         return type_of(typing.get_type_hints(self._function, include_extras=True)["return"])
 
     def call_for(self, code: int, table: Any) -> tuple[Any, Any]:
-        """The entry kernel for a type of table, and the signature to compile it for."""
+        """The entry kernel for a type of table, and the signature to compile it for.  table:
+        Numba's type of it."""
         if code not in self._entries:
             self._entries[code] = self._entry(code)
         signature = numba_typing.signature(
-            self.returns, types.CPointer(numba.typeof(table)), *self.arguments
+            self.returns, types.CPointer(table), *self.arguments
         )
         return self._entries[code], signature
 
@@ -265,9 +267,10 @@ class Linker:
             content = np.array(words_of(table) or [0], np.int64)
             self._kept += [table, content]
             words[STRIDE * code] = content.ctypes.data
+            of_table = numba.typeof(table)  # once: it takes up to 1 ms
             for operation in found:
                 if code in operation.rows:
-                    call = operation.call_for(code, table)
+                    call = operation.call_for(code, of_table)
                     place = words, STRIDE * code + operation.number
                     self.calls.setdefault(call, []).append(place)
         self._kept.append(words)

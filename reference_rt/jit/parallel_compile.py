@@ -35,25 +35,31 @@ _NUMBER = struct.Struct("<i")
 def precompile_all(
     calls: Sequence[Call], threads: int, say: Report | None = None
 ) -> list[Callable[..., Any]]:
-    """`kernel.precompile` of several entry kernels, in parallel where possible.
-
-    Those that are not in the cache are divided among this process and forked children, threads in
-    all, each of which takes the next when it has finished one: so the longest should come first.
-    Children store their kernels in the cache.  Without children (threads = 1, no `fork`, no cache,
-    not in the main thread), or if they fail, this process compiles all.  say(done, total): called
-    after each kernel that had to be compiled, and before the first.
-    """
-    missing = [call for call in calls if not is_compiled(*call)]
-    if missing:
-        tell = say or (lambda done, total: None)
-        tell(0, len(missing))
-        if threads > 1 and len(missing) > 1 and may_fork():
-            _compile_in_parallel(missing, min(threads, len(missing)) - 1, tell)
-        else:
-            for k, call in enumerate(missing):
-                precompile(*call)
-                tell(k + 1, len(missing))
+    """`kernel.precompile` of several entry kernels, in parallel where possible: see
+    `compile_all`."""
+    compile_all([call for call in calls if not is_compiled(*call)], threads, say)
     return [precompile(*call) for call in calls]
+
+
+def compile_all(missing: Sequence[Call], threads: int, say: Report | None = None) -> None:
+    """Compile entry kernels that are not in the cache.
+
+    They are divided among this process and forked children, `threads` in all, each of which takes
+    the next when it has finished one: so the longest should come first.  Children store their
+    kernels in the cache.  Without children (threads = 1, no `fork`, no cache, not in the main
+    thread) this process compiles all; of those that children fail at, none.  say(done, total):
+    called after each kernel, and before the first.
+    """
+    if not missing:
+        return
+    tell = say or (lambda done, total: None)
+    tell(0, len(missing))
+    if threads > 1 and len(missing) > 1 and may_fork():
+        _compile_in_parallel(missing, min(threads, len(missing)) - 1, tell)
+        return
+    for k, call in enumerate(missing):
+        precompile(*call)
+        tell(k + 1, len(missing))
 
 
 def _compile_in_parallel(missing: Sequence[Call], children: int, tell: Report) -> None:

@@ -76,37 +76,16 @@ class Running:
         specialised: bool | None = None,
     ) -> None:
         """specialised: which kernels are used; None: see above.  say: see `precompile_all`."""
-        own = _Specialised(jobs, tables, view, film_filter)
+        own = Specialised(jobs, tables, view, film_filter)
         if specialised is None:
             specialised = own.are_compiled()
         if numba.config.DISABLE_JIT:
             specialised = True
         self._specialised, self._child, self._began = own, 0, math.nan
         self._is_final = specialised
-        if specialised:
-            precompile_all(own.calls, threads, say)
-            self.kernels = own.kernels()
-        else:
-            self.kernels = self._linked(jobs, tables, view, film_filter, threads, say)
-
-    def _linked(
-        self,
-        jobs: Sequence[Job],
-        tables: SceneTables,
-        view: Any,
-        film_filter: Any,
-        threads: int,
-        say: Report | None,
-    ) -> list[Callable[..., None]]:
-        self._linker = linker = Linker()
-        calls, arguments = [], []
-        for job in jobs:
-            given = _linked_arguments(linker, job, tables, view, film_filter)
-            arguments.append(given)
-            calls.append((job.kernel, signature_of(*given, 0, 0, 0, 0)))
-        kernels = precompile_all([*calls, *linker.calls], threads, say)
-        linker.resolve()
-        return [_bound(*one) for one in zip(kernels[: len(jobs)], arguments, strict=True)]
+        used = own if specialised else Linked(jobs, tables, view, film_filter)
+        precompile_all(used.calls, threads, say)
+        self._used, self.kernels = used, used.kernels()
 
     def __enter__(self) -> "Running":
         self._began = time.monotonic()
@@ -150,7 +129,34 @@ class Running:
         self._child = child
 
 
-class _Specialised:
+class Linked:
+    """The linked kernels of some jobs.  calls: those to be compiled, the jobs' own first."""
+
+    def __init__(
+        self, jobs: Sequence[Job], tables: SceneTables, view: Any, film_filter: Any
+    ) -> None:
+        self._linker = linker = Linker()
+        self._arguments = []
+        self.calls: list[Call] = []
+        for job in jobs:
+            given = job.arguments(
+                linked_scene(linker, tables, job.integrator),
+                linked_view(linker, view),
+                linked_filter(linker, film_filter),
+            )
+            self._arguments.append(given)
+            self.calls.append((job.kernel, signature_of(*given, 0, 0, 0, 0)))
+        self._count = len(jobs)
+        self.calls += linker.calls
+
+    def kernels(self) -> list[Callable[..., None]]:
+        """The jobs' kernels, once all calls are compiled.  They are valid as long as this lives."""
+        compiled = [precompile(*call) for call in self.calls[: self._count]]
+        self._linker.resolve()
+        return [_bound(*one) for one in zip(compiled, self._arguments, strict=True)]
+
+
+class Specialised:
     """The specialised kernels of some jobs.  The kernel that traces the rays of path tracing is
     called through a function pointer (`Geometry.tracer`), so that scenes share it."""
 
@@ -186,29 +192,3 @@ class _Specialised:
 
 def _bound(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., None]:
     return lambda *tile: kernel(*arguments, *tile)
-
-
-def _linked_arguments(
-    linker: Linker, job: Job, tables: SceneTables, view: Any, film_filter: Any
-) -> tuple[Any, ...]:
-    scene = linked_scene(linker, tables, job.integrator)
-    return job.arguments(scene, linked_view(linker, view), linked_filter(linker, film_filter))
-
-
-def linked_calls_of(
-    jobs: Sequence[Job], tables: SceneTables, view: Any, film_filter: Any
-) -> list[Call]:
-    """The linked kernels of some jobs: those that `Running` would compile."""
-    linker = Linker()
-    calls: list[Call] = []
-    for job in jobs:
-        given = _linked_arguments(linker, job, tables, view, film_filter)
-        calls.append((job.kernel, signature_of(*given, 0, 0, 0, 0)))
-    return [*calls, *linker.calls]
-
-
-def specialised_calls_of(
-    jobs: Sequence[Job], tables: SceneTables, view: Any, film_filter: Any
-) -> list[Call]:
-    """The specialised kernels of some jobs."""
-    return _Specialised(jobs, tables, view, film_filter).calls

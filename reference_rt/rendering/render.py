@@ -17,6 +17,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import INTEGRATORS, RayCast
 from reference_rt.integrators.path import PathSetup
 from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
+from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering.kernels import Job, Running
 from reference_rt.rendering.tiles import aov_tile, first_hits_tile, render_tile
 from reference_rt.scene.build import BuiltScene, build_tables
@@ -28,9 +29,6 @@ SAMPLES_PER_TILE = 1 << 15
 
 Progress = Callable[[str, float], None]
 """Called with the phase ("compile" or "render") and the fraction of it that is done."""
-
-Counts = Callable[[int, int], None]
-"""Called with the number of kernels that are compiled, and of all that had to be."""
 
 
 @dataclass(frozen=True)
@@ -77,16 +75,16 @@ def render(
     threads: int | None = None,
     tables: SceneTables | None = None,
     progress: Progress | None = None,
-    compiling: Counts | None = None,
+    compiling: Report | None = None,
     specialised: bool | None = None,
 ) -> Picture:
     """Render a scene.
 
     threads: default all cores; their number changes no bit.  tables: the scene's tables, if they
     are built already.  progress: called as the render goes on;  compiling: called in its place
-    while kernels are compiled.  specialised: whether kernels are compiled for this kind of scene,
-    for the highest speed, or linked; None: see `kernels`; no bit changes.  Ctrl-C stops it within a
-    tile.
+    while kernels are compiled, with the number of those that are, and of all.  specialised: whether
+    kernels are compiled for this kind of scene, for the highest speed, or linked; None: see
+    `kernels`; no bit changes.  Ctrl-C stops it within a tile.
     Raises SceneError; issues a SceneWarning for each of `likely_mistakes`.
     """
     say = progress or (lambda what, fraction: None)
@@ -97,20 +95,13 @@ def render(
     for mistake in likely_mistakes(scene, tables):
         scene.warn(mistake.message, *mistake.path)
     film, integrator = scene.film, scene.integrator
-    if isinstance(integrator, RayCast):
-        shown, (jobs, layers) = integrator.show, _aov_jobs(scene)
-    else:
-        shown, (jobs, layers) = "colour", _render_jobs(scene, integrator)
+    shown = integrator.show if isinstance(integrator, RayCast) else "colour"
+    jobs, layers = jobs_of(scene)
     view = scene.camera.setup(film.width, film.height)
     threads = threads or os.cpu_count() or 1
 
-    def say_compiled(done: int, total: int) -> None:
-        if compiling is not None:
-            compiling(done, total)
-        else:
-            say("compile", done / total)
-
-    running = Running(jobs, tables, view, film.filter.setup(), threads, say_compiled, specialised)
+    compiling = compiling or (lambda done, total: say("compile", done / total))
+    running = Running(jobs, tables, view, film.filter.setup(), threads, compiling, specialised)
     say("compile", 1.0)
     clock.append(time.perf_counter())
     pixels = film.width * film.height
@@ -127,11 +118,11 @@ def render(
     return Picture(layers, shown, seconds)
 
 
-def jobs_of(scene: BuiltScene) -> list[Job]:
-    """The jobs that compute a scene's picture."""
-    casts = isinstance(scene.integrator, RayCast)
-    jobs, _ = _aov_jobs(scene) if casts else _render_jobs(scene, scene.integrator)
-    return jobs
+def jobs_of(scene: BuiltScene) -> tuple[list[Job], dict[str, FloatArray]]:
+    """The jobs that compute a scene's picture, and the layers that they write."""
+    if isinstance(scene.integrator, RayCast):
+        return _aov_jobs(scene)
+    return _render_jobs(scene, scene.integrator)
 
 
 def _aov_jobs(scene: BuiltScene) -> tuple[list[Job], dict[str, FloatArray]]:

@@ -18,7 +18,7 @@ from reference_rt.integrators import Path as PathTracing
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import is_named_tuple
 from reference_rt.jit.parallel_compile import Call
-from reference_rt.rendering.kernels import Job, linked_calls_of, specialised_calls_of
+from reference_rt.rendering.kernels import Job, Linked, Specialised
 from reference_rt.rendering.render import jobs_of
 from reference_rt.rendering.warm_up_scenes import scenes
 from reference_rt.sampling import Grid
@@ -27,18 +27,18 @@ from reference_rt.scene.build import BuiltScene
 
 def picture_calls(scene: BuiltScene) -> list[Call]:
     """The linked kernels of a scene's picture."""
-    return linked_calls_of(*_picture(scene))
+    return Linked(*_picture(scene)).calls
 
 
 def specialised_calls(scene: BuiltScene) -> list[Call]:
     """The specialised kernels of a scene's picture."""
-    return specialised_calls_of(*_picture(scene))
+    return Specialised(*_picture(scene)).calls
 
 
 def _picture(scene: BuiltScene) -> tuple[list[Job], SceneTables, Any, Any]:
     # Of one pixel: the number of pixels changes no type.
     film = scene.film.model_copy(update={"width": 1, "height": 1})
-    jobs = jobs_of(scene.model_copy(update={"film": film}))
+    jobs, _ = jobs_of(scene.model_copy(update={"film": film}))
     return jobs, scene.tables, scene.camera.setup(1, 1), film.filter.setup()
 
 

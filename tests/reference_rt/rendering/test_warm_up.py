@@ -18,7 +18,7 @@ from reference_rt.lights.selection.tree import light_trees
 from reference_rt.materials.bsdfs.tables import by_code as bsdfs
 from reference_rt.materials.nested.flattened import FlattenedMaterials, flattened_materials
 from reference_rt.rendering import kernels
-from reference_rt.rendering.kernels import linked_calls_of
+from reference_rt.rendering.kernels import Linked
 from reference_rt.rendering.render import radiance_job
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.warm_up import (
@@ -79,7 +79,7 @@ def test_radiance_along_given_rays(integrator, known):
     tables = rt.Scene(shapes=(rt.Sphere(),), integrator=integrator).tables
     out, rays = np.zeros((4, 3)), GivenRays(np.zeros((4, 3)), np.ones((4, 3)))
     job = radiance_job(integrator.setup(), rt.Independent(spp=2), (4, 1), out, np.zeros((4, 3)))
-    assert described(set(linked_calls_of([job], tables, rays, None)) - set(known)) == set()
+    assert described(set(Linked([job], tables, rays, None).calls) - set(known)) == set()
 
 
 @pytest.mark.parametrize(
