@@ -101,7 +101,7 @@ def test_every_type_of_every_operation(group, known):
     """A type that is added to a group must be added to a scene of the warm-up, too."""
     compiled = {kernel for kernel, _ in known}
     for operation in group.values():
-        needed = {operation.call_for(code, 0)[0] for code in operation.rows}
+        needed = {operation.call_for(code, numba.types.int64)[0] for code in operation.rows}
         assert needed <= compiled or (operation.name in OF_QUERIES and not needed & compiled)
 
 
