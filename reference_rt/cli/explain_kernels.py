@@ -9,7 +9,7 @@ from numba import types
 from reference_rt.jit.kernel import Signature, is_compiled
 from reference_rt.jit.parallel_compile import Call
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.warm_up import picture_calls, specialised_calls
+from reference_rt.rendering.warm_up import operation_of, picture_calls, specialised_calls
 
 Lines = list[tuple[str, str]]
 
@@ -80,7 +80,7 @@ def kernels_of(scene: Scene) -> Lines:
     ]
     found: dict[str, set[str]] = {}
     for compiled, signature in linked:
-        what, operation = _named(compiled.__name__, signature)
+        what, operation = _named(operation_of(compiled), signature)
         found.setdefault(what, set()).add(operation)
     return lines + [(what, ", ".join(sorted(of_type))) for what, of_type in sorted(found.items())]
 

@@ -9,6 +9,7 @@ To add kernels of another kind, such as those of a query: a function that return
 scene, and its place in `_CALLS`.
 """
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -86,7 +87,13 @@ def cost(call: Call) -> float:
     arguments = signature if isinstance(signature, tuple) else signature.args
     if any(is_named_tuple(of, SceneTables) for of in arguments):
         return _COST_SPECIALISED
-    return _COSTS.get(compiled.__name__, _COST)
+    return _COSTS.get(operation_of(compiled), _COST)
 
 
-__all__ = ["cost", "linked_calls", "picture_calls", "specialised_calls"]
+def operation_of(compiled: Any) -> str:
+    """The name of a kernel's operation, or of a kernel that is none; without the code of the type
+    that kernels of operations end with."""
+    return re.sub(r"_\d+$", "", compiled.__name__)
+
+
+__all__ = ["cost", "linked_calls", "operation_of", "picture_calls", "specialised_calls"]

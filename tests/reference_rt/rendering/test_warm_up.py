@@ -21,7 +21,13 @@ from reference_rt.rendering import kernels
 from reference_rt.rendering.kernels import Linked
 from reference_rt.rendering.render import radiance_job
 from reference_rt.rendering.tiles import GivenRays
-from reference_rt.rendering.warm_up import cost, linked_calls, picture_calls, specialised_calls
+from reference_rt.rendering.warm_up import (
+    cost,
+    linked_calls,
+    operation_of,
+    picture_calls,
+    specialised_calls,
+)
 from reference_rt.shapes.meshes.triangle_table import Triangles
 from reference_rt.shapes.tables import by_code as shapes
 from reference_rt.textures.lookup import Textures, textures_operations
@@ -147,7 +153,7 @@ def test_every_combination_of_geometry(known):
     corners = {
         signature.args[0].dtype.types[Geometry._fields.index("bvh")]
         for kernel, signature in known
-        if kernel.__name__ == "any_hits"
+        if operation_of(kernel) == "any_hits"
     }
     assert len(corners) == 3  # no hierarchy, one with triangles, one without
 
