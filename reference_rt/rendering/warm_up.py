@@ -19,6 +19,7 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import is_named_tuple
 from reference_rt.jit.parallel_compile import Call
 from reference_rt.rendering.kernels import Job, Linked, Specialised
+from reference_rt.rendering.query.ahead import query_calls
 from reference_rt.rendering.render import jobs_of
 from reference_rt.rendering.warm_up_scenes import scenes
 from reference_rt.sampling import Grid
@@ -53,7 +54,7 @@ def _pictures(scene: BuiltScene) -> Iterator[Call]:
         yield from picture_calls(scene.model_copy(update=changes))
 
 
-_CALLS: tuple[Callable[[BuiltScene], Iterable[Call]], ...] = (_pictures,)
+_CALLS: tuple[Callable[[BuiltScene], Iterable[Call]], ...] = (_pictures, query_calls)
 """From a scene to the linked kernels that some work on it needs."""
 
 

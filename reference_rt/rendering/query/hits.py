@@ -27,6 +27,9 @@ from reference_rt.rendering.query.tracing import (
 
 BoolArray = npt.NDArray[np.bool_]
 
+OCCLUDED, OCCLUDED_BY_BLOCKS = ("occluded",), ("any_hits",)
+"""The operations of `occluded_of_few` and of `occluded_by_blocks`."""
+
 
 @dataclass(frozen=True)
 class Hits:
@@ -67,14 +70,14 @@ class Intersections(Hits):
 
 
 @entry_kernel
-def _occluded(
+def occluded_by_blocks(
     geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: BoolArray
 ) -> None:
     occluded_rays(geometry, o, d, t_max, out)
 
 
 @entry_kernel
-def _occluded_of_few(
+def occluded_of_few(
     geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: BoolArray
 ) -> None:
     occluded_one_by_one(geometry, o, d, t_max, out)
@@ -147,8 +150,8 @@ def occluded(
     ends = np.full(n, math.inf) if high is None else high
     out = np.zeros(n, np.bool_)
     few = n <= FEW
-    kernel = _occluded_of_few if few else _occluded
-    found = link_to_geometry(scene, "occluded" if few else "any_hits")
+    kernel = occluded_of_few if few else occluded_by_blocks
+    found = link_to_geometry(scene, *(OCCLUDED if few else OCCLUDED_BY_BLOCKS))
 
     def trace(k: slice) -> None:
         o, d, end = rays.o[k], rays.d[k], ends[k]

@@ -7,14 +7,14 @@ pays after 10^8 rays, so queries have none.
 
 import os
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numba
 
 from reference_rt.accel.geometry import Geometry
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.jit.links import Linker
+from reference_rt.jit.links import Link, Linker
 from reference_rt.jit.parallel_compile import precompile_all
 from reference_rt.rendering.linking import linked_geometry, linked_scene, linked_shapes
 
@@ -63,12 +63,13 @@ def linked(
 def link_to_geometry(scene: SceneTables, *operations: str) -> Linked:
     """The scene's geometry behind a link that has these operations."""
     geometry = scene.geometry
+    return linked(scene, operations, lambda made: geometry_of(made, geometry, operations), geometry)
 
-    def link(linker: Linker) -> Any:
-        shapes = linked_shapes(linker, geometry.shapes, _of_shapes(geometry, operations))
-        return linked_geometry(linker, geometry, shapes, operations)
 
-    return linked(scene, operations, link, geometry)
+def geometry_of(linker: Linker, geometry: Geometry, operations: Sequence[str]) -> Link:
+    """A geometry behind a link that has these operations, and what they call."""
+    shapes = linked_shapes(linker, geometry.shapes, _of_shapes(geometry, operations))
+    return linked_geometry(linker, geometry, shapes, operations)
 
 
 def link_to_scene(scene: SceneTables, integrator: str) -> Linked:

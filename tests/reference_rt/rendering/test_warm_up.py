@@ -13,12 +13,16 @@ from reference_rt.accel.geometry import Geometry, geometries
 from reference_rt.cameras import views
 from reference_rt.cameras.filters import film_filters
 from reference_rt.integrators import INTEGRATORS
+from reference_rt.jit.kernel import is_named_tuple
+from reference_rt.jit.links import Link
 from reference_rt.lights.dispatch import by_code as lights
 from reference_rt.lights.selection.tree import light_trees
 from reference_rt.materials.bsdfs.tables import by_code as bsdfs
 from reference_rt.materials.nested.flattened import FlattenedMaterials, flattened_materials
 from reference_rt.rendering import kernels
 from reference_rt.rendering.kernels import Linked
+from reference_rt.rendering.query import tracing
+from reference_rt.rendering.query.ahead import query_calls
 from reference_rt.rendering.render import radiance_job
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.warm_up import (
@@ -35,8 +39,8 @@ from reference_rt.textures.lookup import Textures, textures_operations
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 INTEGRATORS_OF = (rt.Path(), rt.Direct(), rt.Whitted(), rt.RayCast())
-OF_QUERIES = {"_of_quadric", "primitive_count"}
-"""Operations that no linked kernel calls as long as queries are not linked."""
+OF_SOLIDS = {"crossings_of_solid"}
+"""Operations of `Scene.solid_crossings` alone, which are compiled when they are needed."""
 FILES = sorted(SCENES.glob("*.yaml"))
 
 
@@ -102,7 +106,27 @@ def test_every_type_of_every_operation(group, known):
     compiled = {kernel for kernel, _ in known}
     for operation in group.values():
         needed = {operation.call_for(code, numba.types.int64)[0] for code in operation.rows}
-        assert needed <= compiled or (operation.name in OF_QUERIES and not needed & compiled)
+        assert needed <= compiled or (operation.name in OF_SOLIDS and not needed & compiled)
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_queries_of_every_scene(file, known):
+    assert described(set(query_calls(rt.Scene.load(file))) - set(known)) == set()
+
+
+def test_queries_call_these_kernels():
+    """That is with arguments of these types: nothing else is compiled."""
+    scene = rt.Scene(shapes=(rt.Sphere(), rt.Rectangle()))
+    calls = query_calls(scene)
+    o, d = np.zeros((2, 3)), np.ones((2, 3))
+    many = np.zeros((tracing.FEW + 1, 3))
+    scene.intersect(o, d, t_min=0.5, t_max=np.ones(2)), scene.first_hits(o, d)
+    scene.occluded(o, d), scene.occluded(many, d[0], t_max=2.0)
+    scene.crossings(o, d, t_max=2.0), scene.first_hits(many, d[0])
+    for kernel, signature in calls:
+        if isinstance(signature, tuple):  # an entry kernel, not an operation
+            others = [key for key in kernel.overloads if is_named_tuple(key[0], Link)]
+            assert set(others) == {signature}, kernel.__name__
 
 
 def optional(table):
@@ -155,7 +179,7 @@ def test_every_combination_of_geometry(known):
         for kernel, signature in known
         if operation_of(kernel) == "any_hits"
     }
-    assert len(corners) == 3  # no hierarchy, one with triangles, one without
+    assert len(corners) == 2  # no hierarchy, and one: without triangles `corners` is empty
 
 
 def test_every_integrator_with_every_sampler(known):
