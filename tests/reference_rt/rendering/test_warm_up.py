@@ -211,7 +211,7 @@ def test_a_render_reports_the_kernels_that_it_compiles(monkeypatch):
     """By their numbers, in place of the fraction."""
     compile_all = kernels.precompile_all
 
-    def slowly(calls, threads, say):
+    def slowly(calls, threads, say, ahead):
         say(0, 2)
         say(2, 2)
         return compile_all(calls, threads)
