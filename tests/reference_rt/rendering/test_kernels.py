@@ -52,6 +52,9 @@ INTEGRATORS: dict[str, dict[str, Any]] = {
 }
 
 
+SOME = ("cornell_box", "csg_nested", "instances", "textured_room")
+"""Scenes for the quick run by all integrators."""
+
 # ---- what linking asks for ----------------------------------------------------------------------
 
 
@@ -77,7 +80,7 @@ def render_linked(*names):
 @needs_jit
 @pytest.mark.parametrize(
     "names",
-    [DIVERSE, pytest.param([p.stem for p in SCENES.glob("*.yaml")], marks=pytest.mark.slow)],
+    [SOME, pytest.param([p.stem for p in SCENES.glob("*.yaml")], marks=pytest.mark.slow)],
     ids=["some", "all"],
 )
 def test_linking_asks_for_all_that_is_called(names):
