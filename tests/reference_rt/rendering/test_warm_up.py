@@ -9,7 +9,6 @@ import pytest
 from builders import SCENES, every_law, every_light, every_shape
 
 import reference_rt as rt
-from reference_rt.accel.bvh import Bvh
 from reference_rt.accel.geometry import Geometry, geometries
 from reference_rt.cameras import views
 from reference_rt.cameras.filters import film_filters
@@ -25,7 +24,6 @@ from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.warm_up import (
     cost,
     linked_calls,
-    operation_of,
     picture_calls,
     specialised_calls,
 )
@@ -156,12 +154,6 @@ def test_every_combination_of_geometry(known):
         for chosen in subsets(("solids", "instances"))
     }
     assert present(Geometry, known) == expected
-    corners = {
-        signature.args[0].dtype.types[Geometry._fields.index("bvh")]
-        for kernel, signature in known
-        if operation_of(kernel) == "any_hits"
-    }
-    assert len(corners) == 1 + 2 ** len(optional(Bvh))  # no hierarchy; and with each choice
 
 
 def test_every_integrator_with_every_sampler(known):
