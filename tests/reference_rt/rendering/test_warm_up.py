@@ -24,6 +24,7 @@ from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.warm_up import (
     cost,
     linked_calls,
+    operation_of,
     picture_calls,
     specialised_calls,
 )
@@ -34,14 +35,8 @@ from reference_rt.textures.lookup import Textures, textures_operations
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 INTEGRATORS_OF = (rt.Path(), rt.Direct(), rt.Whitted(), rt.RayCast())
-OF_QUERIES = {
-    "_of_quadric",
-    "closest_of_packet",
-    "crossings_of_solid",
-    "next_crossing",
-    "primitive_count",
-}
-"""Operations of queries alone, whose kernels may be left out."""
+OF_QUERIES = {"_of_quadric", "primitive_count"}
+"""Operations that no linked kernel calls as long as queries are not linked."""
 FILES = sorted(SCENES.glob("*.yaml"))
 
 
@@ -125,6 +120,7 @@ def present(table, calls):
         and getattr(signature.args[0].dtype, "instance_class", None) is table
     }
     names = optional(table)
+    assert names
     return {
         tuple(
             name
@@ -154,6 +150,12 @@ def test_every_combination_of_geometry(known):
         for chosen in subsets(("solids", "instances"))
     }
     assert present(Geometry, known) == expected
+    corners = {
+        signature.args[0].dtype.types[Geometry._fields.index("bvh")]
+        for kernel, signature in known
+        if operation_of(kernel) == "any_hits"
+    }
+    assert len(corners) == 3  # no hierarchy, one with triangles, one without
 
 
 def test_every_integrator_with_every_sampler(known):
@@ -185,7 +187,7 @@ def test_a_render_reports_the_kernels_that_it_compiles(monkeypatch):
     """By their numbers, in place of the fraction."""
     compile_all = kernels.precompile_all
 
-    def slowly(calls, threads, say, *ahead):
+    def slowly(calls, threads, say):
         say(0, 2)
         say(2, 2)
         return compile_all(calls, threads)
