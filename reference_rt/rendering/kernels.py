@@ -23,6 +23,7 @@ import numpy as np
 
 from reference_rt.accel.block_query import tracer_of
 from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit import parallel_compile
 from reference_rt.jit.function_pointer import pointer_to
 from reference_rt.jit.kernel import is_compiled, precompile, signature_of
 from reference_rt.jit.links import Link, Linker
@@ -32,7 +33,6 @@ from reference_rt.jit.parallel_compile import (
     Report,
     fork_with_compiler,
     has_ended,
-    may_fork,
     precompile_all,
 )
 from reference_rt.rendering.linking import (
@@ -94,12 +94,11 @@ class Running:
     ) -> None:
         """specialised: which kernels to use; None: see above.  say, ahead: see `precompile_all`."""
         own = Specialised(jobs, tables, view, film_filter)
-        if specialised is None:
-            specialised = own.are_compiled()
-        if numba.config.DISABLE_JIT:
+        self._may_change = specialised is None
+        if numba.config.DISABLE_JIT or (specialised is None and own.are_compiled()):
             specialised = True
+        self._may_change = self._may_change and not specialised
         self._specialised, self._child, self._began = own, 0, math.nan
-        self._is_final = specialised
         used = own if specialised else Linked(jobs, tables, view, film_filter)
         precompile_all(used.calls, threads, say, None if specialised else ahead)
         self._used, self.kernels = used, used.kernels()
@@ -121,17 +120,18 @@ class Running:
     def progress(self, fraction: float) -> None:
         """To be called now and then while rendering: starts to compile the specialised kernels, or
         takes them into use."""
-        if self._is_final:
+        if not self._may_change:
             return
         if self._child:
             if has_ended(self._child):
-                self._child, self._is_final = 0, True
+                self._child = 0
                 if self._specialised.are_compiled():
                     self.kernels = self._specialised.kernels()
+                self._may_change = False
             return
         elapsed = time.monotonic() - self._began
         if elapsed > WAIT and fraction > 0.0:
-            if elapsed / fraction * (1.0 - fraction) > WORTHWHILE and may_fork():
+            if elapsed / fraction * (1.0 - fraction) > WORTHWHILE and parallel_compile.may_fork():
                 self._start()
 
     def _start(self) -> None:

@@ -14,6 +14,7 @@ import pytest
 from builders import HELPERS
 from small_scenes import same, small
 
+from reference_rt.jit import parallel_compile
 from reference_rt.jit.parallel_compile import has_ended
 from reference_rt.rendering import kernels
 from reference_rt.rendering.render import render
@@ -60,7 +61,7 @@ class Watched:
         rendering = sys.modules["reference_rt.rendering.render"]
         monkeypatch.setattr(kernels.Running, "run", watched_run)
         monkeypatch.setattr(kernels, "fork_with_compiler", watched_fork)
-        monkeypatch.setattr(kernels, "may_fork", lambda: True)
+        monkeypatch.setattr(parallel_compile, "may_fork", lambda: True)
         monkeypatch.setattr(kernels, "WAIT", 0.0)
         monkeypatch.setattr(kernels, "WORTHWHILE", 0.0)
         monkeypatch.setattr(rendering, "SAMPLES_PER_TILE", 256)
@@ -108,11 +109,19 @@ def test_specialised_kernels_take_over_between_tiles(scene, monkeypatch):
 
 
 @forks
+def test_linked_kernels_stay_if_they_are_asked_for(scene, monkeypatch):
+    watched = Watched(monkeypatch, lambda w: True)
+    render(scene, threads=2, specialised=False)
+    assert watched.children == []
+    assert all(kernel in watched.linked for kernel in watched.used)
+
+
+@forks
 def test_a_child_that_stores_nothing_changes_nothing(scene, monkeypatch):
     """On a full disk, for example."""
     expected = render(scene, specialised=False)
     as_if_not_compiled(monkeypatch, often=1000)
-    watched = Watched(monkeypatch, lambda w: w.running._is_final)
+    watched = Watched(monkeypatch, lambda w: not w.running._may_change)
     assert same(render(scene, threads=2), expected)
     assert len(watched.children) == 1
     assert all(kernel in watched.linked for kernel in watched.used)
