@@ -35,6 +35,7 @@ from reference_rt.jit.parallel_compile import (
     has_ended,
     precompile_all,
 )
+from reference_rt.rendering.compile_cost import cost
 from reference_rt.rendering.linking import (
     EMPTY_SCENE,
     EMPTY_VIEW,
@@ -163,7 +164,7 @@ class Linked:
             self._arguments.append(given)
             self.calls.append((job.kernel, signature_of(*given, 0, 0, 0, 0)))
         self._count = len(jobs)
-        self.calls += linker.calls
+        self.calls += sorted(linker.calls, key=cost, reverse=True)
 
     def kernels(self) -> list[Callable[..., None]]:
         """The jobs' kernels, once all calls are compiled.  They are valid as long as this lives."""

@@ -9,15 +9,14 @@ To add kernels of another kind, such as those of a query: a function that return
 scene, and its place in `_CALLS`.
 """
 
-import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.jit.kernel import is_named_tuple
 from reference_rt.jit.parallel_compile import Call
+from reference_rt.rendering.compile_cost import cost, operation_of
 from reference_rt.rendering.kernels import Job, Linked, Specialised
 from reference_rt.rendering.query.ahead import query_calls
 from reference_rt.rendering.render import jobs_of
@@ -65,36 +64,6 @@ def linked_calls() -> list[Call]:
         for calls in _CALLS:
             found |= dict.fromkeys(calls(scene))
     return sorted(found, key=cost, reverse=True)
-
-
-_COSTS = {
-    "trace_block": 4.0,  # of specialised kernels only
-    "render_tile": 1.6,
-    "closest_hits": 1.3,
-    "any_hits": 0.9,
-    "closest_hit": 0.8,
-    "occluded": 0.6,
-    "first_hits_tile": 0.4,
-    "aov_tile": 0.4,
-}
-_COST = 0.13
-_COST_SPECIALISED = 8.0
-
-
-def cost(call: Call) -> float:
-    """About how many seconds it takes to compile a kernel (measured: means; others take _COST),
-    for the order and for progress bars."""
-    compiled, signature = call
-    arguments = signature if isinstance(signature, tuple) else signature.args
-    if any(is_named_tuple(of, SceneTables) for of in arguments):
-        return _COST_SPECIALISED
-    return _COSTS.get(operation_of(compiled), _COST)
-
-
-def operation_of(compiled: Any) -> str:
-    """The name of a kernel's operation, or of a kernel that is none; without the code of the type
-    that kernels of operations end with."""
-    return re.sub(r"_\d+$", "", compiled.__name__)
 
 
 __all__ = ["cost", "linked_calls", "operation_of", "picture_calls", "specialised_calls"]

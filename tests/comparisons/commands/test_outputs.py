@@ -42,6 +42,7 @@ ARGUMENTS = {
     "stability": [],
     "explain": [SCENE],
     "schema": [],
+    "warm-up": [],
 }
 """What each command needs besides its outputs."""
 

@@ -197,9 +197,13 @@ def test_a_child_is_deaf_to_an_interrupt(cold, monkeypatch):
             time.sleep(0.01)
 
     monkeypatch.setattr(parallel_compile, "precompile", compiling)
-    parallel_compile.precompile_all(cold.calls, 2)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        parallel_compile.precompile_all(cold.calls, 2)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert cold.compiled(False)
-    assert signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
 
 
 @forks
