@@ -13,9 +13,10 @@ follow these rules for that:
   are guarded (`reciprocal`): Python raises where the machine returns NaN or infinity.
 """
 
+import gc
 import math
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 import numba
@@ -98,8 +99,23 @@ def precompile(compiled: Callable[..., Any], signature: Signature) -> Callable[.
     """
     if numba.config.DISABLE_JIT:
         return compiled
-    ready: Callable[..., Any] = compiled.compile(signature)  # type: ignore[attr-defined]
+    with _no_collections():
+        ready: Callable[..., Any] = compiled.compile(signature)  # type: ignore[attr-defined]
     return ready
+
+
+@contextmanager
+def _no_collections() -> Iterator[None]:
+    """Without Python's garbage collections.  Numba's compiler makes many objects that last until a
+    kernel is compiled, and searching them takes 15 % of the time (measured: 5.2 s to 4.4 s)."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 def is_compiled(compiled: Callable[..., Any], signature: Signature) -> bool:
