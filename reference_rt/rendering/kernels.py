@@ -71,8 +71,8 @@ class Job:
 def compile_ahead(jobs: Sequence[Job], threads: int) -> Ahead:
     """Begins to compile the linked kernels of some jobs, which do not depend on the tables, so that
     these can be built meanwhile."""
-    if numba.config.DISABLE_JIT:
-        return Ahead([], threads)
+    if numba.config.DISABLE_JIT or threads < 2 or not parallel_compile.may_fork():
+        return Ahead([], threads)  # to make the signatures takes 3 ms
     given = [job.arguments(EMPTY_SCENE, EMPTY_VIEW, Link(0)) for job in jobs]
     signatures = [signature_of(*arguments, 0, 0, 0, 0) for arguments in given]
     calls = [(job.kernel, one) for job, one in zip(jobs, signatures, strict=True)]
