@@ -39,6 +39,8 @@ _UNFINISHED_FOR = 3600.0
 """Seconds after which a temporary file is deleted: writing takes less than one, so its writer was
 killed."""
 
+_PACKAGE = Path(__file__).parents[1]
+
 _MAGIC = b"reference_rt kernel\n"
 _CHECKSUM_BYTES = 32
 
@@ -50,9 +52,8 @@ def _sources_digest(compiler: str) -> str:
     for version in (sys.version, numba.__version__, llvmlite.__version__, compiler):
         digest.update(version.encode())
     digest.update(str(numba.config.BOUNDSCHECK).encode())
-    package = Path(__file__).parents[1]  # kernels of every folder call each other
-    for source in sorted(package.rglob("*.py")):
-        digest.update(source.relative_to(package).as_posix().encode())
+    for source in sorted(_PACKAGE.rglob("*.py")):  # kernels of every folder call each other
+        digest.update(source.relative_to(_PACKAGE).as_posix().encode())
         digest.update(source.read_bytes())
     return digest.hexdigest()[:20]
 
@@ -107,6 +108,14 @@ def _delete(path: Path) -> None:
         shutil.rmtree(path, ignore_errors=True)
 
 
+def _place(file: Path) -> str:
+    """A source file's path, for a file of this package within the package: an installed copy and
+    the sources that it was installed from share their kernels, as does a copy elsewhere."""
+    if file.is_relative_to(_PACKAGE):
+        return file.relative_to(_PACKAGE).as_posix()
+    return str(file)
+
+
 class KernelCache:
     """The cache of one function.  Assigned to the attribute `_cache` of Numba's dispatcher, which
     calls `load_overload` before it compiles and `save_overload` afterwards.
@@ -121,8 +130,9 @@ class KernelCache:
         code = function.__code__
         self._name = f"{Path(code.co_filename).stem}.{code.co_name.strip('<>')}"
         # The folder's name covers the sources of this package only; functions may be outside.
-        source = hashlib.blake2b(Path(code.co_filename).read_bytes()).digest()
-        self._identity = code.co_filename, function.__qualname__, code.co_firstlineno, source, name
+        file = Path(code.co_filename)
+        source = hashlib.blake2b(file.read_bytes()).digest()
+        self._identity = _place(file), function.__qualname__, code.co_firstlineno, source, name
         self._head = _MAGIC + self._folder.name.encode()
 
     @property
