@@ -2,7 +2,7 @@
 
 *Linked* kernels reach a scene's tables through links (`jit/links.py`): they are compiled for types,
 once for all scenes.  *Specialised* kernels have the same code inlined, for one kind of scene: they
-take seconds to compile and render in 0.65 to 0.85 of the time.  Both give the same bits.
+take seconds to compile and render in 0.6 to 1.0 of the time.  Both give the same bits.
 
 A picture uses specialised kernels if they are in the cache.  Otherwise it starts with linked ones;
 if it takes long, a second process compiles the specialised ones meanwhile, and they take over

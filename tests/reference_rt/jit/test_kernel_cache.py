@@ -234,7 +234,7 @@ def test_an_edit_anywhere_in_the_package_gives_another_folder(kernels, monkeypat
     whole = Path(kernel_cache.__file__).parents[1]
     package = kernels.parent / "package"
     shutil.copytree(whole, package, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(kernel_cache, "__file__", str(package / "jit" / "kernel_cache.py"))
+    monkeypatch.setattr(kernel_cache, "_PACKAGE", package)
     found = [kernel_cache.prepare_folder("one")]
     one_of_each_folder = {path.parent: path for path in sorted(package.rglob("*.py"))}
     assert {package, package / "jit", package / "shapes" / "curved"} <= set(one_of_each_folder)
