@@ -2,14 +2,15 @@
 
 Contract: a description (pydantic; `deterministic`: it draws no random numbers;
 `follows_scattered`: BSDF-sampled rays collect emission too) whose `setup()` is a NamedTuple of
-parameters, and a kernel `radiance(setup, scene, ray, sampler)`.  It returns the radiance in
-W sr^-1 m^-2, linear sRGB, that arrives at the ray's origin from its (unit) direction; 0 is black.
+parameters, and a kernel for one ray, `radiance(setup, scene, ray, sampler)`, or one for a block of
+rays, `radiances`.  It estimates the radiance in W sr^-1 m^-2, linear sRGB, that arrives at a ray's
+origin from its (unit) direction; 0 is black.
 `RayCast` alone has no such kernel: `ray_cast.cast` computes AOVs.  Shared by all: `shading` (from a
 hit to the BSDF's input), `direct_light` (one light sample, power heuristic), `scene_tables` (what
 kernels read), `scratch` and `path_state` (buffers of a block).
 
-To add an integrator: its file with description, NamedTuple and `radiance` kernel; `AnyIntegrator`
-and one registration in each table below; its counterpart in `comparisons`.
+To add an integrator: its file with description, NamedTuple and kernel; `AnyIntegrator` and its
+registrations below; its counterpart in `comparisons`.
 """
 
 from typing import Annotated, Any
@@ -32,12 +33,10 @@ AnyIntegrator = Annotated[RayCast | Whitted | Direct | Path, Field(discriminator
 INTEGRATORS: dict[type, str] = {PathSetup: "path", DirectSetup: "direct", WhittedSetup: "whitted"}
 """The names of the integrators, by the classes of their setups."""
 
-_radiance = ByClass("radiance")
-_radiance.register(PathSetup, path.radiance)
-_radiance.register(DirectSetup, direct.radiance)
-_radiance.register(WhittedSetup, whitted.radiance)
-radiance = _radiance.function
-"""radiance(setup, scene, ray, sampler) -> Vec3: see above."""
+_of_one = ByClass("radiance")
+_of_one.register(DirectSetup, direct.radiance)
+_of_one.register(WhittedSetup, whitted.radiance)
+_radiance = _of_one.function
 
 
 @kernel
@@ -45,8 +44,8 @@ def _one_by_one(
     setup: Any, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
 ) -> None:
     for j in range(n):
-        ray = ray_of(scratch.rays, j)
-        put_vector(scratch.totals, 0, j, radiance(setup, scene, ray, sampler_of(samplers, j)))
+        ray, sampler = ray_of(scratch.rays, j), sampler_of(samplers, j)
+        put_vector(scratch.totals, 0, j, _radiance(setup, scene, ray, sampler))
 
 
 _radiances = ByClass("radiances")
@@ -54,7 +53,7 @@ _radiances.register(PathSetup, path.radiances)
 _radiances.register(DirectSetup, _one_by_one)
 _radiances.register(WhittedSetup, _one_by_one)
 radiances = _radiances.function
-"""radiances(setup, scene, samplers, n, scratch): `radiance` of the first n of `scratch.rays`, into
-`scratch.totals`."""
+"""radiances(setup, scene, samplers, n, scratch): estimates of the radiance along the first n of
+`scratch.rays`, into `scratch.totals`."""
 
-__all__ = ["AnyIntegrator", "Direct", "Path", "RayCast", "Whitted", "radiance", "radiances"]
+__all__ = ["AnyIntegrator", "Direct", "Path", "RayCast", "Whitted", "radiances"]

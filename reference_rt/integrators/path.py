@@ -16,8 +16,8 @@ of the path takes three steps:
 Step 2 and the next edge's step 1 estimate the same direct light.  `_mis_weight` weights them so
 that it is counted once (multiple importance sampling, Veach 1997).
 
-`radiance` is the algorithm for a single path; `radiances` runs the same steps for a block of paths,
-edge by edge, with the same bits.
+`radiances` takes these steps for a block of paths, edge by edge, so that the rays of all paths are
+traced together.
 """
 
 from typing import Annotated, ClassVar, Literal, NamedTuple
@@ -28,7 +28,6 @@ from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
-from reference_rt.accel.geometry import closest_hit, occluded
 from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.ray_block import add_vector, put_ray, put_vector, ray_of, vector_of
@@ -42,7 +41,7 @@ from reference_rt.integrators.path_state import State, put_state, start, state_o
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of
 from reference_rt.integrators.scratch import Scratch
 from reference_rt.integrators.shading import shade
-from reference_rt.jit.kernel import kernel, local_floats
+from reference_rt.jit.kernel import kernel
 from reference_rt.lights import shadow_ray
 from reference_rt.materials import Shading
 from reference_rt.sampling import Sample, Samplers, draw_pair, sampler_of
@@ -117,40 +116,14 @@ class LightConnection(NamedTuple):
 
 
 @kernel
-def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> Vec3:
-    """An unbiased estimate of the radiance that arrives at the origin of `ray` from its
-    direction."""
-    total = Vec3(0.0, 0.0, 0.0)
-    state = start(ray)
-    kept = local_floats(any_material.scratch_floats(scene.materials))
-    for depth in range(path.max_depth):
-        hit = closest_hit(scene.geometry, ray)
-        if hit.kind < 0:
-            return total + _environment_emission(path, scene, state, ray)
-        shading = shade(scene, ray, hit, kept)
-        if any_light.is_area(scene.lights, shading.point):
-            total = total + _hit_emission(path, scene, state, ray, shading)
-        if depth + 1 >= path.max_depth:
-            break
-        lit = _next_event_estimation(path, scene, state, shading, sampler, depth)
-        if not is_black(lit.light):
-            if not occluded(scene.geometry, lit.shadow):
-                total = total + lit.light
-        step = _scatter(path, scene, state, shading, sampler, depth)
-        if not step.goes_on:
-            break
-        ray, state = step.ray, step.state
-    return total
-
-
-@kernel
 def radiances(
     path: PathSetup, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
 ) -> None:
-    """`radiance` of the first n of `scratch.rays`, into `scratch.totals`.
+    """Unbiased estimates of the radiance that arrives at the origins of the first n of
+    `scratch.rays` from their directions, one path each, into `scratch.totals`.
 
-    All paths advance together, edge by edge, so that their rays are traced as one block.  Ended
-    paths are removed: number j of the active paths belongs to sample `scratch.samples[j]`.
+    Ended paths are removed: number j of the active paths belongs to sample `scratch.samples[j]`.
+    The other paths of a block do not change a path's bits.
     """
     rays, shadows, hits = scratch.rays, scratch.shadows, scratch.hits
     for j in range(n):

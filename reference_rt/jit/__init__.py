@@ -9,6 +9,7 @@
   of, that is tables in memory, types of annotations, calls through function pointers, generated
   text.
 - `compiler.py`, `numba_pipeline.py`: our pipeline, and the fallback to Numba's own.
+- `numba_codegen.py`: what code generation takes from inside Numba (docs/numba.md).
 - `kernel_cache.py`: compiled kernels on disk.
 - `parallel_compile.py`: kernels compiled in several processes.
 - `simd.py`, `simd_kernels.py`: functions that become vector instructions.

@@ -12,49 +12,16 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
-from numba import types
-from numba.core import cgutils
-from numba.core.base import BaseContext
-from numba.core.callconv import CPUCallConv
-from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.registry import cpu_target
-from numba.np import arrayobj
 
+from reference_rt.jit.numba_codegen import SUPPORTED, call_checked
 from reference_rt.util.errors import UsageError
-
-SUPPORTED = "0.68"
-"""The release of Numba that `jit/numba_pipeline.py` is written for, as in pyproject.toml."""
 
 CHOICE = "REFERENCE_RT_COMPILER"
 """The environment variable that names a compiler, `INLINING` or `STOCK`."""
 
 INLINING, STOCK = "inlining", "stock"
-
-
-NEEDED: tuple[tuple[Any, str], ...] = (
-    (JITCodeLibrary, "get_pointer_to_function"),
-    (CPUCallConv, "get_function_type"),
-    (BaseContext, "make_tuple"),
-    (BaseContext, "make_array"),
-    (BaseContext, "get_abi_sizeof"),
-    (BaseContext, "get_dummy_value"),
-    (BaseContext, "cast"),
-    (arrayobj, "populate_array"),
-    (cgutils, "unpack_tuple"),
-    (cgutils, "get_or_insert_function"),
-    (types, "CPointer"),
-    (types.BaseTuple, "from_types"),
-)
-"""Inner parts of Numba that links use (`links.py`, `table_words.py`, `function_pointer.py`),
-whichever compiler is chosen."""
-
-for _owner, _part in NEEDED:
-    if not hasattr(_owner, _part):
-        raise ImportError(
-            f"Numba {numba.__version__}: {_owner.__name__} has no {_part}; "
-            f"expected: pip install 'numba=={SUPPORTED}.*'"
-        )
 
 
 class Compiler(NamedTuple):
@@ -125,22 +92,12 @@ def _inlining() -> Compiler:
 
 
 def _stock() -> Compiler:
-    return Compiler(STOCK, _known(_INSIDE), _known(_ENTRY), _known(_CALLEE), _invoke)
+    return Compiler(STOCK, _known(_INSIDE), _known(_ENTRY), _known(_CALLEE), call_checked)
 
 
 def _known(options: dict[str, Any]) -> dict[str, Any]:
     """The options that this Numba supports.  All but error_model and nogil only save time."""
     return {name: value for name, value in options.items() if hasattr(cpu_target.options, name)}
-
-
-def _invoke(
-    context: Any, builder: Any, function: Any, returns: Any, types: Any, arguments: Any
-) -> Any:
-    """Emit a call as Numba's own compiler does."""
-    status, value = context.call_conv.call_function(builder, function, returns, types, arguments)
-    with builder.if_then(status.is_error, likely=False):
-        context.call_conv.return_status_propagate(builder, status)
-    return value
 
 
 def _refusing(named: str) -> Compiler:
@@ -153,4 +110,4 @@ def _refusing(named: str) -> Compiler:
 
     refusing = {"pipeline_class": Refusing}
     options = _INSIDE | refusing, _ENTRY | refusing, _CALLEE | refusing
-    return Compiler(named, *options, _invoke)
+    return Compiler(named, *options, call_checked)

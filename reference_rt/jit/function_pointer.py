@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reference_rt.jit.kernel import COMPILER, Signature
+from reference_rt.jit.numba_codegen import function_at, items_of
 
 FunctionPointer = npt.NDArray[np.intp]
 """(1,) the function pointer of an entry kernel, stored before the first call."""
@@ -35,7 +35,7 @@ def call_pointer(typing_context: Any, address: Any, arguments: Any) -> Any:
     declared = [types.unliteral(t) for t in arguments]
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        given = cgutils.unpack_tuple(builder, values[1])
+        given = items_of(builder, values[1])
         return emit_call(context, builder, values[0], types.none, declared, arguments, given)
 
     return types.none(types.intp, arguments), generate
@@ -52,8 +52,7 @@ def emit_call(
 ) -> Any:
     """Emit a call of the entry kernel at an address.  returns, declared: the types for which it was
     compiled;  given, values: the types and values of the arguments, which are cast."""
-    function_type = context.call_conv.get_function_type(returns, declared)
-    function = builder.inttoptr(address, function_type.as_pointer())
+    function = function_at(context, builder, address, returns, declared)
     arguments = [
         context.cast(builder, value, a, b)
         for value, a, b in zip(values, given, declared, strict=True)

@@ -24,10 +24,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, types
 from numba.extending import intrinsic, overload, register_jitable
-from numba.np import arrayobj
 
 from reference_rt.jit import compiler
 from reference_rt.jit.kernel_cache import KernelCache, prepare_folder
+from reference_rt.jit.numba_codegen import array_at
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -183,17 +183,7 @@ def _local_array(dtype: Any) -> Any:
             item = context.get_data_type(dtype)
             data = builder.alloca(item, size=arguments[0])
             data.align = 64  # a cache line: loads of vectors that straddle two take longer
-            item_size = context.get_constant(types.intp, context.get_abi_sizeof(item))
-            array = context.make_array(array_type)(context, builder)
-            arrayobj.populate_array(
-                array,
-                data=data,
-                shape=[arguments[0]],
-                strides=[item_size],
-                itemsize=item_size,
-                meminfo=None,
-            )
-            return array._getvalue()
+            return array_at(context, builder, array_type, data, [arguments[0]])
 
         return array_type(types.intp), generate
 

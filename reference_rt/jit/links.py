@@ -30,13 +30,12 @@ import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core import typing as numba_typing
 from numba.extending import intrinsic
 
 from reference_rt.jit.function_pointer import emit_call, pointer_to
 from reference_rt.jit.generated import define, parameters_of
 from reference_rt.jit.kernel import callee_kernel, is_named_tuple, kernel, overload_kernel
+from reference_rt.jit.numba_codegen import call_llvm, items_of, nothing, signature
 from reference_rt.jit.operation_types import type_of
 from reference_rt.jit.table_words import table_at, word_at, words_of
 
@@ -110,7 +109,7 @@ class Operation:
         if code not in self._entries:
             self._entries[code] = self._entry(code)
         pointer = types.CPointer(table)
-        return self._entries[code], numba_typing.signature(self.returns, pointer, *self.arguments)
+        return self._entries[code], signature(self.returns, pointer, *self.arguments)
 
     def _entry(self, code: int) -> Any:
         # The code is part of the name, because all compiled code of a process shares one table of
@@ -163,7 +162,7 @@ class Operation:
         @intrinsic  # type: ignore[untyped-decorator]
         def call(typing_context: Any, pointer: Any, table: Any, arguments: Any) -> Any:
             def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-                given = [values[1], *cgutils.unpack_tuple(builder, values[2])]
+                given = [values[1], *items_of(builder, values[2])]
                 types_of = [table, *arguments]
                 return emit_call(context, builder, values[0], returns, declared, types_of, given)
 
@@ -268,10 +267,8 @@ def stop(typing_context: Any) -> Any:
     not asked for comes here."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        of_type = ir.FunctionType(ir.VoidType(), [])
-        trap = cgutils.get_or_insert_function(builder.module, of_type, "llvm.trap")
-        builder.call(trap, [])
-        return context.get_dummy_value()
+        call_llvm(builder, "llvm.trap", ir.VoidType(), [])
+        return nothing(context)
 
     return types.none(), generate
 

@@ -18,12 +18,14 @@ from numba.core import cgutils, config, typed_passes, types, untyped_passes
 from numba.core.analysis import dead_branch_prune
 from numba.core.base import BaseContext
 from numba.core.codegen import CPUCodegen, JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.datamodel import DataModelManager, default_manager
 from numba.core.datamodel.models import TupleModel, UniTupleModel
 from numba.core.typed_passes import NativeLowering
 from numba.core.untyped_passes import DeadBranchPrune
+
+from reference_rt.jit.numba_codegen import call_checked
 
 # Numba's classes have no types that mypy knows.
 # mypy: disable-error-code="attr-defined, misc, untyped-decorator"
@@ -102,12 +104,7 @@ def invoke(
     """Emit a call of a kernel, as Numba does, but without the five basic blocks that check whether
     it raised an exception.  Kernels raise none, except with NUMBA_BOUNDSCHECK=1 an IndexError."""
     if config.BOUNDSCHECK:
-        status, value = context.call_conv.call_function(
-            builder, function, returns, types, arguments
-        )
-        with cgutils.if_unlikely(builder, status.is_error):
-            context.call_conv.return_status_propagate(builder, status)
-        return value
+        return call_checked(context, builder, function, returns, types, arguments)
     returned = cgutils.alloca_once(builder, function.type.pointee.args[0].pointee)
     raised = builder.function.args[1]
     packed = context.get_arg_packer(types).as_arguments(builder, arguments)
@@ -244,22 +241,6 @@ _LEFT_OUT = (
 )
 
 
-class _Flags(Flags):
-    """Numba's options, with a fast comparison.
-
-    To find kernels that are compiled already, Numba compares options some 30,000 times a scene, and
-    all 25 of them each time: a tenth of its function calls (measured).
-    """
-
-    def __hash__(self) -> int:
-        return 0  # all but a few kernels have equal options
-
-    def __eq__(self, other: object) -> bool:
-        if isinstance(other, _Flags) and self._values == other._values:
-            return True
-        return bool(super().__eq__(other))
-
-
 class _Compiler(CompilerBase):
     """Numba's compiler with the passes and the data models above."""
 
@@ -267,7 +248,6 @@ class _Compiler(CompilerBase):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self.state.flags = _Flags(self.state.flags)
         self.state.targetctx = self.state.targetctx.subtarget(
             data_model_manager=_MODELS, cached_internal_func=_INTERNAL
         )

@@ -100,9 +100,8 @@ def compile_all(
         return
     tell = say or (lambda done, total: None)
     tell(0, total)
-    free = threads - 1 if begun else threads
-    if free > 1 and len(missing) > 1 and may_fork():
-        _compile_in_parallel(missing, min(free, len(missing)) - 1, total, tell)
+    if threads > 1 and len(missing) > 1 and may_fork():
+        _compile_in_parallel(missing, min(threads, len(missing)) - 1, total, tell, ahead)
     else:
         for k, call in enumerate(missing):
             precompile(*call)
@@ -114,8 +113,11 @@ def compile_all(
         tell(total, total)
 
 
-def _compile_in_parallel(missing: Sequence[Call], children: int, total: int, tell: Report) -> None:
-    """Compile these here and in children: whoever is free takes the next number from a pipe."""
+def _compile_in_parallel(
+    missing: Sequence[Call], children: int, total: int, tell: Report, ahead: Ahead | None
+) -> None:
+    """Compile these here and in children: whoever is free takes the next number from a pipe.  While
+    there is the child of `ahead`, there is one child less."""
     waiting, numbers = os.pipe()
     finished, reports = os.pipe()
     started: list[int] = []
@@ -125,10 +127,10 @@ def _compile_in_parallel(missing: Sequence[Call], children: int, total: int, tel
         os.close(numbers)
         numbers = -1
         os.set_blocking(finished, False)
-        while len(started) < children:
-            started.append(_fork(missing, waiting, reports))
         done = 0
         while (taken := os.read(waiting, _NUMBER.size)) != b"":
+            while len(started) < children - (ahead is not None and not ahead.is_done):
+                started.append(_fork(missing, waiting, reports))
             precompile(*missing[_NUMBER.unpack(taken)[0]])
             done += 1 + _count(finished)
             tell(done, total)

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reference_rt.jit.kernel import overload_kernel
+from reference_rt.jit.numba_codegen import call_llvm
 
 VECTOR_WIDTH = 8
 """The vector width: eight float64 are one AVX-512 register."""
@@ -79,10 +79,8 @@ class SimdVector:
     def call(self, name: str, *others: Any) -> "SimdVector":
         """Emit a call of an LLVM intrinsic."""
         values = [self.value, *map(self.of, others)]
-        of_type = ir.FunctionType(F64_VECTOR, [F64_VECTOR] * len(values))
         name = f"llvm.{name}.v{VECTOR_WIDTH}f64"
-        function = cgutils.get_or_insert_function(self.builder.module, of_type, name)
-        return SimdVector(self.builder, self.builder.call(function, values))
+        return SimdVector(self.builder, call_llvm(self.builder, name, F64_VECTOR, values))
 
     def moved(self, by: int) -> "SimdVector":
         """A shuffle: lane k gets the number of lane k ^ by."""

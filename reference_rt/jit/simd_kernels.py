@@ -11,6 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from reference_rt.jit.numba_codegen import data_of, nothing
 from reference_rt.jit.simd import F64_VECTOR, I32, I64, VECTOR_WIDTH, SimdVector, broadcast
 
 
@@ -123,7 +124,7 @@ def simd_kernel(function: Callable[..., Any]) -> Callable[..., int]:
             written: list[Any] = []
             for of, value in zip(signature.args, values, strict=True):
                 if isinstance(of, types.Array):
-                    data = context.make_array(of)(context, builder, value).data
+                    data = data_of(context, builder, of, value)
                     written.append(_Memory(builder, data, of.dtype == types.float32))
                 elif of == types.float64:
                     written.append(SimdVector(builder, broadcast(builder, value)))
@@ -176,13 +177,13 @@ else:
     @intrinsic  # type: ignore[untyped-decorator]
     def prefetch(typing_context: Any, array: Any, start: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            data = context.make_array(array)(context, builder, values[0]).data
+            data = data_of(context, builder, array, values[0])
             byte = ir.IntType(8).as_pointer()
             of_type = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
             function = builder.module.declare_intrinsic("llvm.prefetch", [byte], of_type)
             place = builder.bitcast(builder.gep(data, [values[1]]), byte)
             # For reading, in all cache levels, data not instructions.
             builder.call(function, [place, I32(0), I32(3), I32(1)])
-            return context.get_dummy_value()
+            return nothing(context)
 
         return types.void(array, types.int64), generate

@@ -12,7 +12,8 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
-from numba.np import arrayobj
+
+from reference_rt.jit.numba_codegen import array_at, nothing
 
 _WORD, _REAL = ir.IntType(64), ir.DoubleType()
 
@@ -71,7 +72,7 @@ class _Reader:
     def value(self, numba_type: Any) -> Any:
         context, builder = self.context, self.builder
         if isinstance(numba_type, types.NoneType):
-            return context.get_dummy_value()
+            return nothing(context)
         if isinstance(numba_type, types.BaseTuple):
             parts = [self.value(part) for part in numba_type.types]
             return context.make_tuple(builder, numba_type, parts)
@@ -86,16 +87,6 @@ class _Reader:
         raise TypeError(f"{numba_type}: no words")
 
     def _array(self, numba_type: Any) -> Any:
-        context, builder = self.context, self.builder
-        item = context.get_data_type(numba_type.dtype)
-        size = context.get_constant(types.intp, context.get_abi_sizeof(item))
-        data = self.word(item.as_pointer())
+        data = self.word(self.context.get_data_type(numba_type.dtype).as_pointer())
         shape = [self.word() for _ in range(numba_type.ndim)]
-        strides = [size]
-        for length in shape[:0:-1]:
-            strides.insert(0, builder.mul(strides[0], length))
-        array = context.make_array(numba_type)(context, builder)
-        arrayobj.populate_array(
-            array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None
-        )
-        return array._getvalue()
+        return array_at(self.context, self.builder, numba_type, data, shape)

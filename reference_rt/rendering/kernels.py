@@ -5,8 +5,8 @@ once for all scenes.  *Specialised* kernels have the same code inlined, for one 
 take seconds to compile and render in 0.6 to 1.0 of the time.  Both give the same bits.
 
 A picture uses specialised kernels if they are in the cache.  Otherwise it starts with linked ones;
-if it takes long, a second process compiles the specialised ones meanwhile, and they take over
-between two tiles.
+if it takes long, or if this process has rendered such pictures for long, a second process compiles
+the specialised ones meanwhile, and they take over between two tiles or in the next picture.
 """
 
 import math
@@ -51,6 +51,17 @@ WORTHWHILE = 30.0
 """Seconds left to render from which on specialised kernels are compiled meanwhile.  On two cores
 the 8 s of compiling cost 4 s of rendering, and what is left then takes 0.7 of the time: that pays
 from 22 s on."""
+
+BREAK_EVEN = 13.0
+"""Seconds that this process has rendered with linked kernels of a kind after which the specialised
+ones are compiled during the next picture.  Rendering with them would have saved as much by then as
+compiling them costs; how many more pictures will come is unknown."""
+
+_spent: dict[tuple[Call, ...], float] = {}
+"""Seconds rendered with linked kernels in place of these specialised ones."""
+
+_children: dict[tuple[Call, ...], int] = {}
+"""Child processes that compile these kernels, though the picture that started them is done."""
 
 
 @dataclass(frozen=True)
@@ -99,16 +110,24 @@ class Running:
         if numba.config.DISABLE_JIT or (specialised is None and own.are_compiled()):
             specialised = True
         self._may_change = self._may_change and not specialised
-        self._specialised, self._child, self._began = own, 0, math.nan
+        self._specialised, self._kind = own, tuple(own.calls)
+        self._child, self._began = _children.pop(self._kind, 0), math.nan
         used = own if specialised else Linked(jobs, tables, view, film_filter)
         precompile_all(used.calls, threads, say, None if specialised else ahead)
         self._used, self.kernels = used, used.kernels()
 
     def __enter__(self) -> "Running":
         self._began = time.monotonic()
+        if self._may_change and not self._child and _spent.get(self._kind, 0.0) > BREAK_EVEN:
+            self._start()
         return self
 
-    def __exit__(self, *error: Any) -> None:
+    def __exit__(self, error: type | None, *rest: Any) -> None:
+        if self._may_change:
+            spent = _spent.get(self._kind, 0.0) + time.monotonic() - self._began
+            _spent[self._kind] = spent
+            if self._child and error is None and spent > BREAK_EVEN:
+                _children[self._kind], self._child = self._child, 0
         if self._child:
             with suppress(ProcessLookupError, ChildProcessError):
                 os.kill(self._child, signal.SIGKILL)
@@ -128,14 +147,18 @@ class Running:
                 self._child = 0
                 if self._specialised.are_compiled():
                     self.kernels = self._specialised.kernels()
+                else:
+                    _spent[self._kind] = -math.inf  # it failed: not again
                 self._may_change = False
             return
         elapsed = time.monotonic() - self._began
         if elapsed > WAIT and fraction > 0.0:
-            if elapsed / fraction * (1.0 - fraction) > WORTHWHILE and parallel_compile.may_fork():
+            if elapsed / fraction * (1.0 - fraction) > WORTHWHILE:
                 self._start()
 
     def _start(self) -> None:
+        if not parallel_compile.may_fork():
+            return
         child = fork_with_compiler()
         if child == 0:
             try:

@@ -13,11 +13,11 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import kernel
+from reference_rt.jit.numba_codegen import call_llvm, constant, data_of, nothing, variable
 from reference_rt.sampling import sobol
 from reference_rt.sampling.orders import GROUP, OF_DIGITS
 from reference_rt.sampling.sobol import SobolSetup, pair, reverse_bits, seeds_of
@@ -95,9 +95,7 @@ def _all(value: int | float, of: ir.VectorType = _WORDS) -> ir.Constant:
 
 
 def _reverse(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
-    of_type = ir.FunctionType(_WORDS, [_WORDS])
-    name = f"llvm.bitreverse.v{BLOCK_SAMPLES}i32"
-    return builder.call(cgutils.get_or_insert_function(builder.module, of_type, name), [x])
+    return call_llvm(builder, f"llvm.bitreverse.v{BLOCK_SAMPLES}i32", _WORDS, [x])
 
 
 def _scramble(builder: ir.IRBuilder, x: ir.Value, seed: ir.Value) -> ir.Value:
@@ -124,8 +122,8 @@ def _reordered(builder: ir.IRBuilder, x: ir.Value, place: ir.Value, lanes: Any) 
     so that lanes differ in the lowest digit alone: the other digits are summed once for all."""
     number, word = place.type, ir.IntType(32)
     values = ir.Constant(ir.ArrayType(word, OF_DIGITS.size), [int(x) for x in OF_DIGITS.ravel()])
-    table = cgutils.global_constant(builder, "sampling_orders", values)
-    total = cgutils.alloca_once_value(builder, x)
+    table = constant(builder, "sampling_orders", values)
+    total = variable(builder, x)
     with builder.if_then(builder.icmp_signed(">", place, number(0))):
 
         def of_digit(k: int, digit: ir.Value) -> ir.Value:
@@ -158,8 +156,8 @@ def _generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: An
     def store(x: ir.Value, offset: int) -> None:
         u = builder.uitofp(_reverse(builder, x), _REALS)
         u = builder.fmul(builder.fadd(u, _all(0.5, _REALS)), _all(2.0**-32, _REALS))
-        array = context.make_array(signature.args[5])(context, builder, pairs)
-        place = builder.gep(array.data, [builder.add(at, at.type(offset))])
+        data = data_of(context, builder, signature.args[5], pairs)
+        place = builder.gep(data, [builder.add(at, at.type(offset))])
         builder.store(u, builder.bitcast(place, _REALS.as_pointer()), align=8)
 
     order, x_seed, y_seed = (broadcast(seed) for seed in seeds)
@@ -168,7 +166,7 @@ def _generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: An
     index = _reordered(builder, index, place, broadcast)
     store(_scramble(builder, index, x_seed), 0)
     store(_scramble(builder, _pascal(builder, index), y_seed), BLOCK_SAMPLES)
-    return context.get_dummy_value()
+    return nothing(context)
 
 
 @intrinsic  # type: ignore[untyped-decorator]

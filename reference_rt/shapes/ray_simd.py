@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import BLOCK, Ray
 from reference_rt.core.vec3 import Vec3
+from reference_rt.jit.numba_codegen import data_of, nothing
 from reference_rt.jit.simd import F64_VECTOR, I64, VECTOR_WIDTH, SimdVector, broadcast
 
 _WORDS = ir.VectorType(I64, VECTOR_WIDTH)
@@ -30,7 +31,7 @@ class _Writer:
 
     def _place(self, array_type: Any, array: ir.Value, of: ir.Type, at: ir.Value) -> ir.Value:
         """A pointer to item `at` of an array, of type `of`."""
-        data = self.context.make_array(array_type)(self.context, self.builder, array).data
+        data = data_of(self.context, self.builder, array_type, array)
         return self.builder.bitcast(self.builder.gep(data, [at]), of.as_pointer())
 
     def load(self, array_type: Any, array: ir.Value, of: ir.Type, at: ir.Value = _FIRST) -> Any:
@@ -89,7 +90,7 @@ def make_nearer(distance: Callable[..., Any]) -> Callable[..., None]:
             own = broadcast(builder, code_value, _WORDS)
             writer.store(t, t_value, builder.select(is_nearer, found, best))
             writer.store(codes, codes_value, builder.select(is_nearer, own, which))
-            return context.get_dummy_value()
+            return nothing(context)
 
         number = types.int64
         return types.void(rays, number, shape, number, t, codes), generate
@@ -136,7 +137,7 @@ def _begin_lanes(typing_context: Any, rays: Any, at: Any, t: Any, codes: Any) ->
         writer = _Writer(context, builder)
         writer.store(t, values[2], writer.column(rays, values[0], 6, values[1]).value)
         writer.store(codes, values[3], ir.Constant(_WORDS, [-1] * VECTOR_WIDTH))
-        return context.get_dummy_value()
+        return nothing(context)
 
     return types.void(rays, types.int64, t, codes), generate
 
@@ -150,7 +151,7 @@ def _resume_lanes(
         found = writer.load(from_t, values[0], F64_VECTOR, values[2])
         writer.store(t, values[3], found)
         writer.store(codes, values[4], writer.load(from_codes, values[1], _WORDS, values[2]))
-        return context.get_dummy_value()
+        return nothing(context)
 
     return types.void(from_t, from_codes, types.int64, t, codes), generate
 
@@ -161,7 +162,7 @@ def _end_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_cod
         writer = _Writer(context, builder)
         writer.store(to, values[3], writer.load(t, values[0], F64_VECTOR), values[2])
         writer.store(to_codes, values[4], writer.load(codes, values[1], _WORDS), values[2])
-        return context.get_dummy_value()
+        return nothing(context)
 
     return types.void(t, codes, types.int64, to, to_codes), generate
 

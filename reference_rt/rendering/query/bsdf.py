@@ -70,7 +70,7 @@ def _shading(
 
 
 @entry_kernel
-def _scatter(
+def scatter_kernel(
     materials: Materials,
     textures: Textures | None,
     m: int,
@@ -216,7 +216,9 @@ class Bsdf:
         def scatter(k: slice) -> None:
             wi_of, u_of = (other[k], NOTHING) if u is None else (NOTHING, other[k])
             materials, textures = found.tables
-            _scatter(materials, textures, self._number, back[k], wi_of, u_of, where[k], out[k])
+            scatter_kernel(
+                materials, textures, self._number, back[k], wi_of, u_of, where[k], out[k]
+            )
 
         in_blocks(scatter, len(back), threads)
         return out, shape

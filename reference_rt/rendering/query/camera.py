@@ -22,7 +22,7 @@ class CameraRays(NamedTuple):
 
 # It takes only the camera, so that all scenes with such a camera share it.
 @entry_kernel
-def _camera_rays(
+def camera_kernel(
     view: Any, x: FloatArray, y: FloatArray, lens: FloatArray, o: FloatArray, d: FloatArray
 ) -> None:
     for i in range(len(x)):
@@ -62,7 +62,7 @@ def camera_rays(
     o, d = np.empty((2, math.prod(shape), 3))
 
     def send(k: slice) -> None:
-        _camera_rays(view, x[k], y[k], on_lens[k], o[k], d[k])
+        camera_kernel(view, x[k], y[k], on_lens[k], o[k], d[k])
 
     in_blocks(send, len(o), threads)
     return CameraRays(shaped(o, shape), shaped(d, shape))

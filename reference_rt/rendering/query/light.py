@@ -83,7 +83,7 @@ class DirectLight:
 
 
 @entry_kernel
-def _sample(
+def sample_kernel(
     lights: Lights,
     shapes: Shapes,
     textures: Textures | None,
@@ -114,7 +114,7 @@ def _sample(
 
 
 @entry_kernel
-def _pdf(
+def pdf_kernel(
     geometry: Geometry,
     lights: Lights,
     shapes: Shapes,
@@ -137,7 +137,7 @@ def _pdf(
 
 
 @entry_kernel
-def _direct(
+def direct_kernel(
     scene: SceneTables, o: FloatArray, d: FloatArray, k: int, u: float, v: float, out: FloatArray
 ) -> None:
     kept = local_floats(scratch_floats(scene.materials))
@@ -230,7 +230,7 @@ def sample_lights(
 
     def sample(k: slice) -> None:
         lights, shapes, textures = sources.tables
-        _sample(lights, shapes, textures, p[k], n[k], u[k], light[k], out[k])
+        sample_kernel(lights, shapes, textures, p[k], n[k], u[k], light[k], out[k])
 
     in_blocks(sample, len(p), threads)
     columns = (out[:, 0:3], out[:, 3], out[:, 4:7], out[:, 7:10], out[:, 10], out[:, 11] != 0.0)
@@ -266,7 +266,7 @@ def light_pdf(
         begin = None if rays.t_min is None else rays.t_min[k]
         found = query.trace(p[k], d[k], begin, NO_LIMIT, answers, rows=True)
         lights, shapes, _ = sources.tables
-        _pdf(surfaces.tables, lights, shapes, p[k], n[k], d[k], found, out[k])
+        pdf_kernel(surfaces.tables, lights, shapes, p[k], n[k], d[k], found, out[k])
 
     in_blocks(density, len(p), threads)
     return shaped(out, shape)  # type: ignore[no-any-return]
@@ -286,5 +286,5 @@ def direct_light(
         raise ValueError(f"light {light} cannot be sampled; expected one that can be picked")
     out, found = np.zeros((len(o), 7)), link_to_scene(scene, "direct")
     with np.errstate(all="ignore"):
-        _direct(found.tables, o, d, light, u[0], u[1], out)
+        direct_kernel(found.tables, o, d, light, u[0], u[1], out)
     return DirectLight(target=out[:, 0:3], pdf=out[:, 3], contribution=out[:, 4:7])

@@ -33,7 +33,7 @@ class Radiance(NamedTuple):
 
 
 @entry_kernel
-def _cast(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
+def cast_kernel(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
     for i in range(len(o)):
         found = cast(scene, Ray(row(o, i), row(d, i), math.inf))
         out[i, 0], out[i, 1], out[i, 2] = found.colour
@@ -122,7 +122,7 @@ def _colours(tables: SceneTables, rays: Rays, threads: int | None) -> FloatArray
     found = link_to_scene(tables, "ray_cast")
 
     def trace(k: slice) -> None:
-        _cast(found.tables, o[k], d[k], out[k])
+        cast_kernel(found.tables, o[k], d[k], out[k])
 
     in_blocks(trace, len(o), threads)
     out[~valid] = 0.0

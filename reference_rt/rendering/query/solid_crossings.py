@@ -16,6 +16,9 @@ from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.query.linked import link_to_geometry
 from reference_rt.rendering.query.rays import checked_rays
 
+SOLIDS = ("crossings_of_solid",)
+"""The operation on the geometry."""
+
 
 @dataclass(frozen=True)
 class SolidCrossings:
@@ -33,7 +36,7 @@ class SolidCrossings:
 
 
 @entry_kernel
-def _crossings(
+def crossings_kernel(
     geometry: Geometry,
     solid: int,
     o: FloatArray,
@@ -65,7 +68,7 @@ def crossings(
     t, widths = np.full((2, len(o), most), math.inf)
     part = np.full((len(o), most), -1)
     count = np.zeros(len(o), np.int64)
-    crossed = link_to_geometry(scene, "crossings_of_solid")
+    crossed = link_to_geometry(scene, *SOLIDS)
     with np.errstate(all="ignore"):
-        _crossings(crossed.tables, solid, o, d, t, widths, part, count)
+        crossings_kernel(crossed.tables, solid, o, d, t, widths, part, count)
     return SolidCrossings(t, widths, part, count)

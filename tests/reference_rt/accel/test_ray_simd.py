@@ -19,11 +19,10 @@ from reference_rt.core.ray_block import (
     ray_of,
 )
 from reference_rt.core.vec3 import Vec3
-from reference_rt.integrators import radiance
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.rendering import tiles
-from reference_rt.sampling import start_sample
+from reference_rt.rendering.kernels import Running
+from reference_rt.rendering.render import jobs_of
 from reference_rt.shapes import box
 from reference_rt.shapes.curved import sphere
 from reference_rt.shapes.flat import rectangle
@@ -157,22 +156,6 @@ def test_vector_code_gives_the_bits_of_the_plain_kernel(kind):
     assert finite > 200
 
 
-@entry_kernel
-def _one_by_one(integrator, scene, view, film_filter, setup, shape, spp, out):
-    for pixel in range(len(out)):
-        for sample in range(spp):
-            sampler = start_sample(setup, pixel, sample)
-            x, y = pixel % shape[0], pixel // shape[0]
-            seen = tiles._film_ray(view, film_filter, sampler, shape, x, y)
-            one = radiance(integrator, scene, seen.ray, sampler) * seen.weight
-            out[pixel, 0] += one.x
-            out[pixel, 1] += one.y
-            out[pixel, 2] += one.z
-        out[pixel, 0] /= spp
-        out[pixel, 1] /= spp
-        out[pixel, 2] /= spp
-
-
 @pytest.mark.parametrize("spp", [1, 16, 37])
 def test_paths_together_are_paths_one_by_one(spp):
     """Blocks of samples, whole and in part, beyond the dimensions that are drawn in blocks."""
@@ -182,8 +165,10 @@ def test_paths_together_are_paths_one_by_one(spp):
         sampler=rt.Sobol(spp=spp, seed=3),
         integrator=rt.Path(rr_depth=12),
     )
-    out = np.zeros((12 * 9, 3))
-    view = lit.camera.setup(12, 9)
-    setups = lit.film.filter.setup(), lit.sampler.setup()
-    _one_by_one(lit.integrator.setup(), lit.tables, view, *setups, (12, 9), spp, out)
-    assert np.array_equal(rt.render(lit).colour.reshape(-1, 3), out)
+    jobs, layers = jobs_of(lit)
+    view, film_filter = lit.camera.setup(12, 9), lit.film.filter.setup()
+    with Running(jobs, lit.tables, view, film_filter, 1) as running:
+        for pixel in range(12 * 9):
+            for sample in range(spp):
+                running.run(0)(pixel, pixel + 1, sample, sample + 1)
+    assert np.array_equal(rt.render(lit).colour, layers["colour"])

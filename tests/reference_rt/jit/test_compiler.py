@@ -15,7 +15,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from reference_rt.core.exr import read_exr
-from reference_rt.jit import compiler, function_pointer, numba_pipeline
+from reference_rt.jit import compiler, function_pointer, numba_codegen, numba_pipeline
 from reference_rt.jit import kernel as kernel_module
 from reference_rt.jit.compiler import CHOICE, INLINING, STOCK, SUPPORTED
 from reference_rt.jit.function_pointer import call_pointer, pointer_to
@@ -85,13 +85,15 @@ def test_a_method_that_is_gone_is_found_when_ours_is_imported(owner, name, monke
         runpy.run_path(str(numba_pipeline.__file__))
 
 
-@pytest.mark.parametrize(("owner", "name"), compiler.NEEDED, ids=[n for _, n in compiler.NEEDED])
+@pytest.mark.parametrize(
+    ("owner", "name"), numba_codegen.NEEDED, ids=[n for _, n in numba_codegen.NEEDED]
+)
 def test_a_part_that_links_need_and_that_is_gone_is_named_in_one_line(owner, name, monkeypatch):
     for cls in getattr(owner, "__mro__", [owner]):
         if name in vars(cls):
             monkeypatch.delattr(cls, name)
     with pytest.raises(ImportError, match=rf"^Numba {numba.__version__}: .*{name}; expected: .*$"):
-        runpy.run_path(str(compiler.__file__))
+        runpy.run_path(str(numba_codegen.__file__))
 
 
 def test_options_that_numba_does_not_know_are_left_out(monkeypatch):

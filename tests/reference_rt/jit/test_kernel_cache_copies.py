@@ -17,14 +17,14 @@ pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is com
 _RAYS_AND_PICTURE = """
 import reference_rt as rt
 from reference_rt.jit import links
-from reference_rt.rendering.query.camera import _camera_rays
+from reference_rt.rendering.query.camera import camera_kernel
 from reference_rt.rendering.tiles import aov_tile
 scene = rt.Scene(
     shapes=(rt.Sphere(),), integrator=rt.RayCast(), film=rt.Film(width=2, height=2)
 )
 scene.camera_rays()
 rt.render(scene, threads=1)
-kernels = [_camera_rays, aov_tile]
+kernels = [camera_kernel, aov_tile]
 for group in (rt.accel.geometry.geometries,):
     for operation in group.operations.values():
         kernels += operation._entries.values()

@@ -2,6 +2,7 @@
 
 import functools
 import os
+import signal
 import subprocess
 import sys
 import warnings
@@ -152,3 +153,40 @@ def test_specialised_kernels_are_used_where_they_are_compiled(monkeypatch):
     expected = render(scene, specialised=True)
     monkeypatch.setattr(kernels, "linked_scene", None)  # which would be called to link
     assert same(render(scene), expected)
+
+
+@needs_jit
+def test_pictures_of_one_kind_are_added_up(monkeypatch):
+    """None is long enough by itself to compile specialised kernels for it."""
+    forks = []
+
+    def fork():
+        child = os.fork()
+        if child == 0:
+            signal.pause()
+        forks.append(child)
+        return child
+
+    monkeypatch.setattr(kernels.parallel_compile, "may_fork", lambda: True)
+    monkeypatch.setattr(kernels, "fork_with_compiler", fork)
+    monkeypatch.setattr(kernels.Specialised, "are_compiled", lambda self: False)
+    monkeypatch.setattr(kernels, "BREAK_EVEN", 0.0)
+    monkeypatch.setattr(kernels, "_spent", {})
+    monkeypatch.setattr(kernels, "_children", {})
+    scene = small("cornell_box")
+    render(scene)
+    assert not forks
+    render(scene)
+    render(scene)
+    assert [*kernels._children.values()] == forks
+    assert len(forks) == 1
+
+    def interrupt(what, fraction):
+        if what == "render":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render(scene, progress=interrupt)
+    assert not kernels._children
+    with pytest.raises(ChildProcessError):
+        os.waitpid(forks[0], 0)

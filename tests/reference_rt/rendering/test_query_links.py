@@ -12,7 +12,7 @@ from crossing_forms import GROUPS, kinds, tilted
 
 import reference_rt as rt
 from reference_rt.rendering.query import batches, bsdf, direct_light, hits, light, linked, tracing
-from reference_rt.rendering.query.radiance import _cast
+from reference_rt.rendering.query.radiance import cast_kernel
 from reference_rt.rendering.query.solid_crossings import crossings as solid_crossings
 
 FEW = rt.Scene(shapes=(rt.Sphere(radius=0.7), rt.Box(), rt.Torus(), rt.Cylinder(radius=0.9)))
@@ -141,11 +141,11 @@ KERNELS = (
     tracing.describe,
     hits.occluded_by_blocks,
     hits.occluded_of_few,
-    bsdf._scatter,
-    light._sample,
-    light._pdf,
-    light._direct,
-    _cast,
+    bsdf.scatter_kernel,
+    light.sample_kernel,
+    light.pdf_kernel,
+    light.direct_kernel,
+    cast_kernel,
 )
 
 

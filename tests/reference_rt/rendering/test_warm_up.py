@@ -13,8 +13,7 @@ from reference_rt.accel.geometry import Geometry, geometries
 from reference_rt.cameras import views
 from reference_rt.cameras.filters import film_filters
 from reference_rt.integrators import INTEGRATORS
-from reference_rt.jit.kernel import is_named_tuple
-from reference_rt.jit.links import Link
+from reference_rt.jit.links import LINK
 from reference_rt.lights.dispatch import by_code as lights
 from reference_rt.lights.selection.tree import light_trees
 from reference_rt.materials.bsdfs.tables import by_code as bsdfs
@@ -23,6 +22,9 @@ from reference_rt.rendering import kernels
 from reference_rt.rendering.kernels import Linked
 from reference_rt.rendering.query import tracing
 from reference_rt.rendering.query.ahead import query_calls
+from reference_rt.rendering.query.camera import camera_kernel
+from reference_rt.rendering.query.light import direct_light
+from reference_rt.rendering.query.solid_crossings import crossings as solid_crossings
 from reference_rt.rendering.render import radiance_job
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.warm_up import (
@@ -39,8 +41,6 @@ from reference_rt.textures.lookup import Textures, textures_operations
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 INTEGRATORS_OF = (rt.Path(), rt.Direct(), rt.Whitted(), rt.RayCast())
-OF_SOLIDS = {"crossings_of_solid"}
-"""Operations of `Scene.solid_crossings` alone, which are compiled when they are needed."""
 FILES = sorted(SCENES.glob("*.yaml"))
 
 
@@ -106,7 +106,7 @@ def test_every_type_of_every_operation(group, known):
     compiled = {kernel for kernel, _ in known}
     for operation in group.values():
         needed = {operation.call_for(code, numba.types.int64)[0] for code in operation.rows}
-        assert needed <= compiled or (operation.name in OF_SOLIDS and not needed & compiled)
+        assert needed <= compiled
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -114,19 +114,40 @@ def test_queries_of_every_scene(file, known):
     assert described(set(query_calls(rt.Scene.load(file))) - set(known)) == set()
 
 
+SOLID = """
+shapes:
+- type: difference
+  of: [{type: sphere, radius: 0.5}, {type: box, transform: [{scale: 0.3}]}]
+- {type: rectangle}
+lights: [{type: constant, radiance: 1}]
+"""
+
+
 def test_queries_call_these_kernels():
     """That is with arguments of these types: nothing else is compiled."""
-    scene = rt.Scene(shapes=(rt.Sphere(), rt.Rectangle()))
+    scene = rt.Scene.parse(SOLID)
     calls = query_calls(scene)
     o, d = np.zeros((2, 3)), np.ones((2, 3))
     many = np.zeros((tracing.FEW + 1, 3))
     scene.intersect(o, d, t_min=0.5, t_max=np.ones(2)), scene.first_hits(o, d)
     scene.occluded(o, d), scene.occluded(many, d[0], t_max=2.0)
     scene.crossings(o, d, t_max=2.0), scene.first_hits(many, d[0])
+    scene.camera_rays([[0, 0]]), scene.radiance(o, d, integrator=rt.RayCast())
+    scene.sample_lights(o, d * 0.5), scene.light_pdf(o, d), scene.bsdf(None).sample(d, d * 0.5)
+    direct_light(scene.tables, o, d, 0), solid_crossings(scene.tables, 0, o, d)
     for kernel, signature in calls:
         if isinstance(signature, tuple):  # an entry kernel, not an operation
-            others = [key for key in kernel.overloads if is_named_tuple(key[0], Link)]
-            assert set(others) == {signature}, kernel.__name__
+            others = [key for key in kernel.overloads if LINK in leaves(key)]
+            assert set(others) <= {signature}, kernel.__name__
+            assert others or kernel is camera_kernel, kernel.__name__
+
+
+def leaves(numba_types):
+    """The types of tuples' items, and of their items."""
+    for one in numba_types:
+        yield one
+        if isinstance(one, numba.types.BaseTuple):
+            yield from leaves(one.types)
 
 
 def optional(table):
