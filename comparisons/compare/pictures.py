@@ -19,7 +19,8 @@ from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.image import display
-from reference_rt.rendering.render import Picture, render
+from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures import At, colour_at
 

@@ -99,7 +99,7 @@ def _write(out: Path, outcome: Outcome) -> None:
 
 
 def markdown(outcome: Outcome) -> str:
-    """The tables of the README."""
+    """The tables of docs/results/selftest.md."""
     lines = ["| fault | planted in | scene | standard: rung, strength | smoke: rung, strength |"]
     lines.append("|---|---|---|---|---|")
     by_name: dict[str, dict[str, Finding]] = {}
