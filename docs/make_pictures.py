@@ -1,9 +1,11 @@
-"""Makes docs/pictures/ and docs/gallery.md: `python docs/make_pictures.py`, some three minutes.
+"""Makes docs/pictures/ and docs/gallery.md: `python docs/make_pictures.py [NAME...]`.
 
 The gallery has every scene of scenes/; the first picture of README.md is a comparison with Mitsuba.
+NAME: only the pictures of these scenes, or `compare`; the page is always written.
 """
 
 import io
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -37,7 +39,7 @@ LARGE = (
 WIDE, NARROW = 400, 240
 """Widths in pixels of the large pictures, and of the others."""
 
-SAMPLES = 256
+SAMPLES = 128
 """Least samples per pixel of pictures with noise."""
 
 GROUPS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
@@ -53,11 +55,14 @@ def main() -> None:
     """Write all pictures and the page."""
     (PICTURES / "scenes").mkdir(parents=True, exist_ok=True)
     paths = sorted(SCENES.glob("*.yaml"))
+    wanted = sys.argv[1:] or [*(path.stem for path in paths), "compare"]
     for path in paths:
-        picture_of(path)
+        if path.stem in wanted:
+            picture_of(path)
     with replacing(DOCS / "gallery.md") as temporary:
         temporary.write_text("\n".join(page(paths)) + "\n", encoding="utf-8")
-    comparison()
+    if "compare" in wanted:
+        comparison()
 
 
 def picture_of(path: Path) -> None:
