@@ -43,6 +43,24 @@ _INTERRUPTED = "interrupted; nothing unfinished was written"
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"reference_rt {importlib.metadata.version('reference-rt')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version.", is_eager=True, callback=_print_version
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
 def guarded(command: F) -> F:
     """Report every error of a command as one line on standard error, with its exit code."""
 
@@ -188,6 +206,22 @@ def warm_up(
         f"{done.folder}: {done.compiled} kernels compiled, {done.cached} were in the cache, "
         f"{done.seconds:.1f} s"
     )
+
+
+@app.command()
+@guarded
+def doctor() -> None:
+    """Print what is installed, what works and why not, and the caches; exit code 1 if something
+    does not work."""
+    from reference_rt.cli.doctor import checks, page
+
+    found = []
+    for check in checks():  # one after another: some take seconds
+        found.append(check)
+        for line in page([check]):
+            say(line)
+    if not all(check.works for check in found):
+        raise typer.Exit(1)
 
 
 @app.command()
