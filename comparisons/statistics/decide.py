@@ -7,22 +7,27 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, RungResult, Status
+from comparisons.statistics.cells import image_test, pixel_test, tile_test
 from comparisons.statistics.metrics import count_nonfinite
+from comparisons.statistics.rare import Unseen, unseen, worse
 from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
 from comparisons.statistics.sides import Known, known_side, picture_array, side_of
 from comparisons.statistics.single import single_tests
 from comparisons.statistics.uniformity import Uniformity, uniformity
-from comparisons.statistics.welch import BiasTest, image_test, pixel_test, tile_test
+from comparisons.statistics.welch import BiasTest
 from comparisons.statistics.wording import (
     beyond,
     cell_numbers,
     channels,
+    detectable_words,
     finite,
     image_numbers,
     interval,
     percent,
     uniformity_numbers,
     uniformity_words,
+    unseen_numbers,
+    unseen_words,
     which,
 )
 
@@ -43,6 +48,8 @@ class Findings:
     tiles: BiasTest
     pixels: BiasTest
     uniformity: Uniformity | None
+    unseen: Unseen | None
+    """The worse of both sides; None if either is a single picture."""
     tile: int
     """Side in pixels."""
     single: bool
@@ -90,16 +97,21 @@ def findings(a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins) 
     """All tests, for pictures (R, h, w, 3) that are finite and of one size."""
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
         image, tiles, pixels, side = single_tests(a, b, tile, margins)
-        return Findings(image, tiles, pixels, None, side, True)
+        return Findings(image, tiles, pixels, None, None, side, True)
     one, two = side_of(a), known_side(b) if isinstance(b, Known) else side_of(b)
     return Findings(
         image_test(one, two, margins),
         tile_test(one, two, tile, margins),
         pixel_test(one, two, margins),
         uniformity(one, two, margins),
+        worse(*(_unseen(side) for side in (a, b))),
         tile,
         False,
     )
+
+
+def _unseen(pictures: FloatArray | Known) -> Unseen | None:
+    return None if isinstance(pictures, Known) else unseen(pictures, IMAGE_LEVEL)
 
 
 def read(
@@ -138,10 +150,11 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Run
     image = found.image
     reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
     reason = (
-        f"{finding}; the smallest bias of the image mean seen with {100.0 * POWER:g} % power is "
-        f"{percent(image.over_scale(image.detectable).max())}; the means are equivalent within "
-        f"±{percent(reach)} at {100.0 * (1.0 - IMAGE_LEVEL):g} %"
+        f"{finding}; {detectable_words(image, found.tiles, found.tile, found.pixels)}; the means "
+        f"are equivalent within ±{percent(reach)} at {100.0 * (1.0 - IMAGE_LEVEL):g} %"
     )
+    if found.unseen is not None and status != "differ":
+        reason += f"; {unseen_words(found.unseen)}"
     if found.single:
         reason += f"; {ONE_PICTURE}"
     of_image = image_numbers(image)
@@ -155,7 +168,8 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Run
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(image.samples_factor(limit)),
+        "samples_factor": finite(_samples_factor(found, limit)),
+        "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
         "pixels": cell_numbers(found.pixels, 1),
@@ -190,14 +204,23 @@ def _decide(found: Findings, limit: float) -> tuple[Status, str]:
     widest = f"image mean {interval(image, (int(reach.argmax()),))}"
     sees = bool(np.all(image.over_scale(image.detectable) <= limit))
     inside = bool(image.within(limit).all())
-    if inside and sees:
+    met = found.unseen is None or found.unseen.missing <= limit
+    if inside and sees and met:
         return "agree", f"{widest}, within ±{percent(limit)}; no tile and no pixel differs"
     within = "within" if inside else "not within"
     overlooked = "" if sees else "; a bias of that size could be overlooked"
+    if not met:
+        overlooked += "; as much light may have been missed by chance, since few samples meet it"
     return "inconclusive", (
         f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
-        f"{_wanted(image.samples_factor(limit))}"
+        f"{_wanted(_samples_factor(found, limit))}"
     )
+
+
+def _samples_factor(found: Findings, limit: float) -> float:
+    """How many times as many samples decide the question, and meet enough of the rare light."""
+    unseen = found.unseen.missing / limit if found.unseen is not None else 0.0
+    return max(found.image.samples_factor(limit), unseen)
 
 
 def _wanted(factor: float) -> str:

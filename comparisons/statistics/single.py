@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.metrics import ratio
 from comparisons.statistics.scales import (
     DARK,
     IMAGE_LEVEL,
@@ -167,6 +168,5 @@ def _pixels(difference: FloatArray, reference: FloatArray, margins: Margins) -> 
     whole = min(difference.shape[:2]) >= NEIGHBOURS
     still = whole & (variance <= (margins.constant * scale) ** 2)
     error = Error(np.where(still, 0.0, np.inf), np.full(difference.shape, np.inf))
-    return bias_test(
-        difference, reference, (error,), margins.constant, PIXEL_LEVEL, float(reference.mean())
-    )
+    margin = margins.constant + ratio(margins.stored * np.abs(reference), scale)
+    return bias_test(difference, reference, (error,), margin, PIXEL_LEVEL, float(reference.mean()))
