@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 
+from comparisons.gate.copies import fingerprint
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.results.sealed import read_arrays, write_arrays
@@ -51,13 +52,14 @@ _KEPT = 2 << 30
 class Reference:
     """pictures: (replicates, height, width, 3) linear radiance;  variance: (height, width, 3) of
     their mean, if given separately;  noise_free: made without random numbers;  name: whose pictures
-    these are, for people."""
+    these are, for people;  fingerprints: those of the pictures that candidates may be copies of."""
 
     pictures: FloatArray
     variance: FloatArray | None = None
     noise_free: bool = False
     name: str = "the reference's"
     notes: tuple[str, ...] = ()
+    fingerprints: tuple[str, ...] = ()
 
 
 def is_noise_free(scene: Scene) -> bool:
@@ -123,7 +125,8 @@ def of_files(references: Sequence[Picture], variance: Path | None, noise_free: b
                 f"{variance}: is {size_of(spread)} pixels; expected {size_of(pictures[0])}, as "
                 f"{references[0].name}"
             )
-    return Reference(pictures, spread, noise_free)
+    prints = tuple(fingerprint(picture) for picture in pictures)
+    return Reference(pictures, spread, noise_free, fingerprints=prints)
 
 
 def check_sizes(candidates: Sequence[Picture], expected: str, whose: str) -> None:

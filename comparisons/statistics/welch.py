@@ -114,23 +114,24 @@ class BiasTest:
         return float(cushion * (np.maximum(seen, decided) ** 2).max())
 
 
-def image_test(a: Side, b: Side, margins: Margins) -> BiasTest:
-    """The image mean of each channel, (3,)."""
+def image_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTest:
+    """The image mean of each channel, (3,);  level: the share of the family's that is used."""
     reference = b.mean.mean(axis=(0, 1))
     difference = a.mean.mean(axis=(0, 1)) - reference
     errors = welch_errors(a.of_image(), b.of_image(), a, b)
-    return bias_test(difference, reference, errors, margins.image, IMAGE_LEVEL, reference.mean())
+    of_test = level * IMAGE_LEVEL
+    return bias_test(difference, reference, errors, margins.image, of_test, reference.mean())
 
 
-def tile_test(a: Side, b: Side, tile: int, margins: Margins) -> BiasTest:
+def tile_test(a: Side, b: Side, tile: int, margins: Margins, level: float = 1.0) -> BiasTest:
     """Each channel of each tile, (rows, columns, 3): errors of hue would cancel in luminance."""
     reference = cell_means(b.mean, tile)
     difference = cell_means(a.mean, tile) - reference
     errors = welch_errors(a.of_tiles(tile), b.of_tiles(tile), a, b)
-    return bias_test(difference, reference, errors, margins.tile, TILE_LEVEL, b.mean.mean())
+    return bias_test(difference, reference, errors, margins.tile, level * TILE_LEVEL, b.mean.mean())
 
 
-def pixel_test(a: Side, b: Side, margins: Margins) -> BiasTest:
+def pixel_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTest:
     """Each channel of each pixel, (height, width, 3).
 
     The margin is that of a pixel, but at most half the standard deviation of one picture's pixel:
@@ -140,6 +141,7 @@ def pixel_test(a: Side, b: Side, margins: Margins) -> BiasTest:
     value in all pictures of the candidate and the other in all of the reference, without any
     spread. With few replicates such pixels count only if there are more than chance produces.
     """
+    of_test = level * PIXEL_LEVEL
     noise_a, noise_b = a.of_pixels(), b.of_pixels()
     own, around = welch_errors(noise_a, noise_b, a, b)
     mean = float(b.mean.mean())
@@ -149,14 +151,14 @@ def pixel_test(a: Side, b: Side, margins: Margins) -> BiasTest:
     parted = scale.size * (chance_of_parting(a.count, b.count) if b.pictures is not None else 0.0)
     still = spread <= margins.constant * scale
     noisy = neighbourhood(np.where(still, 0.0, 1.0)).max(axis=-1, keepdims=True) > 0.0
-    if parted < PIXEL_LEVEL / 2.0:  # enough replicates: chance does not separate the sides
+    if parted < of_test / 2.0:  # enough replicates: chance does not separate the sides
         around = replace(around, value=np.where(still, own.value, around.value))
-    test = bias_test(a.mean - b.mean, b.mean, (own, around), margin, PIXEL_LEVEL, mean)
+    test = bias_test(a.mean - b.mean, b.mean, (own, around), margin, of_test, mean)
 
     proven = test.differs & noisy
     # The channels of a pixel may depend on each other: pixels are counted, against the expected
     # number of channels.
-    if np.count_nonzero(proven.any(axis=-1)) > stats.poisson.isf(PIXEL_LEVEL, parted):
+    if np.count_nonzero(proven.any(axis=-1)) > stats.poisson.isf(of_test, parted):
         return test
     return replace(test, half_width=np.where(proven, np.abs(test.difference), test.half_width))
 
@@ -172,16 +174,17 @@ def welch_errors(noise_a: Noise, noise_b: Noise, a: Side, b: Side) -> tuple[Erro
     """The standard errors of a difference of means, between replicates and from pixels.
 
     The side with fewer replicates counts as at least as noisy as the other, for it has seen fewer
-    rare paths; against a known mean the ratio of the noises is that of the median pixel. Degrees of
-    freedom are Welch and Satterthwaite's, with the ratio of the variances from pixels, which is
-    well known. The ratio of few replicates' own variances is not: at the level of one test among
-    many it gave up to 95 times the promised false alarms (measured).
+    rare paths, unless its mean is the more exact one; against a known mean the ratio of the noises
+    is that of the median pixel. Degrees of freedom are Welch and Satterthwaite's, with the ratio of
+    the variances from pixels, which is well known. The ratio of few replicates' own variances is
+    not: at the level of one test among many it gave up to 95 times the promised false alarms
+    (measured).
     """
     own_a, own_b, pixels_a, pixels_b = noise_a.own, noise_b.own, noise_a.pixels, noise_b.pixels
     if b.pictures is None or a.count < b.count:
         factor = 1.0 if b.pictures is not None else typical_ratio(a, b)
         own_a, pixels_a = np.maximum(own_a, factor * own_b), np.maximum(pixels_a, factor * pixels_b)
-    elif b.count < a.count:
+    elif b.count < a.count and not is_more_exact(b, a):
         own_b, pixels_b = np.maximum(own_b, own_a), np.maximum(pixels_b, pixels_a)
     shares = pixels_a / a.count, pixels_b / b.count
     return (
@@ -194,6 +197,18 @@ def welch_errors(noise_a: Noise, noise_b: Noise, a: Side, b: Side) -> tuple[Erro
             satterthwaite(*shares, noise_a.pixels_dof, noise_b.pixels_dof),
         ),
     )
+
+
+def is_more_exact(few: Side, many: Side) -> bool:
+    """Whether the mean of few pictures has less noise than that of many, in the median pixel: they
+    have the more samples, as a reference has whose pictures are rendered for long."""
+    noisy = (few.variance > 0.0) & (many.variance > 0.0)
+    if not noisy.any():
+        return False
+    # Both variances are of some replicates; their medians are low by chi-square's.
+    low = [float(stats.chi2.median(side.count - 1)) / (side.count - 1) for side in (few, many)]
+    ratio_of_one = float(np.median(few.variance[noisy] / many.variance[noisy])) * low[1] / low[0]
+    return ratio_of_one * many.count < few.count
 
 
 def typical_ratio(a: Side, b: Side) -> float:
