@@ -153,9 +153,7 @@ def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray
 def _verdict(
     found: Findings, a: FloatArray, b: FloatArray, limit: float, alone: BiasTest | None
 ) -> RungResult:
-    """alone: as in `advice.wanted`."""
-    advice, factor = wanted(found.image, limit, alone)
-    status, finding = _decide(found, limit, advice)
+    status, finding = _decide(found, limit, alone)
     image = found.image
     reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
     reason = (
@@ -176,7 +174,7 @@ def _verdict(
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(factor),
+        "samples_factor": finite(wanted(image, limit, alone)[1]),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
         "pixels": cell_numbers(found.pixels, 1),
@@ -185,7 +183,8 @@ def _verdict(
     return RungResult("statistics", status, reason, numbers)
 
 
-def _decide(found: Findings, limit: float, advice: str = "") -> tuple[Status, str]:
+def _decide(found: Findings, limit: float, alone: BiasTest | None = None) -> tuple[Status, str]:
+    """alone: as in `advice.wanted`."""
     image, spread = found.image, found.uniformity
     if image.differs.any():
         text = f"the image mean differs: {beyond(image, image.worst)}"
@@ -216,7 +215,8 @@ def _decide(found: Findings, limit: float, advice: str = "") -> tuple[Status, st
     within = "within" if inside else "not within"
     overlooked = "" if sees else "; a bias of that size could be overlooked"
     return "inconclusive", (
-        f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; {advice}"
+        f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
+        f"{wanted(image, limit, alone)[0]}"
     )
 
 
