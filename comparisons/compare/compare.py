@@ -10,6 +10,7 @@ from comparisons.compare import looks, pictures
 from comparisons.compare.budget import Budget
 from comparisons.compare.control import control
 from comparisons.compare.judge import Evidence, Rendered, judge, picture_rungs
+from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
@@ -126,6 +127,7 @@ def gather(
         lights=None
         if scene.integrator.deterministic
         else lambda: single_lights(judged_by, LIGHT_SPP),
+        lengths=path_lengths(judged_by, threads),
         looks=looked,
     )
 

@@ -8,6 +8,7 @@ import numpy as np
 from comparisons import statistics
 from comparisons.compare import diagnosis
 from comparisons.compare.looks import Looks
+from comparisons.compare.path_length import Lengths
 from comparisons.results.case import RUNGS, Case, Cause, FloatArray, ImageRegion, Images, RungResult
 from comparisons.results.verdict import decide
 from comparisons.rungs.images import images_rung
@@ -46,8 +47,8 @@ def of_replicates(
 @dataclass(frozen=True)
 class Evidence:
     """The input of a verdict.  name: the case's;  rungs: the deterministic ones;  rendered: the
-    pictures of both sides, if any;  lights: for the diagnosis;  looks: those at a growing number of
-    replicates, the last of which gives the statistics;  the rest as in `Case`."""
+    pictures of both sides, if any;  lights, lengths: for the diagnosis;  looks: those at a growing
+    number of replicates, the last of which gives the statistics;  the rest as in `Case`."""
 
     name: str
     rungs: tuple[RungResult, ...]
@@ -57,6 +58,7 @@ class Evidence:
     left_out: tuple[str, ...] = ()
     sides: tuple[str, str] = ("ours", "Mitsuba's")
     lights: Lights | None = None
+    lengths: Lengths | None = None
     looks: Looks | None = None
 
 
@@ -80,7 +82,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
     if verdict == "differ":
         cause = diagnosis.of_rungs(rungs)
         if rendered is not None and metrics is not None:
-            cause = cause or likeliest_cause(rendered.images, evidence.lights)
+            cause = cause or likeliest_cause(rendered.images, evidence.lights, evidence.lengths)
             worst = _places(rendered)
     return Case(
         scene=evidence.name,
@@ -150,17 +152,23 @@ def despite(
     return [found] if found.status == "differ" else []
 
 
-def likeliest_cause(images: Images, lights: Lights | None) -> Cause | None:
-    """The likeliest cause of a difference; single lights are rendered only if needed."""
+def likeliest_cause(
+    images: Images, lights: Lights | None, lengths: Lengths | None = None
+) -> Cause | None:
+    """The likeliest cause of a difference; single lights, and paths of other lengths, are rendered
+    only if needed."""
     plain = diagnosis.likeliest(images)
-    if lights is None or (plain is not None and plain.explained > SURE):
+    if plain is not None and plain.explained > SURE:
         return plain
-    return diagnosis.likeliest(images, lights())
+    if lights is None and lengths is None:
+        return plain
+    singles = {} if lights is None else lights()
+    return diagnosis.likeliest(images, singles, *([] if lengths is None else [lengths]))
 
 
 SURE = 0.98
-"""The fraction of the squared difference that a cause must explain for single lights not to be
-tried."""
+"""The fraction of the squared difference that a cause must explain for others not to be rendered.
+"""
 
 
 def _places(rendered: Rendered) -> tuple[ImageRegion, ...]:

@@ -26,6 +26,7 @@ from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
 from comparisons.results.sealed import sealed, unsealed
+from reference_rt.cli.main import adjusted
 from reference_rt.core.exr import write_exr
 from reference_rt.core.model import Description
 from reference_rt.rendering.scene import Scene
@@ -41,10 +42,13 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 class SceneOf(Description):
-    """The scene that a baseline shows."""
+    """The scene that a baseline shows.  size, spp: those that were asked for instead of its own
+    ("WIDTHxHEIGHT", samples per pixel)."""
 
     file: str
     digest: str
+    size: str | None = None
+    spp: int | None = None
 
 
 class Former(Description):
@@ -233,7 +237,9 @@ def scene_of(record: Record, folder: Path) -> Scene | None:
         return None
     places = (Path(record.scene.file), folder.parent / record.scene.file)
     there = next((path for path in places if path.is_file()), None)
-    return None if there is None else Scene.load(there)
+    if there is None:
+        return None
+    return adjusted(Scene.load(there), record.scene.spp, record.scene.size)
 
 
 def used_in(results: Path) -> set[str]:

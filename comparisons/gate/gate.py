@@ -9,6 +9,7 @@ from comparisons import statistics
 from comparisons.compare import diagnosis
 from comparisons.compare.judge import Lights, despite, likeliest_cause
 from comparisons.compare.looks import Looks, level_of
+from comparisons.compare.path_length import Lengths
 from comparisons.gate.copies import Copies
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
@@ -44,12 +45,13 @@ def gate_pictures(
     limit: float = LIMIT,
     name: str = "candidate",
     lights: Lights | None = None,
+    lengths: Lengths | None = None,
     notes: Sequence[str] = (),
 ) -> Case:
     """The verdict on candidates; several are replicates.
 
-    limit: the smallest relative bias of the image mean that must be detectable;  lights: for the
-    diagnosis of a difference.  Candidates that are copies of the reference's pictures are
+    limit: the smallest relative bias of the image mean that must be detectable;  lights, lengths:
+    for the diagnosis of a difference.  Candidates that are copies of the reference's pictures are
     `unchanged`.  Raises ImageError for candidates whose size is not the reference's, UsageError for
     several candidates without noise.
     """
@@ -60,7 +62,9 @@ def gate_pictures(
         return unchanged(name, copies, reference, notes)
     if copies.count:
         notes = [*notes, copies.note(len(others))]
-    return judged(others, reference, limit=limit, name=name, lights=lights, notes=notes)
+    return judged(
+        others, reference, limit=limit, name=name, lights=lights, lengths=lengths, notes=notes
+    )
 
 
 def unchanged(name: str, copies: Copies, reference: Reference, notes: Sequence[str] = ()) -> Case:
@@ -90,6 +94,7 @@ def judged(
     limit: float = LIMIT,
     name: str = "candidate",
     lights: Lights | None = None,
+    lengths: Lengths | None = None,
     notes: Sequence[str] = (),
     looks: Looks | None = None,
 ) -> Case:
@@ -122,7 +127,7 @@ def judged(
     cause: Cause | None = None
     worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":
-        cause = diagnosis.of_rungs(rungs) or likeliest_cause(images, lights)
+        cause = diagnosis.of_rungs(rungs) or likeliest_cause(images, lights, lengths)
         worst = statistics.worst_regions(pictures, _judged_by(reference))
     return Case(
         scene=name,

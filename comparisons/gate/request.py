@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from comparisons.compare.judge import Lights
+from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
@@ -75,8 +76,13 @@ class Judge:
 
     def case(self, gate: Callable[..., Case]) -> Case:
         """The verdict by `gate_pictures` or `judged`, whose other arguments are given already."""
-        lights = None if self.scene is None else _lights(self.scene, self.request.threads)
-        return gate(limit=self.request.limit, name=self.request.name, lights=lights)
+        request, scene = self.request, self.scene
+        return gate(
+            limit=request.limit,
+            name=request.name,
+            lights=None if scene is None else _lights(scene, request.threads),
+            lengths=None if scene is None else path_lengths(scene, request.threads),
+        )
 
 
 def prepared(
