@@ -5,10 +5,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from comparisons import rungs as ladder
-from comparisons.compare import pictures
+from comparisons import statistics
+from comparisons.compare import looks, pictures
 from comparisons.compare.budget import Budget
 from comparisons.compare.control import control
-from comparisons.compare.judge import Evidence, Rendered, judge
+from comparisons.compare.judge import Evidence, Rendered, judge, picture_rungs
+from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
@@ -110,7 +112,8 @@ def gather(
         pictured = False
     if not pictured:
         return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
-    rendered = _pictures(scene, tables, counterpart, budget, threads, say)
+    decided = any(rung.status == "differ" for rung in found)
+    rendered, looked = _pictures(scene, tables, counterpart, budget, threads, say, decided)
     for side, times in rendered.seconds.items():
         seconds[side] = seconds[side] | times
     notes.extend(rendered.notes)
@@ -124,6 +127,8 @@ def gather(
         lights=None
         if scene.integrator.deterministic
         else lambda: single_lights(judged_by, LIGHT_SPP),
+        lengths=path_lengths(judged_by, threads),
+        looks=looked,
     )
 
 
@@ -180,17 +185,42 @@ def _pictures(
     budget: Budget,
     threads: int | None,
     say: Say,
-) -> Rendered:
+    decided: bool,
+) -> tuple[Rendered, looks.Looks | None]:
+    """decided: whether a rung has shown a difference already, which more replicates would only
+    show again."""
     if isinstance(scene.integrator, RayCast):
-        return pictures.cast(scene, tables, counterpart)
+        return pictures.cast(scene, tables, counterpart), None
     if isinstance(scene.integrator, Whitted):
-        return pictures.whitted(scene, tables, counterpart)
+        return pictures.whitted(scene, tables, counterpart), None
     start = time.perf_counter()
-    rendered = pictures.replicates(
-        scene, tables, counterpart, budget.replicates, budget.reference_spp, threads
+    first, numbers = budget.replicates, 3 * scene.film.width * scene.film.height
+    most = looks.most_kept(first, numbers)
+    of_both = pictures.Replicates(
+        scene, tables, counterpart, budget.reference_spp, threads, first if decided else most
     )
-    say(f"{budget.replicates} + {budget.replicates} pictures ({time.perf_counter() - start:.1f} s)")
-    return rendered
+    if budget.seconds is None or decided:
+        of_both.grow(first)
+        say(f"{first} + {first} pictures ({time.perf_counter() - start:.1f} s)")
+        return of_both.rendered(), None
+
+    def look(level: float) -> RungResult:
+        rendered = of_both.rendered()
+        if level == looks.level_of(1):
+            return picture_rungs(rendered, budget.limit, level)[-1]
+        # The input is checked again at the end: each check has its own chance of a false alarm.
+        assert rendered.replicates is not None
+        return statistics.compare(*rendered.replicates, limit=budget.limit, level=level)
+
+    found = looks.until_decided(
+        of_both.grow,
+        look,
+        seconds=budget.seconds,
+        first=first,
+        step=lambda count: looks.group_of(count, most),
+        say=lambda line: say(f"{line} ({time.perf_counter() - start:.1f} s)"),
+    )
+    return of_both.rendered(), found
 
 
 __all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]

@@ -5,6 +5,7 @@ import time
 import numpy as np
 
 from comparisons.compare.judge import Rendered, of_replicates
+from comparisons.compare.looks import Pool, mean_picture
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.counterpart import Counterpart, trace
@@ -130,33 +131,67 @@ AT_ONCE = 1 << 18
 """Rays per call of the plugin: its recursion takes many times their memory."""
 
 
-def replicates(
-    scene: Scene,
-    tables: SceneTables,
-    counterpart: Counterpart,
-    count: int,
-    reference_spp: int | None,
-    threads: int | None,
-) -> Rendered:
-    """Path tracing: `count` pictures by each renderer with independent seeds; the images are their
-    means.  seconds["render"] is the median time of one picture."""
-    sampler = scene.resolved_sampler
-    first = getattr(sampler, "seed", 0)
-    ours, times = [], []
-    for k in range(count):
-        seeded = scene.changed(sampler=sampler.model_copy(update={"seed": first + k}))
-        picture = render(seeded, tables=tables, threads=threads)
-        ours.append(picture.colour)
-        times.append(picture.seconds)
-    theirs = mitsuba_scene.render(counterpart.mi_scene, count, reference_spp or sampler.spp, first)
-    seconds = {
-        "candidate": {
-            "compile": times[0]["compile"],
-            "render": float(np.median([t["render"] for t in times])),
-        },
-        "reference": {"render": float(np.median(theirs.seconds))},
-    }
-    return of_replicates(np.stack(ours), theirs.pictures, seconds)
+_BATCH = 16
+"""Pictures by Mitsuba that are in memory before they are averaged."""
+
+
+class Replicates:
+    """Path tracing: pictures by each renderer with independent seeds, as many as are asked for."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        tables: SceneTables,
+        counterpart: Counterpart,
+        reference_spp: int | None,
+        threads: int | None,
+        most: int,
+    ) -> None:
+        """reference_spp: samples per pixel of Mitsuba's, None: as many as ours;  threads: ours;
+        most: see `comparisons.compare.looks.Pool`."""
+        self._scene, self._tables, self._counterpart = scene, tables, counterpart
+        self._threads, self._sampler = threads, scene.resolved_sampler
+        self._reference_spp = reference_spp or self._sampler.spp
+        self._sides = Pool(most, mean_picture), Pool(most, mean_picture)
+        self._times: list[dict[str, float]] = []
+        self._mitsuba_times: list[float] = []
+
+    def grow(self, count: int) -> None:
+        """Render until there are `count` replicates of each side."""
+        ours, theirs = self._sides
+        made = len(ours)
+        first = getattr(self._sampler, "seed", 0) + made
+        for k in range(count - made):
+            seeded = self._scene.changed(
+                sampler=self._sampler.model_copy(update={"seed": first + k})
+            )
+            picture = render(seeded, tables=self._tables, threads=self._threads)
+            ours.add(picture.colour)
+            self._times.append(picture.seconds)
+        for begun in range(made, count, _BATCH):
+            found = mitsuba_scene.render(
+                self._counterpart.mi_scene,
+                min(_BATCH, count - begun),
+                self._reference_spp,
+                first + begun - made,
+            )
+            for other in found.pictures:
+                theirs.add(other)
+            self._mitsuba_times += found.seconds.tolist()
+
+    def rendered(self) -> Rendered:
+        """What there is so far; the images are its means.  seconds["render"] is the median time of
+        one picture."""
+        times = self._times
+        seconds = {
+            "candidate": {
+                "compile": times[0]["compile"],
+                "render": float(np.median([t["render"] for t in times])),
+            },
+            "reference": {"render": float(np.median(self._mitsuba_times))},
+        }
+        ours, theirs = self._sides
+        return of_replicates(np.stack(ours.pictures()), np.stack(theirs.pictures()), seconds)
 
 
 def _seconds(ours: Picture, mitsuba: float) -> dict[str, dict[str, float]]:

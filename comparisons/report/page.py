@@ -32,6 +32,7 @@ ORDER: tuple[Status, ...] = (
     "not-applicable",
     "reference-limited",
     "agree",
+    "unchanged",
 )
 """The order of cases on the page: those that need attention first."""
 
@@ -46,6 +47,7 @@ SIGNS: dict[Status, str] = {
     "not-applicable": "–",
     "reference-limited": "≈",
     "agree": "✓",
+    "unchanged": "=",
 }
 """Shown beside a verdict, so that it is recognised without its colour."""
 

@@ -10,6 +10,7 @@ FloatArray = npt.NDArray[np.float64]
 
 Status = Literal[
     "agree",  # the same within the stated bound
+    "unchanged",  # each picture is bit for bit one of the baseline's
     "differ",  # different beyond the stated bound
     "reference-limited",  # different because of Mitsuba's float32 precision, as the arbiter shows
     "inconclusive",  # too noisy: no bias is proven, but one that matters could be hidden

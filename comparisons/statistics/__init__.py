@@ -43,9 +43,9 @@ heavy tails make the tests less sensitive, but not wrong. The ranks assume no di
 False alarms per case, measured with 2,000 and more cases each: see the slow tests.
 
 Not handled: light that no replicate of a side has met, not in a single pixel. If the other side
-samples it, the sides differ, as they do where a lamp is forgotten. If neither has met it, both agree
-without it, and the reason says so: it names the number of pixel values, and of the light that one
-replicate alone met the share, and how much of such light may be missing. Every test needs some such
+samples it, the sides differ, as they do where a lamp is forgotten. If neither has met it, both
+agree without it. The reason says so: it names the number of pixel values, the share of the light
+that one replicate alone met, and how much of such light may be missing. Every test needs some such
 assumption (Bahadur and Savage 1956).
 
 Contract: pictures are linear radiance, (R, height, width, 3) or (height, width, 3); biases, limits
@@ -55,9 +55,19 @@ add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3
 `cells`, its numbers in `wording`, and its verdict in `decide`.
 """
 
-from comparisons.statistics.decide import compare
+from comparisons.statistics.advice import noise_free_candidate, shortfall
+from comparisons.statistics.decide import compare, read
 from comparisons.statistics.places import standard_error, worst_regions
 from comparisons.statistics.scales import Margins
 from comparisons.statistics.sides import Known
 
-__all__ = ["Known", "Margins", "compare", "standard_error", "worst_regions"]
+__all__ = [
+    "Known",
+    "Margins",
+    "compare",
+    "noise_free_candidate",
+    "read",
+    "shortfall",
+    "standard_error",
+    "worst_regions",
+]

@@ -17,6 +17,7 @@ from reference_rt.util.console import Bar
 
 _STYLES = {
     "agree": "green",
+    "unchanged": "green",
     "reference-limited": "cyan",
     "inconclusive": "yellow",
     "not-comparable": "yellow",
