@@ -61,7 +61,7 @@ def film(ours: Filter, reference: Filter) -> RungResult:
     x = 1.1 * radius * (2.0 * (np.arange(POINTS) + 0.5) / POINTS - 1.0)
     values = np.array([ours.value(at) for at in x.tolist()])
     error = float(np.abs(values - theirs(x) / integral).max() / ours.value(0.0))
-    edges = -radius + step * np.arange(CELLS + 1)
+    edges: FloatArray = np.linspace(-radius, radius, CELLS + 1)
     cumulative = np.append(0.0, np.cumsum(middles)) / integral
     drawn = _drawn_error(ours, edges, cumulative)
     bound = GAUSSIAN if isinstance(reference, GaussianFilter) else TOLERANCE

@@ -14,7 +14,7 @@ from reference_rt.cameras import Orthographic
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.filters import Filter
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Rotate, Scale, Translate
+from reference_rt.core.transform import Rotate, Scale, Translate, Turn
 from reference_rt.integrators import Path
 from reference_rt.materials import Emissive
 from reference_rt.rendering.render import render
@@ -84,7 +84,7 @@ def _scene(film_filter: Filter, turned: bool) -> Scene:
     """Stripes along y, or along x if `turned`, of radiance 1, one unit a pixel."""
     reach = SIZE / 2 + MARGIN
     first, last = -(MARGIN // PERIOD), (SIZE + MARGIN) // PERIOD
-    turn = (Rotate(rotate={"axis": (0, 0, 1), "degrees": 90}),) if turned else ()
+    turn = (Rotate(rotate=Turn(axis=(0, 0, 1), degrees=90)),) if turned else ()
     stripes = []
     for k in range(first, last):
         begin, end = (PERIOD * k + at - SIZE / 2 for at in STRIPE)
@@ -95,7 +95,9 @@ def _scene(film_filter: Filter, turned: bool) -> Scene:
         stripes.append(Rectangle(material="lamp", transform=(*place, *turn)))
     return Scene(
         camera=Orthographic(eye=(0, 0, 1), target=(0, 0, 0), width=SIZE),
-        film=Film(width=SIZE, height=SIZE, filter=film_filter, layers=("albedo", "normal")),
+        film=Film.model_validate(
+            {"width": SIZE, "height": SIZE, "filter": film_filter, "layers": ["albedo", "normal"]}
+        ),
         sampler=Independent(spp=SAMPLES),
         integrator=Path(max_depth=1),
         materials={"lamp": Emissive(radiance=(1.0, 1.0, 1.0))},

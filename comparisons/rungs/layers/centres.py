@@ -130,18 +130,31 @@ def _of_colours(
     """(n,): SLACK times the distance from the range of colours that Mitsuba's hits of rays next to
     each have, over the tolerance."""
     seen = Seen(scene, sizes)
-    reach = np.full(len(rays.o), sizes.reach.max(initial=0.0))
-    radius = 2.0 * sizes.frame.delta(rays.o, theirs.p, reach)
-    low = high = seen.colours(theirs, of_vertices=True)
-    for move in arbiter.directions(MOVES):
-        hits = trace(counterpart, rays.o + radius[:, None] * move, rays.d)
-        one = seen.colours(hits, of_vertices=True)
-        low, high = np.minimum(low, one), np.maximum(high, one)
+    ratio = _outside(seen.colours(theirs, of_vertices=True), values)
+    far = np.flatnonzero(ratio > 1.0)
+    if len(far) == 0:
+        return SLACK * ratio
+    reach = np.full(len(far), sizes.reach.max(initial=0.0))
+    some = rays.rows(far)
+    radius = 2.0 * sizes.frame.delta(some.o, theirs.p[far], reach)
+    around = [
+        seen.colours(trace(counterpart, some.o + radius[:, None] * move, some.d), of_vertices=True)
+        for move in arbiter.directions(MOVES)
+    ]
+    ratio[far] = _outside(np.stack(around), values[far])
+    return SLACK * ratio
+
+
+def _outside(colours: FloatArray, values: FloatArray) -> FloatArray:
+    """(n,): how far values (n, 3) are outside the range of colours ([k,] n, 3), over the
+    tolerance."""
+    each = colours.reshape(-1, *values.shape)
+    low, high = each.min(axis=0), each.max(axis=0)
     bound = COLOUR * np.maximum(np.abs(low), np.abs(high)).max(axis=1, keepdims=True)
     off = np.maximum(np.maximum(low - values, values - high), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(off > 0.0, off / bound, 0.0).max(axis=1)
-    return np.asarray(SLACK * np.nan_to_num(ratio, nan=np.inf, posinf=np.inf))
+        ratio = np.where(off == 0.0, 0.0, off / bound).max(axis=1)
+    return np.asarray(np.nan_to_num(ratio, nan=np.inf))
 
 
 __all__ = ["Centres", "centres"]

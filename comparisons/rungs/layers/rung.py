@@ -58,23 +58,23 @@ def layers(
     sizes = ShapeSizes(scene, counterpart.frame)
     if isinstance(scene.integrator, RayCast):
         picture = render(scene, tables=tables)
-        found = centres(scene, tables, counterpart, sizes, picture.layers)
-        return _result(_numbers(found), found, [])
+        cast = centres(scene, tables, counterpart, sizes, picture.layers)
+        return _result(_numbers(cast), cast, [])
     small = _smaller(scene)
     numbers: dict[str, Any] = {"layers": list(film_layers)}
     problems: list[str] = []
-    found = None
+    found: Centres | None = None
     own_film = small.film.model_copy(update={"filter": film_filters[0], "layers": film_layers})
     if "variance" in film_layers:
         problems += _of_variance(small.changed(film=own_film), tables, numbers)
     seen = {"albedo", "normal", "depth", "id"}.intersection(film_layers)
     if seen:
         pictures = _pictures(_first_hits(small.changed(film=own_film)), tables, PICTURES, SAMPLES)
-        first = {name: pictures[name][0] for name in ("depth", "id") if name in seen}
+        first = {name: x[0] for name, x in pictures.items() if name in ("depth", "id")}
         if first:
             found = centres(small, tables, counterpart, sizes, first)
             numbers |= _numbers(found)
-        many = {name: pictures[name] for name in ("albedo", "normal") if name in seen}
+        many = {name: x for name, x in pictures.items() if name in ("albedo", "normal")}
         if many:
             problems += _of_means(small, counterpart, sizes, film_filters[1], many, seed, numbers)
     return _result(numbers, found, problems)
@@ -194,7 +194,7 @@ def _result(numbers: dict[str, Any], found: Centres | None, problems: list[str])
             problems = [text, *problems]
     if problems:
         return RungResult("layers", "differ", "; ".join(problems), numbers)
-    text = []
+    said: list[str] = []
     if found is not None:
         edges = (
             f"{found.unresolved} of {found.pixels} pixels lie at edges that float32 does not "
@@ -203,16 +203,16 @@ def _result(numbers: dict[str, Any], found: Centres | None, problems: list[str])
         if arbiter.too_many(found.unresolved, found.pixels):
             return RungResult("layers", "reference-limited", edges, numbers)
         names = ", ".join(found.wrong)
-        text.append(f"{names} agree within {found.ratio:.2g} of float32's bound; {edges}")
-    text += [
+        said.append(f"{names} agree within {found.ratio:.2g} of float32's bound; {edges}")
+    said += [
         f"{name} agrees (a bias of {100.0 * numbers[f'{name}_seen']:.2g} % of its largest value, "
         "root mean square, would be seen)"
         for name in ("albedo", "normal")
         if f"{name}_seen" in numbers
     ]
     if "variance_ratio" in numbers:
-        text.append(f"variance is {numbers['variance_ratio']:.3f} times the pictures' spread")
-    return RungResult("layers", "agree", "; ".join(text), numbers)
+        said.append(f"variance is {numbers['variance_ratio']:.3f} times the pictures' spread")
+    return RungResult("layers", "agree", "; ".join(said), numbers)
 
 
 __all__ = ["applies", "layers"]

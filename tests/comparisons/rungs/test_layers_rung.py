@@ -51,16 +51,6 @@ def scene() -> Scene:
     return Scene.parse(SCENE)
 
 
-@pytest.fixture(scope="module")
-def tables(scene: Scene) -> Any:
-    return build_tables(scene)
-
-
-@pytest.fixture(scope="module")
-def counterpart(scene: Scene) -> Any:
-    return load(scene)
-
-
 def film_of(scene: Scene, names: tuple[str, ...], wide: bool = False) -> tuple[Film, Film]:
     film = scene.film.model_copy(
         update={"layers": names, "filter": MitchellFilter() if wide else BoxFilter()}
