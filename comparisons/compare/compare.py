@@ -13,6 +13,7 @@ from comparisons.compare.single_lights import single_lights
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.translate import UntranslatableError, load
+from comparisons.mitsuba.translate.vertices import with_float32_vertices
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
 from reference_rt.cameras.film import Film
@@ -82,16 +83,18 @@ def gather(
     only: tuple[str, ...] = (),
 ) -> Evidence:
     """Run the deterministic rungs and render the pictures of both sides."""
-    scene = budgeted(subject.scene, budget)
     clock = time.perf_counter()
+    scene, moved = with_float32_vertices(budgeted(subject.scene, budget))
     tables = build_tables(scene)
     seconds: dict[str, dict[str, float]] = {
         "candidate": {"load": time.perf_counter() - clock},
         "reference": {},
     }
     left_out = _left_out(scene, tables)
-    judged_by = budgeted(subject.reference or subject.scene, budget)
     clock = time.perf_counter()
+    judged_by = scene
+    if subject.reference is not None:
+        judged_by, _ = with_float32_vertices(budgeted(subject.reference, budget))
     try:
         counterpart = load(judged_by)
     except UntranslatableError as error:
@@ -102,6 +105,11 @@ def gather(
     notes = [*counterpart.notes(), *notes_of(scene)]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
+    if moved > 0.0:
+        notes.append(
+            f"compared with the vertices of meshes rounded to float32, as Mitsuba holds them: they "
+            f"move by at most {moved:.2g}"
+        )
     films = (subject.scene.film, (subject.reference or subject.scene).film)
     found = _deterministic_rungs(scene, tables, counterpart, films, budget, only, say)
     pictured = not only or not {"statistics", "images"}.isdisjoint(only)

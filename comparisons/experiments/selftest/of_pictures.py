@@ -103,7 +103,7 @@ def _vignette(pictures: FloatArray) -> FloatArray:
     height, width = pictures.shape[1:3]
     y, x = np.mgrid[0:height, 0:width]
     r2 = (2.0 * (x + 0.5) / width - 1.0) ** 2 + (2.0 * (y + 0.5) / height - 1.0) ** 2
-    return pictures * (1.0 - 0.015 * r2[..., None])
+    return np.asarray(pictures * (1.0 - 0.015 * r2[..., None]))
 
 
 def _tiles_exchanged(pictures: FloatArray) -> FloatArray:
