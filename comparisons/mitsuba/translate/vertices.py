@@ -14,13 +14,19 @@ from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.shape import TabulationContext
 
+SHARE = 0.01
+"""Largest distance by which a vertex moves, over the shortest edge's usual length (the median over
+the triangles): beyond it the mesh would be another one, and the comparison is to show Mitsuba's
+precision.  The same hundredth as `geometry.frame.SHARE`."""
+
 
 def with_float32_vertices(scene: Scene) -> tuple[Scene, float]:
     """The scene with the meshes and triangles that stand in it by themselves, not in groups or
     solids, moved to the nearest float32 vertices of the counterpart's frame; and the largest
     distance by which a vertex moves, 0 if the scene is as it was.
 
-    A mesh that cannot be used stays, for the error that `build_tables` raises.
+    A mesh stays as it is where float32 is too coarse for it (SHARE), and where it cannot be used,
+    for the error that `build_tables` raises.
     """
     if not any(isinstance(shape, Mesh | Triangle) for shape in scene.shapes):
         return scene, 0.0
@@ -39,7 +45,7 @@ def with_float32_vertices(scene: Scene) -> tuple[Scene, float]:
         except ValueError:
             continue
         rounded, moved = _rounded(table, shape.material, frame)
-        if moved > 0.0:
+        if 0.0 < moved <= SHARE * _edge(table):
             shapes[k], largest = rounded, max(largest, moved)
             for message in warned:
                 scene.warn(message, "shapes", k)
@@ -63,6 +69,13 @@ def _rounded(table: Triangles, material: str | None, frame: Frame) -> tuple[Mesh
         colours=None if table.colours is None else table.colours.reshape(-1, 3),
     )
     return mesh, moved
+
+
+def _edge(table: Triangles) -> float:
+    """The median over triangles of the shortest edge."""
+    corners = table.vertices.reshape(-1, 3, 3)
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    return float(np.median(edges.min(axis=1)))
 
 
 __all__ = ["with_float32_vertices"]
