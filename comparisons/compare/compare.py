@@ -15,8 +15,11 @@ from comparisons.compare.single_lights import single_lights
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.translate import UntranslatableError, load
+from comparisons.mitsuba.translate.vertices import with_float32_vertices
 from comparisons.results.case import Case, RungResult
-from reference_rt.cameras.filters import BoxFilter, Filter
+from comparisons.rungs.layers.rung import applies
+from reference_rt.cameras.film import Film
+from reference_rt.cameras.filters import BoxFilter
 from reference_rt.cli.explain import explain
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
@@ -59,12 +62,13 @@ def compare_scene(
 
 
 def budgeted(scene: Scene, budget: Budget) -> Scene:
-    """The scene with the budget's size and samples, and a box filter.
+    """The scene with the budget's size and samples, a box filter, and no layers.
 
     With a filter wider than a pixel, Mitsuba's neighbouring pixels share samples and hence noise,
-    but the statistics need independent pixels.  The scene's own filter is compared by its own rung.
+    but the statistics need independent pixels.  The scene's own filter and layers have rungs of
+    their own.
     """
-    film: dict[str, object] = {"filter": BoxFilter()}
+    film: dict[str, object] = {"filter": BoxFilter(), "layers": ()}
     if budget.size is not None:
         film |= dict(zip(("width", "height"), budget.size, strict=True))
     sampler = scene.resolved_sampler
@@ -81,16 +85,18 @@ def gather(
     only: tuple[str, ...] = (),
 ) -> Evidence:
     """Run the deterministic rungs and render the pictures of both sides."""
-    scene = budgeted(subject.scene, budget)
     clock = time.perf_counter()
+    scene, moved = with_float32_vertices(budgeted(subject.scene, budget))
     tables = build_tables(scene)
     seconds: dict[str, dict[str, float]] = {
         "candidate": {"load": time.perf_counter() - clock},
         "reference": {},
     }
     left_out = _left_out(scene, tables)
-    judged_by = budgeted(subject.reference or subject.scene, budget)
     clock = time.perf_counter()
+    judged_by = scene
+    if subject.reference is not None:
+        judged_by, _ = with_float32_vertices(budgeted(subject.reference, budget))
     try:
         counterpart = load(judged_by)
     except UntranslatableError as error:
@@ -101,8 +107,13 @@ def gather(
     notes = [*counterpart.notes(), *notes_of(scene)]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
-    film_filters = (subject.scene.film.filter, (subject.reference or subject.scene).film.filter)
-    found = _deterministic_rungs(scene, tables, counterpart, film_filters, budget, only, say)
+    if moved > 0.0:
+        notes.append(
+            f"compared with the vertices of meshes rounded to float32, as Mitsuba holds them: they "
+            f"move by at most {moved:.2g}"
+        )
+    films = (subject.scene.film, (subject.reference or subject.scene).film)
+    found = _deterministic_rungs(scene, tables, counterpart, films, budget, only, say)
     pictured = not only or not {"statistics", "images"}.isdisjoint(only)
     if counterpart.no_light_reason and not isinstance(scene.integrator, RayCast):
         found += [
@@ -144,13 +155,14 @@ def _deterministic_rungs(
     scene: Scene,
     tables: SceneTables,
     counterpart: Counterpart,
-    film_filters: tuple[Filter, Filter],
+    films: tuple[Film, Film],
     budget: Budget,
     only: tuple[str, ...],
     say: Say,
 ) -> list[RungResult]:
-    """Film, geometry, then light; each only if the rungs below it hold: a wrong convention must not
-    be reported as wrong light."""
+    """Film, geometry, light, layers; each only if the rungs below it hold: a wrong convention must
+    not be reported as wrong light."""
+    film_filters = films[0].filter, films[1].filter
     climbs: dict[str, Callable[[], RungResult]] = {
         "geometry": lambda: ladder.geometry(scene, tables, counterpart, budget.pixels),
         "direct": lambda: ladder.direct(scene, tables, counterpart, budget.light_pixels),
@@ -158,6 +170,8 @@ def _deterministic_rungs(
     }
     if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):
         climbs = {"film": lambda: ladder.film(*film_filters), **climbs}
+    if applies(scene, films[0]):
+        climbs["layers"] = lambda: ladder.layers(scene, tables, counterpart, films)
     found: list[RungResult] = []
     for name, climb in climbs.items():
         if only and name not in only:

@@ -9,21 +9,18 @@ from comparisons.compare.looks import Pool, mean_picture
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.counterpart import Counterpart, trace
-from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.results.case import Images
+from comparisons.rungs.layers.seen import Seen
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.whitted import plugin_radiance
-from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.vec3 import row as row_of
+from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.image import display
 from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
-from reference_rt.textures import At, colour_at
 
 
 def cast(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendered:
@@ -51,7 +48,7 @@ def mitsuba_cast(
             "Mitsuba has different uv, or none, on some shapes: both pictures show ours there"
         )
     layers = {
-        "colour": _colours(scene, tables, hits, uv),
+        "colour": Seen(scene, ShapeSizes(scene)).colours(hits, of_vertices=True),
         "distance": hits.t,
         "normal": np.where(hits.stands_in[:, None], hits.ns, hits.n),
         "id": hits.shape.astype(np.float64),
@@ -59,47 +56,6 @@ def mitsuba_cast(
     }
     shaped = {k: v.reshape(film.height, film.width, *v.shape[1:]) for k, v in layers.items()}
     return display(Picture(shaped, ours.shown)), tuple(notes)
-
-
-def _colours(scene: Scene, tables: SceneTables, hits: MitsubaHits, uv: FloatArray) -> FloatArray:
-    """The colours (n, 3) at hits: the material's, or interpolated from a mesh's vertex colours."""
-    sizes = ShapeSizes(scene)
-    names = [*scene.materials, None]
-    leaf, local = sizes.leaf_of(hits), sizes.local_points(hits)
-    found = np.zeros((len(hits.t), 3))
-    mixed = np.full((len(hits.t), 3), -1.0)  # negative: no vertex colour
-    material = np.full(len(hits.t), -1)
-    for number in np.unique(leaf[leaf >= 0]).tolist():
-        rows = np.flatnonzero(leaf == number)
-        sizes_of = sizes.leaves[number]
-        material[rows] = names.index(sizes_of.material)
-        if sizes_of.field == "triangles" and sizes_of.table.colours is not None:
-            row = sizes_of.row_of(hits.primitive[rows])
-            weights = _barycentrics(sizes_of.table.vertices[row], local[rows])
-            of_corners = sizes_of.table.colours[row].reshape(-1, 3, 3)
-            has_any = of_corners[:, :1, 0] >= 0.0
-            mixed[rows] = np.where(has_any, np.einsum("nk,nki->ni", weights, of_corners), -1.0)
-    _shown(tables, material, uv, mixed, found)
-    return np.where(mixed[:, :1] >= 0.0, mixed, found)
-
-
-@entry_kernel
-def _shown(
-    tables: SceneTables, material: IntArray, uv: FloatArray, colours: FloatArray, out: FloatArray
-) -> None:
-    """The colours of materials (n,), -1 for none, at surface coordinates (n, 2)."""
-    for i in range(len(material)):
-        if material[i] >= 0:
-            at = At(tables.textures, uv[i, 0], uv[i, 1], row_of(colours, i))
-            out[i, 0], out[i, 1], out[i, 2] = colour_at(tables.materials.shown, material[i], at)
-
-
-def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
-    """Barycentric coordinates (n, 3) of points (n, 3) in the planes of triangles (n, 9)."""
-    v = vertices.reshape(-1, 3, 3)
-    normal = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
-    areas = [np.sum(normal * np.cross(v[:, k - 2] - p, v[:, k - 1] - p), axis=1) for k in range(3)]
-    return np.asarray(np.stack(areas, axis=1) / np.sum(normal * normal, axis=1)[:, None])
 
 
 def whitted(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendered:

@@ -19,7 +19,10 @@ Status = Literal[
     "invalid",  # non-finite pixels, wrong size: the pictures cannot be compared
 ]
 
-RUNGS = ("scene", "run", "input", "film", "geometry", "direct", "whitted", "statistics", "images")
+RUNGS = (
+    *("scene", "run", "input", "film", "geometry"),
+    *("direct", "whitted", "layers", "statistics", "images"),
+)
 """The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
 if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`
 checks the pictures themselves."""
