@@ -15,6 +15,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
+from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.rendering.scene import Scene
@@ -41,7 +42,9 @@ app = typer.Typer(
 
 _INTERRUPTED = "interrupted; nothing unfinished was written"
 
-SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
+SceneArgument = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene, or a Mitsuba .xml one.")
+]
 
 
 def guarded(command: F) -> F:
@@ -125,6 +128,7 @@ def render(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    define: Defaults = None,
 ) -> None:
     """Render a scene to a file."""
     from reference_rt.rendering import image
@@ -133,7 +137,8 @@ def render(
     from reference_rt.util.files import check_writable
 
     image.check_suffix(output)
-    description = adjusted(Scene.load(scene), spp, size, integrator, seed)
+    loaded = Scene.load(scene, by_name(define))
+    description = adjusted(loaded, spp, size, integrator, seed)
     check_writable(output)
     with ProgressLine() as progress, _without_blas():
         picture = render_scene(
@@ -160,12 +165,12 @@ def render(
 
 @app.command()
 @guarded
-def explain(scene: SceneArgument) -> None:
+def explain(scene: SceneArgument, define: Defaults = None) -> None:
     """Print what a scene uses, what is specialised away and why, its distance from float64's
     limits, and its kernels."""
     from reference_rt.cli.explain_page import print_page
 
-    print_page(Scene.load(scene))
+    print_page(Scene.load(scene, by_name(define)))
 
 
 @app.command("warm-up")

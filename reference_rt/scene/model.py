@@ -3,7 +3,7 @@
 import hashlib
 import json
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -21,7 +21,7 @@ from reference_rt.lights import AnyLight, Constant, EnvironmentMap
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
 from reference_rt.materials.nested.paths import material_paths
 from reference_rt.sampling import AnySampler, Grid, Sobol
-from reference_rt.scene import yaml_text
+from reference_rt.scene import readers, yaml_text
 from reference_rt.scene.yaml_lines import line_of
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
@@ -199,11 +199,18 @@ class SceneModel(Description):
     # ---- in -------------------------------------------------------------------------------------
 
     @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a .yaml, .yml or .json file.  Raises SceneError (file, line, key path, reason)."""
+    def load(cls, path: str | Path, defaults: Mapping[str, str] | None = None) -> Self:
+        """Read a .yaml, .yml or .json file, or with Mitsuba an .xml file of its own.
+
+        defaults: values for the <default> elements of an .xml file.  Raises SceneError (file, line,
+        key path, reason), ReferenceUnavailableError where Mitsuba is needed and missing.
+        """
         path = Path(path)
-        if path.suffix.lower() not in (".yaml", ".yml", ".json"):
-            raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))
+        if path.suffix.lower() not in readers.OWN:
+            found: Self = readers.reader_of(path).read_file(path, cls, defaults or {})
+            return found
+        if defaults:
+            raise SceneError("has no defaults; expected a Mitsuba scene, .xml", file=str(path))
         try:
             text = read_text(path)
         except OSError as error:
@@ -233,6 +240,13 @@ class SceneModel(Description):
         scene._folder = Path() if folder is None else folder
         scene._source = (name, text)
         return scene
+
+    @classmethod
+    def from_mitsuba(cls, scene: Mapping[str, Any], folder: str | Path = ".") -> Self:
+        """A scene from a dictionary for `mitsuba.load_dict`;  folder: of the files that it names.
+        Raises as `load` does."""
+        found: Self = readers.reader_of(Path("scene.xml")).read_dict(scene, cls, Path(folder))
+        return found
 
     def changed(self, **parts: Any) -> Self:
         """A copy of the scene with other parts (film=..., sampler=...), checked again."""

@@ -21,26 +21,21 @@ from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed, parse_dict, parse_file
 from comparisons.mitsuba.reading.sensors import read_sensor
 from comparisons.mitsuba.reading.shapes import read_shape
-from reference_rt.rendering.scene import Scene
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import SceneWarning
 
 M = TypeVar("M", bound=SceneModel)
 
 
-def read_file(
-    path: Path, cls: type[M] = Scene, defaults: Mapping[str, str] | None = None  # type: ignore[assignment]
-) -> M:
-    """The scene in an .xml file;  defaults: values for its <default> elements.
+def read_file(path: Path, cls: type[M], defaults: Mapping[str, str] | None = None) -> M:
+    """The scene in an .xml file, an object of `cls`;  defaults: values for its <default> elements.
 
     Raises SceneError, ReferenceUnavailableError without Mitsuba; warns of what is read otherwise.
     """
     return _scene(parse_file(path, defaults or {}), cls)
 
 
-def read_dict(
-    scene: Mapping[str, Any], folder: Path | None = None, cls: type[M] = Scene  # type: ignore[assignment]
-) -> M:
+def read_dict(scene: Mapping[str, Any], cls: type[M], folder: Path | None = None) -> M:
     """The scene in a dictionary for `mitsuba.load_dict`;  folder: of its files.  Raises as
     `read_file` does."""
     return _scene(parse_dict(scene, Path() if folder is None else folder), cls)
@@ -86,11 +81,14 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
             shapes=tuple(reading.shapes),
             lights=tuple(reading.lights),
         )
-    scene._folder, scene._source = parsed.folder, (parsed.file, "")
+    scene._folder, scene._source = parsed.folder, (parsed.file, _WITHOUT_LINES)
     for note in reading.notes:
         warnings.warn(SceneWarning(note), stacklevel=4)
     return scene
 
+
+_WITHOUT_LINES = "["
+"""In place of a scene's text: it is no YAML, so that errors found later name no line of it."""
 
 _KINDS = ("Sensor", "Shape", "Emitter", "Integrator", "Medium", "Volume", "PhaseFunction")
 

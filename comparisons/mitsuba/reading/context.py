@@ -7,10 +7,8 @@ from typing import Any
 
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed
-from reference_rt.lights import AnyLight
 from reference_rt.materials import Emissive, Material, Wrapper
-from reference_rt.shapes import Shape
-from reference_rt.textures import Texture, VertexColours, texture_names
+from reference_rt.textures import VertexColours, texture_names
 
 
 @dataclass
@@ -18,11 +16,11 @@ class Reading:
     """What has been read of a scene so far; notes: what the reader should know of it."""
 
     parsed: Parsed
-    textures: dict[str, Texture] = field(default_factory=dict)
-    materials: dict[str, Material] = field(default_factory=dict)
-    groups: dict[str, tuple[Shape, ...]] = field(default_factory=dict)
-    shapes: list[Shape] = field(default_factory=list)
-    lights: list[AnyLight] = field(default_factory=list)
+    textures: dict[str, Any] = field(default_factory=dict)
+    materials: dict[str, Any] = field(default_factory=dict)
+    groups: dict[str, Any] = field(default_factory=dict)
+    shapes: list[Any] = field(default_factory=list)
+    lights: list[Any] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     names: dict[Any, str] = field(default_factory=dict)
     """The names of what has been read, by index of its element and what it is read for."""

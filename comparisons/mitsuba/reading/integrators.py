@@ -81,7 +81,7 @@ def _aov(reading: Reading, node: Node) -> tuple[AnyIntegrator, tuple[str, ...]]:
     """The integrator inside, or ray casting, and the layers for AOVs."""
     layers: list[str] = []
     for token in node.text("aovs", "").replace(",", " ").split():
-        name, _, kind = token.partition(":")
+        kind = token.partition(":")[2]
         if kind not in LAYERS:
             raise node.error(
                 f"'aovs' has '{token}', which is not supported; expected of: {', '.join(LAYERS)}"

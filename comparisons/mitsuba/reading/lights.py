@@ -1,12 +1,13 @@
 """Emitters of Mitsuba scenes.  Colours are radiance, intensity or irradiance as in Mitsuba."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from comparisons.mitsuba.reading.colours import Rgb, colour
 from comparisons.mitsuba.reading.context import Reading
-from comparisons.mitsuba.reading.node import Node
+from comparisons.mitsuba.reading.node import Node, triple
 from comparisons.mitsuba.reading.textures import colour_or_texture
 from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import AnyLight, Constant, Directional, EnvironmentMap, Point, Spot
@@ -42,11 +43,12 @@ def _plain(node: Node, key: str) -> Rgb:
 
 
 def _point(reading: Reading, node: Node) -> AnyLight:
-    position = node.vector("position", None)
-    if position is not None and node.has("to_world"):
-        raise node.error("has both 'position' and 'to_world'; expected one of them")
-    if position is None:
-        position = node.transform()[:, 3]
+    if node.has("position"):
+        if node.has("to_world"):
+            raise node.error("has both 'position' and 'to_world'; expected one of them")
+        position = node.vector("position", (0.0, 0.0, 0.0))
+    else:
+        position = triple(node.transform()[:, 3])
     return Point(position=position, intensity=_plain(node, "intensity"))
 
 
@@ -58,8 +60,8 @@ def _spot(reading: Reading, node: Node) -> AnyLight:
     axis = m[:, 2] / np.linalg.norm(m[:, 2])
     cutoff = node.number("cutoff_angle", 20.0)
     return Spot(
-        origin=m[:, 3],
-        target=m[:, 3] + axis,
+        origin=triple(m[:, 3]),
+        target=triple(m[:, 3] + axis),
         intensity=_plain(node, "intensity"),
         cutoff_angle=cutoff,
         beam_width=node.number("beam_width", 0.75 * cutoff),
@@ -67,11 +69,12 @@ def _spot(reading: Reading, node: Node) -> AnyLight:
 
 
 def _directional(reading: Reading, node: Node) -> AnyLight:
-    direction = node.vector("direction", None)
-    if direction is not None and node.has("to_world"):
-        raise node.error("has both 'direction' and 'to_world'; expected one of them")
-    if direction is None:
-        direction = node.transform()[:, 2]
+    if node.has("direction"):
+        if node.has("to_world"):
+            raise node.error("has both 'direction' and 'to_world'; expected one of them")
+        direction = node.vector("direction", (0.0, 0.0, 1.0))
+    else:
+        direction = triple(node.transform()[:, 2])
     return Directional(direction=direction, irradiance=_plain(node, "irradiance"))
 
 
@@ -86,12 +89,11 @@ def _envmap(reading: Reading, node: Node) -> AnyLight:
         raise node.error("'bitmap', an image in memory, is not supported; expected a file")
     linear = node.transform()[:, :3]  # Mitsuba ignores a translation, too
     rotation = _similarity(node, linear)
+    turn: Any = ()
+    if not np.array_equal(rotation, np.eye(3)):
+        turn = ({"matrix": np.column_stack([rotation, np.zeros(3)]).tolist()},)
     return EnvironmentMap(
-        file=reading.relative(reading.file(node)),
-        scale=node.number("scale", 1.0),
-        transform=()
-        if np.array_equal(rotation, np.eye(3))
-        else ({"matrix": np.column_stack([rotation, np.zeros(3)]).tolist()},),
+        file=reading.relative(reading.file(node)), scale=node.number("scale", 1.0), transform=turn
     )
 
 

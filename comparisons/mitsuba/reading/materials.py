@@ -55,7 +55,7 @@ def black(reading: Reading) -> str:
     """The name of a material that scatters nothing."""
     if "black" not in reading.names:
         name = unused(BLACK, BLACK, reading.materials)
-        reading.materials[name] = Diffuse(reflectance=0.0)
+        reading.materials[name] = Diffuse(reflectance=(0.0, 0.0, 0.0))
         reading.names["black"] = name
     return reading.names["black"]
 
@@ -189,22 +189,16 @@ def _principled(reading: Reading, node: Node) -> Material:
         "clearcoat_sampling_rate",
         "diffuse_reflectance_sampling_rate",
     )
-    index: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     if node.has("eta") and node.has("specular"):
         raise node.error("has both 'eta' and 'specular'; expected one of them")
     if node.has("eta"):
-        index["eta"] = node.number("eta", 1.5)
+        values["eta"] = node.number("eta", 1.5)
     else:
-        index["specular"] = node.number("specular", 0.5)
-    numbers = {
-        name: number_or_texture(reading, node, name, 0.5 if name == "roughness" else 0.0)
-        for name in _NUMBERS
-    }
-    return Principled(
-        base_colour=colour_or_texture(reading, node, "base_color", 0.5),
-        **index,
-        **{name: value for name, value in numbers.items() if node.has(name) or value != 0.0},
-    )
+        values["specular"] = node.number("specular", 0.5)
+    for name in _NUMBERS:
+        values[name] = number_or_texture(reading, node, name, 0.5 if name == "roughness" else 0.0)
+    return Principled(base_colour=colour_or_texture(reading, node, "base_color", 0.5), **values)
 
 
 def _blend(reading: Reading, node: Node) -> Material:

@@ -15,12 +15,12 @@ from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import scalar
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.transform import Affine, apply_normals, apply_points
+from reference_rt.core.transform import Affine, apply_points
 from reference_rt.shapes import Mesh
 from reference_rt.shapes.meshes.files import read_mesh
 from reference_rt.shapes.meshes.files.data import MeshData, checked
 from reference_rt.shapes.meshes.triangle_table import geometric_normals
-from reference_rt.shapes.meshes.vertex_normals import smooth_normals
+from reference_rt.shapes.meshes.vertex_normals import smooth_normals, unit
 from reference_rt.util.files import read_input
 
 
@@ -48,7 +48,7 @@ class Surface:
 def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
     """An obj, ply or serialized mesh."""
     path = reading.file(node)
-    m = node.transform()
+    m, of_normals = node.maps()
     flat, flip = node.flag("face_normals"), node.flag("flip_normals")
     if node.plugin == "serialized":
         data = _data(reading, node, path, node.integer("shape_index", 0))
@@ -60,7 +60,7 @@ def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
     if uv is not None and upside_down:
         uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
     surface = Surface(data.vertices, data.faces, None if flat else data.normals, uv)
-    surface = placed(surface, m, smooth=not flat)
+    surface = placed(surface, m, of_normals, smooth=not flat)
     names = {
         reading.attributes[t] for t in reading.textures_of(material) if t in reading.attributes
     }
@@ -89,12 +89,15 @@ def _data(reading: Reading, node: Node, path: Path, index: int = 0) -> MeshData:
     return found
 
 
-def placed(surface: Surface, m: Affine, smooth: bool) -> Surface:
-    """The surface under the map m.  smooth: make normals where it has none, as Mitsuba does: in the
-    world, a vertex being what the file has for one."""
+def placed(surface: Surface, m: Affine, of_normals: FloatArray, smooth: bool) -> Surface:
+    """The surface under the map m of points and `of_normals` of normals.
+
+    smooth: make normals where it has none, as Mitsuba does: in the world, a vertex being what the
+    file has for one.
+    """
     vertices = apply_points(m, surface.vertices)
     if surface.normals is not None:
-        normals: FloatArray | None = apply_normals(m, surface.normals)
+        normals: FloatArray | None = unit(surface.normals @ of_normals.T)
     elif smooth:
         normals = _smoothed(vertices, surface.faces)
     else:
@@ -104,7 +107,8 @@ def placed(surface: Surface, m: Affine, smooth: bool) -> Surface:
 
 def _smoothed(vertices: FloatArray, faces: IntArray) -> FloatArray:
     # As if each vertex had a uv of its own: vertices at one place stay several.
-    apart = np.column_stack([np.arange(len(vertices)), np.zeros(len(vertices))])
+    apart = np.zeros((len(vertices), 2))
+    apart[:, 0] = np.arange(len(vertices))
     at_corners = smooth_normals(vertices, faces, apart).reshape(-1, 3)
     normals = np.tile([1.0, 0.0, 0.0], (len(vertices), 1))  # Mitsuba's of a vertex without a face
     normals[faces.ravel()] = at_corners
@@ -175,7 +179,7 @@ def _attributes(node: Node, path: Path) -> dict[str, Any]:
             raise node.error(f"{path}: {' '.join(str(error).split())}") from None
         return {
             str(key): np.array(values[key])
-            for key in values.keys()
+            for key in dict(values)
             if str(key).startswith(("vertex_", "face_"))
             and str(key) not in ("vertex_positions", "vertex_normals", "vertex_texcoords")
         }

@@ -13,10 +13,19 @@ import numpy as np
 
 from comparisons.mitsuba.reading.parse import Parsed
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine
+from reference_rt.core.transform import Affine, invert
 from reference_rt.util.errors import SceneError
 
 _PLACE = re.compile(r"^(?P<file>.*) \(line (?P<line>\d+), col (?P<col>\d+)\)$", re.DOTALL)
+
+
+Triple = tuple[float, float, float]
+
+
+def triple(vector: FloatArray) -> Triple:
+    """Three numbers of Python."""
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 class Node:
@@ -29,7 +38,7 @@ class Node:
         self.kind = parsed.state.nodes[index].type.name
         self.plugin = str(self._props.plugin_name())
         self.name = str(self._props.id())
-        self._keys = [str(key) for key in self._props.keys()]
+        self._keys = [str(key) for key in self._props.keys()]  # noqa: SIM118
         self._left = dict.fromkeys(self._keys)
 
     # ---- errors ---------------------------------------------------------------------------------
@@ -146,40 +155,61 @@ class Node:
             raise self.error(f"'{key}' is no text; expected one")
         return value
 
-    def choice(self, key: str, default: str, known: Iterable[str]) -> str:
-        """One of the known words, in any case."""
+    def choice(self, key: str, default: str, known: Iterable[str]) -> Any:
+        """One of the known words, in any case: a string."""
         word = self.text(key, default).lower()
         if word not in known:
             raise self.error(f"'{key}' is '{word}'; expected one of: {', '.join(known)}")
         return word
 
-    def vector(self, key: str, default: tuple[float, float, float] | None) -> FloatArray | None:
-        """(3,)."""
+    def vector(self, key: str, default: Triple) -> Triple:
+        """[x, y, z], finite."""
         value = self.take(key)
         if value is None:
-            return None if default is None else np.array(default, np.float64)
+            return default
         try:
             found = np.array(value, np.float64).reshape(3)
         except (TypeError, ValueError):
             raise self.error(f"'{key}' is no vector; expected three numbers") from None
         if not np.isfinite(found).all():
             raise self.error(f"'{key}' is not finite; expected three finite numbers")
-        return found
+        return triple(found)
 
     def transform(self, key: str = "to_world") -> Affine:
         """(3, 4), the identity by default."""
+        m, of_normals = self.maps(key)
+        product = m[:, :3] @ of_normals.T
+        scales = np.abs(m[:, :3]) @ np.abs(of_normals.T)
+        if (np.abs(product - np.eye(3)) > 1e-4 * np.maximum(scales, 1.0)).any():
+            raise self.error(
+                f"'{key}': Mitsuba's map and its inverse differ, as after a rotation about an axis "
+                "that is no unit vector; expected axes of length 1"
+            )
+        return m
+
+    def maps(self, key: str = "to_world") -> tuple[Affine, FloatArray]:
+        """The map of points (3, 4), and Mitsuba's map of normals (3, 3).
+
+        The second is the inverse transpose of the first, but where a rotation's axis is no unit
+        vector: Mitsuba takes it for one.
+        """
         value = self.take(key)
         if value is None:
-            return np.eye(3, 4)
+            return np.eye(3, 4), np.eye(3)
         try:
             m = np.array(value.matrix, np.float64)
+            of_normals = np.array(value.inverse_transpose, np.float64)[:3, :3]
         except (AttributeError, TypeError, ValueError):
             raise self.error(f"'{key}' is no transform; expected one") from None
         if m.shape != (4, 4) or not np.isfinite(m).all():
             raise self.error(f"'{key}' is not finite; expected a finite transform")
         if np.abs(m[3] - [0.0, 0.0, 0.0, 1.0]).max() > 0.0:
             raise self.error(f"'{key}' is a perspective map; expected an affine one")
-        return m[:3]
+        try:
+            invert(m[:3])
+        except ValueError as error:
+            raise self.error(f"'{key}': {error}") from None
+        return m[:3], of_normals
 
     # ---- nested elements ------------------------------------------------------------------------
 

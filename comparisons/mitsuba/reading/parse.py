@@ -143,7 +143,7 @@ def _scene_error(message: str, path: Path | None) -> SceneError:
     return SceneError((f"column {column}: " if column else "") + text, file=file, line=line)
 
 
-class _TooDeep(Exception):
+class _TooDeepError(Exception):
     pass
 
 
@@ -168,7 +168,7 @@ def check_nesting(path: Path, folder: Path, depth: int = 0, files: int = 0) -> N
         level += 1
         deepest = max(deepest, level)
         if depth + level > MOST_NESTED:
-            raise _TooDeep
+            raise _TooDeepError
         if name == "include" and "filename" in attributes:
             includes.append(attributes["filename"])
 
@@ -179,7 +179,7 @@ def check_nesting(path: Path, folder: Path, depth: int = 0, files: int = 0) -> N
     parser.StartElementHandler, parser.EndElementHandler = start, end
     try:
         parser.Parse(content, True)
-    except _TooDeep:
+    except _TooDeepError:
         raise SceneError(
             f"column {parser.CurrentColumnNumber + 1}: elements nest deeper than {MOST_NESTED}; "
             "expected fewer levels",

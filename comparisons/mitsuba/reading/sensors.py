@@ -271,9 +271,7 @@ def _named_filter(node: Node) -> AnyFilter:
             return CatmullRomFilter()
         case "lanczos":
             return LanczosFilter(lobes=node.integer("lobes", 3))
-    raise node.unsupported(
-        "expected one of: box, tent, gaussian, mitchell, catmullrom, lanczos"
-    )
+    raise node.unsupported("expected one of: box, tent, gaussian, mitchell, catmullrom, lanczos")
 
 
 _STRATIFIED = ("stratified", "multijitter", "orthogonal", "ldsampler")

@@ -9,9 +9,9 @@ from comparisons.mitsuba.reading.context import Reading, unused
 from comparisons.mitsuba.reading.lights import emission
 from comparisons.mitsuba.reading.materials import material_name
 from comparisons.mitsuba.reading.meshes import Surface, finished, mesh, placed
-from comparisons.mitsuba.reading.node import Node
+from comparisons.mitsuba.reading.node import Node, triple
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine, invert
+from reference_rt.core.transform import Affine
 from reference_rt.materials import Emissive
 from reference_rt.shapes import Box, Cylinder, Disk, Quadric, Rectangle, Shape, Sphere
 from reference_rt.shapes.instances import Instance
@@ -90,7 +90,6 @@ def _instance(reading: Reading, node: Node, in_group: bool) -> Shape:
     if group is None or group.plugin != "shapegroup":
         raise node.error("has no shape group; expected a reference to one")
     m = node.transform()
-    _check_volume(node, m)
     found = Instance(group=group_name(reading, group), transform=_steps(m))
     node.finish()
     return found
@@ -102,13 +101,6 @@ def _instance(reading: Reading, node: Node, in_group: bool) -> Shape:
 def _steps(m: Affine) -> Any:
     """The map as our transform."""
     return () if np.array_equal(m, np.eye(3, 4)) else ({"matrix": m.tolist()},)
-
-
-def _check_volume(node: Node, m: Affine) -> None:
-    try:
-        invert(m)
-    except ValueError as error:
-        raise node.error(f"'to_world': {error}") from None
 
 
 def _compose(*maps: FloatArray) -> Affine:
@@ -123,18 +115,11 @@ def _scaled(center: FloatArray, linear: FloatArray) -> FloatArray:
     return np.column_stack([linear, center])
 
 
-def _inside_out(node: Node, m: Affine) -> bool:
-    """Whether Mitsuba turns a sphere or a cylinder inside out: by a mirroring map, too."""
-    return node.flag("flip_normals") != bool(np.linalg.det(m[:, :3]) < 0.0)
-
-
 def _sphere(reading: Reading, node: Node, material: str | None) -> Shape:
     center, radius = node.vector("center", (0.0, 0.0, 0.0)), node.number("radius", 1.0)
-    assert center is not None
     if not radius > 0.0:
         raise node.error(f"'radius' is {radius:g}; expected more than 0")
-    m = _compose(node.transform(), _scaled(center, radius * np.eye(3)))
-    _check_volume(node, m)
+    m = _compose(node.transform(), _scaled(np.array(center), radius * np.eye(3)))
     linear = m[:, :3]
     lengths = np.linalg.norm(linear, axis=0)
     gram = linear.T @ linear
@@ -143,11 +128,12 @@ def _sphere(reading: Reading, node: Node, material: str | None) -> Shape:
             "'to_world' makes it an ellipsoid, which Mitsuba renders as a sphere with a warning; "
             "expected a uniform scale, or an instance of a group with the sphere"
         )
-    if _inside_out(node, m):
+    # A map that mirrors turns Mitsuba's spheres inside out, but not its cylinders (measured).
+    if node.flag("flip_normals") != bool(np.linalg.det(linear) < 0.0):
         form = (-1.0, -1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
         return _turned(reading, node, material, form, (-1.5, -1.5, -1.5), (1.5, 1.5, 1.5), m)
     if np.array_equal(linear, lengths[0] * np.eye(3)):
-        return Sphere(center=m[:, 3], radius=lengths[0], material=material)
+        return Sphere(center=triple(m[:, 3]), radius=float(lengths[0]), material=material)
     return Sphere(transform=_steps(_orthogonal(m, lengths[0])), material=material)
 
 
@@ -159,15 +145,13 @@ def _orthogonal(m: Affine, size: float) -> Affine:
 
 def _cylinder(reading: Reading, node: Node, material: str | None) -> Shape:
     radius = node.number("radius", 1.0)
-    p0, p1 = node.vector("p0", (0.0, 0.0, 0.0)), node.vector("p1", (0.0, 0.0, 1.0))
-    assert p0 is not None
-    assert p1 is not None
+    p0 = np.array(node.vector("p0", (0.0, 0.0, 0.0)))
+    p1 = np.array(node.vector("p1", (0.0, 0.0, 1.0)))
     length = float(np.linalg.norm(p1 - p0))
     if not (radius > 0.0 and length > 0.0):
         raise node.error("'radius' or the distance from 'p0' to 'p1' is 0; expected more")
     turn = _frame((p1 - p0) / length)
     m = _compose(node.transform(), _scaled(p0, turn @ np.diag([radius, radius, length])))
-    _check_volume(node, m)
     linear = m[:, :3]
     gram = linear.T @ linear
     wanted = np.diag([gram[0, 0], gram[0, 0], gram[2, 2]])
@@ -177,7 +161,7 @@ def _cylinder(reading: Reading, node: Node, material: str | None) -> Shape:
             "'to_world' makes it oblique or elliptic, which Mitsuba renders as a round cylinder "
             "with a warning; expected one that scales its radius uniformly"
         )
-    if _inside_out(node, m):
+    if node.flag("flip_normals"):
         form = (-1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
         return _turned(reading, node, material, form, (-1.5, -1.5, 0.0), (1.5, 1.5, 1.0), m)
     return Cylinder(capped=False, transform=_steps(m), material=material)
@@ -199,7 +183,7 @@ def _turned(
     reading: Reading,
     node: Node,
     material: str | None,
-    form: tuple[float, ...],
+    form: Any,
     lower: tuple[float, float, float],
     upper: tuple[float, float, float],
     m: Affine,
@@ -218,7 +202,6 @@ def _turned(
 def _flat(node: Node) -> Affine:
     """to_world of a shape in the plane z = 0; flipping its normal mirrors z."""
     m = node.transform()
-    _check_volume(node, m)
     if node.flag("flip_normals"):
         m = _compose(m, _scaled(np.zeros(3), np.diag([1.0, 1.0, -1.0])))
     return m
@@ -235,12 +218,12 @@ def _disk(reading: Reading, node: Node, material: str | None) -> Shape:
 
 def _cube(reading: Reading, node: Node, material: str | None) -> Shape:
     node.ignore("face_normals")  # it has vertex normals all the same
-    flip, m = node.flag("flip_normals"), node.transform()
-    _check_volume(node, m)
+    flip = node.flag("flip_normals")
+    m, of_normals = node.maps()
     if not (flip or reading.uses_uv(material)):
         return Box(transform=_steps(m), material=material)
     surface = Surface(_CUBE, _CUBE_FACES, _CUBE_NORMALS, _CUBE_UV)
-    return finished(placed(surface, m, smooth=False), flip, True, material)
+    return finished(placed(surface, m, of_normals, smooth=False), flip, True, material)
 
 
 _CUBE = np.array(

@@ -1,8 +1,8 @@
 """Textures of Mitsuba scenes, and parameters that may be textures.
 
 Our shapes get the texture coordinates that Mitsuba's have, so that a texture needs no knowledge of
-the shape.  Mitsuba's v = 0 is the top row of an image, ours the bottom one: the map of an image ends
-with 1 - v.
+the shape.  Mitsuba's v = 0 is the top row of an image, ours the bottom one: the map of an image
+ends with 1 - v.
 """
 
 import math
@@ -89,7 +89,7 @@ def _bitmap(reading: Reading, node: Node) -> Bitmap:
     for key in ("bitmap", "data"):
         if node.has(key):
             raise node.error(f"'{key}', an image in memory, is not supported; expected a file")
-    # By default 8-bit images are kept as they are; half floats, at most 2^-11 off, are not imitated.
+    # By default 8-bit images are kept as they are; half floats, 2^-11 off, are not imitated.
     node.choice("format", "auto", ("auto", "variant", "float16", "fp16", "uint8"))
     return Bitmap(
         file=reading.relative(reading.file(node)),
