@@ -87,7 +87,7 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
     return scene
 
 
-_WITHOUT_LINES = "["
+_WITHOUT_LINES = "]"
 """In place of a scene's text: it is no YAML, so that errors found later name no line of it."""
 
 _KINDS = ("Sensor", "Shape", "Emitter", "Integrator", "Medium", "Volume", "PhaseFunction")

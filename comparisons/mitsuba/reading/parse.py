@@ -122,7 +122,10 @@ def _upgraded(mi: Any, path: Path | None, parse: Any) -> Any:
 
 
 _PLACE = re.compile(r"Error while loading (?P<file>.*?) \(line (?P<line>\d+), col (?P<col>\d+)\): ")
-_FIRST = re.compile(r"^\[\w+\.cpp:\d+\] ")
+_FIRST = re.compile(
+    r'^\[\w+\.cpp:\d+\] (Parsing of XML file ".*" failed|XML parsing failed): |'
+    r"^\[\w+\.cpp:\d+\] "
+)
 _LAST = re.compile(r" \(line (?P<line>\d+), col (?P<col>\d+)\)$")
 
 
@@ -139,7 +142,7 @@ def _scene_error(message: str, path: Path | None) -> SceneError:
     elif last := _LAST.search(message):
         line, column = int(last["line"]), last["col"]
         message = message[: last.start()]
-    text = " ".join(_FIRST.sub("", message).split())
+    text = " ".join(_FIRST.sub("", message, count=1).split())
     return SceneError((f"column {column}: " if column else "") + text, file=file, line=line)
 
 

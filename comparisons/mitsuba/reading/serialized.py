@@ -63,6 +63,8 @@ def _header(content: bytes, start: int) -> int:
 
 
 def _offset(content: bytes, version: int, index: int) -> int:
+    if len(content) < 8:
+        raise ValueError("the file ends before its table of meshes")
     (count,) = struct.unpack_from("<I", content, len(content) - 4)
     if not 0 <= index < count:
         raise ValueError(f"has {count} meshes; expected a 'shape_index' from 0 to {count - 1}")
