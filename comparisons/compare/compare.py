@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from comparisons import rungs as ladder
 from comparisons.compare import pictures
@@ -12,6 +13,7 @@ from comparisons.compare.judge import Evidence, Rendered, judge
 from comparisons.compare.single_lights import single_lights
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
+from comparisons.mitsuba.reading.reference import file_of, own_scene
 from comparisons.mitsuba.translate import UntranslatableError, load
 from comparisons.results.case import Case, RungResult
 from reference_rt.cameras.filters import BoxFilter, Filter
@@ -89,14 +91,19 @@ def gather(
     left_out = _left_out(scene, tables)
     judged_by = budgeted(subject.reference or subject.scene, budget)
     clock = time.perf_counter()
+    own = _own_file(judged_by)
     try:
         counterpart = load(judged_by)
     except UntranslatableError as error:
         rung = RungResult("geometry", "not-comparable", str(error))
-        return Evidence(scene.name, (rung,), None, seconds, left_out=left_out)
+        if own is None:
+            return Evidence(scene.name, (rung,), None, seconds, left_out=left_out)
+        counterpart, only = Counterpart(own, {}), ("statistics", "images")
     seconds["reference"] = {"load": time.perf_counter() - clock}
 
     notes = [*counterpart.notes(), *notes_of(scene)]
+    if own is not None:
+        notes = [*counterpart.notes(), _OWN_FILE.format(file_of(scene))]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
     film_filters = (subject.scene.film.filter, (subject.reference or subject.scene).film.filter)
@@ -110,7 +117,8 @@ def gather(
         pictured = False
     if not pictured:
         return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
-    rendered = _pictures(scene, tables, counterpart, budget, threads, say)
+    shown = counterpart if own is None else Counterpart(own, counterpart.mi_shapes)
+    rendered = _pictures(scene, tables, shown, budget, threads, say)
     for side, times in rendered.seconds.items():
         seconds[side] = seconds[side] | times
     notes.extend(rendered.notes)
@@ -125,6 +133,20 @@ def gather(
         if scene.integrator.deterministic
         else lambda: single_lights(judged_by, LIGHT_SPP),
     )
+
+
+_OWN_FILE = (
+    "Mitsuba's pictures are of {} itself, loaded by Mitsuba and changed in the film's size and "
+    "filter and in its samples only; the rungs below are of our translation of what we read"
+)
+
+
+def _own_file(scene: Scene) -> Any:
+    """Mitsuba's scene of the user's own file; None for other scenes, and where nothing is drawn at
+    random."""
+    if file_of(scene) is None or scene.integrator.deterministic:
+        return None
+    return own_scene(scene)
 
 
 def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:

@@ -68,6 +68,7 @@ class SceneModel(Description):
 
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: "tuple[str, str] | None" = PrivateAttr(default=None)
+    _defaults: dict[str, str] = PrivateAttr(default_factory=dict)
     _warned: set[str] = PrivateAttr(default_factory=set)
 
     @model_validator(mode="after")
@@ -168,6 +169,16 @@ class SceneModel(Description):
         """Whether the scene was read from a file or from text."""
         return self._source is not None
 
+    @property
+    def source_file(self) -> Path | None:
+        """The file that the scene was read from; None for a scene of Python."""
+        return None if self._source is None else Path(self._source[0])
+
+    @property
+    def defaults(self) -> dict[str, str]:
+        """The values of `load` for the <default> elements of its file."""
+        return dict(self._defaults)
+
     def error(self, message: str, *path: str | int) -> SceneError:
         """An error about the part at the key path, with file and line if the scene was read."""
         if self._source is None:
@@ -253,6 +264,7 @@ class SceneModel(Description):
         fields = {name: getattr(self, name) for name in self.model_fields_set} | parts
         scene = type(self)(**fields)
         scene._folder, scene._source = self._folder, self._source
+        scene._defaults = self._defaults
         scene._warned = self._warned
         return scene
 

@@ -32,13 +32,17 @@ def read_file(path: Path, cls: type[M], defaults: Mapping[str, str] | None = Non
 
     Raises SceneError, ReferenceUnavailableError without Mitsuba; warns of what is read otherwise.
     """
-    return _scene(parse_file(path, defaults or {}), cls)
+    scene = _scene(parse_file(path, defaults or {}), cls)
+    scene._source, scene._defaults = (str(path), _WITHOUT_LINES), dict(defaults or {})
+    return scene
 
 
 def read_dict(scene: Mapping[str, Any], cls: type[M], folder: Path | None = None) -> M:
     """The scene in a dictionary for `mitsuba.load_dict`;  folder: of its files.  Raises as
     `read_file` does."""
-    return _scene(parse_dict(scene, Path() if folder is None else folder), cls)
+    found = _scene(parse_dict(scene, Path() if folder is None else folder), cls)
+    found._source = None
+    return found
 
 
 def _scene(parsed: Parsed, cls: type[M]) -> M:

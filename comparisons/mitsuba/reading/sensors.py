@@ -198,6 +198,8 @@ def _orthographic(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     _clip(reading, node)
     node.ignore("focus_distance")
     right, up, _ = np.linalg.norm(m[:, :3], axis=0).tolist()
+    if not frame.is_cropped and right == up:
+        return Orthographic(**place, width=2.0 * right)
     l, r, b, t = frame.window(1.0)
     return Orthographic(**place, view=(l * right, r * right, b * up, t * up))
 
