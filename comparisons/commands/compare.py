@@ -7,6 +7,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Fresh, Threads, out_folder
+from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.main import guarded
 
 if TYPE_CHECKING:
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
 @guarded
 def compare(
     scenes: Annotated[
-        list[Path], typer.Argument(metavar="SCENE...", help="Scene files: .yaml or .json.")
+        list[Path],
+        typer.Argument(metavar="SCENE...", help="Scene files: .yaml, .json, or Mitsuba's .xml."),
     ],
     out: Annotated[Path, out_folder("results.json and report.html")] = Path("out"),
     spp: Annotated[
@@ -32,8 +34,11 @@ def compare(
     ] = 16,
     threads: Threads = None,
     fresh: Fresh = False,
+    define: Defaults = None,
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
+
+    The reference of an .xml scene is that file, loaded by Mitsuba.
 
     Finished cases are kept in the output folder and not run again.
     """
@@ -44,7 +49,7 @@ def compare(
         from comparisons.suites.run import Options, Run, run_cases
         from comparisons.suites.work import Changes, plan_of_files
 
-    changes = Changes(spp=spp, size=size, seed=seed)
+    changes = Changes(spp=spp, size=size, seed=seed, defaults=by_name(define))
     plan = plan_of_files(scenes, changes, Budget(replicates=replicates))
     work = tuple(w._replace(again=_command(w.path, changes, replicates)) for w in plan.work)
 
@@ -61,6 +66,7 @@ def _command(path: Path, changes: "Changes", replicates: int) -> str:
     """The command that repeats one case alone."""
     import shlex
 
-    options = {**changes.model_dump(), "replicates": replicates}
+    options = {**changes.model_dump(exclude={"defaults"}), "replicates": replicates}
     given = [f"--{name} {value}" for name, value in options.items() if value is not None]
+    given += [f"-D {shlex.quote(f'{k}={v}')}" for k, v in changes.defaults.items()]
     return " ".join(["reference-rt compare", shlex.quote(str(path)), "--fresh", *given])

@@ -33,7 +33,7 @@ def own_scene(scene: Scene) -> Any:
     state = parsed.state
     sensor = _first(state, mi.ObjectType.Sensor)
     if sensor is None:
-        raise UntranslatableError("a file without a sensor", "camera")
+        raise UntranslatableError("of a file that has none", "camera")
     film = _child(mi, state, sensor, mi.ObjectType.Film, "hdrfilm")
     _resize(state.nodes[film].props, scene)
     values = {"pixel_format": "rgb", "component_format": "float32", "file_format": "openexr"}
@@ -104,14 +104,14 @@ def _resize(film: Any, scene: Scene) -> None:
         new, rest = divmod(value * wanted[k % 2], old[k % 2])
         if rest:
             raise UntranslatableError(
-                f"a film whose window of {old[0]} x {old[1]} pixels becomes {wanted[0]} x "
+                f"Film, whose window of {old[0]} x {old[1]} pixels becomes {wanted[0]} x "
                 f"{wanted[1]}, so that its '{name}' is no whole number,",
                 "film",
             )
         film[name] = new
     is_view = getattr(scene.camera, "view", None) is not None
     if is_view and wanted[0] * old[1] != wanted[1] * old[0]:
-        raise UntranslatableError("a shifted view in a picture of another shape", "camera")
+        raise UntranslatableError("view, which is shifted, in a picture of another shape", "camera")
 
 
 def _without_moments(mi: Any, state: Any) -> None:

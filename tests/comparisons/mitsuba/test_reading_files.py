@@ -228,7 +228,7 @@ def test_damaged_serialized_meshes_are_refused():
     whole = packed(4, (CORNERS, TRIANGLES, None, False), (CORNERS, TRIANGLES, UPWARDS, True))
     serialized.read(whole, 1)
     for cut in range(0, len(whole) - 1, 7):
-        with pytest.raises(ValueError, match="."):
+        with pytest.raises(ValueError, match=r"."):
             serialized.read(whole[:cut], 1)
     for index in (-1, 2, 10**9):
         with pytest.raises(ValueError, match="has 2 meshes"):
