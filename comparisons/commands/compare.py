@@ -8,6 +8,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Fixed, Fresh, Threads, TimeLimit, out_folder
+from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.main import guarded
 from reference_rt.util.errors import UsageError
 
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 @guarded
 def compare(
     scenes: Annotated[
-        list[Path], typer.Argument(metavar="SCENE...", help="Scene files: .yaml or .json.")
+        list[Path],
+        typer.Argument(metavar="SCENE...", help="Scene files: .yaml, .json, or Mitsuba's .xml."),
     ],
     out: Annotated[Path, out_folder("results.json and report.html")] = Path("out"),
     spp: Annotated[
@@ -41,11 +43,13 @@ def compare(
     fixed: Fixed = False,
     threads: Threads = None,
     fresh: Fresh = False,
+    define: Defaults = None,
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
 
     Noisy pictures are looked at, and doubled in number until they decide or --time-limit is
     reached: easy scenes are done sooner. The chance of a false alarm over all looks is that of one.
+    The reference of an .xml scene is that file, loaded by Mitsuba.
 
     Finished cases are kept in the output folder and not run again.
     """
@@ -57,7 +61,7 @@ def compare(
         from comparisons.suites.run import Options, Run, run_cases
         from comparisons.suites.work import Changes, plan_of_files
 
-    changes = Changes(spp=spp, size=size, seed=seed)
+    changes = Changes(spp=spp, size=size, seed=seed, defaults=by_name(define))
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
     budget = (
@@ -82,7 +86,7 @@ def _command(path: Path, changes: "Changes", given: Mapping[str, float | bool | 
     """The command that repeats one case alone;  given: other options."""
     import shlex
 
-    options = {**changes.model_dump(), **given}
+    options = {**changes.model_dump(exclude={"defaults"}), **given}
     words = [
         f"--{name}"
         if value is True
@@ -92,4 +96,5 @@ def _command(path: Path, changes: "Changes", given: Mapping[str, float | bool | 
         for name, value in options.items()
         if value is not None
     ]
+    words += [f"-D {shlex.quote(f'{k}={v}')}" for k, v in changes.defaults.items()]
     return " ".join(["reference-rt compare", shlex.quote(str(path)), "--fresh", *words])

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from comparisons import rungs as ladder
 from comparisons import statistics
@@ -14,6 +15,7 @@ from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
+from comparisons.mitsuba.reading.reference import file_of, own_scene
 from comparisons.mitsuba.translate import UntranslatableError, load
 from comparisons.mitsuba.translate.vertices import with_float32_vertices
 from comparisons.results.case import Case, RungResult
@@ -97,14 +99,19 @@ def gather(
     judged_by = scene
     if subject.reference is not None:
         judged_by, _ = with_float32_vertices(budgeted(subject.reference, budget))
+    own = _own_file(judged_by)
     try:
         counterpart = load(judged_by)
     except UntranslatableError as error:
         rung = RungResult("geometry", "not-comparable", str(error))
-        return Evidence(scene.name, (rung,), None, seconds, left_out=left_out)
+        if own is None:
+            return Evidence(scene.name, (rung,), None, seconds, left_out=left_out)
+        counterpart, only = Counterpart(own, {}), ("statistics", "images")
     seconds["reference"] = {"load": time.perf_counter() - clock}
 
     notes = [*counterpart.notes(), *notes_of(scene)]
+    if own is not None:
+        notes = [*counterpart.notes(), _OWN_FILE.format(file_of(scene))]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
     if moved > 0.0:
@@ -124,7 +131,8 @@ def gather(
     if not pictured:
         return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
     decided = any(rung.status == "differ" for rung in found)
-    rendered, looked = _pictures(scene, tables, counterpart, budget, threads, say, decided)
+    shown = counterpart if own is None else Counterpart(own, counterpart.mi_shapes)
+    rendered, looked = _pictures(scene, tables, shown, budget, threads, say, decided)
     for side, times in rendered.seconds.items():
         seconds[side] = seconds[side] | times
     notes.extend(rendered.notes)
@@ -141,6 +149,20 @@ def gather(
         lengths=path_lengths(judged_by, threads),
         looks=looked,
     )
+
+
+_OWN_FILE = (
+    "Mitsuba's pictures are of {} itself, loaded by Mitsuba and changed in the film's size and "
+    "filter and in its samples only; the rungs below are of our translation of what we read"
+)
+
+
+def _own_file(scene: Scene) -> Any:
+    """Mitsuba's scene of the user's own file; None for other scenes, and where nothing is drawn at
+    random."""
+    if file_of(scene) is None or scene.integrator.deterministic:
+        return None
+    return own_scene(scene)
 
 
 def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
+from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.rendering.scene import Scene
 from reference_rt.rendering.settings import with_settings
 from reference_rt.util.errors import (
@@ -40,7 +41,9 @@ app = typer.Typer(
 
 _INTERRUPTED = "interrupted; nothing unfinished was written"
 
-SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene.")]
+SceneArgument = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene, or a Mitsuba .xml one.")
+]
 
 
 def _print_version(wanted: bool) -> None:
@@ -142,6 +145,7 @@ def render(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    define: Defaults = None,
 ) -> None:
     """Render a scene to a file."""
     from reference_rt.rendering import image
@@ -150,7 +154,8 @@ def render(
     from reference_rt.util.files import check_writable
 
     image.check_suffix(output)
-    description = adjusted(Scene.load(scene), spp, size, integrator, seed)
+    loaded = Scene.load(scene, by_name(define))
+    description = adjusted(loaded, spp, size, integrator, seed)
     check_writable(output)
     with ProgressLine() as progress, _without_blas():
         picture = render_scene(
@@ -177,12 +182,12 @@ def render(
 
 @app.command()
 @guarded
-def explain(scene: SceneArgument) -> None:
+def explain(scene: SceneArgument, define: Defaults = None) -> None:
     """Print what a scene uses, what is specialised away and why, its distance from float64's
     limits, and its kernels."""
     from reference_rt.cli.explain_page import print_page
 
-    print_page(Scene.load(scene))
+    print_page(Scene.load(scene, by_name(define)))
 
 
 @app.command("warm-up")
