@@ -73,7 +73,11 @@ def guarded(command: F) -> F:
             with scene_warnings(lambda text: typer.echo(f"warning: {text}", err=True)):
                 return command(*args, **kwargs)
         except ReferenceRtError as error:
-            _fail(str(error), error.exit_code)
+            *first, last = (error, *getattr(error, "others", ()))
+            for one in first:
+                with suppress(OSError):
+                    say(f"error: {one}", err=True)
+            _fail(str(last), error.exit_code)
         except typer.Exit:
             raise
         except KeyboardInterrupt as error:
