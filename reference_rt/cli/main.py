@@ -73,7 +73,8 @@ def guarded(command: F) -> F:
             with scene_warnings(lambda text: typer.echo(f"warning: {text}", err=True)):
                 return command(*args, **kwargs)
         except ReferenceRtError as error:
-            *first, last = (error, *getattr(error, "others", ()))
+            others = error.others if isinstance(error, SceneError) else ()
+            *first, last = (error, *others)
             for one in first:
                 with suppress(OSError):
                     say(f"error: {one}", err=True)

@@ -55,9 +55,8 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
         return message, (*keys, cause.field)
     if first["type"] == "extra_forbidden":
         known = _models_at(model, location[:-1])[0].model_fields
-        message = (
-            f"unknown key; expected one of: {', '.join(known)}{meant(str(location[-1]), known)}"
-        )
+        near = meant(str(location[-1]), known)
+        message = f"unknown key; expected one of: {', '.join(known)}{near}"
     elif first["type"] == "missing":
         message = "missing; expected a value"
     elif first["type"] == "union_tag_not_found":

@@ -45,8 +45,8 @@ class SceneError(ReferenceRtError):
     """A scene, or a file that it names, is invalid.
 
     The message is about the first problem; `others` are errors about the others, if several are
-    known.  `path` are the keys that lead to the error in the scene, e.g. ``("shapes", 2, "radius")``;
-    `file` and `line` (1-based) are set if the scene was read from a file.
+    known.  `path` are the keys that lead to the error in the scene, e.g. ``("shapes", 2,
+    "radius")``; `file` and `line` (1-based) are set if the scene was read from a file.
     """
 
     exit_code = 3
