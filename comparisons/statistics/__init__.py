@@ -44,9 +44,9 @@ False alarms per case, measured with 2,000 and more cases each: see the slow tes
 
 Not handled: light that no replicate of a side has met, not in a single pixel. If the other side
 samples it, the sides differ, as they do where a lamp is forgotten. If neither has met it, both
-agree without it. The reason says so: it names the number of pixel values, the share of the light
-that one replicate alone met, and how much of such light may be missing. Every test needs some such
-assumption (Bahadur and Savage 1956).
+agree without it. So the reason says on what it is conditional: it names the number of pixel values,
+the share of the energy that one replicate alone met, and how much of such light may be missing.
+Every test needs some such assumption (Bahadur and Savage 1956).
 
 Contract: pictures are linear radiance, (R, height, width, 3) or (height, width, 3); biases, limits
 and margins are fractions of the reference's mean. `compare` returns the `statistics` rung. A side
@@ -58,10 +58,11 @@ add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3
 from comparisons.statistics.advice import noise_free_candidate, shortfall
 from comparisons.statistics.decide import compare, read
 from comparisons.statistics.places import standard_error, worst_regions
-from comparisons.statistics.scales import Margins
+from comparisons.statistics.scales import CHANNELS, Margins
 from comparisons.statistics.sides import Known
 
 __all__ = [
+    "CHANNELS",
     "Known",
     "Margins",
     "compare",

@@ -7,9 +7,11 @@ of an event is taken from the whole picture, from the *energy met once*: that by
 of a pixel exceeds all others of it, where these are alike.
 
 If energy D is missing from a sum, and came in independent events of energy e, D / e events were
-expected. Their number scatters by its square root (Poisson), and so the sum's variance is D e. It
-is added to the variance of what was met. For events of unequal energies e is their mean weighted by
-energy, since the variance of a sum of events is the sum of their squares.
+expected. That none was met has the chance exp(-D / e) (Poisson), which a normal number has beyond
+sqrt(2 D / e) standard deviations. So the missing light counts as noise of variance D e / 2, which
+is added to the variance of what was met. (Of some events that were met the spread is known, with as
+many degrees of freedom.) For events of unequal energies e is their mean weighted by energy, since
+the variance of a sum of events is the sum of their squares.
 
 Light that no pixel of any replicate met is not covered: `Unseen` says what can be said about it.
 """

@@ -117,7 +117,7 @@ def _unmet(a: Side, b: Side) -> FloatArray:
     of_a, of_b = cell_means(a.mean, BLOCK), cell_means(b.mean, BLOCK)
     difference = of_a - of_b
     events = Events.of_cells(a, b, of_a, of_b, cell_pixels(b.mean, BLOCK))
-    return np.asarray(4.0 * np.abs(difference) * events.missed_by(difference))
+    return np.asarray(8.0 * np.abs(difference) * events.missed_by(difference))
 
 
 def _p_values(value: FloatArray, others: FloatArray) -> FloatArray:

@@ -12,8 +12,8 @@ from comparisons.statistics.sides import NEIGHBOURS, Side
 
 @dataclass(frozen=True)
 class Events:
-    """The energy that one event of rare light adds to the mean of a cell (see `rare`), on either
-    side: arrays that fit those of the test."""
+    """Half the energy that one event of rare light adds to the mean of a cell (see `rare`), on
+    either side: arrays that fit those of the test."""
 
     candidate: FloatArray
     reference: FloatArray
@@ -35,8 +35,8 @@ class Events:
         elif b.pictures is not None and b.count < a.count:
             of_b = np.maximum(of_a, of_b)
         return cls(
-            of_a * _at_least_mean(cells_b, b.mean) / (pixels * a.count),
-            of_b * _at_least_mean(cells_a, a.mean) / (pixels * b.count),
+            0.5 * of_a * _at_least_mean(cells_b, b.mean) / (pixels * a.count),
+            0.5 * of_b * _at_least_mean(cells_a, a.mean) / (pixels * b.count),
         )
 
     def missed_by(self, difference: FloatArray) -> FloatArray:
@@ -90,9 +90,9 @@ lamps found by some hundreds down to about ten scattered rays; 650 for a picture
 FAR = 6.0
 """Standard errors. With sixteen replicates one pixel in 1e5 is as far off by chance."""
 
-NEAR = 3.0
-"""Standard errors. A pixel that nine events of rare light should have reached is met by none once
-in 1e4; and where nothing but common noise is large, its events explain a third of `FAR`."""
+NEAR = 4.0
+"""Standard errors. A pixel that eight events of rare light should have reached is met by none once
+in 3,000; and where nothing but common noise is large, its events explain a third of `FAR`."""
 
 
 def around(values: FloatArray) -> FloatArray:

@@ -81,12 +81,12 @@ def outcome(missed_by_standard: bool = False, alarms: int = 0) -> Outcome:
 
     findings = [one("standard", k, not (missed_by_standard and k == 3)) for k in range(20)]
     findings += [one("smoke", k, k >= 1) for k in range(20)]
-    return Outcome(findings, [], [Alarms("s", 1000, 16, alarms, {}, 0.003)])
+    return Outcome(findings, [], [], [Alarms("kind", "name", True, 1000, alarms, {}, {}, 0.003)])
 
 
 def test_what_holds() -> None:
     assert outcome().holds
     assert outcome(alarms=1).holds
-    assert not outcome(alarms=2).holds
+    assert not outcome(alarms=5).holds
     assert not outcome(missed_by_standard=True).holds
     assert "**missed**" in markdown(outcome())
