@@ -117,6 +117,7 @@ def gate(
         from comparisons.gate.reference import is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
+        from comparisons.results.headline import headline
 
     if (command is None) == (not candidates):
         raise UsageError("expected either candidates or --command")
@@ -188,8 +189,9 @@ def gate(
     outputs.for_ci(case, junit, "" if scene is None else scene.as_posix(), github)
     if failed is not None:
         raise failed
-    say(f"{case.scene}: {case.verdict}: {case.reason}")
+    say(f"{case.scene}: {case.verdict}: {headline(case)}")
     if case.cause is not None:
-        say(f"{case.scene}: likeliest cause: {case.cause.name}: {case.cause.evidence}")
+        say(f"  {case.cause.name}: {case.cause.evidence}")
+    say(f"  {case.reason}")
     tell(f"{results}, {report}")
     raise typer.Exit(outputs.code_of(case))

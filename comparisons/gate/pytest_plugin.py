@@ -193,10 +193,14 @@ def _relative(path: Path, root: Path) -> Path:
 
 
 def _message(case: "Case", folder: Path) -> str:
-    """The message of a failed test: verdict, reason, cause, numbers, and paths of the outputs."""
-    lines = [f"image_gate: {case.verdict}: {case.reason}"]
+    """The message of a failed test: the headline, cause, reason, numbers, and paths of the
+    outputs."""
+    from comparisons.results.headline import headline
+
+    lines = [f"image_gate: {case.verdict}: {headline(case)}"]
     if case.cause is not None:
-        lines.append(f"likeliest cause: {case.cause.name}: {case.cause.evidence}")
+        lines.append(f"{case.cause.name}: {case.cause.evidence}")
+    lines.append(case.reason)
     if case.metrics is not None:
         found = case.metrics
         bias = ", ".join(f"{100.0 * b:+.3g} %" for b in found.mean_bias)

@@ -200,14 +200,14 @@ def _cached(
     name = hashlib.sha256(key.encode()).hexdigest()
     path = cache_folder() / f"{name[:40]}.npz"
     shape = (count, scene.film.height, scene.film.width, 3)
-    # `done` pictures of the present round are in the means already.
-    pictures, rounds, done = _load(path, shape)
+    pictures, made = _load(path, shape)
+    rounds, done = divmod(made, count)  # so many pictures of a round that was cut off
     if rounds > 0 and done == 0 and enough(pictures, rounds):
         return pictures, rounds
     # Far from the seeds that users choose: equal seeds would give both sides the same noise.
     first = int(name[40:52], 16) << 14
     tables = build_tables(scene)
-    task, start = "rendering the reference", first + rounds * count + done
+    task, start = "rendering the reference", made
 
     def compiling(what: str, part: float) -> None:
         if what == "compile":
@@ -217,25 +217,25 @@ def _cached(
     saved = time.monotonic()
     try:
         while rounds == 0 or done or not enough(pictures, rounds):
-            number = first + rounds * count + done
             seeded = scene
             if hasattr(sampler, "seed"):
-                seeded = scene.changed(sampler=sampler.model_copy(update={"seed": number}))
+                seeded = scene.changed(sampler=sampler.model_copy(update={"seed": first + made}))
             picture = render(
                 seeded,
                 tables=tables,
                 threads=threads,
-                progress=compiling if number == start else None,
+                progress=compiling if made == start else None,
             ).colour
             pictures[done] += (picture - pictures[done]) / (rounds + 1)
-            rounds, done = (rounds + 1, 0) if done + 1 == count else (rounds, done + 1)
+            made += 1
+            rounds, done = divmod(made, count)
             total = _rounds_needed(pictures, rounds, target)
             say(task, min(0.999, (rounds + done / count) / total))
             if time.monotonic() - saved > _SAVED_EACH:
-                _save(path, pictures, rounds, done)
+                _save(path, pictures, made)
                 saved = time.monotonic()
     finally:  # after Ctrl-C too: the next gate goes on from here
-        _save(path, pictures, rounds, done)
+        _save(path, pictures, made)
     say(task, 1.0)
     return pictures, rounds
 
@@ -253,26 +253,25 @@ def cache_folder() -> Path:
     return Path(root) / "references"
 
 
-def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int, int]:
-    """Pictures, whole rounds, and the pictures of a round that was cut off, from the cache; zeros
-    if it has none that can be used."""
+def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
+    """Pictures from the cache, and how many renderings they are the means of, one after the other;
+    zeros if it has none that can be used."""
     with suppress(KeyError, TypeError):
         kept = read_arrays(path)
-        pictures, rounds, done = kept["pictures"], int(kept["rounds"]), int(kept["done"])
-        fits = pictures.shape == shape and pictures.dtype == np.float64
-        if fits and rounds >= 0 and 0 <= done < len(pictures):
+        pictures, made = kept["pictures"], int(kept["made"])
+        if pictures.shape == shape and pictures.dtype == np.float64 and made > 0:
             with suppress(OSError):
                 os.utime(path)
-            return pictures, rounds, done
-    return np.zeros(shape), 0, 0
+            return pictures, made
+    return np.zeros(shape), 0
 
 
-def _save(path: Path, pictures: FloatArray, rounds: int, done: int) -> None:
+def _save(path: Path, pictures: FloatArray, made: int) -> None:
     """Store pictures if the cache can be written, and delete the least recently used ones."""
-    if rounds == done == 0:
+    if made == 0:
         return
     with suppress(ImageError, OSError):
-        write_arrays(path, pictures=pictures, rounds=rounds, done=done)
+        write_arrays(path, pictures=pictures, made=made)
         kept = sorted(path.parent.glob("*.npz"), key=lambda file: -file.stat().st_mtime)
         total = 0
         for file in kept:
