@@ -6,6 +6,7 @@ from comparisons.commands.accept import accept
 from comparisons.commands.bench import bench
 from comparisons.commands.compare import compare
 from comparisons.commands.converge import converge
+from comparisons.commands.convert import convert
 from comparisons.commands.gate import gate
 from comparisons.commands.methods import methods
 from comparisons.commands.report import report
@@ -16,6 +17,9 @@ from comparisons.commands.suite import suite
 
 def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
-    commands = (compare, suite, gate, accept, report, selftest, converge, methods, bench, stability)
+    commands = (
+        *(compare, suite, gate, accept, report, selftest),
+        *(converge, methods, bench, stability, convert),
+    )
     for command in commands:
         app.command()(command)

@@ -55,9 +55,20 @@ add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3
 `cells`, its numbers in `wording`, and its verdict in `decide`.
 """
 
-from comparisons.statistics.decide import compare
+from comparisons.statistics.advice import noise_free_candidate, shortfall
+from comparisons.statistics.decide import compare, read
 from comparisons.statistics.places import standard_error, worst_regions
 from comparisons.statistics.scales import CHANNELS, Margins
 from comparisons.statistics.sides import Known
 
-__all__ = ["CHANNELS", "Known", "Margins", "compare", "standard_error", "worst_regions"]
+__all__ = [
+    "CHANNELS",
+    "Known",
+    "Margins",
+    "compare",
+    "noise_free_candidate",
+    "read",
+    "shortfall",
+    "standard_error",
+    "worst_regions",
+]

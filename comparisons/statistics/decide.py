@@ -1,12 +1,12 @@
 """The verdict of the statistics, with its reason and numbers."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, RungResult, Status
+from comparisons.statistics.advice import noise_free_candidate, wanted
 from comparisons.statistics.cells import image_test, pixel_test, tile_test
 from comparisons.statistics.metrics import count_nonfinite
 from comparisons.statistics.rare import Unseen, unseen, worse
@@ -54,6 +54,8 @@ class Findings:
     """Side in pixels."""
     single: bool
     """Whether a side is a single picture."""
+    level: float = 1.0
+    """The share of the families' levels that was used."""
 
 
 def compare(
@@ -63,18 +65,27 @@ def compare(
     limit: float = 0.005,
     tile: int = TILE,
     margins: Margins | None = None,
+    level: float = 1.0,
+    fixed_reference: bool = False,
 ) -> RungResult:
     """Decide whether two sets of replicates have the same mean, by the rule of this package.
 
     candidate, reference: linear radiance, (R, height, width, 3); R may differ between them, and
     should be 16 or more.  limit: the smallest bias of the image mean that must be detectable, as a
     fraction;  tile: side in pixels.  Pictures of different sizes and pixels that are not finite are
-    `invalid`; if both sides are black the rung is `not-applicable`.  Raises ValueError for other
-    shapes, and for a limit that is not larger than the margin of the image mean.
+    `invalid`; if both sides are black the rung is `not-applicable`.
+
+    level: the share of each family's level that is used, for one of several looks at a growing
+    number of replicates, whose shares must not exceed 1 together; not for single pictures;
+    fixed_reference: the reference cannot be rendered with more samples, so that advice is about the
+    candidate's.  Raises ValueError for other shapes, for another level than 0 < level <= 1, and for
+    a limit that is not larger than the margin of the image mean.
     """
     margins = margins or Margins()
     if not limit > margins.image:
         raise ValueError(f"limit {limit}: expected more than the margin {margins.image}")
+    if not 0.0 < level <= 1.0:
+        raise ValueError(f"level {level}: expected a share above 0, and 1 at most")
     a = picture_array(candidate, "candidate", 4)
     b, variance = _reference(reference)
     if a.shape[1:] != b.shape[1:]:
@@ -90,23 +101,29 @@ def compare(
     if not a.any() and not b.any():
         return RungResult("statistics", "not-applicable", "every picture of either side is black")
     known = None if variance is None else Known(b[0], variance)
-    return _verdict(findings(a, known or b, tile, margins), a, b, limit)
+    found = findings(a, known or b, tile, margins, level)
+    alone = noise_free_candidate(known or b, margins, level) if fixed_reference else None
+    return _verdict(found, a, b, limit, alone)
 
 
-def findings(a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins) -> Findings:
-    """All tests, for pictures (R, h, w, 3) that are finite and of one size."""
+def findings(
+    a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins, level: float = 1.0
+) -> Findings:
+    """All tests, for pictures (R, h, w, 3) that are finite and of one size;  level: as in
+    `compare`."""
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
         image, tiles, pixels, side = single_tests(a, b, tile, margins)
         return Findings(image, tiles, pixels, None, None, side, True)
     one, two = side_of(a), known_side(b) if isinstance(b, Known) else side_of(b)
     return Findings(
-        image_test(one, two, margins),
-        tile_test(one, two, tile, margins),
-        pixel_test(one, two, margins),
-        uniformity(one, two, margins),
+        image_test(one, two, margins, level),
+        tile_test(one, two, tile, margins, level),
+        pixel_test(one, two, margins, level),
+        uniformity(one, two, margins, level),
         worse(*(_unseen(side) for side in (a, b))),
         tile,
         False,
+        level,
     )
 
 
@@ -145,13 +162,16 @@ def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray
     return mean[None], variance
 
 
-def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> RungResult:
-    status, finding = _decide(found, limit)
+def _verdict(
+    found: Findings, a: FloatArray, b: FloatArray, limit: float, alone: BiasTest | None
+) -> RungResult:
+    status, finding = _decide(found, limit, alone)
     image = found.image
     reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
     reason = (
         f"{finding}; {detectable_words(image, found.tiles, found.tile, found.pixels)}; the means "
-        f"are equivalent within ±{percent(reach)} at {100.0 * (1.0 - IMAGE_LEVEL):g} %"
+        f"are equivalent within ±{percent(reach)} at "
+        f"{100.0 * (1.0 - found.level * IMAGE_LEVEL):.6g} %"
     )
     if found.unseen is not None and status != "differ":
         reason += f"; {unseen_words(found.unseen)}"
@@ -164,11 +184,11 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Run
         "mean_candidate": channels(a.mean(axis=(0, 1, 2))),
         "mean_reference": channels(b.mean(axis=(0, 1, 2))),
         "limit": limit,
-        "confidence": 1.0 - IMAGE_LEVEL,
+        "confidence": 1.0 - found.level * IMAGE_LEVEL,
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(_samples_factor(found, limit)),
+        "samples_factor": finite(wanted(image, limit, alone, _rare_factor(found, limit))[1]),
         "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
@@ -178,7 +198,8 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Run
     return RungResult("statistics", status, reason, numbers)
 
 
-def _decide(found: Findings, limit: float) -> tuple[Status, str]:
+def _decide(found: Findings, limit: float, alone: BiasTest | None = None) -> tuple[Status, str]:
+    """alone: as in `advice.wanted`."""
     image, spread = found.image, found.uniformity
     if image.differs.any():
         text = f"the image mean differs: {beyond(image, image.worst)}"
@@ -213,21 +234,13 @@ def _decide(found: Findings, limit: float) -> tuple[Status, str]:
         overlooked += "; as much light may have been missed by chance, since few samples meet it"
     return "inconclusive", (
         f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
-        f"{_wanted(_samples_factor(found, limit))}"
+        f"{wanted(image, limit, alone, _rare_factor(found, limit))[0]}"
     )
 
 
-def _samples_factor(found: Findings, limit: float) -> float:
-    """How many times as many samples decide the question, and meet enough of the rare light."""
-    unseen = found.unseen.missing / limit if found.unseen is not None else 0.0
-    return max(found.image.samples_factor(limit), unseen)
-
-
-def _wanted(factor: float) -> str:
-    if not math.isfinite(factor):
-        return "these pictures do not show how many samples are needed: give more replicates"
-    times = f"{factor:.{0 if factor > 10 else 1}f}"
-    return f"it takes about {times} times the samples: replicates x {times} or spp x {times}"
+def _rare_factor(found: Findings, limit: float) -> float:
+    """How many times as many samples meet enough of the rare light."""
+    return found.unseen.missing / limit if found.unseen is not None else 0.0
 
 
 def _size(images: FloatArray) -> str:

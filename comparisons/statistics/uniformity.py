@@ -47,20 +47,25 @@ class Uniformity:
     p_narrow: float
     blocks: int
     replicates: int
+    level: float = UNIFORMITY_LEVEL
+    """Chance of a false alarm of both tests together."""
 
     @property
     def wide(self) -> bool:
         """The blocks differ more than replicates of one side do."""
-        return self.p_wide < UNIFORMITY_LEVEL / 2.0
+        return self.p_wide < self.level / 2.0
 
     @property
     def narrow(self) -> bool:
         """The blocks differ less than independent replicates do."""
-        return self.p_narrow < UNIFORMITY_LEVEL / 2.0
+        return self.p_narrow < self.level / 2.0
 
 
-def uniformity(a: Side, b: Side, margins: Margins) -> Uniformity | None:
-    """The test; None if there are too few replicates, or no block with noise."""
+def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Uniformity | None:
+    """The test; None if there are too few replicates, or no block with noise.
+
+    level: the share of the family's level that is used.
+    """
     if a.pictures is None or b.pictures is None or min(a.count, b.count) < LEAST:
         return None
     half = 2 ** int(math.log2(min(a.count, b.count)))
@@ -101,6 +106,7 @@ def uniformity(a: Side, b: Side, margins: Margins) -> Uniformity | None:
         p_narrow=float(stats.t.sf((means[difference] - expected) / error, dof)),
         blocks=int(noisy.any(axis=-1).sum()),
         replicates=half,
+        level=level * UNIFORMITY_LEVEL,
     )
 
 

@@ -11,6 +11,7 @@ from urllib.parse import unquote
 
 from comparisons.compare.budget import Budget
 from comparisons.mitsuba.backend import Backend
+from comparisons.mitsuba.reading.reference import file_of
 from comparisons.runs import fingerprint
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_input, read_text
@@ -40,6 +41,8 @@ def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Back
 def files_digest(scene: Scene) -> str:
     """SHA-256 of the contents of every file that the scene names."""
     digest = hashlib.sha256()
+    if (own := file_of(scene)) is not None:  # Mitsuba reads it, too
+        digest.update(read_input(own) + repr(sorted(scene.defaults.items())).encode())
     for name, keys in sorted(dict(_named(scene.model_dump())).items()):
         for path in _with_parts(scene.folder / name):
             digest.update(os.fsencode(path.name) + b"\0")

@@ -20,7 +20,7 @@ _Scenes = dict[str, tuple[Path, Scene | SceneError]]
 
 BUILT_IN = ("smoke", "standard", "full")
 
-_SUFFIXES = (".yaml", ".yml", ".json")
+_SUFFIXES = (".yaml", ".yml", ".json", ".xml")
 
 
 class Entry(Budget):
@@ -164,7 +164,9 @@ def _scenes(folder: Path) -> _Scenes:
         else:
             found[name] = path, read(path)
     if not found:
-        raise UsageError(f"--scenes: '{folder}' holds no scene; expected .yaml or .json files")
+        raise UsageError(
+            f"--scenes: '{folder}' holds no scene; expected .yaml, .json or .xml files"
+        )
     return found
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from comparisons.compare.budget import Budget
 from reference_rt.cli.main import adjusted
@@ -22,10 +22,11 @@ class Changes(BaseModel):
     spp: int | None = None
     size: str | None = None
     seed: int | None = None
+    defaults: dict[str, str] = Field(default_factory=dict)
 
     def load(self, path: Path) -> Scene:
         """The scene in the file at `path`, changed.  Raises SceneError, UsageError."""
-        return adjusted(Scene.load(path), self.spp, self.size, None, self.seed)
+        return adjusted(Scene.load(path, self.defaults), self.spp, self.size, None, self.seed)
 
 
 class Work(NamedTuple):

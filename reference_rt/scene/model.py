@@ -3,7 +3,7 @@
 import hashlib
 import json
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -21,13 +21,13 @@ from reference_rt.lights import AnyLight, Constant, EnvironmentMap
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
 from reference_rt.materials.nested.paths import material_paths
 from reference_rt.sampling import AnySampler, Grid, Sobol
-from reference_rt.scene import yaml_text
+from reference_rt.scene import readers, yaml_text
 from reference_rt.scene.yaml_lines import line_of
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
 from reference_rt.shapes.instances import Instance
 from reference_rt.textures import AnyTexture, texture_names
-from reference_rt.util.errors import SceneError, SceneWarning, printable
+from reference_rt.util.errors import SceneError, SceneWarning, meant, printable
 from reference_rt.util.files import read_text
 
 MOST_NESTED = 100
@@ -37,8 +37,9 @@ which each operation takes two."""
 
 def no_such(kind: str, name: str, known: Iterable[str]) -> str:
     """The message for a name that the scene does not define."""
+    known = [*known]
     listed = ", ".join(f"'{k}'" for k in known) or "none"
-    return f"there is no {kind} '{name}'; expected one of: {listed}"
+    return f"there is no {kind} '{name}'; expected one of: {listed}{meant(name, known)}"
 
 
 class SceneModel(Description):
@@ -68,6 +69,7 @@ class SceneModel(Description):
 
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: "tuple[str, str] | None" = PrivateAttr(default=None)
+    _defaults: dict[str, str] = PrivateAttr(default_factory=dict)
     _warned: set[str] = PrivateAttr(default_factory=set)
 
     @model_validator(mode="after")
@@ -168,6 +170,16 @@ class SceneModel(Description):
         """Whether the scene was read from a file or from text."""
         return self._source is not None
 
+    @property
+    def source_file(self) -> Path | None:
+        """The file that the scene was read from; None for a scene of Python."""
+        return None if self._source is None else Path(self._source[0])
+
+    @property
+    def defaults(self) -> dict[str, str]:
+        """The values of `load` for the <default> elements of its file."""
+        return dict(self._defaults)
+
     def error(self, message: str, *path: str | int) -> SceneError:
         """An error about the part at the key path, with file and line if the scene was read."""
         if self._source is None:
@@ -199,11 +211,18 @@ class SceneModel(Description):
     # ---- in -------------------------------------------------------------------------------------
 
     @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a .yaml, .yml or .json file.  Raises SceneError (file, line, key path, reason)."""
+    def load(cls, path: str | Path, defaults: Mapping[str, str] | None = None) -> Self:
+        """Read a .yaml, .yml or .json file, or with Mitsuba an .xml file of its own.
+
+        defaults: values for the <default> elements of an .xml file.  Raises SceneError (file, line,
+        key path, reason), ReferenceUnavailableError where Mitsuba is needed and missing.
+        """
         path = Path(path)
-        if path.suffix.lower() not in (".yaml", ".yml", ".json"):
-            raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))
+        if path.suffix.lower() not in readers.OWN:
+            found: Self = readers.reader_of(path).read_file(path, cls, defaults or {})
+            return found
+        if defaults:
+            raise SceneError("has no defaults; expected a Mitsuba scene, .xml", file=str(path))
         try:
             text = read_text(path)
         except OSError as error:
@@ -228,17 +247,28 @@ class SceneModel(Description):
         try:
             scene = cls._checked(data)
         except SceneError as error:
-            line = line_of(text, error.path)
-            raise SceneError(error.message, error.path, name, line) from None
+            first, *others = (
+                SceneError(one.message, one.path, name, line_of(text, one.path))
+                for one in (error, *error.others)
+            )
+            raise SceneError(first.message, first.path, name, first.line, others) from None
         scene._folder = Path() if folder is None else folder
         scene._source = (name, text)
         return scene
+
+    @classmethod
+    def from_mitsuba(cls, scene: Mapping[str, Any], folder: str | Path = ".") -> Self:
+        """A scene from a dictionary for `mitsuba.load_dict`;  folder: of the files that it names.
+        Raises as `load` does."""
+        found: Self = readers.reader_of(Path("scene.xml")).read_dict(scene, cls, Path(folder))
+        return found
 
     def changed(self, **parts: Any) -> Self:
         """A copy of the scene with other parts (film=..., sampler=...), checked again."""
         fields = {name: getattr(self, name) for name in self.model_fields_set} | parts
         scene = type(self)(**fields)
         scene._folder, scene._source = self._folder, self._source
+        scene._defaults = self._defaults
         scene._warned = self._warned
         return scene
 

@@ -1,0 +1,99 @@
+"""Mitsuba -> scene: reads Mitsuba's scenes, .xml files and dictionaries, into our descriptions.
+
+Contract: Mitsuba's own parser (`parse`) gives elements (`node.Node`); a function for each plugin
+takes its parameters one by one, with Mitsuba's defaults.  What is not taken, and every plugin
+without a function, is a `SceneError` with file, line, column and plugin: nothing is left out
+silently.  Shapes get Mitsuba's texture coordinates (`textures` says why).
+
+To read another plugin: a function in the file of its kind, a line in that file's `_READERS`, and a
+row in `tests/comparisons/mitsuba/test_reading_plugins.py`.
+"""
+
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from comparisons.mitsuba.reading.context import Reading
+from comparisons.mitsuba.reading.integrators import read_integrator
+from comparisons.mitsuba.reading.lights import read_light
+from comparisons.mitsuba.reading.node import Node
+from comparisons.mitsuba.reading.parse import Parsed, parse_dict, parse_file
+from comparisons.mitsuba.reading.sensors import read_sensor
+from comparisons.mitsuba.reading.shapes import read_shape
+from reference_rt.scene.model import SceneModel
+from reference_rt.util.errors import SceneWarning
+
+M = TypeVar("M", bound=SceneModel)
+
+
+def read_file(path: Path, cls: type[M], defaults: Mapping[str, str] | None = None) -> M:
+    """The scene in an .xml file, an object of `cls`;  defaults: values for its <default> elements.
+
+    Raises SceneError, ReferenceUnavailableError without Mitsuba; warns of what is read otherwise.
+    """
+    scene = _scene(parse_file(path, defaults or {}), cls)
+    scene._source, scene._defaults = (str(path), _WITHOUT_LINES), dict(defaults or {})
+    return scene
+
+
+def read_dict(scene: Mapping[str, Any], cls: type[M], folder: Path | None = None) -> M:
+    """The scene in a dictionary for `mitsuba.load_dict`;  folder: of its files.  Raises as
+    `read_file` does."""
+    found = _scene(parse_dict(scene, Path() if folder is None else folder), cls)
+    found._source = None
+    return found
+
+
+def _scene(parsed: Parsed, cls: type[M]) -> M:
+    reading = Reading(parsed)
+    root = Node(parsed, 0)
+    if root.kind != "Scene":
+        raise root.error("is no scene; expected an element <scene>")
+    # They concern how rays are traced, not what they find.
+    root.ignore("embree_use_robust_intersections", "allow_thread_reordering")
+    root.ignore("compact_acceleration_structures")
+    found = root.children(*_KINDS)
+    root.children("BSDF", "Texture", "Film", "Sampler", "ReconstructionFilter")  # used by others
+    sensors = [node for node in found if node.kind == "Sensor"]
+    if len(sensors) > 1:
+        reading.note(sensors[0], f"is the first of {len(sensors)} sensors; the others are left out")
+    for node in found:
+        if node.kind in ("Medium", "Volume", "PhaseFunction"):
+            raise node.unsupported("expected a scene without media")
+        if node.kind == "Shape":
+            read_shape(reading, node)
+        elif node.kind == "Emitter" and node.plugin != "area":  # which belongs to a shape
+            read_light(reading, node)
+    integrators = [node for node in found if node.kind == "Integrator"]
+    if len(integrators) > 1:
+        raise integrators[1].error("is a second integrator; expected one")
+    integrator, layers = read_integrator(reading, integrators[0] if integrators else None)
+    camera, film, sampler = read_sensor(reading, sensors[0] if sensors else None)
+    root.finish()
+    if integrator.deterministic:
+        sampler = None  # type: ignore[assignment]
+    with root.checking():
+        scene = cls(
+            camera=camera,
+            film=film.model_copy(update={"layers": layers}),
+            sampler=sampler,
+            integrator=integrator,
+            textures=reading.textures,
+            materials=reading.materials,
+            groups=reading.groups,
+            shapes=tuple(reading.shapes),
+            lights=tuple(reading.lights),
+        )
+    scene._folder, scene._source = parsed.folder, (parsed.file, _WITHOUT_LINES)
+    for note in reading.notes:
+        warnings.warn(SceneWarning(note), stacklevel=4)
+    return scene
+
+
+_WITHOUT_LINES = "]"
+"""In place of a scene's text: it is no YAML, so that errors found later name no line of it."""
+
+_KINDS = ("Sensor", "Shape", "Emitter", "Integrator", "Medium", "Volume", "PhaseFunction")
+
+__all__ = ["read_dict", "read_file"]

@@ -1,0 +1,185 @@
+"""Meshes of Mitsuba scenes, in world coordinates, with normals and uv as Mitsuba has them.
+
+Mitsuba shades by the vertex normals alone; ours asks the triangle which side is the front, for
+lamps.  So triangles are turned where their vertex normals point the other way.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba.reading import serialized
+from comparisons.mitsuba.reading.context import Reading
+from comparisons.mitsuba.reading.node import Node
+from comparisons.mitsuba.reading.parse import scalar
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.transform import Affine, apply_points
+from reference_rt.shapes import Mesh
+from reference_rt.shapes.meshes.files import read_mesh
+from reference_rt.shapes.meshes.files.data import MeshData, checked
+from reference_rt.shapes.meshes.triangle_table import geometric_normals
+from reference_rt.shapes.meshes.vertex_normals import smooth_normals, unit
+from reference_rt.util.files import read_input
+
+
+@dataclass
+class Surface:
+    """A mesh: vertices (n, 3), faces (m, 3), and per vertex, or None, unit normals (n, 3), uv
+    (n, 2) and colours (n, 3)."""
+
+    vertices: FloatArray
+    faces: IntArray
+    normals: FloatArray | None = None
+    uv: FloatArray | None = None
+    colours: FloatArray | None = None
+
+    def with_own_corners(self) -> "Surface":
+        """The same with three vertices for each triangle."""
+        corners = self.faces.ravel()
+        normals, uv, colours = (
+            None if x is None else x[corners] for x in (self.normals, self.uv, self.colours)
+        )
+        faces = np.arange(len(corners)).reshape(-1, 3)
+        return Surface(self.vertices[corners], faces, normals, uv, colours)
+
+
+def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
+    """An obj, ply or serialized mesh."""
+    path = reading.file(node)
+    m, of_normals = node.maps()
+    flat, flip = node.flag("face_normals"), node.flag("flip_normals")
+    if node.plugin == "serialized":
+        data = _data(reading, node, path, node.integer("shape_index", 0))
+        upside_down = False
+    else:
+        data = _data(reading, node, path)
+        upside_down = node.flag("flip_tex_coords", node.plugin == "obj")
+    uv = data.uv
+    if uv is not None and upside_down:
+        uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
+    surface = Surface(data.vertices, data.faces, None if flat else data.normals, uv)
+    surface = placed(surface, m, of_normals, smooth=not flat)
+    names = {
+        reading.attributes[t] for t in reading.textures_of(material) if t in reading.attributes
+    }
+    if names:
+        surface = _coloured(node, surface, names, path)
+    return finished(surface, flip, reading.uses_uv(material), material)
+
+
+def _data(reading: Reading, node: Node, path: Path, index: int = 0) -> MeshData:
+    key = (path, index, node.plugin)
+    if key not in reading.meshes:
+        try:
+            if node.plugin == "serialized":
+                data = checked(serialized.read(read_input(path), index))
+            else:
+                if path.suffix.lower() != f".{node.plugin}":
+                    raise ValueError(f"{path} is no .{node.plugin} file; expected one")
+                data = read_mesh(path)
+        except OSError as error:
+            raise node.error(f"{path} cannot be read: {error.strerror}; expected a mesh") from None
+        except ValueError as error:
+            text = str(error)
+            raise node.error(text if str(path) in text else f"{path}: {text}") from None
+        reading.meshes[key] = data
+    found: MeshData = reading.meshes[key]
+    return found
+
+
+def placed(surface: Surface, m: Affine, of_normals: FloatArray, smooth: bool) -> Surface:
+    """The surface under the map m of points and `of_normals` of normals.
+
+    smooth: make normals where it has none, as Mitsuba does: in the world, a vertex being what the
+    file has for one.
+    """
+    vertices = apply_points(m, surface.vertices)
+    if surface.normals is not None:
+        normals: FloatArray | None = unit(surface.normals @ of_normals.T)
+    elif smooth:
+        normals = _smoothed(vertices, surface.faces)
+    else:
+        normals = None
+    return replace(surface, vertices=vertices, normals=normals)
+
+
+def _smoothed(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    # As if each vertex had a uv of its own: vertices at one place stay several.
+    apart = np.zeros((len(vertices), 2))
+    apart[:, 0] = np.arange(len(vertices))
+    at_corners = smooth_normals(vertices, faces, apart).reshape(-1, 3)
+    normals = np.tile([1.0, 0.0, 0.0], (len(vertices), 1))  # Mitsuba's of a vertex without a face
+    normals[faces.ravel()] = at_corners
+    return normals
+
+
+def finished(surface: Surface, flip: bool, uses_uv: bool, material: str | None) -> Mesh:
+    """Our mesh.  flip: turn it inside out;  uses_uv: whether its material depends on its uv."""
+    if surface.normals is None:
+        turned = np.full(len(surface.faces), flip)
+    else:
+        geometric = geometric_normals(surface.vertices[surface.faces].reshape(-1, 9))
+        towards = surface.normals[surface.faces].sum(axis=1)
+        turned = (np.einsum("ij,ij->i", geometric, towards) < 0.0) ^ flip
+    if uses_uv and surface.uv is None and turned.any():
+        # Without uv they are barycentric, in the order of the corners.
+        surface = surface.with_own_corners()
+        uv = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (len(surface.faces), 1))
+        surface = replace(surface, uv=uv)
+    faces = surface.faces.copy()
+    faces[turned] = faces[turned][:, [0, 2, 1]]
+    normals = surface.normals
+    if normals is not None and flip:
+        normals = -normals
+    return Mesh(
+        vertices=surface.vertices,
+        faces=faces,
+        normals=normals,
+        uv=surface.uv,
+        colours=surface.colours,
+        face_normals=normals is None,
+        material=material,
+    )
+
+
+def _coloured(node: Node, surface: Surface, names: set[str], path: Path) -> Surface:
+    """The surface with the colours of the attribute that its material shows."""
+    if len(names) > 1:
+        raise node.error(
+            f"its material shows several attributes ({', '.join(sorted(names))}); expected one"
+        )
+    (name,) = names
+    values = _attributes(node, path)
+    if name not in values:
+        raise node.error(f"{path} has no attribute '{name}'; expected one of: {', '.join(values)}")
+    if name.startswith("face_"):
+        surface = surface.with_own_corners()
+        rows, count = np.repeat(np.arange(len(surface.faces)), 3), len(surface.faces)
+    else:
+        rows, count = np.arange(len(surface.vertices)), len(surface.vertices)
+    table = np.asarray(values[name], np.float64).reshape(count, -1)
+    if table.shape[1] == 1:
+        table = np.repeat(table, 3, axis=1)
+    if table.shape[1] != 3:
+        raise node.error(f"attribute '{name}' has {table.shape[1]} numbers; expected 1 or 3")
+    return replace(surface, colours=table[rows])
+
+
+def _attributes(node: Node, path: Path) -> dict[str, Any]:
+    """Attributes of a file's vertices and faces, as Mitsuba reads and names them: the order is the
+    file's."""
+    if node.plugin != "ply":
+        return {}
+    with scalar() as mi:
+        try:
+            values = mi.traverse(mi.load_dict({"type": "ply", "filename": str(path)}))
+        except RuntimeError as error:
+            raise node.error(f"{path}: {' '.join(str(error).split())}") from None
+        return {
+            str(key): np.array(values[key])
+            for key in dict(values)
+            if str(key).startswith(("vertex_", "face_"))
+            and str(key) not in ("vertex_positions", "vertex_normals", "vertex_texcoords")
+        }

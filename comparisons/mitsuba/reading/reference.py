@@ -1,0 +1,132 @@
+"""The user's own file as the reference of a comparison: loaded by Mitsuba, and untouched but for
+the film's size and filter and the samples.  So our reading of the file is checked, too."""
+
+from pathlib import Path
+from typing import Any
+
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.reading.parse import parse_file
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import ReferenceUnavailableError
+
+WINDOW = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
+
+
+def file_of(scene: Scene) -> Path | None:
+    """The .xml file that a scene was read from; None for our own scenes."""
+    path = scene.source_file
+    return path if path is not None and path.suffix.lower() == ".xml" else None
+
+
+def own_scene(scene: Scene) -> Any:
+    """Mitsuba's scene of the file that `scene` was read from, for pictures of the size that `scene`
+    has, with a box filter and independent samples.
+
+    Raises SceneError, UntranslatableError for a size that the film's window cannot have,
+    ReferenceUnavailableError for a file that Mitsuba does not load.
+    """
+    path = file_of(scene)
+    assert path is not None
+    mi = mitsuba()
+    parsed = parse_file(path, scene.defaults)
+    state = parsed.state
+    sensor = _first(state, mi.ObjectType.Sensor)
+    if sensor is None:
+        raise UntranslatableError("of a file that has none", "camera")
+    film = _child(mi, state, sensor, mi.ObjectType.Film, "hdrfilm")
+    _resize(state.nodes[film].props, scene)
+    values = {"pixel_format": "rgb", "component_format": "float32", "file_format": "openexr"}
+    for name, value in values.items():
+        state.nodes[film].props[name] = value
+    box = _child(mi, state, film, mi.ObjectType.ReconstructionFilter, "box")
+    state.nodes[box].props = mi.Properties("box")
+    sampler = _child(mi, state, sensor, mi.ObjectType.Sampler, "independent")
+    state.nodes[sampler].props = mi.Properties("independent")
+    _without_moments(mi, state)
+    config = mi.parser.ParserConfig(mi.variant())
+    config.merge_equivalent = config.merge_meshes = False
+    old = mi.file_resolver()
+    resolver = mi.FileResolver(old)
+    for folder in (path.parent, *reversed(parsed.paths)):
+        resolver.prepend(str(folder))
+    mi.set_file_resolver(resolver)
+    try:
+        return mi.parser.instantiate(config, state)
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise ReferenceUnavailableError(f"Mitsuba does not load {path}: {reason}") from None
+    finally:
+        mi.set_file_resolver(old)
+
+
+def _first(state: Any, kind: Any) -> int | None:
+    """The first of the root's nodes of this kind."""
+    root = state.nodes[0].props
+    for index in _references(root):
+        if state.nodes[index].type == kind:
+            return index
+    return None
+
+
+def _references(props: Any) -> list[int]:
+    found = (props[key] for key in props.keys())  # noqa: SIM118
+    return [value.index() for value in found if type(value).__name__ == "ResolvedReference"]
+
+
+def _child(mi: Any, state: Any, parent: int, kind: Any, plugin: str) -> int:
+    """The child of this kind, which is added if there is none."""
+    for index in _references(state.nodes[parent].props):
+        if state.nodes[index].type == kind:
+            return index
+    node = mi.parser.SceneNode()
+    node.type, node.props = kind, mi.Properties(plugin)
+    state.nodes.append(node)
+    index = len(state.nodes) - 1
+    state.nodes[parent].props[f"added_{plugin}"] = mi.Properties.ResolvedReference(index)
+    return index
+
+
+def _resize(film: Any, scene: Scene) -> None:
+    """Give the film the size of ours, which is that of its window."""
+    width, height = (int(film.get(k, d)) for k, d in (("width", 768), ("height", 576)))
+    given = {
+        "width": width,
+        "height": height,
+        "crop_width": int(film.get("crop_width", width)),
+        "crop_height": int(film.get("crop_height", height)),
+        "crop_offset_x": int(film.get("crop_offset_x", 0)),
+        "crop_offset_y": int(film.get("crop_offset_y", 0)),
+    }
+    wanted = (scene.film.width, scene.film.height)
+    old = (given["crop_width"], given["crop_height"])
+    for k, (name, value) in enumerate(given.items()):
+        new, rest = divmod(value * wanted[k % 2], old[k % 2])
+        if rest:
+            raise UntranslatableError(
+                f"Film, whose window of {old[0]} x {old[1]} pixels becomes {wanted[0]} x "
+                f"{wanted[1]}, so that its '{name}' is no whole number,",
+                "film",
+            )
+        film[name] = new
+    is_view = getattr(scene.camera, "view", None) is not None
+    if is_view and wanted[0] * old[1] != wanted[1] * old[0]:
+        raise UntranslatableError("view, which is shifted, in a picture of another shape", "camera")
+
+
+def _without_moments(mi: Any, state: Any) -> None:
+    """The integrator inside in place of one that only adds channels."""
+    root = state.nodes[0].props
+    for key in list(root.keys()):
+        value = root[key]
+        if type(value).__name__ != "ResolvedReference":
+            continue
+        node = state.nodes[value.index()]
+        if node.type == mi.ObjectType.Integrator and node.props.plugin_name() in ("moment", "aov"):
+            inside = [
+                k
+                for k in _references(node.props)
+                if state.nodes[k].type == mi.ObjectType.Integrator
+            ]
+            if inside:
+                root[key] = mi.Properties.ResolvedReference(inside[0])

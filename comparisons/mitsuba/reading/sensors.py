@@ -1,0 +1,294 @@
+"""Sensors of Mitsuba scenes: camera, film, filter, sampler.
+
+Mitsuba's cameras look along local +z, with +y up and +x to the left.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from comparisons.mitsuba.reading.context import Reading
+from comparisons.mitsuba.reading.node import Node
+from reference_rt.cameras import AnyCamera, Orthographic, Perspective, ThinLens
+from reference_rt.cameras.film import Film
+from reference_rt.cameras.filters import (
+    AnyFilter,
+    BoxFilter,
+    CatmullRomFilter,
+    GaussianFilter,
+    LanczosFilter,
+    MitchellFilter,
+    TentFilter,
+)
+from reference_rt.core.transform import Affine
+from reference_rt.sampling import AnySampler, Independent, Sobol
+
+TOLERANCE = 1e-5
+"""Of a rotation."""
+
+CLIP = {"near_clip": 1e-2, "far_clip": 1e4}
+"""Mitsuba's defaults."""
+
+
+class Frame(NamedTuple):
+    """The size in pixels of the whole film, and of the window of it that is rendered."""
+
+    width: int
+    height: int
+    left: int
+    top: int
+    crop_width: int
+    crop_height: int
+
+    @property
+    def is_cropped(self) -> bool:
+        return (self.crop_width, self.crop_height) != (self.width, self.height)
+
+    def window(self, half: float, shift: tuple[float, float] = (0.0, 0.0)) -> tuple[float, ...]:
+        """The view rectangle [l, r, b, t], where the whole film is 2 `half` wide and its pixels are
+        square;  shift: of the whole film, in widths to the right and heights down."""
+        tall = half * self.height / self.width
+        xs = (self.left, self.left + self.crop_width)
+        ys = (self.top + self.crop_height, self.top)
+        return (
+            *((2.0 * (x / self.width + shift[0]) - 1.0) * half for x in xs),
+            *((1.0 - 2.0 * (y / self.height + shift[1])) * tall for y in ys),
+        )
+
+
+class View(NamedTuple):
+    """What a sensor says: `sampler` is never None."""
+
+    camera: AnyCamera
+    film: Film
+    sampler: AnySampler
+
+
+def read_sensor(reading: Reading, node: Node | None) -> View:
+    """A sensor with its film and sampler; without one, Mitsuba's default."""
+    if node is None:
+        frame, film = Frame(768, 576, 0, 0, 768, 576), Film(width=768, height=576)
+        film = film.model_copy(update={"filter": GaussianFilter()})
+        return View(_camera_without_element(frame), film, Independent(spp=4))
+    if node.plugin not in _CAMERAS:
+        raise node.unsupported(f"expected one of: {', '.join(sorted(_CAMERAS))}")
+    for medium in node.children("Medium"):
+        raise medium.unsupported("expected a scene without media")
+    # The shutter has no effect: nothing moves.
+    node.ignore("shutter_open", "shutter_close")
+    frame, film = _film(node.only("Film"))
+    sampler = _sampler(node.only("Sampler"))
+    with node.checking():
+        camera = _CAMERAS[node.plugin](reading, node, frame)
+    node.finish()
+    return View(camera, film, sampler)
+
+
+def _camera_without_element(frame: Frame) -> AnyCamera:
+    return Perspective(eye=(0, 0, 0), target=(0, 0, 1), **_focal(50.0))
+
+
+# ---- cameras ------------------------------------------------------------------------------------
+
+
+def _place(node: Node, rigid: bool = True) -> tuple[dict[str, Any], Affine]:
+    """eye, target and up, and to_world.  rigid: refuse scales, as Mitsuba does."""
+    m = node.transform()
+    linear = m[:, :3]
+    lengths = np.linalg.norm(linear, axis=0)
+    if not lengths.min() > 0.0:
+        raise node.error("'to_world' flattens space; expected one that can be undone")
+    if rigid and np.abs(lengths - 1.0).max() > 1e-3:
+        raise node.error("'to_world' scales, which Mitsuba refuses, too; expected none")
+    unit = linear / lengths
+    if np.abs(unit.T @ unit - np.eye(3)).max() > TOLERANCE:
+        raise node.error("'to_world' shears; expected a rotation and a translation")
+    if np.linalg.det(unit) < 0.0:
+        raise node.error(
+            "'to_world' mirrors the picture, which is not supported; expected a rotation: mirror "
+            "the picture instead"
+        )
+    eye = m[:, 3]
+    # A target far away in units of the eye's coordinates: the direction must not be lost.
+    distance = max(1.0, float(np.abs(eye).max()))
+    return {"eye": eye, "target": eye + distance * unit[:, 2], "up": unit[:, 1]}, m
+
+
+def _clip(reading: Reading, node: Node) -> float:
+    """Ours have no clipping planes.  The far one."""
+    values = {key: node.number(key, default) for key, default in CLIP.items()}
+    if values != CLIP:
+        reading.note(
+            node,
+            f"near_clip {values['near_clip']:g} and far_clip {values['far_clip']:g} are left out: "
+            "our cameras see what is nearer or farther, too",
+        )
+    return values["far_clip"]
+
+
+_AXES = ("x", "y", "diagonal", "smaller", "larger")
+
+
+def _angle(node: Node, frame: Frame) -> tuple[dict[str, Any], float]:
+    """fov and fov_axis, and the tangent of half of the angle across the film's width."""
+    if node.has("fov"):
+        if node.has("focal_length"):
+            raise node.error("has both 'fov' and 'focal_length'; expected one of them")
+        fov, axis = node.number("fov", 45.0), node.choice("fov_axis", "x", _AXES)
+        if not 0.0 < fov < 180.0:
+            raise node.error(f"'fov' is {fov:g}; expected degrees above 0 and below 180")
+        values: dict[str, Any] = {"fov": fov, "fov_axis": axis}
+    else:
+        node.ignore("fov_axis")  # a focal length is that of a film's diagonal
+        text = node.take("focal_length")
+        try:
+            length = float(str("50mm" if text is None else text).removesuffix("mm"))
+        except ValueError:
+            raise node.error(f"'focal_length' is '{text}'; expected such as 50mm") from None
+        if not length > 0.0:
+            raise node.error(f"'focal_length' is '{text}'; expected more than 0")
+        values = _focal(length)
+    spanned = {
+        "x": frame.width,
+        "y": frame.height,
+        "diagonal": math.hypot(frame.width, frame.height),
+        "smaller": min(frame.width, frame.height),
+        "larger": max(frame.width, frame.height),
+    }[values["fov_axis"]]
+    return values, math.tan(math.radians(values["fov"]) / 2.0) * frame.width / spanned
+
+
+def _focal(length: float) -> dict[str, Any]:
+    """The angle of a focal length in millimetres, of film of 36 x 24 mm."""
+    diagonal = math.hypot(36.0, 24.0)
+    return {
+        "fov": math.degrees(2.0 * math.atan(diagonal / (2.0 * length))),
+        "fov_axis": "diagonal",
+    }
+
+
+def _perspective(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
+    place, _ = _place(node)
+    _clip(reading, node)
+    node.ignore("focus_distance")  # Mitsuba reads it for every projective camera
+    values, half = _angle(node, frame)
+    shift = tuple(node.number(f"principal_point_offset_{axis}", 0.0) for axis in "xy")
+    if frame.is_cropped or any(shift):
+        values = {"view": frame.window(half, shift)}  # type: ignore[arg-type]
+    return Perspective(**place, **values)
+
+
+def _thin_lens(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
+    place, _ = _place(node)
+    far = _clip(reading, node)
+    values, half = _angle(node, frame)
+    if frame.is_cropped:
+        values = {"view": frame.window(half)}
+    if not node.has("aperture_radius"):
+        raise node.error("has no 'aperture_radius'; expected one")
+    radius, focus = node.number("aperture_radius", 0.0), node.number("focus_distance", far)
+    if radius == 0.0:  # Mitsuba takes a tiny one
+        return Perspective(**place, **values)
+    return ThinLens(**place, **values, aperture_radius=radius, focus_distance=focus)
+
+
+def _orthographic(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
+    place, m = _place(node, rigid=False)
+    _clip(reading, node)
+    node.ignore("focus_distance")
+    right, up, _ = np.linalg.norm(m[:, :3], axis=0).tolist()
+    if not frame.is_cropped and right == up:
+        return Orthographic(**place, width=2.0 * right)
+    l, r, b, t = frame.window(1.0)
+    return Orthographic(**place, view=(l * right, r * right, b * up, t * up))
+
+
+_CAMERAS = {"perspective": _perspective, "thinlens": _thin_lens, "orthographic": _orthographic}
+
+
+# ---- film and sampler ---------------------------------------------------------------------------
+
+
+def _film(node: Node | None) -> tuple[Frame, Film]:
+    if node is None:
+        frame = Frame(768, 576, 0, 0, 768, 576)
+        return frame, Film(width=768, height=576, filter=GaussianFilter())
+    if node.plugin != "hdrfilm":
+        raise node.unsupported("expected hdrfilm")
+    # They concern the file that Mitsuba writes, or how it samples.
+    node.ignore("file_format", "pixel_format", "component_format", "sample_border", "banner")
+    node.ignore("compensate")
+    width, height = node.integer("width", 768), node.integer("height", 576)
+    frame = Frame(
+        width,
+        height,
+        node.integer("crop_offset_x", 0),
+        node.integer("crop_offset_y", 0),
+        node.integer("crop_width", width),
+        node.integer("crop_height", height),
+    )
+    inside = (
+        min(frame.left, frame.top) >= 0
+        and min(frame.crop_width, frame.crop_height) >= 1
+        and frame.left + frame.crop_width <= width
+        and frame.top + frame.crop_height <= height
+    )
+    if not inside:
+        raise node.error(
+            f"its window of {frame.crop_width} x {frame.crop_height} pixels at ({frame.left}, "
+            f"{frame.top}) is not inside the film of {width} x {height}; expected one that is"
+        )
+    with node.checking():
+        film = Film(
+            width=frame.crop_width,
+            height=frame.crop_height,
+            filter=_filter(node.only("ReconstructionFilter")),
+        )
+    node.finish()
+    return frame, film
+
+
+def _filter(node: Node | None) -> AnyFilter:
+    if node is None:
+        return GaussianFilter()
+    with node.checking():
+        found = _named_filter(node)
+    node.finish()
+    return found
+
+
+def _named_filter(node: Node) -> AnyFilter:
+    match node.plugin:
+        case "box":
+            return BoxFilter()
+        case "tent":
+            return TentFilter(radius=node.number("radius", 1.0))
+        case "gaussian":
+            return GaussianFilter(stddev=node.number("stddev", 0.5))
+        case "mitchell":
+            third = 1.0 / 3.0
+            return MitchellFilter(b=node.number("B", third), c=node.number("C", third))
+        case "catmullrom":
+            return CatmullRomFilter()
+        case "lanczos":
+            return LanczosFilter(lobes=node.integer("lobes", 3))
+    raise node.unsupported("expected one of: box, tent, gaussian, mitchell, catmullrom, lanczos")
+
+
+_STRATIFIED = ("stratified", "multijitter", "orthogonal", "ldsampler")
+
+
+def _sampler(node: Node | None) -> AnySampler:
+    """Which points are taken does not change the expected picture: ours are the Sobol' points, or
+    independent ones."""
+    if node is None:
+        return Independent(spp=4)
+    if node.plugin not in ("independent", *_STRATIFIED):
+        raise node.unsupported(f"expected one of: {', '.join(('independent', *_STRATIFIED))}")
+    node.ignore("jitter", "strength")
+    with node.checking():
+        kind = Independent if node.plugin == "independent" else Sobol
+        sampler = kind(spp=node.integer("sample_count", 4), seed=node.integer("seed", 0))
+    node.finish()
+    return sampler

@@ -1,0 +1,259 @@
+"""Shapes of Mitsuba scenes, with the normals, uv and sides that Mitsuba gives them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba.reading.context import Reading, unused
+from comparisons.mitsuba.reading.lights import emission
+from comparisons.mitsuba.reading.materials import material_name
+from comparisons.mitsuba.reading.meshes import Surface, finished, mesh, placed
+from comparisons.mitsuba.reading.node import Node, triple
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.transform import Affine
+from reference_rt.materials import Emissive
+from reference_rt.shapes import Box, Cylinder, Disk, Quadric, Rectangle, Shape, Sphere
+from reference_rt.shapes.instances import Instance
+
+Reader = Callable[[Reading, Node, "str | None"], Shape]
+
+TOLERANCE = 1e-5
+"""Of a similarity, relative: XML has about six digits, Mitsuba's own tolerance is 1e-6 of 1."""
+
+
+def read_shape(reading: Reading, node: Node) -> None:
+    """Add a shape to the scene; a group only to its groups."""
+    if node.plugin == "shapegroup":
+        group_name(reading, node)
+        return
+    reading.shapes.append(shape(reading, node))
+
+
+def shape(reading: Reading, node: Node, in_group: bool = False) -> Shape:
+    """The shape of an element.  Raises SceneError."""
+    if node.plugin == "instance":
+        return _instance(reading, node, in_group)
+    if node.plugin not in _READERS:
+        known = ", ".join(sorted([*_READERS, "instance", "shapegroup"]))
+        raise node.unsupported(f"expected one of: {known}")
+    node.ignore("silhouette_sampling_weight")
+    for medium in node.children("Medium"):
+        raise medium.unsupported("expected a scene without media")
+    for sensor in node.children("Sensor"):
+        raise sensor.error("belongs to a shape, which is not supported; expected a camera")
+    material = _material(reading, node, in_group)
+    with node.checking():
+        found = _READERS[node.plugin](reading, node, material)
+    node.finish()
+    return found
+
+
+def _material(reading: Reading, node: Node, in_group: bool) -> str | None:
+    bsdf, emitter = node.only("BSDF"), node.only("Emitter")
+    base = None if bsdf is None else material_name(reading, bsdf)
+    if emitter is None:
+        return base
+    if in_group:
+        raise emitter.error("shines in a group, which Mitsuba refuses, too; expected no emitter")
+    # Without a BSDF a lamp is black (src/render/shape.cpp).
+    key = ("emissive", emitter.index, base)
+    if key not in reading.names:
+        name = unused(emitter.name, "lamp", reading.materials)
+        reading.materials[name] = Emissive(radiance=emission(reading, emitter), base=base)
+        reading.names[key] = name
+    return reading.names[key]
+
+
+# ---- groups -------------------------------------------------------------------------------------
+
+
+def group_name(reading: Reading, node: Node) -> str:
+    """The name of a shape group, which is read if it is not yet."""
+    key = ("group", node.index)
+    if key not in reading.names:
+        node.ignore("to_world")  # which Mitsuba does not use, either
+        members = [shape(reading, child, in_group=True) for child in node.children("Shape")]
+        if not members:
+            raise node.error("has no shapes; expected one or more")
+        node.finish()
+        name = unused(node.name, "group", reading.groups)
+        reading.groups[name] = tuple(members)
+        reading.names[key] = name
+    return reading.names[key]
+
+
+def _instance(reading: Reading, node: Node, in_group: bool) -> Shape:
+    if in_group:
+        raise node.error("is nested in a group, which Mitsuba refuses, too; expected a shape")
+    group = node.only("Shape")
+    if group is None or group.plugin != "shapegroup":
+        raise node.error("has no shape group; expected a reference to one")
+    m = node.transform()
+    found = Instance(group=group_name(reading, group), transform=_steps(m))
+    node.finish()
+    return found
+
+
+# ---- single shapes ------------------------------------------------------------------------------
+
+
+def _steps(m: Affine) -> Any:
+    """The map as our transform."""
+    return () if np.array_equal(m, np.eye(3, 4)) else ({"matrix": m.tolist()},)
+
+
+def _compose(*maps: FloatArray) -> Affine:
+    """The product of maps (3, 4): the last one is applied first, as in Mitsuba's source."""
+    total = np.eye(4)
+    for m in maps:
+        total = total @ np.vstack([m, [0.0, 0.0, 0.0, 1.0]])
+    return total[:3]
+
+
+def _scaled(center: FloatArray, linear: FloatArray) -> FloatArray:
+    return np.column_stack([linear, center])
+
+
+def _sphere(reading: Reading, node: Node, material: str | None) -> Shape:
+    center, radius = node.vector("center", (0.0, 0.0, 0.0)), node.number("radius", 1.0)
+    if not radius > 0.0:
+        raise node.error(f"'radius' is {radius:g}; expected more than 0")
+    m = _compose(node.transform(), _scaled(np.array(center), radius * np.eye(3)))
+    linear = m[:, :3]
+    lengths = np.linalg.norm(linear, axis=0)
+    gram = linear.T @ linear
+    if np.abs(gram - lengths[0] ** 2 * np.eye(3)).max() > TOLERANCE * lengths.max() ** 2:
+        raise node.error(
+            "'to_world' makes it an ellipsoid, which Mitsuba renders as a sphere with a warning; "
+            "expected a uniform scale, or an instance of a group with the sphere"
+        )
+    # A map that mirrors turns Mitsuba's spheres inside out, but not its cylinders (measured).
+    if node.flag("flip_normals") != bool(np.linalg.det(linear) < 0.0):
+        form = (-1.0, -1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        return _turned(reading, node, material, form, (-1.5, -1.5, -1.5), (1.5, 1.5, 1.5), m)
+    if np.array_equal(linear, lengths[0] * np.eye(3)):
+        return Sphere(center=triple(m[:, 3]), radius=float(lengths[0]), material=material)
+    return Sphere(transform=_steps(_orthogonal(m, lengths[0])), material=material)
+
+
+def _orthogonal(m: Affine, size: float) -> Affine:
+    """The nearest similarity: what XML has rounded is no exact rotation."""
+    u, _, v = np.linalg.svd(m[:, :3] / size)
+    return np.column_stack([size * (u @ v), m[:, 3]])
+
+
+def _cylinder(reading: Reading, node: Node, material: str | None) -> Shape:
+    radius = node.number("radius", 1.0)
+    p0 = np.array(node.vector("p0", (0.0, 0.0, 0.0)))
+    p1 = np.array(node.vector("p1", (0.0, 0.0, 1.0)))
+    length = float(np.linalg.norm(p1 - p0))
+    if not (radius > 0.0 and length > 0.0):
+        raise node.error("'radius' or the distance from 'p0' to 'p1' is 0; expected more")
+    turn = _frame((p1 - p0) / length)
+    m = _compose(node.transform(), _scaled(p0, turn @ np.diag([radius, radius, length])))
+    linear = m[:, :3]
+    gram = linear.T @ linear
+    wanted = np.diag([gram[0, 0], gram[0, 0], gram[2, 2]])
+    sizes = np.sqrt(np.diag(gram))
+    if (np.abs(gram - wanted) > TOLERANCE * np.outer(sizes, sizes)).any():
+        raise node.error(
+            "'to_world' makes it oblique or elliptic, which Mitsuba renders as a round cylinder "
+            "with a warning; expected one that scales its radius uniformly"
+        )
+    if node.flag("flip_normals"):
+        form = (-1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        return _turned(reading, node, material, form, (-1.5, -1.5, 0.0), (1.5, 1.5, 1.0), m)
+    return Cylinder(capped=False, transform=_steps(m), material=material)
+
+
+def _frame(n: FloatArray) -> FloatArray:
+    """(3, 3), whose columns are Mitsuba's tangents of the unit vector n, and n (Duff et al. 2017,
+    "Building an Orthonormal Basis, Revisited")."""
+    x, y, z = n
+    sign = float(np.copysign(1.0, z))
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    s = (1.0 + sign * x * x * a, sign * b, -sign * x)
+    t = (b, sign + y * y * a, -y)
+    return np.column_stack([s, t, n])
+
+
+def _turned(
+    reading: Reading,
+    node: Node,
+    material: str | None,
+    form: Any,
+    lower: tuple[float, float, float],
+    upper: tuple[float, float, float],
+    m: Affine,
+) -> Shape:
+    """A quadric, for a sphere or a cylinder whose front is inside; it has other uv."""
+    if reading.uses_uv(material):
+        raise node.error(
+            "is turned inside out ('flip_normals', or a mirroring 'to_world') and has a texture or "
+            "a grain, which is not supported; expected another shape or a plain material"
+        )
+    return Quadric(
+        coefficients=form, lower=lower, upper=upper, transform=_steps(m), material=material
+    )
+
+
+def _flat(node: Node) -> Affine:
+    """to_world of a shape in the plane z = 0; flipping its normal mirrors z."""
+    m = node.transform()
+    if node.flag("flip_normals"):
+        m = _compose(m, _scaled(np.zeros(3), np.diag([1.0, 1.0, -1.0])))
+    return m
+
+
+def _rectangle(reading: Reading, node: Node, material: str | None) -> Shape:
+    node.ignore("face_normals")
+    return Rectangle(transform=_steps(_flat(node)), material=material)
+
+
+def _disk(reading: Reading, node: Node, material: str | None) -> Shape:
+    return Disk(transform=_steps(_flat(node)), material=material)
+
+
+def _cube(reading: Reading, node: Node, material: str | None) -> Shape:
+    node.ignore("face_normals")  # it has vertex normals all the same
+    flip = node.flag("flip_normals")
+    m, of_normals = node.maps()
+    if not (flip or reading.uses_uv(material)):
+        return Box(transform=_steps(m), material=material)
+    surface = Surface(_CUBE, _CUBE_FACES, _CUBE_NORMALS, _CUBE_UV)
+    return finished(placed(surface, m, of_normals, smooth=False), flip, True, material)
+
+
+_CUBE = np.array(
+    [
+        *([1, -1, -1], [1, -1, 1], [-1, -1, 1], [-1, -1, -1]),
+        *([1, 1, -1], [-1, 1, -1], [-1, 1, 1], [1, 1, 1]),
+        *([1, -1, -1], [1, 1, -1], [1, 1, 1], [1, -1, 1]),
+        *([1, -1, 1], [1, 1, 1], [-1, 1, 1], [-1, -1, 1]),
+        *([-1, -1, 1], [-1, 1, 1], [-1, 1, -1], [-1, -1, -1]),
+        *([1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]),
+    ],
+    np.float64,
+)
+_CUBE_NORMALS = np.repeat(
+    [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0],
+     [0.0, 0.0, -1.0]], 4, axis=0,
+)  # fmt: skip
+_CUBE_UV = np.tile([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], (6, 1))
+_CUBE_FACES = np.array([[k, k + 1, k + 2] if odd == 0 else [k + 3, k, k + 2]
+                        for k in range(0, 24, 4) for odd in (0, 1)])  # fmt: skip
+"""Mitsuba's cube (src/shapes/cube.cpp), whose uv are those of no box of ours."""
+
+
+_READERS: dict[str, Reader] = {
+    "sphere": _sphere,
+    "cylinder": _cylinder,
+    "rectangle": _rectangle,
+    "disk": _disk,
+    "cube": _cube,
+    "obj": mesh,
+    "ply": mesh,
+    "serialized": mesh,
+}

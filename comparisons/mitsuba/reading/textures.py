@@ -1,0 +1,159 @@
+"""Textures of Mitsuba scenes, and parameters that may be textures.
+
+Our shapes get the texture coordinates that Mitsuba's have, so that a texture needs no knowledge of
+the shape.  Mitsuba's v = 0 is the top row of an image, ours the bottom one: the map of an image
+ends with 1 - v.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba.reading.colours import SPECTRA, Rgb, colour, constant, luminance
+from comparisons.mitsuba.reading.context import Reading, unused
+from comparisons.mitsuba.reading.node import Node
+from reference_rt.core.arrays import FloatArray
+from reference_rt.textures import Bitmap, Checker, Texture, VertexColours
+from reference_rt.textures.texture import UvMap
+
+_FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+
+TOLERANCE = 1e-6
+"""Relative to the map's size: XML has about seven digits, and Mitsuba's scenes are float32."""
+
+
+def colour_or_texture(
+    reading: Reading, node: Node, key: str, default: float | Rgb, use: str = "reflectance"
+) -> Rgb | str:
+    """A colour, or the name of a texture of `reading`.  use: see `colours.colour`."""
+    if node.has(key) and node.kind_of(key) == "ResolvedReference":
+        value = node.take(key)
+        if value.kind != "Texture":
+            raise node.error(f"'{key}' is a {value.kind.lower()}; expected a texture")
+        if value.plugin in SPECTRA:
+            return constant(value)
+        return texture_name(reading, value, as_number=False)
+    return colour(node, key, default, use)
+
+
+def number_or_texture(reading: Reading, node: Node, key: str, default: float) -> float | str:
+    """A number, or the name of a texture whose luminance it is."""
+    if not node.has(key):
+        return default
+    kind = node.kind_of(key)
+    if kind in ("Float", "Integer"):
+        return node.number(key, default)
+    if kind == "ResolvedReference":
+        value = node.take(key)
+        if value.kind != "Texture":
+            raise node.error(f"'{key}' is a {value.kind.lower()}; expected a number or a texture")
+        if value.plugin not in SPECTRA:
+            return texture_name(reading, value, as_number=True)
+        if value.plugin in ("uniform", "rawconstant"):
+            return constant(value)[0]
+        return luminance(constant(value))
+    return luminance(colour(node, key, default))
+
+
+def texture_name(reading: Reading, node: Node, as_number: bool) -> str:
+    """The name of a texture of `reading`, which is read if it is not yet.
+
+    as_number: whether its luminance stands for a number.
+    """
+    key = ("texture", node.index, as_number and node.plugin == "checkerboard")
+    if key not in reading.names:
+        with node.checking():
+            texture = _texture(reading, node, as_number)
+        name = unused(node.name, node.plugin, reading.textures)
+        reading.textures[name] = texture
+        if isinstance(texture, VertexColours):
+            reading.attributes[name] = node.text("name", "")
+        node.finish()
+        reading.names[key] = name
+    return reading.names[key]
+
+
+def _texture(reading: Reading, node: Node, as_number: bool) -> Texture:
+    if node.plugin == "bitmap":
+        return _bitmap(reading, node)
+    if node.plugin == "checkerboard":
+        return _checker(node, as_number)
+    if node.plugin == "mesh_attribute":
+        return _attribute(node)
+    raise node.unsupported("expected bitmap, checkerboard, mesh_attribute or a colour")
+
+
+def _bitmap(reading: Reading, node: Node) -> Bitmap:
+    node.ignore("accel")
+    for key in ("bitmap", "data"):
+        if node.has(key):
+            raise node.error(f"'{key}', an image in memory, is not supported; expected a file")
+    # By default 8-bit images are kept as they are; half floats, 2^-11 off, are not imitated.
+    node.choice("format", "auto", ("auto", "variant", "float16", "fp16", "uint8"))
+    return Bitmap(
+        file=reading.relative(reading.file(node)),
+        filter=node.choice("filter_type", "bilinear", ("bilinear", "nearest")),
+        wrap=node.choice("wrap_mode", "repeat", ("repeat", "mirror", "clamp")),
+        encoding="raw" if node.flag("raw") else "auto",
+        uv=uv_map(node, _FLIP @ _to_uv(node)),
+    )
+
+
+def _checker(node: Node, as_number: bool) -> Checker:
+    first, second = colour(node, "color0", 0.4), colour(node, "color1", 0.2)
+    if as_number:
+        # Mitsuba's `eval_1` exchanges the two colours of its `eval` (src/textures/checkerboard.cpp,
+        # 3.9.1).
+        first, second = (luminance(second),) * 3, (luminance(first),) * 3
+    return Checker(first=first, second=second, uv=uv_map(node, _to_uv(node)))
+
+
+def _attribute(node: Node) -> VertexColours:
+    name = str(node.properties.get("name", ""))
+    if not name.startswith(("vertex_", "face_")):
+        raise node.error(f"'name' is '{name}'; expected vertex_... or face_...")
+    return VertexColours(scale=node.number("scale", 1.0))
+
+
+def _to_uv(node: Node) -> FloatArray:
+    """(3, 3), homogeneous."""
+    value = node.take("to_uv")
+    if value is None:
+        return np.eye(3)
+    try:
+        m = np.array(value.matrix, np.float64)
+    except (AttributeError, TypeError, ValueError):
+        raise node.error("'to_uv' is no transform; expected one") from None
+    if m.shape == (4, 4):  # of XML; what concerns z is left out, as Mitsuba does
+        m = m[np.ix_([0, 1, 3], [0, 1, 3])]
+    if m.shape != (3, 3) or not np.isfinite(m).all():
+        raise node.error("'to_uv' is not finite; expected a finite transform")
+    if np.abs(m[2] - [0.0, 0.0, 1.0]).max() > 0.0:
+        raise node.error("'to_uv' is a perspective map; expected an affine one")
+    return m
+
+
+def uv_map(node: Node, m: FloatArray) -> UvMap:
+    """The map m (3, 3), homogeneous, as scale, rotation and offset.  Raises SceneError for one that
+    shears."""
+    a, b = m[:2, 0], m[:2, 1]
+    size = float(np.hypot(*a) + np.hypot(*b))
+    if abs(float(a @ b)) > TOLERANCE * size**2:
+        raise node.error("'to_uv' shears; expected a scale, then a rotation, then a translation")
+    along = a if np.hypot(*a) > 0.0 else np.array([b[1], -b[0]])
+    # A turn of at most a right angle: then the scale of u is positive only if it is in XML, too.
+    angle = math.degrees(math.atan2(along[1], along[0]))
+    sign = 1.0
+    if abs(angle) > 90.0:
+        angle -= math.copysign(180.0, angle)
+        sign = -1.0
+    turn = math.radians(angle)
+    c, s = math.cos(turn), math.sin(turn)
+    values: dict[str, Any] = {
+        "scale": (sign * float(np.hypot(*a)), float(c * b[1] - s * b[0])),
+        "rotate": angle,
+        "offset": (float(m[0, 2]), float(m[1, 2])),
+    }
+    plain = UvMap()
+    return UvMap(**{k: v for k, v in values.items() if v != getattr(plain, k)})

@@ -1,0 +1,131 @@
+"""Scenes of Mitsuba: the reference is the user's own file, so that a wrong reading is seen."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, compare_scene
+from comparisons.mitsuba.reading import read_file
+from comparisons.mitsuba.reading.reference import file_of, own_scene
+from comparisons.mitsuba.scene import picture
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.results.case import Case
+from comparisons.suites.keys import case_key
+from comparisons.suites.work import Changes
+from reference_rt.rendering.scene import Scene
+
+FILM = """<integer name="width" value="64"/><integer name="height" value="48"/>
+  <integer name="crop_offset_x" value="16"/><integer name="crop_offset_y" value="12"/>
+  <integer name="crop_width" value="32"/><integer name="crop_height" value="24"/>
+  <string name="pixel_format" value="luminance"/><rfilter type="mitchell"/>"""
+
+SCENE = """<scene version="3.0.0">
+  <default name="grey" value="0.5"/>
+  <integrator type="moment"><integrator type="path"><integer name="max_depth" value="3"/>
+  </integrator></integrator>
+  <sensor type="SENSOR">
+    <float name="fov" value="40"/>EXTRA
+    <transform name="to_world"><lookat origin="0, 1, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <sampler type="multijitter"><integer name="sample_count" value="64"/></sampler>
+    <film type="hdrfilm">FILM</film>
+  </sensor>
+  <shape type="sphere"><bsdf type="diffuse"><float name="reflectance" value="$grey"/></bsdf></shape>
+  <shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/>
+    <translate y="-1"/></transform></shape>
+  <emitter type="constant"/>
+</scene>
+"""
+
+BUDGET = Budget(replicates=8, spp=256, limit=0.01, pixels=64, light_pixels=64)
+
+
+def scene_of(folder: Path, film: str = FILM, **defaults: str) -> Scene:
+    """The scene under a perspective camera."""
+    return placed(folder, film, "perspective", "", defaults)
+
+
+def placed(folder: Path, film: str, sensor: str, extra: str, defaults: Any = None) -> Scene:
+    text = SCENE.replace("FILM", film).replace("SENSOR", sensor).replace("EXTRA", extra)
+    (folder / "own.xml").write_text(text)
+    return read_file(folder / "own.xml", Scene, defaults)
+
+
+def compared(scene: Scene) -> Case:
+    return compare_scene(Subject(scene), BUDGET, lambda _: None, rungs=("statistics",))
+
+
+@pytest.mark.filterwarnings("ignore:.*its moments are left out")
+def test_a_scene_agrees_with_its_own_file(tmp_path):
+    scene = scene_of(tmp_path)
+    assert file_of(scene) == tmp_path / "own.xml"
+    case = compared(scene)
+    assert case.verdict == "agree", case.reason
+    assert any("own.xml itself, loaded by Mitsuba" in note for note in case.notes)
+
+
+@pytest.mark.filterwarnings("ignore:.*its moments are left out")
+def test_a_wrong_reading_differs_from_the_file(tmp_path):
+    scene = scene_of(tmp_path)
+    wrong = scene.changed(materials={"diffuse": {"type": "diffuse", "reflectance": 0.65}})
+    assert file_of(wrong) == tmp_path / "own.xml"
+    assert compared(wrong).verdict == "differ"
+
+
+@pytest.mark.filterwarnings("ignore:.*its moments are left out")
+def test_defaults_are_those_of_the_reading(tmp_path):
+    scene = scene_of(tmp_path, grey="0.9")
+    assert compared(scene).verdict == "agree"
+    dark, bright = (
+        picture(own_scene(s), 16, 0).mean() for s in (scene_of(tmp_path, grey="0.1"), scene)
+    )
+    assert bright > 1.1 * dark
+
+
+@pytest.mark.filterwarnings("ignore:.*its moments are left out")
+def test_a_camera_without_a_translation_is_compared_by_its_picture(tmp_path):
+    """Our translator has no lens off the axis; the user's file has."""
+    extra = '<float name="aperture_radius" value="0.1"/><float name="focus_distance" value="4"/>'
+    case = compared(placed(tmp_path, FILM, "thinlens", extra))
+    assert case.verdict == "agree", case.reason
+
+
+@pytest.mark.filterwarnings("ignore:.*its moments are left out")
+def test_the_window_of_the_film_follows_the_size(tmp_path):
+    scene = scene_of(tmp_path)
+    for size in ((32, 24), (64, 48), (8, 6)):
+        film = scene.film.model_copy(update=dict(zip(("width", "height"), size, strict=True)))
+        assert picture(own_scene(scene.changed(film=film)), 1, 0).shape == (size[1], size[0], 3)
+    film = scene.film.model_copy(update={"width": 40, "height": 30})
+    mean = picture(own_scene(scene.changed(film=film)), 64, 0).mean()
+    np.testing.assert_allclose(mean, picture(own_scene(scene), 64, 0).mean(), rtol=0.02)
+    for width, height in ((33, 24), (64, 24)):
+        film = scene.film.model_copy(update={"width": width, "height": height})
+        with pytest.raises(UntranslatableError):
+            own_scene(scene.changed(film=film))
+
+
+@pytest.mark.filterwarnings("ignore:.*its moments are left out")
+def test_a_film_that_the_file_does_not_have_is_added(tmp_path):
+    text = SCENE.replace("EXTRA", "").replace("SENSOR", "perspective")
+    for found in ('<film type="hdrfilm">FILM</film>', '<sampler type="multijitter"><integer '):
+        assert found in text
+    start, end = text.index("<sampler"), text.index("</sensor>")
+    (tmp_path / "own.xml").write_text(text[:start] + text[end:])
+    scene = Changes(size="40x30").load(tmp_path / "own.xml")
+    assert picture(own_scene(scene), 1, 0).shape == (30, 40, 3)
+
+
+@pytest.mark.filterwarnings("ignore:.*its moments are left out")
+def test_a_change_of_the_file_changes_the_case(tmp_path):
+    from comparisons.mitsuba.backend import backend
+
+    def key(scene: Scene) -> str:
+        return case_key(scene, BUDGET, (), backend())
+
+    keys = {key(scene_of(tmp_path)), key(scene_of(tmp_path, grey="0.5"))}
+    keys.add(key(scene_of(tmp_path, FILM.replace("mitchell", "catmullrom"))))
+    assert len(keys) == 3
+    assert key(scene_of(tmp_path)) in keys

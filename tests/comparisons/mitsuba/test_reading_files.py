@@ -1,0 +1,262 @@
+"""Files of Mitsuba scenes: meshes, `Scene.load`, and `reference-rt convert`."""
+
+import struct
+import zlib
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+from mitsuba_dicts import hits_of, rays_at
+from PIL import Image
+from typer.testing import CliRunner, Result
+
+from comparisons.commands.convert import convert
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.reading import read_file, serialized
+from comparisons.mitsuba.reading.write import write_scene
+from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import ImageError, SceneError, UsageError
+
+SCENE = """<scene version="3.0.0">
+  <default name="spp" value="4"/>
+  <integrator type="path"/>
+  <sensor type="perspective">
+    <transform name="to_world"><lookat origin="0, 1, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
+    <film type="hdrfilm"><integer name="width" value="12"/><integer name="height" value="9"/></film>
+  </sensor>
+  <bsdf type="twosided" id="picture"><bsdf type="diffuse">
+    <texture type="bitmap" name="reflectance"><string name="filename" value="images/a.png"/>
+    </texture></bsdf></bsdf>
+  <bsdf type="diffuse" id="other">
+    <texture type="bitmap" name="reflectance"><string name="filename" value="more/a.png"/>
+    </texture></bsdf>
+  <bsdf type="diffuse" id="coloured">
+    <texture type="mesh_attribute" name="reflectance"><string name="name" value="NAME"/></texture>
+  </bsdf>
+  <shape type="obj"><string name="filename" value="quad.obj"/><ref id="picture"/>
+    <transform name="to_world"><rotate y="1" angle="20"/></transform></shape>
+  <shape type="ply"><string name="filename" value="coloured.ply"/><ref id="coloured"/></shape>
+  <shape type="serialized"><string name="filename" value="two.serialized"/>
+    <integer name="shape_index" value="1"/><ref id="other"/></shape>
+  <shape type="shapegroup" id="group"><shape type="cube"><ref id="picture"/></shape></shape>
+  <shape type="instance"><ref id="group"/>
+    <transform name="to_world"><scale value="0.2"/><translate x="1"/></transform></shape>
+  <emitter type="envmap"><string name="filename" value="images/sky.png"/></emitter>
+</scene>
+"""
+
+PLY = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+property float r
+property float g
+property float b
+element face 2
+property list uchar int vertex_indices
+property float r
+property float g
+property float b
+end_header
+-1 0 -1 0.1 0.2 0.3
+1 0 -1 0.9 0.2 0.3
+1 0.5 -1 0.1 0.8 0.3
+-1 0.5 -1 0.1 0.2 0.7
+3 0 1 2 0.5 0.25 0.125
+3 0 2 3 0.75 0.5 0.25
+"""
+
+
+def packed(version: int, *meshes: tuple[FloatArray, Any, FloatArray | None, bool]) -> bytes:
+    """A .serialized file of meshes: vertices, triangles, normals, whether in double precision."""
+    content, offsets = b"", []
+    for vertices, faces, normals, double in meshes:
+        offsets.append(len(content))
+        kind = "<f8" if double else "<f4"
+        flags = (1 if normals is not None else 0) | 0x0002 | 0x0008 | (0x2000 if double else 0x1000)
+        body = struct.pack("<I", flags) + (b"name\0" if version == 4 else b"")
+        body += struct.pack("<QQ", len(vertices), len(faces)) + vertices.astype(kind).tobytes()
+        if normals is not None:
+            body += normals.astype(kind).tobytes()
+        body += vertices[:, :2].astype(kind).tobytes()  # uv
+        body += vertices.astype(kind).tobytes()  # colours
+        body += np.asarray(faces, "<u4").tobytes()
+        content += struct.pack("<HH", 0x041C, version) + zlib.compress(body)
+    table = "<Q" if version == 4 else "<I"
+    content += b"".join(struct.pack(table, x) for x in offsets)
+    return content + struct.pack("<I", len(offsets))
+
+
+CORNERS = np.array([[-1.0, 0, 0], [1, 0, 0], [1, 1, 0.3], [-1, 1, 0]])
+TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
+UPWARDS = np.array([[0.0, 0, 1], [0, 0.6, 0.8], [0, 0, 1], [0.6, 0, 0.8]])
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A scene with files in several folders, two of them of the same name."""
+    rng = np.random.default_rng(1)
+    for name in ("images/a", "images/sky", "more/a"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        pixels = rng.integers(0, 255, (4, 8, 3), dtype=np.uint8)
+        Image.fromarray(pixels).save(tmp_path / f"{name}.png")
+    lines = [f"v {x} {y} {z}\nvt {x / 3} {y}" for x, y, z in CORNERS]
+    (tmp_path / "quad.obj").write_text("\n".join([*lines, "f 1/1 2/2 3/3 4/4"]))
+    (tmp_path / "coloured.ply").write_text(PLY)
+    one, two = (CORNERS, TRIANGLES, None, False), (CORNERS + 0.1, TRIANGLES, UPWARDS, True)
+    (tmp_path / "two.serialized").write_bytes(packed(4, one, two))
+    (tmp_path / "scene.xml").write_text(SCENE.replace("NAME", "vertex_color"))
+    return tmp_path
+
+
+def run(*arguments: object) -> Result:
+    app = typer.Typer()
+    app.command()(convert)
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_a_converted_scene_is_the_same(folder):
+    scene = read_file(folder / "scene.xml", Scene, {"spp": "16"})
+    out = folder / "out" / "deep" / "scene.yaml"
+    result = run(folder / "scene.xml", "-o", out, "-D", "spp=16")
+    assert result.exit_code == 0, result.output
+    written = Scene.load(out)
+    names = sorted(path.name for path in (out.parent / "scene_files").iterdir())
+    assert names == sorted(
+        ["a.png", "a_2.png", "sky.png", "mesh.ply", "mesh_2.ply", "mesh_3.ply", "mesh_4.ply"]
+    )
+    assert sorted(p.name for p in out.parent.iterdir()) == ["scene.yaml", "scene_files"]
+    o, d = rays_at((0.0, 0.3, 0.0), 1.5, 200, seed=1)
+    for name in ("t", "n", "ns", "uv", "shape"):
+        a, b = (getattr(s.intersect(o, d), name) for s in (scene, written))
+        np.testing.assert_array_equal(a, b)
+    a, b = (s.radiance(o, d, spp=4).mean for s in (scene, written))
+    np.testing.assert_array_equal(a, b)
+    assert written.resolved_sampler.spp == 16
+    again = run(folder / "scene.xml", "-o", out)  # replaces the older one
+    assert again.exit_code == 0
+    assert Scene.load(out).resolved_sampler.spp == 4
+
+
+def test_nothing_is_written_for_a_broken_scene(folder):
+    out = folder / "out" / "scene.yaml"
+    (folder / "images" / "sky.png").unlink()
+    result = run(folder / "scene.xml", "-o", out)
+    assert result.exit_code == SceneError.exit_code
+    assert "there is no file" in result.output
+    assert not (folder / "out").exists()
+    assert run(folder / "scene.xml", "-o", folder / "a.xml").exit_code == UsageError.exit_code
+    assert run(folder / "scene.xml", "-o", out, "-D", "spp").exit_code == UsageError.exit_code
+
+
+def test_a_failure_keeps_the_older_files(folder):
+    scene = read_file(folder / "scene.xml", Scene)
+    out = folder / "out" / "scene.json"
+    assert write_scene(scene, out) == 7
+    before = {p: p.read_bytes() for p in (folder / "out").rglob("*") if p.is_file()}
+    (folder / "more" / "a.png").unlink()
+    with pytest.raises(SceneError, match=r"textures.*no file"):
+        write_scene(scene, out)
+    assert {p: p.read_bytes() for p in (folder / "out").rglob("*") if p.is_file()} == before
+    assert {p.name for p in (folder / "out").iterdir()} == {"scene.json", "scene_files"}
+    (folder / "file").write_text("")
+    with pytest.raises(ImageError):
+        write_scene(scene, folder / "file" / "scene.yaml")
+
+
+@pytest.mark.parametrize("name", ["vertex_color", "face_color"])
+def test_attributes_are_those_of_mitsuba(folder, name):
+    path = folder / "scene.xml"
+    path.write_text(SCENE.replace("NAME", name))
+    scene = read_file(path, Scene)
+    theirs = mitsuba().load_file(str(path), optimize=False)
+    rng = np.random.default_rng(0)
+    target = np.column_stack([rng.uniform(-0.9, 0.9, 50), rng.uniform(0.02, 0.48, 50)])
+    target = np.column_stack([target, np.full(50, -1.0)])
+    o = np.tile([0.0, 0.2, -9.0], (50, 1))
+    d = (target - o) / np.linalg.norm(target - o, axis=1, keepdims=True)
+    ours = scene.changed(integrator={"type": "ray_cast"}, sampler=None).radiance(o, d).mean
+    mi = mitsuba()
+    rays = mi.Ray3f(mi.Point3f(*o.T.astype(np.float32)), mi.Vector3f(*d.T.astype(np.float32)))
+    si = theirs.ray_intersect(rays)
+    found = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
+    np.testing.assert_allclose(ours, found, atol=1e-5)
+    assert np.ptp(ours, axis=0).max() > 0.1
+
+
+def test_an_attribute_that_is_missing_is_refused(folder):
+    (folder / "scene.xml").write_text(SCENE.replace("NAME", "vertex_heat"))
+    with pytest.raises(SceneError, match="no attribute 'vertex_heat'; expected one of: "):
+        read_file(folder / "scene.xml", Scene)
+
+
+@pytest.mark.parametrize("version", [3, 4])
+@pytest.mark.parametrize("index", [0, 1, 2])
+@pytest.mark.parametrize("flat", ["true", "false"])
+def test_serialized_meshes_are_those_of_mitsuba(tmp_path, version, index, flat):
+    meshes = (
+        (CORNERS, TRIANGLES, None, False),
+        (CORNERS * [1, 2, 1], TRIANGLES[:, ::-1], UPWARDS, True),
+        (CORNERS * [1, 1, 3], TRIANGLES, UPWARDS, False),
+    )
+    (tmp_path / "m.serialized").write_bytes(packed(version, *meshes))
+    (tmp_path / "scene.xml").write_text(
+        f"""<scene version="3.0.0"><shape type="serialized">
+        <string name="filename" value="m.serialized"/><boolean name="face_normals" value="{flat}"/>
+        <integer name="shape_index" value="{index}"/></shape></scene>"""
+    )
+    ours = read_file(tmp_path / "scene.xml", Scene)
+    theirs = mitsuba().load_file(str(tmp_path / "scene.xml"))
+    o, d = rays_at((0.0, 0.5, 0.0), 1.0, 300, seed=1)
+    hits = ours.intersect(o, d)
+    t, _, ns, uv = hits_of(theirs, o, d)
+    met = np.isfinite(hits.t) & np.isfinite(t)
+    assert met.sum() > 50
+    np.testing.assert_allclose(hits.t[met], t[met], atol=1e-4)
+    np.testing.assert_allclose(hits.ns[met], ns[met], atol=1e-3)
+    np.testing.assert_allclose(hits.uv[met], uv[met], atol=1e-3)
+
+
+def test_damaged_serialized_meshes_are_refused():
+    whole = packed(4, (CORNERS, TRIANGLES, None, False), (CORNERS, TRIANGLES, UPWARDS, True))
+    serialized.read(whole, 1)
+    for cut in range(0, len(whole) - 1, 7):
+        with pytest.raises(ValueError, match=r"."):
+            serialized.read(whole[:cut], 1)
+    for index in (-1, 2, 10**9):
+        with pytest.raises(ValueError, match="has 2 meshes"):
+            serialized.read(whole, index)
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        damaged = bytearray(whole)
+        damaged[rng.integers(len(whole))] = rng.integers(256)
+        with suppress(ValueError):  # and nothing else
+            serialized.read(bytes(damaged), 1)
+
+
+def test_a_scene_of_mitsuba_loads_by_its_suffix(folder):
+    """Needs the entry point of the installed package."""
+    scene = Scene.load(folder / "scene.xml", {"spp": "9"})
+    assert isinstance(scene, Scene)
+    assert scene.resolved_sampler.spp == 9
+    assert scene.name == "scene"
+    with pytest.raises(SceneError, match="has no defaults"):
+        Scene.load(folder / "scene.yaml", {"spp": "9"})
+    found = Scene.from_mitsuba(
+        {"type": "scene", "s": {"type": "obj", "filename": "quad.obj"}}, folder
+    )
+    assert len(found.shapes) == 1
+
+
+def test_a_later_error_names_the_file(folder):
+    scene = read_file(folder / "scene.xml", Scene)
+    (folder / "images" / "a.png").write_bytes(b"no image")
+    with pytest.raises(SceneError, match=r"scene\.xml: textures\."):
+        _ = scene.tables
