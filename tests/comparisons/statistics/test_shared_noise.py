@@ -74,7 +74,7 @@ LAWS = {law.__name__: law for law in (white, lognormal, fireflies)} | {
     ("law", "count"), [(law, n) for law in LAWS for n in (8, 16) if (law, n) != ("lognormal", 8)]
 )
 def test_two_replicates_of_overlapping_seeds(law: str, count: int) -> None:
-    """The pair that is named is the planted one. (Eight replicates of lognormal noise are too few.)"""
+    """The pair that is named is the planted one. Eight lognormal replicates are too few to tell."""
     for seed in range(4):
         pictures = LAWS[law](np.random.default_rng([seed, count]), count, 48)
         assert correlated_pair(pictures) is None
