@@ -10,6 +10,7 @@ from comparisons.compare import diagnosis
 from comparisons.compare.judge import Lights, likeliest_cause
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
+from comparisons.gate.rim import without_rim
 from comparisons.results.case import (
     Case,
     Cause,
@@ -43,14 +44,18 @@ def gate_pictures(
     name: str = "candidate",
     lights: Lights | None = None,
     notes: Sequence[str] = (),
+    rim: int = 0,
 ) -> Case:
     """The verdict on candidates; several are replicates.
 
     limit: the smallest relative bias of the image mean that must be detectable;  lights: for the
-    diagnosis of a difference.  Raises ImageError for candidates whose size is not the reference's,
-    UsageError for several candidates without noise.
+    diagnosis of a difference;  rim: how many of the outermost pixels are left out on each side.
+    Raises ImageError for candidates whose size is not the reference's, UsageError for several
+    candidates without noise and for a rim that leaves nothing.
     """
     check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
+    if rim:
+        candidates, reference, lights = without_rim(candidates, reference, lights, rim)
     notes = [*notes, *_notes(candidates)]
     if reference.noise_free and candidates[0].displayed:
         reference = replace(reference, pictures=_displayed(reference.pictures))

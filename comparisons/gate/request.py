@@ -27,7 +27,7 @@ class Request:
 
     variance: a file with the variance of a single reference;  baselines: their folder;  limit: the
     smallest relative bias of the image mean that must be detectable;  noise_free: the renderer uses
-    no random numbers;  name: the case's.
+    no random numbers;  rim: how many of the outermost pixels are left out;  name: the case's.
     """
 
     scene: Scene | None = None
@@ -38,6 +38,7 @@ class Request:
     limit: float = LIMIT
     noise_free: bool = False
     threads: int | None = None
+    rim: int = 0
     name: str = "candidate"
 
     def __post_init__(self) -> None:
@@ -74,6 +75,7 @@ def gated(
         limit=request.limit,
         name=request.name,
         lights=lights,
+        rim=request.rim,
     )
 
 

@@ -10,7 +10,7 @@ from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.metrics import count_nonfinite
 from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
 from comparisons.statistics.sides import Known, known_side, picture_array, side_of
-from comparisons.statistics.single import single_tests
+from comparisons.statistics.single import single_factor, single_tests
 from comparisons.statistics.uniformity import Uniformity, uniformity
 from comparisons.statistics.welch import BiasTest, image_test, pixel_test, tile_test
 from comparisons.statistics.wording import (
@@ -28,7 +28,9 @@ from comparisons.statistics.wording import (
 
 ONE_PICTURE = (
     "with a single picture on a side the noise is estimated from the spread of the difference over "
-    "small blocks, assuming that the noise of neighbouring blocks is independent"
+    "small blocks, assuming that the noise of neighbouring blocks is independent; an error of a "
+    "few pixels, or one that varies within a tile such as a contact shadow, is not told from "
+    "noise: only replicates show it"
 )
 
 TOP = ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value")
@@ -155,7 +157,7 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Run
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(image.samples_factor(limit)),
+        "samples_factor": finite(_factor(found, limit)),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
         "pixels": cell_numbers(found.pixels, 1),
@@ -196,8 +198,15 @@ def _decide(found: Findings, limit: float) -> tuple[Status, str]:
     overlooked = "" if sees else "; a bias of that size could be overlooked"
     return "inconclusive", (
         f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
-        f"{_wanted(image.samples_factor(limit))}"
+        f"{_wanted(_factor(found, limit))}"
     )
+
+
+def _factor(found: Findings, limit: float) -> float:
+    """The factor of samples that decides; infinite if these pictures cannot tell it."""
+    if found.single:
+        return single_factor(found.image, limit)
+    return found.image.samples_factor(limit)
 
 
 def _wanted(factor: float) -> str:
