@@ -42,9 +42,9 @@ def rim(misfit: Misfit) -> Cause | None:
             if share > SHARE and sums[1] > ON_A_SIDE * total:
                 pixels = width * block
                 evidence = (
-                    f"{_percent(share)} of the difference are in the outermost {pixels} pixels: "
-                    "some renderers take samples beyond the border for a filter wider than a "
-                    f"pixel, others do not; use a filter of one pixel, or --rim {pixels}"
+                    f"{_percent(share)} of the difference are within {pixels} px of the border: "
+                    "some renderers take samples beyond it for a filter wider than a pixel, others "
+                    "do not; use a filter of one pixel, or leave its radius out by --rim"
                 )
                 return Cause("filter at the picture's border", evidence, min(share, 1.0))
     return None

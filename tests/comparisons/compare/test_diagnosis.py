@@ -144,7 +144,7 @@ def test_the_rim(name: str, width: int, loss: float) -> None:
     found = likeliest(pair(name, rimmed(width, loss)))
     assert found is not None
     assert found.name == "filter at the picture's border"
-    pixels = int(found.evidence.rsplit("--rim ", 1)[1])
+    pixels = int(found.evidence.split(" px of the border")[0].rsplit(" ", 1)[1])
     assert pixels in range(1, width + 1) or pixels == 8  # 8 where only blocks show it
 
 

@@ -32,7 +32,8 @@ def test_a_rim_by_another_convention_is_named_and_can_be_left_out() -> None:
     assert case.verdict == "differ"
     assert case.cause is not None
     assert case.cause.name == "filter at the picture's border"
-    assert "--rim 3" in case.cause.evidence
+    assert "within 3 px of the border" in case.cause.evidence
+    assert "--rim" in case.cause.evidence
     for rim, verdict in ((2, "differ"), (3, "agree"), (5, "agree")):
         case = gate_pictures(candidates(0.8), reference, rim=rim)
         assert case.verdict == verdict, case.reason
