@@ -92,6 +92,14 @@ def gate(
         typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
     ] = 0.005,
     noise_free: NoiseFree = False,
+    rim: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            metavar="PIXELS",
+            help="Leave out the outermost pixels, which a wide filter makes differ by convention.",
+        ),
+    ] = 0,
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder for results.json and report.html.")
     ] = Path("out"),
@@ -165,6 +173,7 @@ def gate(
             limit=limit,
             noise_free=noise_free,
             threads=threads,
+            rim=rim,
             name=name,
         )
         with ProgressLine() as progress:

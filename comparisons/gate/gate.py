@@ -13,6 +13,7 @@ from comparisons.compare.path_length import Lengths
 from comparisons.gate.copies import Copies
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
+from comparisons.gate.rim import without_rim, without_rim_later
 from comparisons.results.case import (
     Case,
     Cause,
@@ -47,13 +48,14 @@ def gate_pictures(
     lights: Lights | None = None,
     lengths: Lengths | None = None,
     notes: Sequence[str] = (),
+    rim: int = 0,
 ) -> Case:
     """The verdict on candidates; several are replicates.
 
     limit: the smallest relative bias of the image mean that must be detectable;  lights, lengths:
-    for the diagnosis of a difference.  Candidates that are copies of the reference's pictures are
-    `unchanged`.  Raises ImageError for candidates whose size is not the reference's, UsageError for
-    several candidates without noise.
+    for the diagnosis of a difference;  rim: how many of the outermost pixels are left out on each
+    side.  Candidates that are copies of the reference's pictures are `unchanged`.  Raises ImageError for candidates whose size is not the reference's, UsageError for
+    several candidates without noise and for a rim that leaves nothing.
     """
     check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
     copies = Copies.of(reference.fingerprints)
@@ -63,7 +65,14 @@ def gate_pictures(
     if copies.count:
         notes = [*notes, copies.note(len(others))]
     return judged(
-        others, reference, limit=limit, name=name, lights=lights, lengths=lengths, notes=notes
+        others,
+        reference,
+        limit=limit,
+        name=name,
+        lights=lights,
+        lengths=lengths,
+        notes=notes,
+        rim=rim,
     )
 
 
@@ -96,12 +105,16 @@ def judged(
     lights: Lights | None = None,
     lengths: Lengths | None = None,
     notes: Sequence[str] = (),
+    rim: int = 0,
     looks: Looks | None = None,
 ) -> Case:
     """`gate_pictures` for candidates that are no copies.
 
     looks: those that were taken, the last one at these candidates.
     """
+    if rim:
+        candidates, reference = without_rim(candidates, reference, rim)
+        lights, lengths = without_rim_later(lights, lengths, rim)
     notes = [*notes, *_notes(candidates)]
     if reference.noise_free and candidates[0].displayed:
         reference = replace(reference, pictures=_displayed(reference.pictures))
@@ -192,10 +205,12 @@ def first_fault(candidate: Picture, reference: Reference) -> RungResult | None:
 
 
 def look(
-    candidates: Sequence[Picture], reference: Reference, limit: float, level: float
+    candidates: Sequence[Picture], reference: Reference, limit: float, level: float, rim: int = 0
 ) -> RungResult:
-    """The statistics of replicates;  level: the share of the levels that this look may use.  At the
-    first look a fault of the input, if there is one."""
+    """The statistics of replicates;  level: the share of the levels that this look may use;  rim:
+    as in `gate_pictures`.  At the first look a fault of the input, if there is one."""
+    if rim:
+        candidates, reference = without_rim(candidates, reference, rim)
     pictures = stacked(candidates)
     if level == level_of(1):
         checked = _input(candidates, pictures, reference)

@@ -13,6 +13,7 @@ from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes
+from comparisons.gate.rim import check_rim
 from comparisons.results.case import Case
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
@@ -29,7 +30,7 @@ class Request:
 
     variance: a file with the variance of a single reference;  baselines: their folder;  limit: the
     smallest relative bias of the image mean that must be detectable;  noise_free: the renderer uses
-    no random numbers;  name: the case's.
+    no random numbers;  rim: how many of the outermost pixels are left out;  name: the case's.
     """
 
     scene: Scene | None = None
@@ -40,6 +41,7 @@ class Request:
     limit: float = LIMIT
     noise_free: bool = False
     threads: int | None = None
+    rim: int = 0
     name: str = "candidate"
 
     def __post_init__(self) -> None:
@@ -82,6 +84,7 @@ class Judge:
             name=request.name,
             lights=None if scene is None else _lights(scene, request.threads),
             lengths=None if scene is None else path_lengths(scene, request.threads),
+            rim=request.rim,
         )
 
 
@@ -97,6 +100,7 @@ def prepared(
         expected = f"{scene.film.width} x {scene.film.height}"
         check_sizes(candidates, expected, f"the size of the scene '{scene.name}'")
     found, scene = _judge(request, scene, [picture.name for picture in candidates], say)
+    check_rim(found.pictures.shape, request.rim)
     return Judge(request, found, scene)
 
 

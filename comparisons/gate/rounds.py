@@ -79,7 +79,7 @@ def gated_renderer(
         if len(others) == 1:
             reason = "all candidates but one are copies of the reference's pictures"
             return RungResult("statistics", "inconclusive", reason)
-        return look(others, reference, request.limit, level)
+        return look(others, reference, request.limit, level, request.rim)
 
     found = looks.until_decided(
         grow,

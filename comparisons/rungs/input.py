@@ -1,7 +1,7 @@
 """The rung of the input: whether the pictures can be compared at all.
 
 It finds wrong shapes and sizes, values that are not finite, transparent, black or constant
-pictures, repeated or correlated replicates, 8-bit quantisation and clamped highlights.
+pictures, repeated, correlated or odd replicates, 8-bit quantisation and clamped highlights.
 """
 
 import math
@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.metrics import nonfinite_pixels, white_level
-from comparisons.statistics.shared_noise import common_noise, largest_correlation
+from comparisons.statistics.odd_replicate import odd_replicate
+from comparisons.statistics.shared_noise import common_noise, correlated_pair
 
 DIM = 1e-3
 """Fraction of the reference's white level above which a pixel counts as lit."""
@@ -67,6 +68,7 @@ def input_rung(
         or _black(a, b)
         or _constant(a, b)
         or (None if alone else _repeated(a, b))
+        or (_odd("candidate", a) or _odd("reference", b))
         or _sharing_noise(a, b)
         or _quantised(a, b)
     )
@@ -200,9 +202,19 @@ def _repeated(a: FloatArray, b: FloatArray) -> str | None:
     return None
 
 
-CORRELATED = 0.1
-"""Correlation of the noise of two replicates above which they are reported to share noise.
-Independent replicates of 1,000 pixels or more stay below it (measured: 0.04 of 64 x 64 pixels)."""
+def _odd(whose: str, x: FloatArray) -> str | None:
+    """One replicate with another mean than the rest, in words."""
+    found = odd_replicate(x) if len(x) > 1 else None
+    if found is None:
+        return None
+    of = f" in {found.channel}" if found.channel else ""
+    where = f" {found.where}" if found.where else ""
+    return (
+        f"replicate {found.index} of the {whose} is unlike the other {len(x) - 1}: its median "
+        f"block is {100.0 * found.bias:+.2g} % from theirs{of}{where} ({found.errors:.0f} standard "
+        "errors of its ranks); expected replicates that differ by noise only"
+    )
+
 
 COMMON = 0.05
 """Variance of the noise common to all replicates, over a replicate's own, above which it is
@@ -213,14 +225,12 @@ def _sharing_noise(a: FloatArray, b: FloatArray) -> str | None:
     if len(a) < 2:
         return None
     advice = "expected independent noise, a seed of its own for each replicate"
-    if len(a) > 2 and (found := largest_correlation(a)) is not None:
+    if (found := correlated_pair(a)) is not None:
         i, j, correlation = found
-        usual = largest_correlation(b) if len(b) > 2 else None
-        if correlation > max(CORRELATED, 2.0 * usual[2] if usual else 0.0):
-            return (
-                f"replicates {i} and {j} of the candidate share noise (correlation "
-                f"{correlation:.2f}); {advice}"
-            )
+        return (
+            f"replicates {i} and {j} of the candidate share noise (correlation {correlation:.2f}); "
+            f"{advice}"
+        )
     common = common_noise(a, b) if len(b) > 1 else None
     if common is not None and common > COMMON:
         share = common / (1.0 + common)

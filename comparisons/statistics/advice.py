@@ -41,8 +41,10 @@ def wanted(
 
     image: the test of this run;  alone: what the reference by itself allows, if only the
     candidate's samples can be raised; None if those of both sides can;  least: the factor that
-    meets enough of the rare light.
+    is needed anyway, infinite if it is unknown.
     """
+    if not math.isfinite(least):
+        return _times(least, ""), least
     if alone is None:
         factor = max(image.samples_factor(limit), least)
         return _times(factor, "replicates x {0} or spp x {0}"), factor

@@ -12,7 +12,7 @@ from comparisons.statistics.metrics import count_nonfinite
 from comparisons.statistics.rare import Unseen, unseen, worse
 from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
 from comparisons.statistics.sides import Known, known_side, picture_array, side_of
-from comparisons.statistics.single import single_tests
+from comparisons.statistics.single import single_factor, single_tests
 from comparisons.statistics.uniformity import Uniformity, uniformity
 from comparisons.statistics.welch import BiasTest
 from comparisons.statistics.wording import (
@@ -33,7 +33,9 @@ from comparisons.statistics.wording import (
 
 ONE_PICTURE = (
     "with a single picture on a side the noise is estimated from the spread of the difference over "
-    "small blocks, assuming that the noise of neighbouring blocks is independent"
+    "small blocks, assuming that the noise of neighbouring blocks is independent; an error of a "
+    "few pixels, or one that varies within a tile such as a contact shadow, is not told from "
+    "noise: only replicates show it"
 )
 
 TOP = ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value")
@@ -188,7 +190,7 @@ def _verdict(
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(wanted(image, limit, alone, _rare_factor(found, limit))[1]),
+        "samples_factor": finite(wanted(image, limit, alone, _least(found, limit))[1]),
         "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
@@ -234,12 +236,15 @@ def _decide(found: Findings, limit: float, alone: BiasTest | None = None) -> tup
         overlooked += "; as much light may have been missed by chance, since few samples meet it"
     return "inconclusive", (
         f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
-        f"{wanted(image, limit, alone, _rare_factor(found, limit))[0]}"
+        f"{wanted(image, limit, alone, _least(found, limit))[0]}"
     )
 
 
-def _rare_factor(found: Findings, limit: float) -> float:
-    """How many times as many samples meet enough of the rare light."""
+def _least(found: Findings, limit: float) -> float:
+    """How many times as many samples are needed besides those that make the intervals narrow: to
+    meet enough of the rare light; infinite if a single picture does not show it."""
+    if found.single:
+        return single_factor(found.image, limit)
     return found.unseen.missing / limit if found.unseen is not None else 0.0
 
 

@@ -3,12 +3,34 @@
 import math
 
 import numpy as np
+import numpy.typing as npt
+from scipy import ndimage, stats
+from scipy.linalg import helmert
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.scales import tile_sums
 
 FEWEST_PIXELS = 256
 """Least number of noisy pixels for these tests."""
+
+CORRELATED = 0.1
+"""Correlation of the noise of two replicates above which it matters."""
+
+FEWEST_REPLICATES = 6
+"""Least number of replicates whose pairs are compared: four or five have too few pairs to show how
+far correlations scatter if all pixels share a few random numbers."""
+
+OUTLYING = (4.0, 48.0)
+"""(a, b): a correlation must lie a + b / R times the scatter of ordinary pairs above these before
+two of R replicates share noise, 12 times for R = 6 and 7 times for R = 16. For noise that all
+pixels have in common, of 1 to 1,000 components, normal or Laplace distributed, the largest of
+independent replicates was 8 and 5 times away once in 1,000 runs; of one uniform random number, once
+in 300 runs 8 times for R = 8."""
+
+ORDINARY = 0.65
+"""The fraction of pairs below which a pair is an ordinary one. If a single random number makes all
+noise, pairs have correlations of +1 or -1, and at least 0.4 of them have +1. If each replicate
+shares noise with the next one, 0.33 of the pairs of six do."""
 
 WHITE = 0.15
 """Largest correlation of neighbouring pixels for noise that is independent between pixels; errors
@@ -18,28 +40,76 @@ LIKE_PICTURE = 0.1
 """Largest fraction of common noise that the reference, its gradient and its curvature may explain:
 a gain, a shift or a filter causes such a difference in a picture with fine texture."""
 
+BY_CHANCE = 5e-4
+"""Chance that independent replicates have as much noise in common; the other conditions make an
+alarm rarer still."""
+
+SHARING = 2.0
+"""How many times as much as that of independent tiles the squares of a difference of replicates
+scatter if pixels far from each other share random numbers."""
+
+FEWEST_TILES = 4
+"""Least number of tiles whose scatter is compared with that of whole pictures."""
+
 EVERYWHERE = 0.5
 """Least common noise of the median tile, as a fraction of the mean: shared noise is everywhere."""
 
 
-def largest_correlation(pictures: FloatArray) -> tuple[int, int, float] | None:
-    """The two replicates of (R, height, width, 3), R > 2, with the most correlated noise, and the
-    correlation; None if there is too little noise.
+def correlated_pair(pictures: FloatArray) -> tuple[int, int, float] | None:
+    """The two replicates of (R, height, width, 3) that share noise, and its correlation; None if no
+    two do, or if that cannot be told.
 
-    Deviations of independent replicates from the common mean have a correlation of -1 / (R - 1),
-    which is subtracted.
+    Pixels may depend on each other, as in a photon map or after a denoiser. The correlations of
+    independent replicates then scatter by 1 / sqrt(the number of independent pixels), which is the
+    same for all pairs. So two share noise if their correlation is an outlier among all pairs, and
+    much further from ordinary ones than any negative correlation. It must be so for the noise and
+    for its detail: a rare event that brightens two pictures is smooth, equal seeds repeat detail.
     """
     count = len(pictures)
     deviation = pictures - pictures.mean(axis=0)
     scale = np.sqrt((deviation**2).mean(axis=0))
     noisy = scale > 1e-9 * max(float(np.abs(pictures).max()), 1e-300)
-    if np.count_nonzero(noisy.any(axis=-1)) < FEWEST_PIXELS:
+    pixels = int(np.count_nonzero(noisy.any(axis=-1)))
+    if count < FEWEST_REPLICATES or pixels < FEWEST_PIXELS:
         return None
-    z = deviation[:, noisy] / scale[noisy]
-    correlation = z @ z.T / z.shape[1]
-    np.fill_diagonal(correlation, -np.inf)
-    i, j = sorted(int(k) for k in np.unravel_index(np.argmax(correlation), correlation.shape))
-    return i, j, float(correlation[i, j]) * (count - 1) / count + 1.0 / count
+    z = np.where(noisy, deviation / np.where(noisy, scale, 1.0), 0.0)
+    bands = [_correlations(band) for band in (z, _detail(z))]
+    lowest = np.min([band - _highest_by_chance(band, pixels) for band in bands], axis=0)
+    i, j = sorted(int(k) for k in np.unravel_index(np.argmax(lowest), lowest.shape))
+    return (i, j, float(bands[0][i, j])) if lowest[i, j] > 0.0 else None
+
+
+def _detail(z: FloatArray) -> FloatArray:
+    """Deviations from the mean of the neighbours."""
+    around = np.array([[0.0, 0.25, 0.0], [0.25, 0.0, 0.25], [0.0, 0.25, 0.0]])
+    return np.asarray(z - ndimage.convolve(z, around[None, :, :, None], mode="reflect"))
+
+
+def _correlations(deviations: FloatArray) -> FloatArray:
+    """(R, R): between replicates, -inf on the diagonal.
+
+    Deviations of independent replicates from the common mean have a correlation of -1 / (R - 1),
+    which is removed.
+    """
+    count = len(deviations)
+    z = deviations.reshape(count, -1)
+    products = z @ z.T
+    length = np.sqrt(np.maximum(np.diag(products), 1e-300))
+    found = products / np.outer(length, length) * (count - 1) / count + 1.0 / count
+    np.fill_diagonal(found, -np.inf)
+    return np.asarray(found)
+
+
+def _highest_by_chance(correlations: FloatArray, pixels: int) -> float:
+    """The correlation that two independent replicates hardly ever exceed."""
+    count = len(correlations)
+    pairs = correlations[np.triu_indices(count, 1)]
+    ordinary = float(np.quantile(pairs, ORDINARY, method="lower"))
+    below = np.maximum(ordinary - pairs, 0.0)
+    scatter = math.sqrt(float((below**2).sum()) / (ORDINARY * len(pairs)))
+    scatter = max(scatter, 1.0 / math.sqrt(pixels))
+    times = OUTLYING[0] + OUTLYING[1] / count
+    return max(CORRELATED, ordinary + max(times * scatter, 2.0 * float(below.max())))
 
 
 def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
@@ -47,7 +117,9 @@ def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
     replicate; None if that error does not look like noise.
 
     Both (replicates, height, width, 3).  Unlike the error of a wrong picture, noise is independent
-    between pixels, present everywhere, and unlike the picture and its gradient.
+    between pixels, present everywhere, and unlike the picture and its gradient.  It must exceed
+    what the scatter of the replicates' own differences makes, which is large where all pixels use
+    the same random numbers.
     """
     sides = (candidate, reference)
     variances = [x.var(axis=0, ddof=1) for x in sides]
@@ -65,6 +137,10 @@ def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
     scatter = float(ratios.std()) / math.sqrt(max(len(ratios) - 1, 1))
     if not float(ratios.mean()) > 5.0 * scatter:  # one false alarm in a million, were it normal
         return None
+    squares = float((difference[noisy] ** 2).sum())
+    by_chance = sum(_factor_by_chance(x, noisy) for x in sides)
+    if not math.log(max(squares, 1e-300) / float(noise[noisy].sum())) > by_chance:
+        return None
     if not (share > 0.0 and float(np.median(ratios)) > EVERYWHERE * float(ratios.mean()) > 0.0):
         return None
     z = np.where(noisy, difference.sum(axis=-1) / np.sqrt(np.where(noisy, own, 1.0)), 0.0)
@@ -73,6 +149,47 @@ def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
     if _explained(z, reference.mean(axis=0).sum(axis=-1), own, noisy) > LIKE_PICTURE:
         return None
     return share
+
+
+def _factor_by_chance(pictures: FloatArray, noisy: npt.NDArray[np.bool_]) -> float:
+    """The logarithm of the factor by which the squares of the mean's noise hardly ever exceed their
+    expectation: from R - 1 orthogonal differences of R replicates, each with the noise of one."""
+    if len(pictures) < 3:
+        return 0.0
+    squares = (_differences(pictures)[:, noisy] ** 2).sum(axis=(1, 2))
+    return _log_factor(squares)
+
+
+def excess_by_sharing(pictures: FloatArray) -> float:
+    """The factor by which the squares of the mean's noise hardly ever exceed their expectation if
+    pixels far from each other share random numbers; 1 if they do not.
+
+    pictures: replicates (R, height, width, 3).  It is 1 too for fewer than four replicates, which
+    do not show it.
+    """
+    noise = tile_sums(pictures.var(axis=0, ddof=1).sum(axis=-1)) if len(pictures) > 3 else None
+    if noise is None or not (noise > 0.0).any():
+        return 1.0
+    lit = noise > 0.0
+    squares = (_differences(pictures) ** 2).sum(axis=-1)
+    ratios = np.stack([tile_sums(x)[lit] / noise[lit] for x in squares])
+    means = ratios.mean(axis=1)
+    if ratios.shape[1] < FEWEST_TILES:
+        return math.exp(_log_factor(means))
+    of_tiles = math.sqrt(float((ratios.var(axis=1, ddof=1) / ratios.shape[1]).mean()))
+    if float(means.std(ddof=1)) < SHARING * of_tiles:
+        return 1.0
+    return math.exp(_log_factor(means))
+
+
+def _differences(pictures: FloatArray) -> FloatArray:
+    """(R - 1, height, width, 3): orthogonal, each with the noise of one replicate and no mean."""
+    return np.asarray(np.tensordot(helmert(len(pictures)), pictures, axes=1))
+
+
+def _log_factor(squares: FloatArray) -> float:
+    scatter = float(np.log(np.maximum(squares, 1e-300)).std(ddof=1))
+    return float(stats.t.isf(BY_CHANCE, len(squares) - 1)) * scatter
 
 
 def _neighbours(z: FloatArray) -> float:

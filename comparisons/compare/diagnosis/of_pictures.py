@@ -7,7 +7,7 @@ import numpy as np
 from comparisons.compare.diagnosis import brightness, place
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import Misfit
-from comparisons.compare.diagnosis.spots import one_place
+from comparisons.compare.diagnosis.spots import one_place, rim
 from comparisons.results.case import Cause, FloatArray, Images
 from comparisons.statistics.metrics import count_nonfinite
 
@@ -47,6 +47,9 @@ def likeliest(
     misfit = Misfit(images)
     if not (misfit.clear and misfit.excess > 0.0):
         return None
+    at_border = rim(misfit)
+    if at_border is not None:
+        return at_border
     found = [
         *brightness.hypotheses(misfit, lights or {}),
         *place.hypotheses(misfit),

@@ -27,6 +27,40 @@ def one_place(misfit: Misfit) -> Cause | None:
     return None
 
 
+def rim(misfit: Misfit) -> Cause | None:
+    """The rim of the picture, on three sides at least, if it holds the difference: renderers treat
+    a wide filter at the border in two ways."""
+    for block, excess in misfit.excesses():
+        total = float(excess.sum())
+        for width in range(1, WIDEST_RIM // block + 1):
+            inner = excess[width:-width, width:-width]
+            if 2 * width >= min(excess.shape) or inner.size < INNER * excess.size:
+                break
+            share = 1.0 - float(inner.sum()) / total
+            sides = (excess[:width], excess[-width:], excess[:, :width], excess[:, -width:])
+            sums = sorted(float(side.sum()) for side in sides)
+            if share > SHARE and sums[1] > ON_A_SIDE * total:
+                pixels = width * block
+                evidence = (
+                    f"{_percent(share)} of the difference are within {pixels} px of the border: "
+                    "some renderers take samples beyond it for a filter wider than a pixel, others "
+                    "do not; use a filter of one pixel, or leave its radius out by --rim"
+                )
+                return Cause("filter at the picture's border", evidence, min(share, 1.0))
+    return None
+
+
+WIDEST_RIM = 8
+"""Width in pixels up to which a rim is sought: filters have radii of 4 at most; in much noise only
+blocks of 8 pixels show it."""
+
+INNER = 0.4
+"""Least fraction of the picture inside a rim."""
+
+ON_A_SIDE = 0.05
+"""Least fraction of the difference on each of three sides."""
+
+
 def _line(excess: FloatArray, total: float) -> Cause | None:
     for axis, name in ((1, "row"), (0, "column")):
         sums = excess.sum(axis=axis)

@@ -118,6 +118,36 @@ def test_planted(name: str, cause: str) -> None:
     assert found.evidence
 
 
+def rimmed(width: int, loss: float) -> Callable[[FloatArray], FloatArray]:
+    """A rim that is darker, as where a filter's weights beyond the border count without samples."""
+
+    def change(p: FloatArray) -> FloatArray:
+        y, x = np.mgrid[: p.shape[0], : p.shape[1]]
+        from_border = np.minimum(np.minimum(x, x[::-1, ::-1]), np.minimum(y, y[::-1, ::-1]))
+        return p * (1.0 - loss * np.maximum(0.0, 1.0 - from_border / width))[..., None]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "loss"),
+    [
+        ("cornell_box", 2, -0.3),  # its outermost pixels are black
+        ("cornell_box", 3, 0.3),
+        ("cornell_box", 4, 0.2),
+        ("spheres_whitted", 1, 0.5),
+        ("spheres_whitted", 2, -0.3),
+        ("spheres_whitted", 4, 0.2),
+    ],
+)
+def test_the_rim(name: str, width: int, loss: float) -> None:
+    found = likeliest(pair(name, rimmed(width, loss)))
+    assert found is not None
+    assert found.name == "filter at the picture's border"
+    pixels = int(found.evidence.split(" px of the border")[0].rsplit(" ", 1)[1])
+    assert pixels in range(1, width + 1) or pixels == 8  # 8 where only blocks show it
+
+
 @pytest.mark.parametrize(
     ("factor", "told"), [(np.pi, "pi times"), (0.5, "half"), (2.0, "twice"), (1 / np.pi, "1/pi")]
 )

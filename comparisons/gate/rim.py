@@ -1,0 +1,81 @@
+"""Pictures without their rim, whose pixels depend on a renderer's convention.
+
+A filter wider than a pixel reaches beyond the border of the picture. Some renderers take samples
+there; others do not, and divide by the weights of the samples that they have. So the outermost
+pixels, as many as the filter's radius, differ in their noise and in their mean.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.judge import Lights
+from comparisons.compare.path_length import Lengths
+from comparisons.gate.pictures_in import Picture
+from comparisons.gate.reference import Reference
+from reference_rt.core.arrays import FloatArray
+from reference_rt.util.errors import UsageError
+
+
+def check_rim(shape: tuple[int, ...], pixels: int) -> None:
+    """Raise UsageError if pictures (..., height, width, 3) would have nothing left, or if `pixels`
+    is negative."""
+    height, width = shape[-3:-1]
+    if pixels < 0 or min(height, width) <= 2 * pixels:
+        raise UsageError(
+            f"the rim is {pixels} pixels wide, and the pictures {width} x {height}; "
+            "expected 0 or more, and less than half of the shorter side"
+        )
+
+
+def without_rim(
+    candidates: Sequence[Picture], reference: Reference, pixels: int
+) -> tuple[list[Picture], Reference]:
+    """All of them without the outermost `pixels` on each side, and a note in the reference.  Raises
+    UsageError: see `check_rim`."""
+    check_rim(reference.pictures.shape, pixels)
+    cropped = [
+        replace(
+            picture,
+            radiance=_inner(picture.radiance, pixels),
+            opacity=None if picture.opacity is None else _inner(picture.opacity, pixels),
+        )
+        for picture in candidates
+    ]
+    note = (
+        f"the outermost {pixels} pixels on each side are left out; positions count from the first "
+        "pixel that is compared"
+    )
+    judge = replace(
+        reference,
+        pictures=_inner(reference.pictures, pixels, 1),
+        variance=None if reference.variance is None else _inner(reference.variance, pixels),
+        notes=(*reference.notes, note),
+    )
+    return cropped, judge
+
+
+def without_rim_later(
+    lights: Lights | None, lengths: Lengths | None, pixels: int
+) -> tuple[Lights | None, Lengths | None]:
+    """The same for pictures that are rendered only if they are needed."""
+
+    def inner_lights() -> dict[str, FloatArray]:
+        assert lights is not None
+        return {name: _inner(light, pixels) for name, light in lights().items()}
+
+    def inner_lengths(reference: FloatArray) -> Iterator[Hypothesis]:
+        assert lengths is not None
+        rim = ((pixels, pixels), (pixels, pixels), (0, 0))
+        for one in lengths(np.pad(reference, rim)):
+            yield replace(one, picture=_inner(one.picture, pixels))
+
+    return inner_lights if lights else None, inner_lengths if lengths else None
+
+
+def _inner(x: FloatArray, pixels: int, first: int = 0) -> FloatArray:
+    """`x` without its rim along axis `first` and the next."""
+    rows, columns = (slice(pixels, x.shape[first + k] - pixels) for k in range(2))
+    return x[(slice(None),) * first + (rows, columns)]

@@ -1,0 +1,103 @@
+"""Noise that pixels share is no fault; noise that replicates share is one."""
+
+import numpy as np
+import pytest
+from renderers_that_share import RENDERERS, independent
+from scipy import stats
+
+from comparisons import statistics
+from comparisons.compare.judge import of_replicates
+from comparisons.results.case import FloatArray
+from comparisons.rungs.images import images_rung
+from comparisons.rungs.input import input_rung
+from comparisons.statistics.metrics import image_metrics
+from comparisons.statistics.shared_noise import correlated_pair
+
+UNSEEN = ("photon map, few photons", "1 point light")
+"""Few bright events of which eight replicates may have none in a region, as with any rare light:
+the tests of tiles and pixels then differ rightly, for they cannot know."""
+
+
+def wrong_rungs(name: str, seed: int, counts: tuple[int, int], same: bool, side: int) -> list[str]:
+    """The rungs by which a right renderer fails, against its own kind or independent pixels."""
+    rng = np.random.default_rng([seed, *counts])
+    a = RENDERERS[name](rng, counts[0], side)
+    b = RENDERERS[name](rng, counts[1], side) if same else independent(name, rng, counts[1], side)
+    rendered = of_replicates(a, b, {})
+    rungs = [input_rung(a, b)]
+    if name not in UNSEEN:
+        rungs += [
+            statistics.compare(a, b),
+            images_rung(rendered.images, image_metrics(rendered.images), (a, b)),
+        ]
+    return [f"{r.name}: {r.reason}" for r in rungs if r.status in ("differ", "invalid")]
+
+
+@pytest.mark.parametrize("same", [False, True], ids=["independent reference", "its own kind"])
+@pytest.mark.parametrize("name", RENDERERS)
+def test_pixels_may_share_random_numbers(name: str, same: bool) -> None:
+    found = [
+        wrong for counts in ((6, 6), (8, 16)) for wrong in wrong_rungs(name, 0, counts, same, 32)
+    ]
+    assert not found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("same", [False, True], ids=["independent reference", "its own kind"])
+@pytest.mark.parametrize("count", [6, 8, 16])
+@pytest.mark.parametrize("name", RENDERERS)
+def test_pixels_may_share_random_numbers_in_many_cases(name, count, same) -> None:
+    cases = 100
+    alarms = sum(bool(wrong_rungs(name, k, (count, 16), same, 32)) for k in range(cases))
+    assert alarms <= stats.binom.isf(1e-4, cases, 1e-3)
+
+
+def white(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    return 1.0 + 0.3 * rng.standard_normal((count, side, side, 3))
+
+
+def lognormal(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    return np.exp(rng.standard_normal((count, side, side, 1))) * np.ones(3)
+
+
+def fireflies(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    smooth = 0.5 * rng.gamma(4.0, 0.25, (count, side, side, 3))
+    return smooth + (rng.random((count, side, side, 1)) < 1e-3) * 50.0
+
+
+LAWS = {law.__name__: law for law in (white, lognormal, fireflies)} | {
+    name: RENDERERS[name] for name in ("photon map, radius 1", "box filter of 3")
+}
+
+
+@pytest.mark.parametrize(
+    ("law", "count"), [(law, n) for law in LAWS for n in (8, 16) if (law, n) != ("lognormal", 8)]
+)
+def test_two_replicates_of_overlapping_seeds(law: str, count: int) -> None:
+    """The pair that is named is the planted one. Eight lognormal replicates are too few to tell."""
+    for seed in range(4):
+        pictures = LAWS[law](np.random.default_rng([seed, count]), count, 48)
+        assert correlated_pair(pictures) is None
+        pictures[5] = 0.5 * pictures[5] + 0.5 * pictures[2]
+        found = correlated_pair(pictures)
+        assert found is not None
+        assert found[:2] == (2, 5)
+        assert found[2] > 0.3
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_chain_of_overlapping_seeds(law: str) -> None:
+    """Every replicate shares half of its samples with the next one."""
+    for seed in range(4):
+        pictures = LAWS[law](np.random.default_rng(seed), 17, 48)
+        found = correlated_pair(0.5 * (pictures[1:] + pictures[:-1]))
+        assert found is not None
+        assert found[1] - found[0] == 1
+
+
+def test_too_few_replicates_or_pixels_to_tell() -> None:
+    rng = np.random.default_rng(0)
+    for pictures in (white(rng, 5, 48), white(rng, 8, 12)):
+        pictures[1] = 0.9 * pictures[0] + 0.1 * pictures[1]
+        assert correlated_pair(pictures) is None
+    assert correlated_pair(np.ones((8, 48, 48, 3))) is None
