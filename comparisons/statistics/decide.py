@@ -174,7 +174,7 @@ def _verdict(
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(wanted(image, limit, alone)[1]),
+        "samples_factor": finite(wanted(image, limit, alone, found.level)[1]),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
         "pixels": cell_numbers(found.pixels, 1),
@@ -216,7 +216,7 @@ def _decide(found: Findings, limit: float, alone: BiasTest | None = None) -> tup
     overlooked = "" if sees else "; a bias of that size could be overlooked"
     return "inconclusive", (
         f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
-        f"{wanted(image, limit, alone)[0]}"
+        f"{wanted(image, limit, alone, found.level)[0]}"
     )
 
 
