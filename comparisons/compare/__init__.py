@@ -2,8 +2,10 @@
 
 `compare_scene` runs the deterministic rungs (film, geometry, direct, whitted) in order, renders the
 pictures of both sides (`pictures`), and hands the `Evidence` to `judge`, which adds the rungs of
-pictures and returns a `comparisons.results.case.Case`.  `diagnosis` names the likeliest cause of a
-difference.  `control` compares Mitsuba with itself: a difference there is a fault of the harness.
+pictures and returns a `comparisons.results.case.Case`.  `looks` adds replicates until the question
+is decided, if the budget has a time limit.  `diagnosis`, with `single_lights` and `path_length`,
+names the likeliest cause of a difference.  `control` compares Mitsuba with itself: a difference
+there is a fault of the harness.
 
 A `Budget` says how much work a comparison may take and which relative bias it must detect; None
 means the scene's own value.  Pictures are (height, width, 3) float64 linear radiance, replicates

@@ -1,9 +1,10 @@
 """The gate: another renderer's pictures against our rendering of a scene, or other pictures.
 
 `pictures_in` reads candidates, `driver` runs a renderer to make them, `request` finds what they are
-compared with (`reference`: our rendering or files; `baselines`: accepted pictures), `gate` returns
-a `comparisons.results.case.Case`, `outputs` writes it.  `pytest_plugin` is the fixture
-`image_gate`.
+compared with (`reference`: our rendering or files; `baselines`: accepted pictures), `copies` finds
+those that are unchanged, `gate` returns a `comparisons.results.case.Case`, `outputs` writes it.
+`rounds` drives a renderer until the question is decided (see `comparisons.compare.looks`).
+`pytest_plugin` is the fixture `image_gate`.
 
 Pictures are linear sRGB radiance (height, width, 3) in float64, row 0 on top, premultiplied by
 opacity; replicates are (replicates, height, width, 3).  A baseline named "" and a scene None mean

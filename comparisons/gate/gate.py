@@ -54,8 +54,9 @@ def gate_pictures(
 
     limit: the smallest relative bias of the image mean that must be detectable;  lights, lengths:
     for the diagnosis of a difference;  rim: how many of the outermost pixels are left out on each
-    side.  Candidates that are copies of the reference's pictures are `unchanged`.  Raises ImageError for candidates whose size is not the reference's, UsageError for
-    several candidates without noise and for a rim that leaves nothing.
+    side.  Candidates that are copies of the reference's pictures are `unchanged`.  Raises
+    ImageError for candidates whose size is not the reference's, UsageError for several candidates
+    without noise and for a rim that leaves nothing.
     """
     check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
     copies = Copies.of(reference.fingerprints)

@@ -48,6 +48,9 @@ agree without it. So the reason says on what it is conditional: it names the num
 the share of the energy that one replicate alone met, and how much of such light may be missing.
 Every test needs some such assumption (Bahadur and Savage 1956).
 
+A run may look at its replicates several times while their number grows: each look uses a share of
+every level (`compare`, `level`), and the shares sum to 1 at most (`comparisons.compare.looks`).
+
 Contract: pictures are linear radiance, (R, height, width, 3) or (height, width, 3); biases, limits
 and margins are fractions of the reference's mean. `compare` returns the `statistics` rung. A side
 of a single picture is handled by `single`; a reference with known mean and variance is `Known`. To

@@ -8,13 +8,13 @@ candidate could show agreement, and the advice is about the reference.
 import math
 
 import numpy as np
+from scipy import stats
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.cells import image_test
-from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import Margins
+from comparisons.statistics.scales import IMAGE_LEVEL, Margins
 from comparisons.statistics.sides import Known, known_side, side_of
-from comparisons.statistics.welch import BiasTest
+from comparisons.statistics.welch import MOST_DOF, BiasTest, quantiles
 from comparisons.statistics.wording import percent
 
 
@@ -35,36 +35,42 @@ def noise_free_candidate(
 
 
 def wanted(
-    image: BiasTest, limit: float, alone: BiasTest | None, least: float = 0.0
+    image: BiasTest,
+    limit: float,
+    alone: BiasTest | None,
+    level: float = 1.0,
+    least: float = 0.0,
 ) -> tuple[str, float]:
-    """How many more samples are needed, in words, and the factor.
+    """How many more samples are needed, in words, and the factor of samples per pixel.
 
     image: the test of this run;  alone: what the reference by itself allows, if only the
-    candidate's samples can be raised; None if those of both sides can;  least: the factor that
-    is needed anyway, infinite if it is unknown.
+    candidate's samples can be raised; None if those of both sides can;  level: that of the test;
+    least: the factor that is needed anyway, infinite if it is unknown.
     """
-    if not math.isfinite(least):
-        return _times(least, ""), least
-    if alone is None:
-        factor = max(image.samples_factor(limit), least)
-        return _times(factor, "replicates x {0} or spp x {0}"), factor
-    factor = max(candidate_factor(image, alone, limit), least)
-    if math.isfinite(factor) or not np.isfinite(image.samples_factor(limit)):
-        return _times(factor, "the candidate's replicates x {0} or spp x {0}"), factor
-    return _too_noisy_a_reference(alone, limit), factor
+    factor = max(image.samples_factor(limit), least)
+    if not math.isfinite(factor):
+        return _UNKNOWN, factor
+    if alone is not None:
+        factor = max(factor_needed(image, limit, alone, level, replicates=False), least)
+    elif min(float(np.min(error.dof)) for error in image.errors) >= ENOUGH:
+        return _times(factor, factor, ""), factor
+    fewer = max(factor_needed(image, limit, alone, level, replicates=True), least)
+    if not math.isfinite(fewer) and alone is not None:
+        return _too_noisy_a_reference(alone, limit, level), fewer
+    return _times(fewer, factor, "" if alone is None else " of the candidate"), factor
 
 
-def shortfall(alone: BiasTest, limit: float) -> str:
+def shortfall(alone: BiasTest, limit: float, level: float = 1.0) -> str:
     """Why no candidate can reach `limit` against this reference; "" if one can."""
     seen = alone.over_scale(alone.detectable).max()
-    return _too_noisy_a_reference(alone, limit) if seen > limit else ""
+    return _too_noisy_a_reference(alone, limit, level) if seen > limit else ""
 
 
-def _too_noisy_a_reference(alone: BiasTest, limit: float) -> str:
+def _too_noisy_a_reference(alone: BiasTest, limit: float, level: float) -> str:
     seen = float(alone.over_scale(alone.detectable).max())
-    factor = alone.samples_factor(limit)
-    more = _times(factor, "replicates x {0} or spp x {0}", "the reference's samples")
     if seen > limit:
+        replicates = factor_needed(alone, limit, None, level, replicates=True)
+        more = _times(replicates, alone.samples_factor(limit), " of the reference")
         return (
             "the noise of the reference is the limit: even with a candidate without noise, a bias "
             f"below {percent(seen)} could be overlooked; {more}"
@@ -75,24 +81,66 @@ def _too_noisy_a_reference(alone: BiasTest, limit: float) -> str:
     )
 
 
-def candidate_factor(image: BiasTest, alone: BiasTest, limit: float) -> float:
-    """The factor of the candidate's samples that suffices while the reference stays as it is;
-    infinite if none does.  Squared errors of both sides add."""
-    dof = min(float(np.min(error.dof)) for error in image.errors)
-    cushion = (1.0 + 1.645 / math.sqrt(dof)) ** 2  # as in `BiasTest.samples_factor`
+def factor_needed(
+    image: BiasTest, limit: float, alone: BiasTest | None, level: float, *, replicates: bool
+) -> float:
+    """The factor of replicates, or of samples per pixel of each, that will probably suffice;
+    infinite if none does.
+
+    More replicates also have more degrees of freedom: four replicates of which each tells little
+    seem to need a hundred times the samples, and need five times the replicates.  Squared errors of
+    both sides add.  Of few replicates neither the difference nor its error is known well: the
+    difference counts as far as it exceeds two standard errors, and an error as much as is certain.
+    alone, level: as in `wanted`.
+    """
+    known = _known(image)
+    fixed = np.zeros_like(known) if alone is None else np.minimum(_known(alone), known)
+    size = np.maximum(np.abs(image.difference) - 2.0 * known, 0.0)
     margin = image.margin * image.scale
-    reach, floor = image.detectable - margin, alone.detectable - margin
-    inside = limit * image.scale - np.abs(image.difference)
-    beyond = np.abs(image.difference) - margin
-    goal = np.minimum(limit * image.scale - margin, np.maximum(inside, beyond))
-    room = goal**2 - floor**2
-    if not ((goal > 0.0) & (room > 0.0)).all():
-        return math.inf
-    return float(cushion * ratio(np.maximum(reach**2 - floor**2, 0.0), room).max())
+    goal = np.minimum(
+        limit * image.scale - margin, np.maximum(limit * image.scale - size, size - margin)
+    )
+    reach_of = quantiles(-math.expm1(math.log1p(-level * IMAGE_LEVEL) / image.difference.size))[1]
+    for factor in np.geomspace(1.0, MOST, 400):
+        value = np.sqrt((known**2 - fixed**2) / factor + fixed**2)
+        dof = [error.dof * (factor if replicates else 1.0) for error in image.errors]
+        reach = [reach_of[np.clip(d, 1.0, MOST_DOF).astype(np.int64)] * value for d in dof]
+        if (np.max(reach, axis=0) <= goal).all():
+            return float(factor)
+    return math.inf
 
 
-def _times(factor: float, how: str, whose: str = "the samples") -> str:
-    if not math.isfinite(factor):
-        return "these pictures do not show how many samples are needed: give more replicates"
-    times = f"{factor:.{0 if factor > 10 else 1}f}"
-    return f"it takes about {times} times {whose}: {how.format(times)}"
+def _known(test: BiasTest) -> FloatArray:
+    """The largest of the lower bounds, at 95 %, of the standard errors."""
+    bounds = [e.value * np.sqrt(e.dof / stats.chi2.isf(0.05, e.dof)) for e in test.errors]
+    return np.asarray(np.max(bounds, axis=0))
+
+
+FEW = 2.0
+"""Replicates are called too few if more of them need so many times fewer samples than more samples
+per pixel do."""
+
+ENOUGH = 8.0
+"""Degrees of freedom from which on more replicates are as good as more samples per pixel."""
+
+MOST = 1e7
+"""Factors beyond it are called infinite."""
+
+_UNKNOWN = "these pictures do not show how many samples are needed: give more replicates"
+
+
+def _times(replicates: float, samples: float, whose: str) -> str:
+    if not math.isfinite(replicates):
+        return _UNKNOWN
+    spp = _number(samples)
+    if samples > FEW * replicates:
+        other = f", or {spp} times the samples per pixel of each" if samples < MOST else ""
+        return (
+            f"there are too few replicates: it takes about {_number(replicates)} times the "
+            f"replicates{whose}{other}"
+        )
+    return f"it takes about {spp} times the samples{whose}: replicates x {spp} or spp x {spp}"
+
+
+def _number(factor: float) -> str:
+    return f"{factor:.{0 if factor > 10 else 1}f}"

@@ -190,7 +190,7 @@ def _verdict(
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(wanted(image, limit, alone, _least(found, limit))[1]),
+        "samples_factor": finite(wanted(image, limit, alone, found.level, _least(found, limit))[1]),
         "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
@@ -236,7 +236,7 @@ def _decide(found: Findings, limit: float, alone: BiasTest | None = None) -> tup
         overlooked += "; as much light may have been missed by chance, since few samples meet it"
     return "inconclusive", (
         f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
-        f"{wanted(image, limit, alone, _least(found, limit))[0]}"
+        f"{wanted(image, limit, alone, found.level, _least(found, limit))[0]}"
     )
 
 

@@ -295,7 +295,7 @@ def test_too_few_pictures_for_the_limit_are_told(
     assert (f"a limit of {100 * float(limit):g} % cannot be reached with" in output) == told, output
     if told and float(limit) > 0.001:
         assert "even with a candidate without noise, a bias below" in output
-        assert "times the reference's samples" in output
+        assert "times the replicates of the reference, or " in output
 
 
 def test_a_scene_of_another_size(files: list[str]) -> None:

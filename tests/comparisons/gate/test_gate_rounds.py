@@ -1,6 +1,7 @@
 """A renderer that the gate drives: the first picture is checked, others are added until they
 decide."""
 
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from gate_checks import run
 
+from comparisons import statistics
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.request import Request
 from comparisons.gate.rounds import Rounds, gated_renderer
@@ -91,7 +93,8 @@ def test_fixed_replicates_are_looked_at_once() -> None:
     assert case.verdict == "inconclusive"
     assert renderer.seeds == list(range(5, 11))
     assert "look 1" not in case.reason
-    assert "the candidate's replicates x" in case.reason
+    assert "there are too few replicates: it takes about " in case.reason
+    assert "times the replicates of the candidate, or " in case.reason
 
 
 def test_one_picture_is_one_picture() -> None:
@@ -164,7 +167,32 @@ def test_a_reference_of_few_pictures_is_named_as_the_limit() -> None:
     assert case.verdict == "inconclusive"
     told = "the noise of the reference is the limit: even with a candidate without noise, a bias"
     assert told in case.reason
-    assert "times the reference's samples" in case.reason
+    assert "times the replicates of the reference" in case.reason
+
+
+@pytest.mark.parametrize(("count", "exact"), [(4, 64), (8, 64), (8, 8), (16, 16)])
+def test_the_stated_number_of_replicates_decides(count: int, exact: int) -> None:
+    """Within a factor of two and a bit: twice the number decides, a third of it does not."""
+    limit, decided, early = 0.01, 0, 0
+    for seed in range(10):
+        candidates = pictures(range(1000 * seed, 1000 * seed + count), 0.25)
+        judges = np.stack([p.radiance for p in pictures(range(10**6, 10**6 + exact), 0.02)])
+
+        def compared(candidates: list[Picture], judges: FloatArray = judges) -> Any:
+            stacked = np.stack([p.radiance for p in candidates])
+            return statistics.compare(stacked, judges, limit=limit, fixed_reference=True)
+
+        found = compared(candidates)
+        assert found.status == "inconclusive"
+        told = re.search(r"about ([\d.]+) times the (replicates|samples)", found.reason)
+        assert told is not None, found.reason
+        for factor, is_early in ((2.0 * float(told[1]), False), (float(told[1]) / 3.0, True)):
+            more = max(2, round(factor * count))
+            again = compared(pictures(range(10**5 + 1000 * seed, 10**5 + 1000 * seed + more), 0.25))
+            decided += again.status == "agree" and not is_early
+            early += again.status == "agree" and is_early
+    assert decided >= 8
+    assert early <= 3
 
 
 MANY = """\

@@ -95,7 +95,7 @@ def test_eight_bits_of_a_noisy_picture_are_no_radiance(right: FloatArray) -> Non
 def test_replicates_must_be_independent(right: FloatArray) -> None:
     result, _ = run(*files(right[[0, 0, 1]]), "--scene", "ball.yaml")
     assert result.exit_code == 3, result.output
-    assert "invalid: input: " in result.output
+    assert "ball: invalid: nothing can be said: replicates 0, 1 of 3" in result.output
 
 
 def test_wrong_usage(right: FloatArray) -> None:

@@ -159,14 +159,15 @@ mean."""
 
 
 def alarms_against_a_precise_reference(law, counts, cases):
-    """A gate's: its pictures are fewer than the candidate's, but have more samples. Without the
-    ranks, which assume pictures of one law on both sides."""
+    """A gate's: its pictures are fewer than the candidate's, but have more samples. Of the image
+    and its tiles: ranks and single pixels assume pictures of one law on both sides, and have false
+    alarms here (pareto: 2 in 400 by the ranks; texture: 4 in 300 by pixels)."""
     alarms, (many, few, each) = 0, counts
     for seed in range(cases):
         rng = np.random.default_rng([seed, *counts])
         reference = np.stack([law(rng, each, 16).mean(axis=0) for _ in range(few)])
         found = findings(law(rng, many, 16), reference, 16, Margins())
-        alarms += any(t.differs.any() for t in (found.image, found.tiles, found.pixels))
+        alarms += any(t.differs.any() for t in (found.image, found.tiles))
     return alarms
 
 
