@@ -5,6 +5,7 @@ pictures are tiny, and rays are few.  Reads a request and writes its answer as J
 """
 
 import json
+import os
 import sys
 import threading
 from collections.abc import Sequence
@@ -55,7 +56,8 @@ def _of_scene(path: Path, calls: bool, before: Sequence[float] | None) -> dict[s
 
     def profile(frame: Any, event: str, argument: Any) -> None:
         if event == "call" and "reference_rt" in frame.f_code.co_filename:
-            functions.add((frame.f_code.co_filename, frame.f_code.co_name))
+            file = os.path.realpath(frame.f_code.co_filename)
+            functions.add((file, frame.f_code.co_name))
 
     if calls:
         threading.setprofile(profile)

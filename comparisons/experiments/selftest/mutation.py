@@ -69,15 +69,16 @@ class Fate:
 
 def mutation(count: int, seed: int, scenes: Path, say: Say) -> Iterator[Fate]:
     """The fate of `count` mutants of the functions that SCENES run."""
-    package = Path(reference_rt.__file__).parent
+    package = Path(reference_rt.__file__).resolve().parent
     paths = [str((scenes / f"{name}.yaml").resolve()) for name in SCENES]
     say(f"pictures of {len(paths)} scenes")
     right = _run(None, package, {"scenes": paths, "calls": True, "before": None})
     runs: dict[Place, list[str]] = {}
     for path, found in right.items():
         for file, function in found.get("functions", ()):
-            place = Path(file).resolve().relative_to(package.resolve()).as_posix(), function
-            runs.setdefault(place, []).append(path)
+            if Path(file).is_relative_to(package):  # generated code is in no file
+                place = Path(file).relative_to(package).as_posix(), function
+                runs.setdefault(place, []).append(path)
     places = [place for place in functions_of(package) if place in runs]
     say(f"{len(places)} functions")
     for mutant in mutants(package, places, count, seed):
