@@ -22,9 +22,17 @@ def selftest(
     power: Annotated[
         bool, typer.Option(help="Measure how often biases of each size are caught.")
     ] = True,
+    mutants: Annotated[
+        int,
+        typer.Option(min=0, help="In place of all that: so many random changes of the kernels."),
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random changes.")] = 0,
     scenes: Scenes = Path("scenes"),
 ) -> None:
     """Test the harness: plant faults and check that the suites catch them; count false alarms."""
+    if mutants:
+        _mutate(mutants, seed, scenes, out)
+        return
     from comparisons.experiments.selftest import FAULTS
     from comparisons.experiments.selftest.run import SUITES, run
     from reference_rt.util.files import check_writable
@@ -49,3 +57,23 @@ def selftest(
             say(f"{alarms.kind}, {alarms.name}: {alarms.false_alarms} false alarms")
     say(", ".join(map(str, files)))
     raise typer.Exit(0 if outcome.holds else 1)
+
+
+def _mutate(count: int, seed: int, scenes: Path, out: Path) -> None:
+    """Mutation testing; writes what is known after each mutant."""
+    from comparisons.experiments.selftest.mutation import FILES, mutation, summary, write
+    from reference_rt.util.files import check_writable
+
+    check_writable(*(out / name for name in FILES))
+    console = Console(stderr=True, highlight=False)
+
+    def say(line: str) -> None:
+        console.print(line, markup=False, soft_wrap=True)
+
+    fates = []
+    for fate in mutation(count, seed, scenes, say):
+        fates.append(fate)
+        where = f" ({fate.rung}, {fate.scene})" if fate.rung else ""
+        say(f"{fate.file}:{fate.line} {fate.what}: {fate.outcome}{where}")
+        write(fates, seed, out)
+    say(summary(fates).partition("\n")[0])

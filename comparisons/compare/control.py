@@ -73,9 +73,7 @@ def _pictures(scene: Scene, budget: Budget, seed: int) -> FloatArray:
     """(replicates, height, width, 3) by the active variant; one replicate if deterministic."""
     counterpart = load(scene)
     if isinstance(scene.integrator, RayCast):
-        tables = build_tables(scene)
-        ours = render(scene, tables=tables)
-        return pictures.mitsuba_cast(scene, tables, counterpart, ours)[0][np.newaxis]
+        return pictures.mitsuba_cast(scene, counterpart, render(scene))[0][np.newaxis]
     if counterpart.no_light_reason:
         raise _NoLightError(counterpart.no_light_reason)
     if isinstance(scene.integrator, Whitted):

@@ -27,13 +27,13 @@ def cast(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendere
     """Ray casting: the displayed layer; Mitsuba's is made from its own hits of the same rays."""
     ours = render(scene, tables=tables)
     start = time.perf_counter()
-    theirs, notes = mitsuba_cast(scene, tables, counterpart, ours)
+    theirs, notes = mitsuba_cast(scene, counterpart, ours)
     seconds = _seconds(ours, time.perf_counter() - start)
     return Rendered(Images(display(ours), theirs), seconds, notes=notes)
 
 
 def mitsuba_cast(
-    scene: Scene, tables: SceneTables, counterpart: Counterpart, ours: Picture
+    scene: Scene, counterpart: Counterpart, ours: Picture
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """The layer that `ours` shows, as displayed (height, width, 3), made from Mitsuba's hits of the
     rays through the pixel centres; and notes for the reader."""

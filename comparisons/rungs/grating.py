@@ -31,7 +31,7 @@ PERIOD = 3
 STRIPE = (0.2, 1.6)
 """Where a stripe begins and ends in its period."""
 
-SAMPLES = 16
+SAMPLES = 64
 
 LIMIT = 6.0
 """Largest error in units of the standard error of the mean of a third of the pixels: by chance

@@ -129,7 +129,7 @@ def _mitsubas(scene: Scene) -> GridPoint:
     for _ in range(REPEATS):  # the first compiles
         start = time.perf_counter()
         if casts:
-            picture = pictures.mitsuba_cast(scene, scene.tables, counterpart, ours)[0]
+            picture = pictures.mitsuba_cast(scene, counterpart, ours)[0]
         else:
             picture = pictures.mitsuba_whitted(scene, scene.tables, counterpart)
         seconds.append(time.perf_counter() - start)

@@ -3,9 +3,10 @@
 Sensitivity: faults are planted in pictures (`of_pictures`), scenes (`of_scenes`, `of_materials`,
 `of_shapes`) and the renderer's source (`of_sources`, `of_kernels`), and compared with a suite's
 budgets; `finding` says whether a fault was caught, and at which rung.  `power`: the fraction of
-runs that catch a fault, by its size.  `calibration`: how often the bias that a verdict states as
-detectable is detected.  Specificity: right renderers of twelve kinds (`right`) are judged with many
-seeds, and false alarms are counted.
+runs that catch a fault, by its size.  Mutation testing: random changes of the kernels (`mutants`),
+and what the rungs say to them (`mutation`).  `calibration`: how often the bias that a verdict
+states as detectable is detected.  Specificity: right renderers of twelve kinds (`right`) are judged
+with many seeds, and false alarms are counted.
 
 To add a fault, add it to FAULTS of its file; a source fault's old text must occur exactly once.
 """

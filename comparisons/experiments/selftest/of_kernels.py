@@ -138,6 +138,11 @@ FAULTS = (
         "            total = total + weight * background * (1.0 if depth == 0 else 0.0)\n",
     ),
     SourceFault(
+        "mirrors in mirrors black after two", "whitted_classic", "integrators/whitted.py",
+        "        if depth == whitted.max_depth:\n",
+        "        if depth == min(whitted.max_depth, 2):\n",
+    ),
+    SourceFault(
         "checks of a third", "whitted_classic", "textures/checker.py",
         "    low_u = u - math.floor(u) < 0.5\n", "    low_u = u - math.floor(u) < 0.34\n",
     ),

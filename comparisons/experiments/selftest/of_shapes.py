@@ -97,5 +97,4 @@ FAULTS = (
     SceneFault("difference of a solid in reverse", "csg_inside", _operands_turned_round),
     SceneFault("operand of a solid 0.1 % larger", "csg_inside", operand(radius=3.003)),
     SceneFault("box of a solid lost its turn", "transforms", first(Box, transform=())),
-    SceneFault("one mirror image less", "whitted_classic", part("integrator", max_depth=1)),
 )  # fmt: skip

@@ -174,6 +174,27 @@ def test_means_of_one_distribution_agree(seed: int) -> None:
     assert means.compare_means((halves[0], halves[1]), (halves[2], halves[3])).score < means.LIMIT
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["edges", "rare", "few edges"])
+def test_false_alarms_of_means(kind: str) -> None:
+    """Ours of independent samples, Mitsuba's of stratified ones: the products are not symmetric."""
+    worst = 0.0
+    for seed in range(400):
+        rng = np.random.default_rng(seed)
+        share = rng.uniform(size=(48, 64, 1)) * (0.02 if kind == "rare" else 1.0)
+        if kind == "few edges":
+            share *= rng.uniform(size=share.shape) < 0.05
+        colour = np.array([1.0, 0.5, 0.2])
+        ours = [rng.binomial(64, share) / 64 * colour for _ in range(2)]
+        least = np.floor(64 * share)
+        theirs = [
+            (least + (rng.uniform(size=share.shape) < 64 * share - least)) / 64 * colour
+            for _ in range(2)
+        ]
+        worst = max(worst, means.compare_means((ours[0], ours[1]), (theirs[0], theirs[1])).score)
+    assert worst < means.LIMIT
+
+
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("factor", [1.0, 1.15, 0.85])
 def test_variance_of_heavy_tails(seed: int, factor: float) -> None:

@@ -1,0 +1,93 @@
+"""Mutants: each is one change, still Python, drawn by a seed; and the counting of their fates."""
+
+import ast
+import textwrap
+from pathlib import Path
+
+import pytest
+
+import reference_rt
+from comparisons.experiments.selftest.mutants import functions_of, mutants
+from comparisons.experiments.selftest.mutation import SCENES, Fate, summary, write
+
+PACKAGE = Path(reference_rt.__file__).parent
+ROOT = Path(__file__).parents[3]
+
+
+def package(folder: Path, text: str) -> Path:
+    (folder / "core").mkdir()
+    (folder / "core" / "a.py").write_text(textwrap.dedent(text))
+    return folder
+
+
+def test_kernels_of_the_package_are_found() -> None:
+    found = functions_of(PACKAGE)
+    assert len(found) > 500
+    assert ("integrators/path.py", "radiances") in found
+    assert ("accel/geometry.py", "closest_hit") in found  # an operation
+    assert ("rendering/tiles.py", "render_tile") in found
+    assert not any(name == "tabulate" for _, name in found)
+
+
+def test_mutants_are_one_change_each_and_python() -> None:
+    found = mutants(PACKAGE, functions_of(PACKAGE), 60, 3)
+    assert len({(m.file, m.function, m.line, m.what) for m in found}) > 55
+    for mutant in found:
+        tree = ast.parse(mutant.text)
+        right = ast.parse((PACKAGE / mutant.file).read_text(encoding="utf-8"))
+        a, b = ast.unparse(right).splitlines(), ast.unparse(tree).splitlines()
+        assert len(a) == len(b)
+        assert sum(x != y for x, y in zip(a, b, strict=True)) == 1, mutant
+
+
+def test_the_seed_decides() -> None:
+    places = functions_of(PACKAGE)
+    one, same, other = (mutants(PACKAGE, places, 5, seed) for seed in (1, 1, 2))
+    assert one == same
+    assert one != other
+
+
+@pytest.mark.parametrize(
+    ("line", "changes"),
+    [
+        ("return a + b", {"a - b"}),
+        ("return a / b", {"a * b"}),
+        ("return a < b", {"a > b"}),
+        ("return a and b", {"a or b"}),
+        ("return -a", {"+a"}),
+        ("return not a", {"-a"}),
+        ("return a[2]", {"3"}),
+        ("return 0.5", {"0.525"}),
+        ("return 0.0", {"0.05"}),
+        ("return a.x", {"a.y"}),
+        ("return min(a, b)", {"max"}),
+        ("return math.sin(a)", {"math.cos"}),
+        ("return a", set()),
+        ("return 'a'", set()),
+        ("return True", set()),
+    ],
+)
+def test_every_kind_of_change(tmp_path: Path, line: str, changes: set[str]) -> None:
+    root = package(tmp_path, f"@kernel\ndef f(a, b):\n    {line}\n\ndef g(a):\n    return a + 1\n")
+    found = mutants(root, functions_of(root), 99, 0)
+    assert {m.what.partition(" -> ")[2] for m in found} == changes
+    assert all(m.function == "f" for m in found)
+
+
+def test_counting(tmp_path: Path) -> None:
+    def fate(outcome: str) -> Fate:
+        return Fate("f.py", "g", 7, "a + b -> a - b", outcome, "direct", "s", "why")
+
+    fates = [*[fate("caught")] * 18, *[fate("survives")] * 2, fate("same"), fate("fails")]
+    text = summary(fates)
+    assert text.startswith("18 of 20 mutants that change a picture are caught (68% to 99%)")
+    assert text.count("- f.py:7 g: a + b -> a - b") == 2
+    write(fates, 4, tmp_path)
+    assert (tmp_path / "mutants.md").read_text() == text
+    assert summary([fate("caught")]).startswith("1 of 1")
+    assert summary([]).startswith("0 of 0")
+
+
+def test_the_scenes_exist() -> None:
+    assert all((ROOT / "scenes" / f"{name}.yaml").is_file() for name in SCENES)
+    assert len(set(SCENES)) == len(SCENES)
