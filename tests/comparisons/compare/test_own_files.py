@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
@@ -16,6 +17,7 @@ from comparisons.results.case import Case
 from comparisons.suites.keys import case_key
 from comparisons.suites.work import Changes
 from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import SceneWarning
 
 FILM = """<integer name="width" value="64"/><integer name="height" value="48"/>
   <integer name="crop_offset_x" value="16"/><integer name="crop_offset_y" value="12"/>
@@ -89,6 +91,47 @@ def test_a_camera_without_a_translation_is_compared_by_its_picture(tmp_path):
     """Our translator has no lens off the axis; the user's file has."""
     extra = '<float name="aperture_radius" value="0.1"/><float name="focus_distance" value="4"/>'
     case = compared(placed(tmp_path, FILM, "thinlens", extra))
+    assert case.verdict == "agree", case.reason
+
+
+MIRRORED = """<scene version="3.0.0">
+  <sensor type="perspective"><float name="fov" value="45"/><transform name="to_world">
+    <scale x="-1"/><lookat origin="1, 2, 5" target="0.2, 0, 0" up="0.1, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/>
+      <integer name="crop_width" value="20"/><integer name="crop_offset_x" value="1"/></film>
+  </sensor>
+  <bsdf type="twosided" id="b"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">
+    <transform name="to_uv"><scale x="6" y="3"/></transform></texture></bsdf></bsdf>
+  <shape type="sphere"><ref id="b"/><transform name="to_world"><rotate y="1" angle="50"/>
+    <translate x="-1"/></transform></shape>
+  <shape type="disk"><ref id="b"/><transform name="to_world"><scale x="2" y="1"/>
+    <rotate x="1" angle="-60"/><translate x="1"/></transform></shape>
+  <shape type="cube"><bsdf type="dielectric"/><transform name="to_world"><scale value="0.4"/>
+    <rotate z="1" angle="20"/><translate x="1" y="1"/></transform></shape>
+  <shape type="shapegroup" id="g"><shape type="cylinder"><ref id="b"/></shape></shape>
+  <shape type="instance"><ref id="g"/><transform name="to_world"><scale value="0.3"/>
+    <rotate y="1" angle="70"/><translate y="1.2"/></transform></shape>
+  <shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/>
+    <translate y="-1"/></transform></shape>
+  <shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
+    <translate x="-2" y="3"/></transform><emitter type="area"/></shape>
+  <emitter type="spot"><transform name="to_world"><lookat origin="3, 3, 1" target="0, 0, 0"
+    up="0, 1, 0"/></transform><rgb name="intensity" value="20, 10, 5"/></emitter>
+  <emitter type="point"><point name="position" x="2" y="1" z="3"/></emitter>
+  <emitter type="directional"><vector name="direction" x="1" y="-2" z="-0.5"/></emitter>
+  <emitter type="envmap"><string name="filename" value="sky.png"/><transform name="to_world">
+    <rotate y="1" angle="30"/></transform></emitter>
+</scene>
+"""
+
+
+def test_a_camera_that_mirrors_sees_the_mirrored_scene(tmp_path):
+    sky = np.random.default_rng(0).integers(0, 255, (4, 8, 3), dtype=np.uint8)
+    Image.fromarray(sky).save(tmp_path / "sky.png")
+    (tmp_path / "own.xml").write_text(MIRRORED)
+    with pytest.warns(SceneWarning, match="the whole scene is mirrored"):
+        scene = read_file(tmp_path / "own.xml", Scene)
+    case = compared(scene)
     assert case.verdict == "agree", case.reason
 
 
