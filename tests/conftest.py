@@ -15,6 +15,7 @@ LONGEST_FIRST = (
     "test_extremes",  # compiles the kernels of all tests that use `worlds`
     "test_plain_python",
     "test_counterpart_light",
+    "test_reading_plugins",
     "test_rungs",
     "test_stability_metamorphic",
     "test_estimators",

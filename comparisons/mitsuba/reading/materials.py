@@ -255,11 +255,15 @@ def _bump(reading: Reading, node: Node) -> Material:
 
 
 def _normal_map(reading: Reading, node: Node) -> Material:
-    _plain_law(node)
     (base,) = _nested(reading, node, 1, 1)
     normals = colour_or_texture(reading, node, "normalmap", 0.5)
+    if normals == (0.5, 0.5, 1.0):  # the surface's own normals: no law applies
+        node.ignore("flip_invalid_normals", "use_shadowing_function")
+        found: Material = reading.materials[base]
+        return found
     if not isinstance(normals, str):
         raise node.error("'normalmap' is a colour, or not given; expected a texture")
+    _plain_law(node)
     return NormalMap(base=base, normals=normals)
 
 

@@ -133,6 +133,8 @@ def finished(surface: Surface, flip: bool, uses_uv: bool, material: str | None) 
     normals = surface.normals
     if normals is not None and flip:
         normals = -normals
+    if normals is not None and _are_flat(surface.vertices[faces], normals[faces]):
+        normals = None
     return Mesh(
         vertices=surface.vertices,
         faces=faces,
@@ -142,6 +144,13 @@ def finished(surface: Surface, flip: bool, uses_uv: bool, material: str | None) 
         face_normals=normals is None,
         material=material,
     )
+
+
+def _are_flat(corners: FloatArray, normals: FloatArray) -> bool:
+    """Whether all vertex normals (m, 3, 3) are those of the triangles (m, 3, 3) themselves, to
+    float32: a mesh without vertex normals is the simpler scene."""
+    own = unit(geometric_normals(corners.reshape(-1, 9)))
+    return bool(np.abs(normals - own[:, None, :]).max() < 2.0**-22)
 
 
 def _coloured(node: Node, surface: Surface, names: set[str], path: Path) -> Surface:

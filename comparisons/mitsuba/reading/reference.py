@@ -43,6 +43,7 @@ def own_scene(scene: Scene) -> Any:
     state.nodes[box].props = mi.Properties("box")
     sampler = _child(mi, state, sensor, mi.ObjectType.Sampler, "independent")
     state.nodes[sampler].props = mi.Properties("independent")
+    _child(mi, state, 0, mi.ObjectType.Integrator, "path")
     _without_moments(mi, state)
     config = mi.parser.ParserConfig(mi.variant())
     config.merge_equivalent = config.merge_meshes = False

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.mitsuba.reading.context import Reading
+from comparisons.mitsuba.reading.mirrored import MIRROR, mirror_scene
 from comparisons.mitsuba.reading.node import Node
 from reference_rt.cameras import AnyCamera, Orthographic, Perspective, ThinLens
 from reference_rt.cameras.film import Film
@@ -92,7 +93,7 @@ def _camera_without_element(frame: Frame) -> AnyCamera:
 # ---- cameras ------------------------------------------------------------------------------------
 
 
-def _place(node: Node, rigid: bool = True) -> tuple[dict[str, Any], Affine]:
+def _place(reading: Reading, node: Node, rigid: bool = True) -> tuple[dict[str, Any], Affine]:
     """eye, target and up, and to_world.  rigid: refuse scales, as Mitsuba does."""
     m = node.transform()
     linear = m[:, :3]
@@ -105,10 +106,8 @@ def _place(node: Node, rigid: bool = True) -> tuple[dict[str, Any], Affine]:
     if np.abs(unit.T @ unit - np.eye(3)).max() > TOLERANCE:
         raise node.error("'to_world' shears; expected a rotation and a translation")
     if np.linalg.det(unit) < 0.0:
-        raise node.error(
-            "'to_world' mirrors the picture, which is not supported; expected a rotation: mirror "
-            "the picture instead"
-        )
+        mirror_scene(reading, node)
+        m, unit = MIRROR @ m, MIRROR @ unit
     eye = m[:, 3]
     # A target far away in units of the eye's coordinates: the direction must not be lost.
     distance = max(1.0, float(np.abs(eye).max()))
@@ -169,7 +168,7 @@ def _focal(length: float) -> dict[str, Any]:
 
 
 def _perspective(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
-    place, _ = _place(node)
+    place, _ = _place(reading, node)
     _clip(reading, node)
     node.ignore("focus_distance")  # Mitsuba reads it for every projective camera
     values, half = _angle(node, frame)
@@ -180,7 +179,7 @@ def _perspective(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
 
 
 def _thin_lens(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
-    place, _ = _place(node)
+    place, _ = _place(reading, node)
     far = _clip(reading, node)
     values, half = _angle(node, frame)
     if frame.is_cropped:
@@ -194,7 +193,7 @@ def _thin_lens(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
 
 
 def _orthographic(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
-    place, m = _place(node, rigid=False)
+    place, m = _place(reading, node, rigid=False)
     _clip(reading, node)
     node.ignore("focus_distance")
     right, up, _ = np.linalg.norm(m[:, :3], axis=0).tolist()

@@ -5,17 +5,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mitsuba_dicts import hits_of, theirs_along
+from PIL import Image
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
+from comparisons.mitsuba.backend import backend, mitsuba
 from comparisons.mitsuba.reading import read_file
 from comparisons.mitsuba.reading.reference import file_of, own_scene
-from comparisons.mitsuba.scene import picture
+from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.results.case import Case
+from comparisons.rungs.rays.camera import camera_rays
 from comparisons.suites.keys import case_key
 from comparisons.suites.work import Changes
 from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import SceneWarning
 
 FILM = """<integer name="width" value="64"/><integer name="height" value="48"/>
   <integer name="crop_offset_x" value="16"/><integer name="crop_offset_y" value="12"/>
@@ -92,6 +97,67 @@ def test_a_camera_without_a_translation_is_compared_by_its_picture(tmp_path):
     assert case.verdict == "agree", case.reason
 
 
+MIRRORED = """<scene version="3.0.0">
+  <sensor type="perspective"><float name="fov" value="45"/><transform name="to_world">
+    <scale x="-1"/><lookat origin="1, 2, 5" target="0.2, 0, 0" up="0.1, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/>
+      <integer name="crop_width" value="20"/><integer name="crop_offset_x" value="1"/></film>
+  </sensor>
+  <bsdf type="twosided" id="b"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">
+    <transform name="to_uv"><scale x="6" y="3"/></transform></texture></bsdf></bsdf>
+  <shape type="sphere"><ref id="b"/><transform name="to_world"><rotate y="1" angle="50"/>
+    <translate x="-1"/></transform></shape>
+  <shape type="disk"><ref id="b"/><transform name="to_world"><scale x="2" y="1"/>
+    <rotate x="1" angle="-60"/><translate x="1"/></transform></shape>
+  <shape type="cube"><ref id="b"/><transform name="to_world"><scale value="0.4"/>
+    <rotate z="1" angle="20"/><translate x="1" y="1"/></transform></shape>
+  <shape type="shapegroup" id="g"><shape type="cylinder"><ref id="b"/></shape></shape>
+  <shape type="instance"><ref id="g"/><transform name="to_world"><scale value="0.3"/>
+    <rotate y="1" angle="70"/><translate y="1.2"/></transform></shape>
+  <shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/>
+    <translate y="-1"/></transform></shape>
+  <shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
+    <translate x="-2" y="3"/></transform><emitter type="area"/></shape>
+  <emitter type="spot"><transform name="to_world"><lookat origin="3, 3, 1" target="0, 0, 0"
+    up="0, 1, 0"/></transform><rgb name="intensity" value="20, 10, 5"/></emitter>
+  <emitter type="point"><point name="position" x="2" y="1" z="3"/></emitter>
+  <emitter type="directional"><vector name="direction" x="1" y="-2" z="-0.5"/></emitter>
+  <emitter type="envmap"><string name="filename" value="sky.png"/><transform name="to_world">
+    <rotate y="1" angle="30"/></transform></emitter>
+</scene>
+"""
+
+
+def test_a_camera_that_mirrors_sees_the_mirrored_scene(tmp_path):
+    sky = np.random.default_rng(0).integers(0, 255, (4, 8, 3), dtype=np.uint8)
+    Image.fromarray(sky).save(tmp_path / "sky.png")
+    (tmp_path / "own.xml").write_text(MIRRORED)
+    with pytest.warns(SceneWarning, match="the whole scene is mirrored"):
+        scene = read_file(tmp_path / "own.xml", Scene)
+    rng = np.random.default_rng(1)
+    x, y = rng.uniform(0.0, scene.film.width, 96), rng.uniform(0.0, scene.film.height, 96)
+    ours_o, ours_d = camera_rays(scene, x, y)
+    o, d = (rays * [-1.0, 1.0, 1.0] for rays in (ours_o, ours_d))
+    own = own_scene(scene)
+    t, *_ = hits_of(own, o, d)
+    np.testing.assert_allclose(scene.intersect(ours_o, ours_d).t, t, rtol=1e-4)
+    # Many: some lights are selected rarely, and few samples do not show how noisy they are.
+    ours = scene.radiance(ours_o, ours_d, spp=4096)
+    theirs, error = theirs_along(own, o, d, 4096)
+    spread = np.hypot(ours.standard_error, error) + 1e-3 * theirs + 1e-6
+    assert np.abs((ours.mean - theirs) / spread).max() < 5.5
+    sensor = own.sensors()[0]
+    mi = mitsuba()
+
+    def ray(place: Any) -> tuple[Any, ...]:
+        point = mi.Point2f(place.x, place.y)
+        found, _ = sensor.sample_ray_differential(0.0, 0.5, point, mi.Point2f(0.5, 0.5))
+        return (found.d,)
+
+    at = np.column_stack([x / scene.film.width, y / scene.film.height, np.zeros(96)])
+    np.testing.assert_allclose(for_rays(ray, at)[0], d, atol=2e-6)
+
+
 @pytest.mark.filterwarnings("ignore:.*its moments are left out")
 def test_the_window_of_the_film_follows_the_size(tmp_path):
     scene = scene_of(tmp_path)
@@ -120,8 +186,6 @@ def test_a_film_that_the_file_does_not_have_is_added(tmp_path):
 
 @pytest.mark.filterwarnings("ignore:.*its moments are left out")
 def test_a_change_of_the_file_changes_the_case(tmp_path):
-    from comparisons.mitsuba.backend import backend
-
     def key(scene: Scene) -> str:
         return case_key(scene, BUDGET, (), backend())
 

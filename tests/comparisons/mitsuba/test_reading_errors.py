@@ -128,7 +128,12 @@ REFUSED = {
     sensor('<float name="fov" value="200"/>'): "'fov' is 200",
     sensor('<string name="focal_length" value="long"/>'): "50mm",
     sensor(map_of('<scale value="3"/>')): "which Mitsuba refuses, too",
-    sensor(map_of('<scale x="-1" y="1" z="1"/>')): "mirrors the picture",
+    on_sphere(
+        'type="normalmap"><texture type="bitmap" name="normalmap"><string name="filename" '
+        'value="scene.xml"/></texture><bsdf type="diffuse"/><boolean name="flip_invalid_normals" '
+        'value="false"/><boolean name="use_shadowing_function" value="false"/>'
+    )
+    + sensor(map_of('<scale x="-1" y="1" z="1"/>')): "mirrors the picture",
     '<sensor type="thinlens"/>': "has no 'aperture_radius'",
     sensor('<film type="specfilm"/>'): "expected hdrfilm",
     sensor('<film type="hdrfilm"><integer name="crop_width" value="900"/></film>'): "not inside",
