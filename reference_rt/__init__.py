@@ -40,7 +40,9 @@ from reference_rt.materials import (
     ThinDielectric,
     TwoSided,
 )
-from reference_rt.rendering.render import Picture, render
+from reference_rt.rendering.image import read_image
+from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid, Independent, Sobol
 from reference_rt.scene.build import build_tables
@@ -141,7 +143,17 @@ __all__ = [
     "UsageError",
     "VertexColours",
     "Whitted",
+    "__version__",
     "build_tables",
     "json_schema",
+    "read_image",
     "render",
 ]
+
+
+def __getattr__(name: str) -> str:
+    if name == "__version__":  # reading the metadata takes milliseconds
+        import importlib.metadata
+
+        return importlib.metadata.version("reference-rt")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,12 +7,13 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Baselines, Layer, NoiseFree
-from reference_rt.cli.main import guarded, say
+from reference_rt.cli.main import adjusted, guarded, say
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, UsageError
 
 if TYPE_CHECKING:
     from comparisons.gate.baselines import Record
+    from comparisons.results.case import FloatArray
 
 
 @guarded
@@ -29,6 +30,19 @@ def accept(
         Path | None,
         typer.Option(help="The scene shown; if it changes, the baseline becomes stale."),
     ] = None,
+    spp: Annotated[
+        int | None, typer.Option(min=1, help="Samples per pixel of the scene, if not its own.")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="WIDTHxHEIGHT", help="The scene's size, if not its own.")
+    ] = None,
+    limit: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            help="Warn if no gate could detect this relative bias with so few pictures.",
+        ),
+    ] = 0.005,
     baselines: Baselines = Path("baselines"),
     layer: Layer = "",
     noise_free: NoiseFree = False,
@@ -60,6 +74,8 @@ def accept(
                 say(_described(one.record, baselines))
         idle = [one for one in found if used is not None and one.record.name not in used]
         raise typer.Exit(1 if idle else 0)
+    if scene is None and (spp is not None or size is not None):
+        raise UsageError("--spp and --size only apply to --scene; expected that too")
     if not candidates or name is None or reason is None:
         raise UsageError("expected CANDIDATE... with --name and --reason, or --list, or --unused")
     store.refuse_in_ci()
@@ -67,10 +83,12 @@ def accept(
     pictures = [p for path in candidates for p in read_candidates(path, layer)]
     of_scene = None
     if scene is not None:
-        described = Scene.load(scene)
+        described = adjusted(Scene.load(scene), spp, size)
         film = described.film
         check_sizes(pictures, f"{film.width} x {film.height}", "the size of the scene")
-        of_scene = store.SceneOf(file=scene.as_posix(), digest=scene_digest(described))
+        of_scene = store.SceneOf(
+            file=scene.as_posix(), digest=scene_digest(described), size=size, spp=spp
+        )
         noise_free = noise_free or is_noise_free(described)
     facts = ours()
     written = store.accept(
@@ -85,12 +103,26 @@ def accept(
         date=facts["date"],
     )
     say(f"{written.folder}: accepted; commit it", err=True)
+    too_noisy = "" if noise_free else _too_noisy(written.reference().pictures, limit)
+    if too_noisy:
+        told = f"a limit of {100.0 * limit:g} % cannot be reached with this baseline: {too_noisy}"
+        say(f"note: {told}", err=True)
     if len(pictures) == 1 and not noise_free:
         say(
             "note: the noise of a single picture is unknown, which makes the gate less sensitive; "
             "accept several with different seeds, or use --noise-free",
             err=True,
         )
+
+
+def _too_noisy(pictures: "FloatArray", limit: float) -> str:
+    """Why no candidate can be shown to agree within `limit`; "" if one can, or if it is unknown."""
+    from comparisons import statistics
+
+    if not limit > statistics.Margins().image:
+        return "it is not above the margin of the image mean, 0.1 %"
+    alone = statistics.noise_free_candidate(pictures)
+    return "" if alone is None else statistics.shortfall(alone, limit)
 
 
 def _described(record: "Record", folder: Path) -> str:

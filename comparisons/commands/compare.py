@@ -1,14 +1,16 @@
 """`reference-rt compare`."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh, Threads, out_folder
+from comparisons.commands.options import Fixed, Fresh, Threads, TimeLimit, out_folder
 from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.main import guarded
+from reference_rt.util.errors import UsageError
 
 if TYPE_CHECKING:
     from comparisons.suites.work import Changes
@@ -30,28 +32,46 @@ def compare(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first replicate.")] = None,
     replicates: Annotated[
-        int, typer.Option(min=2, help="Independent pictures by each renderer (path tracing).")
-    ] = 16,
+        int | None,
+        typer.Option(
+            min=2,
+            help="Independent pictures by each renderer (path tracing) at the first look. "
+            "(default: 8; with --fixed 16)",
+        ),
+    ] = None,
+    time_limit: TimeLimit = None,
+    fixed: Fixed = False,
     threads: Threads = None,
     fresh: Fresh = False,
     define: Defaults = None,
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
 
+    Noisy pictures are looked at, and doubled in number until they decide or --time-limit is
+    reached: easy scenes are done sooner. The chance of a false alarm over all looks is that of one.
     The reference of an .xml scene is that file, loaded by Mitsuba.
 
     Finished cases are kept in the output folder and not run again.
     """
     with compare_extra():
         from comparisons.compare.budget import Budget
+        from comparisons.compare.looks import FIRST, SECONDS
         from comparisons.results.verdict import exit_code
         from comparisons.suites.display import summarise
         from comparisons.suites.run import Options, Run, run_cases
         from comparisons.suites.work import Changes, plan_of_files
 
     changes = Changes(spp=spp, size=size, seed=seed, defaults=by_name(define))
-    plan = plan_of_files(scenes, changes, Budget(replicates=replicates))
-    work = tuple(w._replace(again=_command(w.path, changes, replicates)) for w in plan.work)
+    if fixed and time_limit is not None:
+        raise UsageError("got --fixed and --time-limit; expected one of them")
+    budget = (
+        Budget(replicates=replicates or Budget().replicates)
+        if fixed
+        else Budget(replicates=replicates or FIRST, seconds=time_limit or SECONDS)
+    )
+    plan = plan_of_files(scenes, changes, budget)
+    given = {"replicates": replicates, "time-limit": time_limit, "fixed": fixed or None}
+    work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
 
     def tell(run: Run) -> None:
         summarise(run.cases, run.walls, run.not_run, run.missing)
@@ -62,11 +82,19 @@ def compare(
     raise typer.Exit(exit_code(run.cases, run.missing))
 
 
-def _command(path: Path, changes: "Changes", replicates: int) -> str:
-    """The command that repeats one case alone."""
+def _command(path: Path, changes: "Changes", given: Mapping[str, float | bool | None]) -> str:
+    """The command that repeats one case alone;  given: other options."""
     import shlex
 
-    options = {**changes.model_dump(exclude={"defaults"}), "replicates": replicates}
-    given = [f"--{name} {value}" for name, value in options.items() if value is not None]
-    given += [f"-D {shlex.quote(f'{k}={v}')}" for k, v in changes.defaults.items()]
-    return " ".join(["reference-rt compare", shlex.quote(str(path)), "--fresh", *given])
+    options = {**changes.model_dump(exclude={"defaults"}), **given}
+    words = [
+        f"--{name}"
+        if value is True
+        else f"--{name} {value:g}"
+        if isinstance(value, float)
+        else f"--{name} {value}"
+        for name, value in options.items()
+        if value is not None
+    ]
+    words += [f"-D {shlex.quote(f'{k}={v}')}" for k, v in changes.defaults.items()]
+    return " ".join(["reference-rt compare", shlex.quote(str(path)), "--fresh", *words])

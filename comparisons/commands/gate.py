@@ -2,22 +2,18 @@
 
 import shlex
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Baselines, GitHub, JUnit, Layer, NoiseFree, Threads
-from reference_rt.cli.main import guarded, say
+from comparisons.commands.options import Baselines, Fixed, GitHub, JUnit, Layer, NoiseFree, Threads
+from reference_rt.cli.main import adjusted, guarded, say
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import ReferenceRtError, UsageError, printable
-
-if TYPE_CHECKING:
-    from comparisons.gate.pictures_in import Picture
 
 
 @guarded
@@ -51,21 +47,41 @@ def gate(
         str | None,
         typer.Option(
             help="Run this renderer to make the candidates: "
-            '"prog {scene} -o {output} --seed {seed} --spp {spp}".'
+            '"prog {scene} -o {output} --seed {seed} --spp {spp}"; also {width}, {height}, and '
+            "{seeds}, with which one start makes several pictures: %d in {output} is the seed."
         ),
     ] = None,
     replicates: Annotated[
-        int | None, typer.Option(min=1, help="Runs of --command. (default: 8; 1 without noise)")
+        int | None,
+        typer.Option(
+            min=1,
+            help="Pictures by --command at the first look; 1: no more. "
+            "(default: 8; 1 without noise)",
+        ),
     ] = None,
+    fixed: Fixed = False,
     spp: Annotated[
-        int | None, typer.Option(min=1, help="Value of {spp}. (default: the scene's)")
+        int | None,
+        typer.Option(min=1, help="Samples per pixel of the scene, and {spp}. (default: its own)"),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WIDTHxHEIGHT",
+            help="The scene's size, and {width} and {height}. (default: its own)",
+        ),
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="First value of {seed}. (default: 1)")
     ] = None,
     time_limit: Annotated[
         float | None,
-        typer.Option(min=0.1, metavar="SECONDS", help="Limit of one run. (default: 600)"),
+        typer.Option(
+            min=0.1,
+            metavar="SECONDS",
+            help="Add no pictures by --command beyond this time; also the limit of each. "
+            "(default: 600)",
+        ),
     ] = None,
     suffix: Annotated[
         str | None, typer.Option(help="Suffix of {output}. (default: .exr)", metavar=".EXT")
@@ -85,33 +101,50 @@ def gate(
 ) -> None:
     """Compare another renderer's pictures with our rendering, a reference or a baseline.
 
-    Exit codes: 0: they agree; 1: they differ, or are too noisy to tell; 2: wrong usage; 3: invalid
-    picture, scene or baseline; 4: the renderer could not run, or the baseline is missing or stale.
+    The pictures that --command makes are doubled in number until they decide or --time-limit is
+    reached. The chance of a false alarm over all looks is that of one.
+
+    Exit codes: 0: they agree, or are unchanged; 1: they differ, or are too noisy to tell; 2: wrong
+    usage; 3: invalid picture, scene or baseline; 4: the renderer could not run, or the baseline is
+    missing or stale.
     """
     with compare_extra("the gate"):
+        from comparisons.compare.looks import SECONDS
         from comparisons.gate import outputs
-        from comparisons.gate.driver import Command, drive
+        from comparisons.gate.driver import Command, Driver
         from comparisons.gate.gate import not_run
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import is_noise_free
         from comparisons.gate.request import Request, gated
+        from comparisons.gate.rounds import Rounds, gated_renderer
+        from comparisons.results.headline import headline
 
     if (command is None) == (not candidates):
         raise UsageError("expected either candidates or --command")
-    driving: dict[str, Any] = {"replicates": replicates, "spp": spp, "seed": seed, "suffix": suffix}
-    driving |= {"time-limit": time_limit}
+    driving: dict[str, Any] = {"replicates": replicates, "seed": seed, "suffix": suffix}
+    driving |= {"time-limit": time_limit, "fixed": fixed or None}
     given = [name for name, value in driving.items() if value is not None]
     if command is None and given:
         raise UsageError(f"--{given[0]}: only applies to --command; expected that too")
-    described = None if scene is None else Scene.load(scene)
-    run = None
+    if scene is None and size is not None:
+        raise UsageError("--size: only applies to --scene; expected that too")
+    if scene is None and command is None and spp is not None:
+        raise UsageError("--spp: only applies to --scene or --command; expected one of them")
+    described = None if scene is None else adjusted(Scene.load(scene), spp, size)
+    run, rounds = None, Rounds()
     if command is not None:
         noiseless = noise_free or (described is not None and is_noise_free(described))
-        own = None if described is None else getattr(described.resolved_sampler, "spp", None)
-        run = Command(command, scene, spp or own, suffix or ".exr", time_limit or 600.0)
+        own, film = spp, None
+        if described is not None:
+            own = getattr(described.resolved_sampler, "spp", spp)
+            film = (described.film.width, described.film.height)
+        run = Command(command, scene, own, suffix or ".exr", time_limit or SECONDS, film)
         run.arguments(out, 0)
-        first = 1 if seed is None else seed
-        seeds = range(first, first + (replicates or (1 if noiseless else 8)))
+        rounds = Rounds(
+            1 if seed is None else seed,
+            replicates or (1 if noiseless else Rounds().replicates),
+            None if fixed else time_limit or SECONDS,
+        )
 
     def tell(line: str) -> None:
         say(line, err=True)
@@ -120,8 +153,7 @@ def gate(
     name = printable(name or Path((reference or [Path("nothing")])[0]).stem)
     kept = () if run is None else (out / "candidates" / "a candidate",)
     outputs.prepare(out, *kept, *outputs.ci_files(junit, github))
-    start = time.perf_counter()
-    pictures: list[Picture] = []
+    driver: Driver | None = None
     failed: ReferenceRtError | None = None
     try:
         request = Request(
@@ -135,30 +167,31 @@ def gate(
             threads=threads,
             name=name,
         )
-        if run is not None:
-            pictures = drive(run, seeds, out / "candidates", tell)
-        else:
-            pictures = [p for path in candidates or () for p in read_candidates(path, layer)]
-        driven = time.perf_counter() - start
         with ProgressLine() as progress:
-            case = gated(request, pictures, progress)
+            if run is not None:
+                driver = Driver(run, out / "candidates", progress.line)
+                case = gated_renderer(request, driver, rounds, progress.line, progress)
+            else:
+                pictures = [p for path in candidates or () for p in read_candidates(path, layer)]
+                case = gated(request, pictures, progress)
     except UsageError:
         raise
     except ReferenceRtError as error:
         case, failed = not_run(name, error), error
     else:
-        case = replace(case, seconds={"candidate": {"render": driven}} if run else {})
+        case = replace(case, seconds={"candidate": {"render": driver.seconds}} if driver else {})
     case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]))
-    names = [str(path) for path in candidates or ()]
-    facts = {"limit": limit, "candidates": names or [picture.name for picture in pictures]}
+    names = [str(path) for path in candidates or (driver.made if driver else ())]
+    facts = {"limit": limit, "candidates": names}
     facts |= {"baseline": baseline} if baseline else {}
     facts |= {"command": command} if command else {}
     results, report = outputs.write(case, out, facts)
     outputs.for_ci(case, junit, "" if scene is None else scene.as_posix(), github)
     if failed is not None:
         raise failed
-    say(f"{case.scene}: {case.verdict}: {case.reason}")
+    say(f"{case.scene}: {case.verdict}: {headline(case)}")
     if case.cause is not None:
-        say(f"{case.scene}: likeliest cause: {case.cause.name}: {case.cause.evidence}")
+        say(f"  {case.cause.name}: {case.cause.evidence}")
+    say(f"  {case.reason}")
     tell(f"{results}, {report}")
     raise typer.Exit(outputs.code_of(case))

@@ -7,6 +7,11 @@ import typer
 
 Baselines = Annotated[Path, typer.Option(metavar="DIR", help="The folder of baselines.")]
 
+Fixed = Annotated[
+    bool,
+    typer.Option("--fixed", help="Make exactly --replicates, and look at them once."),
+]
+
 Fresh = Annotated[
     bool, typer.Option("--fresh", help="Ignore stored results and do everything again.")
 ]
@@ -32,6 +37,16 @@ NoiseFree = Annotated[
 Scenes = Annotated[Path, typer.Option(metavar="DIR", help="The folder of scene files.")]
 
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads. (default: all cores)")]
+
+
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        min=0.1,
+        metavar="SECONDS",
+        help="Add no replicates beyond this time, for each scene. (default: 600)",
+    ),
+]
 
 
 def out_folder(what: str, metavar: str | None = None) -> Any:

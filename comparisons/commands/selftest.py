@@ -18,11 +18,9 @@ def selftest(
     only: Annotated[
         list[str] | None, typer.Option(help="Only faults whose names match this pattern.")
     ] = None,
-    seeds: Annotated[
-        int, typer.Option(min=0, help="Runs of the correct renderer, to count false alarms.")
-    ] = 1000,
+    seeds: Annotated[int, typer.Option(min=0, help="Runs of each kind of right renderer.")] = 1000,
     power: Annotated[
-        bool, typer.Option(help="Measure how often faults of each size are caught.")
+        bool, typer.Option(help="Measure how often biases of each size are caught.")
     ] = True,
     scenes: Scenes = Path("scenes"),
 ) -> None:
@@ -47,6 +45,7 @@ def selftest(
         caught, total = outcome.share(suite)
         say(f"{suite}: {caught} of {total} faults caught")
     for alarms in outcome.alarms:
-        say(f"{alarms.scene}: {alarms.false_alarms} false alarms in {alarms.runs:,} runs")
+        if not alarms.holds:
+            say(f"{alarms.kind}, {alarms.name}: {alarms.false_alarms} false alarms")
     say(", ".join(map(str, files)))
     raise typer.Exit(0 if outcome.holds else 1)

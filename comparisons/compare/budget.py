@@ -20,7 +20,12 @@ class Budget(Description):
     size: Annotated[PixelSize, Field(strict=False)] | None = None
     """Width and height in pixels; None: the scene's own."""
     replicates: Annotated[int, Field(ge=2)] = 16
-    """Independent pictures by each renderer."""
+    """Independent pictures by each renderer; with `seconds`, those of the first look."""
+    seconds: Annotated[float, Field(gt=0)] | None = None
+    """None: exactly `replicates`.  Otherwise they are doubled until the statistics are decided, or
+    until this time has passed since the first one was begun (see `comparisons.compare.looks`).
+    Suites have fixed replicates: their budgets are chosen from the measured noise, their run time
+    is known, and their results depend on no clock."""
     pixels: Annotated[int, Field(ge=16)] = 16_700
     """Camera rays of the Whitted rung, and of the geometry rung, which traces six times as many
     rays in total."""

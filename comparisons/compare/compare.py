@@ -6,17 +6,22 @@ from dataclasses import dataclass
 from typing import Any
 
 from comparisons import rungs as ladder
-from comparisons.compare import pictures
+from comparisons import statistics
+from comparisons.compare import looks, pictures
 from comparisons.compare.budget import Budget
 from comparisons.compare.control import control
-from comparisons.compare.judge import Evidence, Rendered, judge
+from comparisons.compare.judge import Evidence, Rendered, judge, picture_rungs
+from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.reading.reference import file_of, own_scene
 from comparisons.mitsuba.translate import UntranslatableError, load
+from comparisons.mitsuba.translate.vertices import with_float32_vertices
 from comparisons.results.case import Case, RungResult
-from reference_rt.cameras.filters import BoxFilter, Filter
+from comparisons.rungs.layers.rung import applies
+from reference_rt.cameras.film import Film
+from reference_rt.cameras.filters import BoxFilter
 from reference_rt.cli.explain import explain
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
@@ -59,12 +64,13 @@ def compare_scene(
 
 
 def budgeted(scene: Scene, budget: Budget) -> Scene:
-    """The scene with the budget's size and samples, and a box filter.
+    """The scene with the budget's size and samples, a box filter, and no layers.
 
     With a filter wider than a pixel, Mitsuba's neighbouring pixels share samples and hence noise,
-    but the statistics need independent pixels.  The scene's own filter is compared by its own rung.
+    but the statistics need independent pixels.  The scene's own filter and layers have rungs of
+    their own.
     """
-    film: dict[str, object] = {"filter": BoxFilter()}
+    film: dict[str, object] = {"filter": BoxFilter(), "layers": ()}
     if budget.size is not None:
         film |= dict(zip(("width", "height"), budget.size, strict=True))
     sampler = scene.resolved_sampler
@@ -81,16 +87,18 @@ def gather(
     only: tuple[str, ...] = (),
 ) -> Evidence:
     """Run the deterministic rungs and render the pictures of both sides."""
-    scene = budgeted(subject.scene, budget)
     clock = time.perf_counter()
+    scene, moved = with_float32_vertices(budgeted(subject.scene, budget))
     tables = build_tables(scene)
     seconds: dict[str, dict[str, float]] = {
         "candidate": {"load": time.perf_counter() - clock},
         "reference": {},
     }
     left_out = _left_out(scene, tables)
-    judged_by = budgeted(subject.reference or subject.scene, budget)
     clock = time.perf_counter()
+    judged_by = scene
+    if subject.reference is not None:
+        judged_by, _ = with_float32_vertices(budgeted(subject.reference, budget))
     own = _own_file(judged_by)
     try:
         counterpart = load(judged_by)
@@ -106,8 +114,13 @@ def gather(
         notes = [*counterpart.notes(), _OWN_FILE.format(file_of(scene))]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
-    film_filters = (subject.scene.film.filter, (subject.reference or subject.scene).film.filter)
-    found = _deterministic_rungs(scene, tables, counterpart, film_filters, budget, only, say)
+    if moved > 0.0:
+        notes.append(
+            f"compared with the vertices of meshes rounded to float32, as Mitsuba holds them: they "
+            f"move by at most {moved:.2g}"
+        )
+    films = (subject.scene.film, (subject.reference or subject.scene).film)
+    found = _deterministic_rungs(scene, tables, counterpart, films, budget, only, say)
     pictured = not only or not {"statistics", "images"}.isdisjoint(only)
     if counterpart.no_light_reason and not isinstance(scene.integrator, RayCast):
         found += [
@@ -117,8 +130,9 @@ def gather(
         pictured = False
     if not pictured:
         return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
+    decided = any(rung.status == "differ" for rung in found)
     shown = counterpart if own is None else Counterpart(own, counterpart.mi_shapes)
-    rendered = _pictures(scene, tables, shown, budget, threads, say)
+    rendered, looked = _pictures(scene, tables, shown, budget, threads, say, decided)
     for side, times in rendered.seconds.items():
         seconds[side] = seconds[side] | times
     notes.extend(rendered.notes)
@@ -132,6 +146,8 @@ def gather(
         lights=None
         if scene.integrator.deterministic
         else lambda: single_lights(judged_by, LIGHT_SPP),
+        lengths=path_lengths(judged_by, threads),
+        looks=looked,
     )
 
 
@@ -161,13 +177,14 @@ def _deterministic_rungs(
     scene: Scene,
     tables: SceneTables,
     counterpart: Counterpart,
-    film_filters: tuple[Filter, Filter],
+    films: tuple[Film, Film],
     budget: Budget,
     only: tuple[str, ...],
     say: Say,
 ) -> list[RungResult]:
-    """Film, geometry, then light; each only if the rungs below it hold: a wrong convention must not
-    be reported as wrong light."""
+    """Film, geometry, light, layers; each only if the rungs below it hold: a wrong convention must
+    not be reported as wrong light."""
+    film_filters = films[0].filter, films[1].filter
     climbs: dict[str, Callable[[], RungResult]] = {
         "geometry": lambda: ladder.geometry(scene, tables, counterpart, budget.pixels),
         "direct": lambda: ladder.direct(scene, tables, counterpart, budget.light_pixels),
@@ -175,6 +192,8 @@ def _deterministic_rungs(
     }
     if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):
         climbs = {"film": lambda: ladder.film(*film_filters), **climbs}
+    if applies(scene, films[0]):
+        climbs["layers"] = lambda: ladder.layers(scene, tables, counterpart, films)
     found: list[RungResult] = []
     for name, climb in climbs.items():
         if only and name not in only:
@@ -202,17 +221,42 @@ def _pictures(
     budget: Budget,
     threads: int | None,
     say: Say,
-) -> Rendered:
+    decided: bool,
+) -> tuple[Rendered, looks.Looks | None]:
+    """decided: whether a rung has shown a difference already, which more replicates would only
+    show again."""
     if isinstance(scene.integrator, RayCast):
-        return pictures.cast(scene, tables, counterpart)
+        return pictures.cast(scene, tables, counterpart), None
     if isinstance(scene.integrator, Whitted):
-        return pictures.whitted(scene, tables, counterpart)
+        return pictures.whitted(scene, tables, counterpart), None
     start = time.perf_counter()
-    rendered = pictures.replicates(
-        scene, tables, counterpart, budget.replicates, budget.reference_spp, threads
+    first, numbers = budget.replicates, 3 * scene.film.width * scene.film.height
+    most = looks.most_kept(first, numbers)
+    of_both = pictures.Replicates(
+        scene, tables, counterpart, budget.reference_spp, threads, first if decided else most
     )
-    say(f"{budget.replicates} + {budget.replicates} pictures ({time.perf_counter() - start:.1f} s)")
-    return rendered
+    if budget.seconds is None or decided:
+        of_both.grow(first)
+        say(f"{first} + {first} pictures ({time.perf_counter() - start:.1f} s)")
+        return of_both.rendered(), None
+
+    def look(level: float) -> RungResult:
+        rendered = of_both.rendered()
+        if level == looks.level_of(1):
+            return picture_rungs(rendered, budget.limit, level)[-1]
+        # The input is checked again at the end: each check has its own chance of a false alarm.
+        assert rendered.replicates is not None
+        return statistics.compare(*rendered.replicates, limit=budget.limit, level=level)
+
+    found = looks.until_decided(
+        of_both.grow,
+        look,
+        seconds=budget.seconds,
+        first=first,
+        step=lambda count: looks.group_of(count, most),
+        say=lambda line: say(f"{line} ({time.perf_counter() - start:.1f} s)"),
+    )
+    return of_both.rendered(), found
 
 
 __all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]

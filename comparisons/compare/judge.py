@@ -7,12 +7,14 @@ import numpy as np
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
+from comparisons.compare.looks import Looks
+from comparisons.compare.path_length import Lengths
 from comparisons.results.case import RUNGS, Case, Cause, FloatArray, ImageRegion, Images, RungResult
 from comparisons.results.verdict import decide
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.limited import limited
-from comparisons.statistics.metrics import image_metrics
+from comparisons.statistics.metrics import image_metrics, nonfinite_pixels
 
 Lights = Callable[[], Mapping[str, FloatArray]]
 """Returns the reference's pictures of single lights (height, width, 3) by name; renders them."""
@@ -45,7 +47,8 @@ def of_replicates(
 @dataclass(frozen=True)
 class Evidence:
     """The input of a verdict.  name: the case's;  rungs: the deterministic ones;  rendered: the
-    pictures of both sides, if any;  lights: for the diagnosis;  the rest as in `Case`."""
+    pictures of both sides, if any;  lights, lengths: for the diagnosis;  looks: those at a growing
+    number of replicates, the last of which gives the statistics;  the rest as in `Case`."""
 
     name: str
     rungs: tuple[RungResult, ...]
@@ -55,6 +58,8 @@ class Evidence:
     left_out: tuple[str, ...] = ()
     sides: tuple[str, str] = ("ours", "Mitsuba's")
     lights: Lights | None = None
+    lengths: Lengths | None = None
+    looks: Looks | None = None
 
 
 def judge(evidence: Evidence, limit: float) -> Case:
@@ -65,7 +70,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
     rungs, rendered = list(evidence.rungs), evidence.rendered
     metrics, images = None, None
     if rendered is not None:
-        rungs += picture_rungs(rendered, limit)
+        rungs += picture_rungs(rendered, limit, looks=evidence.looks)
         images = rendered.images
         if not any(rung.status == "invalid" for rung in rungs):
             metrics = image_metrics(images)
@@ -77,7 +82,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
     if verdict == "differ":
         cause = diagnosis.of_rungs(rungs)
         if rendered is not None and metrics is not None:
-            cause = cause or likeliest_cause(rendered.images, evidence.lights)
+            cause = cause or likeliest_cause(rendered.images, evidence.lights, evidence.lengths)
             worst = _places(rendered)
     return Case(
         scene=evidence.name,
@@ -95,8 +100,13 @@ def judge(evidence: Evidence, limit: float) -> Case:
     )
 
 
-def picture_rungs(rendered: Rendered, limit: float) -> list[RungResult]:
-    """The rungs `input` and, for noisy pictures that are valid, `statistics`."""
+def picture_rungs(
+    rendered: Rendered, limit: float, level: float = 1.0, looks: Looks | None = None
+) -> list[RungResult]:
+    """The rungs `input` and, for noisy pictures that are valid, `statistics`.
+
+    level: as in `statistics.compare`;  looks: were taken already, the last at these pictures.
+    """
     if rendered.replicates is None:
         images = rendered.images
         checked = input_rung(images.candidate, images.reference)
@@ -106,21 +116,59 @@ def picture_rungs(rendered: Rendered, limit: float) -> list[RungResult]:
         ]
     checked = input_rung(*rendered.replicates)
     if checked.status == "invalid":
-        return [checked]
-    return [checked, statistics.compare(*rendered.replicates, limit=limit)]
+        return [checked, *despite(*rendered.replicates, limit)]
+    if looks is not None:
+        return [checked, looks.judged]
+    return [checked, statistics.compare(*rendered.replicates, limit=limit, level=level)]
 
 
-def likeliest_cause(images: Images, lights: Lights | None) -> Cause | None:
-    """The likeliest cause of a difference; single lights are rendered only if needed."""
+def despite(
+    candidate: FloatArray, reference: "FloatArray | statistics.Known", limit: float
+) -> list[RungResult]:
+    """The statistics of invalid pictures, if a bias is certain nevertheless; else nothing.
+
+    The noise of replicates that depend on each other is not known from their spread: the mean of
+    the candidate's counts as a single picture.  Pixels that are not finite are left out.
+    """
+    try:
+        a, b = statistics.read(candidate, reference, finite=False)
+    except ValueError:  # other sizes or channels
+        return []
+    judges = b.mean[np.newaxis] if isinstance(b, statistics.Known) else b
+    bad = [nonfinite_pixels(candidate)]
+    if not isinstance(reference, statistics.Known):
+        bad.append(nonfinite_pixels(reference))
+    finite = np.expand_dims(~np.concatenate(bad).any(axis=0), -1)
+    mean = np.where(finite, a.mean(axis=0), 0.0)
+    if not (judges.any() and np.ptp(mean) > 0.0):
+        return []  # black or constant, which was said already
+    if isinstance(b, statistics.Known):
+        judge: FloatArray | statistics.Known = statistics.Known(
+            np.where(finite, b.mean, 0.0), np.where(finite, b.variance, 0.0)
+        )
+    else:
+        judge = np.where(finite, b, 0.0)
+    found = statistics.compare(mean[np.newaxis], judge, limit=limit)
+    return [found] if found.status == "differ" else []
+
+
+def likeliest_cause(
+    images: Images, lights: Lights | None, lengths: Lengths | None = None
+) -> Cause | None:
+    """The likeliest cause of a difference; single lights, and paths of other lengths, are rendered
+    only if needed."""
     plain = diagnosis.likeliest(images)
-    if lights is None or (plain is not None and plain.explained > SURE):
+    if plain is not None and plain.explained > SURE:
         return plain
-    return diagnosis.likeliest(images, lights())
+    if lights is None and lengths is None:
+        return plain
+    singles = {} if lights is None else lights()
+    return diagnosis.likeliest(images, singles, *([] if lengths is None else [lengths]))
 
 
 SURE = 0.98
-"""The fraction of the squared difference that a cause must explain for single lights not to be
-tried."""
+"""The fraction of the squared difference that a cause must explain for others not to be rendered.
+"""
 
 
 def _places(rendered: Rendered) -> tuple[ImageRegion, ...]:

@@ -5,23 +5,22 @@ import time
 import numpy as np
 
 from comparisons.compare.judge import Rendered, of_replicates
+from comparisons.compare.looks import Pool, mean_picture
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.counterpart import Counterpart, trace
-from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.results.case import Images
+from comparisons.rungs.layers.seen import Seen
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.whitted import plugin_radiance
-from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.vec3 import row as row_of
+from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.image import display
-from reference_rt.rendering.render import Picture, render
+from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
-from reference_rt.textures import At, colour_at
 
 
 def cast(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendered:
@@ -49,7 +48,7 @@ def mitsuba_cast(
             "Mitsuba has different uv, or none, on some shapes: both pictures show ours there"
         )
     layers = {
-        "colour": _colours(scene, tables, hits, uv),
+        "colour": Seen(scene, ShapeSizes(scene)).colours(hits, of_vertices=True),
         "distance": hits.t,
         "normal": np.where(hits.stands_in[:, None], hits.ns, hits.n),
         "id": hits.shape.astype(np.float64),
@@ -57,47 +56,6 @@ def mitsuba_cast(
     }
     shaped = {k: v.reshape(film.height, film.width, *v.shape[1:]) for k, v in layers.items()}
     return display(Picture(shaped, ours.shown)), tuple(notes)
-
-
-def _colours(scene: Scene, tables: SceneTables, hits: MitsubaHits, uv: FloatArray) -> FloatArray:
-    """The colours (n, 3) at hits: the material's, or interpolated from a mesh's vertex colours."""
-    sizes = ShapeSizes(scene)
-    names = [*scene.materials, None]
-    leaf, local = sizes.leaf_of(hits), sizes.local_points(hits)
-    found = np.zeros((len(hits.t), 3))
-    mixed = np.full((len(hits.t), 3), -1.0)  # negative: no vertex colour
-    material = np.full(len(hits.t), -1)
-    for number in np.unique(leaf[leaf >= 0]).tolist():
-        rows = np.flatnonzero(leaf == number)
-        sizes_of = sizes.leaves[number]
-        material[rows] = names.index(sizes_of.material)
-        if sizes_of.field == "triangles" and sizes_of.table.colours is not None:
-            row = sizes_of.row_of(hits.primitive[rows])
-            weights = _barycentrics(sizes_of.table.vertices[row], local[rows])
-            of_corners = sizes_of.table.colours[row].reshape(-1, 3, 3)
-            has_any = of_corners[:, :1, 0] >= 0.0
-            mixed[rows] = np.where(has_any, np.einsum("nk,nki->ni", weights, of_corners), -1.0)
-    _shown(tables, material, uv, mixed, found)
-    return np.where(mixed[:, :1] >= 0.0, mixed, found)
-
-
-@entry_kernel
-def _shown(
-    tables: SceneTables, material: IntArray, uv: FloatArray, colours: FloatArray, out: FloatArray
-) -> None:
-    """The colours of materials (n,), -1 for none, at surface coordinates (n, 2)."""
-    for i in range(len(material)):
-        if material[i] >= 0:
-            at = At(tables.textures, uv[i, 0], uv[i, 1], row_of(colours, i))
-            out[i, 0], out[i, 1], out[i, 2] = colour_at(tables.materials.shown, material[i], at)
-
-
-def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:
-    """Barycentric coordinates (n, 3) of points (n, 3) in the planes of triangles (n, 9)."""
-    v = vertices.reshape(-1, 3, 3)
-    normal = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
-    areas = [np.sum(normal * np.cross(v[:, k - 2] - p, v[:, k - 1] - p), axis=1) for k in range(3)]
-    return np.asarray(np.stack(areas, axis=1) / np.sum(normal * normal, axis=1)[:, None])
 
 
 def whitted(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendered:
@@ -129,33 +87,67 @@ AT_ONCE = 1 << 18
 """Rays per call of the plugin: its recursion takes many times their memory."""
 
 
-def replicates(
-    scene: Scene,
-    tables: SceneTables,
-    counterpart: Counterpart,
-    count: int,
-    reference_spp: int | None,
-    threads: int | None,
-) -> Rendered:
-    """Path tracing: `count` pictures by each renderer with independent seeds; the images are their
-    means.  seconds["render"] is the median time of one picture."""
-    sampler = scene.resolved_sampler
-    first = getattr(sampler, "seed", 0)
-    ours, times = [], []
-    for k in range(count):
-        seeded = scene.changed(sampler=sampler.model_copy(update={"seed": first + k}))
-        picture = render(seeded, tables=tables, threads=threads)
-        ours.append(picture.colour)
-        times.append(picture.seconds)
-    theirs = mitsuba_scene.render(counterpart.mi_scene, count, reference_spp or sampler.spp, first)
-    seconds = {
-        "candidate": {
-            "compile": times[0]["compile"],
-            "render": float(np.median([t["render"] for t in times])),
-        },
-        "reference": {"render": float(np.median(theirs.seconds))},
-    }
-    return of_replicates(np.stack(ours), theirs.pictures, seconds)
+_BATCH = 16
+"""Pictures by Mitsuba that are in memory before they are averaged."""
+
+
+class Replicates:
+    """Path tracing: pictures by each renderer with independent seeds, as many as are asked for."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        tables: SceneTables,
+        counterpart: Counterpart,
+        reference_spp: int | None,
+        threads: int | None,
+        most: int,
+    ) -> None:
+        """reference_spp: samples per pixel of Mitsuba's, None: as many as ours;  threads: ours;
+        most: see `comparisons.compare.looks.Pool`."""
+        self._scene, self._tables, self._counterpart = scene, tables, counterpart
+        self._threads, self._sampler = threads, scene.resolved_sampler
+        self._reference_spp = reference_spp or self._sampler.spp
+        self._sides = Pool(most, mean_picture), Pool(most, mean_picture)
+        self._times: list[dict[str, float]] = []
+        self._mitsuba_times: list[float] = []
+
+    def grow(self, count: int) -> None:
+        """Render until there are `count` replicates of each side."""
+        ours, theirs = self._sides
+        made = len(ours)
+        first = getattr(self._sampler, "seed", 0) + made
+        for k in range(count - made):
+            seeded = self._scene.changed(
+                sampler=self._sampler.model_copy(update={"seed": first + k})
+            )
+            picture = render(seeded, tables=self._tables, threads=self._threads)
+            ours.add(picture.colour)
+            self._times.append(picture.seconds)
+        for begun in range(made, count, _BATCH):
+            found = mitsuba_scene.render(
+                self._counterpart.mi_scene,
+                min(_BATCH, count - begun),
+                self._reference_spp,
+                first + begun - made,
+            )
+            for other in found.pictures:
+                theirs.add(other)
+            self._mitsuba_times += found.seconds.tolist()
+
+    def rendered(self) -> Rendered:
+        """What there is so far; the images are its means.  seconds["render"] is the median time of
+        one picture."""
+        times = self._times
+        seconds = {
+            "candidate": {
+                "compile": times[0]["compile"],
+                "render": float(np.median([t["render"] for t in times])),
+            },
+            "reference": {"render": float(np.median(self._mitsuba_times))},
+        }
+        ours, theirs = self._sides
+        return of_replicates(np.stack(ours.pictures()), np.stack(theirs.pictures()), seconds)
 
 
 def _seconds(ours: Picture, mitsuba: float) -> dict[str, dict[str, float]]:

@@ -21,10 +21,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from comparisons.gate.copies import fingerprint
 from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
 from comparisons.results.sealed import sealed, unsealed
+from reference_rt.cli.main import adjusted
 from reference_rt.core.exr import write_exr
 from reference_rt.core.model import Description
 from reference_rt.rendering.scene import Scene
@@ -40,10 +42,13 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 class SceneOf(Description):
-    """The scene that a baseline shows."""
+    """The scene that a baseline shows.  size, spp: those that were asked for instead of its own
+    ("WIDTHxHEIGHT", samples per pixel)."""
 
     file: str
     digest: str
+    size: str | None = None
+    spp: int | None = None
 
 
 class Former(Description):
@@ -56,7 +61,8 @@ class Former(Description):
 
 class Record(Description):
     """`baseline.json`.  files: SHA-256 by name;  sources: for each accepted picture its file, its
-    SHA-256 and the text of its header (software, samples, seed, if the renderer wrote them)."""
+    SHA-256, the fingerprint of its pixels, and the text of its header (software, samples, seed, if
+    the renderer wrote them)."""
 
     format: Annotated[int, Field(ge=1, le=1)] = 1
     name: str
@@ -92,7 +98,12 @@ class Baseline:
                 )
         pictures = [read_candidate(self.folder / name) for name in sorted(self.record.files)]
         name = f"the baseline's, {self.record.name}"
-        return Reference(stacked(pictures), None, self.record.noise_free, name)
+        accepted = [str(source.get("pixels", "")) for source in self.record.sources]
+        if "" in accepted:  # by a former version
+            accepted = [fingerprint(picture.radiance) for picture in pictures]
+        return Reference(
+            stacked(pictures), None, self.record.noise_free, name, fingerprints=tuple(accepted)
+        )
 
 
 def check_name(name: str) -> None:
@@ -226,7 +237,9 @@ def scene_of(record: Record, folder: Path) -> Scene | None:
         return None
     places = (Path(record.scene.file), folder.parent / record.scene.file)
     there = next((path for path in places if path.is_file()), None)
-    return None if there is None else Scene.load(there)
+    if there is None:
+        return None
+    return adjusted(Scene.load(there), record.scene.spp, record.scene.size)
 
 
 def used_in(results: Path) -> set[str]:
@@ -241,6 +254,7 @@ def used_in(results: Path) -> set[str]:
 
 def _source(picture: Picture) -> dict[str, Any]:
     source: dict[str, Any] = {"file": Path(picture.name).name}
+    source["pixels"] = fingerprint(picture.radiance)
     with suppress(OSError):
         source["sha256"] = hashlib.sha256(read_input(Path(picture.name))).hexdigest()
     header = {key: value[:500] for key, value in list(picture.header.items())[:32]}

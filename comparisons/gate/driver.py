@@ -1,4 +1,4 @@
-"""Runs another renderer's command line, once per replicate."""
+"""Runs another renderer's command line, once per replicate, or once for several."""
 
 import os
 import re
@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from comparisons.gate.pictures_in import Picture, read_candidate
 from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ImageError, UsageError
 
-PLACEHOLDERS = ("scene", "output", "seed", "spp")
+PLACEHOLDERS = ("scene", "output", "seed", "seeds", "spp", "width", "height")
 
 _BRACES = re.compile(r"\{([A-Za-z_]*)\}")
 
@@ -32,9 +33,12 @@ _LAST_LINES = 5
 class Command:
     """How a renderer is called.
 
-    template: the command line, split like a shell's but run without a shell; {scene}, {output},
-    {seed} and {spp} in its arguments are replaced;  scene: the file for {scene};  suffix: the
-    output's, from which most renderers derive the format;  seconds: time limit of one run.
+    template: the command line, split like a shell's but run without a shell; the PLACEHOLDERS in
+    its arguments are replaced;  scene: the file for {scene};  size: {width} and {height};  suffix:
+    the output's, from which most renderers derive the format;  seconds: time limit of one picture.
+
+    With {seeds} the renderer makes several pictures in one start: {seeds} becomes "1,2,3", and
+    {output} a file name with %d in place of the seed.
     """
 
     template: str
@@ -42,20 +46,30 @@ class Command:
     spp: int | None = None
     suffix: str = ".exr"
     seconds: float = 600.0
+    size: tuple[int, int] | None = None
 
-    def arguments(self, output: Path, seed: int) -> list[str]:
-        """The arguments of one run.  Raises UsageError."""
+    @property
+    def together(self) -> bool:
+        """Whether one start makes the pictures of several seeds."""
+        return "{seeds}" in self.template
+
+    def arguments(self, output: Path, *seeds: int) -> list[str]:
+        """The arguments of one start.  Raises UsageError."""
         try:
             words = shlex.split(self.template)
         except ValueError as error:
             raise UsageError(f"--command: {str(error).lower()}; expected closed quotes") from None
         if not words:
             raise UsageError("--command: is empty; expected a program and its arguments")
+        width, height = (None, None) if self.size is None else map(str, self.size)
         values = {
             "scene": None if self.scene is None else str(self.scene),
             "output": str(output),
-            "seed": str(seed),
+            "seed": str(seeds[0]),
+            "seeds": ",".join(map(str, seeds)),
             "spp": None if self.spp is None else str(self.spp),
+            "width": width,
+            "height": height,
         }
         named = {name for word in words for name in _BRACES.findall(word)}
         known = ", ".join(f"{{{name}}}" for name in PLACEHOLDERS)
@@ -63,45 +77,90 @@ class Command:
             raise UsageError(f"--command: there is no {{{name}}}; expected some of {known}")
         if "output" not in named:
             raise UsageError("--command: has no {output}; expected it as the picture's file name")
+        if {"seed", "seeds"} <= named:
+            raise UsageError("--command: has {seed} and {seeds}; expected one of them")
         for name in sorted(named):
             if values[name] is None:
-                raise UsageError(f"--command: has {{{name}}}; expected --{name} too")
+                option = "size or --scene" if name in ("width", "height") else name
+                raise UsageError(f"--command: has {{{name}}}; expected --{option} too")
         return [_BRACES.sub(lambda match: values[match[1]] or "", word) for word in words]
 
 
-def drive(
-    command: Command, seeds: range, keep: Path, say: Callable[[str], None] = lambda line: None
-) -> list[Picture]:
-    """The pictures of one run per seed, each in a new folder; copies are kept in `keep`.
+class Driver:
+    """Runs a renderer, each time in a new folder; copies of its pictures are kept in `keep`, from
+    which those of an earlier gate are removed.  say: is told of each start.  Raises UsageError for
+    a command that cannot be run."""
 
-    Raises UsageError, RendererError (it hung, crashed, or did not write the output) and ImageError
-    (the output is not a picture).
-    """
-    command.arguments(Path("checked first"), 0)
-    with suppress(OSError):  # remove the candidates of an earlier run
-        for old in keep.glob("candidate-*"):
-            old.unlink()
-    pictures = []
-    for k, seed in enumerate(seeds):
-        say(f"candidate {k + 1} of {len(seeds)}, seed {seed}")
+    def __init__(
+        self, command: Command, keep: Path, say: Callable[[str], None] = lambda line: None
+    ) -> None:
+        command.arguments(Path("checked first"), 0)
+        self._command, self._keep, self._say = command, keep, say
+        self.made: list[Path] = []
+        """The pictures that are kept."""
+        self.seconds = 0.0
+        """Wall clock of all starts."""
+        with suppress(OSError):
+            for old in keep.glob("candidate-*"):
+                old.unlink()
+
+    @property
+    def together(self) -> bool:
+        """Whether one start makes several pictures."""
+        return self._command.together
+
+    def pictures(self, seeds: range) -> list[Picture]:
+        """A picture for each seed.
+
+        Raises RendererError (it hung, crashed, or did not write an output) and ImageError (an
+        output is not a picture).
+        """
+        starts = [seeds] if self._command.together else [range(s, s + 1) for s in seeds]
+        return [picture for start in starts if start for picture in self._start(start)]
+
+    def _start(self, seeds: range) -> list[Picture]:
+        which = _named(seeds)
+        first = len(self.made) + 1
+        last = first + len(seeds) - 1
+        number = f"candidate {first}" if last == first else f"candidates {first} to {last}"
+        self._say(f"{number}, {which}")
+        suffix = self._command.suffix
         with tempfile.TemporaryDirectory(prefix="candidate-", ignore_cleanup_errors=True) as name:
-            folder = Path(name)
-            (folder / "output").mkdir()
-            output = folder / "output" / f"candidate-{k:02d}{command.suffix}"
+            folder = Path(name) / "output"
+            folder.mkdir()
+            if self._command.together:
+                pattern = folder / f"candidate-%d{suffix}"
+                outputs = [folder / f"candidate-{seed}{suffix}" for seed in seeds]
+            else:
+                pattern = folder / f"candidate-{len(self.made):02d}{suffix}"
+                outputs = [pattern]
             before = _pictures_here()
-            _run(command.arguments(output, seed), folder / "said", command.seconds, seed)
-            _check_written(output, before, seed)
-            kept = keep / output.name
-            try:
-                keep.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(output, kept)
-            except OSError as error:
-                raise ImageError(f"{kept}: cannot be written: {error.strerror}") from None
-        pictures.append(read_candidate(kept))
-    return pictures
+            arguments = self._command.arguments(pattern, *seeds)
+            begun = time.perf_counter()
+            _run(arguments, Path(name) / "said", self._command.seconds * len(seeds), which)
+            self.seconds += time.perf_counter() - begun
+            for output in outputs:
+                _check_written(output, before, which)
+            kept = [self._kept(output) for output in outputs]
+        return [read_candidate(path) for path in kept]
+
+    def _kept(self, output: Path) -> Path:
+        """Copy a picture; its place among those that are kept.  Raises ImageError."""
+        kept = self._keep / f"candidate-{len(self.made):02d}{self._command.suffix}"
+        try:
+            self._keep.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(output, kept)
+        except OSError as error:
+            raise ImageError(f"{kept}: cannot be written: {error.strerror}") from None
+        self.made.append(kept)
+        return kept
 
 
-def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
+def _named(seeds: range) -> str:
+    return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
+
+
+def _run(arguments: list[str], said: Path, seconds: float, which: str) -> None:
     """Run the renderer; after the time limit, kill it and all its children."""
     with said.open("wb") as log:
         try:
@@ -124,7 +183,7 @@ def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
         code = process.wait(seconds)
     except subprocess.TimeoutExpired:
         raise RendererError(
-            f"{name} exceeded the time limit of {seconds:g} s with seed {seed}, and was killed "
+            f"{name} exceeded the time limit of {seconds:g} s with {which}, and was killed "
             f"with its children; a longer --time-limit would let it run on{_last_lines(said)}"
         ) from None
     finally:
@@ -134,11 +193,11 @@ def _run(arguments: list[str], said: Path, seconds: float, seed: int) -> None:
     if code < 0:
         with suppress(ValueError):
             raise RendererError(
-                f"{name} crashed with seed {seed}: {signal.Signals(-code).name}{_last_lines(said)}"
+                f"{name} crashed with {which}: {signal.Signals(-code).name}{_last_lines(said)}"
             )
     if code != 0:
         raise RendererError(
-            f"{name} failed with seed {seed}: exit code {code}, expected 0{_last_lines(said)}"
+            f"{name} failed with {which}: exit code {code}, expected 0{_last_lines(said)}"
         )
 
 
@@ -190,7 +249,7 @@ def _pictures_here() -> set[tuple[str, int]]:
     return found
 
 
-def _check_written(output: Path, before: set[tuple[str, int]], seed: int) -> None:
+def _check_written(output: Path, before: set[tuple[str, int]], which: str) -> None:
     if output.is_file():
         return
     others = sorted(path.name for path in output.parent.iterdir())
@@ -199,10 +258,10 @@ def _check_written(output: Path, before: set[tuple[str, int]], seed: int) -> Non
         found = [f"{name} in the same folder" for name in others[:3]]
         found += [f"{name} in the working folder" for name in here[:3]]
         raise RendererError(
-            f"the renderer wrote another file with seed {seed}: {', '.join(found)}; expected "
+            f"the renderer wrote another file with {which}: {', '.join(found)}; expected "
             f"{output.name}, at the path given by {{output}}"
         )
     raise RendererError(
-        f"the renderer ended without an error with seed {seed}, but wrote no file; expected "
+        f"the renderer ended without an error with {which}, but wrote no file; expected "
         f"{output.name}, at the path given by {{output}}"
     )

@@ -7,7 +7,10 @@ import numpy as np
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
-from comparisons.compare.judge import Lights, likeliest_cause
+from comparisons.compare.judge import Lights, despite, likeliest_cause
+from comparisons.compare.looks import Looks, level_of
+from comparisons.compare.path_length import Lengths
+from comparisons.gate.copies import Copies
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
 from comparisons.results.case import (
@@ -42,15 +45,63 @@ def gate_pictures(
     limit: float = LIMIT,
     name: str = "candidate",
     lights: Lights | None = None,
+    lengths: Lengths | None = None,
     notes: Sequence[str] = (),
 ) -> Case:
     """The verdict on candidates; several are replicates.
 
-    limit: the smallest relative bias of the image mean that must be detectable;  lights: for the
-    diagnosis of a difference.  Raises ImageError for candidates whose size is not the reference's,
-    UsageError for several candidates without noise.
+    limit: the smallest relative bias of the image mean that must be detectable;  lights, lengths:
+    for the diagnosis of a difference.  Candidates that are copies of the reference's pictures are
+    `unchanged`.  Raises ImageError for candidates whose size is not the reference's, UsageError for
+    several candidates without noise.
     """
     check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
+    copies = Copies.of(reference.fingerprints)
+    others = copies.others(candidates)
+    if not others:
+        return unchanged(name, copies, reference, notes)
+    if copies.count:
+        notes = [*notes, copies.note(len(others))]
+    return judged(
+        others, reference, limit=limit, name=name, lights=lights, lengths=lengths, notes=notes
+    )
+
+
+def unchanged(name: str, copies: Copies, reference: Reference, notes: Sequence[str] = ()) -> Case:
+    """The case of candidates that are all copies of the reference's pictures."""
+    images = Images(*2 * [reference.pictures.mean(axis=0)])
+    nothing = RungResult("statistics", "not-applicable", "there is no difference to test")
+    rungs = [nothing, RungResult("images", "unchanged", copies.words, {"copies": copies.count})]
+    metrics = image_metrics(images)
+    verdict, reason = decide(rungs, metrics)
+    return Case(
+        scene=name,
+        verdict=verdict,
+        reason=reason,
+        rungs=tuple(rungs),
+        metrics=metrics,
+        seconds={},
+        images=images,
+        notes=(*notes, *reference.notes),
+        sides=("candidate's", reference.name),
+    )
+
+
+def judged(
+    candidates: Sequence[Picture],
+    reference: Reference,
+    *,
+    limit: float = LIMIT,
+    name: str = "candidate",
+    lights: Lights | None = None,
+    lengths: Lengths | None = None,
+    notes: Sequence[str] = (),
+    looks: Looks | None = None,
+) -> Case:
+    """`gate_pictures` for candidates that are no copies.
+
+    looks: those that were taken, the last one at these candidates.
+    """
     notes = [*notes, *_notes(candidates)]
     if reference.noise_free and candidates[0].displayed:
         reference = replace(reference, pictures=_displayed(reference.pictures))
@@ -64,17 +115,19 @@ def gate_pictures(
     images = _images(pictures, reference)
     rungs = [_input(candidates, pictures, reference)]
     metrics = None
-    if rungs[0].status != "invalid":
+    if rungs[0].status == "invalid":
+        rungs += despite(pictures, _judged_by(reference), limit) if not reference.noise_free else []
+    else:
         metrics = image_metrics(images)
         rungs += [
-            _statistics(pictures, reference, limit),
+            _statistics(pictures, reference, limit) if looks is None else looks.judged,
             _images_rung(images, metrics, pictures, reference),
         ]
     verdict, reason = decide(rungs, metrics)
     cause: Cause | None = None
     worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":
-        cause = diagnosis.of_rungs(rungs) or likeliest_cause(images, lights)
+        cause = diagnosis.of_rungs(rungs) or likeliest_cause(images, lights, lengths)
         worst = statistics.worst_regions(pictures, _judged_by(reference))
     return Case(
         scene=name,
@@ -130,10 +183,39 @@ def _input(candidates: Sequence[Picture], pictures: FloatArray, reference: Refer
     return input_rung(pictures, judges, opacity)
 
 
-def _statistics(pictures: FloatArray, reference: Reference, limit: float) -> RungResult:
+def first_fault(candidate: Picture, reference: Reference) -> RungResult | None:
+    """What is wrong with the input, as far as one picture shows it, so that no others need to be
+    rendered; None if nothing is.  Raises ImageError for another size."""
+    check_sizes([candidate], size_of(reference.pictures[0]), "as the reference")
+    rung = _input([candidate], stacked([candidate]), reference)
+    return rung if rung.status == "invalid" else None
+
+
+def look(
+    candidates: Sequence[Picture], reference: Reference, limit: float, level: float
+) -> RungResult:
+    """The statistics of replicates;  level: the share of the levels that this look may use.  At the
+    first look a fault of the input, if there is one."""
+    pictures = stacked(candidates)
+    if level == level_of(1):
+        checked = _input(candidates, pictures, reference)
+        if checked.status == "invalid":
+            return checked
+    return _statistics(pictures, reference, limit, level)
+
+
+def _statistics(
+    pictures: FloatArray, reference: Reference, limit: float, level: float = 1.0
+) -> RungResult:
     if reference.noise_free:
         return RungResult("statistics", "not-applicable", _NO_NOISE)
-    return statistics.compare(pictures, _judged_by(reference), limit=limit)
+    return statistics.compare(
+        pictures,
+        _judged_by(reference),
+        limit=limit,
+        level=level,
+        fixed_reference=True,
+    )
 
 
 def _images_rung(

@@ -78,12 +78,16 @@ class ImageGate:
         """
         __tracebackhide__ = True
         self._calls += 1
+        missing, failed = "", ""
         try:
             from comparisons.gate.request import Request, gated
             from reference_rt.rendering.scene import Scene
             from reference_rt.util.errors import ReferenceRtError
         except ModuleNotFoundError as error:
-            pytest.fail(f"image_gate needs {error.name}: pip install 'reference-rt[compare]'")
+            missing = str(error.name)
+        # Failing outside of `except`: pytest would show the handled error, with all its frames.
+        if missing:
+            pytest.fail(f"image_gate needs {missing}: pip install 'reference-rt[compare]'")
 
         given: list[tuple[Picture, Path | None]] = []
         try:
@@ -102,12 +106,14 @@ class ImageGate:
             case = gated(judge, [picture for picture, _ in given])
             passed = self._write(case, folder, baseline)
         except ReferenceRtError as error:
-            kept = _keep(given)
-            pytest.fail(f"image_gate: {error}" + (f"\nkept: {', '.join(kept)}" if kept else ""))
+            failed = f"image_gate: {error}"
+        if failed:
+            kept, unkept = _kept(given)
+            pytest.fail("\n".join([failed, *kept, *unkept]))
         self._node.user_properties.append(("image_gate", f"{case.verdict}: {case.reason}"))
         if not passed:
-            _keep(given)
-            pytest.fail(_message(case, _relative(folder, self._root)))
+            _, unkept = _kept(given)
+            pytest.fail("\n".join([_message(case, _relative(folder, self._root)), *unkept]))
         return case
 
     def _folder(self) -> Path:
@@ -157,6 +163,17 @@ def _pictures(given: Any, folder: Path = Path()) -> "list[tuple[Picture, Path | 
     return found
 
 
+def _kept(given: "Sequence[tuple[Picture, Path | None]]") -> tuple[list[str], list[str]]:
+    """Save the pictures that came as arrays; lines that say where, and why not."""
+    from reference_rt.util.errors import ReferenceRtError
+
+    try:
+        kept = _keep(given)
+    except ReferenceRtError as error:
+        return [], [f"not kept: {error}"]
+    return ([f"kept: {', '.join(kept)}"] if kept else []), []
+
+
 def _keep(given: "Sequence[tuple[Picture, Path | None]]") -> list[str]:
     """Save the pictures that came as arrays; return their files.  Raises ImageError."""
     from reference_rt.core.exr import write_exr
@@ -176,10 +193,14 @@ def _relative(path: Path, root: Path) -> Path:
 
 
 def _message(case: "Case", folder: Path) -> str:
-    """The message of a failed test: verdict, reason, cause, numbers, and paths of the outputs."""
-    lines = [f"image_gate: {case.verdict}: {case.reason}"]
+    """The message of a failed test: the headline, cause, reason, numbers, and paths of the
+    outputs."""
+    from comparisons.results.headline import headline
+
+    lines = [f"image_gate: {case.verdict}: {headline(case)}"]
     if case.cause is not None:
-        lines.append(f"likeliest cause: {case.cause.name}: {case.cause.evidence}")
+        lines.append(f"{case.cause.name}: {case.cause.evidence}")
+    lines.append(case.reason)
     if case.metrics is not None:
         found = case.metrics
         bias = ", ".join(f"{100.0 * b:+.3g} %" for b in found.mean_bias)

@@ -3,6 +3,7 @@
 import hashlib
 import math
 import os
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 
+from comparisons.gate.copies import fingerprint
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.results.sealed import read_arrays, write_arrays
@@ -40,6 +42,9 @@ report that the run was too noisy."""
 _ROUND = 1 << 18
 """Minimum of camera samples of one picture in one round: half a second."""
 
+_SAVED_EACH = 20.0
+"""Seconds after which pictures are stored while others are rendered: what a kill can cost."""
+
 _MOST_NUMBERS = 1 << 28
 """Values of all replicates together, 2 GiB: large pictures have fewer replicates."""
 
@@ -51,13 +56,14 @@ _KEPT = 2 << 30
 class Reference:
     """pictures: (replicates, height, width, 3) linear radiance;  variance: (height, width, 3) of
     their mean, if given separately;  noise_free: made without random numbers;  name: whose pictures
-    these are, for people."""
+    these are, for people;  fingerprints: those of the pictures that candidates may be copies of."""
 
     pictures: FloatArray
     variance: FloatArray | None = None
     noise_free: bool = False
     name: str = "the reference's"
     notes: tuple[str, ...] = ()
+    fingerprints: tuple[str, ...] = ()
 
 
 def is_noise_free(scene: Scene) -> bool:
@@ -123,7 +129,8 @@ def of_files(references: Sequence[Picture], variance: Path | None, noise_free: b
                 f"{variance}: is {size_of(spread)} pixels; expected {size_of(pictures[0])}, as "
                 f"{references[0].name}"
             )
-    return Reference(pictures, spread, noise_free)
+    prints = tuple(fingerprint(picture) for picture in pictures)
+    return Reference(pictures, spread, noise_free, fingerprints=prints)
 
 
 def check_sizes(candidates: Sequence[Picture], expected: str, whose: str) -> None:
@@ -189,41 +196,47 @@ def _cached(
     """`count` pictures of the scene, each the mean of some rounds, and the number of rounds."""
     sampler = scene.resolved_sampler
     spp = getattr(sampler, "spp", 1)
-    key = f"1 {scene_digest(scene)} {source_digest()} {sampler.type} {spp} {count}"
+    key = f"2 {scene_digest(scene)} {source_digest()} {sampler.type} {spp} {count}"
     name = hashlib.sha256(key.encode()).hexdigest()
     path = cache_folder() / f"{name[:40]}.npz"
     shape = (count, scene.film.height, scene.film.width, 3)
-    pictures, rounds = _load(path, shape)
-    if rounds > 0 and enough(pictures, rounds):
+    pictures, made = _load(path, shape)
+    rounds, done = divmod(made, count)  # so many pictures of a round that was cut off
+    if rounds > 0 and done == 0 and enough(pictures, rounds):
         return pictures, rounds
     # Far from the seeds that users choose: equal seeds would give both sides the same noise.
     first = int(name[40:52], 16) << 14
     tables = build_tables(scene)
-    task, start = "rendering the reference", first + rounds * count
+    task, start = "rendering the reference", made
 
     def compiling(what: str, part: float) -> None:
         if what == "compile":
             say(what, part)
 
     say(task, 0.0)
-    while rounds == 0 or not enough(pictures, rounds):
-        begun = first + rounds * count
-        for k in range(count):
+    saved = time.monotonic()
+    try:
+        while rounds == 0 or done or not enough(pictures, rounds):
             seeded = scene
             if hasattr(sampler, "seed"):
-                seeded = scene.changed(sampler=sampler.model_copy(update={"seed": begun + k}))
+                seeded = scene.changed(sampler=sampler.model_copy(update={"seed": first + made}))
             picture = render(
                 seeded,
                 tables=tables,
                 threads=threads,
-                progress=compiling if k == 0 and begun == start else None,
+                progress=compiling if made == start else None,
             ).colour
-            pictures[k] += (picture - pictures[k]) / (rounds + 1)
+            pictures[done] += (picture - pictures[done]) / (rounds + 1)
+            made += 1
+            rounds, done = divmod(made, count)
             total = _rounds_needed(pictures, rounds, target)
-            say(task, min(0.999, (rounds + (k + 1) / count) / total))
-        rounds += 1
+            say(task, min(0.999, (rounds + done / count) / total))
+            if time.monotonic() - saved > _SAVED_EACH:
+                _save(path, pictures, made)
+                saved = time.monotonic()
+    finally:  # after Ctrl-C too: the next gate goes on from here
+        _save(path, pictures, made)
     say(task, 1.0)
-    _save(path, pictures, rounds)
     return pictures, rounds
 
 
@@ -241,21 +254,24 @@ def cache_folder() -> Path:
 
 
 def _load(path: Path, shape: tuple[int, ...]) -> tuple[FloatArray, int]:
-    """Pictures and rounds from the cache; zeros and 0 if it has none that can be used."""
-    with suppress(KeyError):
+    """Pictures from the cache, and how many renderings they are the means of, one after the other;
+    zeros if it has none that can be used."""
+    with suppress(KeyError, TypeError):
         kept = read_arrays(path)
-        pictures, rounds = kept["pictures"], int(kept["rounds"])
-        if pictures.shape == shape and pictures.dtype == np.float64 and rounds > 0:
+        pictures, made = kept["pictures"], int(kept["made"])
+        if pictures.shape == shape and pictures.dtype == np.float64 and made > 0:
             with suppress(OSError):
                 os.utime(path)
-            return pictures, rounds
+            return pictures, made
     return np.zeros(shape), 0
 
 
-def _save(path: Path, pictures: FloatArray, rounds: int) -> None:
+def _save(path: Path, pictures: FloatArray, made: int) -> None:
     """Store pictures if the cache can be written, and delete the least recently used ones."""
+    if made == 0:
+        return
     with suppress(ImageError, OSError):
-        write_arrays(path, pictures=pictures, rounds=rounds)
+        write_arrays(path, pictures=pictures, made=made)
         kept = sorted(path.parent.glob("*.npz"), key=lambda file: -file.stat().st_mtime)
         total = 0
         for file in kept:

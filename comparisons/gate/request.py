@@ -1,10 +1,12 @@
 """A gate's request: what the candidates are compared with."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from comparisons.compare.judge import Lights
+from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
@@ -60,21 +62,42 @@ def gated(
 ) -> Case:
     """The verdict.  Raises ImageError, SceneError, UsageError, BaselineMissingError,
     BaselineEditedError."""
+    judge = prepared(request, candidates, say)
+    return judge.case(partial(gate_pictures, candidates, judge.reference))
+
+
+@dataclass(frozen=True)
+class Judge:
+    """What candidates are compared with, and what is known for the diagnosis of a difference."""
+
+    request: Request
+    reference: Reference
+    scene: Scene | None
+
+    def case(self, gate: Callable[..., Case]) -> Case:
+        """The verdict by `gate_pictures` or `judged`, whose other arguments are given already."""
+        request, scene = self.request, self.scene
+        return gate(
+            limit=request.limit,
+            name=request.name,
+            lights=None if scene is None else _lights(scene, request.threads),
+            lengths=None if scene is None else path_lengths(scene, request.threads),
+        )
+
+
+def prepared(
+    request: Request,
+    candidates: Sequence[Picture],
+    say: Progress = lambda what, fraction: None,
+) -> Judge:
+    """The reference of a request, once the candidates have the scene's size; raises what `gated`
+    does."""
     scene = request.scene
     if scene is not None:
         expected = f"{scene.film.width} x {scene.film.height}"
         check_sizes(candidates, expected, f"the size of the scene '{scene.name}'")
-    judge, scene = _judge(request, scene, [picture.name for picture in candidates], say)
-    lights: Lights | None = None
-    if scene is not None:
-        lights = _lights(scene, request.threads)
-    return gate_pictures(
-        candidates,
-        judge,
-        limit=request.limit,
-        name=request.name,
-        lights=lights,
-    )
+    found, scene = _judge(request, scene, [picture.name for picture in candidates], say)
+    return Judge(request, found, scene)
 
 
 def _judge(

@@ -20,6 +20,7 @@ from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, thumbnails
 from comparisons.report.values import shown
 from comparisons.results.case import RUNGS, Case, Metrics, Status, how_many
+from comparisons.results.headline import headline
 
 MOST_BYTES = 15_000_000
 """Default size limit of a page: it can still be mailed, and opens without a wait."""
@@ -32,6 +33,7 @@ ORDER: tuple[Status, ...] = (
     "not-applicable",
     "reference-limited",
     "agree",
+    "unchanged",
 )
 """The order of cases on the page: those that need attention first."""
 
@@ -46,6 +48,7 @@ SIGNS: dict[Status, str] = {
     "not-applicable": "–",
     "reference-limited": "≈",
     "agree": "✓",
+    "unchanged": "=",
 }
 """Shown beside a verdict, so that it is recognised without its colour."""
 
@@ -125,6 +128,7 @@ def _view(case: Case) -> dict[str, Any]:
     pictures = _thumbnails(case)
     return {
         "case": case,
+        "headline": headline(case),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
         "figures": _figures(case, pictures) if pictures else [],

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.results.case import Case, RungResult
+from comparisons.results.headline import headline
 from comparisons.results.json_values import plain
 from reference_rt.util.files import replacing
 
@@ -28,7 +29,7 @@ def write_results(
          "asked": number of requested cases, without those of "not_run",
          "missing": [names of requested cases that were not run: the run was interrupted],
          "not_run": {name of a case: why it was not run},
-         "cases": [{"scene", "verdict", "reason",
+         "cases": [{"scene", "verdict", "headline": one plain sentence, "reason",
                     "sides": {"candidate": whose pictures, "reference": whose},
                     "tiers": {name of a rung: {"status", "reason", and the rung's numbers}},
                     "metrics": {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias",
@@ -67,6 +68,7 @@ def _case(case: Case) -> dict[str, Any]:
     return {
         "scene": case.scene,
         "verdict": case.verdict,
+        "headline": headline(case),
         "reason": case.reason,
         "sides": dict(zip(("candidate", "reference"), case.sides, strict=True)),
         "tiers": rungs,

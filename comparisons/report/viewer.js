@@ -13,7 +13,7 @@ const look = { stops: 0, colours: "srgb" };
 // Cases: search, verdicts, next and previous
 
 const texts = sections.map((section) => {
-  const parts = section.querySelectorAll("h2, .reason, .cause");
+  const parts = section.querySelectorAll("h2, .headline, .reason, .cause");
   return [...parts].map((part) => part.textContent).join(" ").toLowerCase();
 });
 

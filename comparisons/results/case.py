@@ -10,6 +10,7 @@ FloatArray = npt.NDArray[np.float64]
 
 Status = Literal[
     "agree",  # the same within the stated bound
+    "unchanged",  # each picture is bit for bit one of the baseline's
     "differ",  # different beyond the stated bound
     "reference-limited",  # different because of Mitsuba's float32 precision, as the arbiter shows
     "inconclusive",  # too noisy: no bias is proven, but one that matters could be hidden
@@ -18,7 +19,10 @@ Status = Literal[
     "invalid",  # non-finite pixels, wrong size: the pictures cannot be compared
 ]
 
-RUNGS = ("scene", "run", "input", "film", "geometry", "direct", "whitted", "statistics", "images")
+RUNGS = (
+    *("scene", "run", "input", "film", "geometry"),
+    *("direct", "whitted", "layers", "statistics", "images"),
+)
 """The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
 if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`
 checks the pictures themselves."""

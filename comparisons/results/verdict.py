@@ -13,7 +13,7 @@ _FAILURES: tuple[Status, ...] = (
 )
 """The statuses that keep a scene from agreeing, gravest first."""
 
-PASSING: tuple[Status, ...] = ("agree", "reference-limited")
+PASSING: tuple[Status, ...] = ("agree", "unchanged", "reference-limited")
 
 
 def decide(results: Sequence[RungResult], metrics: Metrics | None) -> tuple[Status, str]:
@@ -21,8 +21,9 @@ def decide(results: Sequence[RungResult], metrics: Metrics | None) -> tuple[Stat
 
     The gravest status of any rung decides: `invalid` (also by pixels not finite in the pictures),
     `differ`, `inconclusive`, `not-comparable`, `reference-limited`; among rungs of that status the
-    first one of RUNGS gives the reason. Otherwise the scene agrees if at least one rung other than
-    `input` agrees; if none does it is `not-comparable`. Raises ValueError for a name not in RUNGS.
+    first one of RUNGS gives the reason. Otherwise the scene is `unchanged` if a rung is, and agrees
+    if at least one rung other than `input` agrees; if none does it is `not-comparable`. Raises
+    ValueError for a name not in RUNGS.
     """
     if unknown := {result.name for result in results} - set(RUNGS):
         raise ValueError(f"not a rung: {', '.join(sorted(unknown))}; the rungs are {RUNGS}")
@@ -33,7 +34,10 @@ def decide(results: Sequence[RungResult], metrics: Metrics | None) -> tuple[Stat
     for status in _FAILURES:
         for result in ladder:
             if result.status == status:
-                return status, f"{result.name}: {result.reason}"
+                return status, f"{result.name}: {result.reason}{_besides(ladder, status)}"
+    for result in ladder:
+        if result.status == "unchanged":
+            return "unchanged", f"{result.name}: {result.reason}"
     agreed = [result for result in ladder if result.status == "agree"]
     if not any(result.name != "input" for result in agreed):
         return "not-comparable", "no rung applies to this scene"
@@ -43,8 +47,14 @@ def decide(results: Sequence[RungResult], metrics: Metrics | None) -> tuple[Stat
     return "agree", f"{rungs}: {summary.reason}"
 
 
+def _besides(ladder: Sequence[RungResult], verdict: Status) -> str:
+    """What else was found in pictures that are invalid: a difference that is certain even so."""
+    found = [f"{r.name}: {r.reason}" for r in ladder if r.status == "differ"]
+    return f"; besides, {found[0]}" if verdict == "invalid" and found else ""
+
+
 def exit_code(cases: Sequence[Case], missing: Sequence[str] = ()) -> int:
-    """0 if every case passes (`agree` or `reference-limited`), otherwise the highest of these:
+    """0 if every case passes (with a verdict of PASSING), otherwise the highest of these:
 
     - 4: a case could not be completed (its process died or hung), or there is no case at all;
     - 3: a scene, or one of its files, is invalid;

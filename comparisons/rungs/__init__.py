@@ -1,7 +1,8 @@
 """Rungs: the tests of one scene, from the camera's rays up to the finished pictures.
 
 A rung is one test of the ladder `comparisons.results.case.RUNGS`.  `film`, `geometry`, `direct` and
-`whitted` compare without noise, ray by ray; `input` checks the pictures themselves, `images`
+`whitted` compare without noise, ray by ray; `layers` compares what is written beside the colour;
+`input` checks the pictures themselves, `images`
 compares them by metrics, `comparisons.statistics` their means.  `limited` changes `differ` to
 `reference-limited` above a rung that shows that Mitsuba's precision is too low.
 
@@ -18,6 +19,7 @@ planted fault breaks it.
 from comparisons.rungs.direct import direct
 from comparisons.rungs.film import film
 from comparisons.rungs.geometry import geometry
+from comparisons.rungs.layers import layers
 from comparisons.rungs.whitted import whitted
 
-__all__ = ["direct", "film", "geometry", "whitted"]
+__all__ = ["direct", "film", "geometry", "layers", "whitted"]

@@ -13,6 +13,7 @@ from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
 from comparisons.results.case import RungResult, Status
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.adversarial_rays import aimed_rays
+from comparisons.rungs.rays.any_hit import any_hits
 from comparisons.rungs.rays.camera import compare_camera
 from comparisons.rungs.rays.coincidence import coincident, in_one_place
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
@@ -50,7 +51,8 @@ def geometry(
 
     Both tracers get the same float32 numbers.  Agreement needs every ray's hit, shape, face, t,
     normals and uv to be within float32's bound, or the arbiter to find that float32 cannot resolve
-    the ray.  For what remains exact arithmetic decides which tracer is wrong.
+    the ray.  For what remains exact arithmetic decides which tracer is wrong.  Any-hit queries are
+    compared with closest hits, and with rays through every triangle of meshes.
     """
     camera = compare_camera(scene, counterpart, pixels)
     sizes = ShapeSizes(scene, counterpart.frame)
@@ -70,6 +72,7 @@ def geometry(
     mismatches = mismatches[np.argsort(is_aimed[mismatches], kind="stable")]
     verdict = judged(Referee(sizes), rays, traced.ours, traced.theirs, mismatches)
     explained = apart
+    shadows = any_hits(tables, counterpart, sizes, rays, traced.ours, seed)
     right = traced.ratios[(traced.ratios <= 1.0).all(axis=1)]
     numbers: dict[str, Any] = {
         "rays": len(rays.o),
@@ -98,6 +101,10 @@ def geometry(
             f"shape_{shape}": [s._asdict() for s in found]
             for shape, found in counterpart.stand_ins().items()
         },
+        "any_hit_rays": shadows.rays,
+        "any_hit_triangles": shadows.triangles,
+        "any_hit_wrong": shadows.wrong,
+        "any_hit_mitsuba_wrong": shadows.mitsuba_wrong,
         **camera.numbers,
     }
     if not isinstance(scene.integrator, RayCast):
@@ -105,6 +112,9 @@ def geometry(
     if camera.problem:
         return RungResult("geometry", "differ", camera.problem, numbers)
     status, reason = _outcome(traced, verdict, is_aimed, numbers)
+    if shadows.wrong and status != "differ":
+        status = "differ"
+        reason = f"{shadows.wrong} of {shadows.rays} shadow rays are wrong; {shadows.first}"
     return RungResult("geometry", status, reason, numbers)
 
 

@@ -7,11 +7,12 @@ level (Šidák 1967); the levels of all families add up to one false alarm in a 
 - *image*: the mean of each channel; *tiles*: of each channel of each tile; *pixels*: of each pixel.
 - *uniformity*: the rank of the difference of small blocks among differences that hold only noise.
 
-Each mean has two standard errors, and a bias is proven only if it is so with both. One comes from
+Each mean has three standard errors, and a bias is proven only if it is so with each. One comes from
 the spread of the means between replicates, whatever happens inside a picture (correlated pixels,
 stratification, a filter); it has about 2 (R - 1) degrees of freedom. The other comes from the
 pixels inside the cell (for a pixel: from its neighbours), as if they were independent; it has
-thousands. It protects against few replicates that agree by chance, whose spread is too small.
+thousands. It protects against few replicates that agree by chance, whose spread is too small. The
+third adds the noise of light that few replicates met, and that a cell may have missed (`rare`).
 
 The rule is one of equivalence: the absence of a proven difference is not yet agreement.
 
@@ -19,11 +20,12 @@ The rule is one of equivalence: the absence of a proven difference is not yet ag
   outside ± the margin of its scale (`Margins`); or the ranks are too low.
 - `invalid`: the ranks are too high: the two sides share their noise.
 - `agree`: nothing differs, each channel's interval of the image mean lies wholly inside ± the
-  limit, and the smallest bias that such a run detects with 99 % power is at most the limit.
+  limit, the smallest bias that such a run detects with 99 % power is at most the limit, and no more
+  than the limit may be missing of the light that few replicates met.
 - `inconclusive`: none of these; the reason says how many times more samples are needed.
 
 The least standard error is the rounding of float32: no side counts as free of noise. Pixels without
-noise may differ by `Margins.constant`.
+noise, or with hardly any, may differ by the rounding of half floats (`Margins.stored`).
 
 Heavy tails. If noise is lognormal, or few fireflies carry much of the energy, the sample variance
 of replicates is unreliable, and Student's t fails. Four rules keep the level:
@@ -40,20 +42,33 @@ With as many replicates on both sides and noise of one distribution the differen
 heavy tails make the tests less sensitive, but not wrong. The ranks assume no distribution at all.
 False alarms per case, measured with 2,000 and more cases each: see the slow tests.
 
-Not handled: energy in paths so rare that no replicate of either side has sampled one, if the sides
-sample it differently. Such a side may falsely be proven different. Every test needs some such
-assumption (Bahadur and Savage 1956).
+Not handled: light that no replicate of a side has met, not in a single pixel. If the other side
+samples it, the sides differ, as they do where a lamp is forgotten. If neither has met it, both
+agree without it. So the reason says on what it is conditional: it names the number of pixel values,
+the share of the energy that one replicate alone met, and how much of such light may be missing.
+Every test needs some such assumption (Bahadur and Savage 1956).
 
 Contract: pictures are linear radiance, (R, height, width, 3) or (height, width, 3); biases, limits
 and margins are fractions of the reference's mean. `compare` returns the `statistics` rung. A side
 of a single picture is handled by `single`; a reference with known mean and variance is `Known`. To
 add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3), a test in
-`welch`, its numbers in `wording`, and its verdict in `decide`.
+`cells`, its numbers in `wording`, and its verdict in `decide`.
 """
 
-from comparisons.statistics.decide import compare
+from comparisons.statistics.advice import noise_free_candidate, shortfall
+from comparisons.statistics.decide import compare, read
 from comparisons.statistics.places import standard_error, worst_regions
-from comparisons.statistics.scales import Margins
+from comparisons.statistics.scales import CHANNELS, Margins
 from comparisons.statistics.sides import Known
 
-__all__ = ["Known", "Margins", "compare", "standard_error", "worst_regions"]
+__all__ = [
+    "CHANNELS",
+    "Known",
+    "Margins",
+    "compare",
+    "noise_free_candidate",
+    "read",
+    "shortfall",
+    "standard_error",
+    "worst_regions",
+]

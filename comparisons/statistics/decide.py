@@ -1,28 +1,33 @@
 """The verdict of the statistics, with its reason and numbers."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, RungResult, Status
+from comparisons.statistics.advice import noise_free_candidate, wanted
+from comparisons.statistics.cells import image_test, pixel_test, tile_test
 from comparisons.statistics.metrics import count_nonfinite
+from comparisons.statistics.rare import Unseen, unseen, worse
 from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
 from comparisons.statistics.sides import Known, known_side, picture_array, side_of
 from comparisons.statistics.single import single_tests
 from comparisons.statistics.uniformity import Uniformity, uniformity
-from comparisons.statistics.welch import BiasTest, image_test, pixel_test, tile_test
+from comparisons.statistics.welch import BiasTest
 from comparisons.statistics.wording import (
     beyond,
     cell_numbers,
     channels,
+    detectable_words,
     finite,
     image_numbers,
     interval,
     percent,
     uniformity_numbers,
     uniformity_words,
+    unseen_numbers,
+    unseen_words,
     which,
 )
 
@@ -43,10 +48,14 @@ class Findings:
     tiles: BiasTest
     pixels: BiasTest
     uniformity: Uniformity | None
+    unseen: Unseen | None
+    """The worse of both sides; None if either is a single picture."""
     tile: int
     """Side in pixels."""
     single: bool
     """Whether a side is a single picture."""
+    level: float = 1.0
+    """The share of the families' levels that was used."""
 
 
 def compare(
@@ -56,18 +65,27 @@ def compare(
     limit: float = 0.005,
     tile: int = TILE,
     margins: Margins | None = None,
+    level: float = 1.0,
+    fixed_reference: bool = False,
 ) -> RungResult:
     """Decide whether two sets of replicates have the same mean, by the rule of this package.
 
     candidate, reference: linear radiance, (R, height, width, 3); R may differ between them, and
     should be 16 or more.  limit: the smallest bias of the image mean that must be detectable, as a
     fraction;  tile: side in pixels.  Pictures of different sizes and pixels that are not finite are
-    `invalid`; if both sides are black the rung is `not-applicable`.  Raises ValueError for other
-    shapes, and for a limit that is not larger than the margin of the image mean.
+    `invalid`; if both sides are black the rung is `not-applicable`.
+
+    level: the share of each family's level that is used, for one of several looks at a growing
+    number of replicates, whose shares must not exceed 1 together; not for single pictures;
+    fixed_reference: the reference cannot be rendered with more samples, so that advice is about the
+    candidate's.  Raises ValueError for other shapes, for another level than 0 < level <= 1, and for
+    a limit that is not larger than the margin of the image mean.
     """
     margins = margins or Margins()
     if not limit > margins.image:
         raise ValueError(f"limit {limit}: expected more than the margin {margins.image}")
+    if not 0.0 < level <= 1.0:
+        raise ValueError(f"level {level}: expected a share above 0, and 1 at most")
     a = picture_array(candidate, "candidate", 4)
     b, variance = _reference(reference)
     if a.shape[1:] != b.shape[1:]:
@@ -83,23 +101,34 @@ def compare(
     if not a.any() and not b.any():
         return RungResult("statistics", "not-applicable", "every picture of either side is black")
     known = None if variance is None else Known(b[0], variance)
-    return _verdict(findings(a, known or b, tile, margins), a, b, limit)
+    found = findings(a, known or b, tile, margins, level)
+    alone = noise_free_candidate(known or b, margins, level) if fixed_reference else None
+    return _verdict(found, a, b, limit, alone)
 
 
-def findings(a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins) -> Findings:
-    """All tests, for pictures (R, h, w, 3) that are finite and of one size."""
+def findings(
+    a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins, level: float = 1.0
+) -> Findings:
+    """All tests, for pictures (R, h, w, 3) that are finite and of one size;  level: as in
+    `compare`."""
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
         image, tiles, pixels, side = single_tests(a, b, tile, margins)
-        return Findings(image, tiles, pixels, None, side, True)
+        return Findings(image, tiles, pixels, None, None, side, True)
     one, two = side_of(a), known_side(b) if isinstance(b, Known) else side_of(b)
     return Findings(
-        image_test(one, two, margins),
-        tile_test(one, two, tile, margins),
-        pixel_test(one, two, margins),
-        uniformity(one, two, margins),
+        image_test(one, two, margins, level),
+        tile_test(one, two, tile, margins, level),
+        pixel_test(one, two, margins, level),
+        uniformity(one, two, margins, level),
+        worse(*(_unseen(side) for side in (a, b))),
         tile,
         False,
+        level,
     )
+
+
+def _unseen(pictures: FloatArray | Known) -> Unseen | None:
+    return None if isinstance(pictures, Known) else unseen(pictures, IMAGE_LEVEL)
 
 
 def read(
@@ -133,15 +162,19 @@ def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray
     return mean[None], variance
 
 
-def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> RungResult:
-    status, finding = _decide(found, limit)
+def _verdict(
+    found: Findings, a: FloatArray, b: FloatArray, limit: float, alone: BiasTest | None
+) -> RungResult:
+    status, finding = _decide(found, limit, alone)
     image = found.image
     reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
     reason = (
-        f"{finding}; the smallest bias of the image mean seen with {100.0 * POWER:g} % power is "
-        f"{percent(image.over_scale(image.detectable).max())}; the means are equivalent within "
-        f"±{percent(reach)} at {100.0 * (1.0 - IMAGE_LEVEL):g} %"
+        f"{finding}; {detectable_words(image, found.tiles, found.tile, found.pixels)}; the means "
+        f"are equivalent within ±{percent(reach)} at "
+        f"{100.0 * (1.0 - found.level * IMAGE_LEVEL):.6g} %"
     )
+    if found.unseen is not None and status != "differ":
+        reason += f"; {unseen_words(found.unseen)}"
     if found.single:
         reason += f"; {ONE_PICTURE}"
     of_image = image_numbers(image)
@@ -151,11 +184,12 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Run
         "mean_candidate": channels(a.mean(axis=(0, 1, 2))),
         "mean_reference": channels(b.mean(axis=(0, 1, 2))),
         "limit": limit,
-        "confidence": 1.0 - IMAGE_LEVEL,
+        "confidence": 1.0 - found.level * IMAGE_LEVEL,
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(image.samples_factor(limit)),
+        "samples_factor": finite(wanted(image, limit, alone, _rare_factor(found, limit))[1]),
+        "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
         "pixels": cell_numbers(found.pixels, 1),
@@ -164,7 +198,8 @@ def _verdict(found: Findings, a: FloatArray, b: FloatArray, limit: float) -> Run
     return RungResult("statistics", status, reason, numbers)
 
 
-def _decide(found: Findings, limit: float) -> tuple[Status, str]:
+def _decide(found: Findings, limit: float, alone: BiasTest | None = None) -> tuple[Status, str]:
+    """alone: as in `advice.wanted`."""
     image, spread = found.image, found.uniformity
     if image.differs.any():
         text = f"the image mean differs: {beyond(image, image.worst)}"
@@ -190,21 +225,22 @@ def _decide(found: Findings, limit: float) -> tuple[Status, str]:
     widest = f"image mean {interval(image, (int(reach.argmax()),))}"
     sees = bool(np.all(image.over_scale(image.detectable) <= limit))
     inside = bool(image.within(limit).all())
-    if inside and sees:
+    met = found.unseen is None or found.unseen.missing <= limit
+    if inside and sees and met:
         return "agree", f"{widest}, within ±{percent(limit)}; no tile and no pixel differs"
     within = "within" if inside else "not within"
     overlooked = "" if sees else "; a bias of that size could be overlooked"
+    if not met:
+        overlooked += "; as much light may have been missed by chance, since few samples meet it"
     return "inconclusive", (
         f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
-        f"{_wanted(image.samples_factor(limit))}"
+        f"{wanted(image, limit, alone, _rare_factor(found, limit))[0]}"
     )
 
 
-def _wanted(factor: float) -> str:
-    if not math.isfinite(factor):
-        return "these pictures do not show how many samples are needed: give more replicates"
-    times = f"{factor:.{0 if factor > 10 else 1}f}"
-    return f"it takes about {times} times the samples: replicates x {times} or spp x {times}"
+def _rare_factor(found: Findings, limit: float) -> float:
+    """How many times as many samples meet enough of the rare light."""
+    return found.unseen.missing / limit if found.unseen is not None else 0.0
 
 
 def _size(images: FloatArray) -> str:

@@ -31,6 +31,10 @@ ray epsilon is proportional to its surroundings."""
 ROUNDING = 2.0**-24
 """Half a unit in the last place of float32: the least relative standard error that is believed."""
 
+HALF = 2.0**-11
+"""Largest relative rounding of a half float (IEEE 754 binary16), 0.049 %. Many renderers hold
+textures and skies in this format, and many EXR files are written in it."""
+
 
 @dataclass(frozen=True)
 class Margins:
@@ -44,9 +48,12 @@ class Margins:
     pixel: float = 0.05
     """And still more of a pixel: in a picture 256 pixels wide the offset is a fortieth of a pixel,
     and light that leaks along a contact may double the error."""
+    stored: float = HALF
+    """For a pixel with little noise or none, such as a smooth sky: of the pixel's own value, by
+    which texels and pixels that are stored as half floats may be off."""
     constant: float = 1e-5
-    """For a pixel without noise, such as the background or a directly visible lamp: only its value
-    is rounded, in sums and products of some tens of float32 numbers."""
+    """In addition, for sums and products of some tens of float32 numbers; of at least DARK times
+    the mean, so that it is all that is permitted in a dark pixel without noise, as a background."""
 
 
 def cell_sums(images: FloatArray, tile: int) -> FloatArray:

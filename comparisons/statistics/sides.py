@@ -1,5 +1,6 @@
 """The two sides of a comparison, and the noise estimated from their replicates."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,8 @@ import numpy.typing as npt
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.metrics import ratio
+from comparisons.statistics.rare import event, met_once
 from comparisons.statistics.scales import cell_means, cell_pixels, cell_sums
 
 NEIGHBOURS = 5
@@ -76,6 +79,22 @@ class Side:
         dof = self._dof(n * around, n * neighbourhood(self.fourth), n)
         own_dof = np.inf if self.pictures is None else float(self.count - 1)
         return Noise(self.variance, own_dof, around, dof)
+
+    @functools.cached_property
+    def met_once(self) -> FloatArray:
+        """(h, w, 3): the energy of one picture that only one replicate has met; of a known mean,
+        for which this is unknown, zero."""
+        return np.zeros_like(self.mean) if self.pictures is None else met_once(self.pictures)
+
+    def event(self, scale: FloatArray) -> FloatArray:
+        """(3,): the energy of an event of rare light in a pixel of one picture over `scale`, (h, w,
+        3) and positive; of a known mean, that of a Poisson variable's events, the variance over the
+        mean."""
+        if self.pictures is not None:
+            return event(self.met_once, scale)
+        lit = np.where(self.variance > 0.0, np.abs(self.mean), 0.0).sum(axis=(0, 1))
+        energy = (self.variance / scale).sum(axis=(0, 1))
+        return np.where(lit > 0.0, ratio(energy, lit), 0.0)
 
     def _dof(
         self, variance: FloatArray, fourth: FloatArray, pixels: FloatArray | float

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.metrics import ratio
 from comparisons.statistics.scales import (
     DARK,
     IMAGE_LEVEL,
@@ -166,7 +167,7 @@ def _pixels(difference: FloatArray, reference: FloatArray, margins: Margins) -> 
     variance = neighbourhood(difference**2) - around**2
     whole = min(difference.shape[:2]) >= NEIGHBOURS
     still = whole & (variance <= (margins.constant * scale) ** 2)
-    error = Error(np.where(still, 0.0, np.inf), np.full(difference.shape, np.inf))
-    return bias_test(
-        difference, reference, (error,), margins.constant, PIXEL_LEVEL, float(reference.mean())
-    )
+    spread = np.sqrt(np.maximum(variance, 0.0))
+    error = Error(np.where(still, spread, np.inf), np.full(difference.shape, np.inf))
+    margin = margins.constant + ratio(margins.stored * np.abs(reference), scale)
+    return bias_test(difference, reference, (error,), margin, PIXEL_LEVEL, float(reference.mean()))

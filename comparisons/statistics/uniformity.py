@@ -21,8 +21,9 @@ from scipy import stats
 from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import DARK, UNIFORMITY_LEVEL, Margins, cell_means
+from comparisons.statistics.scales import DARK, UNIFORMITY_LEVEL, Margins, cell_means, cell_pixels
 from comparisons.statistics.sides import Side
+from comparisons.statistics.unmet import Events
 
 BLOCK = 4
 """Side of a block in pixels: larger than a filter's radius, and many blocks even in small
@@ -46,20 +47,25 @@ class Uniformity:
     p_narrow: float
     blocks: int
     replicates: int
+    level: float = UNIFORMITY_LEVEL
+    """Chance of a false alarm of both tests together."""
 
     @property
     def wide(self) -> bool:
         """The blocks differ more than replicates of one side do."""
-        return self.p_wide < UNIFORMITY_LEVEL / 2.0
+        return self.p_wide < self.level / 2.0
 
     @property
     def narrow(self) -> bool:
         """The blocks differ less than independent replicates do."""
-        return self.p_narrow < UNIFORMITY_LEVEL / 2.0
+        return self.p_narrow < self.level / 2.0
 
 
-def uniformity(a: Side, b: Side, margins: Margins) -> Uniformity | None:
-    """The test; None if there are too few replicates, or no block with noise."""
+def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Uniformity | None:
+    """The test; None if there are too few replicates, or no block with noise.
+
+    level: the share of the family's level that is used.
+    """
     if a.pictures is None or b.pictures is None or min(a.count, b.count) < LEAST:
         return None
     half = 2 ** int(math.log2(min(a.count, b.count)))
@@ -78,8 +84,8 @@ def uniformity(a: Side, b: Side, margins: Margins) -> Uniformity | None:
         return None
     size = size[:, noisy]
     # Bias and noise have equal signs half of the time, so their squares add.
-    permitted = margins.tile * scale[noisy]
-    beyond = np.sqrt(np.maximum(size[difference] ** 2 - permitted**2, 0.0))
+    permitted = (margins.tile * scale[noisy]) ** 2 + _unmet(a, b)[noisy]
+    beyond = np.sqrt(np.maximum(size[difference] ** 2 - permitted, 0.0))
     means = _mean_p_values(size)
     others = np.delete(means, difference)
     expected, dof = float(others.mean()), len(others) - 2
@@ -100,7 +106,18 @@ def uniformity(a: Side, b: Side, margins: Margins) -> Uniformity | None:
         p_narrow=float(stats.t.sf((means[difference] - expected) / error, dof)),
         blocks=int(noisy.any(axis=-1).sum()),
         replicates=half,
+        level=level * UNIFORMITY_LEVEL,
     )
+
+
+def _unmet(a: Side, b: Side) -> FloatArray:
+    """The square of two standard errors of rare light (see `rare`) in the blocks' differences. The
+    ranks presume noise of one distribution on both sides; of a side that seldom meets a light, most
+    blocks are darker, though none by more than a few events."""
+    of_a, of_b = cell_means(a.mean, BLOCK), cell_means(b.mean, BLOCK)
+    difference = of_a - of_b
+    events = Events.of_cells(a, b, of_a, of_b, cell_pixels(b.mean, BLOCK))
+    return np.asarray(8.0 * np.abs(difference) * events.missed_by(difference))
 
 
 def _p_values(value: FloatArray, others: FloatArray) -> FloatArray:

@@ -1,8 +1,8 @@
-"""Welch's test of the image mean, of tiles and of pixels, with the noise of both sides."""
+"""Welch's test of many means at once, with the noise of both sides."""
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -10,17 +10,9 @@ from scipy import stats
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import (
-    DARK,
-    IMAGE_LEVEL,
-    PIXEL_LEVEL,
-    POWER,
-    ROUNDING,
-    TILE_LEVEL,
-    Margins,
-    cell_means,
-)
-from comparisons.statistics.sides import Noise, Side, neighbourhood
+from comparisons.statistics.scales import DARK, POWER, ROUNDING
+from comparisons.statistics.sides import Noise, Side
+from comparisons.statistics.unmet import Events
 
 MOST_DOF = 1000
 """Cap on degrees of freedom: beyond it the quantile is the normal one within 1 %."""
@@ -51,6 +43,9 @@ class BiasTest:
     detectable: FloatArray
     """The smallest true bias that such a run proves to exceed the margin, with a chance of POWER,
     if the estimated standard error is correct."""
+    rare: FloatArray
+    """The energy of rare light, of the other side's mean, that may be missing by chance: less than
+    this cannot be proven to be missing, however little noise there is."""
 
     @property
     def standard_error(self) -> FloatArray:
@@ -107,81 +102,33 @@ class BiasTest:
         dof = min(float(np.min(error.dof)) for error in self.errors)
         cushion = (1.0 + stats.norm.isf(0.05) / math.sqrt(dof)) ** 2
         reach = self.detectable - self.margin * self.scale
-        seen = ratio(reach, (limit - self.margin) * self.scale)
         inside = limit * self.scale - np.abs(self.difference)
         beyond = np.abs(self.difference) - self.margin * self.scale
-        decided = ratio(reach, np.maximum(inside, beyond))
-        return float(cushion * (np.maximum(seen, decided) ** 2).max())
+        wanted = np.minimum((limit - self.margin) * self.scale, np.maximum(inside, beyond))
+        # The reach falls by the square root of the factor, that of rare light by the factor.
+        less = self.rare * (wanted - np.where(self.rare > 0.0, reach, wanted))
+        factor = ratio(reach**2 + less, wanted**2)
+        return float(cushion * factor.max())
 
 
-def image_test(a: Side, b: Side, margins: Margins) -> BiasTest:
-    """The image mean of each channel, (3,)."""
-    reference = b.mean.mean(axis=(0, 1))
-    difference = a.mean.mean(axis=(0, 1)) - reference
-    errors = welch_errors(a.of_image(), b.of_image(), a, b)
-    return bias_test(difference, reference, errors, margins.image, IMAGE_LEVEL, reference.mean())
-
-
-def tile_test(a: Side, b: Side, tile: int, margins: Margins) -> BiasTest:
-    """Each channel of each tile, (rows, columns, 3): errors of hue would cancel in luminance."""
-    reference = cell_means(b.mean, tile)
-    difference = cell_means(a.mean, tile) - reference
-    errors = welch_errors(a.of_tiles(tile), b.of_tiles(tile), a, b)
-    return bias_test(difference, reference, errors, margins.tile, TILE_LEVEL, b.mean.mean())
-
-
-def pixel_test(a: Side, b: Side, margins: Margins) -> BiasTest:
-    """Each channel of each pixel, (height, width, 3).
-
-    The margin is that of a pixel, but at most half the standard deviation of one picture's pixel:
-    whatever a rounded ray could hit differently varies within the pixel, and so is noise.
-
-    A pixel with two possible values (a lamp's edge, one sample per pixel) may by chance have one
-    value in all pictures of the candidate and the other in all of the reference, without any
-    spread. With few replicates such pixels count only if there are more than chance produces.
-    """
-    noise_a, noise_b = a.of_pixels(), b.of_pixels()
-    own, around = welch_errors(noise_a, noise_b, a, b)
-    mean = float(b.mean.mean())
-    scale = np.maximum(np.abs(b.mean), DARK * abs(mean))
-    spread = np.sqrt(np.maximum(a.variance, b.variance))
-    margin = margins.constant + np.minimum(margins.pixel, 0.5 * np.minimum(ratio(spread, scale), 1))
-    parted = scale.size * (chance_of_parting(a.count, b.count) if b.pictures is not None else 0.0)
-    still = spread <= margins.constant * scale
-    noisy = neighbourhood(np.where(still, 0.0, 1.0)).max(axis=-1, keepdims=True) > 0.0
-    if parted < PIXEL_LEVEL / 2.0:  # enough replicates: chance does not separate the sides
-        around = replace(around, value=np.where(still, own.value, around.value))
-    test = bias_test(a.mean - b.mean, b.mean, (own, around), margin, PIXEL_LEVEL, mean)
-
-    proven = test.differs & noisy
-    # The channels of a pixel may depend on each other: pixels are counted, against the expected
-    # number of channels.
-    if np.count_nonzero(proven.any(axis=-1)) > stats.poisson.isf(PIXEL_LEVEL, parted):
-        return test
-    return replace(test, half_width=np.where(proven, np.abs(test.difference), test.half_width))
-
-
-def chance_of_parting(count_a: int, count_b: int) -> float:
-    """The chance that all coin tosses of one side show heads and all of the other tails, for the
-    coin with the largest chance."""
-    share = count_a / (count_a + count_b)
-    return 2.0 * math.exp(count_a * math.log(share) + count_b * math.log1p(-share))
-
-
-def welch_errors(noise_a: Noise, noise_b: Noise, a: Side, b: Side) -> tuple[Error, Error]:
+def welch_errors(
+    noise_a: Noise, noise_b: Noise, a: Side, b: Side, by_count: bool = False
+) -> tuple[Error, Error]:
     """The standard errors of a difference of means, between replicates and from pixels.
 
     The side with fewer replicates counts as at least as noisy as the other, for it has seen fewer
-    rare paths; against a known mean the ratio of the noises is that of the median pixel. Degrees of
-    freedom are Welch and Satterthwaite's, with the ratio of the variances from pixels, which is
-    well known. The ratio of few replicates' own variances is not: at the level of one test among
-    many it gave up to 95 times the promised false alarms (measured).
+    rare paths, unless its mean is the more exact one (even then with `by_count`, for single pixels,
+    which either side may have met alone); against a known mean the ratio of the noises is that of
+    the median pixel. Degrees of freedom are Welch and Satterthwaite's, with the ratio of
+    the variances from pixels, which is well known. The ratio of few replicates' own variances is
+    not: at the level of one test among many it gave up to 95 times the promised false alarms
+    (measured).
     """
     own_a, own_b, pixels_a, pixels_b = noise_a.own, noise_b.own, noise_a.pixels, noise_b.pixels
     if b.pictures is None or a.count < b.count:
         factor = 1.0 if b.pictures is not None else typical_ratio(a, b)
         own_a, pixels_a = np.maximum(own_a, factor * own_b), np.maximum(pixels_a, factor * pixels_b)
-    elif b.count < a.count:
+    elif b.count < a.count and (by_count or not is_more_exact(b, a)):
         own_b, pixels_b = np.maximum(own_b, own_a), np.maximum(pixels_b, pixels_a)
     shares = pixels_a / a.count, pixels_b / b.count
     return (
@@ -194,6 +141,18 @@ def welch_errors(noise_a: Noise, noise_b: Noise, a: Side, b: Side) -> tuple[Erro
             satterthwaite(*shares, noise_a.pixels_dof, noise_b.pixels_dof),
         ),
     )
+
+
+def is_more_exact(few: Side, many: Side) -> bool:
+    """Whether the mean of few pictures has less noise than that of many, in the median pixel: they
+    have the more samples, as a reference has whose pictures are rendered for long."""
+    noisy = (few.variance > 0.0) & (many.variance > 0.0)
+    if not noisy.any():
+        return False
+    # Both variances are of some replicates; their medians are low by chi-square's.
+    low = [float(stats.chi2.median(side.count - 1)) / (side.count - 1) for side in (few, many)]
+    ratio_of_one = float(np.median(few.variance[noisy] / many.variance[noisy])) * low[1] / low[0]
+    return ratio_of_one * many.count < few.count
 
 
 def typical_ratio(a: Side, b: Side) -> float:
@@ -225,24 +184,42 @@ def bias_test(
     margin: FloatArray | float,
     level: float,
     image_mean: float,
+    events: Events | None = None,
 ) -> BiasTest:
-    """Compare entry by entry, at `level` for all entries together (Šidák 1967)."""
+    """Compare entry by entry, at `level` for all entries together (Šidák 1967).
+
+    events: of rare light. They make a third standard error: the largest of the others, with the
+    scatter of as much missing light as there is difference.
+    """
     scale = np.maximum(np.abs(reference), DARK * abs(image_mean))
     level_of_one = -math.expm1(math.log1p(-level) / difference.size)
     critical_of, reach_of = quantiles(level_of_one)
     half_width, reach = np.zeros_like(scale), np.zeros_like(scale)
+    # Rounding is a bound, not an estimate: it is added without a quantile.
+    rounding = ROUNDING * scale
     believed = []
     for error in errors:
         dof = np.clip(error.dof, 1.0, MOST_DOF)
         whole = dof.astype(np.int64)  # rounded down, to the safe side
-        # Rounding is a bound, not an estimate: it is added without a quantile.
-        rounding = ROUNDING * scale
         half_width = np.maximum(half_width, critical_of[whole] * error.value + rounding)
         reach = np.maximum(reach, reach_of[whole] * error.value + rounding)
         believed.append(Error(np.hypot(error.value, rounding), dof))
     margins = np.broadcast_to(np.asarray(margin, dtype=np.float64), scale.shape)
+    rare = np.zeros_like(scale)
+    if events is not None:
+        largest = np.max([error.value for error in errors], axis=0)
+        noisy = largest > rounding  # without any noise there is no light that is seldom met
+        missed = np.where(noisy, np.abs(difference) * events.missed_by(difference), 0.0)
+        unmet = np.sqrt(largest**2 + missed)
+        half_width = np.maximum(half_width, critical_of[MOST_DOF] * unmet + rounding)
+        believed.append(Error(np.hypot(unmet, rounding), np.full(scale.shape, float(MOST_DOF))))
+        # The reach x of a bias that is the margin and x: x^2 = k^2 (error^2 + event (margin + x)).
+        k = float(reach_of[MOST_DOF])
+        rare = np.where(noisy, k**2 * events.largest(), 0.0)
+        fixed = (k * largest) ** 2 + rare * margins * scale
+        reach = np.maximum(reach, 0.5 * rare + np.sqrt((0.5 * rare) ** 2 + fixed) + rounding)
     detectable = margins * scale + reach
-    return BiasTest(difference, scale, tuple(believed), margins, half_width, detectable)
+    return BiasTest(difference, scale, tuple(believed), margins, half_width, detectable, rare)
 
 
 @functools.lru_cache(maxsize=64)

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import CHANNELS
+from comparisons.statistics.rare import Unseen
+from comparisons.statistics.scales import CHANNELS, POWER
 from comparisons.statistics.uniformity import Uniformity
 from comparisons.statistics.welch import BiasTest
 
@@ -55,6 +56,33 @@ def which(test: BiasTest, side: int, what: str, though: str = "") -> str:
     )
 
 
+def detectable_words(image: BiasTest, tiles: BiasTest, side: int, pixels: BiasTest) -> str:
+    """The smallest bias that would have been seen at each scale."""
+    of_tiles, of_pixels = (
+        test.over_scale(test.detectable).max(axis=-1) for test in (tiles, pixels)
+    )
+    text = (
+        f"the smallest bias of the image mean seen with {100.0 * POWER:g} % power is "
+        f"{percent(image.over_scale(image.detectable).max())}; of a tile of {side} x {side} pixels "
+        f"it is {percent(float(np.median(of_tiles)))} in half of the tiles and "
+        f"{percent(of_tiles.max())} in all"
+    )
+    half = float(np.median(of_pixels))
+    if not math.isfinite(half):
+        return f"{text}; single pixels are tested only where there is no noise"
+    return f"{text}; of a pixel it is {percent(half)} in half of the pixels"
+
+
+def unseen_words(found: Unseen) -> str:
+    """On what the statement is conditional."""
+    return (
+        f"this holds for light that the pictures have met: what reaches less than one in "
+        f"{found.values:,} pixel values may be missing on both sides; "
+        f"{percent(found.met_once)} of the energy was met by one picture alone, and of such light "
+        f"at most {percent(found.missing)} is missing by chance"
+    )
+
+
 def image_numbers(test: BiasTest) -> dict[str, Any]:
     """Numbers by channel; names that end in `_of_bias` or `_bias` are fractions of the mean."""
     return {
@@ -77,6 +105,7 @@ def cell_numbers(test: BiasTest, side: int) -> dict[str, Any]:
         "tested": differ.size,
         "differ": int(np.count_nonzero(differ)),
         "median_detectable_bias": finite(np.median(test.over_scale(test.detectable))),
+        "largest_detectable_bias": finite(test.over_scale(test.detectable).max()),
         "worst_x": column * side,
         "worst_y": row * side,
         "worst_channel": CHANNELS[channel],
@@ -84,6 +113,17 @@ def cell_numbers(test: BiasTest, side: int) -> dict[str, Any]:
         "worst_half_width": finite(test.over_scale(test.half_width)[test.worst]),
         "worst_margin": float(test.margin[test.worst]),
         "worst_p_value": finite(float(test.p_value(test.worst))),
+    }
+
+
+def unseen_numbers(found: Unseen | None) -> dict[str, Any] | None:
+    """Shares of the energy; None without replicates."""
+    if found is None:
+        return None
+    return {
+        "met_once": found.met_once,
+        "missing_at_most": finite(found.missing),
+        "pixel_values": found.values,
     }
 
 

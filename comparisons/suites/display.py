@@ -11,12 +11,14 @@ from rich.text import Text
 
 from comparisons.report.ci.ranking import ranked
 from comparisons.results.case import WARNING, Case, how_many
+from comparisons.results.headline import headline
 from comparisons.results.verdict import PASSING
 from comparisons.suites.worker import Request
 from reference_rt.util.console import Bar
 
 _STYLES = {
     "agree": "green",
+    "unchanged": "green",
     "reference-limited": "cyan",
     "inconclusive": "yellow",
     "not-comparable": "yellow",
@@ -53,7 +55,7 @@ class Display(Bar):
         line = Text.assemble(f"{case.scene}: ", (case.verdict, _STYLES[case.verdict]))
         line.append(f" ({remark})")
         if self._steps or case.verdict not in PASSING:
-            line.append(f": {case.reason}")
+            line.append(f": {headline(case)}\n  {case.reason}")
         self._console.print(line, soft_wrap=True)
         self._bar.advance(self._task)
         self._show()

@@ -96,7 +96,7 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
 
 def described(budget: Budget) -> str:
     """A budget as a note for people."""
-    parts = [f"limit {100.0 * budget.limit:g} %", f"{budget.replicates} replicates"]
+    parts = [f"limit {100.0 * budget.limit:g} %", _replicates(budget)]
     if budget.spp is not None:
         parts.append(f"{budget.spp} samples per pixel")
     if budget.reference_spp is not None:
@@ -106,6 +106,15 @@ def described(budget: Budget) -> str:
     if not budget.control:
         parts.append(f"{budget.pixels} camera rays, {budget.light_pixels} for direct light")
     return "budget: " + ", ".join(parts)
+
+
+def _replicates(budget: Budget) -> str:
+    if budget.seconds is None:
+        return f"{budget.replicates} replicates"
+    return (
+        f"{budget.replicates} replicates, doubled until the question is decided or "
+        f"{budget.seconds:g} s have passed"
+    )
 
 
 def compare(

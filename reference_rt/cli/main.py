@@ -16,9 +16,8 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from reference_rt.cli.defaults import Defaults, by_name
-from reference_rt.integrators import Direct, RayCast, Whitted
-from reference_rt.integrators import Path as PathTracing
 from reference_rt.rendering.scene import Scene
+from reference_rt.rendering.settings import with_settings
 from reference_rt.util.errors import (
     ImageError,
     ReferenceRtError,
@@ -47,6 +46,24 @@ SceneArgument = Annotated[
 ]
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"reference_rt {importlib.metadata.version('reference-rt')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version.", is_eager=True, callback=_print_version
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
 def guarded(command: F) -> F:
     """Report every error of a command as one line on standard error, with its exit code."""
 
@@ -56,7 +73,12 @@ def guarded(command: F) -> F:
             with scene_warnings(lambda text: typer.echo(f"warning: {text}", err=True)):
                 return command(*args, **kwargs)
         except ReferenceRtError as error:
-            _fail(str(error), error.exit_code)
+            others = error.others if isinstance(error, SceneError) else ()
+            *first, last = (error, *others)
+            for one in first:
+                with suppress(OSError):
+                    say(f"error: {one}", err=True)
+            _fail(str(last), error.exit_code)
         except typer.Exit:
             raise
         except KeyboardInterrupt as error:
@@ -144,7 +166,7 @@ def render(
         picture = render_scene(
             description, threads=threads, progress=progress, compiling=progress.compiling
         )
-    image.write(output, picture, provenance(description))
+    picture.save(output)
     seconds = picture.seconds
     say(
         f"{output}: {description.film.width} x {description.film.height}, "
@@ -198,11 +220,31 @@ def warm_up(
 
 @app.command()
 @guarded
+def doctor() -> None:
+    """Print what is installed, what works and why not, and the caches; exit code 1 if something
+    does not work."""
+    from reference_rt.cli.doctor import checks, page
+
+    found = []
+    for check in checks():  # one after another: some take seconds
+        found.append(check)
+        for line in page([check]):
+            say(line)
+    if not all(check.works for check in found):
+        raise typer.Exit(1)
+
+
+@app.command()
+@guarded
 def schema() -> None:
     """Print the JSON Schema of scene files."""
     from reference_rt.scene.model import json_schema
 
     typer.echo(json.dumps(json_schema(), indent=2))
+
+
+_OPTIONS = (("spp",), ("size",), ("integrator",), ("seed",))
+"""Settings that errors of `with_settings` name."""
 
 
 def adjusted(
@@ -213,51 +255,18 @@ def adjusted(
     seed: int | None = None,
 ) -> Scene:
     """The scene with the options of the command line.  Raises UsageError."""
-    parts: dict[str, Any] = {}
+    pixels = None
     if size is not None:
         width, _, height = size.lower().partition("x")
         if not all(n.isdecimal() and len(n) < 11 for n in (width, height)):
             raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{size}'")
-        parts["film"] = _changed(scene.film, "--size", width=int(width), height=int(height))
-    if integrator is not None and integrator != scene.integrator.type:
-        known = {"ray_cast": RayCast, "whitted": Whitted, "direct": Direct, "path": PathTracing}
-        if integrator not in known:
-            raise UsageError(
-                f"--integrator: expected one of {', '.join(known)}, got '{integrator}'"
-            )
-        parts["integrator"] = known[integrator]()
-        if parts["integrator"].deterministic != scene.integrator.deterministic:
-            parts["sampler"] = None
-    scene = scene.changed(**parts)
-    sampler = scene.resolved_sampler
-    if spp is not None:
-        sampler = _changed(sampler, "--spp", spp=spp)
-    if seed is not None and hasattr(sampler, "seed"):
-        sampler = _changed(sampler, "--seed", seed=seed)
-    return scene.changed(sampler=sampler)
-
-
-def _changed(part: Any, option: str, **fields: Any) -> Any:
-    """`part` with some fields changed, checked again."""
+        pixels = int(width), int(height)
     try:
-        return type(part)(
-            **{name: getattr(part, name) for name in type(part).model_fields} | fields
-        )
+        return with_settings(scene, spp=spp, size=pixels, integrator=integrator, seed=seed)
     except SceneError as error:
-        raise UsageError(f"{option}: {error.message}") from None
-
-
-def provenance(scene: Scene) -> dict[str, str]:
-    """The provenance of a picture, for its header: the same scene has the same bytes."""
-    sampler = scene.resolved_sampler
-    return {
-        "software": f"reference_rt {importlib.metadata.version('reference-rt')}",
-        "scene": scene.name,
-        "sceneSha256": scene.digest(),
-        "integrator": scene.integrator.model_dump_json(),
-        "sampler": sampler.model_dump_json(),
-        "filter": scene.film.filter.model_dump_json(),
-    }
+        if error.path in _OPTIONS:
+            raise UsageError(f"--{error.path[0]}: {error.message}") from None
+        raise
 
 
 @contextmanager

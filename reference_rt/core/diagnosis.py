@@ -5,6 +5,8 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from reference_rt.util.errors import SceneError, meant
+
 Keys = tuple[str | int, ...]
 
 
@@ -25,10 +27,26 @@ _PLAIN = {
 """What is expected, for errors that pydantic words in terms of Python's types."""
 
 
-def first_problem(model: type[BaseModel], error: ValidationError, data: Any) -> tuple[str, Keys]:
-    """(message, keys) of the first error that pydantic reports about `data`: the message is one
-    line, the keys lead to the wrong value."""
-    first = error.errors()[0]
+MOST = 20
+"""The most problems that are reported: one wrong default may spoil 100,000 shapes."""
+
+
+def scene_error(model: type[BaseModel], error: ValidationError, data: Any) -> SceneError:
+    """What pydantic reports about `data`: an error with all problems, one for each wrong value."""
+    found: dict[Keys, str] = {}
+    for first in error.errors(include_url=False):
+        message, keys = _problem(model, first, data)
+        # What is inside a value that is wrong itself, or is tried as several types, counts once.
+        found.setdefault(keys, message)
+        if len(found) == MOST:
+            break
+    errors = [SceneError(message, keys) for keys, message in found.items()]
+    return SceneError(errors[0].message, errors[0].path, others=errors[1:])
+
+
+def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
+    """(message, keys) of one of pydantic's errors: the message is one line, the keys lead to the
+    wrong value."""
     location: Keys = first["loc"]
     keys = _keys_in(data, location)
     message = first["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
@@ -37,14 +55,16 @@ def first_problem(model: type[BaseModel], error: ValidationError, data: Any) -> 
         return message, (*keys, cause.field)
     if first["type"] == "extra_forbidden":
         known = _models_at(model, location[:-1])[0].model_fields
-        message = f"unknown key; expected one of: {', '.join(known)}"
+        near = meant(str(location[-1]), known)
+        message = f"unknown key; expected one of: {', '.join(known)}{near}"
     elif first["type"] == "missing":
         message = "missing; expected a value"
     elif first["type"] == "union_tag_not_found":
         message = f"missing 'type'; expected one of: {_types(_models_at(model, location))}"
     elif first["type"] == "union_tag_invalid":
-        known_types = _types(_models_at(model, location))
-        message = f"unknown type '{first['ctx']['tag']}'; expected one of: {known_types}"
+        known_types, tag = _types(_models_at(model, location)), first["ctx"]["tag"]
+        near = meant(tag, known_types.split(", "))
+        message = f"unknown type '{tag}'; expected one of: {known_types}{near}"
     elif first["type"] == "too_long":
         message = f"expected at most {first['ctx']['max_length']} items"
     elif first["type"] == "too_short":

@@ -19,7 +19,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from reference_rt.core.diagnosis import first_problem
+from reference_rt.core.diagnosis import scene_error
 from reference_rt.core.numpy_fields import plain
 from reference_rt.util.errors import SceneError
 
@@ -54,7 +54,7 @@ class Description(BaseModel):
         try:
             found: Self = cls.__pydantic_validator__.validate_python(data, self_instance=instance)
         except ValidationError as error:
-            raise SceneError(*first_problem(cls, error, data)) from None
+            raise scene_error(cls, error, data) from None
         return found
 
     @classmethod
@@ -64,7 +64,7 @@ class Description(BaseModel):
         try:
             return super().model_validate(data, **options)
         except ValidationError as error:
-            raise SceneError(*first_problem(cls, error, data)) from None
+            raise scene_error(cls, error, data) from None
 
     @classmethod
     def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:

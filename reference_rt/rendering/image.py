@@ -1,18 +1,32 @@
 """Pictures in files: EXR (float32, named channels, provenance) and PNG (8-bit sRGB)."""
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
-from reference_rt.rendering.render import Picture
-from reference_rt.util.errors import UsageError
+from reference_rt.textures.image_file import linear
+from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import replacing
+from reference_rt.util.memory import check_memory
 
 SUFFIXES = (".exr", ".png")
+
+
+class Layered(Protocol):
+    """A `Picture`: its layers, and the name of the one that is shown."""
+
+    @property
+    def layers(self) -> dict[str, FloatArray]: ...
+
+    @property
+    def shown(self) -> str: ...
+
 
 # EXR channel names of each layer: the colour's are those that every viewer shows.
 _CHANNELS: dict[str, tuple[str, ...]] = {
@@ -33,13 +47,35 @@ def check_suffix(path: Path) -> None:
         raise UsageError(f"{path}: '{path.suffix}' is not supported; expected .exr or .png")
 
 
-def write(path: Path, picture: Picture, provenance: Mapping[str, str]) -> None:
+def write(path: Path, picture: Layered, provenance: Mapping[str, str]) -> None:
     """Write every layer to .exr, or the shown one to .png.  No partial file is ever left."""
     check_suffix(path)
     if path.suffix.lower() == ".png":
         write_png(path, display(picture), provenance)
     else:
         write_exr(path, channels(picture.layers), provenance)
+
+
+def read_image(path: str | os.PathLike[str], layer: str = "") -> FloatArray:
+    """(height, width, 3) linear values of an image file, row 0 on top; 8-bit files are decoded from
+    sRGB.
+
+    layer: the prefix of the channels' names of an EXR file, such as "albedo".  Raises ImageError.
+    """
+    from reference_rt.core.image_files import open_image  # importing Pillow is slow
+
+    try:
+        image = open_image(Path(path), layer)
+        check_memory(image.width * image.height * 32, f"{image.width} x {image.height} pixels")
+        found = np.empty((image.height, image.width, 3))
+        for rows, colours, _ in image.strips(linear if image.is_integer else None):
+            found[rows] = colours
+    except OSError as error:
+        reason = error.strerror or error
+        raise ImageError(f"{path}: cannot be read: {reason}; expected an image") from None
+    except (ValueError, MemoryError) as error:
+        raise ImageError(f"{path}: {error}") from None
+    return found
 
 
 def channels(layers: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
@@ -56,37 +92,42 @@ def write_png(path: Path, image: FloatArray, provenance: Mapping[str, str]) -> N
     """An (height, width, 3) image of display values in [0, 1] as 8 bits; NaN becomes magenta."""
     from PIL import Image, PngImagePlugin
 
-    pixels = np.round(255.0 * np.clip(np.nan_to_num(image), 0.0, 1.0)).astype(np.uint8)
-    pixels[~np.isfinite(image).all(axis=-1)] = (255, 0, 255)
     text = PngImagePlugin.PngInfo()
     for key, value in provenance.items():
         text.add_text(key, value)
     with replacing(path) as temporary:
-        Image.fromarray(pixels).save(temporary, pnginfo=text)
+        Image.fromarray(eight_bits(image)).save(temporary, pnginfo=text)
 
 
-def srgb(linear: npt.ArrayLike) -> FloatArray:
+def eight_bits(image: FloatArray) -> npt.NDArray[np.uint8]:
+    """Display values (height, width, 3) in [0, 1] as 8 bits; what is not finite becomes magenta."""
+    pixels = np.round(255.0 * np.clip(np.nan_to_num(image), 0.0, 1.0)).astype(np.uint8)
+    pixels[~np.isfinite(image).all(axis=-1)] = (255, 0, 255)
+    return pixels
+
+
+def srgb(radiance: npt.ArrayLike) -> FloatArray:
     """The sRGB transfer function (IEC 61966-2-1) of linear values; NaN and infinity are kept."""
-    x = np.asarray(linear, dtype=np.float64)
+    x = np.asarray(radiance, dtype=np.float64)
     with np.errstate(invalid="ignore"):
         high = 1.055 * np.power(np.maximum(x, 0.0031308), 1.0 / 2.4) - 0.055
         return np.where(x <= 0.0031308, 12.92 * x, high)
 
 
-def display(picture: Picture) -> FloatArray:
+def display(picture: Layered) -> FloatArray:
     """The shown layer as display values (height, width, 3), nominally in [0, 1].
 
-    Radiance: sRGB-encoded.  Distance: from white (nearest) to dark grey.  Normals: (n + 1) / 2.
-    Id: a colour for each.  u and v: their fractional parts as red and green.  Misses of distances,
-    normals and ids are black.
+    Radiance, albedo and variance: sRGB-encoded.  Distance and depth: from white (nearest) to dark
+    grey.  Normals: (n + 1) / 2.  Id: a colour for each.  u and v: their fractional parts as red and
+    green.  Misses of distances, normals and ids are black.
     """
     layer = picture.layers[picture.shown]
-    if picture.shown == "colour":
+    if picture.shown in ("colour", "albedo", "variance"):
         return srgb(layer)
     if picture.shown == "normal":
         missed = ~layer.any(axis=-1, keepdims=True)
         return np.where(missed, 0.0, 0.5 * (layer + 1.0))
-    if picture.shown == "distance":
+    if picture.shown in ("distance", "depth"):
         return _grey(_nearness(layer))
     if picture.shown == "uv":
         return np.concatenate([np.mod(layer, 1.0), np.zeros_like(layer[..., :1])], axis=-1)

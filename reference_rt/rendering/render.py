@@ -8,17 +8,18 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import INTEGRATORS, RayCast
 from reference_rt.integrators.path import PathSetup
 from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
 from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering.kernels import Job, Running, compile_ahead
+from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.settings import with_settings
 from reference_rt.rendering.tiles import aov_tile, first_hits_tile, render_tile
 from reference_rt.scene.build import BuiltScene, build_tables
 from reference_rt.scene.likely_mistakes import likely_mistakes
@@ -31,63 +32,33 @@ Progress = Callable[[str, float], None]
 """Called with the phase ("compile" or "render") and the fraction of it that is done."""
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A rendered scene.
-
-    layers: float64 arrays by name.  "colour" (height, width, 3) is linear radiance; the others are
-    those of `Film.layers`: albedo, normal and variance (height, width, 3), depth and id (height,
-    width).  Ray casting always has colour and normal (height, width, 3), distance and id (height,
-    width), uv (height, width, 2).  shown: the layer that is the picture.  seconds: wall-clock time
-    of "tables" (files, arrays, hierarchy), "compile" (or loading cached kernels) and "render".
-    """
-
-    layers: dict[str, FloatArray]
-    shown: str = "colour"
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def colour(self) -> FloatArray:
-        """(height, width, 3), row 0 on top."""
-        return self.layers["colour"]
-
-    @property
-    def nonfinite_pixels(self) -> IntArray:
-        """(n, 2) column and row, along rows, of the pixels that have a NaN or a value beyond the
-        range of float32 (the files' format) in any layer but depth and distance, which are inf for
-        a miss."""
-        most = np.finfo(np.float32).max
-        bad = np.zeros(self.colour.shape[:2], np.bool_)
-        for name, layer in self.layers.items():
-            if name not in ("depth", "distance"):
-                bad |= ~(np.abs(layer.reshape(*bad.shape, -1)) <= most).all(axis=-1)
-        return np.argwhere(bad)[:, ::-1]
-
-    @property
-    def nonfinite(self) -> int:
-        """The number of `nonfinite_pixels`."""
-        return len(self.nonfinite_pixels)
-
-
 def render(
-    scene: BuiltScene,
+    scene: BuiltScene | str | os.PathLike[str],
     *,
+    spp: int | None = None,
+    size: tuple[int, int] | None = None,
+    seed: int | None = None,
     threads: int | None = None,
     tables: SceneTables | None = None,
     progress: Progress | None = None,
     compiling: Report | None = None,
     specialised: bool | None = None,
 ) -> Picture:
-    """Render a scene.
+    """Render a scene, or a scene file.
 
-    threads: default all cores; their number changes no bit.  tables: the scene's tables, if they
-    are built already.  progress: called as the render goes on;  compiling: called in its place
-    while kernels are compiled, with the number of those that are, and of all.  specialised: whether
-    kernels are compiled for this kind of scene, for the highest speed, or linked; None: see
-    `kernels`; no bit changes.  Ctrl-C stops it within a tile.
+    spp: samples per pixel;  size: width and height in pixels;  seed: of the random numbers; None:
+    the scene's own.  threads: default all cores; their number changes no bit.  tables: the scene's
+    tables, if they are built already.  progress: called as the render goes on;  compiling: called
+    in its place while kernels are compiled, with the number of those that are, and of all.
+    specialised: whether kernels are compiled for this kind of scene, for the highest speed, or
+    linked; None: see `kernels`; no bit changes.  Ctrl-C stops it within a tile.
     Raises SceneError; issues a SceneWarning for each of `likely_mistakes`.
     """
     say = progress or (lambda what, fraction: None)
+    if not isinstance(scene, BuiltScene):
+        scene = BuiltScene.load(os.fspath(scene))
+    if (spp, size, seed) != (None, None, None):
+        scene = with_settings(scene, spp=spp, size=size, seed=seed)
     _check(scene)
     film, integrator = scene.film, scene.integrator
     shown = integrator.show if isinstance(integrator, RayCast) else "colour"
@@ -118,7 +89,7 @@ def render(
             run_tiles(running.run(k), (), pixels, job.spp, threads, say_part)
     clock.append(time.perf_counter())
     seconds = dict(zip(("tables", "compile", "render"), np.diff(clock).tolist(), strict=True))
-    return Picture(layers, shown, seconds)
+    return Picture(layers, shown, seconds, scene)
 
 
 def jobs_of(scene: BuiltScene) -> tuple[list[Job], dict[str, FloatArray]]:

@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
+from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.render import render
 from reference_rt.scene.build import BuiltScene
 
 P = ParamSpec("P")
@@ -76,3 +78,14 @@ class Scene(BuiltScene):
     def bsdf(self, material: str | None) -> query.Bsdf:
         """The BSDF of a material, to evaluate and sample: see `reference_rt.query.Bsdf`."""
         return query.Bsdf(self, material)
+
+    def preview(self, width: int = 320, spp: int = 16) -> Picture:
+        """A small picture of the scene, of its own aspect ratio.  width: in pixels;  spp: at most
+        so many samples per pixel."""
+        height = max(1, round(self.film.height * width / self.film.width))
+        spp = min(spp, self.resolved_sampler.spp)
+        return render(self, size=(width, height), spp=spp)
+
+    def _repr_png_(self) -> bytes:
+        """The preview, for notebooks."""
+        return self.preview().png()

@@ -27,7 +27,7 @@ from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
 from reference_rt.shapes.instances import Instance
 from reference_rt.textures import AnyTexture, texture_names
-from reference_rt.util.errors import SceneError, SceneWarning, printable
+from reference_rt.util.errors import SceneError, SceneWarning, meant, printable
 from reference_rt.util.files import read_text
 
 MOST_NESTED = 100
@@ -37,8 +37,9 @@ which each operation takes two."""
 
 def no_such(kind: str, name: str, known: Iterable[str]) -> str:
     """The message for a name that the scene does not define."""
+    known = [*known]
     listed = ", ".join(f"'{k}'" for k in known) or "none"
-    return f"there is no {kind} '{name}'; expected one of: {listed}"
+    return f"there is no {kind} '{name}'; expected one of: {listed}{meant(name, known)}"
 
 
 class SceneModel(Description):
@@ -246,8 +247,11 @@ class SceneModel(Description):
         try:
             scene = cls._checked(data)
         except SceneError as error:
-            line = line_of(text, error.path)
-            raise SceneError(error.message, error.path, name, line) from None
+            first, *others = (
+                SceneError(one.message, one.path, name, line_of(text, one.path))
+                for one in (error, *error.others)
+            )
+            raise SceneError(first.message, first.path, name, first.line, others) from None
         scene._folder = Path() if folder is None else folder
         scene._source = (name, text)
         return scene

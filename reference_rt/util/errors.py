@@ -1,6 +1,7 @@
 """The errors that a user can cause, each with its exit code on the command line."""
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 
 
 def printable(text: str, kept: str = "") -> str:
@@ -17,6 +18,12 @@ def printable(text: str, kept: str = "") -> str:
 
 _MOST_KEYS = 16
 """The most keys of a path into a scene that a message shows; the middle ones are left out."""
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """ "; did you mean 'NAME'?", if one of the known names is near; else nothing."""
+    near = difflib.get_close_matches(name, [*known], n=1)
+    return f"; did you mean '{near[0]}'?" if near else ""
 
 
 class ReferenceRtError(Exception):
@@ -37,8 +44,9 @@ class UsageError(ReferenceRtError):
 class SceneError(ReferenceRtError):
     """A scene, or a file that it names, is invalid.
 
-    `path` are the keys that lead to the error in the scene, e.g. ``("shapes", 2, "radius")``;
-    `file` and `line` (1-based) are set if the scene was read from a file.
+    The message is about the first problem; `others` are errors about the others, if several are
+    known.  `path` are the keys that lead to the error in the scene, e.g. ``("shapes", 2,
+    "radius")``; `file` and `line` (1-based) are set if the scene was read from a file.
     """
 
     exit_code = 3
@@ -49,8 +57,10 @@ class SceneError(ReferenceRtError):
         path: Sequence[str | int] = (),
         file: str | None = None,
         line: int | None = None,
+        others: Sequence["SceneError"] = (),
     ) -> None:
         self.message, self.path, self.file, self.line = message, tuple(path), file, line
+        self.others = tuple(others)
         super().__init__(self._text())
 
     def _text(self) -> str:

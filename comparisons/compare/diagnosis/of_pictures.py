@@ -1,6 +1,6 @@
 """The hypothesis that explains the difference of two pictures best, where one clearly does."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -29,11 +29,16 @@ GENERALISED = {"gain": "gains", "gain of a channel": "gains", "sRGB": "gamma"}
 """A family's generalisation, which fits as well and is therefore not its rival."""
 
 
-def likeliest(images: Images, lights: Mapping[str, FloatArray] | None = None) -> Cause | None:
+def likeliest(
+    images: Images,
+    lights: Mapping[str, FloatArray] | None = None,
+    also: Callable[[FloatArray], Iterable[Hypothesis]] = lambda reference: (),
+) -> Cause | None:
     """Name the one cause that explains most of the squared difference beyond noise, or None where
     nothing does so clearly.
 
-    lights: the reference's pictures of single lights (height, width, 3), by name.
+    lights: the reference's pictures of single lights (height, width, 3), by name;  also: other
+    hypotheses about a reference, rendered only if the difference is clear.
     """
     if images.candidate.shape != images.reference.shape:
         return None
@@ -42,7 +47,11 @@ def likeliest(images: Images, lights: Mapping[str, FloatArray] | None = None) ->
     misfit = Misfit(images)
     if not (misfit.clear and misfit.excess > 0.0):
         return None
-    found = [*brightness.hypotheses(misfit, lights or {}), *place.hypotheses(misfit)]
+    found = [
+        *brightness.hypotheses(misfit, lights or {}),
+        *place.hypotheses(misfit),
+        *also(misfit.reference),
+    ]
     left = np.array([misfit.left(h.picture) for h in found])
     # Noise may leave less than nothing.
     left -= min(float(left.min()), 0.0)

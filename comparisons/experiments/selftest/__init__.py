@@ -1,16 +1,29 @@
 """`reference-rt selftest`: does the harness fail if the renderer is wrong, and only then?
 
-Sensitivity: faults are planted in pictures (`of_pictures`), scenes (`of_scenes`) and the renderer's
-source (`of_sources`), and compared with a suite's budgets; `finding` says whether a fault was
-caught, and at which rung.  `power`: the fraction of runs that catch a fault, by its size.
-Specificity: the correct renderer is compared with many seeds, and false alarms are counted.
+Sensitivity: faults are planted in pictures (`of_pictures`), scenes (`of_scenes`, `of_materials`,
+`of_shapes`) and the renderer's source (`of_sources`, `of_kernels`), and compared with a suite's
+budgets; `finding` says whether a fault was caught, and at which rung.  `power`: the fraction of
+runs that catch a fault, by its size.  `calibration`: how often the bias that a verdict states as
+detectable is detected.  Specificity: right renderers of twelve kinds (`right`) are judged with many
+seeds, and false alarms are counted.
 
 To add a fault, add it to FAULTS of its file; a source fault's old text must occur exactly once.
 """
 
-from comparisons.experiments.selftest import of_pictures, of_scenes, of_sources
+from comparisons.experiments.selftest import (
+    of_kernels,
+    of_materials,
+    of_pictures,
+    of_scenes,
+    of_shapes,
+    of_sources,
+)
 from comparisons.experiments.selftest.fault import Fault, PictureFault, SceneFault, SourceFault
 
-FAULTS: tuple[Fault, ...] = (*of_pictures.FAULTS, *of_scenes.FAULTS, *of_sources.FAULTS)
+FAULTS: tuple[Fault, ...] = (
+    *of_pictures.FAULTS,
+    *(*of_scenes.FAULTS, *of_materials.FAULTS, *of_shapes.FAULTS),
+    *(*of_sources.FAULTS, *of_kernels.FAULTS),
+)
 
 __all__ = ["FAULTS", "Fault", "PictureFault", "SceneFault", "SourceFault"]

@@ -98,6 +98,31 @@ def black_level(radiance: float) -> PictureFault:
     return PictureFault(name, SCENE, lambda pictures: pictures + radiance)
 
 
+def _vignette(pictures: FloatArray) -> FloatArray:
+    """Corners 3 % dark."""
+    height, width = pictures.shape[1:3]
+    y, x = np.mgrid[0:height, 0:width]
+    r2 = (2.0 * (x + 0.5) / width - 1.0) ** 2 + (2.0 * (y + 0.5) / height - 1.0) ** 2
+    return np.asarray(pictures * (1.0 - 0.015 * r2[..., None]))
+
+
+def _tiles_exchanged(pictures: FloatArray) -> FloatArray:
+    """Two neighbouring tiles of 16 x 16 pixels in each other's place."""
+    pictures = pictures.copy()
+    y, x = pictures.shape[1] // 4, pictures.shape[2] // 4
+    first, second = (pictures[:, y : y + 16, k : k + 16].copy() for k in (x, x + 16))
+    pictures[:, y : y + 16, x : x + 16], pictures[:, y : y + 16, x + 16 : x + 32] = second, first
+    return pictures
+
+
+def _tile_weight(pictures: FloatArray) -> FloatArray:
+    """A tile that is divided by one sample too few, of 16."""
+    pictures = pictures.copy()
+    y, x = pictures.shape[1] // 3, pictures.shape[2] // 2
+    pictures[:, y : y + 16, x : x + 16] *= 16.0 / 15.0
+    return pictures
+
+
 FAULTS = (
     gain(1.005),
     gain(1.01),
@@ -114,6 +139,10 @@ FAULTS = (
     PictureFault("red and blue swapped", SCENE, lambda pictures: pictures[..., ::-1]),
     PictureFault("one tile of fireflies", SCENE, _tile),
     dark_tile(0.1),
+    PictureFault("corners 3 % dark", SCENE, _vignette),
+    PictureFault("two tiles exchanged", SCENE, _tiles_exchanged),
+    PictureFault("one tile divided by 15 for 16", SCENE, _tile_weight),
+    PictureFault("every second row twice", SCENE, lambda p: np.repeat(p[:, ::2], 2, axis=1)),
     PictureFault("one NaN", SCENE, _nan),
     PictureFault("one infinity", SCENE, _infinity),
     PictureFault("one black row", SCENE, _row),

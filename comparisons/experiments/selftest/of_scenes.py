@@ -23,7 +23,7 @@ def material(name: str, **fields: Any) -> Callable[[Scene], Scene]:
     return change
 
 
-def entry(of: str, index: int, **fields: Any) -> Callable[[Scene], Scene]:
+def entry(of: str, index: int, /, **fields: Any) -> Callable[[Scene], Scene]:
     """Change fields of an entry of the "shapes" or "lights"."""
 
     def change(scene: Scene) -> Scene:

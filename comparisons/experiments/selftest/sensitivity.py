@@ -15,8 +15,9 @@ import numpy as np
 
 import reference_rt
 from comparisons.compare.budget import Budget
-from comparisons.compare.compare import Say, Subject, compare_scene, gather
+from comparisons.compare.compare import Say, Subject, gather
 from comparisons.compare.judge import Evidence, judge, of_replicates
+from comparisons.experiments.selftest.compared import compared
 from comparisons.experiments.selftest.fault import Fault, PictureFault, SceneFault, SourceFault
 from comparisons.experiments.selftest.finding import Finding, finding
 from comparisons.results.case import Case
@@ -52,7 +53,7 @@ def sensitivity(
             elif isinstance(fault, SceneFault):
                 scene = Scene.load(scenes / f"{fault.scene}.yaml")
                 subject = Subject(fault.change(scene), scene)
-                yield finding(fault, suite, compare_scene(subject, budget, _silent))
+                yield finding(fault, suite, compared(subject, budget))
     sources = [fault for fault in faults if isinstance(fault, SourceFault)]
     threads = max(1, (os.cpu_count() or 1) // jobs)
     with ThreadPoolExecutor(jobs) as pool:

@@ -8,8 +8,9 @@ import sys
 from pathlib import Path
 
 from comparisons.compare.budget import Budget
-from comparisons.compare.compare import Subject, compare_scene
+from comparisons.compare.compare import Subject
 from comparisons.experiments.selftest import FAULTS
+from comparisons.experiments.selftest.compared import compared
 from comparisons.experiments.selftest.finding import finding
 from reference_rt.rendering.scene import Scene
 
@@ -22,7 +23,7 @@ def main() -> None:
     found = []
     for suite, fields in task["budgets"].items():
         budget = Budget.model_validate(fields)
-        case = compare_scene(Subject(scene), budget, lambda step: None, threads=task["threads"])
+        case = compared(Subject(scene), budget, task["threads"])
         found.append(finding(fault, suite, case).as_json())
     json.dump(found, sys.stdout)
 

@@ -1,4 +1,4 @@
-"""The rate of false alarms: verdicts against the correct renderer, over many seeds."""
+"""The rate of false alarms: verdicts about right renderers, over many seeds."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -9,76 +9,73 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from comparisons.compare.budget import Budget
-from comparisons.compare.compare import Say, budgeted
-from comparisons.compare.judge import Evidence, judge, of_replicates
+from comparisons.compare.compare import Say
 from comparisons.experiments.selftest.finding import CAUGHT
-from comparisons.mitsuba import scene as mitsuba_scene
-from comparisons.mitsuba.translate import load
-from reference_rt.rendering.render import render
-from reference_rt.rendering.scene import Scene
-from reference_rt.scene.build import build_tables
-
-SCENES: tuple[tuple[str, Budget], ...] = (
-    ("cornell_box", Budget(size=(32, 32), spp=16)),
-    ("caustic_glass", Budget(size=(32, 24), spp=64)),
-)
-"""Small pictures, which can be rendered thousands of times; the second has heavy-tailed noise."""
+from comparisons.experiments.selftest.right import CASES, RightCase
+from comparisons.gate.gate import gate_pictures
+from comparisons.gate.pictures_in import Picture
+from comparisons.gate.reference import Reference
+from comparisons.results.case import FloatArray
 
 ALLOWED = 1e-3
 """Allowed false alarms per case."""
 
+LEVEL = 0.01
+"""Of the test whether more false alarms were counted than ALLOWED explains: in a thousand runs one
+is expected, and four or fewer are no evidence of more."""
+
 
 @dataclass(frozen=True)
 class Alarms:
-    """runs: comparisons with new replicates;  false_alarms: verdicts `differ` and `invalid`;
-    rungs: their numbers by rung;  upper: the upper 95 % confidence bound of their rate (Clopper and
+    """kind, name, rendered: of the `RightCase`;  runs: verdicts about new pictures;  false_alarms:
+    those that are `differ` or `invalid`;  reasons: their numbers by the first words;  verdicts: all
+    by status;  upper: the upper 95 % confidence bound of the rate of false alarms (Clopper and
     Pearson 1934)."""
 
-    scene: str
+    kind: str
+    name: str
+    rendered: bool
     runs: int
-    replicates: int
     false_alarms: int
-    rungs: dict[str, int]
+    reasons: dict[str, int]
+    verdicts: dict[str, int]
     upper: float
 
     @property
     def holds(self) -> bool:
-        """Whether the rate is at most ALLOWED."""
-        return self.false_alarms <= ALLOWED * self.runs
+        """Whether the runs do not show a rate above ALLOWED."""
+        return self.false_alarms <= float(stats.binom.isf(LEVEL, self.runs, ALLOWED))
 
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
 
 
-def specificity(runs: int, scenes: Path, say: Say) -> Sequence[Alarms]:
-    """Compare `runs` sets of replicates per scene; no seed is used twice."""
-    return [_of_scene(scenes / f"{name}.yaml", budget, runs, say) for name, budget in SCENES]
+def specificity(
+    runs: int, scenes: Path, say: Say, cases: Sequence[RightCase] = CASES
+) -> Sequence[Alarms]:
+    """`runs` verdicts about each case."""
+    return [alarms_of(case, runs, scenes, say) for case in cases]
 
 
-def _of_scene(path: Path, budget: Budget, runs: int, say: Say) -> Alarms:
-    scene = budgeted(Scene.load(path), budget)
-    tables, counterpart = build_tables(scene), load(scene)
-    sampler, count = scene.resolved_sampler, budget.replicates
-    found: Counter[str] = Counter()
+def alarms_of(case: RightCase, runs: int, scenes: Path, say: Say) -> Alarms:
+    """`runs` verdicts about the case, each with random numbers of its own."""
+    draw = case.prepare(scenes)
+    verdicts: Counter[str] = Counter()
+    reasons: Counter[str] = Counter()
     for run in range(runs):
-        seeds = range(run * count, (run + 1) * count)
-        ours = np.stack(
-            [
-                render(
-                    scene.changed(sampler=sampler.model_copy(update={"seed": seed})), tables=tables
-                ).colour
-                for seed in seeds
-            ]
-        )
-        reference = np.stack(
-            [mitsuba_scene.picture(counterpart.mi_scene, sampler.spp, seed) for seed in seeds]
-        )
-        case = judge(Evidence(scene.name, (), of_replicates(ours, reference, {}), {}), budget.limit)
-        if case.verdict in CAUGHT:
-            found[case.reason.partition(":")[0]] += 1
-        if (run + 1) % 100 == 0:
-            say(f"{scene.name}: {sum(found.values())} false alarms in {run + 1} runs")
-    alarms = sum(found.values())
+        status, reason = verdict(*draw(np.random.default_rng(run)))
+        verdicts[status] += 1
+        if status in CAUGHT:
+            reasons[": ".join(part.strip() for part in reason.split(":")[:2])] += 1
+    alarms = sum(reasons.values())
     upper = float(stats.beta.ppf(0.95, alarms + 1, runs - alarms)) if alarms < runs else 1.0
-    return Alarms(scene.name, runs, count, alarms, dict(found), upper)
+    say(f"{case.kind}, {case.name}: {alarms} false alarms in {runs} runs")
+    return Alarms(
+        case.kind, case.name, case.rendered, runs, alarms, dict(reasons), dict(verdicts), upper
+    )
+
+
+def verdict(candidate: FloatArray, reference: FloatArray) -> tuple[str, str]:
+    """The gate's verdict on replicates (R, height, width, 3), and the reason."""
+    case = gate_pictures([Picture(picture) for picture in candidate], Reference(reference))
+    return case.verdict, case.reason

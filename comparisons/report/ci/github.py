@@ -9,6 +9,7 @@ from typing import TextIO
 
 from comparisons.report.ci.ranking import SEVERITY, ranked
 from comparisons.results.case import INTERRUPTED, Case, how_many
+from comparisons.results.headline import headline
 from comparisons.results.verdict import PASSING
 from reference_rt.util.errors import ImageError, printable
 
@@ -79,9 +80,9 @@ def _command(stream: TextIO, kind: str, properties: Mapping[str, str], message: 
 
 
 def _message(case: Case) -> str:
-    lines = [_cut(case.reason)]
+    lines = [_cut(headline(case)), _cut(case.reason)]
     if case.cause:
-        lines.append(_cut(f"Likeliest cause: {case.cause.name}: {case.cause.evidence}"))
+        lines.append(_cut(f"{case.cause.name}: {case.cause.evidence}"))
     if case.again:
         lines.append(f"Reproduce: {case.again}")
     return "\n".join(lines)
@@ -146,9 +147,7 @@ def _fitting(rows: Sequence[str], room: int) -> str:
 
 
 def _row(case: Case) -> str:
-    why = _cut(case.reason)
-    if case.cause and case.verdict not in PASSING:
-        why += f"; likeliest cause: {_cut(case.cause.name)}"
+    why = _cut(headline(case))
     sign = "✅" if case.verdict in PASSING else "❌"
     return f"| {_markdown(case.scene)} | {sign} {case.verdict} | {_markdown(why)} |\n"
 

@@ -7,6 +7,7 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from comparisons.report.ci.ranking import ranked
 from comparisons.results.case import INTERRUPTED, Case
+from comparisons.results.headline import headline
 from comparisons.results.verdict import PASSING
 from reference_rt.util.errors import printable
 from reference_rt.util.files import replacing
@@ -57,7 +58,7 @@ def _test(case: Case, suite: str, seconds: float) -> TestCase:
         test.system_out = details
         return test
     kind = Error if case.verdict == _BROKEN else Failure
-    result = kind(_legal(f"{case.verdict}: {case.reason}"), case.verdict)
+    result = kind(_legal(f"{case.verdict}: {headline(case)}"), case.verdict)
     result.text = details
     test.result = [result]
     return test
@@ -65,10 +66,10 @@ def _test(case: Case, suite: str, seconds: float) -> TestCase:
 
 def _details(case: Case) -> list[str]:
     """The text of a case's test, line by line."""
-    lines = [f"{case.scene}: {case.verdict}: {case.reason}"]
+    lines = [f"{case.scene}: {case.verdict}: {headline(case)}", case.reason]
     lines += [f"{rung.name}: {rung.status}: {rung.reason}" for rung in case.rungs]
     if case.cause:
-        lines.append(f"likeliest cause: {case.cause.name}: {case.cause.evidence}")
+        lines.append(f"{case.cause.name}: {case.cause.evidence}")
     lines += [
         f"{place.width} x {place.height} pixels at ({place.x}, {place.y}): {place.what}"
         for place in case.worst

@@ -12,6 +12,7 @@ SEVERITY: tuple[Status, ...] = (
     "reference-limited",
     "not-applicable",
     "agree",
+    "unchanged",
 )
 """Verdicts, the worst first."""
 

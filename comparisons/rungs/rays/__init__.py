@@ -1,6 +1,7 @@
 """Rays that both renderers trace, and the error bounds that their hits must keep.
 
 - Which rays: `rays` (camera, random, secondary), `adversarial_rays` (aimed at edges), `camera`.
+- Shadow rays: `any_hit`.
 - How large an error float32 explains: `bounds`, `light_error`, `slopes`.
 - What a difference means: `comparer` (error over bound), `arbiter` (neighbouring rays in our
   tracer), `coincidence` (coincident surfaces), `judgement` (exact arithmetic).

@@ -58,13 +58,27 @@ def test_scenes_agree(tmp_path: Path) -> None:
 
 def test_path_tracing_is_compared_by_replicates(tmp_path: Path) -> None:
     scene = str(SCENES / "cornell_box.yaml")
-    result, found = compare(tmp_path, scene, "--size", "32x32", "--spp", "16", "--replicates", "4")
+    small = [scene, "--size", "32x32", "--spp", "16", "--replicates", "4"]
+    result, found = compare(tmp_path, *small, "--fixed")
     statistics = found["cases"][0]["tiers"]["statistics"]
     # 4 x 16 samples of 32 x 32 pixels are too few to tell half a percent: it must say so.
     assert found["cases"][0]["verdict"] == "inconclusive"
     assert statistics["status"] == "inconclusive"
     assert "smallest bias of the image mean seen with 99 % power" in statistics["reason"]
     assert result.exit_code == 1
+    assert found["cases"][0]["again"].endswith(
+        "--fresh --spp 16 --size 32x32 --replicates 4 --fixed"
+    )
+    # So it goes on, as long as it may.
+    result, found = compare(tmp_path, *small, "--time-limit", "5")
+    statistics = found["cases"][0]["tiers"]["statistics"]
+    assert statistics["looks"] == len(statistics["replicates_at_looks"]) > 1
+    assert statistics["replicates_at_looks"][:2] == [4, 8]
+    assert f"look {statistics['looks']}, at " in statistics["reason"]
+    assert "doubled until the question is decided or 5 s" in str(found["cases"][0]["notes"])
+    result, _ = compare(tmp_path, *small, "--time-limit", "5", "--fixed")
+    assert result.exit_code == 2
+    assert "--fixed and --time-limit; expected one of them" in result.output
 
 
 def test_wrong_light_differs_at_its_rung(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -273,3 +273,42 @@ def test_the_digest_is_of_what_the_picture_depends_on(here: Path) -> None:
         (here / "b.bin").write_bytes(buffer)
         digests.add(scene_digest(Scene.parse(with_file, folder=here)))
     assert len(digests) == 3
+
+
+@pytest.mark.parametrize(
+    ("count", "noise", "limit", "told"),
+    [
+        (4, 0.3, "0.005", True),
+        (4, 0.3, "0.9", False),
+        (8, 0.001, "0.005", False),
+        (8, 0.001, "0.0005", True),  # below the margin
+    ],
+)
+def test_too_few_pictures_for_the_limit_are_told(
+    count: int, noise: float, limit: str, told: bool
+) -> None:
+    rng = np.random.default_rng(3)
+    names = [f"n{k}.exr" for k in range(count)]
+    for name in names:
+        write(name, 1.0 + noise * rng.standard_normal((16, 16, 3)))
+    output = accepted(names, "--limit", limit).output
+    assert (f"a limit of {100 * float(limit):g} % cannot be reached with" in output) == told, output
+    if told and float(limit) > 0.001:
+        assert "even with a candidate without noise, a bias below" in output
+        assert "times the reference's samples" in output
+
+
+def test_a_scene_of_another_size(files: list[str]) -> None:
+    """The size is remembered: the scene of the baseline is the one that was shown."""
+    for k in range(4):
+        write(f"s{k}.exr", np.random.default_rng(k).uniform(0.5, 1.5, (3, 4, 3)))
+    small = [f"s{k}.exr" for k in range(4)]
+    assert accepted(small, "--scene", "scene.yaml").exit_code == 3
+    assert accepted(small, "--size", "4x3").exit_code == 2
+    assert accepted(small, "--scene", "scene.yaml", "--size", "4x3", "--spp", "9").exit_code == 0
+    found = baselines.load(Path("baselines"), "ball")
+    scene = baselines.scene_of(found.record, Path("baselines"))
+    assert scene is not None
+    assert (scene.film.width, scene.film.height) == (4, 3)
+    baselines.check_fresh(found, scene_digest(scene), "the scene")
+    assert "(stale)" not in run("--list").output

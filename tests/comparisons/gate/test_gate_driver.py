@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons.gate.driver import Command, drive
+from comparisons.gate.driver import Command, Driver
 from comparisons.gate.errors import RendererError
 from reference_rt.util.errors import ImageError, UsageError
 
@@ -63,14 +63,14 @@ def test_each_seed_has_its_picture(renderer: str, tmp_path: Path) -> None:
     keep.mkdir()
     (keep / "candidate-09.npy").write_text("of an earlier run")
     said: list[str] = []
-    pictures = drive(command(renderer, "well"), range(5, 8), keep, said.append)
+    pictures = Driver(command(renderer, "well"), keep, said.append).pictures(range(5, 8))
     for seed, picture in zip(range(5, 8), pictures, strict=True):
         expected = np.random.default_rng(seed).random((4, 6, 3))
         np.testing.assert_array_equal(picture.radiance, expected)
         assert Path(picture.name).is_file()
     names = [f"candidate-0{k}.npy" for k in range(3)]
     assert sorted(path.name for path in keep.iterdir()) == names
-    assert said == [f"candidate {k + 1} of 3, seed {5 + k}" for k in range(3)]
+    assert said == [f"candidate {k + 1}, seed {5 + k}" for k in range(3)]
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_each_seed_has_its_picture(renderer: str, tmp_path: Path) -> None:
 )
 def test_failures(renderer: str, tmp_path: Path, how: str, message: str) -> None:
     with pytest.raises(RendererError, match=message) as caught:
-        drive(command(renderer, how), range(1, 3), tmp_path / "kept")
+        Driver(command(renderer, how), tmp_path / "kept").pictures(range(1, 3))
     assert caught.value.exit_code == 4
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.glob("kept/*"))
@@ -106,7 +106,7 @@ def test_what_is_written_must_be_a_picture(
     renderer: str, tmp_path: Path, how: str, message: str
 ) -> None:
     with pytest.raises(ImageError, match=message):
-        drive(command(renderer, how), range(1, 2), tmp_path / "kept")
+        Driver(command(renderer, how), tmp_path / "kept").pictures(range(1, 2))
 
 
 def test_what_hangs_is_killed_with_its_children(renderer: str, tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_what_hangs_is_killed_with_its_children(renderer: str, tmp_path: Path) -
     with pytest.raises(
         RendererError, match=r"exceeded the time limit of 3 s with seed 3, and was kill"
     ):
-        drive(hanging, range(3, 4), tmp_path / "kept")
+        Driver(hanging, tmp_path / "kept").pictures(range(3, 4))
     child = int(note.read_text())
     for _ in range(100):  # an orphan's end is noted by init, when it comes to it
         if not _runs(child):
@@ -152,12 +152,12 @@ def test_placeholders(tmp_path: Path) -> None:
         ("", "is empty; expected a program"),
     ):
         with pytest.raises(UsageError, match=f"--command: {message}"):
-            drive(Command(template), range(1), tmp_path)
+            Driver(Command(template), tmp_path)
 
 
 def test_a_shell_is_not_there(renderer: str, tmp_path: Path) -> None:
     template = f"{renderer} well {{output}} {{seed}} ; touch {tmp_path / 'touched'} $(touch b)"
-    drive(Command(template, suffix=".npy"), range(1), tmp_path / "kept")
+    Driver(Command(template, suffix=".npy"), tmp_path / "kept").pictures(range(1))
     assert not (tmp_path / "touched").exists()
     with pytest.raises(RendererError, match="no-such-program: cannot be started: No such file"):
-        drive(Command("no-such-program {output}"), range(1), tmp_path / "kept")
+        Driver(Command("no-such-program {output}"), tmp_path / "kept").pictures(range(1))

@@ -163,3 +163,44 @@ def test_relative_error_is_a_standard_error() -> None:
     dark = pictures * np.array([1.0, 1.0, 0.0])
     assert relative_error(dark) <= relative_error(pictures)
     assert relative_error(np.zeros((4, 2, 2, 3))) == 0.0
+
+
+class CutOffError(BaseException):
+    """In place of Ctrl-C."""
+
+
+@pytest.mark.parametrize("at", [5, reference.REPLICATES + 3])
+@pytest.mark.parametrize("how", ["interrupted", "killed"])
+def test_what_was_cut_off_continues(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, at: int, how: str
+) -> None:
+    """After Ctrl-C nothing is lost; after a kill, which nothing can catch, what was stored in
+    passing. The result is that of a run without a break, to the last bit."""
+    scene = Scene.parse(SCENE)
+    whole = of_scene(scene, LIMIT)
+    for file in cache.iterdir():
+        file.unlink()
+    calls = Renderings(monkeypatch)
+    counted, save = reference.render, reference._save
+    if how == "killed":
+        monkeypatch.setattr(reference, "_SAVED_EACH", 0.0)
+
+    def cut_off(*arguments: object, **more: object) -> object:
+        if calls.count == at:
+            if how == "killed":
+                monkeypatch.setattr(reference, "_save", lambda *kept: None)
+            raise CutOffError
+        return counted(*arguments, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(reference, "render", cut_off)
+    with pytest.raises(CutOffError):
+        of_scene(scene, LIMIT)
+    monkeypatch.setattr(reference, "render", counted)
+    monkeypatch.setattr(reference, "_save", save)
+    assert calls.count == at
+    np.testing.assert_array_equal(of_scene(scene, LIMIT).pictures, whole.pictures)
+    rendered = calls.count
+    for file in cache.iterdir():
+        file.unlink()
+    of_scene(scene, LIMIT)
+    assert calls.count - rendered == rendered  # each picture was rendered once

@@ -51,7 +51,7 @@ def test_a_renderer_is_driven(right: FloatArray, how: str, code: int, verdict: s
     result, found = drive(how, "--replicates", "4")
     assert result.exit_code == code, result.output
     assert found["cases"][0]["verdict"] == verdict
-    assert "candidate 4 of 4, seed 4" in result.output
+    assert "candidate 4, seed 4" in result.output
     assert len(list(Path("out/candidates").iterdir())) == 4
     assert found["provenance"]["command"].endswith("{output} {seed} {scene} {spp}")
 

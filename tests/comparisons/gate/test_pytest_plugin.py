@@ -84,11 +84,11 @@ def test_one_noisy_picture(image_gate):
     )
     result.assert_outcomes(passed=1, failed=2)
     text = result.stdout.str()
-    assert "image_gate: differ: statistics: " in text
-    assert "likeliest cause: " in text
+    assert "image_gate: differ: likeliest cause: constant gain of " in text
+    assert "statistics: the image mean differs: " in text
     assert "gain" in text
     assert re.search(r"bias of the mean \(R, G, B\): \+(0.9|1)", text)
-    assert "image_gate: inconclusive: statistics: " in text
+    assert "image_gate: inconclusive: too noisy to decide: " in text
     result.stdout.fnmatch_lines(
         ["E *pictures: image-gate/*/pictures.exr; page: image-gate/*/report.html"]
     )
@@ -234,3 +234,66 @@ def test_options_are_documented(project: pytest.Pytester) -> None:
     text = project.runpytest_subprocess(*PLUGIN, "--help").stdout.str()
     for option in ("--image-gate-out=DIR", "--image-gate-baselines=DIR"):
         assert option in text
+
+
+FAILURES = """
+import pytest
+
+RIGHT = np.load("right.npy")
+
+@pytest.mark.parametrize("how", [
+    "differs", "noisy", "no file", "no scene", "broken scene", "bytes", "nan", "size", "no judge",
+    "no baseline", "bad name", "two judges", "variance", "limit", "unwritable", "nothing", "text",
+])
+def test_it(image_gate, how):
+    if how == "differs":
+        image_gate(1.5 * RIGHT, reference=RIGHT, noise_free=True)
+    elif how == "noisy":
+        image_gate(RIGHT[None].repeat(2, 0) + NOISE, reference=list(RIGHT + 2 * NOISE[::-1]))
+    elif how == "no file":
+        image_gate("none.npy", reference=RIGHT)
+    elif how == "no scene":
+        image_gate(RIGHT, scene="none.yaml")
+    elif how == "broken scene":
+        image_gate(RIGHT, scene="broken.yaml")
+    elif how == "bytes":
+        image_gate(RIGHT.astype("u1"), reference=RIGHT)
+    elif how == "nan":
+        image_gate(np.nan * RIGHT, reference=RIGHT)
+    elif how == "size":
+        image_gate(RIGHT[1:], reference=RIGHT)
+    elif how == "no judge":
+        image_gate(RIGHT)
+    elif how == "no baseline":
+        image_gate(RIGHT, baseline="none")
+    elif how == "bad name":
+        image_gate(RIGHT, baseline="../none")
+    elif how == "two judges":
+        image_gate(RIGHT, baseline="none", reference=RIGHT)
+    elif how == "variance":
+        image_gate(RIGHT, reference=RIGHT, variance="none.exr")
+    elif how == "limit":
+        image_gate(RIGHT, reference=RIGHT, limit=2.0)
+    elif how == "unwritable":
+        image_gate._out = image_gate._root / "right.npy"  # a file
+        image_gate(RIGHT, reference=RIGHT)
+    elif how == "nothing":
+        image_gate([], reference=RIGHT)
+    else:
+        image_gate(np.array("text"), reference=RIGHT)
+"""
+
+
+def test_no_failure_shows_frames_of_the_gate(project: pytest.Pytester) -> None:
+    """Of whatever kind it is: what is shown is the line of the test, and the message."""
+    rng = np.random.default_rng(1)
+    np.save(project.path / "right.npy", rng.uniform(0.2, 1.0, (32, 32, 3)))
+    np.save(project.path / "noise.npy", rng.normal(0.0, 0.2, (2, 32, 32, 3)))
+    (project.path / "broken.yaml").write_text("camera: {}")
+    body = FAILURES.replace("RIGHT =", 'NOISE = np.load("noise.npy")\nRIGHT =', 1)
+    result = run(project, body)
+    result.assert_outcomes(failed=17)
+    text = result.stdout.str()
+    assert text.count("E       Failed: image_gate: ") == 17
+    for frame in ("comparisons/", "reference_rt/", "numpy/", "During handling", "Traceback"):
+        assert frame not in text.replace("image_gate needs", ""), frame

@@ -1,5 +1,6 @@
-"""How far Mitsuba's materials are from the exact law, where a counterpart replaces them: what the
-README and the notes of a case say is what is measured here, with Mitsuba's own materials."""
+"""How far Mitsuba's materials are from the exact law, where a counterpart replaces them.
+
+What docs/verdict.md and the notes of a case say is measured here, with Mitsuba's own materials."""
 
 import itertools
 import re
@@ -18,7 +19,7 @@ from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.materials import Blend, Diffuse, Mirror, Plastic, RoughPlastic
 from reference_rt.rendering.scene import Scene
 
-README = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
+VERDICT = (Path(__file__).parents[3] / "docs/verdict.md").read_text(encoding="utf-8")
 
 
 def directions(cosines, azimuth=0.0):
@@ -83,8 +84,8 @@ def test_a_darker_nonlinear_base_errs_less():
 
 
 def documented():
-    """(index, alpha, GGX, Beckmann): what README's table says, in percent."""
-    table = README.partition("<!-- rough-plastic -->")[2].partition("<!-- end -->")[0]
+    """(index, alpha, GGX, Beckmann): what the table of docs/verdict.md says, in percent."""
+    table = VERDICT.partition("<!-- rough-plastic -->")[2].partition("<!-- end -->")[0]
     head, _, *rows = (line.split("|")[1:-1] for line in table.strip().splitlines())
     alphas = [float(re.findall(r"[\d.]+$", cell.strip())[0]) for cell in head[1:]]
     for name, *cells in rows:

@@ -48,16 +48,17 @@ def test_junit_says_what_failed_and_why(tmp_path):
     cases = [*EVERY, case("differ", "other", cause=cause, again="do it again")]
     junit.write(path, cases, "smoke", {"other": 12.3456}, {"left": "no need"})
     suite = next(iter(JUnitXml.fromfile(str(path))))
-    assert (suite.name, suite.tests, suite.failures) == ("smoke", 8, 4)
+    assert (suite.name, suite.tests, suite.failures) == ("smoke", 9, 4)
     assert (suite.errors, suite.skipped) == (1, 1)
     tests = {test.name: test for test in suite}
     assert next(iter(tests)) == "scene-invalid"
     assert tests["other"].time == pytest.approx(12.346)
     assert tests["scene-agree"].time == pytest.approx(1.5)
-    assert tests["scene-agree"].result == tests["scene-reference-limited"].result == []
+    for verdict in ("agree", "unchanged", "reference-limited"):
+        assert tests[f"scene-{verdict}"].result == []
     (failure,) = tests["other"].result
     assert isinstance(failure, Failure)
-    assert failure.message == "differ: geometry: why"
+    assert failure.message == "differ: likeliest cause: gain; why"
     assert failure.type == "differ"
     for told in ("input: agree: fine", "gain: 1.02 times", "reproduce: do it again"):
         assert told in failure.text
@@ -121,7 +122,7 @@ def test_annotations_keep_to_their_line_whatever_the_text():
     ((kind, properties, message),) = annotations([case("differ", NASTY, NASTY)])
     assert kind == "error"
     assert unescaped(properties["title"]) == f"{nasty}: differ"
-    assert unescaped(message) == f"geometry: {nasty}"
+    assert unescaped(message) == f"{nasty}; no single cause explains it\ngeometry: {nasty}"
 
 
 @pytest.mark.parametrize("number", [10, 11, 60])
@@ -147,11 +148,11 @@ def test_the_summary_has_every_case_the_worst_first(tmp_path):
     github.summarise([*EVERY, case("differ", "z", cause=cause)], path, "smoke", {"left": "no need"})
     text = path.read_text()
     assert text.startswith("before\n## smoke\n")
-    assert "7 cases: **1** invalid, **2** differ, **1** inconclusive" in text
+    assert "8 cases: **1** invalid, **2** differ, **1** inconclusive" in text
     rows = re.findall(r"^\| ([\w-]+) \|", text, re.MULTILINE)
     assert rows == ["case", "---", "scene-invalid", "scene-differ", "z", "scene-inconclusive",
                     "scene-not-comparable", "scene-reference-limited", "scene-agree",
-                    "left"]  # fmt: skip
+                    "scene-unchanged", "left"]  # fmt: skip
     assert "likeliest cause: gain" in text
 
 

@@ -93,7 +93,8 @@ def test_everything_a_case_says_is_there(page):
     )
     _, text = page(told)
     for words in (
-        "Likeliest cause: lost light.",
+        "Likeliest cause: lost light; ",
+        "<b>lost light:</b>",
         "r = 0.97",
         "4 × 2 pixels at (8, 16)",
         "z = 14",

@@ -55,6 +55,7 @@ def test_everything_is_reported(tmp_path):
             {
                 "scene": "scene",
                 "verdict": "differ",
+                "headline": "likeliest cause: gain; why",
                 "reason": "geometry: differs",
                 "sides": {"candidate": "yours", "reference": "the baseline's"},
                 "tiers": {

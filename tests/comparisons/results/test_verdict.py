@@ -17,7 +17,6 @@ def rungs(**statuses):
     [
         ({"statistics": "differ", "geometry": "differ", "direct": "agree"}, "differ", "geometry"),
         ({"geometry": "agree", "direct": "differ", "whitted": "differ"}, "differ", "direct"),
-        ({"geometry": "differ", "statistics": "invalid"}, "invalid", "statistics"),
         ({"geometry": "inconclusive", "statistics": "differ"}, "differ", "statistics"),
         ({"geometry": "reference-limited", "statistics": "differ"}, "differ", "statistics"),
         ({"geometry": "not-comparable", "direct": "inconclusive"}, "inconclusive", "direct"),
@@ -32,6 +31,18 @@ def rungs(**statuses):
 )
 def test_gravest_status_then_first_rung(statuses, verdict, rung):
     assert decide(rungs(**statuses), METRICS) == (verdict, f"{rung}: {rung} says {verdict}")
+
+
+def test_what_is_invalid_hides_no_difference():
+    told = "statistics: statistics says invalid; besides, geometry: geometry says differ"
+    found = decide(rungs(geometry="differ", statistics="invalid", images="inconclusive"), METRICS)
+    assert found == ("invalid", told)
+
+
+def test_unchanged_is_no_agreement_and_no_failure():
+    found = rungs(statistics="not-applicable", images="unchanged")
+    assert decide(found, METRICS) == ("unchanged", "images: images says unchanged")
+    assert decide(rungs(input="invalid", images="unchanged"), METRICS)[0] == "invalid"
 
 
 def test_agreement_needs_a_rung_that_agreed():

@@ -110,7 +110,7 @@ def test_faults_are_seen(picture: FloatArray, fault: str) -> None:
     elif fault == "shift":
         wrong = np.roll(wrong, 1, axis=1)
     elif fault == "background":
-        wrong[:, :16] *= 1.0001
+        wrong[:, :16] *= 1.0015
     elif fault == "blur":
         wrong = ndimage.gaussian_filter(wrong, (1.0, 1.0, 0.0))
     candidate, reference = replicates(0, picture), replicates(1, wrong)

@@ -153,6 +153,37 @@ def test_false_alarms_against_a_known_mean_of_many_cases(law, count):
     assert alarms <= stats.binom.isf(0.01, 2 * cases, 1e-3)
 
 
+PRECISE = [(8, 4, 64), (32, 16, 16), (64, 16, 16), (64, 4, 64)]
+"""Replicates of the candidate; pictures of the reference; of how many replicates each is the
+mean."""
+
+
+def alarms_against_a_precise_reference(law, counts, cases):
+    """A gate's: its pictures are fewer than the candidate's, but have more samples. Without the
+    ranks, which assume pictures of one law on both sides."""
+    alarms, (many, few, each) = 0, counts
+    for seed in range(cases):
+        rng = np.random.default_rng([seed, *counts])
+        reference = np.stack([law(rng, each, 16).mean(axis=0) for _ in range(few)])
+        found = findings(law(rng, many, 16), reference, 16, Margins())
+        alarms += any(t.differs.any() for t in (found.image, found.tiles, found.pixels))
+    return alarms
+
+
+@pytest.mark.parametrize("counts", PRECISE)
+@pytest.mark.parametrize("law", LAWS)
+def test_false_alarms_against_a_precise_reference(law, counts):
+    assert alarms_against_a_precise_reference(LAWS[law], counts, 10) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("counts", PRECISE)
+@pytest.mark.parametrize("law", LAWS)
+def test_false_alarms_against_a_precise_reference_of_many_cases(law, counts):
+    alarms = alarms_against_a_precise_reference(LAWS[law], counts, 1000)
+    assert alarms <= stats.binom.isf(0.01, 1000, 1e-3)
+
+
 def test_pixels_of_two_values_that_part_by_chance():
     """Four heads against four tails happen somewhere in any picture; two rows of them do not."""
     rng = np.random.default_rng(0)

@@ -2,23 +2,14 @@
 
 import numpy as np
 import pytest
-from planted import HEIGHT, MARGINS, NONE, STILL, WIDTH, replicates, scene
+from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
 from scipy import stats
 
 from comparisons.statistics import Known, compare
+from comparisons.statistics.cells import chance_of_parting, image_test, pixel_test, tile_test
 from comparisons.statistics.sides import known_side, side_of
 from comparisons.statistics.uniformity import uniformity
-from comparisons.statistics.welch import (
-    Error,
-    bias_test,
-    chance_of_parting,
-    image_test,
-    pixel_test,
-    quantiles,
-    satterthwaite,
-    tile_test,
-    welch_errors,
-)
+from comparisons.statistics.welch import Error, bias_test, quantiles, satterthwaite, welch_errors
 
 # Welch's test itself
 
@@ -142,7 +133,8 @@ def test_the_margin_of_a_pixel_follows_its_noise():
     rng = np.random.default_rng(0)
     a, b = (replicates(rng, scene(), noise=0.02) for _ in range(2))
     margin = pixel_test(side_of(a), side_of(b), MARGINS).margin
-    assert np.all(margin[np.broadcast_to(STILL, margin.shape)] == pytest.approx(1e-5))
+    assert np.all(margin[:6] == pytest.approx(1e-5))  # black: nothing is rounded
+    assert np.all(margin[LAMP] == pytest.approx(1e-5 + 2.0**-11))
     assert np.median(margin[20:]) == pytest.approx(0.01, rel=0.3)
     a, b = (replicates(rng, scene(), noise=0.5) for _ in range(2))
     margin = pixel_test(side_of(a), side_of(b), MARGINS).margin
@@ -159,7 +151,7 @@ def test_ranks_are_uniform_whatever_the_noise():
         a, b = np.exp(2.0 * rng.standard_normal((2, 8, 16, 16, 3)))
         found = uniformity(side_of(a), side_of(b), NONE)
         p.append(found.p_narrow)
-        assert found.p_wide == pytest.approx(1.0 - found.p_narrow)
+        assert found.p_wide >= 1.0 - found.p_narrow - 1e-9  # rare light is allowed for
         assert found.blocks == 16
     assert stats.kstest(p, "uniform").pvalue > 1e-3
 

@@ -146,7 +146,7 @@ def test_so_does_compare(tmp_path, folder, program):
     assert names == [*(path.stem for path in files[:-3]), "a (2)", "nowhere", "rubbish"]
     assert (tmp_path / "out" / "cases" / "a.2" / "case.json").exists()
     again = {case.scene: case.again for case in program.found.cases}["a (2)"]
-    assert again == f"reference-rt compare {tmp_path}/other/a.yaml --fresh --replicates 16"
+    assert again == f"reference-rt compare {tmp_path}/other/a.yaml --fresh"
 
 
 def test_the_command_line_changes_each_scene(tmp_path, program):

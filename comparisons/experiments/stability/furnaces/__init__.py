@@ -8,8 +8,8 @@ Law.
 - open: a surface under a white sky sends back, in power, no more than arrives: the mean of weights
   of samples is at most 1, to its noise, and is the integral of evaluate() over a chart of half
   vectors, which no sample has a part in.
-  Principled materials with a diffuse part are not among these: by their law (README) a white base
-  returns up to 1.6 times the light; metals and glass of it are.
+  Principled materials with a diffuse part are not among these: by their law (docs/scenes.md) a
+  white base returns up to 1.6 times the light; metals and glass of it are.
 - lossless: n spheres of glass within each other are invisible under a white sky: every pixel is 1,
   not only in the mean, to 64 u for each edge of the mean path, 4 n; a path through all of them is
   2 n edges long, and mirrored ones are longer.

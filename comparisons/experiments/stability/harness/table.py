@@ -98,7 +98,7 @@ def terminal(found: Sequence[Found]) -> Table:
 def markdown(
     found: Sequence[Found], effort: Effort, seed: int, provenance: Mapping[str, Any]
 ) -> str:
-    """The table with its date and machine, for a README."""
+    """The table with its date and machine, for docs/results/stability.md."""
     shown = [
         f"`reference-rt stability --{effort} --seed {seed}`",
         str(provenance["date"])[:10],

@@ -22,11 +22,13 @@ import numba
 import numpy as np
 import typer
 
-from reference_rt.cli.main import adjusted, guarded, provenance
+from reference_rt.cli.main import adjusted, guarded
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import image
-from reference_rt.rendering.render import Picture, render
+from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.provenance import provenance
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 from reference_rt.util.errors import ImageError

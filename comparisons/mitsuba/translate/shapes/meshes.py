@@ -47,8 +47,15 @@ class Soup:
         self.faces = np.arange(len(positions)).reshape(-1, 3) if faces is None else faces
 
     def moved(self, m: transform.Affine, mirrored: bool) -> "Soup":
-        """The mesh under an affine map;  mirrored: reverse the corners, and so the front."""
-        normals = None if self.normals is None else transform.apply_normals(m, self.normals)
+        """The mesh under an affine map;  mirrored: reverse the corners, and so the front.
+
+        Normals are not made unit again: between vertices they are interpolated, and an instance
+        interpolates before it maps them.
+        """
+        normals = None
+        if self.normals is not None:
+            normals = self.normals @ transform.invert(m)[:, :3]
+            normals /= np.abs(normals).max()
         positions = transform.apply_points(m, self.positions)
         if not mirrored:
             return Soup(positions, normals, self.uvs, self.colours, self.faces)

@@ -1,0 +1,26 @@
+"""What `reference-rt doctor` says about comparisons."""
+
+import importlib.util
+from collections.abc import Iterable
+
+from comparisons.mitsuba import backend
+from reference_rt.cli.doctor import Check
+from reference_rt.util.errors import ReferenceUnavailableError
+
+PACKAGES = ("skimage", "flip_evaluator", "scipy", "jinja2", "junitparser", "manifold3d", "flint")
+"""Modules of the extra `compare`, besides Mitsuba."""
+
+
+def checks() -> Iterable[Check]:
+    """The variant of Mitsuba that works here, and the packages that comparisons need."""
+    try:
+        chosen = backend.choose()
+    except ReferenceUnavailableError as error:
+        yield Check("Mitsuba", "does not work", " ".join(str(error).split()), False)
+    else:
+        advice = "" if chosen.variant != backend.SCALAR else f"slow: {chosen.reason}"
+        yield Check("Mitsuba", f"{chosen.version}, {chosen.variant}", advice)
+    missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
+    if missing:
+        found = f"without {', '.join(missing)}"
+        yield Check("comparisons", found, "pip install 'reference-rt[compare]'", False)

@@ -1,0 +1,154 @@
+"""The verdict of a case in one plain sentence, the likeliest cause first; the numbers are in the
+reasons of the rungs."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from comparisons.results.case import Case, RungResult, Status
+
+
+def headline(case: Case) -> str:
+    """One sentence without a full stop, such as "likeliest cause: half-pixel shift in x; 25 of 64
+    tiles differ, the worst by +12 %"."""
+    return _SENTENCES[case.verdict](case)
+
+
+def _differ(case: Case) -> str:
+    rung = _first(case, "differ")
+    what = "the pictures differ" if rung is None else _WHAT.get(rung.name, _plainly)(rung, case)
+    if case.cause is None:
+        return f"{what}; no single cause explains it"
+    return f"likeliest cause: {case.cause.name}; {what}"
+
+
+def _agree(case: Case) -> str:
+    seen = _detectable(_first(case, "agree", "statistics"))
+    if seen is None:
+        return "no difference was found"
+    return f"no difference was found, and a bias of {_percent(seen)} would have been seen"
+
+
+def _unchanged(case: Case) -> str:
+    return "nothing has changed: the pictures are the reference's, bit for bit"
+
+
+def _inconclusive(case: Case) -> str:
+    rung = _first(case, "inconclusive")
+    seen = _detectable(rung)
+    limit = None if rung is None else rung.numbers.get("limit")
+    if rung is None or seen is None or not isinstance(limit, int | float):
+        return "too noisy to decide" if rung is None else f"undecided: {_clause(rung.reason)}"
+    if seen > limit:
+        return (
+            f"too noisy to decide: only a bias above {_percent(seen)} would be seen, and "
+            f"{_percent(limit)} is asked for"
+        )
+    return f"too near to the limit of {_percent(limit)} to decide with so few samples"
+
+
+def _invalid(case: Case) -> str:
+    rung = _first(case, "invalid")
+    text = case.reason.partition(": ")[2] if rung is None else rung.reason
+    other = _first(case, "differ")
+    if other is None:
+        return f"nothing can be said: {_clause(text)}"
+    return f"the pictures are invalid ({_clause(text)}), and {_WHAT[other.name](other, case)}"
+
+
+def _by_reason(case: Case) -> str:
+    return f"no comparison: {_clause(case.reason.partition(': ')[2] or case.reason)}"
+
+
+def _limited(case: Case) -> str:
+    return "Mitsuba's float32 is too coarse for this scene; nothing else differs"
+
+
+_SENTENCES: Mapping[Status, Callable[[Case], str]] = {
+    "agree": _agree,
+    "unchanged": _unchanged,
+    "differ": _differ,
+    "reference-limited": _limited,
+    "inconclusive": _inconclusive,
+    "not-comparable": _by_reason,
+    "not-applicable": _by_reason,
+    "invalid": _invalid,
+}
+
+
+# ---- what differs, by rung ----------------------------------------------------------------------
+
+
+def _of_statistics(rung: RungResult, case: Case) -> str:
+    image, tiles, pixels = (
+        part if isinstance(part := rung.numbers.get(name), Mapping) else {}
+        for name in ("image", "tiles", "pixels")
+    )
+    biases = rung.numbers.get("relative_bias")
+    if image.get("differs") and isinstance(biases, Mapping):
+        return _brighter(biases, case)
+    for cells, what in ((tiles, "tiles"), (pixels, "pixels")):
+        if cells.get("differ"):
+            worst = cells.get("worst_bias")
+            by = "" if worst is None else f", the worst by {_percent(worst, sign=True)}"
+            return f"{cells['differ']:,} of {cells['tested']:,} {what} differ{by}"
+    return _plainly(rung, case)
+
+
+def _brighter(biases: Mapping[str, Any], case: Case) -> str:
+    known = {name: bias for name, bias in biases.items() if bias is not None}
+    if not known:
+        return f"the picture is not black, as {case.sides[1]} is"
+    values = list(known.values())
+    low, high = min(values), max(values)
+    owners = {"ours": "our", "candidate's": "the candidate's"}
+    picture = f"{owners.get(case.sides[0], case.sides[0])} picture is"
+    if low * high > 0.0 and max(abs(low), abs(high)) < 2.0 * min(abs(low), abs(high)):
+        mean = sum(values) / len(values)
+        how = "brighter" if mean > 0.0 else "darker"
+        return f"{picture} {_percent(abs(mean))} {how} than {case.sides[1]}"
+    each = ", ".join(f"{name} {_percent(bias, sign=True)}" for name, bias in known.items())
+    return f"{picture} of another brightness than {case.sides[1]}: {each}"
+
+
+def _plainly(rung: RungResult, case: Case) -> str:
+    return _clause(rung.reason)
+
+
+_WHAT: Mapping[str, Callable[[RungResult, Case], str]] = {
+    "statistics": _of_statistics,
+    **dict.fromkeys(
+        ("scene", "run", "input", "film", "geometry", "direct", "whitted", "images"), _plainly
+    ),
+}
+
+
+# ---- words --------------------------------------------------------------------------------------
+
+
+def _first(case: Case, status: Status, name: str = "") -> RungResult | None:
+    """The first rung with this status, and this name if one is given."""
+    found = (r for r in case.rungs if r.status == status and name in ("", r.name))
+    return next(found, None)
+
+
+def _detectable(rung: RungResult | None) -> float | None:
+    """The smallest bias of the image mean that would have been seen; None if it is unknown."""
+    biases = {} if rung is None else rung.numbers.get("detectable_bias")
+    if not isinstance(biases, Mapping) or not biases or None in biases.values():
+        return None
+    return float(max(biases.values()))
+
+
+def _clause(reason: str) -> str:
+    """The first part of a reason."""
+    return reason.partition("; ")[0]
+
+
+def _percent(fraction: float, *, sign: bool = False) -> str:
+    """To two digits, such as "0.31 %", "12 %" or "+140 %"."""
+    number = 100.0 * fraction
+    if not math.isfinite(number):
+        return "an unbounded amount"
+    digits = max(0, 1 - math.floor(math.log10(abs(number)))) if number else 0
+    return f"{number:{'+' if sign else ''}.{digits}f} %"

@@ -1,0 +1,164 @@
+"""Makes docs/pictures/ and docs/gallery.md: `python docs/make_pictures.py [NAME...]`.
+
+The gallery has every scene of scenes/; the first picture of README.md is a comparison with Mitsuba.
+NAME: only the pictures of these scenes, or `compare`; the page is always written.
+"""
+
+import io
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from PIL import Image
+
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, gather
+from comparisons.compare.judge import judge
+from reference_rt import Scene, render
+from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.image import display, srgb
+from reference_rt.util.files import read_text, replacing
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+
+DOCS = Path(__file__).parent
+SCENES = DOCS.parent / "scenes"
+PICTURES = DOCS / "pictures"
+
+LARGE = (
+    "cornell_box",
+    "textured_room",
+    "caustic_glass",
+    "whitted_classic",
+    "mesh_knot",
+    "csg_dice",
+)
+WIDE, NARROW = 400, 240
+"""Widths in pixels of the large pictures, and of the others."""
+
+SAMPLES = 128
+"""Least samples per pixel of pictures with noise."""
+
+GROUPS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("Solids", "Set operations on shapes: union, intersection, difference.", ("csg_",)),
+    ("Materials", "One material each, on the same shapes.", ("material_", "texture")),
+    ("Lights", "", ("light_", "environment", "many_lights", "soft_shadows", "tilted_lamps")),
+    ("Cameras and filters", "", ("camera_", "filter_")),
+)
+"""Title, text and the beginnings of the names of scenes."""
+
+
+def main() -> None:
+    """Write all pictures and the page."""
+    (PICTURES / "scenes").mkdir(parents=True, exist_ok=True)
+    paths = sorted(SCENES.glob("*.yaml"))
+    wanted = sys.argv[1:] or [*(path.stem for path in paths), "compare"]
+    for path in paths:
+        if path.stem in wanted:
+            picture_of(path)
+    with replacing(DOCS / "gallery.md") as temporary:
+        temporary.write_text("\n".join(page(paths)) + "\n", encoding="utf-8")
+    if "compare" in wanted:
+        comparison()
+
+
+def picture_of(path: Path) -> None:
+    """The picture of a scene as its command line shows it, as JPEG."""
+    scene = Scene.load(path)
+    film, sampler = scene.film, scene.resolved_sampler
+    width = WIDE if path.stem in LARGE else NARROW
+    height = round(film.height * width / film.width)
+    if not scene.integrator.deterministic and sampler.type != "grid":
+        sampler = sampler.model_copy(update={"spp": max(sampler.spp, SAMPLES)})
+    film = film.model_copy(update={"width": width, "height": height})
+    picture = render(scene.changed(film=film, sampler=sampler))
+    values = np.round(255.0 * np.clip(display(picture), 0.0, 1.0)).astype(np.uint8)
+    save(PICTURES / "scenes" / f"{path.stem}.jpg", values)
+    print(path.stem, flush=True)
+
+
+def save(path: Path, values: np.ndarray) -> None:
+    data = io.BytesIO()
+    Image.fromarray(values).save(data, "JPEG", quality=88, optimize=True)
+    with replacing(path) as temporary:
+        temporary.write_bytes(data.getvalue())
+
+
+def page(paths: Iterable[Path]) -> Iterable[str]:
+    """The lines of the gallery."""
+    rest = list(paths)
+    yield "# Gallery"
+    yield ""
+    yield "All scenes of the repository, each in `scenes/NAME.yaml`. `reference-rt render` makes"
+    yield "the pictures, and `reference-rt compare` judges them against Mitsuba."
+    stress = [path for path in rest if read_text(path).startswith("# Stiff")]
+    large = [path for path in rest if path.stem in LARGE]
+    yield from section("A few large ones", "", large)
+    rest = [path for path in rest if path not in stress and path not in large]
+    for title, text, beginnings in GROUPS:
+        of_group = [path for path in rest if path.stem.startswith(beginnings)]
+        rest = [path for path in rest if path not in of_group]
+        yield from section(title, text, of_group)
+    yield from section("Others", "", rest)
+    text = "Each is extreme in one way. The text says what to look for in the picture."
+    yield from section("Stress scenes", text, stress)
+
+
+def section(title: str, text: str, paths: Iterable[Path]) -> Iterable[str]:
+    """A heading, and a table of pictures."""
+    yield from ("", f"## {title}", "")
+    if text:
+        yield from (text, "")
+    yield from ("| picture | scene |", "|---|---|")
+    for path in paths:
+        link = f"![{path.stem}](pictures/scenes/{path.stem}.jpg)"
+        yield f"| {link} | **{path.stem}**: {words(path)} |"
+
+
+def words(path: Path) -> str:
+    """The description of a scene; of a stress scene, what its first lines say."""
+    comment = []
+    for line in read_text(path).splitlines():
+        if not line.startswith("#"):
+            break
+        comment.append(line.lstrip("# "))
+    text = " ".join(comment).removeprefix("Stiff: ") or Scene.load(path).description
+    return (text[:1].upper() + text[1:]).replace("|", "\\|").rstrip(".") + "."
+
+
+def comparison() -> None:
+    """Both pictures of the Cornell box, and the difference in standard errors."""
+    subject, budget = Subject(Scene.load(SCENES / "cornell_box.yaml")), Budget()
+    evidence = gather(subject, budget, lambda line: None)
+    case = judge(evidence, budget.limit)
+    images = evidence.rendered.images
+    error = np.maximum(images.error, 1e-12)
+    z = ((images.candidate - images.reference) / error).mean(axis=-1) * 3.0**0.5
+    figure, axes = plt.subplots(1, 3, figsize=(9.0, 3.45), layout="constrained")
+    for axis, title, image in (
+        (axes[0], "reference_rt", shown(images.candidate)),
+        (axes[1], "Mitsuba 3", shown(images.reference)),
+    ):
+        axis.imshow(image)
+        axis.set_title(title, fontsize=10)
+    drawn = axes[2].imshow(z, cmap="RdBu_r", vmin=-4, vmax=4)
+    axes[2].set_title("difference / standard error", fontsize=10)
+    figure.colorbar(drawn, ax=axes[2], fraction=0.046, pad=0.02, ticks=[-4, -2, 0, 2, 4])
+    for axis in axes:
+        axis.set_xticks([])
+        axis.set_yticks([])
+    figure.suptitle(f"cornell_box: {case.verdict}", fontsize=11)
+    with replacing(PICTURES / "compare.png") as temporary:
+        figure.savefig(temporary, dpi=110, format="png")
+    print(case.verdict, case.reason)
+
+
+def shown(image: FloatArray) -> FloatArray:
+    return srgb(np.clip(image, 0.0, 1.0))
+
+
+if __name__ == "__main__":
+    main()

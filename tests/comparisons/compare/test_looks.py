@@ -1,0 +1,218 @@
+"""Looks at a growing number of replicates: how they grow, when they end, and their false alarms."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from comparisons import statistics
+from comparisons.compare.looks import (
+    FIRST,
+    MOST_KEPT,
+    Looks,
+    Pool,
+    group_of,
+    level_of,
+    mean_picture,
+    most_kept,
+    until_decided,
+)
+from comparisons.results.case import RungResult
+
+SIDE = 16
+
+
+class Time:
+    """A clock that only `grow` moves: `each` seconds a replicate."""
+
+    def __init__(self, each):
+        self.now, self.each, self.made = 0.0, each, 0
+        self.grown = []
+
+    def __call__(self):
+        return self.now
+
+    def grow(self, count):
+        self.now += self.each * (count - self.made)
+        self.made = count
+        self.grown.append(count)
+
+
+def looked(statuses, each=1.0, seconds=1e9, **more):
+    """The looks that judge so, the last status for ever; and what they were told."""
+    time, levels, said = Time(each), [], []
+    answers = itertools.chain(statuses, itertools.repeat(statuses[-1]))
+
+    def judge(level):
+        levels.append(level)
+        return RungResult("statistics", next(answers), "because", {"a": 1})
+
+    found = until_decided(time.grow, judge, seconds=seconds, say=said.append, clock=time, **more)
+    assert found.counts == tuple(time.grown)
+    assert levels == [level_of(k + 1) for k in range(len(levels))]
+    return found, said
+
+
+def test_levels_sum_to_less_than_one():
+    levels = [level_of(look) for look in range(1, 40)]
+    assert 0.99 < sum(levels) <= 1.0
+    assert all(a > b > 0.0 for a, b in itertools.pairwise(levels))
+    with pytest.raises(ValueError, match="look 0"):
+        level_of(0)
+
+
+@pytest.mark.parametrize("status", ["agree", "differ", "invalid", "not-applicable"])
+@pytest.mark.parametrize("before", [0, 1, 4])
+def test_it_ends_when_it_is_decided(status, before):
+    found, said = looked(["inconclusive"] * before + [status])
+    assert found.counts == tuple(FIRST << k for k in range(before + 1))
+    assert found.rung.status == status
+    assert found.level == level_of(before + 1)
+    assert not found.out_of_time
+    assert len(said) == before + 1
+    assert said[-1] == f"look {before + 1}, {FIRST << before} replicates: {status}"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "counts"),
+    [
+        (0.1, (8,)),  # the first look is always taken
+        (9.0, (8,)),  # one more is not worth a look
+        (12.0, (8, 12)),  # what there is time for
+        (16.0, (8, 16)),
+        (17.0, (8, 16)),
+        (63.5, (8, 16, 32, 63)),
+        (1e3, (8, 16, 32, 64, 128, 256, 512, 1000)),
+    ],
+)
+def test_it_ends_at_the_time_limit(seconds, counts):
+    found, said = looked(["inconclusive"], seconds=seconds)
+    assert found.counts == counts
+    assert found.out_of_time
+    assert said[-1].endswith(f"the time limit of {seconds:g} s is reached")
+    assert "time limit was reached" in found.judged.reason
+
+
+def test_a_look_ends_with_whole_groups():
+    found, _ = looked(["inconclusive"], seconds=1e3, step=lambda count: group_of(count, 64))
+    assert found.counts[-1] == 1000  # groups of eight
+    found, _ = looked(["inconclusive"], seconds=999.0, step=lambda count: group_of(count, 64))
+    assert found.counts[-1] == 992
+
+
+def test_what_is_said_of_looks():
+    rung = RungResult("statistics", "agree", "it is so", {"a": 1})
+    found = Looks((8, 16, 32), 0.125, rung)
+    assert found.judged.reason == "it is so; look 3, at 32 replicates (after 8, 16)"
+    assert found.judged.numbers == {
+        "a": 1,
+        "looks": 3,
+        "replicates_at_looks": [8, 16, 32],
+        "share_of_levels": 0.125,
+    }
+    assert Looks((8,), 0.5, rung).words == "look 1, at 8 replicates"
+
+
+@pytest.mark.parametrize("most", [1, 3, 8])
+def test_a_pool_keeps_means_of_groups(most):
+    rng = np.random.default_rng(1)
+    given = rng.random((50, 2, 3, 3))
+    pool = Pool(most, mean_picture)
+    for count, picture in enumerate(given, 1):
+        pool.add(picture)
+        assert len(pool) == count
+        per = group_of(count, most)
+        whole = count // per
+        expected = given[: whole * per].reshape(whole, per, 2, 3, 3).mean(axis=1)
+        # Means of means: rounding of a few sums.
+        assert len(pool.pictures()) == whole
+        np.testing.assert_allclose(pool.pictures(), expected, rtol=1e-14)
+        assert len(expected) < 2 * most or per == 1
+
+
+def test_how_many_are_kept():
+    assert most_kept(8, 3 * 64 * 64) == MOST_KEPT
+    assert most_kept(8, 1 << 26) == 8  # those of the first look, whatever they take
+    assert most_kept(200, 12) == 200
+
+
+# ---- laws of noise: (rng, count) -> (count, SIDE, SIDE, 3) --------------------------------------
+
+
+def normal(rng, count):
+    return 1.0 + 0.3 * rng.standard_normal((count, SIDE, SIDE, 3))
+
+
+def lognormal(rng, count):
+    return np.exp(1.5 * rng.standard_normal((count, SIDE, SIDE, 3)) - 1.125)
+
+
+def fireflies(rng, count):
+    smooth = 0.5 * rng.gamma(4.0, 0.25, (count, SIDE, SIDE, 3))
+    return smooth + (rng.random((count, SIDE, SIDE, 1)) < 1e-3) * 500.0
+
+
+def on_and_off(rng, count):
+    return (rng.random((count, SIDE, SIDE, 3)) < 0.05).astype(float)
+
+
+LAWS = {law.__name__: law for law in (normal, lognormal, fireflies, on_and_off)}
+
+
+def sequence(law, seed, limit, gain=1.0, looks=5, stop=True):
+    """The statuses of looks at two sides of this noise, the candidate's times a gain; without
+    `stop` all looks are taken, whatever the former ones said."""
+    rng = np.random.default_rng(seed)
+    sides = [], []
+    statuses = []
+
+    def grow(count):
+        while len(sides[0]) < count:
+            sides[0].append(gain * law(rng, 1)[0])
+            sides[1].append(law(rng, 1)[0])
+
+    def judge(level):
+        found = statistics.compare(*map(np.stack, sides), limit=limit, level=level)
+        statuses.append(found.status)
+        on = not stop or found.status == "inconclusive"
+        ends = len(statuses) == looks or not on
+        return RungResult("statistics", "agree" if ends else "inconclusive", "")
+
+    until_decided(grow, judge, seconds=1e9)
+    return statuses
+
+
+def alarms(statuses):
+    return any(status in ("differ", "invalid") for status in statuses)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_no_false_alarm_at_any_look(law):
+    """All looks are taken, even after agreement, which is harder than what is done."""
+    found = [sequence(LAWS[law], seed, 0.02, looks=3, stop=False) for seed in range(12)]
+    assert sum(map(alarms, found)) == 0
+    assert all(len(statuses) == 3 for statuses in found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS)
+def test_false_alarms_of_all_looks_over_a_thousand_seeds(law):
+    """At most one in a thousand, as for a single look: binomial, at 1 %."""
+    cases = 1000
+    found = sum(
+        alarms(sequence(LAWS[law], seed, 1e-2, looks=5, stop=False)) for seed in range(cases)
+    )
+    assert found <= stats.binom.isf(0.01, cases, 1e-3)
+
+
+@pytest.mark.slow
+def test_what_looks_decide():
+    """The right ones agree, the stated bias is caught in 97 % and more; the law is one whose
+    standard error falls to what the limit asks for between the second and the third look."""
+    limit, cases = 0.02, 200
+    ends = {
+        gain: [sequence(normal, s, limit, gain)[-1] for s in range(cases)] for gain in (1.0, 1.02)
+    }
+    assert ends[1.0].count("agree") == cases
+    assert ends[1.02].count("differ") >= 0.97 * cases

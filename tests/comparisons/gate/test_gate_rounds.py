@@ -1,0 +1,216 @@
+"""A renderer that the gate drives: the first picture is checked, others are added until they
+decide."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gate_checks import run
+
+from comparisons.gate.pictures_in import Picture
+from comparisons.gate.request import Request
+from comparisons.gate.rounds import Rounds, gated_renderer
+from comparisons.results.case import Case
+from reference_rt.core.arrays import FloatArray
+from reference_rt.util.errors import ImageError
+
+SIDE = 32
+
+
+def pictures(seeds: range, noise: float = 0.1, gain: float = 1.0) -> list[Picture]:
+    """A picture with normal noise for each seed."""
+    found = []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        values = gain * (1.0 + noise * rng.standard_normal((SIDE, SIDE, 3)))
+        found.append(Picture(values.astype(np.float32).astype(np.float64), name=f"seed {seed}"))
+    return found
+
+
+class Renderer:
+    """In place of a `Driver`: what it was asked for, and the pictures."""
+
+    def __init__(self, together: bool = False, **more: Any) -> None:
+        self.together, self._more = together, more
+        self.starts: list[range] = []
+
+    def pictures(self, seeds: range) -> list[Picture]:
+        starts = [seeds] if self.together else [range(s, s + 1) for s in seeds]
+        self.starts += [start for start in starts if start]
+        return self._made(pictures(seeds, **self._more))
+
+    def _made(self, made: list[Picture]) -> list[Picture]:
+        return made
+
+    @property
+    def seeds(self) -> list[int]:
+        return [seed for start in self.starts for seed in start]
+
+
+def gated(renderer: Renderer, rounds: Rounds | None = None, exact: int = 16, **more: Any) -> Case:
+    """Against `exact` pictures with a tenth of the noise."""
+    reference = pictures(range(10**6, 10**6 + exact), 0.01)
+    request = Request(references=tuple(reference), **{"limit": 0.005, **more})
+    return gated_renderer(request, renderer, rounds or Rounds())  # type: ignore[arg-type]
+
+
+def looks(case: Case) -> list[int]:
+    (found,) = [rung for rung in case.rungs if rung.name == "statistics"]
+    return list(found.numbers["replicates_at_looks"])
+
+
+@pytest.mark.parametrize("together", [False, True])
+@pytest.mark.parametrize(
+    ("noise", "gain", "verdict", "counts"),
+    [
+        (0.02, 1.0, "agree", [8]),
+        (0.02, 1.05, "differ", [8]),
+        (0.05, 1.0, "agree", [8, 16]),
+        (0.4, 1.05, "differ", [8]),
+        (0.1, 1.0, "agree", [8, 16, 32, 64]),
+    ],
+)
+def test_it_goes_on_until_it_is_decided(
+    together: bool, noise: float, gain: float, verdict: str, counts: list[int]
+) -> None:
+    renderer = Renderer(together, noise=noise, gain=gain)
+    case = gated(renderer)
+    assert case.verdict == verdict, case.reason
+    assert looks(case) == counts
+    assert renderer.seeds == list(range(1, counts[-1] + 1))  # each once, in order
+    assert len(renderer.starts) == (len(counts) if together else counts[-1])
+    assert f"look {len(counts)}, at {counts[-1]} replicates" in case.reason
+
+
+def test_fixed_replicates_are_looked_at_once() -> None:
+    renderer = Renderer(noise=0.3)
+    case = gated(renderer, Rounds(seed=5, replicates=6, seconds=None))
+    assert case.verdict == "inconclusive"
+    assert renderer.seeds == list(range(5, 11))
+    assert "look 1" not in case.reason
+    assert "the candidate's replicates x" in case.reason
+
+
+def test_one_picture_is_one_picture() -> None:
+    renderer = Renderer()
+    gated(renderer, Rounds(replicates=1))
+    assert renderer.seeds == [1]
+
+
+class Broken(Renderer):
+    """Whose pictures have a fault."""
+
+    def __init__(self, how: str, **more: Any) -> None:
+        super().__init__(**more)
+        self._how = how
+
+    def _made(self, made: list[Picture]) -> list[Picture]:
+        for picture in made:
+            if self._how == "nan":
+                picture.radiance[3, 4, 1] = np.nan
+            elif self._how == "black":
+                picture.radiance[:] = 0.0
+            elif self._how == "constant":
+                picture.radiance[:] = 0.5
+        if self._how == "size":
+            return [Picture(picture.radiance[1:]) for picture in made]
+        return made
+
+
+@pytest.mark.parametrize("how", ["nan", "black", "constant", "size"])
+def test_the_first_picture_is_checked_before_the_rest(how: str) -> None:
+    renderer = Broken(how)
+    if how == "size":
+        with pytest.raises(ImageError, match="is 32 x 31 pixels; expected 32 x 32"):
+            gated(renderer)
+    else:
+        case = gated(renderer)
+        assert case.verdict == "invalid"
+        assert case.reason.startswith("input: ")
+    assert renderer.seeds == [1]
+
+
+@pytest.mark.parametrize("copied", [range(1, 9), range(1, 4)])
+def test_seeds_of_the_reference(copied: range) -> None:
+    """All copies: unchanged after the first look. Some: the others are compared."""
+    renderer = Renderer(noise=0.05)
+    exact = [*pictures(copied, 0.05), *pictures(range(99, 115 - len(copied)), 0.05)]
+    request = Request(references=tuple(exact), limit=0.02)
+    case = gated_renderer(request, renderer, Rounds())  # type: ignore[arg-type]
+    assert case.verdict == ("unchanged" if len(copied) == 8 else "agree"), case.reason
+    if len(copied) < 8:
+        assert "3 of 8 candidates are copies" in str(case.notes)
+    assert renderer.seeds == list(range(1, 9))
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.4])
+def test_more_candidates_than_pictures_of_a_precise_reference(noise: float) -> None:
+    """Sixteen precise pictures are no limit for sixty-four noisy ones: the standard error is that
+    of the candidate's mean, and not of sixteen of its pictures."""
+    renderer = Renderer(noise=noise)
+    case = gated(renderer, Rounds(replicates=64, seconds=None), limit=0.5)
+    (found,) = [rung for rung in case.rungs if rung.name == "statistics"]
+    expected = noise / np.sqrt(64 * SIDE**2)
+    errors = np.array(list(found.numbers["standard_error_of_bias"].values()))
+    # The largest of two estimates, one of 15 degrees of freedom: 99.9 % are below 1.6 times.
+    assert (errors < 1.7 * np.hypot(expected, 0.01 / np.sqrt(16 * SIDE**2))).all()
+
+
+def test_a_reference_of_few_pictures_is_named_as_the_limit() -> None:
+    case = gated(Renderer(noise=0.05), Rounds(seconds=None), exact=2, limit=0.002)
+    assert case.verdict == "inconclusive"
+    told = "the noise of the reference is the limit: even with a candidate without noise, a bias"
+    assert told in case.reason
+    assert "times the reference's samples" in case.reason
+
+
+MANY = """\
+import sys
+from pathlib import Path
+import numpy as np
+output, seeds, size = sys.argv[1], sys.argv[2].split(","), [int(n) for n in sys.argv[3:]]
+with open("starts.txt", "a") as file:
+    print(*seeds, *size, file=file)
+for seed in seeds:
+    rng = np.random.default_rng(int(seed))
+    values = 1.0 + 0.01 * rng.standard_normal((size[1], size[0], 3))
+    if seed != "6" or size[0] != 20:
+        with open(output % int(seed), "wb") as file:
+            np.save(file, values)
+"""
+
+
+def many(size: str, *more: str) -> tuple[Any, Any]:
+    Path("renderer.py").write_text(MANY)
+    command = f"{shlex.quote(sys.executable)} renderer.py {{output}} {{seeds}} {{width}} {{height}}"
+    return run(
+        "--command", command, "--scene", "ball.yaml", "--suffix", ".npy", "--size", size, *more
+    )
+
+
+@pytest.mark.usefixtures("gate_folder")
+def test_one_start_makes_all_seeds_at_the_size_that_was_asked_for() -> None:
+    result, found = many("24x16")
+    assert Path("starts.txt").read_text().splitlines()[0] == "1 2 3 4 5 6 7 8 24 16"
+    assert result.exit_code == 1, result.output  # noise is no ball
+    assert found["cases"][0]["verdict"] == "differ"
+    assert found["cases"][0]["tiers"]["input"]["width"] == 24
+    kept = [f"candidate-0{k}.npy" for k in range(8)]
+    assert sorted(p.name for p in Path("out/candidates").iterdir()) == kept
+    result, _ = many("20x16")
+    assert result.exit_code == 4
+    assert "with seeds 1 to 8, but wrote" in result.output or "another file with seeds 1 to 8" in (
+        result.output
+    )
+
+
+@pytest.mark.usefixtures("gate_folder")
+def test_files_at_another_size_than_the_scenes_own(right: FloatArray) -> None:
+    np.save("half.npy", right.reshape(4, 16, 2, 16, 2, 3).mean(axis=(2, 4)))
+    result, _ = run("half.npy", "--scene", "ball.yaml")
+    assert result.exit_code == 3
+    result, found = run("half.npy", "--scene", "ball.yaml", "--size", "16x16", "--spp", "64")
+    assert (result.exit_code, found["cases"][0]["verdict"]) == (0, "agree"), result.output

@@ -1,0 +1,110 @@
+"""The headline: one plain sentence, the cause first, whatever the case."""
+
+import typing
+
+import pytest
+
+from comparisons.results.case import RUNGS, Case, Cause, RungResult, Status
+from comparisons.results.headline import headline
+
+STATUSES = typing.get_args(Status)
+CAUSE = Cause("half-pixel shift in x", "by 0.5, 0 pixels", 0.99)
+
+
+def case(verdict, *rungs, cause=None, reason="input: why; and more", sides=("ours", "Mitsuba's")):
+    return Case("a", verdict, reason, rungs, None, {}, cause=cause, sides=sides)
+
+
+def statistics(status="differ", biases=(0.01, 0.011, 0.012), image=True, tiles=0, pixels=0, **more):
+    numbers = {
+        "relative_bias": dict(zip("RGB", biases, strict=True)),
+        "detectable_bias": {"R": 0.002, "G": 0.0035, "B": 0.001},
+        "limit": 0.005,
+        "image": {"differs": image},
+        "tiles": {"differ": tiles, "tested": 64, "worst_bias": -0.12},
+        "pixels": {"differ": pixels, "tested": 16384, "worst_bias": 2.0},
+    }
+    return RungResult("statistics", status, "numbers; more numbers", numbers | more)
+
+
+@pytest.mark.parametrize(
+    ("rung", "sides", "what"),
+    [
+        (statistics(), ("ours", "Mitsuba's"), "our picture is 1.1 % brighter than Mitsuba's"),
+        (
+            statistics(biases=(-0.02, -0.02, -0.02)),
+            ("candidate's", "the baseline's, x"),
+            "the candidate's picture is 2.0 % darker than the baseline's, x",
+        ),
+        (
+            statistics(biases=(0.02, -0.001, 0.0)),
+            ("ours", "Mitsuba's"),
+            "our picture is of another brightness than Mitsuba's: R +2.0 %, G -0.10 %, B +0 %",
+        ),
+        (statistics(biases=(None,) * 3), ("o", "m"), "the picture is not black, as m is"),
+        (statistics(image=False, tiles=3), ("o", "m"), "3 of 64 tiles differ, the worst by -12 %"),
+        (
+            statistics(image=False, pixels=1200),
+            ("o", "m"),
+            "1,200 of 16,384 pixels differ, the worst by +200 %",
+        ),
+        (statistics(image=False), ("o", "m"), "numbers"),
+        (RungResult("statistics", "differ", "of others; x"), ("o", "m"), "of others"),
+        (RungResult("geometry", "differ", "9 of 10 rays; x"), ("o", "m"), "9 of 10 rays"),
+    ],
+)
+def test_what_differs_after_its_cause(rung, sides, what):
+    told = headline(case("differ", rung, cause=CAUSE, sides=sides))
+    assert told == f"likeliest cause: half-pixel shift in x; {what}"
+    told = headline(case("differ", rung, sides=sides))
+    assert told == f"{what}; no single cause explains it"
+
+
+@pytest.mark.parametrize(
+    ("found", "told"),
+    [
+        (
+            case("agree", RungResult("geometry", "agree", "x"), statistics("agree")),
+            "no difference was found, and a bias of 0.35 % would have been seen",
+        ),
+        (case("agree", RungResult("whitted", "agree", "x")), "no difference was found"),
+        (
+            case("inconclusive", statistics("inconclusive", limit=0.001)),
+            "too noisy to decide: only a bias above 0.35 % would be seen, and 0.10 % is asked for",
+        ),
+        (
+            case("inconclusive", statistics("inconclusive")),
+            "too near to the limit of 0.50 % to decide with so few samples",
+        ),
+        (
+            case("invalid", RungResult("input", "invalid", "1 pixel not finite; expected none")),
+            "nothing can be said: 1 pixel not finite",
+        ),
+        (
+            case("invalid", RungResult("input", "invalid", "noise is shared; x"), statistics()),
+            "the pictures are invalid (noise is shared), and our picture is 1.1 % brighter than "
+            "Mitsuba's",
+        ),
+        (case("invalid"), "nothing can be said: why"),
+        (
+            case("unchanged", RungResult("images", "unchanged", "x")),
+            "nothing has changed: the pictures are the reference's, bit for bit",
+        ),
+        (case("not-comparable"), "no comparison: why"),
+    ],
+)
+def test_other_verdicts(found, told):
+    assert headline(found) == told
+
+
+@pytest.mark.parametrize("verdict", STATUSES)
+@pytest.mark.parametrize("rung", [None, *RUNGS])
+def test_every_case_has_a_sentence(verdict, rung):
+    """Also one whose rungs say nothing, in one line without an end."""
+    rungs = [] if rung is None else [RungResult(rung, verdict, "why; and more")]
+    for cause in (None, CAUSE):
+        told = headline(case(verdict, *rungs, cause=cause))
+        assert told
+        assert told[-1] not in ".;: "
+        assert "\n" not in told
+        assert "more" not in told

@@ -1,0 +1,66 @@
+"""The scripts of examples/ run, and print what their numbers must be."""
+
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    def run(name, *arguments):
+        monkeypatch.chdir(ROOT)
+        monkeypatch.setattr(sys, "argv", [name, *arguments])
+        runpy.run_path(f"examples/{name}.py", run_name="__main__")
+        return capsys.readouterr().out
+
+    return run
+
+
+def test_every_example_is_tested():
+    tests = Path(__file__).read_text(encoding="utf-8")
+    assert [path.stem for path in EXAMPLES if f'run("{path.stem}"' not in tests] == []
+
+
+def test_oracle(run):
+    """float64 leaves the textbook's formula 1e-16 of 1e10 = (1e5 radii)^2, halved by the root."""
+    error = float(re.search(r"up to (\S+) radii", run("oracle"))[1])
+    assert 1e-6 < error < 1e-3
+
+
+def test_furnace(run):
+    lost = [float(x) for x in re.findall(r"([\d.]+)%", run("furnace"))]
+    assert lost == sorted(lost)
+    assert lost[0] < 1 < lost[-1]
+
+
+def test_two_samplers(run):
+    rows = [line.split() for line in run("two_samplers").splitlines()[1:]]
+    assert [row[0] for row in rows] == ["16", "64", "256"]
+    for *_, independent, sobol in rows:
+        assert float(sobol.strip("%")) < float(independent.strip("%"))
+
+
+def test_lens(run):
+    near, exact = re.findall(r"= (\d\.\d+); by .* (\d\.\d+)", run("lens"))[0]
+    assert abs(float(near) - float(exact)) < 1e-3
+
+
+def test_batch(run, tmp_path):
+    scene = (ROOT / "scenes/light_spot.yaml").read_text(encoding="utf-8")
+    for name, text in (("a", scene), ("b", scene), ("c", "shapes: [{type: spher}]")):
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    said = run("batch", str(tmp_path), str(tmp_path / "sheet.png"))
+    assert said.count("<Picture 80 x") == 2
+    assert "c.yaml:1" in said
+    assert (tmp_path / "sheet.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("power", "verdict"), [("0.5", "agree"), ("0.4", "differ")])
+def test_gate_a_renderer(run, power, verdict):
+    assert run("gate_a_renderer", power).startswith(verdict)
