@@ -76,6 +76,13 @@ def test_links_within_the_repository(page: Path) -> None:
     assert missing == []
 
 
+def test_every_scene_is_in_the_gallery() -> None:
+    gallery = (ROOT / "docs/gallery.md").read_text(encoding="utf-8")
+    names = [path.stem for path in (ROOT / "scenes").glob("*.yaml")]
+    missing = [n for n in names if f"(pictures/scenes/{n}.jpg)" not in gallery]
+    assert missing == []  # docs/make_pictures.py adds them
+
+
 def test_every_page_is_in_the_contents() -> None:
     contents = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     pages = [
