@@ -122,15 +122,15 @@ def findings(
         tile_test(one, two, tile, margins, level),
         pixel_test(one, two, margins, level),
         uniformity(one, two, margins, level),
-        worse(*(_unseen(side) for side in (a, b))),
+        worse(*(_unseen(side, level) for side in (a, b))),
         tile,
         False,
         level,
     )
 
 
-def _unseen(pictures: FloatArray | Known) -> Unseen | None:
-    return None if isinstance(pictures, Known) else unseen(pictures, IMAGE_LEVEL)
+def _unseen(pictures: FloatArray | Known, level: float) -> Unseen | None:
+    return None if isinstance(pictures, Known) else unseen(pictures, level * IMAGE_LEVEL)
 
 
 def read(

@@ -44,9 +44,10 @@ def met_once(pictures: FloatArray) -> FloatArray:
 
 
 def event(energy: FloatArray, scale: FloatArray) -> FloatArray:
-    """(3,): of energies met once (h, w, 3) the size over `scale`, weighted by energy; 0 if there is
+    """(3,): of energies met once (h, w, 3) the size over `scale`, weighted by itself; 0 if there is
     none."""
-    return ratio((energy**2 / scale).sum(axis=(0, 1)), energy.sum(axis=(0, 1)))
+    size = energy / scale
+    return ratio((size**2).sum(axis=(0, 1)), size.sum(axis=(0, 1)))
 
 
 @dataclass(frozen=True)

@@ -83,9 +83,10 @@ def share_unmet(a: Side, b: Side) -> float:
     return float(unseen.any(axis=-1).mean()) if missing < MOST_MISSING * met else 0.0
 
 
-MOST_MISSING = 4.0
+MOST_MISSING = 10.0
 """Largest ratio of the missing energy and that met once; 1 is expected. Measured 0.05 to 2.3 with
-lamps found by some hundreds down to about ten scattered rays; 650 for a picture that is shifted."""
+lamps found by some hundreds down to about ten scattered rays, and 4.6 once where two were found
+though nine were expected; 650 for a picture that is shifted."""
 
 FAR = 6.0
 """Standard errors. With sixteen replicates one pixel in 1e5 is as far off by chance."""

@@ -26,12 +26,14 @@ REPLICATES = 16
 @dataclass(frozen=True)
 class RightCase:
     """kind: one of KINDS;  name: of the case;  rendered: whether its pictures are;  prepare: from
-    the folder of scenes makes what draws the pictures."""
+    the folder of scenes makes what draws the pictures;  looks: the numbers of replicates at which
+    they are looked at until the question is decided; none for one look at all."""
 
     kind: str
     name: str
     rendered: bool
     prepare: Callable[[Path], Draw]
+    looks: tuple[int, ...] = ()
 
 
 KINDS = (
@@ -42,7 +44,7 @@ KINDS = (
     "the baseline's own pictures",
     "wide filters",
     "a single picture",
-    "fine meshes",
+    "looks at a growing number of replicates",
     "heavy-tailed caustics",
     "unequal samples",
     "unequal replicates",
@@ -224,6 +226,16 @@ def _pareto(rng: np.random.Generator, count: int) -> FloatArray:
     return np.asarray(pictures)
 
 
+def _fireflies(scenes: Path) -> Draw:
+    """One sample in 1e4 has half of the energy."""
+
+    def side(rng: np.random.Generator) -> FloatArray:
+        smooth = 0.5 * rng.gamma(4.0, 0.25, (32, SIDE, SIDE, 3))
+        return np.asarray(smooth + (rng.random((32, SIDE, SIDE, 1)) < 1e-4) * 5000.0)
+
+    return lambda rng: (side(rng), side(rng))
+
+
 Law = Callable[[np.random.Generator, int], FloatArray]
 
 
@@ -246,8 +258,8 @@ CASES: tuple[RightCase, ...] = (
     *(_by_scattered_rays(radius) for radius in (0.3, 0.1, 0.03, 0.01)),
     RightCase(KINDS[0], "small torus that shines, against Mitsuba", True, _torus),
     *(_unmet(radius) for radius in (0.01, 0.002)),
-    _synthetic(KINDS[2], "one random sequence for all pixels", _one_sequence),
-    _synthetic(KINDS[2], "photon map", _photons),
+    _synthetic(KINDS[2], "one random sequence for all pixels", _one_sequence, (8, 8)),
+    _synthetic(KINDS[2], "photon map", _photons, (8, 8)),
     _synthetic(KINDS[2], "denoised", _denoised),
     _synthetic(KINDS[3], "smooth sky, noise of 1e-5", _sky(1e-5)),
     _drawn(KINDS[3], "half-float texels", _half_texels),
@@ -257,7 +269,7 @@ CASES: tuple[RightCase, ...] = (
     _synthetic(KINDS[5], "gaussian filter over skewed noise", _filtered),
     _synthetic(KINDS[6], "against sixteen", _gamma, (1, REPLICATES)),
     _scene(KINDS[6], "cornell_box", _SMALL, (1, REPLICATES)),
-    _scene(KINDS[7], "mesh_knot", Budget(size=(40, 30), spp=16)),
+    RightCase(KINDS[7], "fireflies at 4, 8, 16 and 32", False, _fireflies, (4, 8, 16, 32)),
     _scene(KINDS[8], "caustic_glass", Budget(size=(32, 24), spp=64)),
     _synthetic(KINDS[8], "caustic of infinite variance", _pareto),
     _scene(KINDS[9], "cornell_box", Budget(size=(32, 32), spp=8, reference_spp=64)),

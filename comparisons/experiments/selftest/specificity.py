@@ -10,9 +10,11 @@ import numpy as np
 from scipy import stats
 
 from comparisons.compare.compare import Say
+from comparisons.compare.looks import level_of
 from comparisons.experiments.selftest.finding import CAUGHT
 from comparisons.experiments.selftest.right import CASES, RightCase
-from comparisons.gate.gate import gate_pictures
+from comparisons.gate.copies import fingerprint
+from comparisons.gate.gate import LIMIT, gate_pictures, look
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference
 from comparisons.results.case import FloatArray
@@ -63,7 +65,7 @@ def alarms_of(case: RightCase, runs: int, scenes: Path, say: Say) -> Alarms:
     verdicts: Counter[str] = Counter()
     reasons: Counter[str] = Counter()
     for run in range(runs):
-        status, reason = verdict(*draw(np.random.default_rng(run)))
+        status, reason = verdict(*draw(np.random.default_rng(run)), case.looks)
         verdicts[status] += 1
         if status in CAUGHT:
             reasons[": ".join(part.strip() for part in reason.split(":")[:2])] += 1
@@ -75,7 +77,16 @@ def alarms_of(case: RightCase, runs: int, scenes: Path, say: Say) -> Alarms:
     )
 
 
-def verdict(candidate: FloatArray, reference: FloatArray) -> tuple[str, str]:
-    """The gate's verdict on replicates (R, height, width, 3), and the reason."""
-    case = gate_pictures([Picture(picture) for picture in candidate], Reference(reference))
+def verdict(
+    candidate: FloatArray, reference: FloatArray, looks: Sequence[int] = ()
+) -> tuple[str, str]:
+    """The gate's verdict on replicates (R, height, width, 3), and the reason; with looks that of
+    the statistics, at the first that decides."""
+    pictures = [Picture(picture) for picture in candidate]
+    for number, count in enumerate(looks, start=1):
+        rung = look(pictures[:count], Reference(reference[:count]), LIMIT, level_of(number))
+        if rung.status != "inconclusive" or count == looks[-1]:
+            return rung.status, f"{rung.name}: {rung.reason}"
+    prints = tuple(fingerprint(picture) for picture in reference)
+    case = gate_pictures(pictures, Reference(reference, fingerprints=prints))
     return case.verdict, case.reason
