@@ -25,8 +25,10 @@ def convert(
     with compare_extra("converting"):
         from comparisons.mitsuba.reading.write import check_name, folder_of, write_scene
     from reference_rt.rendering.scene import Scene
+    from reference_rt.util.files import check_writable
 
     check_name(output)
+    check_writable(output)
     count = write_scene(Scene.load(scene, by_name(define)), output)
     files = f", and {count} files in {folder_of(output)}" if count else ""
     say(f"{output}{files}", err=True)

@@ -47,9 +47,6 @@ def likeliest(
     misfit = Misfit(images)
     if not (misfit.clear and misfit.excess > 0.0):
         return None
-    at_border = rim(misfit)
-    if at_border is not None:
-        return at_border
     found = [
         *brightness.hypotheses(misfit, lights or {}),
         *place.hypotheses(misfit),
@@ -60,6 +57,10 @@ def likeliest(
     left -= min(float(left.min()), 0.0)
     ranked = list(zip(found, left.tolist(), strict=True))
     best = _best(ranked, misfit.margin)
+    at_border = rim(misfit)
+    # A wrong rim changes no other pixel: what explains more of the difference is not of the rim.
+    if at_border is not None and 1.0 - left.min() < at_border.explained:
+        return at_border
     if best is not None:
         hypothesis, unexplained = best
         explained = 1.0 - unexplained

@@ -41,6 +41,8 @@ ARGUMENTS = {
     "bench": ["--scenes", str(Path(SCENE).parent)],
     "stability": [],
     "explain": [SCENE],
+    "convert": [SCENE],
+    "doctor": [],
     "schema": [],
     "warm-up": [],
 }
@@ -51,6 +53,7 @@ INPUTS = {"scene", "scenes", "candidates", "reference", "variance", "folder", "m
 
 FILES = {
     ("render", "output"): ["x.exr"],
+    ("convert", "output"): ["x.yaml"],
     ("compare", "out"): ["results.json", "report.html", "cases/x"],
     ("suite", "out"): ["results.json", "report.html", "cases/x"],
     ("suite", "junit"): [""],
