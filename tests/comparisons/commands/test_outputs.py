@@ -133,7 +133,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
     command, option, file, how, tmp_path
 ):
     out = tmp_path / "out"
-    named = out / file if command == "render" else out
+    named = out / file if command in ("render", "convert") else out
     target = out / file if file else out
     if how == "a file on the way":
         blocker = target.parent if file else (tmp_path / "file")

@@ -101,3 +101,16 @@ def test_too_few_replicates_or_pixels_to_tell() -> None:
         pictures[1] = 0.9 * pictures[0] + 0.1 * pictures[1]
         assert correlated_pair(pictures) is None
     assert correlated_pair(np.ones((8, 48, 48, 3))) is None
+
+
+@pytest.mark.parametrize("count", [6, 8, 12, 16])
+@pytest.mark.parametrize("make", [white, lognormal], ids=["white", "lognormal"])
+def test_two_of_few_replicates_that_share_nearly_all_noise(count, make) -> None:
+    """They pull the mean of so few replicates towards themselves."""
+    for seed in range(5):
+        pictures = make(np.random.default_rng([seed, count]), count, 48)
+        pictures[1] = 0.1 * pictures[1] + 0.9 * pictures[4]
+        found = correlated_pair(pictures)
+        assert found is not None
+        assert found[:2] == (1, 4)
+        assert correlated_pair(make(np.random.default_rng([seed, count, 1]), count, 48)) is None
