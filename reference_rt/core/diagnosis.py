@@ -64,7 +64,8 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
     elif first["type"] == "union_tag_invalid":
         known_types, tag = _types(_models_at(model, location)), first["ctx"]["tag"]
         near = meant(tag, known_types.split(", "))
-        message = f"unknown type '{tag}'; expected one of: {known_types}{near}"
+        shown = tag if len(tag) <= _MOST_SHOWN else f"{tag[:_MOST_SHOWN]}..."
+        message = f"unknown type '{shown}'; expected one of: {known_types}{near}"
     elif first["type"] == "too_long":
         message = f"expected at most {first['ctx']['max_length']} items"
     elif first["type"] == "too_short":

@@ -142,7 +142,7 @@ def test_help(command):
 
 
 def test_an_internal_error_is_one_line(refused, monkeypatch, tmp_path):
-    monkeypatch.setattr("reference_rt.rendering.scene.Scene.load", lambda path: 1 / 0)
+    monkeypatch.setattr("reference_rt.rendering.scene.Scene.load", lambda *_: 1 / 0)
     result = run("explain", SPHERES)
     assert result.exit_code == 5
     assert result.stderr == (

@@ -32,6 +32,7 @@ from comparisons.experiments.stability.hostile.damage import (
 from comparisons.experiments.stability.hostile.grammar import sentence
 from comparisons.experiments.stability.hostile.mitsuba import judged as judged_of_mitsuba
 from comparisons.experiments.stability.hostile.pool import Answer, answers
+from reference_rt.core.diagnosis import MOST
 
 FOR_MITSUBA = {"quick": 8, "full": 60}
 """Scenes of a sweep point that Mitsuba gets: each takes it some 0.1 s, after 2 s to start."""
@@ -49,12 +50,13 @@ def problem(answer: Answer, scene: Path) -> str | None:
     if answer.exit == 0:
         return f"{answer.nonfinite} pixels not finite, not told" if answer.nonfinite else None
     lines = answer.said.splitlines()
-    if len(lines) != 1 or not lines[0].startswith("error: "):
-        return f"not one line of error: {answer.said[:300]!r}"
-    if str(scene.parent) not in lines[0]:
-        return f"names no file: {lines[0][:300]}"
-    if "expected" not in lines[0] and "malformed" not in lines[0]:
-        return f"says not what was expected: {lines[0][-300:]}"
+    if not 1 <= len(lines) <= MOST or not all(line.startswith("error: ") for line in lines):
+        return f"not one line of error for each problem: {answer.said[:300]!r}"
+    for line in lines:
+        if str(scene.parent) not in line:
+            return f"names no file: {line[:300]}"
+        if "expected" not in line and "malformed" not in line:
+            return f"says not what was expected: {line[-300:]}"
     return None
 
 
