@@ -62,6 +62,7 @@ class ImageGate:
         variance: str | Path | None = None,
         limit: float = 0.005,
         noise_free: bool = False,
+        rim: int = 0,
     ) -> "Case":
         """Fail the test unless `candidate` agrees with the scene, the baseline or the reference.
 
@@ -71,7 +72,8 @@ class ImageGate:
         reference_rt renders as the reference;  baseline: the name of a baseline that `reference-rt
         accept` wrote;  reference: pictures, like `candidate`;  variance: a file with the variance
         of a single reference;  limit: the smallest relative bias of the image mean that must be
-        detectable;  noise_free: the candidates were rendered without random numbers.
+        detectable;  noise_free: the candidates were rendered without random numbers;  rim: how many
+        of the outermost pixels are left out on each side.
 
         Pictures that are too noisy to tell fail too.  Returns the
         `comparisons.results.case.Case`.
@@ -101,6 +103,7 @@ class ImageGate:
                 baselines=self._baselines,
                 limit=limit,
                 noise_free=noise_free,
+                rim=rim,
                 name=self._node.nodeid + (f" [{self._calls}]" if self._calls > 1 else ""),
             )
             case = gated(judge, [picture for picture, _ in given])

@@ -16,7 +16,7 @@ def headline(case: Case) -> str:
 
 def _differ(case: Case) -> str:
     rung = _first(case, "differ")
-    what = "the pictures differ" if rung is None else _WHAT.get(rung.name, _plainly)(rung, case)
+    what = "the pictures differ" if rung is None else _what(rung, case)
     if case.cause is None:
         return f"{what}; no single cause explains it"
     return f"likeliest cause: {case.cause.name}; {what}"
@@ -44,6 +44,13 @@ def _inconclusive(case: Case) -> str:
             f"too noisy to decide: only a bias above {_percent(seen)} would be seen, and "
             f"{_percent(limit)} is asked for"
         )
+    unseen = rung.numbers.get("unseen_light")
+    missing = unseen.get("missing_at_most") if isinstance(unseen, Mapping) else None
+    if isinstance(missing, int | float) and missing > limit:
+        return (
+            f"too few samples met the rare light: {_percent(missing)} of all light may be missing "
+            f"by chance, and {_percent(limit)} is asked for"
+        )
     return f"too near to the limit of {_percent(limit)} to decide with so few samples"
 
 
@@ -53,7 +60,7 @@ def _invalid(case: Case) -> str:
     other = _first(case, "differ")
     if other is None:
         return f"nothing can be said: {_clause(text)}"
-    return f"the pictures are invalid ({_clause(text)}), and {_WHAT[other.name](other, case)}"
+    return f"the pictures are invalid ({_clause(text)}), and {_what(other, case)}"
 
 
 def _by_reason(case: Case) -> str:
@@ -92,7 +99,7 @@ def _of_statistics(rung: RungResult, case: Case) -> str:
             worst = cells.get("worst_bias")
             by = "" if worst is None else f", the worst by {_percent(worst, sign=True)}"
             return f"{cells['differ']:,} of {cells['tested']:,} {what} differ{by}"
-    return _plainly(rung, case)
+    return _clause(rung.reason)
 
 
 def _brighter(biases: Mapping[str, Any], case: Case) -> str:
@@ -111,16 +118,9 @@ def _brighter(biases: Mapping[str, Any], case: Case) -> str:
     return f"{picture} of another brightness than {case.sides[1]}: {each}"
 
 
-def _plainly(rung: RungResult, case: Case) -> str:
-    return _clause(rung.reason)
-
-
-_WHAT: Mapping[str, Callable[[RungResult, Case], str]] = {
-    "statistics": _of_statistics,
-    **dict.fromkeys(
-        ("scene", "run", "input", "film", "geometry", "direct", "whitted", "images"), _plainly
-    ),
-}
+def _what(rung: RungResult, case: Case) -> str:
+    """What a rung has found to differ."""
+    return _of_statistics(rung, case) if rung.name == "statistics" else _clause(rung.reason)
 
 
 # ---- words --------------------------------------------------------------------------------------

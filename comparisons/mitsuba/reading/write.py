@@ -33,11 +33,12 @@ def check_name(path: Path) -> None:
 def write_scene(scene: SceneModel, path: Path) -> int:
     """Write the scene, and return how many files of its own it has.
 
-    An older folder of the same name is replaced.  Raises ImageError, UsageError, SceneError for a
-    file of the scene that cannot be read.
+    The folder of the scene that it replaces is replaced, too.  Raises ImageError, also if the
+    folder holds anything else; UsageError; SceneError for a file of the scene that cannot be read.
     """
     check_name(path)
     folder = folder_of(path)
+    _check_folder(path, folder)
     mark = secrets.token_hex(4)
     temporary, old = (folder.with_name(f".{mark}-{k}-{folder.name}") for k in ("new", "old"))
     writer = _Writer(scene, temporary, folder.name)
@@ -62,6 +63,24 @@ def write_scene(scene: SceneModel, path: Path) -> int:
         for left in (temporary, old):
             shutil.rmtree(left, ignore_errors=True)
     return len(writer.taken)
+
+
+def _check_folder(path: Path, folder: Path) -> None:
+    """Raises ImageError if a folder is there that holds more than the files of the scene that is
+    there: it would be lost."""
+    if not folder.exists():
+        return
+    try:
+        scene = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+        found = sorted(file.name for file in folder.iterdir()) if folder.is_dir() else [""]
+    except OSError as error:
+        raise ImageError(f"{folder}: cannot be read: {error.strerror}") from None
+    others = [name for name in found if not name or f"{folder.name}/{name}" not in scene]
+    if others:
+        raise ImageError(
+            f"{folder / others[0]}: is not of the scene {path}, and would be lost; expected no "
+            "such folder, or another name for the scene"
+        )
 
 
 class _Writer:

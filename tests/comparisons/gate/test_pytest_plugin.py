@@ -130,6 +130,15 @@ def test_equal(image_gate):
 def test_gain(image_gate):
     image_gate(1.02 * RIGHT, reference=RIGHT, noise_free=True)
 
+FRAMED = RIGHT.copy()
+FRAMED[:, :2] *= 0.5
+
+def test_without_the_rim(image_gate):
+    image_gate(FRAMED, reference=RIGHT, noise_free=True, rim=2)
+
+def test_with_a_part_of_it(image_gate):
+    image_gate(FRAMED, reference=RIGHT, noise_free=True, rim=1)
+
 @pytest.mark.parametrize("file", ["nan.npy", "small.npy", "none.npy"])
 def test_file(image_gate, file):
     image_gate(file, reference=RIGHT, noise_free=True)
@@ -144,7 +153,7 @@ def test_no_scene(image_gate):
     image_gate(RIGHT, scene="scenes/none.yaml")
 """,
     )
-    result.assert_outcomes(passed=1, failed=7)
+    result.assert_outcomes(passed=2, failed=8)
     text = result.stdout.str()
     for message in (
         "image_gate: differ: likeliest cause: constant gain of 1.02; FLIP 0.0",

@@ -171,6 +171,28 @@ def test_a_failure_keeps_the_older_files(folder):
         write_scene(scene, folder / "file" / "scene.yaml")
 
 
+@pytest.mark.parametrize("kind", ["file", "folder", "name of a file"])
+@pytest.mark.parametrize("converted", [False, True])
+def test_files_of_others_are_not_lost(folder, kind, converted):
+    """In the folder that a converted scene would have; also if there is a scene already."""
+    out = folder / "out" / "scene.yaml"
+    out.parent.mkdir()
+    if converted:
+        assert run(folder / "scene.xml", "-o", out).exit_code == 0
+    files = out.parent / "scene_files"
+    if kind == "name of a file" and not converted:
+        files.write_text("mine")
+    else:
+        other = files / "mine" if kind == "folder" else files
+        other.mkdir(parents=True, exist_ok=True)
+        (other / "thesis.txt").write_text("mine")
+    before = {p: p.read_bytes() for p in out.parent.rglob("*") if p.is_file()}
+    result = run(folder / "scene.xml", "-o", out)
+    assert result.exit_code == ImageError.exit_code
+    assert "would be lost; expected" in result.output
+    assert {p: p.read_bytes() for p in out.parent.rglob("*") if p.is_file()} == before
+
+
 @pytest.mark.parametrize("name", ["vertex_color", "face_color"])
 def test_attributes_are_those_of_mitsuba(folder, name):
     path = folder / "scene.xml"

@@ -77,6 +77,19 @@ def test_what_differs_after_its_cause(rung, sides, what):
             "too near to the limit of 0.50 % to decide with so few samples",
         ),
         (
+            case(
+                "inconclusive", statistics("inconclusive", unseen_light={"missing_at_most": 0.02})
+            ),
+            "too few samples met the rare light: 2.0 % of all light may be missing by chance, and "
+            "0.50 % is asked for",
+        ),
+        (
+            case(
+                "inconclusive", statistics("inconclusive", unseen_light={"missing_at_most": 0.001})
+            ),
+            "too near to the limit of 0.50 % to decide with so few samples",
+        ),
+        (
             case("invalid", RungResult("input", "invalid", "1 pixel not finite; expected none")),
             "nothing can be said: 1 pixel not finite",
         ),
@@ -108,3 +121,12 @@ def test_every_case_has_a_sentence(verdict, rung):
         assert told[-1] not in ".;: "
         assert "\n" not in told
         assert "more" not in told
+
+
+@pytest.mark.parametrize("other", RUNGS)
+@pytest.mark.parametrize("verdict", STATUSES)
+def test_every_rung_may_differ_besides(verdict, other):
+    first = RungResult("input", verdict, "why; and more")
+    told = headline(case(verdict, first, RungResult(other, "differ", "9 of 10 rays; and more")))
+    assert told
+    assert "more" not in told
