@@ -141,7 +141,7 @@ RENDERERS: dict[str, Renderer] = {
     "photon map, radius 3": partial(photon_map, 1.0, 3.0),
     "photon map, radius 8": partial(photon_map, 0.1, 8.0),
     "photon map, radius 20": partial(photon_map, 0.02, 20.0),
-    "photon map, few photons": partial(photon_map, 0.002, 8.0),
+    "photon map, few photons": partial(photon_map, 0.006, 8.0),  # fewer leave pictures black
     "1 point light": partial(point_lights, 1),
     "8 point lights": partial(point_lights, 8),
     "64 point lights": partial(point_lights, 64),

@@ -13,9 +13,9 @@ from comparisons.rungs.input import input_rung
 from comparisons.statistics.metrics import image_metrics
 from comparisons.statistics.shared_noise import correlated_pair
 
-UNSEEN = ("photon map, few photons", "1 point light")
-"""Few bright events of which eight replicates may have none in a region, as with any rare light:
-the tests of tiles and pixels then differ rightly, for they cannot know."""
+UNSEEN = ("1 point light",)
+"""All light of a picture comes from one random point: a region that it lights seldom may be dark in
+all of eight replicates.  Tiles then differ (4 of 20 runs against independent pixels)."""
 
 
 def wrong_rungs(name: str, seed: int, counts: tuple[int, int], same: bool, side: int) -> list[str]:
