@@ -2,6 +2,7 @@
 
 import os
 import re
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -70,6 +71,14 @@ def fuzz(
     ] = False,
     out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/fuzz"),
     junit: JUnit = None,
+    planted: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PATTERN",
+            help="In place of all that: plant the source faults of `selftest` whose names match, "
+            "and measure how soon each is found.",
+        ),
+    ] = None,
 ) -> None:
     """Search for scenes that the two renderers, or two descriptions of one scene, disagree on.
 
@@ -91,6 +100,9 @@ def fuzz(
         from comparisons.runs.provenance import provenance
     from reference_rt.util.files import check_writable
 
+    if planted is not None:
+        _plant(planted, out, seed, jobs or os.cpu_count() or 1)
+        return
     effort: dict[str, Any] = {} if rays is None else {"pixels": rays, "light_pixels": rays}
     if rungs is not None:
         effort["rungs"] = _rungs(rungs, RUNGS)
@@ -128,6 +140,24 @@ def fuzz(
         say(f"  {summary.again(plan, one)}")
     say(f"{out / 'fuzz.json'}, fuzz.html", err=True)
     raise typer.Exit(1 if found.findings else 0)
+
+
+def _plant(pattern: str, out: Path, seed: int, jobs: int) -> None:
+    """Search for planted faults, and say what became of each."""
+    from comparisons.experiments.fuzz.planted import FILE, search, source_faults, summary
+    from reference_rt.util.files import check_writable
+
+    faults = [fault for fault in source_faults() if fnmatchcase(fault.name, pattern)]
+    if not faults:
+        raise UsageError(f"--planted: no source fault matches {pattern}")
+    check_writable(out / FILE)
+    found = []
+    for one in search(faults, out, seed, jobs):
+        found.append(one)
+        after = f"after {one.scenes} scenes: {one.rung}: {one.cause}" if one.scenes else "not found"
+        say(f"{one.fault}: {after}; {one.shapes} shapes, {one.lines} lines")
+    say(summary(found))
+    raise typer.Exit(0 if all(one.scenes for one in found) else 1)
 
 
 def _rungs(text: str, known: tuple[str, ...]) -> tuple[str, ...]:

@@ -63,7 +63,7 @@ class Reduced(BaseModel):
         return *self.finding.key, *self.types
 
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|\bnan\b|\binf\b|0x[0-9a-f]+")
+_NUMBER = re.compile(r"0x[0-9a-f]+|[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|\bnan\b|\binf\b")
 
 
 def without_numbers(text: str, longest: int = 160) -> str:

@@ -16,8 +16,8 @@ def without_textures(scene: Data) -> Data:
     found.get("camera", {}).pop("view", None)
     textures = {*found.get("textures", {})}
     for name in [*found.get("materials", {})]:
-        material = found["materials"][name]
-        if material["type"] in ("bump", "normal_map"):
+        material = found["materials"].get(name)  # it may have gone with another one
+        if material is not None and material["type"] in ("bump", "normal_map"):
             found = renamed(found, name, material["base"])
     for material in found.get("materials", {}).values():
         for field, value in material.items():

@@ -84,7 +84,7 @@ def _judged(name: str, how: str, at: Bench, hits: Intersections, offset: float) 
     cause = "hits differ"
     if (hits.shape[k] < 0) != (at.hits.shape[k] < 0):
         cause = "a hit and a miss"
-    elif abs(hits.t[k] - at.hits.t[k]) <= 1e-9 * abs(hits.t[k]):
+    elif hits.shape[k] >= 0 and abs(hits.t[k] - at.hits.t[k]) <= 1e-9 * abs(hits.t[k]):
         cause = "normals differ"
     return Finding(
         rung=f"identity {name}",
@@ -96,7 +96,8 @@ def _judged(name: str, how: str, at: Bench, hits: Intersections, offset: float) 
 
 def _differs(t: FloatArray, n: FloatArray, t2: FloatArray, n2: FloatArray, size: float) -> Any:
     """Where hits differ by more than a few roundings."""
-    same_t = (t == t2) | (np.abs(t - t2) <= size * np.abs(t))
+    with np.errstate(invalid="ignore"):  # both may be infinite
+        same_t = (t == t2) | (np.abs(t - t2) <= size * np.abs(t))
     missed = ~np.isfinite(t) & ~np.isfinite(t2)
     same_n = np.abs(n - n2).max(axis=1) <= NORMAL
     return ~(missed | (same_t & same_n))

@@ -93,8 +93,10 @@ def reordered(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding |
     other = scene.changed(shapes=tuple(scene.shapes[k] for k in order))
     hits = query.intersect(other.tables, at.o, at.d)
     old = np.append(order, -1)[hits.shape]
-    bad = np.flatnonzero(_unlike(hits.t, at.hits.t) | (old != at.hits.shape))
-    bad = np.array([k for k in bad.tolist() if not _is_tie(scene, at, k, int(old[k]))], np.int64)
+    differs = _unlike(hits.t, at.hits.t)
+    for k in np.flatnonzero(~differs & (old != at.hits.shape)).tolist():
+        differs[k] = not _is_tie(scene, at, k, int(old[k]))
+    bad = np.flatnonzero(differs)
     if len(bad):
         return _of_rays("another order", "reordered", at, hits, bad)
     return "agree"

@@ -167,12 +167,19 @@ def fewer_fields(scene: Data) -> Iterator[Data]:
 def _fields(part: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
     if isinstance(part, dict):
         for key, value in part.items():
-            if path and key not in ("type", "of") and not _is_named(path):
-                yield *path, key
+            there = *path, key
+            if path and key not in ("type", "of") and not (_is_named(path) or fixes_view(there)):
+                yield there
             yield from _fields(value, (*path, key))
     elif isinstance(part, list) and path[-1] not in ("faces", "vertices", "rings"):
         for k, value in enumerate(part):
             yield from _fields(value, (*path, k))
+
+
+def fixes_view(path: tuple[Any, ...]) -> bool:
+    """Whether a number says where the camera is: its default may lie on a surface, and the scene
+    would then fail for that reason."""
+    return path[:2] in (("camera", "eye"), ("camera", "target"))
 
 
 def _is_named(path: tuple[Any, ...]) -> bool:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from comparisons.experiments.fuzz.data import Data, copy_of
+from comparisons.experiments.fuzz.reduce.edits import fixes_view
 
 _FIXED = {"faces", "seed", "spp", "width", "height"}
 
@@ -13,26 +14,28 @@ def simpler_numbers(scene: Data) -> Iterator[Data]:
     """Each number as 0, 1, a whole number, or one of fewer digits."""
     for path in [*_numbers(scene, ())]:
         value = _at(scene, path)
-        for other in simpler(float(value)):
+        for other in simpler(float(value), digits_only=fixes_view(path)):
             smaller = copy_of(scene)
             _at(smaller, path[:-1])[path[-1]] = other
             yield smaller
 
 
-def simpler(x: float) -> list[float]:
-    """Numbers to try in place of x, the simplest first; none as long as x itself."""
+def simpler(x: float, digits_only: bool = False) -> list[float]:
+    """Numbers to try in place of x, the simplest first; none as long as x itself.  digits_only:
+    only those near x."""
     size = len(_short(x))
-    found = [0.0, 1.0, -1.0, float(round(x))]
+    found = [] if digits_only else [0.0, 1.0, -1.0]
+    found.append(float(round(x)))
     if x != 0.0 and math.isfinite(x):
         found += [float(f"{x:.1g}"), float(f"{x:.2g}")]
     kept = [y for y in dict.fromkeys(found) if y != x and len(_short(y)) < size]
     if x == -1.0:
-        kept = [1.0, 0.0]
+        kept = [] if digits_only else [1.0, 0.0]
     return [] if x in (0.0, 1.0) else kept
 
 
 def _short(x: float) -> str:
-    return f"{x:.17g}".replace("-", "")
+    return repr(x).replace("-", "").removesuffix(".0")
 
 
 def _numbers(part: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
