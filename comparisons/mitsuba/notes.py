@@ -5,6 +5,7 @@ from typing import Any
 
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.plastic_error import base_error
+from comparisons.mitsuba.translate.integrators import counts_lights_often
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.mitsuba.translate.wrappers import has_delta
 from reference_rt.materials import (
@@ -33,6 +34,11 @@ def notes_of(scene: Scene) -> list[str]:
                 f"'{name}': a relative error of {off:.2g} of its light is allowed for (tables, "
                 "float32: comparisons.mitsuba.accuracy)"
             )
+    if counts_lights_often(scene):
+        found.append(
+            "Mitsuba's direct illumination adds up its samples of lights without extent, which it "
+            "should average: its counterpart takes one"
+        )
     return list(dict.fromkeys(note for note in found if note))
 
 

@@ -118,6 +118,10 @@ class Assembly:
         if wanted and _bases(known[wanted[0]]):
             wanted.insert(0, "diffuse")
         images = any(_names_image(known[kind]) for kind in wanted)
+        if "normal_map" in wanted:
+            image = {"type": "bitmap", "file": assets.NORMALS, "encoding": "raw"}
+            self.textures["normals"] = image
+            self.names.normals.append("normals")
         if images and not self.names.images:
             self._add_texture(f"t{len(self.textures)}", "bitmap")
         for kind in wanted:

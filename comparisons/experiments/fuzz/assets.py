@@ -15,6 +15,10 @@ from reference_rt.core.exr import write_exr
 from reference_rt.util.files import replacing
 
 IMAGES = ("square.png", "wide.png", "grey.png")
+NORMALS = "normals.png"
+"""An image of normals that lean by up to 40 degrees: of others, some would point below the surface,
+where Mitsuba's normal maps reflect no ambient light."""
+
 SKIES = ("sky.exr", "low_sky.exr")
 
 FILES: dict[str, tuple[str, ...]] = {
@@ -43,6 +47,12 @@ def write(folder: Path) -> Path:
         sky[height // 3, height // 2] = 8.0
         if not (folder / name).exists():
             write_exr(folder / name, {c: sky[..., k] for k, c in enumerate("RGB")}, {})
+    if not (folder / NORMALS).exists():
+        low, high = np.array([80, 80, 200]), np.array([175, 175, 255])
+        with replacing(folder / NORMALS) as temporary:
+            Image.fromarray(rng.integers(low, high, (6, 6, 3)).astype(np.uint8)).save(
+                temporary, "PNG"
+            )
     for name in MESHES:
         if not (folder / name).exists():
             with replacing(folder / name) as temporary:

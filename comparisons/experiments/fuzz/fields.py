@@ -18,11 +18,12 @@ DIGITS = 3
 
 @dataclass
 class Names:
-    """What fields may name.  textures: for colours and numbers;  images: for slopes and normals;
-    files: by type, such as "bitmap"."""
+    """What fields may name.  textures: for colours and numbers;  images: for slopes;  normals: for
+    normals;  files: by type, such as "bitmap"."""
 
     textures: list[str] = field(default_factory=list)
     images: list[str] = field(default_factory=list)
+    normals: list[str] = field(default_factory=list)
     groups: list[str] = field(default_factory=list)
     files: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
@@ -168,7 +169,8 @@ def _word(part: dict[str, Any], draw: Draw, names: Names, own: str, key: str) ->
         return draw.pick(names.files[own]) if own in names.files else None
     if key == "group":
         return draw.pick(names.groups) if names.groups else None
-    return draw.pick(names.images) if names.images else None
+    images = names.normals if key == "normals" and not draw.extreme else names.images
+    return draw.pick(images) if images else None
 
 
 # ---- where the schema's range is wider than what scenes have -------------------------------------

@@ -22,7 +22,7 @@ from comparisons.mitsuba.stand_ins import MitsubaShape, Plugin, same_uv
 from comparisons.mitsuba.translate.cameras import translate_camera
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.film import translate_film, translate_sampler
-from comparisons.mitsuba.translate.integrators import translate_integrator
+from comparisons.mitsuba.translate.integrators import counts_lights_often, translate_integrator
 from comparisons.mitsuba.translate.lights import translate_light
 from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
@@ -100,6 +100,8 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
     integrator = translate_integrator(scene.integrator)
     if integrator is not None:
         plain["integrator"] = integrator
+        if counts_lights_often(scene):
+            integrator["emitter_samples"] = 1
     result = _Translated(plain, {}, [])
     copies = copies_of(scene)
     count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}

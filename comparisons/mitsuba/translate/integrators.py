@@ -5,6 +5,8 @@ from typing import Any
 
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
+from reference_rt.lights import Directional, Point, Spot
+from reference_rt.scene.model import SceneModel
 
 
 @singledispatch
@@ -27,6 +29,16 @@ def _(integrator: Path) -> dict[str, Any]:
 def _(integrator: Direct) -> dict[str, Any]:
     lights, bsdfs = integrator.light_samples, integrator.bsdf_samples
     return {"type": "direct", "emitter_samples": lights, "bsdf_samples": bsdfs}
+
+
+def counts_lights_often(scene: SceneModel) -> bool:
+    """Whether Mitsuba's integrator `direct` would be wrong for a scene: it adds up its samples of
+    lights without extent, which it should average (src/integrators/direct.cpp: their weight is 1
+    whatever `emitter_samples` is), so that they are as many times too bright.  The mean does not
+    depend on the number, and the counterpart has one."""
+    integrator = scene.integrator
+    points = any(isinstance(light, Point | Spot | Directional) for light in scene.lights)
+    return points and isinstance(integrator, Direct) and integrator.light_samples > 1
 
 
 @translate_integrator.register
