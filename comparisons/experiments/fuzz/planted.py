@@ -79,7 +79,7 @@ def summary(found: Sequence[Planted]) -> str:
 def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> Planted:
     """Run `reference-rt fuzz --stop` with a patched copy of the renderer."""
     text = patched_text(fault)
-    folder = out / "".join(c if c.isalnum() else "_" for c in fault.name)
+    folder = out.resolve() / "".join(c if c.isalnum() else "_" for c in fault.name)
     with tempfile.TemporaryDirectory(prefix="reference_rt_fuzz_") as temporary:
         package = Path(temporary) / "reference_rt"
         skipped = shutil.ignore_patterns("__pycache__")
@@ -94,6 +94,7 @@ def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> 
             capture_output=True,
             text=True,
             timeout=SECONDS,
+            cwd=temporary,  # workers import from the current folder first
             **tied(),
             check=False,
         )
