@@ -62,6 +62,7 @@ def selftest(
 def _mutate(count: int, seed: int, scenes: Path, out: Path) -> None:
     """Mutation testing; writes what is known after each mutant."""
     from comparisons.experiments.selftest.mutation import FILES, mutation, summary, write
+    from comparisons.experiments.selftest.run import SUITES, budgets_of
     from reference_rt.util.files import check_writable
 
     check_writable(*(out / name for name in FILES))
@@ -70,10 +71,12 @@ def _mutate(count: int, seed: int, scenes: Path, out: Path) -> None:
     def say(line: str) -> None:
         console.print(line, markup=False, soft_wrap=True)
 
+    by_suite = budgets_of(scenes)
+    budgets = {suite: by_suite[suite] for suite in reversed(SUITES)}  # the small one first
     fates = []
-    for fate in mutation(count, seed, scenes, say):
+    for fate in mutation(count, seed, scenes, budgets, say):
         fates.append(fate)
-        where = f" ({fate.rung}, {fate.scene})" if fate.rung else ""
+        where = f" ({fate.by}, {fate.rung}, {fate.scene})" if fate.rung else ""
         say(f"{fate.file}:{fate.line} {fate.what}: {fate.outcome}{where}")
         write(fates, seed, out)
-    say(summary(fates).partition("\n")[0])
+    say(summary(fates))
