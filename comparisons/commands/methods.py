@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import out_folder
@@ -34,6 +33,8 @@ def methods(
         from comparisons.runs.provenance import ours
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
+    from rich.console import Console
+
     from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable
 
