@@ -100,7 +100,7 @@ class CatmullRomFilter(Filter):
 
 
 class LanczosFilter(Filter):
-    """A sinc under the middle lobe of a wider sinc: sharpest, with `lobes` - 1 rings (Duchon 1979)."""
+    """A sinc under the middle lobe of a wider one: sharp, with `lobes` - 1 rings (Duchon 1979)."""
 
     type: Literal["lanczos"] = "lanczos"
     lobes: Annotated[int, Field(ge=1, le=64)] = 3
