@@ -33,7 +33,7 @@ def scene_of(name: str) -> Scene:
     )
     scene = scene.changed(film=film)
     if "sampler" not in shown and not scene.integrator.deterministic:
-        scene = scene.changed(sampler=Sobol(spp=SAMPLES))
+        scene = scene.changed(sampler=Sobol(spp=example.get("spp", SAMPLES)))
     return scene
 
 

@@ -31,7 +31,7 @@ def test_a_file_is_rewritten(tmp_path):
     assert list(out.parent.iterdir()) == [out]
     image = Image.open(out)
     assert image.size == (12, 8)
-    assert "reference_rt" in image.text
+    assert image.text["scene"] == "cornell_box"
 
 
 def test_without_a_display_the_file_is_beside_the_caller(tmp_path, monkeypatch):

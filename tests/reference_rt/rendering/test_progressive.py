@@ -41,9 +41,10 @@ def test_a_stage_is_the_mean_of_its_passes():
 
 
 def test_without_random_numbers_there_is_one_stage():
-    (stage,) = progressive(scene(integrator=rt.Whitted()), spp=64)
+    whitted = scene(integrator=rt.Whitted(), sampler=None)
+    (stage,) = progressive(whitted, spp=64)
     assert (stage.noise, stage.finished) == (0.0, True)
-    assert (stage.picture.colour == rt.render(scene(integrator=rt.Whitted())).colour).all()
+    assert (stage.picture.colour == rt.render(whitted).colour).all()
 
 
 def test_further_layers_are_left_out():
