@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from comparisons.commands.options import Scenes, out_folder
 from reference_rt.cli.main import guarded
@@ -33,6 +32,8 @@ def selftest(
     if mutants:
         _mutate(mutants, seed, scenes, out)
         return
+    from rich.console import Console
+
     from comparisons.experiments.selftest import FAULTS
     from comparisons.experiments.selftest.run import SUITES, run
     from reference_rt.util.files import check_writable
@@ -61,6 +62,8 @@ def selftest(
 
 def _mutate(count: int, seed: int, scenes: Path, out: Path) -> None:
     """Mutation testing; writes what is known after each mutant."""
+    from rich.console import Console
+
     from comparisons.experiments.selftest.mutation import FILES, mutation, summary, write
     from comparisons.experiments.selftest.run import SUITES, budgets_of
     from reference_rt.util.files import check_writable

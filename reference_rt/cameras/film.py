@@ -31,8 +31,12 @@ class Film(Description):
     """The picture: its size in pixels, its reconstruction filter and its layers."""
 
     width: Annotated[int, Field(ge=1, lt=2**31)] = 256
+    """Columns of pixels."""
     height: Annotated[int, Field(ge=1, lt=2**31)] = 256
+    """Rows of pixels; row 0 is the top of the picture."""
     filter: AnyFilter = BoxFilter()
+    """The reconstruction filter: how a sample's weight in a pixel falls with its distance.
+    Default: the mean over the pixel's square."""
     layers: Annotated[tuple[LayerName, ...], BeforeValidator(_each_once)] = ()
     """Which layers (AOVs) are written beside the colour.
 

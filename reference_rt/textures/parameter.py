@@ -64,7 +64,7 @@ TextureName = Annotated[str, MayBeTexture()]
 def texture_names(description: Description) -> dict[str, str]:
     """The names of the textures that a description's fields refer to, by field."""
     found = {}
-    for field, info in type(description).model_fields.items():
+    for field, info in type(description).__pydantic_fields__.items():
         value = getattr(description, field)
         if isinstance(value, str) and any(isinstance(m, MayBeTexture) for m in info.metadata):
             found[field] = value

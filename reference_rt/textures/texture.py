@@ -34,12 +34,14 @@ Pair = Annotated[
 
 
 class UvMap(Description):
-    """From surface coordinates to texture coordinates: scaled, then rotated, then translated."""
+    """The map from surface coordinates to texture coordinates: scaled, then rotated, then moved."""
 
     scale: Pair = (1.0, 1.0)
+    """Factors of u and v: one number for both, or two.  Larger ones make the pattern smaller."""
     rotate: float = 0.0
-    """Angle in degrees, counterclockwise in (u, v)."""
+    """Angle in degrees, counter-clockwise in (u, v), after scaling."""
     offset: Pair = (0.0, 0.0)
+    """Added to u and v at last: one number for both, or two."""
 
     def matrix(self) -> FloatArray:
         """(6,): u' = m0 u + m1 v + m2, v' = m3 u + m4 v + m5."""
@@ -59,7 +61,7 @@ class Texture(Description):
     """A colour, or through its luminance a number, for every point of a surface."""
 
     uv: UvMap = UvMap()
-    """The map from the surface's coordinates to the texture's."""
+    """The map from the surface's coordinates (u, v) to the texture's.  Default: none."""
 
     def tabulate(self, folder: Any) -> Any:
         """One row of the texture's table.  Raises ValueError (what is wrong, what was expected)."""

@@ -13,12 +13,14 @@ from reference_rt.lights.light import LightSample
 
 
 class Directional(Description):
-    """Light that travels along `direction` everywhere."""
+    """Parallel light from infinitely far away, such as the sun's without its size."""
 
     type: Literal["directional"] = "directional"
     direction: Direction
+    """The direction in which light travels, away from its source: world coordinates, of any length
+    but 0."""
     irradiance: Colour
-    """On a plane across the light, W m^-2, linear sRGB."""
+    """Irradiance on a plane perpendicular to the light: W m^-2, linear sRGB."""
 
     def tabulate(self) -> "Directionals":
         away = np.array(self.direction) / math.hypot(*self.direction)

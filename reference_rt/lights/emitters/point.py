@@ -13,12 +13,13 @@ from reference_rt.lights.light import LightSample, from_position
 
 
 class Point(Description):
-    """A point that shines equally to all sides."""
+    """A point that emits the same intensity in all directions."""
 
     type: Literal["point"] = "point"
     position: Vector
+    """Where it is: [x, y, z] in world coordinates, in scene units."""
     intensity: Colour
-    """Radiant intensity, W sr^-1, linear sRGB."""
+    """Radiant intensity in every direction: W sr^-1, linear sRGB."""
 
     def tabulate(self) -> "Points":
         return Points(np.array([self.position]), np.array([self.intensity]))

@@ -14,24 +14,30 @@ from reference_rt.lights.light import LightSample, from_position
 
 
 class Spot(Description):
-    """A point that shines from `origin` towards `target`: with its whole intensity within
-    `beam_width` of the axis, with none beyond `cutoff_angle`, linear in the angle between the two.
-    """
+    """A point that emits into a cone: full intensity within `beam_width`, none beyond
+    `cutoff_angle`, linear in the angle between the two."""
 
     type: Literal["spot"] = "spot"
     origin: Vector
+    """Where it is: [x, y, z] in world coordinates, in scene units."""
     target: Vector
+    """A point on the axis of the cone: [x, y, z] in world coordinates, not the origin."""
     intensity: Colour
-    """Radiant intensity on the axis, W sr^-1, linear sRGB."""
+    """Radiant intensity on the axis: W sr^-1, linear sRGB."""
     cutoff_angle: Annotated[float, Field(gt=0, le=180)] = 20.0
-    """Degrees from the axis: half of the cone's opening."""
+    """Angle in degrees from the axis to the rim of the cone, beyond which it is dark; above 0, at
+    most 180."""
     beam_width: Annotated[float, Field(ge=0, le=180)] | None = None
-    """Degrees from the axis; none stands for three quarters of the cutoff."""
+    """Angle in degrees from the axis within which the intensity is full; at most `cutoff_angle`.
+    Default: three quarters of it."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not 0.0 < math.dist(self.origin, self.target) < math.inf:
-            raise ValueError("origin and target give no direction; expected two different points")
+            raise ValueError(
+                "origin and target give no direction; expected two different points, "
+                f"got {list(self.origin)} and {list(self.target)}"
+            )
         if self.beam_width is not None and self.beam_width > self.cutoff_angle:
             raise ValueError(
                 f"beam_width {self.beam_width:g} is more than cutoff_angle {self.cutoff_angle:g}; "

@@ -21,19 +21,20 @@ from reference_rt.textures.lookup import At, lookup_gradient
 
 
 class Bump(Wrapper):
-    """Its base, under normals that tilt as if the surface were raised along them by a texture's
-    luminance.
+    """A material whose normals are tilted as if the surface were raised by a texture's luminance.
 
-    Only a bitmap with the filter `bilinear` has slopes: a checker's steps have none, nor have
-    colours of vertices.
+    The texture is a bitmap with the filter `bilinear`: others have no slope.
     """
 
     type: Literal["bump"] = "bump"
     base: str
+    """Name of the material whose normals are tilted."""
     height: TextureName
-    """A texture; of an image file of integers, most likely one with `encoding: raw`."""
+    """Name of the texture whose luminance is the height.  An image file of integers usually needs
+    `encoding: raw`."""
     scale: float = 1.0
-    """What a luminance of 1 stands for, in units of the scene, also for the copies of a group."""
+    """The height of a luminance of 1, in scene units; negative ones press in.  The transform of an
+    instance does not change it."""
 
     @property
     def oriented(self) -> bool:

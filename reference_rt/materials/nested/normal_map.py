@@ -17,13 +17,16 @@ from reference_rt.textures.lookup import At, lookup
 
 
 class NormalMap(Wrapper):
-    """Its base, under normals from a texture: the direction 2 rgb - 1, of any length, red along
-    dp/du, blue along the surface's own shading normal."""
+    """A material whose normals are replaced by a texture's: the direction 2 rgb - 1 of any length.
+
+    Red is along dp/du, blue along the surface's own shading normal.
+    """
 
     type: Literal["normal_map"] = "normal_map"
     base: str
+    """Name of the material whose normals are replaced."""
     normals: TextureName
-    """A texture; of an image file of integers, one with `encoding: raw`."""
+    """Name of the texture of normals.  An image file of integers needs `encoding: raw`."""
 
     @property
     def oriented(self) -> bool:

@@ -123,6 +123,16 @@ lights: [{type: constant, radiance: 1}]
 """
 
 
+@pytest.mark.parametrize("solids", [False, True])
+def test_operations_on_solids_are_compiled_where_there_are_some(solids):
+    """They do not compile for a geometry without, and `warm-up` would fail."""
+    text = (
+        SOLID if solids else "shapes: [{type: rectangle}]\nlights: [{type: constant, radiance: 1}]"
+    )
+    names = {kernel.__name__ for kernel, _ in query_calls(rt.Scene.parse(text))}
+    assert any(name.startswith("crossings_of_solid") for name in names) == solids
+
+
 def test_queries_call_these_kernels():
     """That is with arguments of these types: nothing else is compiled."""
     scene = rt.Scene.parse(SOLID)
