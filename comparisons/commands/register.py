@@ -7,6 +7,7 @@ from comparisons.commands.bench import bench
 from comparisons.commands.compare import compare
 from comparisons.commands.converge import converge
 from comparisons.commands.convert import convert
+from comparisons.commands.fuzz import fuzz
 from comparisons.commands.gate import gate
 from comparisons.commands.methods import methods
 from comparisons.commands.report import report
@@ -19,7 +20,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
     commands = (
         *(compare, suite, gate, accept, report, selftest),
-        *(converge, methods, bench, stability, convert),
+        *(converge, methods, bench, stability, convert, fuzz),
     )
     for command in commands:
         app.command()(command)

@@ -168,15 +168,19 @@ def _features(field: str, table: Any) -> FloatArray:
         ]
         return np.array([min(heights)])
     if field == "triangles":
-        v = table.vertices.reshape(-1, 3, 3)
-        edges = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1)
-        double_area = np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
-        height = np.divide(double_area, edges, out=np.zeros_like(edges), where=edges > 0.0)
-        return np.asarray(height)
+        return heights_of(table.vertices.reshape(-1, 3, 3))
     least = np.linalg.norm(table.to_local.reshape(3, 3), axis=1).max()  # of a box, a torus
     if field == "tori":
         return np.asarray(table.minor / np.linalg.norm(table.to_local.reshape(3, 3), 2))
     return np.array([2.0 / least])
+
+
+def heights_of(corners: FloatArray) -> FloatArray:
+    """(n,): the smallest height of each triangle;  corners: (n, 3, 3)."""
+    v = corners
+    edges = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1)
+    double_area = np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
+    return np.asarray(np.divide(double_area, edges, out=np.zeros_like(edges), where=edges > 0.0))
 
 
 def _quadric_features(table: Any, p: FloatArray, primitive: IntArray) -> FloatArray:

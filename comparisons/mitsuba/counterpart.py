@@ -123,7 +123,7 @@ def trace(
     scale = counterpart.frame.scale
     met = found.shape >= 0
     found.p[met] = counterpart.frame.out(found.p[met])
-    return replace(found, t=found.t / scale, sag=found.sag / scale)
+    return replace(found, t=found.t / scale, sag=found.sag / scale, height=found.height / scale)
 
 
 def _trace(counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: float) -> MitsubaHits:

@@ -25,13 +25,16 @@ class MitsubaHits(Intersections):
     has_uv (n,): whether uv can be compared;  sag, turn (n,): the distance in scene units, and the
     angle in radians, by which the hit surface and its shading normal may differ from those of our
     shape, beyond float32's common bound;  stands_in (n,): whether the hit is on a mesh that stands
-    in for a curved surface, and has the geometric normal of a flat triangle.
+    in for a curved surface, and has the geometric normal of a flat triangle;  height (n,): the
+    smallest height of the hit triangle, in scene units, where a flat shape is a mesh in Mitsuba, of
+    which our surface knows nothing; else infinite.
     """
 
     has_uv: BoolArray
     sag: FloatArray
     turn: FloatArray
     stands_in: BoolArray
+    height: FloatArray
 
 
 CURVED = 4.0
@@ -64,6 +67,8 @@ def read(hits: RawHits, mi_shapes: Sequence[MitsubaShape], o: FloatArray) -> Mit
             found.uv[rows] = uv if plugin.uv is same_uv else plugin.uv(uv)
             found.has_uv[rows] = True
         found.stands_in[rows] = plugin.faceted
+        if plugin.heights is not None:
+            found.height[rows] = plugin.heights[hits.prim[rows]]
         if plugin.stand_in is not None:
             found.sag[rows], found.turn[rows] = plugin.stand_in.sag, plugin.stand_in.turn
             found.stands_in[rows] = True
@@ -90,6 +95,7 @@ def misses(n: int) -> MitsubaHits:
         sag=np.zeros(n),
         turn=np.zeros(n),
         stands_in=np.zeros(n, bool),
+        height=np.full(n, np.inf),
     )
 
 

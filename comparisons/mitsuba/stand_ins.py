@@ -43,7 +43,8 @@ class Plugin(NamedTuple):
     in for an infinite plane;  group: the group of an instance;  curved: the radius of a surface
     whose quadratic Mitsuba solves in float32 (see `hits.CURVED`), else 0;  faceted: whether its
     triangles are so small that float32 turns their geometric normals, so that shading normals are
-    compared.
+    compared;  heights: the smallest height of each triangle of a flat shape that we do not
+    triangulate.
     """
 
     value: Any
@@ -55,6 +56,7 @@ class Plugin(NamedTuple):
     group: "ShapeGroup | None" = None
     curved: float = 0.0
     faceted: bool = False
+    heights: FloatArray | None = None
 
 
 class ShapeGroup(NamedTuple):

@@ -177,6 +177,8 @@ def _area_lights(
         if table is None:
             continue
         mine = np.flatnonzero(np.isin(table.material, emissive))
+        # In the order of the scene: that of the rows depends on the acceleration structure.
+        mine = mine[np.lexsort((table.face[mine], table.owner[mine]))]
         area = np.full(len(mine), np.inf)
         if hasattr(module, "sample"):
             of_scene = table.owner[mine] < len(scene.shapes)

@@ -1,5 +1,6 @@
 """Rays that hit coincident surfaces, of which each tracer may report either."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
 from comparisons.rungs.rays.bounds import slide
-from comparisons.rungs.rays.comparer import DISCRETE, Comparer
+from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import Translate
@@ -27,8 +28,9 @@ def coincident(
     report one and Mitsuba the other.
 
     Two operands of a solid: t and the normals agree, or Mitsuba's solid has our hit with another
-    tolerance for merging crossings that float32 cannot separate.  Two shapes: with our shape moved
-    far away, our tracer has Mitsuba's hit at the same t.
+    tolerance for merging crossings that float32 cannot separate.  Two faces of a shape: our ray
+    crosses Mitsuba's face too, at the same t.  Two shapes: with our shape moved far away, our
+    tracer has Mitsuba's hit at the same t.
     """
     found = np.zeros(len(numbers), bool)
     if len(numbers) == 0:
@@ -44,6 +46,9 @@ def coincident(
                 again = trace(counterpart, some.o, some.d, tolerance)
             _as_one_part(counterpart, some, mine, again)
             found[rest] = (comparer.ratios(some, mine, again) <= 1.0).all(axis=1)
+    rest = np.flatnonzero(~found)
+    k = numbers[rest]
+    found[rest] = _on_two_faces(scene, comparer, rays.rows(k), rows_of(ours, k), rows_of(theirs, k))
     left = ours.shape[numbers][~found]
     for shape in np.unique(left[left >= 0])[:COINCIDENCES].tolist():
         rest = np.flatnonzero(~found & (ours.shape[numbers] == shape))
@@ -56,6 +61,42 @@ def coincident(
         with np.errstate(invalid="ignore"):
             found[rest] = agrees & (np.abs(behind.t - ours.t[k]) <= e)
     return found
+
+
+def _on_two_faces(
+    scene: Scene, comparer: Comparer, rays: Rays, ours: Intersections, theirs: MitsubaHits
+) -> BoolArray:
+    """Which rays cross the face that Mitsuba reports at the same t as another face of the same
+    shape, which we report: as where a mesh has a triangle twice."""
+    found = np.zeros(len(ours.t), bool)
+    same = (ours.shape >= 0) & (ours.shape == theirs.shape) & (ours.instance == theirs.instance)
+    rows = np.flatnonzero(same & (ours.part == theirs.part) & (ours.primitive != theirs.primitive))
+    if len(rows) == 0:
+        return found
+    some, mine, other = rays.rows(rows), rows_of(ours, rows), rows_of(theirs, rows)
+    e = slide(comparer.sizes, some.o, some.d, mine, other.sag) / np.linalg.norm(some.d, axis=1)
+    crossed = query.crossings(scene.tables, some.o, some.d)
+    all_of_them = _as_hits(crossed)
+    ray = crossed.ray
+    near = np.abs(all_of_them.t - mine.t[ray]) <= e[ray]
+    like = np.column_stack(
+        [getattr(all_of_them, name) == getattr(other, name)[ray] for name in KINDS[1:DISCRETE]]
+    ).all(axis=1)
+    for k in np.flatnonzero(near & like).tolist():
+        one = int(ray[k])
+        ratios = comparer.ratios(
+            some.rows(np.array([one])),
+            rows_of(all_of_them, np.array([k])),
+            rows_of(other, np.array([one])),
+        )
+        found[rows[one]] |= bool((ratios <= 1.0).all())
+    return found
+
+
+def _as_hits(crossed: query.Crossings) -> Intersections:
+    """Crossings as hits of their rays."""
+    names = [field.name for field in dataclasses.fields(Intersections)]
+    return Intersections(**{name: getattr(crossed, name) for name in names})
 
 
 def in_one_place(comparer: Comparer, traced: Any, numbers: IntArray) -> BoolArray:

@@ -42,8 +42,9 @@ class Comparer:
 
         e = (delta + sag) / cos is how far the point may slide along the surface.  The bound of t is
         e; of uv and normals e over the smallest length on which they change; of shading normals
-        twice that, as they turn by up to two unit vectors on that length.  Where a mesh stands in
-        for a curved surface, its shading normal is used as the geometric one too.
+        twice that, as they turn by up to two unit vectors on that length.  Where Mitsuba has
+        triangles in place of a flat shape, their heights are such lengths too.  Where a mesh stands
+        in for a curved surface, its shading normal is used as the geometric one too.
         """
         hit = (ours.shape >= 0) & (theirs.shape >= 0)
         different = [(ours.shape >= 0) != (theirs.shape >= 0)]
@@ -56,7 +57,7 @@ class Comparer:
         normal = np.where(theirs.stands_in[:, None], theirs.ns, theirs.n)
         with np.errstate(divide="ignore", invalid="ignore"):
             e = slide(self.sizes, rays.o, rays.d, ours, theirs.sag)
-            turn = e / self.sizes.feature_of(ours)
+            turn = e / np.minimum(self.sizes.feature_of(ours), theirs.height)
             error_t = np.abs(theirs.t - ours.t) * length / e
             error_n = np.linalg.norm(normal - ours.n, axis=1) / (turn + theirs.turn)
             error_ns = np.linalg.norm(theirs.ns - ours.ns, axis=1) / (2.0 * turn + theirs.turn)

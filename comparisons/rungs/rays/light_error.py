@@ -9,7 +9,7 @@ from comparisons.mitsuba.accuracy import accuracy
 from comparisons.rungs.rays.bounds import slide
 from comparisons.rungs.rays.light_context import LightContext, described, kind_of
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.slopes import is_steep, moved, slopes
+from comparisons.rungs.rays.slopes import is_steep, moved, slopes, turned
 from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import AREA, DIRECTIONAL, ENVIRONMENT, SPOT, EnvironmentMap, Spot
 from reference_rt.materials import Emissive
@@ -99,11 +99,18 @@ def slopes_of(
     value: FloatArray,
 ) -> FloatArray:
     """(n,): how much f cos L changes within float32's bound because of highlights and textures:
-    measured with our tracer along moved rays, and at moved points of textured lights."""
+    measured with our tracer along moved rays, and at moved points of textured lights.
+
+    A mesh that stands in for a shape has other normals.  A normal turned by an angle turns the half
+    vector of a highlight as far as a ray does that is turned by twice the angle, or less.
+    """
     queries: list[tuple[Rays, tuple[float, float]]] = []
     if is_steep(context.scene):
+        sag, of_normal = stand_ins(context, hits)
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
-        queries += [(other, u) for other in moved(rays, radius)]
+        queries += [(other, u) for other in moved(rays, radius + sag)]
+        if of_normal.any():
+            queries += [(other, u) for other in turned(rays, hits.p, 2.0 * of_normal)]
     if _has_image(context, light):
         for step in (-U_STEP, U_STEP):
             queries += [(rays, (u[0] + step, u[1])), (rays, (u[0], u[1] + step))]

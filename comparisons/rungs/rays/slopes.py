@@ -50,6 +50,28 @@ def moved(rays: Rays, radius: FloatArray) -> list[Rays]:
     return found
 
 
+NEAR = 0.01
+"""How far from the point that it must hit a turned ray starts, as a fraction of its length: a ray
+from further away meets other surfaces."""
+
+
+def turned(rays: Rays, p: FloatArray, angle: FloatArray) -> list[Rays]:
+    """Four versions of the rays that hit the same points p (n, 3), turned about them by `angle`
+    (n,), up, down, left and right."""
+    length = np.linalg.norm(p - rays.o, axis=1)[:, None]
+    forward = rays.d / np.linalg.norm(rays.d, axis=1)[:, None]
+    least = np.eye(3)[np.argmin(np.abs(forward), axis=1)]
+    right = np.cross(forward, least)
+    right /= np.linalg.norm(right, axis=1)[:, None]
+    up = np.cross(right, forward)
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    found = []
+    for across in (right, up, -right, -up):
+        d = cosine * forward + sine * across
+        found.append(Rays(p - NEAR * length * d, d))
+    return found
+
+
 def slopes(
     value: FloatArray, others: Sequence[Callable[[], FloatArray]], brightest: float
 ) -> FloatArray:

@@ -175,3 +175,29 @@ def test_unlimited_paths_without_any_light_are_black():
     )
     with pytest.warns(rt.SceneWarning, match="no lights"):
         assert not rt.render(scene).colour.any()
+
+
+def test_light_samples_do_not_depend_on_the_acceleration_structure():
+    """Lights are numbered in the order of the scene, not of the rows that a BVH sorts."""
+    rng = np.random.default_rng(3)
+    corners = rng.uniform(-1.0, 1.0, (20, 3, 3)) + rng.uniform(-3.0, 3.0, (20, 1, 3))
+    lamp = rt.Mesh(
+        material="lamp", vertices=corners.reshape(-1, 3), faces=np.arange(60).reshape(20, 3)
+    )
+    floor = FLOOR.model_copy(
+        update={"transform": (*FLOOR.transform, transform.Translate(translate=(0, -4, 0)))}
+    )
+    scene = rt.Scene(
+        camera=rt.Perspective(eye=(0, 3, 9), target=(0, 0, 0)),
+        film=rt.Film(width=8, height=6),
+        sampler=rt.Sobol(spp=4),
+        materials=MATERIALS,
+        shapes=(lamp, floor, *ELSEWHERE),
+    )
+    pictures = [
+        rt.render(scene.changed(hierarchy=kind)).colour
+        for kind in ("none", "sah", "median", "spatial")
+    ]
+    assert pictures[0].any()
+    for other in pictures[1:]:
+        np.testing.assert_array_equal(other, pictures[0])

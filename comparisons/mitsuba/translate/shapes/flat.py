@@ -3,6 +3,7 @@
 import manifold3d
 import numpy as np
 
+from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.stand_ins import Extent, Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import Soup
@@ -73,8 +74,10 @@ def _(shape: Polygon, site: Site) -> list[Plugin]:
     positions[:, axis] = middle[axis] - (flat - middle[kept]) @ n[kept] / n[axis]
     soup = Soup(positions, uvs=filled, faces=faces)
     m = transform.compose(transform.affine(shape.transform), site.place.outer)
-    mesh = soup.moved(m, transform.flips_orientation(m)).mesh(site.parts)
-    return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv)]
+    placed = soup.moved(m, transform.flips_orientation(m))
+    heights = heights_of(placed.positions[placed.faces])
+    mesh = placed.mesh(site.parts)
+    return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv, heights=heights)]
 
 
 DIGITS = 2.0**20

@@ -1,7 +1,9 @@
 """Fine meshes that stand in for curved surfaces that Mitsuba lacks, with the surface's normals;
 their distance from the surface is measured."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import partial
 from typing import NamedTuple
 
@@ -62,6 +64,21 @@ def meshed(patches: Sequence[Patch], surface: Implicit, box: Box | None, finenes
     return Soup(np.concatenate(positions), np.concatenate(normals), faces=np.concatenate(faces))
 
 
+_fineness = ContextVar("fineness", default=1.0)
+
+
+@contextmanager
+def coarser(factor: float) -> Iterator[None]:
+    """Meshes with `factor` times as many cells along each side are made inside the block: for many
+    scenes of few rays each, whose meshes would take most of the time.  Their larger error is
+    measured as that of any others."""
+    token = _fineness.set(factor)
+    try:
+        yield
+    finally:
+        _fineness.reset(token)
+
+
 def stand_in(
     shape: Shape, patches: Sequence[Patch], surface: Implicit, box: Box | None, site: Site
 ) -> Plugin:
@@ -70,9 +87,10 @@ def stand_in(
     own = transform.affine(shape.transform)
     key = ("stand-in", id(shape))
     if key not in site.shared:
-        soup = meshed(patches, surface, box, 1.0)
+        fineness = _fineness.get()
+        soup = meshed(patches, surface, box, fineness)
         sag, turn = measured_error(soup, surface, own)
-        coarse, _ = measured_error(meshed(patches, surface, box, 0.5), surface, own)
+        coarse, _ = measured_error(meshed(patches, surface, box, 0.5 * fineness), surface, own)
         name, ratio = type(shape).__name__.lower(), coarse / sag if sag > 0.0 else 1.0
         site.shared[key] = soup, StandIn(name, len(soup.faces), sag, turn, ratio)
     soup, found = site.shared[key]

@@ -1,0 +1,189 @@
+"""`reference-rt fuzz`."""
+
+import os
+import re
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import JUnit, out_folder
+from reference_rt.cli.main import guarded, say
+from reference_rt.util.errors import UsageError
+
+
+@guarded
+def fuzz(
+    count: Annotated[
+        int | None, typer.Option(min=1, help="Scenes to check. (default: 100, or until --time)")
+    ] = None,
+    time: Annotated[
+        str | None,
+        typer.Option(metavar="DURATION", help="Begin scenes for so long: 90s, 10m or 2h."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all scenes.")] = 0,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first scene.")] = 0,
+    rungs: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Only these, comma-separated: render, identities, film, geometry, direct, "
+            "whitted, layers, statistics.",
+        ),
+    ] = None,
+    features: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Types or groups of types that every scene has, comma-separated: csg,glass,torus.",
+        ),
+    ] = None,
+    extreme: Annotated[
+        bool, typer.Option("--extreme", help="Also scenes that are far, tiny or thin.")
+    ] = False,
+    scene: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Check this scene instead: repeat for several."),
+    ] = None,
+    rays: Annotated[
+        int | None, typer.Option(min=16, help="Camera rays of each scene. (default: 48)")
+    ] = None,
+    renderer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COMMAND",
+            help="Compare this renderer with ours, in place of Mitsuba: "
+            '"prog {scene} -o {output} --seed {seed} --spp {spp}", as in `gate`.',
+        ),
+    ] = None,
+    stop: Annotated[bool, typer.Option("--stop", help="Stop at the first finding.")] = False,
+    reduce: Annotated[
+        float,
+        typer.Option(min=0.0, metavar="SECONDS", help="Time to reduce a finding; 0: do not."),
+    ] = 120.0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Parallel processes. (default: all cores)")
+    ] = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Remove stored results first, and check all again.")
+    ] = False,
+    out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/fuzz"),
+    junit: JUnit = None,
+    planted: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PATTERN",
+            help="In place of all that: plant the source faults of `selftest` whose names match, "
+            "and measure how soon each is found.",
+        ),
+    ] = None,
+) -> None:
+    """Search for scenes that the two renderers, or two descriptions of one scene, disagree on.
+
+    Random valid scenes are rendered, changed in ways that must not matter, and compared with
+    Mitsuba; a scene that fails is reduced to a few lines. A run with the same options and folder
+    goes on where the last one ended.
+
+    Exit codes: 0: nothing was found; 1: findings; 2: wrong usage; 4: Mitsuba is missing.
+    """
+    with compare_extra("fuzzing"):
+        from comparisons.experiments.fuzz import summary
+        from comparisons.experiments.fuzz.check import RUNGS, Effort
+        from comparisons.experiments.fuzz.generate import Grammar
+        from comparisons.experiments.fuzz.page import write_page
+        from comparisons.experiments.fuzz.progress import Display
+        from comparisons.experiments.fuzz.run import Plan, run
+        from comparisons.experiments.fuzz.stored import remove
+        from comparisons.experiments.fuzz.types import features as known
+        from comparisons.runs.provenance import provenance
+    from reference_rt.util.files import check_writable
+
+    if planted is not None:
+        _plant(planted, out, seed, jobs or os.cpu_count() or 1)
+        return
+    effort: dict[str, Any] = {} if rays is None else {"pixels": rays, "light_pixels": rays}
+    if rungs is not None:
+        effort["rungs"] = _rungs(rungs, RUNGS)
+    names = () if features is None else tuple(features.split(","))
+    known(names)
+    seconds = None if time is None else _seconds(time)
+    page = out / "fuzz.html"
+    check_writable(out / "fuzz.json", page, *([junit] if junit else []))
+    if fresh:
+        remove(out)
+    plan = Plan(
+        out=out,
+        seed=seed,
+        count=count if count is not None or time is not None else 100,
+        seconds=seconds,
+        first=first,
+        jobs=jobs or os.cpu_count() or 1,
+        grammar=Grammar(names, extreme),
+        effort=Effort(**effort),
+        stop=stop,
+        command=renderer or "",
+        scenes=tuple(_data(path, out) for path in scene or ()),
+        shrink=reduce,
+    )
+    with Display(len(plan.scenes) or plan.count) as display:
+        found = run(plan, display.done, display.line)
+    facts = provenance()
+    summary.write(plan, found, facts, junit)
+    write_page(page, plan, found, facts)
+    for line in summary.words(found):
+        say(line)
+    for one, times in summary.distinct(found):
+        say(f"{one.finding.rung}: {one.finding.cause} ({times} scenes, such as {one.number})")
+        say(f"  {one.finding.detail.splitlines()[0][:300]}")
+        say(f"  {summary.again(plan, one)}")
+    say(f"{out / 'fuzz.json'}, fuzz.html", err=True)
+    raise typer.Exit(1 if found.findings else 0)
+
+
+def _plant(pattern: str, out: Path, seed: int, jobs: int) -> None:
+    """Search for planted faults, and say what became of each."""
+    from comparisons.experiments.fuzz.planted import FILE, search, source_faults, summary
+    from reference_rt.util.files import check_writable
+
+    faults = [fault for fault in source_faults() if fnmatchcase(fault.name, pattern)]
+    if not faults:
+        raise UsageError(f"--planted: no source fault matches {pattern}")
+    check_writable(out / FILE)
+    found = []
+    for one in search(faults, out, seed, jobs):
+        found.append(one)
+        after = f"after {one.scenes} scenes: {one.rung}: {one.cause}" if one.scenes else "not found"
+        say(f"{one.fault}: {after}; {one.shapes} shapes, {one.lines} lines")
+    say(summary(found))
+    raise typer.Exit(0 if all(one.scenes for one in found) else 1)
+
+
+def _rungs(text: str, known: tuple[str, ...]) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    for name in names:
+        if name not in known:
+            raise UsageError(f"--rungs: expected some of {', '.join(known)}, got '{name}'")
+    return names
+
+
+def _seconds(text: str) -> float:
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", text)
+    if match is None:
+        raise UsageError(f"--time: expected a duration such as 90s, 10m or 2h, got '{text}'")
+    return float(match[1]) * {"s": 1.0, "m": 60.0, "h": 3600.0}[match[2]]
+
+
+def _data(path: Path, out: Path) -> dict[str, Any]:
+    """The data of a scene file; the files that it names must lie in the run's folder of files, or
+    beside it, from where they are copied."""
+    import json
+
+    from comparisons.experiments.fuzz.assets import bring
+    from reference_rt.rendering.scene import Scene
+
+    scene = Scene.load(path)
+    data: dict[str, Any] = json.loads(scene.to_json())
+    bring(data, scene.folder, out / "files")
+    return data

@@ -1,0 +1,257 @@
+"""One scene: rendered, put through identities, and compared with Mitsuba rung by rung."""
+
+import dataclasses
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, gather
+from comparisons.compare.judge import judge
+from comparisons.experiments.fuzz.data import Data
+from comparisons.experiments.fuzz.finding import Checked, Finding, without_numbers
+from comparisons.experiments.fuzz.generate import parse
+from comparisons.experiments.fuzz.identities import IDENTITIES
+from comparisons.experiments.fuzz.plain import without_textures
+from comparisons.experiments.fuzz.types import types_in
+from comparisons.mitsuba.translate.shapes.stand_ins import coarser
+from comparisons.results.case import Case, RungResult
+from comparisons.rungs.limited import limited
+from reference_rt.materials import (
+    Blend,
+    Mask,
+    Phong,
+    Plastic,
+    RoughConductor,
+    RoughDielectric,
+    RoughPlastic,
+)
+from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import ReferenceUnavailableError, SceneError, SceneWarning
+
+DETERMINISTIC = ("film", "geometry", "direct", "whitted", "layers")
+"""Rungs without noise."""
+
+RUNGS = ("render", "identities", *DETERMINISTIC, "statistics")
+"""What a scene is put through, in this order."""
+
+FAILED = ("differ", "invalid")
+
+COARSE = 0.35
+"""The cells along each side of meshes that stand in for shapes that Mitsuba lacks, as a fraction of
+those of other comparisons: a scene with a quadric takes a third of the time."""
+
+
+class Effort(BaseModel):
+    """rungs: some of RUNGS;  pixels: camera rays of geometry and Whitted;  light_pixels: of direct
+    light;  spp, replicates: of statistics;  identity_rays: that each identity traces;  every: the
+    statistics of each so many-th scene only."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rungs: tuple[str, ...] = RUNGS
+    pixels: int = 48
+    light_pixels: int = 24
+    spp: int = 16
+    replicates: int = 8
+    identity_rays: int = 240
+    every: int = 4
+
+
+def check(data: Data, number: int, effort: Effort, folder: Path) -> Checked:
+    """What is found in a scene;  folder: of the files that it names.  Raises
+    ReferenceUnavailableError."""
+    start = time.perf_counter()
+    found = Checked(number=number, types=sorted(f"{k}:{n}" for k, n in types_in(data)))
+    with warnings.catch_warnings(), np.errstate(all="ignore"), coarser(COARSE):
+        warnings.simplefilter("ignore", SceneWarning)
+        _check(data, found, effort, folder)
+    found.seconds = time.perf_counter() - start
+    return found
+
+
+def _check(data: Data, found: Checked, effort: Effort, folder: Path) -> None:
+    try:
+        scene = parse(data, found.number, folder)
+    except SceneError as error:
+        text = str(error.message)
+        found.findings.append(Finding(rung="scene", cause=without_numbers(text), detail=str(error)))
+        return
+    if "render" in effort.rungs:
+        _guarded("render", found, lambda: _render(scene, found))
+    if "identities" in effort.rungs and not found.findings:
+        rng = np.random.default_rng(found.number)
+        for name, identity in IDENTITIES.items():
+            if not _guarded(
+                f"identity {name}", found, partial(identity, scene, rng, effort.identity_rays)
+            ):
+                break
+    only = tuple(rung for rung in DETERMINISTIC if rung in effort.rungs)
+    if only and not found.findings:
+        _guarded("compare", found, lambda: _compare(data, scene, found, effort, only, folder))
+    if "statistics" in effort.rungs and not found.findings and found.number % effort.every == 0:
+        _guarded("compare", found, lambda: _statistics(scene, found, effort))
+
+
+def _guarded(name: str, found: Checked, task: Callable[[], str | Finding | None]) -> bool:
+    """Run a step; its errors are findings.  Whether it found nothing."""
+    try:
+        result = task()
+    except ReferenceUnavailableError:
+        raise
+    except SceneError as error:
+        if name == "render":
+            cause = f"refused: {without_numbers(error.message)}"
+            found.findings.append(Finding(rung="scene", cause=cause, detail=str(error)))
+        else:
+            found.rungs[name] = "not-comparable"
+        return False
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(place.filename).name}, {place.name}"
+        cause = f"{type(error).__name__} in {where}: {without_numbers(str(error))}"
+        detail = "".join(traceback.format_exception(error, limit=-6))[-1500:]
+        found.findings.append(Finding(rung=name, cause=cause, detail=detail))
+        return False
+    if isinstance(result, Finding):
+        found.findings.append(result)
+        found.rungs[name] = "differ"
+        return False
+    if result is not None:
+        found.rungs[name] = result
+    return True
+
+
+def _render(scene: Scene, found: Checked) -> str | Finding:
+    """Our picture: every number finite, but distances, which are infinite for a miss."""
+    picture = render(scene, threads=1)
+    found.lit = bool(np.any(picture.colour > 0.0)) if "colour" in picture.layers else True
+    for name, layer in picture.layers.items():
+        far = name in ("distance", "depth")
+        bad = np.isnan(layer) if far else ~np.isfinite(layer)
+        if bad.any():
+            where = np.argwhere(bad)[0].tolist()
+            return Finding(
+                rung="render",
+                cause=f"the layer {name} is not finite",
+                detail=f"{int(bad.sum())} numbers, the first in row {where[0]}, column {where[1]}",
+            )
+    return "agree" if found.lit else "black"
+
+
+# ---- Mitsuba ------------------------------------------------------------------------------------
+
+
+def budget_of(scene: Scene, effort: Effort) -> Budget:
+    """The comparison's work."""
+    return Budget(
+        pixels=max(16, effort.pixels),
+        light_pixels=max(16, effort.light_pixels),
+        spp=None if scene.integrator.deterministic else effort.spp,
+        replicates=effort.replicates,
+        limit=0.02,
+    )
+
+
+def compare(
+    scene: Scene, effort: Effort, only: Sequence[str], other: Scene | None = None
+) -> list[RungResult]:
+    """The results of the rungs;  other: what Mitsuba renders, if not the same."""
+    evidence = gather(
+        Subject(scene, other), budget_of(scene, effort), lambda step: None, 1, tuple(only)
+    )
+    return limited(evidence.rungs)
+
+
+def _compare(
+    data: Data, scene: Scene, found: Checked, effort: Effort, only: Sequence[str], folder: Path
+) -> Finding | None:
+    """The rungs without noise; of a scene with something that Mitsuba lacks, without that."""
+    results = compare(scene, effort, only)
+    if [result.status for result in results] == ["not-comparable"]:
+        plain = without_textures(data)
+        results = compare(parse(plain, found.number, folder), effort, only)
+        found.rungs["plain"] = "compared"
+    found.rungs |= {result.name: result.status for result in results}
+    return next((of_rung(result) for result in results if result.status in FAILED), None)
+
+
+def of_rung(result: RungResult) -> Finding:
+    """The finding of a rung that failed."""
+    return Finding(rung=result.name, cause=_cause(result), detail=result.reason)
+
+
+def _cause(result: RungResult) -> str:
+    """What is wrong, without this scene's numbers."""
+    numbers = result.numbers
+    if result.name == "geometry" and "mismatches" in numbers and "rays" in result.reason:
+        if "shadow rays" in result.reason:
+            return "any-hit queries"
+        kinds = [kind for kind, n in numbers["mismatches_by_kind"].items() if n]
+        who = "ours wrong" if numbers["decided_ours"] else ""
+        who = who or ("Mitsuba's wrong" if numbers["decided_mitsuba"] else "undecided")
+        return f"{who}: {', '.join(kinds[:2])}"
+    if result.name in ("direct", "whitted"):
+        return "values differ" if result.status == "differ" else without_numbers(result.reason)
+    return without_numbers(result.reason.partition(";")[0], 80)
+
+
+SLOW = (Blend, Mask, Phong, Plastic, RoughPlastic)
+"""Materials whose counterparts in Mitsuba are our plugins, in Python: some 20 microseconds for each
+evaluation, so that noisy pictures take minutes."""
+
+
+def is_slow(scene: Scene) -> bool:
+    """Whether Mitsuba's pictures of a scene need plugins in Python."""
+    beckmann = any(
+        isinstance(m, RoughConductor | RoughDielectric) and m.distribution == "beckmann"
+        for m in scene.materials.values()
+    )
+    return beckmann or any(isinstance(m, SLOW) for m in scene.materials.values())
+
+
+def _statistics(scene: Scene, found: Checked, effort: Effort) -> Finding | None:
+    """Pictures; a difference that noise may have made is looked at again, with other random numbers
+    and four times as many.  Pictures without noise are what the rungs below saw already, and of so
+    few pixels that one at an edge changes all metrics."""
+    if is_slow(scene) or scene.integrator.deterministic:
+        found.rungs["statistics"] = "not-run"
+        return None
+    case = pictures(scene, effort)
+    failed = _failed(case)
+    if failed is not None:
+        sampler = scene.resolved_sampler.model_copy(update={"seed": 7_654_321})
+        again = effort.model_copy(update={"spp": 4 * effort.spp, "replicates": 16})
+        failed = _failed(pictures(scene.changed(sampler=sampler), again))
+        if failed is None:
+            found.rungs["statistics"] = "false alarm"
+            return None
+    found.rungs |= {r.name: r.status for r in case.rungs if r.name in ("statistics", "images")}
+    return None if failed is None else of_rung(failed)
+
+
+def pictures(scene: Scene, effort: Effort) -> Case:
+    """The case of a scene's pictures."""
+    budget = budget_of(scene, effort)
+    evidence = gather(Subject(scene), budget, lambda step: None, 1, ("statistics", "images"))
+    if evidence.rendered is not None:
+        evidence = dataclasses.replace(evidence, lights=None, lengths=None)
+    return judge(evidence, budget.limit)
+
+
+def _failed(case: Case) -> RungResult | None:
+    black = "black"  # a picture without light is the generator's, and in both
+    return next((r for r in case.rungs if r.status in FAILED and black not in r.reason), None)
+
+
+def as_picture(scene: Scene) -> Picture:
+    """Our picture of a scene, for people."""
+    return render(scene, threads=1)

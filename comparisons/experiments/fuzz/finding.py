@@ -1,0 +1,71 @@
+"""What the fuzzer finds, and what is known of one scene, as data."""
+
+import re
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from comparisons.experiments.fuzz.data import Data
+
+
+class Finding(BaseModel):
+    """rung: of the comparison, "identity NAME", "render", "run" (the process died or hung) or
+    "scene" (the schema refused a generated scene);  cause: what is wrong, without the numbers of
+    this scene, so that scenes with one cause have equal ones;  detail: the differing ray, pixel or
+    number with both values."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rung: str
+    cause: str
+    detail: str
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What two findings of one cause share before they are reduced."""
+        return self.rung, self.cause
+
+
+class Checked(BaseModel):
+    """What came of one scene.  number: of the scene;  findings: empty for a good scene;  rungs: the
+    status of each rung and identity by name;  lit: whether our picture is not black;  types: those
+    that occur, as "kind:name";  seconds: wall clock."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    number: int
+    findings: list[Finding] = Field(default_factory=list)
+    rungs: dict[str, str] = Field(default_factory=dict)
+    lit: bool = False
+    types: list[str] = Field(default_factory=list)
+    seconds: float = 0.0
+
+
+class Reduced(BaseModel):
+    """A finding whose scene was reduced.  number, finding: of the scene as it was generated, and
+    what is left of it;  scene: reduced data;  tried: how many scenes it took;  pixels: camera rays
+    that show it;  pictures: PNGs of both sides as data: URLs, by whose they are."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    number: int
+    finding: Finding
+    scene: Data
+    tried: int = 0
+    pixels: int = 0
+    types: list[str] = Field(default_factory=list)
+    pictures: dict[str, str] = Field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def signature(self) -> tuple[Any, ...]:
+        """Findings with equal ones are the same: rung, cause and the types that are left."""
+        return *self.finding.key, *self.types
+
+
+_NUMBER = re.compile(r"0x[0-9a-f]+|[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|\bnan\b|\binf\b")
+
+
+def without_numbers(text: str, longest: int = 160) -> str:
+    """A message with '#' in place of each number, for comparison with those of other scenes."""
+    return " ".join(_NUMBER.sub("#", text).split())[:longest]

@@ -1,0 +1,117 @@
+"""How soon the fuzzer finds faults that are planted in the renderer's source, and how small the
+scenes become that show them."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import reference_rt
+from comparisons.experiments.selftest import FAULTS
+from comparisons.experiments.selftest.fault import SourceFault
+from comparisons.experiments.selftest.sensitivity import patched_text
+from reference_rt.util.child_processes import tied
+from reference_rt.util.errors import ReferenceRtError
+from reference_rt.util.files import replacing
+
+MOST_SCENES = 500
+
+SECONDS = 3600.0
+"""Time limit of the search for one fault, which compiles the kernels of the faulty renderer."""
+
+FILE = "planted.json"
+
+
+@dataclass(frozen=True)
+class Planted:
+    """fault: its name;  scenes: how many were checked until it was found, 0 if it was not;  rung,
+    cause: of the finding;  shapes, lines: of the reduced scene;  scene: its text."""
+
+    fault: str
+    scenes: int
+    rung: str = ""
+    cause: str = ""
+    shapes: int = 0
+    lines: int = 0
+    scene: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def source_faults() -> list[SourceFault]:
+    """The faults of the self-test that are planted in the source."""
+    return [fault for fault in FAULTS if isinstance(fault, SourceFault)]
+
+
+def search(
+    faults: Sequence[SourceFault], out: Path, seed: int, jobs: int, count: int = MOST_SCENES
+) -> Iterator[Planted]:
+    """What becomes of each fault; writes FILE after each."""
+    found: list[Planted] = []
+    for fault in faults:
+        found.append(_search(fault, out / "planted", seed, jobs, count))
+        with replacing(out / FILE) as temporary:
+            document = {"seed": seed, "planted": [one.as_json() for one in found]}
+            temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        yield found[-1]
+
+
+def summary(found: Sequence[Planted]) -> str:
+    """In one line."""
+    caught = [one for one in found if one.scenes]
+    if not caught:
+        return f"0 of {len(found)} faults found"
+    return (
+        f"{len(caught)} of {len(found)} faults found, after {median(o.scenes for o in caught):g} "
+        f"scenes (median); reduced to {median(o.shapes for o in caught):g} shapes and "
+        f"{median(o.lines for o in caught):g} lines (median)"
+    )
+
+
+def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> Planted:
+    """Run `reference-rt fuzz --stop` with a patched copy of the renderer."""
+    text = patched_text(fault)
+    folder = out / "".join(c if c.isalnum() else "_" for c in fault.name)
+    with tempfile.TemporaryDirectory(prefix="reference_rt_fuzz_") as temporary:
+        package = Path(temporary) / "reference_rt"
+        skipped = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(Path(reference_rt.__file__).parent, package, ignore=skipped)
+        (package / fault.file).write_text(text, encoding="utf-8")
+        path = os.environ.get("PYTHONPATH", "")
+        words = ["--count", str(count), "--seed", str(seed), "--jobs", str(jobs), "--stop"]
+        run = subprocess.run(
+            # -P: do not import from the current folder, which may have a reference_rt.
+            [sys.executable, "-P", "-m", "reference_rt.cli", "fuzz", *words, "--out", str(folder)],
+            env={**os.environ, "PYTHONPATH": f"{temporary}{os.pathsep}{path}".rstrip(os.pathsep)},
+            capture_output=True,
+            text=True,
+            timeout=SECONDS,
+            **tied(),
+            check=False,
+        )
+    if run.returncode not in (0, 1):
+        lines = [line for line in run.stderr.splitlines() if line.strip()]
+        raise ReferenceRtError(f"fuzz: '{fault.name}': {lines[-1] if lines else run.returncode}")
+    result = json.loads((folder / "fuzz.json").read_text(encoding="utf-8"))
+    if not result["findings"]:
+        return Planted(fault.name, 0)
+    one = result["findings"][0]
+    scene = one["scene"] or ""
+    shapes = scene.partition("shapes:\n")[2].partition("\nlights:")[0]
+    return Planted(
+        fault.name,
+        result["scenes"],
+        one["rung"],
+        one["cause"],
+        sum(line.startswith("  - ") for line in shapes.splitlines()),
+        len(scene.splitlines()),
+        scene,
+    )

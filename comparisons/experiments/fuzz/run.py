@@ -1,0 +1,272 @@
+"""A run: scenes through worker processes, findings reduced, results that a later run resumes."""
+
+import contextlib
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from comparisons.experiments.fuzz import assets, stored
+from comparisons.experiments.fuzz.check import Effort
+from comparisons.experiments.fuzz.data import Data
+from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, without_numbers
+from comparisons.experiments.fuzz.generate import Grammar, generate
+from comparisons.experiments.fuzz.reduce import reduce
+from comparisons.experiments.fuzz.request import Request
+from comparisons.experiments.fuzz.types import types_in
+from comparisons.runs.processes import pool
+from reference_rt.util.errors import UsageError
+
+SECONDS = 120.0
+"""Time limit of a scene: sixty times as long as one usually takes; one that takes longer hangs."""
+
+EACH = 3
+"""Findings of one rung and cause that are reduced; more are counted."""
+
+BATCH = 400
+"""Scenes that are given to the processes at a time."""
+
+WORKER = ("comparisons.experiments.fuzz.worker",)
+
+FEW = 40
+"""Scenes that are tried to reduce one at which a process dies or hangs: each takes a process."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """out: folder of the results;  count, seconds: of scenes and wall clock, whichever ends first;
+    first: the number of the first scene;  jobs: parallel processes;  stop: at the first finding;
+    command: another renderer's;  scenes: data in place of generated scenes;  shrink: seconds for
+    the reduction of a finding, 0: none;  limit: seconds of a scene."""
+
+    out: Path
+    seed: int = 0
+    count: int | None = None
+    seconds: float | None = None
+    first: int = 0
+    jobs: int = 1
+    grammar: Grammar = field(default_factory=Grammar)
+    effort: Effort = field(default_factory=Effort)
+    stop: bool = False
+    command: str = ""
+    scenes: tuple[Data, ...] = ()
+    shrink: float = 120.0
+    limit: float = SECONDS
+
+    @property
+    def files(self) -> Path:
+        """The folder of the files that scenes name."""
+        return self.out / "files"
+
+    @property
+    def settings(self) -> dict[str, object]:
+        """What results of an earlier run must have in common with this one's."""
+        return {
+            "seed": self.seed,
+            "features": list(self.grammar.features),
+            "extreme": self.grammar.extreme,
+            "effort": self.effort.model_dump(mode="json"),
+            "command": self.command,
+            "scenes": len(self.scenes),
+        }
+
+
+@dataclass
+class Run:
+    """scenes: by number, those of earlier runs too;  reduced: findings;  seconds, fresh: wall clock
+    and scenes of this run alone."""
+
+    scenes: dict[int, Checked] = field(default_factory=dict)
+    reduced: list[Reduced] = field(default_factory=list)
+    seconds: float = 0.0
+    fresh: int = 0
+
+    @property
+    def findings(self) -> list[tuple[int, Finding]]:
+        """All findings with the numbers of their scenes."""
+        return [(n, f) for n in sorted(self.scenes) for f in self.scenes[n].findings]
+
+
+Tell = Callable[[Checked], None]
+"""Called with what came of each scene."""
+
+
+def run(plan: Plan, tell: Tell, say: Callable[[str], None] = lambda line: None) -> Run:
+    """Check scenes that are not stored yet, and reduce what is found.
+
+    Raises UsageError for a folder with results of other settings, ReferenceUnavailableError.
+    """
+    plan.out.mkdir(parents=True, exist_ok=True)
+    if not stored.check_settings(plan.out, plan.settings):
+        raise UsageError(
+            f"{plan.out}: has results of another seed or other settings; expected the same, or "
+            "another folder by --out"
+        )
+    assets.write(plan.files)
+    reader = stored.Reader(plan.out)
+    found = Run(reader.new(), [*stored.reduced(plan.out)])
+    start = time.monotonic()
+    try:
+        for checked in _checked(plan, found.scenes, reader, start):
+            found.scenes[checked.number] = checked
+            found.fresh += 1
+            tell(checked)
+            if plan.stop and checked.findings:
+                break
+        found.seconds = time.monotonic() - start
+    finally:
+        found.seconds = found.seconds or time.monotonic() - start
+    if plan.shrink:
+        _reduce_all(plan, found, say)
+    return found
+
+
+def _numbers(plan: Plan, done: dict[int, Checked]) -> Iterator[int]:
+    number = plan.first
+    last = None if plan.count is None else plan.first + plan.count
+    if plan.scenes:
+        last = len(plan.scenes)
+    while last is None or number < last:
+        if number not in done:
+            yield number
+        number += 1
+
+
+def _checked(
+    plan: Plan, done: dict[int, Checked], reader: stored.Reader, start: float
+) -> Iterator[Checked]:
+    """What comes of the scenes, as they end."""
+    numbers = _numbers(plan, done)
+    size = BATCH if plan.seconds is None else 20 * plan.jobs
+
+    def is_late() -> bool:
+        return plan.seconds is not None and time.monotonic() - start > plan.seconds
+
+    while not is_late():
+        batch = [number for number, _ in zip(numbers, range(size), strict=False)]
+        if not batch:
+            return
+        requests = [_request(plan, number) for number in batch]
+        fresh: dict[int, Checked] = {}
+        running = pool.run(requests, plan.jobs, plan.limit, lambda r, step: None, WORKER)
+        with contextlib.closing(running):
+            for outcome in running:
+                if outcome.failure is not None:
+                    stored.add(plan.out, _dead(outcome))
+                fresh |= reader.new()
+                number = outcome.request.number
+                yield fresh.pop(number) if number in fresh else _dead(outcome)
+                if is_late():
+                    return
+
+
+def _dead(outcome: pool.Outcome[Request]) -> Checked:
+    """The result of a scene at which its process died, hung or stopped with an error."""
+    why = outcome.failure or "no result was stored"
+    finding = Finding(
+        rung="run", cause=without_numbers(why), detail=f"{why}\n{outcome.log[-1500:]}"
+    )
+    request = outcome.request
+    return Checked(number=request.number, findings=[finding], seconds=outcome.wall)
+
+
+def _request(plan: Plan, number: int) -> Request:
+    return Request(
+        number=number,
+        out=plan.out,
+        files=plan.files,
+        seed=plan.seed,
+        features=plan.grammar.features,
+        extreme=plan.grammar.extreme,
+        effort=plan.effort,
+        scene=plan.scenes[number] if plan.scenes else None,
+        command=plan.command,
+        seconds=plan.shrink,
+    )
+
+
+# ---- reduction ----------------------------------------------------------------------------------
+
+
+def _reduce_all(plan: Plan, found: Run, say: Callable[[str], None]) -> None:
+    """Reduce the first findings of each rung and cause that are not reduced yet."""
+    done = {one.number for one in found.reduced}
+    counts = Counter(one.finding.rung for one in found.reduced)
+    chosen: list[tuple[int, Finding]] = []
+    seen: Counter[tuple[str, str]] = Counter()
+    for number, finding in found.findings:
+        seen[finding.key] += 1
+        if seen[finding.key] <= EACH and number not in done:
+            chosen.append((number, finding))
+    if plan.stop:
+        chosen = chosen[: max(0, 1 - sum(counts.values()))]
+    if chosen:
+        say(f"reducing {len(chosen)} findings")
+    requests = [
+        _request(plan, number).model_copy(update={"task": "reduce", "finding": finding})
+        for number, finding in chosen
+    ]
+    inside = [r for r in requests if not _died(r)]
+    limit = 3.0 * plan.shrink + plan.limit
+    running = pool.run(inside, plan.jobs, limit, lambda r, step: None, WORKER)
+    with contextlib.closing(running):
+        for outcome in running:
+            if outcome.failure is not None:
+                stored.add_reduced(plan.out, _unreduced(plan, outcome.request))
+            say(f"scene {outcome.request.number}: reduced ({outcome.wall:.0f} s)")
+    for request in requests:
+        if _died(request):
+            stored.add_reduced(plan.out, _outside(plan, request))
+    found.reduced = [*stored.reduced(plan.out)]
+
+
+def _died(request: Request) -> bool:
+    """Whether the finding is that our process died or hung, not another renderer's."""
+    return request.finding is not None and request.finding.rung == "run" and not request.command
+
+
+def _scene(plan: Plan, number: int) -> Data:
+    if plan.scenes:
+        return plan.scenes[number]
+    return generate(plan.seed, number, plan.grammar, plan.files)
+
+
+def _unreduced(plan: Plan, request: Request) -> Reduced:
+    scene = _scene(plan, request.number)
+    assert request.finding is not None
+    return Reduced(number=request.number, finding=request.finding, scene=scene, types=_types(scene))
+
+
+def _types(scene: Data) -> list[str]:
+    return sorted(f"{kind}:{name}" for kind, name in types_in(scene))
+
+
+def _outside(plan: Plan, request: Request) -> Reduced:
+    """A scene at which a process dies or hangs, reduced in a new process for each try."""
+    wanted = request.finding
+    assert wanted is not None
+
+    def fails(candidate: Data) -> bool:
+        one = request.model_copy(update={"task": "scene", "scene": candidate})
+        one = one.model_copy(update={"out": plan.out / "tried"})
+        one.out.mkdir(exist_ok=True)
+        limit = min(plan.limit, 30.0) if "took longer" not in wanted.cause else plan.limit / 2.0
+        (outcome,) = pool.run([one], 1, limit, lambda r, step: None, WORKER)
+        return outcome.failure is not None and without_numbers(outcome.failure) == wanted.cause
+
+    try:
+        scene = _scene(plan, request.number)
+    except Exception:
+        return Reduced(number=request.number, finding=wanted, scene={})
+    found = reduce(scene, fails, most=FEW, seconds=10.0 * plan.shrink)
+    return Reduced(
+        number=request.number,
+        finding=wanted,
+        scene=found.scene,
+        tried=found.tried,
+        types=_types(found.scene),
+    )
+
+
+__all__ = ["Plan", "Run", "Tell", "run"]
