@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from reference_rt.cli import render_options
 from reference_rt.cli.adjusted import SceneArgument, without_blas
 from reference_rt.cli.adjusted import adjusted as adjusted
 from reference_rt.cli.defaults import Defaults, by_name
@@ -29,6 +30,9 @@ app = typer.Typer(
     "1 difference, 2 usage, 3 invalid scene or image, 4 reference missing or could not run, "
     "5 internal error, 130 interrupted (by SIGTERM 143, by SIGHUP 129).",
 )
+
+
+Threads = Annotated[int | None, typer.Option(min=1, help="Default: all cores.")]
 
 
 def _print_version(wanted: bool) -> None:
@@ -62,41 +66,37 @@ def render(
         str | None, typer.Option(help="ray_cast, whitted, direct or path.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    threads: Threads = None,
     define: Defaults = None,
+    time_limit: render_options.TimeLimit = None,
+    target_error: render_options.TargetError = None,
+    checkpoint: render_options.CheckpointFolder = None,
+    no_checkpoint: render_options.NoCheckpoint = False,
+    resume: render_options.Resume = False,
+    more_spp: render_options.MoreSpp = None,
+    preview: render_options.Preview = None,
+    memory: render_options.Memory = None,
 ) -> None:
-    """Render a scene to a file."""
-    from reference_rt.rendering import image
-    from reference_rt.rendering.render import render as render_scene
+    """Render a scene to a file.
+
+    Ctrl-C writes the picture so far, marked as partial in its header.
+    """
+    from reference_rt.cli.render import Limited, Stored, render_to_file
+    from reference_rt.rendering.image import check_suffix
     from reference_rt.rendering.scene import Scene
-    from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable
 
-    image.check_suffix(output)
+    check_suffix(output)
     loaded = Scene.load(scene, by_name(define))
     description = adjusted(loaded, spp, size, integrator, seed)
     check_writable(output)
-    with ProgressLine() as progress, without_blas():
-        picture = render_scene(
-            description, threads=threads, progress=progress, compiling=progress.compiling
-        )
-    picture.save(output)
-    seconds = picture.seconds
-    say(
-        f"{output}: {description.film.width} x {description.film.height}, "
-        f"{seconds['tables']:.2f} s to build, {seconds['compile']:.2f} s to compile or load "
-        f"kernels, {seconds['render']:.2f} s to render",
-        err=True,
-    )
-    if not picture.layers[picture.shown].any():
-        description.warn("the picture is black: no light reaches the camera", "camera")
-    bad = picture.nonfinite_pixels
-    if len(bad) > 0:
-        places = ", ".join(f"({x}, {y})" for x, y in bad[:4])
-        raise ImageError(
-            f"{output}: {len(bad)} pixels are not finite; (column, row): {places}"
-            + (", ..." if len(bad) > 4 else "")
-        )
+    limits = Limited(time_limit, target_error, memory)
+    storage = Stored(checkpoint, no_checkpoint, resume, more_spp or 0)
+    with without_blas():
+        text, code = render_to_file(description, output, threads, limits, storage, preview)
+    say(text if code == 0 else f"error: {text}", err=True)
+    if code:
+        raise typer.Exit(code)
 
 
 app.command()(preview)
@@ -119,7 +119,7 @@ def warm_up(
         list[Path] | None,
         typer.Argument(metavar="[SCENE]...", help="Whose specialised kernels are compiled, too."),
     ] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    threads: Threads = None,
 ) -> None:
     """Compile all kernels that scenes share, so that no render waits for them.
 

@@ -29,12 +29,12 @@ FAULTS = (
         "normal = normal + point.ns * seen.weight", "normal = normal + point.n * seen.weight",
     ),
     SourceFault(
-        "variance of one sample", LAYERS, "rendering/tiles.py",
-        "    scale = 1.0 / (spp * (spp - 1.0))\n", "    scale = 1.0 / (spp - 1.0)\n",
+        "variance of one sample", LAYERS, "rendering/accumulation.py",
+        "np.divide(1.0, spp * (spp - 1.0))", "np.divide(1.0, spp - 1.0)",
     ),
     SourceFault(
-        "variance over n for n - 1", LAYERS, "rendering/tiles.py",
-        "    scale = 1.0 / (spp * (spp - 1.0))\n", "    scale = 1.0 / (spp * (spp - 0.0))\n",
+        "variance over n for n - 1", LAYERS, "rendering/accumulation.py",
+        "np.divide(1.0, spp * (spp - 1.0))", "np.divide(1.0, spp * (spp - 0.0))",
     ),
     SourceFault(
         "weights of a filter ignored", "filter_lanczos", "rendering/tiles.py",
