@@ -20,7 +20,15 @@ from reference_rt.cameras.film import (
 )
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import Ambient, Constant, Directional, EnvironmentMap, Point, Spot
+from reference_rt.lights import (
+    Ambient,
+    Constant,
+    Directional,
+    EnvironmentMap,
+    Point,
+    Projector,
+    Spot,
+)
 from reference_rt.materials import (
     Blend,
     Bump,
@@ -34,6 +42,7 @@ from reference_rt.materials import (
     Phong,
     Plastic,
     Principled,
+    PrincipledThin,
     RoughConductor,
     RoughDielectric,
     RoughPlastic,
@@ -118,6 +127,8 @@ __all__ = [
     "Point",
     "Polygon",
     "Principled",
+    "PrincipledThin",
+    "Projector",
     "Quadric",
     "RayCast",
     "Rectangle",

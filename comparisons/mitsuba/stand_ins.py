@@ -43,7 +43,8 @@ class Plugin(NamedTuple):
     in for an infinite plane;  group: the group of an instance;  curved: the radius of a surface
     whose quadratic Mitsuba solves in float32 (see `hits.CURVED`), else 0;  faceted: whether its
     triangles are so small that float32 turns their geometric normals, so that shading normals are
-    compared.
+    compared;  uv_of_mesh: whether the vertices of a mesh that stands in have our uv, which between
+    them are interpolated.
     """
 
     value: Any
@@ -55,6 +56,12 @@ class Plugin(NamedTuple):
     group: "ShapeGroup | None" = None
     curved: float = 0.0
     faceted: bool = False
+    uv_of_mesh: bool = False
+
+    @property
+    def has_our_uv(self) -> bool:
+        """Whether textures see our uv."""
+        return self.uv is same_uv or self.uv_of_mesh
 
 
 class ShapeGroup(NamedTuple):

@@ -128,9 +128,9 @@ def _render_jobs(scene: BuiltScene, integrator: Any) -> tuple[list[Job], dict[st
     layers = {"colour": out}
     if variance is not None:
         layers["variance"] = variance
-    if {"albedo", "normal"} & set(film.layers):
-        layers |= {"albedo": np.zeros_like(out), "normal": np.zeros_like(out)}
-        hits = [layers[name].reshape(-1, 3) for name in ("albedo", "normal")]
+    if set(_OF_FIRST_HITS) & set(film.layers):
+        layers |= {name: np.zeros_like(out) for name in _OF_FIRST_HITS}
+        hits = [layers[name].reshape(-1, 3) for name in _OF_FIRST_HITS]
         random_numbers = sampler.setup()
 
         def arguments(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
@@ -143,6 +143,9 @@ def _render_jobs(scene: BuiltScene, integrator: Any) -> tuple[list[Job], dict[st
         layers |= {"depth": cast["distance"], "id": cast["id"]}
     return jobs, {name: layers[name] for name in ("colour", *film.layers)}
 
+
+_OF_FIRST_HITS = ("albedo", "normal", "position")
+"""Layers of `first_hits_tile`, in its order."""
 
 _NONE = np.zeros((0, 3))
 
@@ -181,8 +184,8 @@ def _check(scene: BuiltScene) -> None:
         raise scene.error(
             "one sample per pixel has no variance; expected at least 2", "film", "layers"
         )
-    # At most 10 channels of float64, 22 with layers, and the same again while files are written.
-    needed = film.width * film.height * (22 if film.layers else 10) * 2 * 8
+    # At most 10 channels of float64, 25 with layers, and the same again while files are written.
+    needed = film.width * film.height * (25 if film.layers else 10) * 2 * 8
     try:
         available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):  # not every system has these

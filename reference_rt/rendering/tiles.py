@@ -242,16 +242,18 @@ def first_hits_tile(
     spp: int,
     albedos: FloatArray,
     normals: FloatArray,
+    positions: FloatArray,
     begin: int,
     end: int,
     first: int,
     last: int,
 ) -> None:
-    """Mean albedo and shading normal at the first hits of the rays of `render_tile`, into albedos
-    (n, 3) and normals (n, 3)."""
+    """Mean albedo, shading normal and position of the first hits of the rays of `render_tile`, into
+    albedos, normals and positions (n, 3)."""
     for pixel in range(begin, end):
         y, x = pixel // shape[0], pixel % shape[0]
         albedo, normal = row(albedos, pixel), row(normals, pixel)
+        position = row(positions, pixel)
         for sample in range(first, last):
             sampler = start_sample(sampler_setup, pixel, sample)
             seen = _film_ray(view, film_filter, sampler, shape, x, y)
@@ -262,10 +264,12 @@ def first_hits_tile(
                 own = colour_at(scene.materials.shown, point.material, at)
                 albedo = albedo + own * seen.weight
                 normal = normal + point.ns * seen.weight
+                position = position + point.p * seen.weight
         if last == spp:
-            albedo, normal = albedo / spp, normal / spp
+            albedo, normal, position = albedo / spp, normal / spp, position / spp
         albedos[pixel, 0], albedos[pixel, 1], albedos[pixel, 2] = albedo
         normals[pixel, 0], normals[pixel, 1], normals[pixel, 2] = normal
+        positions[pixel, 0], positions[pixel, 1], positions[pixel, 2] = position
 
 
 @entry_kernel
