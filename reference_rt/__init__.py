@@ -17,12 +17,12 @@ Shapes
     Instance; and solids: Union, Intersection, Difference
 Materials
     Diffuse, Mirror, Dielectric, ThinDielectric, Conductor, RoughConductor, RoughDielectric,
-    Plastic, RoughPlastic, Principled, Phong, Emissive; made of others: Mask, TwoSided, Blend,
-    Bump, NormalMap
+    Plastic, RoughPlastic, Principled, PrincipledThin, Phong, Emissive; made of others: Mask,
+    TwoSided, Blend, Bump, NormalMap
 Textures
     Checker, Bitmap, VertexColours
 Lights
-    Point, Spot, Directional, Constant, EnvironmentMap, Ambient
+    Point, Spot, Projector, Directional, Constant, EnvironmentMap, Ambient
 Integrators
     Path, Direct, Whitted, RayCast
 Samplers
@@ -60,7 +60,15 @@ if TYPE_CHECKING:
     )
     from reference_rt.integrators import Direct, Path, RayCast, Whitted
     from reference_rt.integrators.scene_tables import SceneTables
-    from reference_rt.lights import Ambient, Constant, Directional, EnvironmentMap, Point, Spot
+    from reference_rt.lights import (
+        Ambient,
+        Constant,
+        Directional,
+        EnvironmentMap,
+        Point,
+        Projector,
+        Spot,
+    )
     from reference_rt.materials import (
         Blend,
         Bump,
@@ -74,6 +82,7 @@ if TYPE_CHECKING:
         Phong,
         Plastic,
         Principled,
+        PrincipledThin,
         RoughConductor,
         RoughDielectric,
         RoughPlastic,
@@ -158,6 +167,8 @@ if TYPE_CHECKING:
         "Point",
         "Polygon",
         "Principled",
+        "PrincipledThin",
+        "Projector",
         "Quadric",
         "RayCast",
         "Rectangle",
@@ -200,7 +211,7 @@ _EXPORTS = {
     ),
     "reference_rt.integrators": "Direct Path RayCast Whitted",
     "reference_rt.integrators.scene_tables": "SceneTables",
-    "reference_rt.lights": "Ambient Constant Directional EnvironmentMap Point Spot",
+    "reference_rt.lights": "Ambient Constant Directional EnvironmentMap Point Projector Spot",
     "reference_rt.materials": (
         "Blend Bump Conductor Dielectric Diffuse Emissive Mask Mirror NormalMap Phong Plastic "
         "Principled RoughConductor RoughDielectric RoughPlastic ThinDielectric TwoSided"

@@ -21,6 +21,9 @@ from reference_rt.scene.build import BuiltScene
 Sums = dict[str, FloatArray]
 """Sums (n, width) of n pixels by name."""
 
+OF_FIRST_HITS = ("albedo", "normal", "position")
+"""Layers of `first_hits_tile`, in its order."""
+
 _CENTRE = "centre"
 _CENTRE_COLUMNS = {
     "colour": slice(0, 3),
@@ -81,13 +84,13 @@ def jobs_of(scene: BuiltScene) -> list[Job]:
     sampler, wanted = scene.resolved_sampler, set(scene.film.layers)
     has_variance = "variance" in wanted
     jobs = [radiance_job(scene.integrator.setup(), sampler, shape, has_variance)]
-    if {"albedo", "normal"} & wanted:
+    if set(OF_FIRST_HITS) & wanted:
         random_numbers = sampler.setup()
 
         def first_hits(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
             return tables, view, film_filter, random_numbers, shape
 
-        jobs.append(Job(first_hits_tile, "first_hits", first_hits, ("albedo", "normal")))
+        jobs.append(Job(first_hits_tile, "first_hits", first_hits, OF_FIRST_HITS))
     if {"depth", "id"} & wanted:
         columns = {name: _CENTRE_COLUMNS[name] for name in ("distance", "id")}
         jobs.append(Job(aov_tile, "ray_cast", centres, (_CENTRE,), columns))
@@ -115,8 +118,8 @@ def widths_of(scene: BuiltScene) -> dict[str, int]:
     wanted, widths = set(scene.film.layers), {"colour": 3}
     if "variance" in wanted:
         widths["m2"] = 3
-    if {"albedo", "normal"} & wanted:
-        widths |= {"albedo": 3, "normal": 3}
+    if set(OF_FIRST_HITS) & wanted:
+        widths |= dict.fromkeys(OF_FIRST_HITS, 3)
     if {"depth", "id"} & wanted:
         widths |= {"distance": 1, "id": 1}
     return widths
@@ -154,7 +157,7 @@ def layers_of(
         for name in scene.film.layers:
             if name == "variance":
                 layers[name] = mean_and_variance(sums, count)[1]
-            elif name in ("albedo", "normal"):
+            elif name in OF_FIRST_HITS:
                 layers[name] = sums[name] / count
             else:
                 layers[name] = _flat(sums["distance" if name == "depth" else name].copy())

@@ -42,11 +42,11 @@ class Picture:
     """A rendered scene.
 
     layers: float64 arrays by name.  "colour" (height, width, 3) is linear radiance; the others are
-    those of `Film.layers`: albedo, normal and variance (height, width, 3), depth and id (height,
-    width).  Ray casting always has colour and normal (height, width, 3), distance and id (height,
-    width), uv (height, width, 2).  shown: the layer that is the picture.  seconds: wall-clock time
-    of "tables" (files, arrays, hierarchy), "compile" (or loading cached kernels) and "render".
-    scene: what was rendered, and taken: with which samples; None if that is unknown.
+    those of `Film.layers`: albedo, normal, position and variance (height, width, 3), depth and id
+    (height, width).  Ray casting always has colour and normal (height, width, 3), distance and id
+    (height, width), uv (height, width, 2).  shown: the layer that is the picture.  seconds:
+    wall-clock time of "tables" (files, arrays, hierarchy), "compile" (or loading cached kernels)
+    and "render".  scene: what was rendered, and taken: with which samples; None if that is unknown.
     """
 
     layers: dict[str, FloatArray]

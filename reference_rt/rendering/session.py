@@ -201,8 +201,8 @@ def _check(scene: BuiltScene, memory: int | None) -> None:
         )
     if memory is not None:
         return
-    # At most 10 channels of float64, 22 with layers, and the same again while files are written.
-    needed = film.width * film.height * (22 if film.layers else 10) * 2 * 8
+    # At most 10 channels of float64, 25 with layers, and the same again while files are written.
+    needed = film.width * film.height * (25 if film.layers else 10) * 2 * 8
     try:
         available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):  # not every system has these

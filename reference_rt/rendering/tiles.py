@@ -225,17 +225,18 @@ def first_hits_tile(
     shape: tuple[int, int],
     albedos: FloatArray,
     normals: FloatArray,
+    positions: FloatArray,
     begin: int,
     end: int,
     first: int,
     last: int,
 ) -> None:
-    """Albedo and shading normal at the first hits of the rays of `render_tile`: their sums over
-    samples in albedos (n, 3) and normals (n, 3)."""
+    """Albedo, shading normal and position at the first hits of the rays of `render_tile`: their
+    sums over samples in albedos, normals and positions (n, 3)."""
     for pixel in range(begin, end):
         y, x = pixel // shape[0], pixel % shape[0]
         i = pixel - begin
-        albedo, normal = row(albedos, i), row(normals, i)
+        albedo, normal, position = row(albedos, i), row(normals, i), row(positions, i)
         for sample in range(first, last):
             sampler = start_sample(sampler_setup, pixel, sample)
             seen = _film_ray(view, film_filter, sampler, shape, x, y)
@@ -246,8 +247,10 @@ def first_hits_tile(
                 own = colour_at(scene.materials.shown, point.material, at)
                 albedo = albedo + own * seen.weight
                 normal = normal + point.ns * seen.weight
+                position = position + point.p * seen.weight
         albedos[i, 0], albedos[i, 1], albedos[i, 2] = albedo
         normals[i, 0], normals[i, 1], normals[i, 2] = normal
+        positions[i, 0], positions[i, 1], positions[i, 2] = position
 
 
 @entry_kernel

@@ -93,6 +93,8 @@ class SceneModel(Description):
                     material_paths(name, self.materials)
                 except ValueError as error:
                     raise SceneError(str(error), ("materials", name)) from None
+        for i, light in enumerate(self.lights):
+            self._check_textures(light, "lights", i)
         if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
             raise SceneError("more than one environment; expected at most one", ("lights",))
         if isinstance(self.sampler, Grid) and not self.integrator.deterministic:
@@ -103,12 +105,15 @@ class SceneModel(Description):
             )
         return self
 
+    def _check_textures(self, part: Description, *path: str | int) -> None:
+        """Check that the textures that a material or a light names exist."""
+        for field, texture in texture_names(part).items():
+            if texture not in self.textures:
+                raise SceneError(no_such("texture", texture, self.textures), (*path, *field))
+
     def _check_parts(self, name: str, material: Material) -> None:
         """Check that the textures and materials that a material names exist and fit."""
-        for field, texture in texture_names(material).items():
-            if texture not in self.textures:
-                message = no_such("texture", texture, self.textures)
-                raise SceneError(message, ("materials", name, field))
+        self._check_textures(material, "materials", name)
         bases: tuple[str, ...] = ()
         if isinstance(material, Emissive):
             bases = ("base",)

@@ -10,6 +10,7 @@ from reference_rt.core.model import Colour, Description, Direction
 from reference_rt.core.vec3 import Vec3, luminance, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.light import LightSample
+from reference_rt.textures import NO_TEXTURES, Palette
 
 
 class Directional(Description):
@@ -22,7 +23,7 @@ class Directional(Description):
     irradiance: Colour
     """Irradiance on a plane perpendicular to the light: W m^-2, linear sRGB."""
 
-    def tabulate(self) -> "Directionals":
+    def tabulate(self, palette: Palette = NO_TEXTURES) -> "Directionals":
         away = np.array(self.direction) / math.hypot(*self.direction)
         return Directionals(-away[None], np.array([self.irradiance]))
 

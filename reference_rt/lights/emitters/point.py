@@ -10,6 +10,7 @@ from reference_rt.core.model import Colour, Description, Vector
 from reference_rt.core.vec3 import Vec3, luminance, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.light import LightSample, from_position
+from reference_rt.textures import NO_TEXTURES, Palette
 
 
 class Point(Description):
@@ -21,7 +22,7 @@ class Point(Description):
     intensity: Colour
     """Radiant intensity in every direction: W sr^-1, linear sRGB."""
 
-    def tabulate(self) -> "Points":
+    def tabulate(self, palette: Palette = NO_TEXTURES) -> "Points":
         return Points(np.array([self.position]), np.array([self.intensity]))
 
 
