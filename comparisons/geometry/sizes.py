@@ -139,6 +139,32 @@ class ShapeSizes:
             found[rows] = self._least[copy[rows]] * feature
         return found
 
+    def straightness_of(self, hits: Intersections) -> FloatArray:
+        """(n,): the length of the sum of the weighted vertex normals at each hit of a mesh, 1 where
+        they agree and 0 where they cancel; 1 elsewhere.  The unit normal turns by 1 / that length
+        as much as the sum does."""
+        found = np.ones(len(hits.t))
+        leaf, local = self.leaf_of(hits), self.local_points(hits)
+        for number in np.unique(leaf[leaf >= 0]).tolist():
+            of = self.leaves[number]
+            if getattr(of.table, "normals", None) is not None:
+                rows = np.flatnonzero(leaf == number)
+                found[rows] = _interpolated(of.table, of.row_of(hits.primitive[rows]), local[rows])
+        return found
+
+
+def _interpolated(table: Any, rows: IntArray, p: FloatArray) -> FloatArray:
+    """(n,): the length of the interpolated vertex normals at points p (n, 3) of triangles."""
+    a, b, c = np.moveaxis(table.vertices[rows].reshape(-1, 3, 3), 1, 0)
+    n = np.cross(b - a, c - a)
+    twice = np.sum(n * n, axis=1)
+    weights = [
+        np.sum(n * np.cross(v - u, p - u), axis=1) / twice for u, v in ((b, c), (c, a), (a, b))
+    ]
+    normals = np.moveaxis(table.normals[rows].reshape(-1, 3, 3), 1, 0)
+    mixed = sum(w[:, None] * m for w, m in zip(weights, normals, strict=True))
+    return np.asarray(np.linalg.norm(mixed, axis=1))
+
 
 def _name(copy: Copy) -> str:
     """The key that copies with the same leaves share: the group, or a shape's index and a colon,

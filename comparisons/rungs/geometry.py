@@ -196,7 +196,9 @@ def _traced(
     ours, theirs = query.intersect(tables, rays.o, rays.d), trace(counterpart, rays.o, rays.d)
     ratios = comparer.ratios(rays, ours, theirs)
     beyond = _beyond(counterpart, ours)
-    ratios[beyond] = 0.0
+    # Mitsuba's scalar variants take a ray in a plane through its own origin to hit it there; a ray
+    # of ours begins beyond t = 0.
+    ratios[beyond | ((theirs.shape >= 0) & (theirs.t == 0.0))] = 0.0
     sizes = comparer.sizes
     reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))
     sag = np.zeros(len(sizes.reach) + 1)

@@ -1,6 +1,6 @@
 """The rung of Whitted ray tracing: the radiance of pixel centres, without noise."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -95,7 +95,7 @@ def whitted(
     settled = _explained(
         some,
         ((ours[outliers], ours_along), (theirs[outliers], theirs_along)),
-        _radii(tables, sizes, some),
+        _moves(tables, sizes, some, counterpart),
         bound[outliers],
     )
     unexplained = outliers[~settled]
@@ -132,6 +132,25 @@ def _radii(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> tuple[FloatArr
     p = query.intersect(tables, rays.o, rays.d).p
     reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
     return sizes.frame.delta(rays.o, p, reach), sizes.frame.epsilon(p)
+
+
+BENT = 4.0
+"""A normal that is off by an angle turns a mirrored ray by twice that; two surfaces that stand in
+for others, one seen in the other, by twice as much."""
+
+
+def _moves(
+    tables: SceneTables, sizes: ShapeSizes, rays: Rays, counterpart: Counterpart
+) -> list[tuple[FloatArray, float]]:
+    """How far the arbiter moves and turns rays: by float32's bound, by Mitsuba's ray epsilon, and
+    by the errors of meshes that stand in for shapes."""
+    angle = ROUNDINGS * UNIT_ROUNDOFF
+    found = [(radius, angle) for radius in _radii(tables, sizes, rays)]
+    stand_ins = [s for some in counterpart.stand_ins().values() for s in some]
+    if stand_ins:
+        sag, turn = (max(getattr(s, name) for s in stand_ins) for name in ("sag", "turn"))
+        found.append((found[0][0] + sag, angle + BENT * turn))
+    return found
 
 
 SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
@@ -175,7 +194,7 @@ Radiance = Callable[[FloatArray, FloatArray], FloatArray]
 def _explained(
     rays: Rays,
     sides: tuple[tuple[FloatArray, Radiance], tuple[FloatArray, Radiance]],
-    radii: tuple[FloatArray, ...],
+    moves: Sequence[tuple[FloatArray, float]],
     bound: FloatArray,
 ) -> arbiter.BoolArray:
     """Which of the outliers (m,) have a neighbouring ray along which one renderer has the other's
@@ -185,14 +204,14 @@ def _explained(
     Where Mitsuba's own value changes that much within its rounding, it is not resolved.
     """
     settled = np.zeros(len(bound), bool)
-    for radius in radii:
+    for radius, angle in moves:
         for k in (0, 1):
             radiance, wanted = sides[k][1], sides[1 - k][0]
             rows = np.flatnonzero(~settled)[: MOST_OUTLIERS[k]]
             if len(rows) == 0:
                 return settled
             low, high = arbiter.values_around(
-                rays.o[rows], rays.d[rows], radius[rows], ROUNDINGS * UNIT_ROUNDOFF, radiance
+                rays.o[rows], rays.d[rows], radius[rows], angle, radiance
             )
             slack, wanted = bound[rows][:, None], wanted[rows]
             settled[rows] = ((wanted >= low - slack) & (wanted <= high + slack)).all(axis=1)

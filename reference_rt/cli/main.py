@@ -76,12 +76,15 @@ def render(
     more_spp: render_options.MoreSpp = None,
     preview: render_options.Preview = None,
     memory: render_options.Memory = None,
+    workers: render_options.NumberOfWorkers = None,
+    scheduler: render_options.Scheduler = None,
+    cluster: render_options.ClusterFile = None,
 ) -> None:
     """Render a scene to a file.
 
     Ctrl-C writes the picture so far, marked as partial in its header.
     """
-    from reference_rt.cli.render import Limited, Stored, render_to_file
+    from reference_rt.cli.render import Limited, Stored, Where, render_to_file
     from reference_rt.rendering.image import check_suffix
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
@@ -90,10 +93,11 @@ def render(
     loaded = Scene.load(scene, by_name(define))
     description = adjusted(loaded, spp, size, integrator, seed)
     check_writable(output)
+    where = Where(threads, workers, scheduler, cluster)
     limits = Limited(time_limit, target_error, memory)
     storage = Stored(checkpoint, no_checkpoint, resume, more_spp or 0)
     with without_blas():
-        text, code = render_to_file(description, output, threads, limits, storage, preview)
+        text, code = render_to_file(description, output, where, limits, storage, preview)
     say(text if code == 0 else f"error: {text}", err=True)
     if code:
         raise typer.Exit(code)

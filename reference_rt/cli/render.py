@@ -1,5 +1,6 @@
 """`reference-rt render`: a picture in a file, with limits, checkpoints and previews."""
 
+import functools
 import math
 import time
 from contextlib import suppress
@@ -10,9 +11,10 @@ from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_
 from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.rendering import image
 from reference_rt.rendering.loop import Limits
+from reference_rt.rendering.processes import Processes
 from reference_rt.rendering.render_folders import delete_old
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.session import Session, Storage
+from reference_rt.rendering.session import Session, Storage, Workers
 from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import check_writable
@@ -72,10 +74,34 @@ class Limited(NamedTuple):
         return None if self.memory is None else bytes_of(self.memory, "--memory")
 
 
+class Where(NamedTuple):
+    """The options of the command line about what computes a render."""
+
+    threads: int | None = None
+    workers: int | None = None
+    scheduler: str | None = None
+    cluster: Path | None = None
+
+    def maker(self) -> Workers | None:
+        """What makes the executor; None: threads of this process.  Raises UsageError."""
+        names = ("threads", "workers", "scheduler", "cluster")
+        given = [name for name, one in zip(names, self, strict=True) if one is not None]
+        if len(given) > 1:
+            listed = " and ".join(f"--{name}" for name in given)
+            raise UsageError(f"{listed} contradict each other; expected one of them")
+        if self.workers is not None:
+            return functools.partial(Processes, workers=self.workers)
+        if self.scheduler is None and self.cluster is None:
+            return None
+        from reference_rt.rendering.cluster import Cluster
+
+        return functools.partial(Cluster, scheduler=self.scheduler or "", file=self.cluster)
+
+
 def render_to_file(
     scene: Scene,
     output: Path,
-    threads: int | None,
+    where: Where,
     limited: Limited,
     stored: Stored,
     preview: Path | None,
@@ -90,11 +116,13 @@ def render_to_file(
         image.check_suffix(preview)
         check_writable(preview)
     memory, limits, storage = limited.bytes(), limited.limits(), stored.storage()
+    workers = where.maker()
     code = 0
     with ProgressLine() as progress:
         session = Session(
             scene,
-            threads=threads,
+            threads=where.threads,
+            workers=workers,
             compiling=progress.compiling,
             limits=limits,
             storage=storage,

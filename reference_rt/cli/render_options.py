@@ -37,3 +37,15 @@ Memory = Annotated[
     str | None,
     typer.Option(help="Memory that may be used, such as 2G; what does not fit is on disk."),
 ]
+NumberOfWorkers = Annotated[
+    int | None,
+    typer.Option("--workers", min=1, help="Processes of one thread each, in place of threads."),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(help="The workers of the Dask scheduler at this address: tcp://HOST:8786."),
+]
+ClusterFile = Annotated[
+    Path | None,
+    typer.Option("--cluster", help="Workers of a batch system: a .yaml file, see docs/scale.md."),
+]

@@ -241,7 +241,7 @@ class Loop:
             self._is_saving, self._next_save = False, now + _AGAIN
             return
         if seconds is None:
-            self._is_saving = False
+            self._is_saving, self.save_error = False, ""
             rest = self._save_seconds / _SHARE
             self._next_save = now + max(self._saving.every, rest)
         else:
@@ -254,6 +254,7 @@ class Loop:
         try:
             self._frame.begin_saving()
             self._frame.save(wait=True)
+            self.save_error = ""
         except ImageError as error:
             self._failed_to_save(error)
 

@@ -31,11 +31,12 @@ def statistics(before: FloatArray, after: FloatArray, samples: int, chunk: int) 
 
     before, after: the sums of colour (n, 3) of its pixels;  samples: how many it adds to each.
     """
-    added = np.square(after - before).sum(axis=1) / samples
-    values = (added, np.square(after).sum(axis=1), after.sum(axis=1))
-    starts = np.arange(0, len(after), chunk)
-    between, energy, total = (np.add.reduceat(one, starts) for one in values)
-    return np.stack([between, np.ones_like(between), energy, total], axis=1)
+    with np.errstate(all="ignore"):  # infinite radiance
+        added = np.square(after - before).sum(axis=1) / samples
+        values = (added, np.square(after).sum(axis=1), after.sum(axis=1))
+        starts = np.arange(0, len(after), chunk)
+        between, energy, total = (np.add.reduceat(one, starts) for one in values)
+        return np.stack([between, np.ones_like(between), energy, total], axis=1)
 
 
 def relative_error(found: FloatArray, done: IntArray, pixels: int) -> float | None:

@@ -29,6 +29,15 @@ class Done(NamedTuple):
     statistics: FloatArray
 
 
+def build_and_check(scene: BuiltScene, tables: SceneTables | None = None) -> SceneTables:
+    """The tables of a scene, unless they are given.  Raises SceneError; issues a SceneWarning for
+    each of `likely_mistakes`."""
+    tables = build_tables(scene) if tables is None else tables
+    for mistake in likely_mistakes(scene, tables):
+        scene.warn(mistake.message, *mistake.path)
+    return tables
+
+
 class Prepared:
     """A scene with its tables and kernels.  A context manager while units are computed.
 
@@ -43,17 +52,14 @@ class Prepared:
         compiling: Report | None = None,
         specialised: bool | None = None,
     ) -> None:
-        """Parameters as for `render.render`.  Raises SceneError; issues a SceneWarning for each of
-        `likely_mistakes`."""
+        """Parameters as for `render.render`; raises as `build_and_check` does."""
         film = scene.film
         self.scene, self.jobs = scene, jobs_of(scene)
         view = scene.camera.setup(film.width, film.height)
         clock = [time.perf_counter()]
         with compile_ahead(self.jobs, threads if specialised is not True else 1) as ahead:
-            self.tables = build_tables(scene) if tables is None else tables
+            self.tables = build_and_check(scene, tables)
             clock.append(time.perf_counter())
-            for mistake in likely_mistakes(scene, self.tables):
-                scene.warn(mistake.message, *mistake.path)
             filter_setup = film.filter.setup()
             self.running = Running(
                 self.jobs, self.tables, view, filter_setup, threads, compiling, specialised, ahead

@@ -1,5 +1,6 @@
 """`render`: from a scene, or a scene's file, to a picture."""
 
+import functools
 import math
 import os
 from pathlib import Path
@@ -8,6 +9,7 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering.loop import Limits
 from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.processes import Processes
 from reference_rt.rendering.session import Session, Storage
 from reference_rt.rendering.settings import with_settings
 from reference_rt.rendering.thread_pool import Progress
@@ -28,6 +30,7 @@ def render(
     time_limit: float | None = None,
     target_error: float | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
 ) -> Picture:
     """Render a scene, or a scene file.
 
@@ -40,9 +43,11 @@ def render(
 
     time_limit: seconds after which it ends, with the samples that there are by then;
     target_error: relative standard error (see `noise`) at which it ends;  checkpoint: a folder
-    where it is stored as it goes on: a render that was ended goes on there.
+    where it is stored as it goes on: a render that was ended goes on there.  workers: processes to
+    compute it, of one thread each, in place of threads of this one; they change no bit.
 
-    Raises SceneError, UsageError; issues a SceneWarning for each of `likely_mistakes`.
+    Raises SceneError, UsageError, WorkersError; issues a SceneWarning for each of
+    `likely_mistakes`.
     """
     say = progress or (lambda what, fraction: None)
     if not isinstance(scene, BuiltScene):
@@ -57,6 +62,7 @@ def render(
         compiling=compiling or (lambda done, total: say("compile", done / total)),
         specialised=specialised,
         limits=limits,
+        workers=None if workers is None else functools.partial(Processes, workers=workers),
         storage=None if checkpoint is None else Storage(Path(checkpoint)),
         at_once=limits == Limits() and checkpoint is None,
     ) as session:

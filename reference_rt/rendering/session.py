@@ -17,7 +17,8 @@ from reference_rt.rendering.executor import Executor, Threads
 from reference_rt.rendering.framebuffer import Framebuffer
 from reference_rt.rendering.loop import Limits, Loop, Saving
 from reference_rt.rendering.picture import Picture, Taken, header_of
-from reference_rt.rendering.prepared import Prepared
+from reference_rt.rendering.prepared import Prepared, build_and_check
+from reference_rt.rendering.remote import RemoteScene, remote_scene
 from reference_rt.rendering.settings import with_settings
 from reference_rt.rendering.streaming import Written, check_fits, write_in_parts, written
 from reference_rt.rendering.thread_pool import Progress
@@ -39,6 +40,10 @@ class Storage(NamedTuple):
     more: int = 0
 
 
+Workers = Callable[[RemoteScene], Executor]
+"""Makes an executor of other processes: `processes.Processes` or `cluster.Cluster`."""
+
+
 class Session:
     """A render that is begun, goes on, and may end early.  A context manager.
 
@@ -57,18 +62,27 @@ class Session:
         limits: Limits | None = None,
         storage: Storage | None = None,
         memory: int | None = None,
+        workers: Workers | None = None,
         at_once: bool = False,
     ) -> None:
         """threads, tables, compiling, specialised: see `render.render`;  limits: what ends it
         early;  memory: bytes that this process may take; None: as much as it needs, with all
-        pixels in memory;  at_once: see `units.plan`.  Raises SceneError, UsageError."""
+        pixels in memory;  workers: what computes it, other than this process;  at_once: see
+        `units.plan`.  Raises SceneError, UsageError, WorkersError."""
         _check(scene, memory)
         threads = threads or os.cpu_count() or 1
-        prepared = Prepared(scene, threads, tables, compiling, specialised)
+        prepared: Prepared | None = None
+        if workers is None:
+            prepared = Prepared(scene, threads, tables, compiling, specialised)
+            tables, self.seconds = prepared.tables, dict(prepared.seconds)
+        else:
+            began = time.perf_counter()
+            tables = build_and_check(scene, tables)
+            self.seconds = {"tables": time.perf_counter() - began, "compile": 0.0}
         pixels, widths = scene.film.width * scene.film.height, widths_of(scene)
         self.store = None
+        digest = functools.cache(functools.partial(render_digest, scene, tables))
         if storage is not None:
-            digest = functools.partial(render_digest, scene, prepared.tables)
             self.store = Checkpoint(storage.folder, digest, storage.resume)
         budget = check_fits(scene, widths, memory, self.store)
         self.frame = Framebuffer(widths, pixels, self.store, budget)
@@ -81,21 +95,25 @@ class Session:
                 f"--spp: the checkpoint has {stored} samples per pixel already; expected at least "
                 "as many"
             )
-        executor: Executor = Threads(prepared, threads, self.frame.chunk)
-        self._executor = executor
+        if prepared is not None:
+            self._executor: Executor = Threads(prepared, threads, self.frame.chunk)
+        else:
+            assert workers is not None
+            self._executor = workers(remote_scene(scene, digest(), self.frame.chunk))
         after = math.inf if storage is None else storage.after
         saving = Saving(after, needed=budget is not None)
-        self.loop = Loop(self.frame, executor, spp, limits or Limits(), saving, at_once)
-        self.seconds = dict(prepared.seconds)
+        self.loop = Loop(self.frame, self._executor, spp, limits or Limits(), saving, at_once)
 
     def __enter__(self) -> Self:
-        self._prepared.running.__enter__()
+        if self._prepared is not None:
+            self._prepared.running.__enter__()
         return self
 
     def __exit__(self, *error: Any) -> None:
         self._executor.close()
         self.frame.close()
-        self._prepared.running.__exit__(*error)
+        if self._prepared is not None:
+            self._prepared.running.__exit__(*error)
 
     def run(self, say: Progress, watch: Callable[[], None] = lambda: None) -> None:
         """Render; calls say("render", fraction) and `watch` meanwhile.  Raises what they raise."""

@@ -42,7 +42,8 @@ class Comparer:
 
         e = (delta + sag) / cos is how far the point may slide along the surface.  The bound of t is
         e; of uv and normals e over the smallest length on which they change; of shading normals
-        twice that, as they turn by up to two unit vectors on that length.  Where Mitsuba has
+        twice that, as they turn by up to two unit vectors on that length, and more where those of a
+        triangle's vertices nearly cancel.  Where Mitsuba has
         triangles in place of a flat shape, their heights are such lengths too.  Where a mesh stands
         in for a curved surface, its shading normal is used as the geometric one too.
         """
@@ -60,7 +61,8 @@ class Comparer:
             turn = e / np.minimum(self.sizes.feature_of(ours), theirs.height)
             error_t = np.abs(theirs.t - ours.t) * length / e
             error_n = np.linalg.norm(normal - ours.n, axis=1) / (turn + theirs.turn)
-            error_ns = np.linalg.norm(theirs.ns - ours.ns, axis=1) / (2.0 * turn + theirs.turn)
+            bent = 2.0 * turn / self.sizes.straightness_of(ours)
+            error_ns = np.linalg.norm(theirs.ns - ours.ns, axis=1) / (bent + theirs.turn)
             error_uv = (
                 np.linalg.norm(self._spot(theirs, ours) - self._spot(ours, ours), axis=1) / turn
             )

@@ -9,8 +9,9 @@ from comparisons.mitsuba.translate.shapes.stand_ins import Box, Patch
 from reference_rt.core.arrays import FloatArray, IntArray
 
 CURVED = (768, 384)
-STRAIGHT = (2048, 1)
-"""Cells of a patch that is curved along u and v, and of one that is straight along v."""
+STRAIGHT = (2048, 4)
+"""Cells of a patch that is curved along u and v, and of one that is straight along v: see
+`quadrics.SIDE` for why that has more than one."""
 
 ZERO = 1e-12
 """An eigenvalue below this fraction of the largest counts as 0."""

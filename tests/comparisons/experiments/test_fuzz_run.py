@@ -1,0 +1,202 @@
+"""A run: processes that crash, results that are resumed, distinct findings, outputs, exit codes."""
+
+import json
+import shlex
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from builders import HELPERS
+from junitparser import JUnitXml
+from typer.testing import CliRunner
+
+from comparisons.commands.fuzz import fuzz
+from comparisons.experiments.fuzz import run as running
+from comparisons.experiments.fuzz import stored, summary
+from comparisons.experiments.fuzz.check import Effort
+from comparisons.experiments.fuzz.finding import Checked
+from comparisons.experiments.fuzz.page import write_page
+from comparisons.experiments.fuzz.planted import Planted, source_faults
+from comparisons.experiments.fuzz.planted import summary as planted_summary
+from comparisons.experiments.fuzz.run import Plan, run
+from comparisons.experiments.selftest.sensitivity import patched_text
+from reference_rt.scene.model import SceneModel
+from reference_rt.util.errors import UsageError
+
+SCENES = Path(__file__).parents[3] / "scenes"
+
+
+@pytest.fixture
+def fake_workers(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(HELPERS))
+    monkeypatch.setattr(running, "WORKER", ("fuzz_workers",))
+
+
+def quiet(checked: Checked) -> None:
+    pass
+
+
+def by_number(found):
+    return dict(found.findings)
+
+
+@pytest.mark.slow
+def test_a_scene_that_hangs_is_a_finding(tmp_path, fake_workers):
+    found = run(Plan(tmp_path, first=3, count=1, limit=40.0, shrink=0.0), quiet)
+    assert by_number(found)[3].cause == "took longer than # s"
+
+
+def test_scenes_that_crash_or_raise_are_findings(tmp_path, fake_workers):
+    plan = Plan(tmp_path, count=7, jobs=2, shrink=0.0)
+    stored.add(tmp_path, Checked(number=3))  # it would hang
+    told = []
+    found = run(plan, told.append)
+    assert sorted(c.number for c in told) == [0, 1, 2, 4, 5, 6]
+    findings = by_number(found)
+    assert set(findings) == {1, 2, 4, 5}
+    assert "SIGSEGV" in findings[1].detail
+    assert "KeyError" in findings[2].cause
+    assert findings[4] == findings[5]
+    again = run(plan, told.append)
+    assert again.fresh == 0
+    assert by_number(again) == findings
+    more = run(replace(plan, count=8), told.append)
+    assert more.fresh == 1
+    with pytest.raises(UsageError, match="another seed or other settings"):
+        run(replace(plan, seed=3), quiet)
+
+
+@pytest.mark.slow  # each try is a new process
+def test_a_crash_is_reduced_in_new_processes(tmp_path, fake_workers, monkeypatch):
+    scene = {"shapes": [{"type": "torus", "major_radius": 0.8}, {"type": "box"}]}
+    monkeypatch.setattr(running, "generate", lambda *arguments: scene)
+    found = run(Plan(tmp_path, first=1, count=1, shrink=20.0), quiet)
+    (one,) = found.reduced
+    assert one.scene["shapes"] == [{"type": "torus"}]
+
+
+def test_findings_of_one_cause_are_one(tmp_path, fake_workers):
+    plan = Plan(tmp_path, first=4, count=3, jobs=1)
+    found = run(plan, quiet)
+    assert len(found.findings) == 2
+    ((one, count),) = summary.distinct(found)
+    assert (one.number, count, one.tried) == (4, 2, 7)
+    summary.write(plan, found, {"who": "a test"}, tmp_path / "junit.xml")
+    document = json.loads((tmp_path / "fuzz.json").read_text())
+    assert document["scenes"] == document["lit"] == document["valid"] == 3
+    (listed,) = document["findings"]
+    assert listed["scene"] == "shapes:\n  - {type: sphere}\n"
+    words = shlex.split(listed["again"])
+    assert SceneModel.load(words[words.index("--scene") + 1]).shapes
+    suite = next(iter(JUnitXml.fromfile(str(tmp_path / "junit.xml"))))
+    assert (suite.tests, suite.failures) == (2, 1)
+    write_page(tmp_path / "fuzz.html", plan, found, {"who": "<a test>"})
+    page = (tmp_path / "fuzz.html").read_text()
+    assert "geometry: ours wrong: t" in page
+    assert "&lt;a test&gt;" in page
+    assert "{type: sphere}" in page
+
+
+def test_it_stops_at_the_first_finding(tmp_path, fake_workers):
+    found = run(Plan(tmp_path, first=4, count=100, jobs=1, stop=True), quiet)
+    assert len(found.scenes) == 1
+    assert len(found.reduced) == 1
+
+
+def test_half_a_line_is_left_out(tmp_path):
+    stored.add(tmp_path, Checked(number=3))
+    with (tmp_path / stored.SCENES).open("a") as file:
+        file.write('{"number": 4, "lit"')
+    reader = stored.Reader(tmp_path)
+    assert set(reader.new()) == {3}
+    assert reader.new() == {}
+
+
+def test_the_command_refuses_what_it_does_not_know(tmp_path):
+    import typer
+
+    app = typer.Typer()
+    app.command()(fuzz)
+    for words, said in (
+        (["--rungs", "geometri"], "--rungs: expected some of"),
+        (["--time", "10"], "--time: expected a duration"),
+        (["--features", "glas"], "did you mean 'glass'"),
+        (["--planted", "nothing like it"], "no source fault matches"),
+    ):
+        result = CliRunner().invoke(app, [*words, "--out", str(tmp_path)])
+        assert result.exit_code == 2
+        assert said in " ".join(result.output.split())
+
+
+def test_every_source_fault_can_be_planted():
+    assert len(source_faults()) >= 15
+    for fault in source_faults():
+        assert patched_text(fault)
+    some = [Planted("a", 3, "direct", "", 1, 9), Planted("b", 0), Planted("c", 5, "run", "", 3, 11)]
+    assert planted_summary(some) == (
+        "2 of 3 faults found, after 4 scenes (median); reduced to 2 shapes and 10 lines (median)"
+    )
+
+
+RENDERER = """
+import sys
+import reference_rt as rt
+scene, output, seed, spp, wrong = sys.argv[1:]
+scene = rt.Scene.load(scene)
+picture = rt.render(scene, spp=int(spp), seed=int(seed) + 555, threads=1)
+if wrong == "yes":
+    picture.layers["colour"][:] *= 1.3
+picture.save(output)
+"""
+
+
+@pytest.mark.parametrize("wrong", ["no", "yes"])
+def test_another_renderer_is_compared_with_ours(tmp_path, wrong):
+    program = tmp_path / "renderer.py"
+    program.write_text(RENDERER)
+    scene = {
+        "camera": {"type": "perspective", "eye": [0, 1, 5], "target": [0, 0, 0], "fov": 40},
+        "film": {"width": 12, "height": 9},
+        "integrator": {"type": "path", "max_depth": 3},
+        "shapes": [{"type": "sphere"}, {"type": "box", "transform": [{"translate": [2, 0, 0]}]}],
+        "lights": [{"type": "constant", "radiance": 1.0}],
+    }
+    command = shlex.join([sys.executable, str(program)])
+    command += " {scene} {output} {seed} {spp} " + wrong
+    plan = Plan(
+        tmp_path / "out",
+        jobs=1,
+        command=command,
+        scenes=(scene,),
+        effort=Effort(spp=64, replicates=4),
+        shrink=0.0,
+    )
+    found = run(plan, quiet)
+    if wrong == "no":
+        assert found.findings == []
+        assert found.scenes[0].rungs == {"renderer": "agree"}
+    else:
+        ((_, finding),) = found.findings
+        assert finding.rung == "statistics"
+
+
+@pytest.mark.slow
+def test_a_run_of_two_minutes_finds_nothing(tmp_path):
+    found = run(Plan(tmp_path, seed=20260101, seconds=120.0, jobs=2, shrink=0.0), quiet)
+    assert found.findings == []
+    assert len(found.scenes) >= 10
+
+
+REGRESSIONS = sorted((SCENES / "regressions").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", REGRESSIONS, ids=lambda path: path.stem)
+def test_what_was_found_before_is_mended(path, monkeypatch):
+    from comparisons.commands.fuzz import _data
+    from comparisons.experiments.fuzz.check import check
+
+    data = _data(path, path.parent.parent)
+    for pixels in (48, 144):
+        found = check(data, 4, Effort(pixels=pixels, light_pixels=pixels // 2), path.parent)
+        assert found.findings == []

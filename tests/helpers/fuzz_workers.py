@@ -1,0 +1,57 @@
+"""A worker of the fuzzer in tests: by the scene's number it finds nothing, finds something, raises,
+hangs, or ends the process."""
+
+import os
+import signal
+import sys
+import time
+
+from comparisons.experiments.fuzz import stored
+from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced
+from comparisons.experiments.fuzz.request import Request
+from comparisons.runs.processes.protocol import carry_out, private_stdout
+
+FOUND = Finding(rung="geometry", cause="ours wrong: t", detail="1 of 9 rays")
+
+
+def scene(request: Request) -> None:
+    shapes = [] if request.scene is None else request.scene.get("shapes", [])
+    torus = any(shape["type"] == "torus" for shape in shapes)
+    if request.number == 1 and (request.scene is None or torus):
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if request.number == 2:
+        raise KeyError("no such thing")
+    if request.number == 3:
+        time.sleep(600.0)
+    findings = [FOUND] if request.number in (4, 5) else []
+    types = ["shape:sphere", "material:mirror"]
+    stored.add(
+        request.out, Checked(number=request.number, findings=findings, types=types, lit=True)
+    )
+
+
+def reduced(request: Request) -> None:
+    assert request.finding is not None
+    stored.add_reduced(
+        request.out,
+        Reduced(
+            number=request.number,
+            finding=request.finding,
+            scene={"shapes": [{"type": "sphere"}]},
+            types=["shape:sphere"],
+            tried=7,
+            pixels=48,
+        ),
+    )
+
+
+def main() -> None:
+    answers = private_stdout()
+    for line in sys.stdin:
+        request = Request.model_validate_json(line)
+        task = scene if request.task == "scene" else reduced
+        carry_out(lambda task=task, request=request: task(request), answers)  # type: ignore[misc]
+
+
+if __name__ == "__main__":
+    main()
