@@ -20,6 +20,9 @@ from reference_rt.util.files import replacing
 
 PAGE = DOCS / "scene_reference.md"
 
+LONGEST_LINE = 76
+"""Characters of a line of YAML, which fit beside the contents of the page."""
+
 SCHEMA = json_schema()
 TYPES: dict[str, Any] = SCHEMA["$defs"]
 
@@ -126,6 +129,27 @@ def page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def wrapped(text: str) -> list[str]:
+    """Lines of YAML; those that are too long are continued below their first brace, where line
+    breaks mean nothing."""
+    found = []
+    for whole in text.rstrip().splitlines():
+        line, indent = whole, " " * (whole.find("{") + 1)
+        while len(line) > LONGEST_LINE and ", " in line[len(indent) : LONGEST_LINE]:
+            # The last place that is inside of the fewest brackets.
+            places = [k for k in range(len(indent), LONGEST_LINE) if line.startswith(", ", k)]
+            end = min(places, key=lambda k: (_depth(line[:k]), -k)) + 1
+            found.append(line[:end])
+            line = indent + line[end:].lstrip()
+        found.append(line)
+    return found
+
+
+def _depth(text: str) -> int:
+    """How many brackets are open at the end of a text."""
+    return sum(text.count(sign) for sign in "[{") - sum(text.count(sign) for sign in "]}")
+
+
 def shared_fields(names: list[str]) -> list[str]:
     """The fields, besides `type`, that all types have with the same schema."""
     if len(names) < 2:
@@ -145,7 +169,7 @@ def entry(name: str, shared: Iterable[str]) -> list[str]:
     lines = ["", f"### {word(name)}", "", *"\n\n".join(paragraphs).splitlines(), ""]
     if name in EXAMPLES:
         lines += [f"![{word(name)}](pictures/reference/{name}.jpg){{ width={WIDTH} }}", ""]
-        lines += ["```yaml", EXAMPLES[name]["yaml"].rstrip(), "```", ""]
+        lines += ["```yaml", *wrapped(EXAMPLES[name]["yaml"]), "```", ""]
     rows = table(part, shared)
     return [*lines, *rows] if rows else lines[:-1]
 

@@ -3,39 +3,27 @@
     from reference_rt import Scene, render
 
     scene = Scene.load("scenes/cornell_box.yaml")
-    picture = render(scene, spp=64)            # a Picture: save(path), show(), layers
-    hits = scene.intersect(origins, directions)  # arrays of hits, shadows, radiance, BSDFs ...
+    picture = render(scene, spp=64)  # a Picture: save(path), show(), layers
+    hits = scene.intersect(origins, directions)  # for arrays of rays
 
 `help(reference_rt.Sphere)` and its like describe a type; `Sphere.model_fields["radius"]` a field.
 
-A scene
-    Scene, Film, json_schema; SceneError, SceneWarning
-Cameras
-    Perspective, Orthographic, Pinhole, ThinLens
-Shapes
-    Sphere, Plane, Disk, Rectangle, Triangle, Polygon, Box, Cylinder, Cone, Torus, Quadric, Mesh;
-    Instance; and solids: Union, Intersection, Difference
-Materials
-    Diffuse, Mirror, Dielectric, ThinDielectric, Conductor, RoughConductor, RoughDielectric,
-    Plastic, RoughPlastic, Principled, PrincipledThin, Phong, Emissive; made of others: Mask,
-    TwoSided, Blend, Bump, NormalMap
-Textures
-    Checker, Bitmap, VertexColours
-Lights
-    Point, Spot, Projector, Directional, Constant, EnvironmentMap, Ambient
-Integrators
-    Path, Direct, Whitted, RayCast
-Samplers
-    Sobol, Independent, Grid
-Filters
-    BoxFilter, TentFilter, GaussianFilter, MitchellFilter, CatmullRomFilter, LanczosFilter
-Pictures
-    render, Picture, read_image, ImageError
-Queries and tables
-    query: array queries, the methods of Scene; transform: affine maps; textbook: the textbook's
-    intersection methods; build_tables, SceneTables
-Other errors
-    ReferenceRtError, ReferenceUnavailableError, UsageError
+- A scene: Scene, Film, json_schema; SceneError, SceneWarning
+- Cameras: Perspective, Orthographic, Pinhole, ThinLens
+- Shapes: Sphere, Plane, Disk, Rectangle, Triangle, Polygon, Box, Cylinder, Cone, Torus, Quadric,
+  Mesh, Instance; solids: Union, Intersection, Difference
+- Materials: Diffuse, Mirror, Dielectric, ThinDielectric, Conductor, RoughConductor,
+  RoughDielectric, Plastic, RoughPlastic, Principled, PrincipledThin, Phong, Emissive; made of
+  others: Mask, TwoSided, Blend, Bump, NormalMap
+- Textures: Checker, Bitmap, VertexColours
+- Lights: Point, Spot, Projector, Directional, Constant, EnvironmentMap, Ambient
+- Integrators: Path, Direct, Whitted, RayCast
+- Samplers: Sobol, Independent, Grid
+- Filters: BoxFilter, TentFilter, GaussianFilter, MitchellFilter, CatmullRomFilter, LanczosFilter
+- Pictures: render, Picture, read_image, ImageError
+- Queries: query (array queries, the methods of Scene), transform (affine maps), textbook (the
+  textbook's intersection methods), build_tables, SceneTables
+- Other errors: ReferenceRtError, ReferenceUnavailableError, UsageError
 
 Other modules are internal.  A name is imported when it is first used: importing the package takes
 milliseconds, and the renderer, with Numba, a second.  Folders from the lowest to the highest, each
@@ -214,7 +202,8 @@ _EXPORTS = {
     "reference_rt.lights": "Ambient Constant Directional EnvironmentMap Point Projector Spot",
     "reference_rt.materials": (
         "Blend Bump Conductor Dielectric Diffuse Emissive Mask Mirror NormalMap Phong Plastic "
-        "Principled RoughConductor RoughDielectric RoughPlastic ThinDielectric TwoSided"
+        "Principled PrincipledThin RoughConductor RoughDielectric RoughPlastic ThinDielectric "
+        "TwoSided"
     ),
     "reference_rt.rendering.image": "read_image",
     "reference_rt.rendering.picture": "Picture",

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from reference_rt import build_tables
 
@@ -48,6 +49,15 @@ def test_every_link_leads_to_a_heading():
 def test_every_type_has_an_example_and_a_picture():
     assert set(EXAMPLES) == make_reference.LISTED, "reference_examples.yaml"
     assert {path.stem for path in PICTURES.iterdir()} == set(EXAMPLES), AGAIN
+
+
+def test_what_the_page_shows_is_the_example():
+    shown = re.findall(r"^```yaml\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+    assert len(shown) == len(EXAMPLES)
+    for text in shown:
+        assert all(len(line) <= make_reference.LONGEST_LINE for line in text.splitlines())
+    read = [yaml.safe_load(text) for text in shown]
+    assert all(yaml.safe_load(example["yaml"]) in read for example in EXAMPLES.values())
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
