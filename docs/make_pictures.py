@@ -4,14 +4,13 @@ The gallery has every scene of scenes/; the first picture of README.md is a comp
 NAME: only the pictures of these scenes, or `compare`; the page is always written.
 """
 
-import io
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from PIL import Image
+from docs_pages import DOCS, save
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
@@ -24,7 +23,6 @@ from reference_rt.util.files import read_text, replacing
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-DOCS = Path(__file__).parent
 SCENES = DOCS.parent / "scenes"
 PICTURES = DOCS / "pictures"
 
@@ -78,13 +76,6 @@ def picture_of(path: Path) -> None:
     values = np.round(255.0 * np.clip(display(picture), 0.0, 1.0)).astype(np.uint8)
     save(PICTURES / "scenes" / f"{path.stem}.jpg", values)
     print(path.stem, flush=True)
-
-
-def save(path: Path, values: np.ndarray) -> None:
-    data = io.BytesIO()
-    Image.fromarray(values).save(data, "JPEG", quality=88, optimize=True)
-    with replacing(path) as temporary:
-        temporary.write_bytes(data.getvalue())
 
 
 def page(paths: Iterable[Path]) -> Iterable[str]:

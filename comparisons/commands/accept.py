@@ -8,7 +8,6 @@ import typer
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Baselines, Layer, NoiseFree
 from reference_rt.cli.main import adjusted, guarded, say
-from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, UsageError
 
 if TYPE_CHECKING:
@@ -64,6 +63,8 @@ def accept(
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import check_sizes, is_noise_free
         from comparisons.runs.provenance import ours
+    from reference_rt.rendering.scene import Scene
+
     if listed or unused is not None:
         if candidates or name:
             raise UsageError("--list and --unused write no baseline; expected no candidates")

@@ -31,14 +31,12 @@ def bench(
 ) -> None:
     """Measure the renderer's speed against Mitsuba's; takes about half an hour."""
     with compare_extra():
-        from rich.console import Console
-
         from comparisons.experiments.bench import table
         from comparisons.experiments.bench.display import Display
         from comparisons.experiments.bench.groups import chosen
         from comparisons.experiments.bench.run import run
         from comparisons.experiments.bench.setting import Setting
-        from comparisons.report import marker_block
+        from comparisons.report import marker_block, terminal
 
     groups = chosen(only or ())
     if mesh is not None and not mesh.is_file():
@@ -48,7 +46,8 @@ def bench(
     with Display() as display:
         setting = Setting(scenes=scenes, mesh=mesh, quick=quick, say=display.say)
         outcome = run(groups, setting, out, display, fresh)
-    Console().print(table.terminal(outcome.rows))
+    console = terminal.console()
+    console.print(table.terminal(outcome.rows, console.width))
     if markdown is not None:
         written = table.markdown(outcome.rows, outcome.machine, outcome.not_measured)
         marker_block.rewrite(markdown, "bench", written)

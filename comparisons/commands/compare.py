@@ -74,7 +74,7 @@ def compare(
     work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
 
     def tell(run: Run) -> None:
-        summarise(run.cases, run.walls, run.not_run, run.missing)
+        summarise(run.cases, run.walls, run.not_run, run.missing, every=True)
         typer.echo(f"{options.results}, {options.report}", err=True)
 
     options = Options(out, threads=threads, fresh=fresh, steps=True, tell=tell)

@@ -2,16 +2,17 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Fresh, out_folder
 from reference_rt.cli.main import guarded, say
-from reference_rt.rendering.scene import Scene
-from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import SceneError, UsageError, printable
+
+if TYPE_CHECKING:
+    from reference_rt.rendering.scene import Scene
 
 
 @guarded
@@ -69,6 +70,7 @@ def converge(
         from comparisons.results.case import INTERRUPTED
         from comparisons.runs.provenance import provenance
         from comparisons.suites.work import folder_name, read
+    from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable
 
     settings = Settings(
@@ -91,7 +93,7 @@ def converge(
     facts = provenance()
     found = [Curves(name, problem=INTERRUPTED) for name in names]
 
-    def curves_of(scene: Scene | SceneError, name: str) -> Curves:
+    def curves_of(scene: "Scene | SceneError", name: str) -> Curves:
         if isinstance(scene, SceneError):
             raise scene
         key = run_key(prepared(scene, settings), replicates)

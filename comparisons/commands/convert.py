@@ -15,20 +15,33 @@ def convert(
     scene: Annotated[
         Path, typer.Argument(metavar="SCENE", help="A Mitsuba .xml scene, or one of ours.")
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="A .yaml or .json file.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="A .yaml, .json or (for Mitsuba) .xml file.")
+    ],
     define: Defaults = None,
 ) -> None:
-    """Write a scene in our format, with its meshes and images in a folder beside it.
+    """Write a scene in our format, or as a Mitsuba scene (.xml), with its meshes and images in a
+    folder beside it.
 
-    The result renders without Mitsuba.
+    Scenes in our format render without Mitsuba.
     """
     with compare_extra("converting"):
-        from comparisons.mitsuba.reading.write import check_name, folder_of, write_scene
+        from comparisons.mitsuba.reading.write import check_name, write_scene
+        from comparisons.mitsuba.writing import write_xml
+        from comparisons.mitsuba.writing.files import folder_of
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 
-    check_name(output)
+    is_mitsuba = output.suffix.lower() == ".xml"
+    if not is_mitsuba:
+        check_name(output)
     check_writable(output)
-    count = write_scene(Scene.load(scene, by_name(define)), output)
+    found = Scene.load(scene, by_name(define))
+    if is_mitsuba:
+        count, notes = write_xml(found, output)
+        for note in notes:
+            say(f"note: {note}", err=True)
+    else:
+        count = write_scene(found, output)
     files = f", and {count} files in {folder_of(output)}" if count else ""
     say(f"{output}{files}", err=True)

@@ -11,8 +11,6 @@ import typer
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Baselines, Fixed, GitHub, JUnit, Layer, NoiseFree, Threads
 from reference_rt.cli.main import adjusted, guarded, say
-from reference_rt.rendering.scene import Scene
-from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import ReferenceRtError, UsageError, printable
 
 
@@ -126,6 +124,8 @@ def gate(
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
         from comparisons.results.headline import headline
+    from reference_rt.rendering.scene import Scene
+    from reference_rt.util.console import ProgressLine
 
     if (command is None) == (not candidates):
         raise UsageError("expected either candidates or --command")

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import out_folder
@@ -34,6 +33,7 @@ def methods(
         from comparisons.runs.provenance import ours
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
+    from comparisons.report import terminal
     from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable
 
@@ -51,9 +51,9 @@ def methods(
         progress("page", 0.0)
         write_page(page, rows, effort, seed, about)
         progress("page", 1.0)
-    console = Console(highlight=False)
+    console = terminal.console()
     for name in names:
-        for table in tables([row for row in rows if row.family == name]):
+        for table in tables([row for row in rows if row.family == name], console.width):
             console.print(table)
             console.print()
     say(f"{out / 'results.json'}, results.csv, methods.html", err=True)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from comparisons.commands.options import Scenes, out_folder
 from reference_rt.cli.main import guarded
@@ -33,6 +32,8 @@ def selftest(
     if mutants:
         _mutate(mutants, seed, scenes, out)
         return
+    from rich.console import Console
+
     from comparisons.experiments.selftest import FAULTS
     from comparisons.experiments.selftest.run import SUITES, run
     from reference_rt.util.files import check_writable
@@ -61,7 +62,10 @@ def selftest(
 
 def _mutate(count: int, seed: int, scenes: Path, out: Path) -> None:
     """Mutation testing; writes what is known after each mutant."""
+    from rich.console import Console
+
     from comparisons.experiments.selftest.mutation import FILES, mutation, summary, write
+    from comparisons.experiments.selftest.run import SUITES, budgets_of
     from reference_rt.util.files import check_writable
 
     check_writable(*(out / name for name in FILES))
@@ -70,10 +74,12 @@ def _mutate(count: int, seed: int, scenes: Path, out: Path) -> None:
     def say(line: str) -> None:
         console.print(line, markup=False, soft_wrap=True)
 
+    by_suite = budgets_of(scenes)
+    budgets = {suite: by_suite[suite] for suite in reversed(SUITES)}  # the small one first
     fates = []
-    for fate in mutation(count, seed, scenes, say):
+    for fate in mutation(count, seed, scenes, budgets, say):
         fates.append(fate)
-        where = f" ({fate.rung}, {fate.scene})" if fate.rung else ""
+        where = f" ({fate.by}, {fate.rung}, {fate.scene})" if fate.rung else ""
         say(f"{fate.file}:{fate.line} {fate.what}: {fate.outcome}{where}")
         write(fates, seed, out)
-    say(summary(fates).partition("\n")[0])
+    say(summary(fates))

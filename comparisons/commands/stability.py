@@ -43,8 +43,6 @@ def stability(
     Exact arithmetic and closed forms decide which answer is right.
     """
     with compare_extra():
-        from rich.console import Console
-
         from comparisons.experiments.stability.harness import table
         from comparisons.experiments.stability.harness.core import Effort
         from comparisons.experiments.stability.harness.display import Display
@@ -58,7 +56,7 @@ def stability(
             run,
             shoot,
         )
-        from comparisons.report import marker_block
+        from comparisons.report import marker_block, terminal
         from comparisons.runs.provenance import ours, provenance
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
@@ -92,10 +90,8 @@ def stability(
         display.line("pictures and page")
         pictures = shoot(choice, found, out, processes)
         write_page(page, found, pictures, effort, seed, facts)
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 180  # a log has no edge, and words stay whole
-    console.print(table.terminal(found))
+    console = terminal.console()
+    console.print(table.terminal(found, console.width))
     if markdown is not None:
         marker_block.rewrite(markdown, "stability", table.markdown(found, effort, seed, facts))
     holds = True

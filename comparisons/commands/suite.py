@@ -9,7 +9,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Fresh, GitHub, JUnit, Scenes
-from comparisons.results.case import COMPARED
+from comparisons.results.rungs import COMPARED
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import UsageError
 

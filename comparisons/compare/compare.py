@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from comparisons import rungs as ladder
@@ -13,10 +13,12 @@ from comparisons.compare.control import control
 from comparisons.compare.judge import Evidence, Rendered, judge, picture_rungs
 from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
+from comparisons.geometry.flatten import copies_of
+from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.reading.reference import file_of, own_scene
-from comparisons.mitsuba.translate import UntranslatableError, load
+from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, load
 from comparisons.mitsuba.translate.vertices import with_float32_vertices
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
@@ -87,6 +89,28 @@ def gather(
     only: tuple[str, ...] = (),
 ) -> Evidence:
     """Run the deterministic rungs and render the pictures of both sides."""
+    if not _has_many_instances(subject.reference or subject.scene):
+        return _gather(subject, budget, say, threads, only)
+    with scalar():
+        found = _gather(subject, budget, say, threads, only)
+    note = (
+        "Mitsuba renders in its scalar variant: its fast ones compile code for each of the many "
+        "instances"
+    )
+    return replace(found, lights=None, notes=(note, *found.notes))
+
+
+def _has_many_instances(scene: Scene) -> bool:
+    """Whether light on instances is to be compared in Mitsuba's scalar variant."""
+    if isinstance(scene.integrator, RayCast):
+        return False  # which needs their hits alone: see `InstancedGroup`
+    return sum(copy.instance >= 0 for copy in copies_of(scene)) > MOST_INSTANCES
+
+
+def _gather(
+    subject: Subject, budget: Budget, say: Say, threads: int | None, only: tuple[str, ...]
+) -> Evidence:
+    """The same in the current variant of Mitsuba."""
     clock = time.perf_counter()
     scene, moved = with_float32_vertices(budgeted(subject.scene, budget))
     tables = build_tables(scene)

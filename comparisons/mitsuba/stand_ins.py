@@ -44,7 +44,8 @@ class Plugin(NamedTuple):
     whose quadratic Mitsuba solves in float32 (see `hits.CURVED`), else 0;  faceted: whether its
     triangles are so small that float32 turns their geometric normals, so that shading normals are
     compared;  heights: the smallest height of each triangle of a flat shape that we do not
-    triangulate.
+    triangulate;  uv_of_mesh: whether the vertices of a mesh that stands in have our uv, which
+    between them are interpolated.
     """
 
     value: Any
@@ -57,6 +58,12 @@ class Plugin(NamedTuple):
     curved: float = 0.0
     faceted: bool = False
     heights: FloatArray | None = None
+    uv_of_mesh: bool = False
+
+    @property
+    def has_our_uv(self) -> bool:
+        """Whether textures see our uv."""
+        return self.uv is same_uv or self.uv_of_mesh
 
 
 class ShapeGroup(NamedTuple):

@@ -41,9 +41,25 @@ function luminance(r, g, b) {
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }
 
+/** Reinhard et al. 2002, eq. 4, with the value 4 as white. */
+function reinhard(x) {
+  return (x * (1 + x / 16)) / (1 + x);
+}
+
+/** A curve of film, fitted to ACES (Narkowicz 2015, CC0). */
+function filmic(x) {
+  return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
+}
+
+function toned(curve, r, g, b) {
+  return [r, g, b].map((value) => srgb(curve(Math.max(value, 0))));
+}
+
 /** Radiance r, g, b in units of white to a colour. */
 const RADIANCE = {
   srgb: (r, g, b) => [srgb(r), srgb(g), srgb(b)],
+  reinhard: (r, g, b) => toned(reinhard, r, g, b),
+  filmic: (r, g, b) => toned(filmic, r, g, b),
   linear: (r, g, b) => viridis(luminance(r, g, b)),
   log: (r, g, b) => viridis(1 + Math.log2(Math.max(luminance(r, g, b), 0)) / LOG_STOPS),
 };

@@ -16,6 +16,8 @@ from typing import Any
 from markupsafe import Markup
 
 from comparisons.report.fitting import Fitted, fitted
+from comparisons.report.flip_map import flip_map
+from comparisons.report.histograms import histograms
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, thumbnails
 from comparisons.report.values import shown
@@ -52,6 +54,12 @@ SIGNS: dict[Status, str] = {
 }
 """Shown beside a verdict, so that it is recognised without its colour."""
 
+MOST_OPEN = 4
+"""Cases of a page whose passing cases are shown whole, too; of longer pages they are collapsed."""
+
+MOST_MAPPED = 12
+"""Cases of a page whose passing cases have maps of FLIP, too, each of which takes 0.1 s."""
+
 MODES = (
     ("side", "side by side"),
     ("flip", "flip"),
@@ -61,7 +69,10 @@ MODES = (
 )
 """Ways of viewing the pictures, in the order of their keys 1 to 5."""
 
-SCRIPTS = ("unpack.js", "colour.js", "crop.js", "view.js", "viewer.js")
+SCRIPTS = (
+    *("unpack.js", "colour.js", "crop.js", "view.js"),
+    *("overview.js", "link.js", "viewer.js"),
+)
 """Concatenated in this order to one module."""
 
 
@@ -83,7 +94,8 @@ def write_report(
     In the numbers of a rung, a name that ends in `_bias` means a fraction and is shown in percent.
     """
     ranked = sorted(cases, key=lambda case: ORDER.index(case.verdict))
-    views = [_view(case) for case in ranked]
+    mapped = len(cases) <= MOST_MAPPED
+    views = [_view(case, mapped or case.verdict in FAILED) for case in ranked]
     filled = template("page.html.jinja").render
     script = Markup(_script())  # trusted: part of this package
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
@@ -96,6 +108,8 @@ def write_report(
             view["factor"] = data.factor if data else 1
         return filled(
             counts=[(status, counts[status]) for status in ORDER if counts[status]],
+            sides=_common_sides(cases),
+            expanded=len(cases) <= MOST_OPEN,
             signs=SIGNS,
             modes=MODES,
             provenance=provenance,
@@ -122,20 +136,46 @@ def _script() -> str:
     return "\n" + "\n".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
 
 
-def _view(case: Case) -> dict[str, Any]:
-    """A case as the template takes it."""
+def _view(case: Case, mapped: bool) -> dict[str, Any]:
+    """A case as the template takes it.  mapped: whether it has a map of FLIP."""
     stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
     pictures = _thumbnails(case)
+    seconds = {_side(who, case): times for who, times in case.seconds.items()}
     return {
         "case": case,
+        "failed": case.verdict in FAILED,
+        "rank": ORDER.index(case.verdict),
         "headline": headline(case),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
-        "figures": _figures(case, pictures) if pictures else [],
+        "figures": _figures(case, pictures, mapped) if pictures else [],
+        "histograms": _histograms(case, pictures) if pictures else [],
         "metrics": _metric_rows(case.metrics) if case.metrics else [],
         "stages": list(stages),
-        "totals": {who: sum(times.values()) for who, times in case.seconds.items()},
+        "seconds": seconds,
+        "totals": {who: sum(times.values()) for who, times in seconds.items()},
     }
+
+
+def _side(who: str, case: Case) -> str:
+    """What the page calls a side, also where times name it by its role."""
+    return dict(zip(("candidate", "reference"), case.sides, strict=True)).get(who, who)
+
+
+def _common_sides(cases: Sequence[Case]) -> tuple[str, str]:
+    """What the sides are called, if all cases call them the same; else their roles."""
+    found = {case.sides for case in cases}
+    return found.pop() if len(found) == 1 else ("candidate", "reference")
+
+
+def _histograms(case: Case, pictures: Thumbnails) -> list[dict[str, Any]]:
+    """Title, drawing and text of each histogram."""
+    assert case.images is not None
+    # Trusted: `svg` escapes its texts.
+    return [
+        {"title": one.title, "svg": Markup(one.svg), "text": one.text}
+        for one in histograms(case.images, pictures.span)
+    ]
 
 
 def _thumbnails(case: Case) -> Thumbnails | None:
@@ -146,7 +186,7 @@ def _thumbnails(case: Case) -> Thumbnails | None:
     return thumbnails(images)
 
 
-def _figures(case: Case, pictures: Thumbnails) -> list[tuple[str, Thumbnail, str]]:
+def _figures(case: Case, pictures: Thumbnails, mapped: bool) -> list[tuple[str, Thumbnail, str]]:
     """Kind, thumbnail and title of each picture; the z-map, drawn by the script, has none."""
     candidate, reference = case.sides
     figures = [
@@ -157,6 +197,8 @@ def _figures(case: Case, pictures: Thumbnails) -> list[tuple[str, Thumbnail, str
         figures.append(("difference", pictures.difference, f"{candidate} − {reference}"))
         if case.images and case.images.error is not None:
             figures.append(("z", pictures.candidate, "difference / standard error"))
+    if mapped and case.images and (found := flip_map(case.images)) is not None:
+        figures.append(("flip", found[0], f"FLIP, 0 to {shown(found[1])}"))
     return figures
 
 

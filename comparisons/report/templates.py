@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
-from comparisons.report.values import label, shown
+from comparisons.report.values import label, rows_of, shown
 from reference_rt.util.errors import printable
 from reference_rt.util.files import replacing
 
@@ -24,7 +24,7 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"shown": shown, "label": label, **filters}
+    environment.filters |= {"shown": shown, "label": label, "rows": rows_of, **filters}
     return environment.get_template(name)
 
 

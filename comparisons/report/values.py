@@ -32,6 +32,25 @@ def shown(value: Any, name: str = "") -> str:
             return str(value)
 
 
+def rows_of(numbers: Mapping[str, Any], level: int = 0) -> list[tuple[int, str, list[str]]]:
+    """Numbers as rows of a table: (indentation, label, cells); cells are one text, or three for
+    red, green and blue; none for the heading of the rows below it, which are indented."""
+    rows = []
+    for name, value in numbers.items():
+        if isinstance(value, Mapping) and set(value) == set("RGB"):
+            rows.append((level, label(name), [shown(value[key], name) for key in "RGB"]))
+        elif isinstance(value, Mapping) and value and level < _DEEPEST:
+            rows.append((level, label(name), []))
+            rows += rows_of(value, level + 1)
+        else:
+            rows.append((level, label(name), [shown(value, name)]))
+    return rows
+
+
+_DEEPEST = 2
+"""Levels of indentation; numbers that are nested deeper are one text."""
+
+
 def percent(fraction: float) -> str:
     """A fraction as a percentage with three digits."""
     return f"{_real(100.0 * fraction, '.3g')} %" if math.isfinite(fraction) else _real(fraction)

@@ -1,5 +1,7 @@
 // The pictures of one case: drawing, zoom, the pixel cursor and its readings.
 
+/** Pixels of the screen within which a drag of a zoomed picture moves the slider. */
+const NEAR_SLIDER = 24;
 const SIGNIFICANT = { candidate: 3, reference: 3, difference: 2, z: 2 };
 
 /** A value with as many digits as were kept of it. */
@@ -27,23 +29,28 @@ class CaseView {
     /** What of the pictures shows: from (left, top), as fractions, 1 / zoom of each side. */
     this.area = { zoom: 1, left: 0, top: 0 };
     this.cursor = null;
+    this.sliding = false;
+    /** Called with the section when the cursor has moved. */
+    this.onlook = () => {};
     this.region = null;
     this.pictures = null;
     this.row.tabIndex = 0;
     this.listen();
   }
 
-  /** A canvas in place of the thumbnail. */
+  /** A canvas in place of the thumbnail; the map of FLIP is a picture already. */
   figure(element) {
     const kind = element.dataset.kind;
-    const stored = this.data[kind === "z" || kind === "difference" ? "reference" : kind];
+    const stored = this.data[kind === "candidate" ? kind : "reference"];
     const frame = element.querySelector(".frame");
     const canvas = document.createElement("canvas");
     const image = frame.querySelector("img");
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", image.alt || element.querySelector("b").textContent);
+    if (kind === "flip") image.classList.add("map");
     return {
-      element, kind, frame, image, canvas, width: stored.width, height: stored.height,
+      element, kind, frame, image, canvas: kind === "flip" ? image : canvas,
+      width: stored.width, height: stored.height,
       low: element.querySelector(".low"), high: element.querySelector(".high"),
     };
   }
@@ -52,7 +59,7 @@ class CaseView {
   async show(look) {
     this.pictures ??= await unpack(this.data);
     const own = { ...look, white: this.white, span: this.span };
-    for (const figure of this.figures) {
+    for (const figure of this.figures.filter(({ kind }) => kind !== "flip")) {
       paintKind(figure.canvas, figure.kind, this.pictures[figure.kind], own);
       figure.image.replaceWith(figure.canvas);
       const end = reading(this.span / 2 ** look.stops, 4);
@@ -74,6 +81,8 @@ class CaseView {
     const white = this.white / 2 ** stops;
     if (colours === "linear") return `Luminance: yellow is ${reading(white, 4)}, purple is 0`;
     const dark = reading(white / 2 ** LOG_STOPS, 4);
+    if (colours === "reinhard") return `Reinhard's curve: radiance ${reading(4 * white, 4)} is white`;
+    if (colours === "filmic") return `A curve of film: radiance ${reading(white, 4)} is bright`;
     if (colours === "log") return `Luminance: yellow is ${reading(white, 4)}, purple is ${dark}`;
     return `White is radiance ${reading(white, 4)} in both pictures`;
   }
@@ -91,8 +100,27 @@ class CaseView {
     for (const button of this.box.querySelectorAll("[data-zoom]")) {
       button.addEventListener("click", () => this.zoom(button.dataset.zoom));
     }
-    const wipe = this.box.querySelector(".wipe input");
-    wipe.addEventListener("input", () => this.box.style.setProperty("--wipe", `${wipe.value}%`));
+    this.wipe = this.box.querySelector(".wipe input");
+    this.wipe.addEventListener("input", () => this.setWipe(Number(this.wipe.value)));
+  }
+
+  /** Percent of the frame from its left edge to the slider. */
+  setWipe(percent) {
+    this.wipe.value = clamp(percent, 0, 100);
+    this.box.style.setProperty("--wipe", `${this.wipe.value}%`);
+  }
+
+  /** Whether a drag moves the slider: near it, or anywhere if there is nothing to pan. */
+  moves(figure, event) {
+    if (document.body.dataset.mode !== "slider") return false;
+    const box = figure.frame.getBoundingClientRect();
+    const far = Math.abs(event.clientX - box.left - (box.width * Number(this.wipe.value)) / 100);
+    return this.area.zoom === 1 || far < NEAR_SLIDER;
+  }
+
+  slide(figure, event) {
+    const box = figure.frame.getBoundingClientRect();
+    this.setWipe((100 * (event.clientX - box.left)) / box.width);
   }
 
   /** Where in the whole picture an event happened, as fractions of its sides. */
@@ -106,7 +134,9 @@ class CaseView {
   }
 
   moved(figure, event) {
-    if (event.buttons === 1 && this.area.zoom > 1) {
+    if (event.buttons === 1 && this.sliding) {
+      this.slide(figure, event);
+    } else if (event.buttons === 1 && this.area.zoom > 1) {
       const box = figure.frame.getBoundingClientRect();
       const { zoom, left, top } = this.area;
       const [x, y] = [event.movementX / box.width, event.movementY / box.height];
@@ -117,7 +147,9 @@ class CaseView {
   }
 
   pressed(figure, event) {
-    if (this.area.zoom > 1) figure.frame.setPointerCapture(event.pointerId);
+    this.sliding = this.moves(figure, event);
+    if (this.area.zoom > 1 || this.sliding) figure.frame.setPointerCapture(event.pointerId);
+    if (this.sliding) this.slide(figure, event);
     this.pointTo(figure, event);
   }
 
@@ -139,6 +171,7 @@ class CaseView {
     this.cursor = { x: clamp(x, 0, width - 1), y: clamp(y, 0, height - 1) };
     this.place();
     this.read();
+    this.onlook(this.section);
   }
 
   /** Move the cursor by pixels, and what shows along with it. */

@@ -1,7 +1,7 @@
 // The page: which cases show, how their pictures show, and the keyboard.
 
-const COLOURS = ["srgb", "linear", "log"];
-const WHICH = ["candidate", "reference", "difference", "z"];
+const COLOURS = ["srgb", "reinhard", "filmic", "linear", "log"];
+const WHICH = ["candidate", "reference", "difference", "z", "flip"];
 const BLINK_MILLISECONDS = 700;
 
 const find = (selector) => document.querySelector(selector);
@@ -9,6 +9,22 @@ const sections = [...document.querySelectorAll(".case")];
 const rows = [...document.querySelectorAll("nav tbody tr")];
 const views = new Map();
 const look = { stops: 0, colours: "srgb" };
+const overview = new Overview(sections, rows);
+/** The case that was looked at last. */
+let looked = null;
+
+/** The pictures of a case, made when they are first needed; undefined if there are none. */
+function viewOf(section) {
+  if (!views.has(section) && section?.querySelector("script.data")) {
+    const view = new CaseView(section);
+    view.onlook = (at) => {
+      looked = at;
+      address.changed();
+    };
+    views.set(section, view);
+  }
+  return views.get(section);
+}
 
 // Cases: search, verdicts, next and previous
 
@@ -30,6 +46,7 @@ function filter() {
     count += shown;
   });
   find("#shown").textContent = `${count} of ${sections.length}`;
+  address.changed();
   find("#none").hidden = count > 0 || sections.length === 0;
 }
 
@@ -38,34 +55,48 @@ function current() {
   const focused = document.activeElement.closest(".case:not([hidden])");
   if (focused) return focused;
   const above = (section) => section.getBoundingClientRect().top < window.innerHeight / 3;
-  return sections.filter((section) => !section.hidden).findLast(above);
+  return overview.ordered.filter((section) => !section.hidden).findLast(above);
 }
 
 function step(by) {
-  const shown = sections.filter((section) => !section.hidden);
+  const shown = overview.ordered.filter((section) => !section.hidden);
   const next = shown[shown.indexOf(current()) + by];
-  if (!next) return;
-  next.scrollIntoView();
-  (views.get(next)?.row ?? next).focus({ preventScroll: true });
+  if (next) goTo(next);
+}
+
+function goTo(section) {
+  section.scrollIntoView();
+  const row = section.querySelector(".body").open && viewOf(section)?.row;
+  (row || section).focus({ preventScroll: true });
+  looked = section;
+  address.changed();
+}
+
+function toggle(section) {
+  const body = section?.querySelector(".body");
+  if (body) body.open = !body.open;
 }
 
 // Pictures: views, exposure, colours
 
+/** The cases in the window or not far from it. */
+const near = new Set();
+
 const drawn = new IntersectionObserver(
   (entries) => {
     for (const { target, isIntersecting } of entries) {
-      const view = views.get(target);
-      view.near = isIntersecting;
+      near[isIntersecting ? "add" : "delete"](target);
       if (isIntersecting) draw(target);
-      else view.forget();
+      else views.get(target)?.forget();
     }
   },
   { rootMargin: "400px" },
 );
 
 async function draw(section) {
+  if (!section.querySelector(".body").open) return;
   try {
-    await views.get(section).show(look);
+    await viewOf(section).show(look);
   } catch (error) {
     // The thumbnails remain.
     const hint = section.querySelector(".exposed");
@@ -77,7 +108,8 @@ function redraw() {
   find("#stops").value = look.stops;
   find("#stops-text").textContent = look.stops > 0 ? `+${look.stops}` : `${look.stops}`.replace("-", "−");
   find("#colours").value = look.colours;
-  for (const [section, view] of views) if (view.near) draw(section);
+  near.forEach(draw);
+  address.changed();
 }
 
 function expose(stops) {
@@ -104,15 +136,17 @@ function setMode(mode) {
   // Pictures change their size: keep what is looked at where it is.
   if (section) window.scrollBy(0, section.getBoundingClientRect().top - before);
   resized();
+  address.changed();
 }
 
 function resized() {
-  for (const view of views.values()) if (view.near) view.place();
+  for (const section of near) views.get(section)?.place();
 }
 
 function setWhich(which) {
   document.body.dataset.which = which;
   find("#which").value = which;
+  address.changed();
 }
 
 /** The other picture of the pair; of a single view, the next one. */
@@ -125,6 +159,54 @@ function flip() {
 function flipKey() {
   if (!["flip", "single"].includes(document.body.dataset.mode)) setMode("flip");
   flip();
+}
+
+// The address
+
+function state() {
+  const { mode, which } = document.body.dataset;
+  const boxes = [...document.querySelectorAll("[name=verdict]")];
+  const checked = boxes.filter((box) => box.checked).map((box) => box.value);
+  const { x, y } = views.get(looked)?.cursor ?? {};
+  const { key, down } = overview.sorted;
+  return {
+    case: looked?.dataset.name ?? "",
+    view: mode,
+    of: mode === "side" || mode === "slider" || mode === "blink" ? "candidate" : which,
+    x: x ?? "",
+    y: y ?? "",
+    stops: String(look.stops),
+    colours: look.colours,
+    search: find("#search").value,
+    only: checked.length === boxes.length ? "" : checked.join(" "),
+    sort: key,
+    order: down ? "down" : "up",
+  };
+}
+
+const address = new Address(state);
+
+/** Show what an address says. */
+async function follow(fragment) {
+  const wanted = readFragment(fragment);
+  if (!wanted) return;
+  if (wanted.search !== undefined) find("#search").value = wanted.search;
+  if (wanted.only !== undefined) {
+    const only = wanted.only.split(" ");
+    for (const box of document.querySelectorAll("[name=verdict]")) box.checked = only.includes(box.value);
+  }
+  filter();
+  if (wanted.sort) overview.sort(wanted.sort, wanted.order === "down");
+  if (modes.includes(wanted.view)) setMode(wanted.view);
+  if (WHICH.includes(wanted.of)) setWhich(wanted.of);
+  if (COLOURS.includes(wanted.colours)) look.colours = wanted.colours;
+  expose(Number(wanted.stops) || 0);
+  const section = sections.find(({ dataset }) => dataset.name === wanted.case);
+  if (!section) return;
+  section.querySelector(".body").open = true;
+  goTo(section);
+  const [x, y] = [Number(wanted.x), Number(wanted.y)];
+  if (wanted.x !== undefined && Number.isInteger(x) && Number.isInteger(y)) viewOf(section)?.setCursor(x, y);
 }
 
 // Commands to copy
@@ -157,9 +239,10 @@ const KEYS = {
   "=": () => expose(look.stops + 1),
   "-": () => expose(look.stops - 1),
   0: () => expose(0),
-  i: () => views.get(current())?.zoom("in"),
-  o: () => views.get(current())?.zoom("out"),
-  w: () => views.get(current())?.zoom("whole"),
+  e: () => toggle(current()),
+  i: () => viewOf(current())?.zoom("in"),
+  o: () => viewOf(current())?.zoom("out"),
+  w: () => viewOf(current())?.zoom("whole"),
   "/": () => find("#search").focus(),
   "?": () => find("#help").showModal(),
   ...Object.fromEntries(modes.map((mode, k) => [k + 1, () => setMode(mode)])),
@@ -185,11 +268,29 @@ function pressed(event) {
 }
 
 document.documentElement.classList.add("scripted");
-for (const section of sections) {
-  if (!section.querySelector("script.data")) continue;
-  views.set(section, new CaseView(section));
-  drawn.observe(section);
-}
+sections.forEach((section, k) => {
+  if (section.querySelector("script.data")) {
+    drawn.observe(section);
+    section.querySelector(".body").addEventListener("toggle", () => near.has(section) && draw(section));
+  }
+  const fragment = `#${writeFragment({ case: section.dataset.name })}`;
+  section.querySelector(".permalink").setAttribute("href", fragment);
+  const entry = rows[k].querySelector("a");
+  entry.setAttribute("href", fragment);
+  entry.addEventListener("click", (event) => {
+    event.preventDefault();
+    section.querySelector(".body").open = true;
+    goTo(section);
+  });
+});
+overview.onsort = () => address.changed();
+find("#expand").addEventListener("click", ({ target }) => {
+  const all = target.getAttribute("aria-pressed") !== "true";
+  target.setAttribute("aria-pressed", String(all));
+  target.textContent = all ? "collapse all" : "expand all";
+  overview.expand(all);
+});
+window.addEventListener("hashchange", () => follow(location.hash));
 document.addEventListener("keydown", pressed);
 window.addEventListener("resize", resized);
 find(".toolbar").addEventListener("submit", (event) => event.preventDefault());
@@ -209,3 +310,4 @@ for (const button of document.querySelectorAll(".copy")) {
 setMode(find("[name=mode]:checked").value);
 expose(Number(find("#stops").value));
 filter();
+follow(location.hash);

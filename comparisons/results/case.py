@@ -6,6 +6,9 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from comparisons.results.rungs import COMPARED as COMPARED
+from comparisons.results.rungs import RUNGS as RUNGS
+
 FloatArray = npt.NDArray[np.float64]
 
 Status = Literal[
@@ -18,17 +21,6 @@ Status = Literal[
     "not-applicable",  # the rung does not apply to this scene
     "invalid",  # non-finite pixels, wrong size: the pictures cannot be compared
 ]
-
-RUNGS = (
-    *("scene", "run", "input", "film", "geometry"),
-    *("direct", "whitted", "layers", "statistics", "images"),
-)
-"""The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
-if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`
-checks the pictures themselves."""
-
-COMPARED = RUNGS[3:]
-"""The rungs that compare the two renderers: those a suite can be limited to."""
 
 
 @dataclass(frozen=True)

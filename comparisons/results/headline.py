@@ -14,6 +14,16 @@ def headline(case: Case) -> str:
     return _SENTENCES[case.verdict](case)
 
 
+def first_difference(case: Case) -> str:
+    """The first rung that differs, and what it found; of a case without one, why it is as it is."""
+    rung = _first(case, "differ")
+    if rung is not None:
+        return f"{rung.name}: {_what(rung, case)}"
+    if case.verdict in ("agree", "unchanged"):
+        return ""
+    return headline(case)
+
+
 def _differ(case: Case) -> str:
     rung = _first(case, "differ")
     what = "the pictures differ" if rung is None else _what(rung, case)

@@ -14,7 +14,7 @@ from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext
 from comparisons.rungs.rays.light_error import bounds, slopes_of, stand_ins
 from comparisons.rungs.rays.mitsuba_light import is_dark, mitsuba_direct
-from comparisons.rungs.rays.rays import mixed_rays
+from comparisons.rungs.rays.rays import described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.materials import any_smooth
@@ -38,14 +38,16 @@ FEWEST = 20
 class Outcome(NamedTuple):
     """The comparison at one point of one light.
 
-    rays: how many were compared;  unexplained: indices of those that differ;  explained: how many
-    the arbiter explains;  max_error, max_ratio: the largest error, and error over bound, of the
-    rest;  ratio, cosine (m,): of rays that differ and are lit on both sides, our value over
-    Mitsuba's, and the cosine at the surface.
+    rays: how many were compared;  unexplained: indices of those that differ;  ours, theirs (m, 3):
+    their values in W/sr/m²;  explained: how many the arbiter explains;  max_error, max_ratio: the
+    largest error, and error over bound, of the rest;  ratio, cosine (m,): of rays that differ and
+    are lit on both sides, our value over Mitsuba's, and the cosine at the surface.
     """
 
     rays: int
     unexplained: IntArray
+    ours: FloatArray
+    theirs: FloatArray
     explained: int
     max_error: float
     max_ratio: float
@@ -104,8 +106,8 @@ def direct(
             k = int(outcome.unexplained[0])
             reason = (
                 f"{unexplained} of {total} values differ by more than float32 explains; the first: "
-                f"light {light}, point u = {u}, the ray from {rays.o[k].tolist()} along "
-                f"{rays.d[k].tolist()}"
+                f"light {light}, point u = {u}, {described(scene.film, pixels, rays, k)}: "
+                f"ours {outcome.ours[0]}, Mitsuba's {outcome.theirs[0]} W/sr/m²"
             )
             return RungResult("direct", "differ", reason, numbers)
     shadows = (
@@ -149,7 +151,8 @@ def _compare(
     target = _targets(ours)
     known = np.flatnonzero((hits.shape >= 0) & np.isfinite(target).all(axis=1))
     if len(known) == 0:
-        return Outcome(0, known, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
+        none = np.zeros((0, 3))
+        return Outcome(0, known, none, none, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
     rays, hits, target = rays.rows(known), rows_of(hits, known), target[known]
     value = ours.contribution[known]
     theirs, their_cosine = mitsuba_direct(context, light, rays, target)
@@ -180,6 +183,8 @@ def _compare(
     return Outcome(
         rays=len(known),
         unexplained=known[left],
+        ours=value[left],
+        theirs=theirs[left],
         explained=int(np.count_nonzero(settled)),
         max_error=float(error[right].max(initial=0.0)),
         max_ratio=float(ratio.max(initial=0.0)),

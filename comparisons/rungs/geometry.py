@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,8 +19,9 @@ from comparisons.rungs.rays.camera import compare_camera
 from comparisons.rungs.rays.coincidence import coincident, in_one_place
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
 from comparisons.rungs.rays.judgement import FEW, MOST_JUDGED, Judgement, judged
-from comparisons.rungs.rays.rays import Rays, joined, mixed_rays
+from comparisons.rungs.rays.rays import Rays, described, joined, mixed_rays
 from comparisons.rungs.rays.resolution import resolution
+from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
@@ -74,6 +76,7 @@ def geometry(
     explained = apart
     shadows = any_hits(tables, counterpart, sizes, rays, traced.ours, seed)
     right = traced.ratios[(traced.ratios <= 1.0).all(axis=1)]
+    say = partial(_describe, traced, scene.film, pixels)
     numbers: dict[str, Any] = {
         "rays": len(rays.o),
         "hits": int(np.count_nonzero(traced.ours.shape >= 0)),
@@ -96,7 +99,7 @@ def geometry(
             kind: int(np.count_nonzero(traced.ratios[mismatches, k] > 1.0))
             for k, kind in enumerate(KINDS)
         },
-        "mitsuba_wrong": [_describe(traced, k) for k in verdict.mitsuba[:LISTED].tolist()],
+        "mitsuba_wrong": [say(k) for k in verdict.mitsuba[:LISTED].tolist()],
         "stand_ins": {
             f"shape_{shape}": [s._asdict() for s in found]
             for shape, found in counterpart.stand_ins().items()
@@ -111,7 +114,7 @@ def geometry(
         numbers["resolution"] = resolution(scene, tables, counterpart, seed)._asdict()
     if camera.problem:
         return RungResult("geometry", "differ", camera.problem, numbers)
-    status, reason = _outcome(traced, verdict, is_aimed, numbers)
+    status, reason = _outcome(traced, verdict, is_aimed, numbers, say)
     if shadows.wrong and status != "differ":
         status = "differ"
         reason = f"{shadows.wrong} of {shadows.rays} shadow rays are wrong; {shadows.first}"
@@ -123,10 +126,17 @@ LISTED = 20
 
 
 def _outcome(
-    traced: TracedRays, verdict: Judgement, is_aimed: BoolArray, numbers: dict[str, Any]
+    traced: TracedRays,
+    verdict: Judgement,
+    is_aimed: BoolArray,
+    numbers: dict[str, Any],
+    say: Callable[[int], str],
 ) -> tuple[Status, str]:
-    """The status and the reason.  Few hits that Mitsuba alone gets wrong are its precision; many
-    mean that its scene is another one."""
+    """The status and the reason;  say: describes a ray.
+
+    Few hits that Mitsuba alone gets wrong are its precision; many mean that its scene is another
+    one.
+    """
     total, mitsuba = len(is_aimed), verdict.mitsuba
     count = int(np.count_nonzero(~is_aimed))
     unaimed = int(np.count_nonzero(~is_aimed[mitsuba]))
@@ -136,9 +146,9 @@ def _outcome(
         if len(verdict.ours):
             text += f", {len(verdict.ours)} by our fault (exact arithmetic decides)"
         first = int((verdict.ours if len(verdict.ours) else ours)[0])
-        return "differ", f"{text}; the first: {_describe(traced, first)}"
+        return "differ", f"{text}; the first: {say(first)}"
     if arbiter.too_many(unaimed, count, FEW):
-        where = _describe(traced, int(mitsuba[0]))
+        where = say(int(mitsuba[0]))
         return "differ", (
             f"{numbers['mismatches']} of {total} rays differ; by exact arithmetic our hits are "
             f"right, so Mitsuba's scene is a different one; the first: {where}"
@@ -265,13 +275,11 @@ def _same_hit(
     return like_theirs
 
 
-def _describe(traced: TracedRays, k: int) -> str:
-    rays = traced.rays
+def _describe(traced: TracedRays, film: Film, most: int, k: int) -> str:
     kind = KINDS[int(np.argmax(traced.ratios[k]))]
     sides = [
         f"{who}: shape {hits.shape[k]}, part {hits.part[k]}, primitive {hits.primitive[k]}, "
         f"instance {hits.instance[k]}, t = {hits.t[k]:.9g}, n = {hits.n[k]}"
         for who, hits in (("ours", traced.ours), ("Mitsuba's", traced.theirs))
     ]
-    ray = f"the ray from {rays.o[k].tolist()} along {rays.d[k].tolist()}"
-    return f"{kind} of {ray}: {'; '.join(sides)}"
+    return f"{kind} of {described(film, most, traced.rays, k)}: {'; '.join(sides)}"

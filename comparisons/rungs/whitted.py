@@ -16,7 +16,7 @@ from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import ambient_of
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.rays import Rays, pixel_rays
+from comparisons.rungs.rays.rays import Rays, described, pixel_rays
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
@@ -113,8 +113,8 @@ def whitted(
         k = int(unexplained[np.argmax(np.nan_to_num(error[unexplained], nan=np.inf))])
         reason = (
             f"{len(unexplained)} of {len(rays.o)} pixels differ by more than float32 explains; the "
-            f"largest error, of the ray from {rays.o[k].tolist()} along {rays.d[k].tolist()}: "
-            f"ours {ours[k]}, Mitsuba's {theirs[k]}"
+            f"largest error, of {described(scene.film, pixels, rays, k)}: "
+            f"ours {ours[k]}, Mitsuba's {theirs[k]} W/sr/m²"
         )
         return RungResult("whitted", "differ", reason, numbers)
     edges = (

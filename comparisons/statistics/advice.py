@@ -5,6 +5,7 @@ candidate's can: the reference may be a baseline of few replicates. If these alo
 candidate could show agreement, and the advice is about the reference.
 """
 
+import bisect
 import math
 
 import numpy as np
@@ -101,13 +102,16 @@ def factor_needed(
         limit * image.scale - margin, np.maximum(limit * image.scale - size, size - margin)
     )
     reach_of = quantiles(-math.expm1(math.log1p(-level * IMAGE_LEVEL) / image.difference.size))[1]
-    for factor in np.geomspace(1.0, MOST, 400):
+
+    def suffices(factor: float) -> bool:
         value = np.sqrt((known**2 - fixed**2) / factor + fixed**2)
         dof = [error.dof * (factor if replicates else 1.0) for error in image.errors]
         reach = [reach_of[np.clip(d, 1.0, MOST_DOF).astype(np.int64)] * value for d in dof]
-        if (np.max(reach, axis=0) <= goal).all():
-            return float(factor)
-    return math.inf
+        return bool((np.max(reach, axis=0) <= goal).all())
+
+    factors = np.geomspace(1.0, MOST, 400).tolist()
+    least = bisect.bisect_left(factors, True, key=suffices)  # the reach falls with the factor
+    return float(factors[least]) if least < len(factors) else math.inf
 
 
 def _known(test: BiasTest) -> FloatArray:

@@ -67,7 +67,7 @@ def pixel_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTe
     """
     of_test = level * PIXEL_LEVEL
     noise_a, noise_b = a.of_pixels(), b.of_pixels()
-    own, near = welch_errors(noise_a, noise_b, a, b, by_count=True)
+    own, near = welch_errors(noise_a, noise_b, a, b, single_pixels=True)
     mean = float(b.mean.mean())
     scale = np.maximum(np.abs(b.mean), DARK * abs(mean))
     spread = np.sqrt(np.maximum(a.variance, b.variance))

@@ -167,7 +167,8 @@ def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray
 def _verdict(
     found: Findings, a: FloatArray, b: FloatArray, limit: float, alone: BiasTest | None
 ) -> RungResult:
-    status, finding = _decide(found, limit, alone)
+    advice, factor = wanted(found.image, limit, alone, found.level, _least(found, limit))
+    status, finding = _decide(found, limit, advice)
     image = found.image
     reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
     reason = (
@@ -190,7 +191,7 @@ def _verdict(
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
-        "samples_factor": finite(wanted(image, limit, alone, found.level, _least(found, limit))[1]),
+        "samples_factor": finite(factor),
         "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
@@ -200,8 +201,8 @@ def _verdict(
     return RungResult("statistics", status, reason, numbers)
 
 
-def _decide(found: Findings, limit: float, alone: BiasTest | None = None) -> tuple[Status, str]:
-    """alone: as in `advice.wanted`."""
+def _decide(found: Findings, limit: float, advice: str) -> tuple[Status, str]:
+    """The status and what was found;  advice: how many more samples are needed, in words."""
     image, spread = found.image, found.uniformity
     if image.differs.any():
         text = f"the image mean differs: {beyond(image, image.worst)}"
@@ -235,8 +236,7 @@ def _decide(found: Findings, limit: float, alone: BiasTest | None = None) -> tup
     if not met:
         overlooked += "; as much light may have been missed by chance, since few samples meet it"
     return "inconclusive", (
-        f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; "
-        f"{wanted(image, limit, alone, found.level, _least(found, limit))[0]}"
+        f"too noisy: {widest}, {within} ±{percent(limit)}{overlooked}; {advice}"
     )
 
 

@@ -111,31 +111,46 @@ class BiasTest:
         return float(cushion * factor.max())
 
 
+UNEQUAL = 4.0
+"""Where one side's pictures have this many times the variance of the other's, they have fewer
+samples, and their noise is of another law: the mean of more samples is less skewed. Two estimators
+of the same samples seldom differ as much."""
+
+
 def welch_errors(
-    noise_a: Noise, noise_b: Noise, a: Side, b: Side, by_count: bool = False
+    noise_a: Noise, noise_b: Noise, a: Side, b: Side, single_pixels: bool = False
 ) -> tuple[Error, Error]:
     """The standard errors of a difference of means, between replicates and from pixels.
 
     The side with fewer replicates counts as at least as noisy as the other, for it has seen fewer
-    rare paths, unless its mean is the more exact one (even then with `by_count`, for single pixels,
-    which either side may have met alone); against a known mean the ratio of the noises is that of
-    the median pixel. Degrees of freedom are Welch and Satterthwaite's, with the ratio of
-    the variances from pixels, which is well known. The ratio of few replicates' own variances is
-    not: at the level of one test among many it gave up to 95 times the promised false alarms
-    (measured).
+    rare paths, unless its mean is the more exact one. A single pixel may have met such paths on one
+    side alone, so that there the side with the less exact mean counts as at least as noisy, if the
+    pictures of the sides have unequal samples. The noise of unequal samples, and that of a known
+    mean, is scaled by the ratio of the median pixel.
+
+    Degrees of freedom are Welch and Satterthwaite's, with the ratio of the variances from pixels,
+    which is well known. The ratio of few replicates' own variances is not: at the level of one test
+    among many it gave up to 95 times the promised false alarms (measured).
     """
     own_a, own_b, pixels_a, pixels_b = noise_a.own, noise_b.own, noise_a.pixels, noise_b.pixels
-    if b.pictures is None or a.count < b.count:
-        factor = 1.0 if b.pictures is not None else typical_ratio(a, b)
+    dof_a, dof_b = noise_a.own_dof, noise_b.own_dof
+    ratio_of_one = noise_ratio(a, b)
+    less_exact_a = a.count < ratio_of_one * b.count
+    factor, raises_a, raises_b = 1.0, a.count < b.count, b.count < a.count
+    if b.pictures is None:
+        factor, raises_a, raises_b = ratio_of_one, True, False
+    elif single_pixels and are_unequal(ratio_of_one):
+        factor, raises_a, raises_b = ratio_of_one, less_exact_a, not less_exact_a
+        dof_a = dof_b = np.minimum(dof_a, dof_b)  # of either side's replicates
+    elif not single_pixels:
+        raises_b = raises_b and not less_exact_a
+    if raises_a:
         own_a, pixels_a = np.maximum(own_a, factor * own_b), np.maximum(pixels_a, factor * pixels_b)
-    elif b.count < a.count and (by_count or not is_more_exact(b, a)):
-        own_b, pixels_b = np.maximum(own_b, own_a), np.maximum(pixels_b, pixels_a)
+    elif raises_b:
+        own_b, pixels_b = np.maximum(own_b, own_a / factor), np.maximum(pixels_b, pixels_a / factor)
     shares = pixels_a / a.count, pixels_b / b.count
     return (
-        Error(
-            np.sqrt(own_a / a.count + own_b / b.count),
-            satterthwaite(*shares, noise_a.own_dof, noise_b.own_dof),
-        ),
+        Error(np.sqrt(own_a / a.count + own_b / b.count), satterthwaite(*shares, dof_a, dof_b)),
         Error(
             np.sqrt(shares[0] + shares[1]),
             satterthwaite(*shares, noise_a.pixels_dof, noise_b.pixels_dof),
@@ -143,26 +158,25 @@ def welch_errors(
     )
 
 
-def is_more_exact(few: Side, many: Side) -> bool:
-    """Whether the mean of few pictures has less noise than that of many, in the median pixel: they
-    have the more samples, as a reference has whose pictures are rendered for long."""
-    noisy = (few.variance > 0.0) & (many.variance > 0.0)
-    if not noisy.any():
-        return False
-    # Both variances are of some replicates; their medians are low by chi-square's.
-    low = [float(stats.chi2.median(side.count - 1)) / (side.count - 1) for side in (few, many)]
-    ratio_of_one = float(np.median(few.variance[noisy] / many.variance[noisy])) * low[1] / low[0]
-    return ratio_of_one * many.count < few.count
-
-
-def typical_ratio(a: Side, b: Side) -> float:
-    """How many times as noisy as a known mean one picture of `a` is, in the median pixel."""
+def noise_ratio(a: Side, b: Side) -> float:
+    """How many times as noisy (variance) one picture of `a` is as one of `b`, in the median pixel;
+    a known mean counts as one picture.  0 if no pixel has noise on both sides."""
     noisy = (a.variance > 0.0) & (b.variance > 0.0)
     if not noisy.any():
         return 0.0
-    dof = a.count - 1
-    unbiased = dof / float(stats.chi2.median(dof))  # the median of few replicates' variances is low
-    return unbiased * float(np.median(a.variance[noisy] / b.variance[noisy]))
+    # The variances are of some replicates; their medians are low by chi-square's.
+    low_a, low_b = (
+        1.0
+        if side.pictures is None
+        else float(stats.chi2.median(side.count - 1)) / (side.count - 1)
+        for side in (a, b)
+    )
+    return float(np.median(a.variance[noisy] / b.variance[noisy])) * low_b / low_a
+
+
+def are_unequal(noise: float) -> bool:
+    """Whether pictures whose `noise_ratio` this is have unequal numbers of samples."""
+    return noise > UNEQUAL or 0.0 < noise < 1.0 / UNEQUAL
 
 
 def satterthwaite(

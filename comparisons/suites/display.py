@@ -4,14 +4,13 @@ line per case."""
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from rich.console import Console
 from rich.progress import MofNCompleteColumn, TimeElapsedColumn
-from rich.table import Table
 from rich.text import Text
 
+from comparisons.report import terminal
 from comparisons.report.ci.ranking import ranked
 from comparisons.results.case import WARNING, Case, how_many
-from comparisons.results.headline import headline
+from comparisons.results.headline import first_difference, headline
 from comparisons.results.verdict import PASSING
 from comparisons.suites.worker import Request
 from reference_rt.util.console import Bar
@@ -25,6 +24,8 @@ _STYLES = {
     "differ": "bold red",
     "invalid": "bold red",
 }
+
+_COLUMNS = ("case", "verdict", "likeliest cause", "first difference", "seconds")
 
 _SLOWEST = 3
 
@@ -70,24 +71,31 @@ def summarise(
     walls: Mapping[str, float],
     not_run: Mapping[str, str],
     missing: Sequence[str] = (),
+    every: bool = False,
 ) -> None:
-    """Print counts of the verdicts, failed cases with the first rung that broke, the slowest cases,
-    skipped cases, and those that an interrupted run did not reach."""
-    console = Console(stderr=True, highlight=False)
+    """Print counts of the verdicts, failed cases with their causes and their first differences, the
+    slowest cases, skipped cases, and those that an interrupted run did not reach.
+
+    every: whether cases that have not failed are in the table, too.
+    """
+    console = terminal.console(stderr=True)
     counts = Counter(case.verdict for case in cases)
     verdicts = ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
     verdicts = f": {verdicts}" if verdicts else ""
     console.print(f"{how_many(len(cases), len(missing))}{verdicts}", markup=False)
-    failed = [case for case in ranked(cases) if case.verdict not in PASSING]
-    if failed:
-        # The reason is on the line of the case above.
-        table = Table("case", "verdict", "first rung", "seconds", box=None)
-        for case in failed:
-            rung = case.reason.partition(":")[0]
-            seconds = f"{walls[case.scene]:.1f}" if case.scene in walls else ""
-            verdict = Text(case.verdict, _STYLES[case.verdict])
-            table.add_row(Text(case.scene), verdict, Text(rung), seconds)
-        console.print(table)
+    shown = [case for case in ranked(cases) if every or case.verdict not in PASSING]
+    if shown:
+        rows = [
+            (
+                case.scene,
+                Text(case.verdict, _STYLES[case.verdict]),
+                "" if case.cause is None else case.cause.name,
+                first_difference(case),
+                f"{walls[case.scene]:.1f}" if case.scene in walls else "",
+            )
+            for case in shown
+        ]
+        console.print(terminal.fitted(console.width, _COLUMNS, rows, right=("seconds",)))
     slowest = sorted(walls, key=lambda name: walls[name], reverse=True)[:_SLOWEST]
     if slowest:
         times = ", ".join(f"{name} {walls[name]:.1f} s" for name in slowest)

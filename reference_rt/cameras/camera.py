@@ -18,8 +18,12 @@ class Camera(Description):
     """A camera at `eye` that looks at `target`; `up` is up in the picture."""
 
     eye: Vector = (0.0, 0.0, 1.0)
+    """Where the camera stands: [x, y, z] in world coordinates, in scene units."""
     target: Vector = (0.0, 0.0, 0.0)
+    """The point that the camera looks at: [x, y, z] in world coordinates, not the eye."""
     up: Direction = (0.0, 1.0, 0.0)
+    """The direction that points up in the picture: world coordinates, of any length, not parallel
+    to the line of view."""
 
     @model_validator(mode="after")
     def _check_orientation(self) -> Self:

@@ -15,7 +15,7 @@ from reference_rt.cameras.filters import (
 )
 from reference_rt.core.model import Description
 
-LayerName = Literal["albedo", "normal", "depth", "id", "variance"]
+LayerName = Literal["albedo", "normal", "position", "depth", "id", "variance"]
 
 
 def _each_once(value: Any) -> Any:
@@ -31,17 +31,21 @@ class Film(Description):
     """The picture: its size in pixels, its reconstruction filter and its layers."""
 
     width: Annotated[int, Field(ge=1, lt=2**31)] = 256
+    """Columns of pixels."""
     height: Annotated[int, Field(ge=1, lt=2**31)] = 256
+    """Rows of pixels; row 0 is the top of the picture."""
     filter: AnyFilter = BoxFilter()
+    """The reconstruction filter: how a sample's weight in a pixel falls with its distance.
+    Default: the mean over the pixel's square."""
     layers: Annotated[tuple[LayerName, ...], BeforeValidator(_each_once)] = ()
     """Which layers (AOVs) are written beside the colour.
 
     Means over camera rays of the first hit, weighted by the filter, 0 for misses, masked holes
-    counting as hits: albedo, the material's own colour, and normal, the shading normal without bump
-    and normal maps.  For the ray through the centres of pixel and lens: depth, the distance from
-    the eye, inf for a miss, and id, the shape's index, -1 for a miss.  variance: of the pixel's
-    mean, estimated from its samples; for `sobol` and `grid`, whose samples are stratified, an upper
-    estimate.  Ray casting writes its own layers instead.
+    counting as hits: albedo, the material's own colour, normal, the shading normal without bump
+    and normal maps, and position, the point in the world.  For the ray through the centres of pixel
+    and lens: depth, the distance from the eye, inf for a miss, and id, the shape's index, -1 for a
+    miss.  variance: of the pixel's mean, estimated from its samples; for `sobol` and `grid`, whose
+    samples are stratified, an upper estimate.  Ray casting writes its own layers instead.
     """
 
 

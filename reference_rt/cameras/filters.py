@@ -38,7 +38,7 @@ class Filter(Description):
 
 
 class BoxFilter(Filter):
-    """Constant over the pixel's square."""
+    """The mean over the pixel's square."""
 
     type: Literal["box"] = "box"
 
@@ -54,6 +54,7 @@ class TentFilter(Filter):
 
     type: Literal["tent"] = "tent"
     radius: Positive = 1.0
+    """Half the filter's width in x and in y, in pixels."""
 
     def setup(self) -> "TentSetup":
         return TentSetup(self.radius)
@@ -67,7 +68,7 @@ class GaussianFilter(Filter):
 
     type: Literal["gaussian"] = "gaussian"
     stddev: Positive = 0.5
-    """s, in pixels."""
+    """The standard deviation s, in pixels."""
 
     def setup(self) -> "Tabulated":
         return _tabulated(Gaussian(self.stddev, math.exp(-8.0)), 4.0 * self.stddev)
@@ -81,16 +82,16 @@ class MitchellFilter(Filter):
 
     type: Literal["mitchell"] = "mitchell"
     b: Unit = 1.0 / 3.0
-    """Blur: 1 and `c` 0 is the cubic B-spline."""
+    """Blur, from 0 to 1: 1 with `c` = 0 is the cubic B-spline."""
     c: Unit = 1.0 / 3.0
-    """Ringing: the authors advise b + 2 c = 1."""
+    """Ringing, from 0 to 1: the authors advise b + 2 c = 1."""
 
     def setup(self) -> "Tabulated":
         return _tabulated(Cubics(self.b, self.c), 2.0)
 
 
 class CatmullRomFilter(Filter):
-    """Mitchell's filter of b = 0 and c = 1/2, which interpolates: sharp, with one ring."""
+    """Mitchell's filter with b = 0 and c = 1/2, which interpolates: sharp, with one ring."""
 
     type: Literal["catmull_rom"] = "catmull_rom"
 
@@ -99,12 +100,11 @@ class CatmullRomFilter(Filter):
 
 
 class LanczosFilter(Filter):
-    """sinc(x) under the middle lobe of another sinc: sharpest, with `lobes` - 1 rings
-    (Duchon 1979)."""
+    """A sinc under the middle lobe of a wider one: sharp, with `lobes` - 1 rings (Duchon 1979)."""
 
     type: Literal["lanczos"] = "lanczos"
     lobes: Annotated[int, Field(ge=1, le=64)] = 3
-    """Also the radius in pixels."""
+    """Lobes on each side, from 1 to 64; also the filter's radius in pixels."""
 
     def setup(self) -> "Tabulated":
         return _tabulated(WindowedSinc(float(self.lobes)), float(self.lobes), 64 * 2 * self.lobes)

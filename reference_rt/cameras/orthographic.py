@@ -14,15 +14,15 @@ from reference_rt.jit.kernel import kernel
 
 
 class Orthographic(Camera):
-    """A view rectangle through the eye, across the view direction; all rays are parallel."""
+    """Parallel rays through a view rectangle at the eye, perpendicular to the view direction."""
 
     type: Literal["orthographic"] = "orthographic"
     width: Positive | None = None
     """Width of the view rectangle, centred on the eye, in scene units; its height follows from the
-    picture's shape.  Without `width` and `view`, 2."""
+    picture's shape.  Default, without `view`: 2."""
     view: Edges | None = None
-    """Instead of `width`: the view rectangle [l, r, b, t].  Where its shape is not the picture's,
-    pixels are not square."""
+    """Instead of `width`: the edges [left, right, bottom, top] of the view rectangle, relative to
+    the eye, in scene units.  Where its shape is not the picture's, pixels are not square."""
 
     @model_validator(mode="after")
     def _one_of_width_and_view(self) -> Self:

@@ -10,7 +10,7 @@ from reference_rt.jit.kernel import kernel
 
 
 class Perspective(CentralCamera):
-    """The simplified pinhole camera: d = s - e, with s on the view rectangle in front."""
+    """The ideal pinhole camera: rays from the eye through a view rectangle in front of it."""
 
     type: Literal["perspective"] = "perspective"
 

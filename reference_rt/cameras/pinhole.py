@@ -12,21 +12,21 @@ from reference_rt.core.vec3 import Vec3
 
 
 class Pinhole(Camera):
-    """A film behind the hole at `eye`: the picture is what light draws on it, upside down and with
-    left and right exchanged.
+    """A real pinhole camera: a film behind the hole at `eye`, on which the image is upside down and
+    mirrored.
 
-    It shows the film as one sees it from behind, looking forward: pixels to the right lie to the
-    right in space.  It is the picture of `perspective` with the same angle, turned by 180 degrees.
+    The film is shown as seen from behind, looking forward: pixels to the right lie to the right in
+    space.  The picture is that of `perspective` with the same angle, turned by 180 degrees.
 
-    Rays start at the hole, not on the film.  Around the film is a box, which lets light in at the
-    hole alone: whatever a scene has between film and hole, or behind, is not seen.
+    Rays start at the hole.  A box around the film lets light in at the hole alone, so that no shape
+    between film and hole is seen.
     """
 
     type: Literal["pinhole"] = "pinhole"
     film_width: Positive = 1.0
     """Width of the film in scene units; its height follows from the picture's shape."""
     film_distance: Positive = 1.0
-    """From the hole back to the film, in scene units."""
+    """Distance from the hole back to the film, in scene units."""
 
     @model_validator(mode="after")
     def _check_angle(self) -> Self:

@@ -15,19 +15,19 @@ from reference_rt.sampling.warp import concentric_disk
 
 
 class ThinLens(CentralCamera):
-    """An ideal lens around the eye, across the view direction (Cook et al. 1984): all rays of one
-    film point meet again in the plane of focus.
+    """A perspective camera with an ideal lens: what is not in the plane of focus is blurred (Cook
+    et al. 1984).
 
-    The lens is sampled.  Where no random numbers are drawn - by ray casting, and on a `grid` -
-    every ray passes its centre: the picture of `perspective`, sharp everywhere.
+    Where no random numbers are drawn (by ray casting, and on a `grid`) every ray passes the lens's
+    centre, and everything is sharp.
     """
 
     type: Literal["thin_lens"] = "thin_lens"
     aperture_radius: Positive
-    """Radius of the lens in scene units."""
+    """Radius of the lens in scene units: larger ones blur more out of focus."""
     focus_distance: Positive | None = None
-    """From the lens to the plane of focus, along the axis of view, in scene units; none: the plane
-    through `target`."""
+    """Distance from the lens to the plane in focus, along the view direction, in scene units.
+    Default: the plane through `target`."""
 
     @model_validator(mode="after")
     def _check_focus(self) -> Self:

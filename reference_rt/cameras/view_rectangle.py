@@ -112,14 +112,18 @@ class CentralCamera(Camera):
     (`fov`) or by its edges (`view`)."""
 
     fov: Annotated[float, Field(gt=0, lt=180)] | None = None
-    """Full angle of view in degrees along `fov_axis`; without `fov` and `view`, 45."""
+    """Full angle of view in degrees along `fov_axis`, above 0 and below 180.  Default, without
+    `view`: 45."""
     fov_axis: FovAxis | None = None
-    """The side of the picture that `fov` spans; none: x."""
+    """The side of the picture that `fov` spans: width, height, diagonal, the smaller or the larger
+    side.  Default: x."""
     view: Edges | None = None
-    """Instead of `fov`: the view rectangle [l, r, b, t] at `distance`.  Where its shape is not the
-    picture's, pixels are not square; where it is off the axis, the view is sheared (shifted)."""
+    """Instead of `fov`: the edges [left, right, bottom, top] of the view rectangle at `distance`,
+    in scene units.  Where its shape is not the picture's, pixels are not square.  Where it is off
+    the axis, the view is sheared (shifted)."""
     distance: Positive | None = None
-    """From the eye to the rectangle `view`, along the axis; none: 1."""
+    """Distance from the eye to the rectangle `view`, along the view direction, in scene units.
+    Default: 1."""
 
     @model_validator(mode="after")
     def _one_of_fov_and_view(self) -> Self:

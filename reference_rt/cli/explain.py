@@ -200,6 +200,7 @@ def _lights(scene: Scene, tables: SceneTables, used: Lines, pruned: Lines) -> No
     for name, table in (
         ("point lights", lights.points),
         ("spots", lights.spots),
+        ("projectors", lights.projectors),
         ("directional lights", lights.directionals),
         ("emissive primitives", lights.areas),
     ):

@@ -1,49 +1,38 @@
 """`reference-rt`: render, explain, warm-up, schema, and the commands of other packages."""
 
-import errno
-import functools
 import gc
 import importlib.metadata
 import json
 import os
 import sys
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated
 
 import typer
 
+from reference_rt.cli import render_options
+from reference_rt.cli.adjusted import SceneArgument, without_blas
+from reference_rt.cli.adjusted import adjusted as adjusted
 from reference_rt.cli.defaults import Defaults, by_name
-from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.settings import with_settings
-from reference_rt.util.errors import (
-    ImageError,
-    ReferenceRtError,
-    SceneError,
-    SceneWarning,
-    UsageError,
-    printable,
-)
-from reference_rt.util.signals import catch_signals, dropped, exit_code_of
-
-F = TypeVar("F", bound=Callable[..., Any])
+from reference_rt.cli.guarded import guarded as guarded
+from reference_rt.cli.guarded import is_output_lost, lost_output
+from reference_rt.cli.guarded import say as say
+from reference_rt.cli.guarded import scene_warnings as scene_warnings
+from reference_rt.cli.preview_command import preview
+from reference_rt.util.errors import ImageError
+from reference_rt.util.signals import catch_signals, exit_code_of
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     help="An independent float64 reference ray tracer.\n\nExit codes: 0 success or agreement, "
     "1 difference, 2 usage, 3 invalid scene or image, 4 reference missing or could not run, "
     "5 internal error, 130 interrupted (by SIGTERM 143, by SIGHUP 129).",
 )
 
-_INTERRUPTED = "interrupted; nothing unfinished was written"
 
-SceneArgument = Annotated[
-    Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene, or a Mitsuba .xml one.")
-]
+Threads = Annotated[int | None, typer.Option(min=1, help="Default: all cores.")]
 
 
 def _print_version(wanted: bool) -> None:
@@ -64,78 +53,6 @@ def _options(
     pass
 
 
-def guarded(command: F) -> F:
-    """Report every error of a command as one line on standard error, with its exit code."""
-
-    @functools.wraps(command)
-    def run(*args: Any, **kwargs: Any) -> Any:
-        try:
-            with scene_warnings(lambda text: typer.echo(f"warning: {text}", err=True)):
-                return command(*args, **kwargs)
-        except ReferenceRtError as error:
-            others = error.others if isinstance(error, SceneError) else ()
-            *first, last = (error, *others)
-            for one in first:
-                with suppress(OSError):
-                    say(f"error: {one}", err=True)
-            _fail(str(last), error.exit_code)
-        except typer.Exit:
-            raise
-        except KeyboardInterrupt as error:
-            _fail(_INTERRUPTED, exit_code_of(error))
-        except BrokenPipeError:
-            raise
-        except Exception as error:
-            if (signal := dropped()) is not None:
-                _fail(_INTERRUPTED, exit_code_of(signal))
-            if is_output_lost(error):
-                _fail(lost_output(error), ImageError.exit_code)
-            message = " ".join(str(error).split())
-            _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
-
-    return run  # type: ignore[return-value]
-
-
-def say(text: str, err: bool = False) -> None:
-    """Print one line; unprintable characters are escaped."""
-    typer.echo(printable(text), err=err)
-
-
-def lost_output(error: BaseException) -> str:
-    """The message for a failed print."""
-    reason = getattr(error, "strerror", None)
-    return f"standard output cannot be written: {reason}; expected free space"
-
-
-def is_output_lost(error: BaseException) -> bool:
-    """Whether a print failed, as on a full disk.  Our output files raise ImageError instead."""
-    lost = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-    return isinstance(error, OSError) and error.errno in lost and error.filename is None
-
-
-@contextmanager
-def scene_warnings(report: Callable[[str], None]) -> Iterator[None]:
-    """Call `report` with the text of each `SceneWarning`; other warnings are Python's."""
-    with warnings.catch_warnings():
-        others = warnings.showwarning
-
-        def show(message: Warning | str, category: type[Warning], *place: Any, **to: Any) -> None:
-            if issubclass(category, SceneWarning):
-                report(str(message))
-            else:
-                others(message, category, *place, **to)
-
-        warnings.simplefilter("always", SceneWarning)
-        warnings.showwarning = show
-        yield
-
-
-def _fail(message: str, code: int) -> None:
-    with suppress(OSError):  # standard error may fail, too
-        say(f"error: {message}", err=True)
-    raise typer.Exit(code)
-
-
 @app.command()
 @guarded
 def render(
@@ -149,48 +66,52 @@ def render(
         str | None, typer.Option(help="ray_cast, whitted, direct or path.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    threads: Threads = None,
     define: Defaults = None,
+    time_limit: render_options.TimeLimit = None,
+    target_error: render_options.TargetError = None,
+    checkpoint: render_options.CheckpointFolder = None,
+    no_checkpoint: render_options.NoCheckpoint = False,
+    resume: render_options.Resume = False,
+    more_spp: render_options.MoreSpp = None,
+    preview: render_options.Preview = None,
+    memory: render_options.Memory = None,
+    workers: render_options.NumberOfWorkers = None,
+    scheduler: render_options.Scheduler = None,
+    cluster: render_options.ClusterFile = None,
 ) -> None:
-    """Render a scene to a file."""
-    from reference_rt.rendering import image
-    from reference_rt.rendering.render import render as render_scene
-    from reference_rt.util.console import ProgressLine
+    """Render a scene to a file.
+
+    Ctrl-C writes the picture so far, marked as partial in its header.
+    """
+    from reference_rt.cli.render import Limited, Stored, Where, render_to_file
+    from reference_rt.rendering.image import check_suffix
+    from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 
-    image.check_suffix(output)
+    check_suffix(output)
     loaded = Scene.load(scene, by_name(define))
     description = adjusted(loaded, spp, size, integrator, seed)
     check_writable(output)
-    with ProgressLine() as progress, _without_blas():
-        picture = render_scene(
-            description, threads=threads, progress=progress, compiling=progress.compiling
-        )
-    picture.save(output)
-    seconds = picture.seconds
-    say(
-        f"{output}: {description.film.width} x {description.film.height}, "
-        f"{seconds['tables']:.2f} s to build, {seconds['compile']:.2f} s to compile or load "
-        f"kernels, {seconds['render']:.2f} s to render",
-        err=True,
-    )
-    if not picture.layers[picture.shown].any():
-        description.warn("the picture is black: no light reaches the camera", "camera")
-    bad = picture.nonfinite_pixels
-    if len(bad) > 0:
-        places = ", ".join(f"({x}, {y})" for x, y in bad[:4])
-        raise ImageError(
-            f"{output}: {len(bad)} pixels are not finite; (column, row): {places}"
-            + (", ..." if len(bad) > 4 else "")
-        )
+    where = Where(threads, workers, scheduler, cluster)
+    limits = Limited(time_limit, target_error, memory)
+    storage = Stored(checkpoint, no_checkpoint, resume, more_spp or 0)
+    with without_blas():
+        text, code = render_to_file(description, output, where, limits, storage, preview)
+    say(text if code == 0 else f"error: {text}", err=True)
+    if code:
+        raise typer.Exit(code)
+
+
+app.command()(preview)
 
 
 @app.command()
 @guarded
 def explain(scene: SceneArgument, define: Defaults = None) -> None:
-    """Print what a scene uses, what is specialised away and why, its distance from float64's
-    limits, and its kernels."""
+    """Print what a scene uses, how near to float64's limits it is, and its kernels."""
     from reference_rt.cli.explain_page import print_page
+    from reference_rt.rendering.scene import Scene
 
     print_page(Scene.load(scene, by_name(define)))
 
@@ -202,15 +123,16 @@ def warm_up(
         list[Path] | None,
         typer.Argument(metavar="[SCENE]...", help="Whose specialised kernels are compiled, too."),
     ] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    threads: Threads = None,
 ) -> None:
     """Compile all kernels that scenes share, so that no render waits for them.
 
     If it is interrupted, the kernels that are compiled by then are kept.
     """
     from reference_rt.cli.warm_up import warm_up as compile_kernels
+    from reference_rt.rendering.scene import Scene
 
-    with _without_blas():
+    with without_blas():
         done = compile_kernels([Scene.load(scene) for scene in scenes or ()], threads)
     say(
         f"{done.folder}: {done.compiled} kernels compiled, {done.cached} were in the cache, "
@@ -221,8 +143,7 @@ def warm_up(
 @app.command()
 @guarded
 def doctor() -> None:
-    """Print what is installed, what works and why not, and the caches; exit code 1 if something
-    does not work."""
+    """Print what is installed, what works, and the caches; exit code 1 if something does not."""
     from reference_rt.cli.doctor import checks, page
 
     found = []
@@ -241,47 +162,6 @@ def schema() -> None:
     from reference_rt.scene.model import json_schema
 
     typer.echo(json.dumps(json_schema(), indent=2))
-
-
-_OPTIONS = (("spp",), ("size",), ("integrator",), ("seed",))
-"""Settings that errors of `with_settings` name."""
-
-
-def adjusted(
-    scene: Scene,
-    spp: int | None = None,
-    size: str | None = None,
-    integrator: str | None = None,
-    seed: int | None = None,
-) -> Scene:
-    """The scene with the options of the command line.  Raises UsageError."""
-    pixels = None
-    if size is not None:
-        width, _, height = size.lower().partition("x")
-        if not all(n.isdecimal() and len(n) < 11 for n in (width, height)):
-            raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{size}'")
-        pixels = int(width), int(height)
-    try:
-        return with_settings(scene, spp=spp, size=pixels, integrator=integrator, seed=seed)
-    except SceneError as error:
-        if error.path in _OPTIONS:
-            raise UsageError(f"--{error.path[0]}: {error.message}") from None
-        raise
-
-
-@contextmanager
-def _without_blas() -> Iterator[None]:
-    """Stop Numba from importing SciPy with its first kernel to look for BLAS: 0.1 s for a feature
-    that no kernel of ours uses."""
-    name = "scipy.linalg.cython_blas"
-    absent = name not in sys.modules
-    if absent:
-        sys.modules[name] = None  # type: ignore[assignment]
-    try:
-        yield
-    finally:
-        if absent:
-            del sys.modules[name]
 
 
 def _add_commands() -> None:

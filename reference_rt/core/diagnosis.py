@@ -1,5 +1,6 @@
 """Validation errors for users: pydantic's error as one line, with the keys that lead to it."""
 
+import reprlib
 from collections.abc import Iterator
 from typing import Any, get_args
 
@@ -54,7 +55,7 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
     if isinstance(cause, FieldError):
         return message, (*keys, cause.field)
     if first["type"] == "extra_forbidden":
-        known = _models_at(model, location[:-1])[0].model_fields
+        known = _models_at(model, location[:-1])[0].__pydantic_fields__
         near = meant(str(location[-1]), known)
         message = f"unknown key; expected one of: {', '.join(known)}{near}"
     elif first["type"] == "missing":
@@ -67,20 +68,37 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
         shown = tag if len(tag) <= _MOST_SHOWN else f"{tag[:_MOST_SHOWN]}..."
         message = f"unknown type '{shown}'; expected one of: {known_types}{near}"
     elif first["type"] == "too_long":
-        message = f"expected at most {first['ctx']['max_length']} items"
+        message = f"expected at most {_items(first['ctx']['max_length'])}, got {_size(first)}"
     elif first["type"] == "too_short":
-        message = f"expected at least {first['ctx']['min_length']} items"
+        message = f"expected at least {_items(first['ctx']['min_length'])}, got {_size(first)}"
     elif first["type"].startswith("recursion"):
         message = "nested too deeply; expected fewer levels"
     elif first["type"] in _PLAIN:
-        message = f"expected {_PLAIN[first['type']]}"
-    elif first["type"] != "value_error" and not isinstance(first["input"], dict | list | tuple):
-        message += f", got {_shown(first['input'])}"
+        message = f"expected {_PLAIN[first['type']]}, got {_shown(first['input'])}"
+    elif first["type"] == "transform_step" and isinstance(first["input"], dict):
+        message += f", got {_shown(list(first['input']))}"
+    elif not isinstance(first["input"], dict | BaseModel) and "got " not in message:
+        joint = "; " if {":", ";"} & set(message) else ", "
+        message += f"{joint}got {_shown(first['input'])}"
     return message, keys
+
+
+def _items(count: int) -> str:
+    return "1 item" if count == 1 else f"{count} items"
+
+
+def _size(first: Any) -> str:
+    """The number of items that were given; of an iterator that was cut off, that it is more."""
+    count = first["ctx"]["actual_length"]
+    return "more" if count is None else str(count)
 
 
 _MOST_SHOWN = 60
 """The most characters of a wrong value that a message repeats."""
+
+_SHORT = reprlib.Repr()
+"""Writes the first items of lists and keys: values may have millions."""
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = _MOST_SHOWN
 
 
 def _shown(value: Any) -> str:
@@ -89,7 +107,7 @@ def _shown(value: Any) -> str:
     if hasattr(value, "dtype") and hasattr(value, "shape"):
         return f"{value.dtype} of shape {value.shape}"
     try:
-        text = repr(value)
+        text = _SHORT.repr(value)
     except ValueError:  # an integer of thousands of digits
         return f"an {type(value).__name__} too long to show"
     return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
@@ -114,7 +132,7 @@ def _models_at(model: type[BaseModel], location: Keys) -> list[type[BaseModel]]:
     models = [model]
     for key in location:
         chosen = [m for m in models if len(models) > 1 and _type_of(m) == key]
-        fields = [m.model_fields[key] for m in models if key in m.model_fields]
+        fields = [m.__pydantic_fields__[key] for m in models if key in m.__pydantic_fields__]
         if chosen:
             models = chosen
         elif isinstance(key, str) and fields:
@@ -131,7 +149,8 @@ def _descriptions_in(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def _type_of(model: type[BaseModel]) -> Any:
-    return model.model_fields["type"].default if "type" in model.model_fields else None
+    fields = model.__pydantic_fields__
+    return fields["type"].default if "type" in fields else None
 
 
 def _types(models: list[type[BaseModel]]) -> str:

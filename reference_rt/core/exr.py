@@ -4,7 +4,7 @@ import ctypes
 import io
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,48 @@ def write_exr(path: Path, channels: Mapping[str, FloatArray], header: Mapping[st
         try:
             OpenEXR.File(settings | dict(header), planes).write(_name(temporary))
         except RuntimeError as error:  # raised by the library for any failure to write
+            raise OSError(None, str(error)) from None
+
+
+EXR_ROWS = 16
+"""Rows that are compressed together: `exr_rows` takes as many at a time."""
+
+
+@contextmanager
+def exr_rows(
+    path: Path, size: tuple[int, int], names: Sequence[str], header: Mapping[str, str]
+) -> Iterator[Callable[[Mapping[str, FloatArray]], None]]:
+    """Yields a function that adds EXR_ROWS rows, at the end fewer, to an image of float32 channels,
+    from the top, without the whole image in memory; the file is there when all rows are.
+
+    size: width and height;  names: of the channels.  Raises ImageError.
+    """
+    import Imath
+    import OpenEXR
+
+    settings = OpenEXR.Header(*size)
+    channel = Imath.Channel(Imath.PixelType(Imath.PixelType.FLOAT))
+    settings["channels"] = dict.fromkeys(names, channel)
+    settings["compression"] = Imath.Compression(Imath.Compression.ZIP_COMPRESSION)
+    settings |= {name: text.encode() for name, text in header.items()}
+    with replacing(path) as temporary:
+        try:
+            file = OpenEXR.OutputFile(str(temporary), settings)
+
+            def put(planes: Mapping[str, FloatArray]) -> None:
+                with np.errstate(over="ignore"):  # overflow of float32 becomes infinity
+                    rows = {
+                        name: np.ascontiguousarray(plane, np.float32)
+                        for name, plane in planes.items()
+                    }
+                count = len(next(iter(rows.values())))
+                file.writePixels({name: plane.tobytes() for name, plane in rows.items()}, count)
+
+            try:
+                yield put
+            finally:
+                file.close()
+        except (RuntimeError, UnicodeError) as error:  # raised by the library
             raise OSError(None, str(error)) from None
 
 

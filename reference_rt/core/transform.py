@@ -123,6 +123,7 @@ class Translate(Description):
     """Moves by [x, y, z]."""
 
     translate: Vector
+    """The offset [x, y, z] in scene units."""
 
     def matrix_of(self) -> Affine:
         return translate(self.translate)
@@ -140,6 +141,7 @@ class Scale(Description):
         BeforeValidator(_factors),
         WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "array"}]}),
     ]
+    """One factor for all axes, or three [x, y, z].  Negative ones mirror; 0 is an error."""
 
     def matrix_of(self) -> Affine:
         return scale(self.scale)
@@ -149,13 +151,16 @@ class Turn(Description):
     """An axis and an angle in degrees, counter-clockwise if the axis points at the viewer."""
 
     axis: Direction
+    """The axis through the origin: a direction [x, y, z] of any length but 0."""
     degrees: float
+    """The angle in degrees, counter-clockwise if the axis points at the viewer."""
 
 
 class Rotate(Description):
     """Rotates about an axis through the origin."""
 
     rotate: Turn
+    """The axis and the angle: `{axis: [x, y, z], degrees: a}`."""
 
     def matrix_of(self) -> Affine:
         return rotate(self.rotate.axis, self.rotate.degrees)
@@ -184,13 +189,15 @@ class Matrix(Description):
     matrix: Annotated[
         tuple[Row, Row, Row], BeforeValidator(_rows), WithJsonSchema({"type": "array"})
     ]
+    """The rows of an invertible affine map: three rows of four numbers, the fourth being the offset
+    in scene units; or four rows, the last being [0, 0, 0, 1]."""
 
     def matrix_of(self) -> Affine:
         return np.array(self.matrix)
 
 
 def _kind_of_step(step: Any) -> str | None:
-    keys = list(step if isinstance(step, dict) else getattr(type(step), "model_fields", ()))
+    keys = list(step if isinstance(step, dict) else getattr(type(step), "__pydantic_fields__", ()))
     return str(keys[0]) if len(keys) == 1 else None
 
 

@@ -28,15 +28,16 @@ _Count = Annotated[int, Field(ge=0, le=1024)]
 
 
 class Direct(Description):
-    """Emission, and light that is scattered once: n samples of lights and m of the material,
-    joined by multiple importance sampling."""
+    """Emission, and light that is scattered once, by sampling lights and materials with multiple
+    importance sampling."""
 
     deterministic: ClassVar[bool] = False
     type: Literal["direct"] = "direct"
     light_samples: _Count = 1
-    """Of lights, for each ray; without any, lights that are points or directions are not seen."""
+    """Samples of lights for each camera ray, from 0 to 1024.  With 0, light of points and
+    directions is missing."""
     bsdf_samples: _Count = 1
-    """Of the material."""
+    """Directions that are sampled from the material for each camera ray, from 0 to 1024."""
 
     @model_validator(mode="after")
     def _any(self) -> Self:

@@ -61,19 +61,21 @@ _STRATEGIES = {"lights": _LIGHT_SAMPLING, "bsdf": _BSDF_SAMPLING}
 
 
 class Path(Description):
-    """Unbiased global illumination: next-event estimation, multiple importance sampling, Russian
+    """Path tracing: unbiased global illumination by light sampling, BSDF sampling and Russian
     roulette."""
 
     deterministic: ClassVar[bool] = False
     type: Literal["path"] = "path"
     max_depth: Annotated[int, Field(ge=0)] | None = None
-    """Most edges of a path from the eye: 1 shows lights alone, 2 adds direct light; none: no end.
-    """
+    """Most edges of a path, counted from the camera: 1 shows emission alone, 2 adds direct light.
+    Default: no limit."""
     rr_depth: Annotated[int, Field(ge=1, le=4096)] = 5
-    """Edges after which Russian roulette begins: what no limit ends, it does."""
+    """Edges after which Russian roulette may end a path, from 1 to 4096.  The mean does not depend
+    on it."""
     sampling: Literal["both", "lights", "bsdf"] = "both"
-    """What finds lights: samples of lights, of the materials, or both, each weighted by how well
-    it does (the same mean, most noise for one alone).  What only one can find, it finds."""
+    """How direct light is sampled: `lights` samples lights, `bsdf` samples materials, `both`
+    combines them by multiple importance sampling.  The mean is the same.  Light that only one
+    strategy can sample is always sampled by that one."""
 
     @property
     def follows_scattered(self) -> bool:

@@ -15,14 +15,19 @@ LAYERS = ("colour", "distance", "normal", "id", "uv")
 
 
 class RayCast(Description):
-    """The display modes: one ray per pixel; all layers are computed, one is the picture."""
+    """One ray through each pixel's centre, without light: colours, distances, normals, indices,
+    coordinates.
+
+    All layers are computed; `show` selects the picture.
+    """
 
     deterministic: ClassVar[bool] = True
     follows_scattered: ClassVar[bool] = False
     type: Literal["ray_cast"] = "ray_cast"
     show: Literal["colour", "distance", "normal", "id", "uv"] = "colour"
-    """Which layer is the picture: the surface's own colour, the distance from the eye, the
-    geometric normal, the shape's index, or the surface coordinates."""
+    """The layer that is the picture: the surface's own colour, the distance from the eye in scene
+    units, the geometric normal in world coordinates, the index of the shape, or the surface
+    coordinates (u, v)."""
 
 
 class Cast(NamedTuple):

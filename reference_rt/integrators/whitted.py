@@ -26,20 +26,20 @@ from reference_rt.sampling import Sample
 
 
 class Whitted(Description):
-    """Ambient and direct light with shadows; mirrored and refracted rays, recursively; the
-    background.
+    """Recursive ray tracing: ambient and direct light with shadows, mirrored and refracted rays,
+    the background.
 
-    Every area light is one point, the middle of its parameters; an environment is seen, but lights
-    nothing but through mirrors and glass.
+    Every area light is one point, its middle.  An environment is seen, directly and in mirrors and
+    glass, but lights nothing else.
     """
 
     deterministic: ClassVar[bool] = True
     follows_scattered: ClassVar[bool] = False
     type: Literal["whitted"] = "whitted"
     max_depth: Annotated[int, Field(ge=0, le=4096)] = 8
-    """Most mirrorings and refractions of a ray."""
+    """Most reflections and refractions in a row, from 0 to 4096."""
     min_contribution: Annotated[float, Field(ge=0, lt=1)] = 1e-4
-    """Rays that count for less than this fraction of the pixel are not followed."""
+    """Rays whose weight in the pixel is below this fraction are not traced, from 0 to below 1."""
 
     def setup(self) -> "WhittedSetup":
         return WhittedSetup(self.max_depth, self.min_contribution)

@@ -41,19 +41,21 @@ from reference_rt.lights.dispatch import (
     pick_probability,
     sample_one,
 )
-from reference_rt.lights.emitters import directional, point, spot
+from reference_rt.lights.emitters import directional, point, projector, spot
 from reference_rt.lights.emitters.ambient import Ambient
 from reference_rt.lights.emitters.area import Areas
 from reference_rt.lights.emitters.constant import Constant, Environment
 from reference_rt.lights.emitters.directional import Directional
 from reference_rt.lights.emitters.environment_map import EnvironmentMap
 from reference_rt.lights.emitters.point import Point
+from reference_rt.lights.emitters.projector import Projector
 from reference_rt.lights.emitters.spot import Spot
 from reference_rt.lights.light import (
     AREA,
     DIRECTIONAL,
     ENVIRONMENT,
     POINT,
+    PROJECTOR,
     SPOT,
     LightSample,
     shadow_ray,
@@ -68,12 +70,14 @@ from reference_rt.lights.tables import (
 )
 
 AnyLight = Annotated[
-    Point | Spot | Directional | Constant | EnvironmentMap | Ambient, Field(discriminator="type")
+    Point | Spot | Projector | Directional | Constant | EnvironmentMap | Ambient,
+    Field(discriminator="type"),
 ]
 
 TABLES: tuple[tuple[int, str, type, Any], ...] = (
     (POINT, "points", Point, point),
     (SPOT, "spots", Spot, spot),
+    (PROJECTOR, "projectors", Projector, projector),
     (DIRECTIONAL, "directionals", Directional, directional),
 )
 """(code, field of Lights, description, module) of those that are neither surfaces nor surround the
@@ -84,6 +88,7 @@ __all__ = [
     "DIRECTIONAL",
     "ENVIRONMENT",
     "POINT",
+    "PROJECTOR",
     "SPOT",
     "TABLES",
     "Ambient",
@@ -99,6 +104,7 @@ __all__ = [
     "LinkedLights",
     "Pick",
     "Point",
+    "Projector",
     "Spot",
     "ambient",
     "area_pdf",

@@ -8,7 +8,7 @@ from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import kernel
 
 # Codes of `Lights.kind`.
-AREA, POINT, SPOT, DIRECTIONAL, ENVIRONMENT = range(5)
+AREA, POINT, SPOT, DIRECTIONAL, ENVIRONMENT, PROJECTOR = range(6)
 
 
 class LightSample(NamedTuple):

@@ -8,18 +8,28 @@ from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.jit.links import LINK, Link
 from reference_rt.jit.operation_types import declare
-from reference_rt.lights.emitters import area, constant, directional, environment_map, point, spot
+from reference_rt.lights.emitters import (
+    area,
+    constant,
+    directional,
+    environment_map,
+    point,
+    projector,
+    spot,
+)
 from reference_rt.lights.emitters.area import Areas
 from reference_rt.lights.emitters.constant import Environment
 from reference_rt.lights.emitters.directional import Directionals
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.lights.emitters.point import Points
+from reference_rt.lights.emitters.projector import Projectors
 from reference_rt.lights.emitters.spot import Spots
 from reference_rt.lights.light import (
     AREA,
     DIRECTIONAL,
     ENVIRONMENT,
     POINT,
+    PROJECTOR,
     SPOT,
     LightSample,
 )
@@ -32,11 +42,13 @@ class Lights(NamedTuple):
 
     ambient (1, 3): the ambient radiance;  choice: the entries of the light sampler, None if no
     light can be picked;  tree: the light tree, None for few lights.  Entries are in this order: all
-    areas, points, spots, directional lights, the environment.  So area light i is entry i.
+    areas, points, spots, projectors, directional lights, the environment.  So area light i is entry
+    i.
     """
 
     points: Points | None
     spots: Spots | None
+    projectors: Projectors | None
     directionals: Directionals | None
     areas: Areas | None
     environment: Environment | EnvironmentMaps | None
@@ -85,6 +97,7 @@ TABLES: tuple[tuple[int, str, Any], ...] = (
     (AREA, "areas", area),
     (POINT, "points", point),
     (SPOT, "spots", spot),
+    (PROJECTOR, "projectors", projector),
     (DIRECTIONAL, "directionals", directional),
     (ENVIRONMENT, "environment", _Surroundings),
 )

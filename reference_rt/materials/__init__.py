@@ -32,6 +32,7 @@ from reference_rt.materials.bsdfs.mirror import Mirror
 from reference_rt.materials.bsdfs.phong import Phong
 from reference_rt.materials.bsdfs.plastic import Plastic
 from reference_rt.materials.bsdfs.principled import Principled
+from reference_rt.materials.bsdfs.principled_thin import PrincipledThin
 from reference_rt.materials.bsdfs.rough_conductor import RoughConductor
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric
 from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic
@@ -74,6 +75,7 @@ AnyMaterial = Annotated[
     | Plastic
     | RoughPlastic
     | Principled
+    | PrincipledThin
     | Phong
     | Emissive
     | Mask
@@ -103,6 +105,7 @@ __all__ = [
     "Phong",
     "Plastic",
     "Principled",
+    "PrincipledThin",
     "RoughConductor",
     "RoughDielectric",
     "RoughPlastic",

@@ -10,13 +10,13 @@ from reference_rt.textures import ColourParameter, Palette
 
 
 class Emissive(Material):
-    """Emits the same radiance to all sides of its front, and scatters like its base."""
+    """Emits the same radiance in all directions of its front: its shape is an area light."""
 
     type: Literal["emissive"] = "emissive"
     radiance: ColourParameter
-    """W sr^-1 m^-2, linear sRGB."""
+    """Emitted radiance: W sr^-1 m^-2, linear sRGB, or a texture."""
     base: str | None = None
-    """A key of the scene's materials: how it scatters besides; none means not at all."""
+    """Name of the material that scatters light besides.  Default: the surface scatters none."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:

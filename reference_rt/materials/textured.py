@@ -49,9 +49,9 @@ def _textures(name: str, materials: Mapping[str, Material], palette: Palette) ->
     material = materials[name]
     found = {
         palette.numbers_of[texture]
-        for field, texture in texture_names(material).items()
+        for path, texture in texture_names(material).items()
         # Of heights the gradient is needed, not the colour, and in one place only.
-        if not (isinstance(material, Bump) and field == "height")
+        if not (isinstance(material, Bump) and path == ("height",))
     }
     return found.union(*(_textures(base, materials, palette) for base in _bases(material)))
 

@@ -36,6 +36,7 @@ _CHANNELS: dict[str, tuple[str, ...]] = {
     "id": ("id.V",),
     "uv": ("uv.U", "uv.V"),
     "albedo": ("albedo.R", "albedo.G", "albedo.B"),
+    "position": ("position.X", "position.Y", "position.Z"),
     "depth": ("depth.Z",),
     "variance": ("variance.R", "variance.G", "variance.B"),
 }
@@ -118,12 +119,15 @@ def display(picture: Layered) -> FloatArray:
     """The shown layer as display values (height, width, 3), nominally in [0, 1].
 
     Radiance, albedo and variance: sRGB-encoded.  Distance and depth: from white (nearest) to dark
-    grey.  Normals: (n + 1) / 2.  Id: a colour for each.  u and v: their fractional parts as red and
-    green.  Misses of distances, normals and ids are black.
+    grey.  Normals: (n + 1) / 2.  Position: each coordinate from 0 to 1 over what is hit.  Id: a
+    colour for each.  u and v: their fractional parts as red and green.  Misses of distances,
+    normals, positions and ids are black.
     """
     layer = picture.layers[picture.shown]
     if picture.shown in ("colour", "albedo", "variance"):
         return srgb(layer)
+    if picture.shown == "position":
+        return _spread(layer)
     if picture.shown == "normal":
         missed = ~layer.any(axis=-1, keepdims=True)
         return np.where(missed, 0.0, 0.5 * (layer + 1.0))
@@ -132,6 +136,16 @@ def display(picture: Layered) -> FloatArray:
     if picture.shown == "uv":
         return np.concatenate([np.mod(layer, 1.0), np.zeros_like(layer[..., :1])], axis=-1)
     return _palette(layer.astype(np.int64))
+
+
+def _spread(positions: FloatArray) -> FloatArray:
+    """Each coordinate from 0 to 1 over what is hit; misses, (0, 0, 0), are black."""
+    hit = np.asarray((positions != 0.0).any(axis=-1))
+    if not hit.any():
+        return np.zeros_like(positions)
+    low, high = positions[hit].min(axis=0), positions[hit].max(axis=0)
+    scaled = (positions - low) / np.where(high > low, high - low, 1.0)
+    return np.where(hit[..., None], scaled, 0.0)
 
 
 def _nearness(distance: FloatArray) -> FloatArray:

@@ -15,7 +15,6 @@ import signal
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any
 
 import numba
@@ -35,6 +34,7 @@ from reference_rt.jit.parallel_compile import (
     has_ended,
     precompile_all,
 )
+from reference_rt.rendering.accumulation import ABSENT, Job
 from reference_rt.rendering.compile_cost import cost
 from reference_rt.rendering.linking import (
     EMPTY_SCENE,
@@ -64,34 +64,22 @@ _children: dict[tuple[Call, ...], int] = {}
 """Child processes that compile these kernels, though the picture that started them is done."""
 
 
-@dataclass(frozen=True)
-class Job:
-    """A kernel of `tiles` over all pixels.
-
-    integrator: see `linking.linked_scene`;  spp: its samples per pixel;  arguments: from the scene,
-    the view and the filter, each the tables themselves or linked, to the kernel's arguments except
-    the last four (begin, end, first, last).
-    """
-
-    kernel: Any
-    integrator: str
-    spp: int
-    arguments: Callable[[Any, Any, Any], tuple[Any, ...]]
-
-
 def compile_ahead(jobs: Sequence[Job], threads: int) -> Ahead:
     """Begins to compile the linked kernels of some jobs, which do not depend on the tables, so that
     these can be built meanwhile."""
     if numba.config.DISABLE_JIT or threads < 2 or not parallel_compile.may_fork():
         return Ahead([], threads)  # to make the signatures takes 3 ms
-    given = [job.arguments(EMPTY_SCENE, EMPTY_VIEW, Link(0)) for job in jobs]
-    signatures = [signature_of(*arguments, 0, 0, 0, 0) for arguments in given]
-    calls = [(job.kernel, one) for job, one in zip(jobs, signatures, strict=True)]
-    return Ahead(calls, threads)
+    given = (EMPTY_SCENE, EMPTY_VIEW, Link(0))
+    return Ahead([_call(job, job.arguments(*given), ABSENT) for job in jobs], threads)
+
+
+def _call(job: Job, arguments: tuple[Any, ...], absent: Any) -> Call:
+    return job.kernel, signature_of(*arguments, *job.empty(absent), 0, 0, 0, 0)
 
 
 class Running:
-    """The kernels of some jobs, ready to be run, as functions of (begin, end, first, last)."""
+    """The kernels of some jobs, ready to be run, as functions of (sums, begin, end, first, last).
+    sums: arrays by name, see `accumulation.Job`."""
 
     def __init__(
         self,
@@ -136,6 +124,12 @@ class Running:
     def run(self, k: int) -> Callable[..., None]:
         """Job k's kernel, a function that may change to the specialised one while it is used."""
         return lambda *tile: self.kernels[k](*tile)
+
+    def specialise(self) -> None:
+        """Compile the specialised kernels in this process, and take them into use."""
+        if self._may_change:
+            self._may_change = False
+            self.kernels = self._specialised.kernels()
 
     def progress(self, fraction: float) -> None:
         """To be called now and then while rendering: starts to compile the specialised kernels, or
@@ -185,15 +179,16 @@ class Linked:
                 linked_filter(linker, film_filter),
             )
             self._arguments.append(given)
-            self.calls.append((job.kernel, signature_of(*given, 0, 0, 0, 0)))
-        self._count = len(jobs)
+            self.calls.append(_call(job, given, ABSENT))
+        self._jobs = jobs
         self.calls += sorted(linker.calls, key=cost, reverse=True)
 
     def kernels(self) -> list[Callable[..., None]]:
         """The jobs' kernels, once all calls are compiled.  They are valid as long as this lives."""
-        compiled = [precompile(*call) for call in self.calls[: self._count]]
+        compiled = [precompile(*call) for call in self.calls[: len(self._jobs)]]
         self._linker.resolve()
-        return [_bound(*one) for one in zip(compiled, self._arguments, strict=True)]
+        bound = zip(self._jobs, compiled, self._arguments, strict=True)
+        return [_bound(*one, ABSENT) for one in bound]
 
 
 class Specialised:
@@ -211,10 +206,9 @@ class Specialised:
         self._tables = tables
         self._arguments = [job.arguments(tables, view, film_filter) for job in jobs]
         self.calls: list[Call] = [
-            (job.kernel, signature_of(*given, 0, 0, 0, 0))
-            for job, given in zip(jobs, self._arguments, strict=True)
+            _call(job, given, None) for job, given in zip(jobs, self._arguments, strict=True)
         ]
-        self._count = len(jobs)
+        self._jobs = jobs
         if self._tracer is not None:
             self.calls.append(self._tracer)
 
@@ -226,9 +220,9 @@ class Specialised:
         if self._tracer is not None:
             address: Any = self._tables.geometry.tracer
             address[0] = pointer_to(*self._tracer)
-        kernels = compiled[: self._count]
-        return [_bound(*one) for one in zip(kernels, self._arguments, strict=True)]
+        bound = zip(self._jobs, compiled[: len(self._jobs)], self._arguments, strict=True)
+        return [_bound(*one, None) for one in bound]
 
 
-def _bound(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., None]:
-    return lambda *tile: kernel(*arguments, *tile)
+def _bound(job: Job, kernel: Any, arguments: tuple[Any, ...], absent: Any) -> Callable[..., None]:
+    return lambda sums, *tile: kernel(*arguments, *job.given(sums, absent), *tile)

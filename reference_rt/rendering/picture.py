@@ -5,6 +5,7 @@ import io
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,22 +18,42 @@ BRIGHT = 99.0
 """The percentile of the brightest channel that a notebook shows as white: lamps may be brighter."""
 
 
+class Taken(NamedTuple):
+    """The samples of a picture.  fewest, most: of a pixel;  wanted: of every pixel of the whole
+    picture;  error: an estimate of the relative standard error (see `noise`), None if there is
+    none."""
+
+    fewest: int
+    most: int
+    wanted: int
+    error: float | None = None
+
+    @property
+    def partial(self) -> str:
+        """How many there are, if there are fewer than wanted; else ""."""
+        if self.fewest >= self.wanted:
+            return ""
+        count = f"{self.fewest} to {self.most}" if self.most > self.fewest else f"{self.most}"
+        return f"{count} of {self.wanted} samples per pixel"
+
+
 @dataclass(frozen=True)
 class Picture:
     """A rendered scene.
 
     layers: float64 arrays by name.  "colour" (height, width, 3) is linear radiance; the others are
-    those of `Film.layers`: albedo, normal and variance (height, width, 3), depth and id (height,
-    width).  Ray casting always has colour and normal (height, width, 3), distance and id (height,
-    width), uv (height, width, 2).  shown: the layer that is the picture.  seconds: wall-clock time
-    of "tables" (files, arrays, hierarchy), "compile" (or loading cached kernels) and "render".
-    scene: what was rendered, None if that is unknown.
+    those of `Film.layers`: albedo, normal, position and variance (height, width, 3), depth and id
+    (height, width).  Ray casting always has colour and normal (height, width, 3), distance and id
+    (height, width), uv (height, width, 2).  shown: the layer that is the picture.  seconds:
+    wall-clock time of "tables" (files, arrays, hierarchy), "compile" (or loading cached kernels)
+    and "render".  scene: what was rendered, and taken: with which samples; None if that is unknown.
     """
 
     layers: dict[str, FloatArray]
     shown: str = "colour"
     seconds: dict[str, float] = field(default_factory=dict)
     scene: SceneModel | None = None
+    taken: Taken | None = None
 
     @property
     def colour(self) -> FloatArray:
@@ -62,7 +83,7 @@ class Picture:
         other suffixes, ImageError for what cannot be written."""
         target = Path(path)
         check_suffix(target)
-        write(target, self, {} if self.scene is None else provenance(self.scene))
+        write(target, self, header_of(self.scene, self.taken))
 
     def show(self, exposure: float | None = None) -> None:
         """Open the shown layer in the system's image viewer.  exposure: see `png`."""
@@ -107,6 +128,14 @@ class Picture:
         )
         text = repr(self).strip("<>") + note
         return f"<div>{_image(self.png(), 480)}<div>{text}</div>{others}</div>"
+
+
+def header_of(scene: SceneModel | None, taken: Taken | None) -> dict[str, str]:
+    """The provenance in the header of a picture's file, and that it is partial if it is."""
+    header = {} if scene is None else provenance(scene)
+    if taken is not None and taken.partial:
+        header["partial"] = taken.partial
+    return header
 
 
 _RADIANCE = ("colour", "variance")

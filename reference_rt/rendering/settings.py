@@ -54,7 +54,7 @@ def _changed(part: Any, setting: str, **fields: Any) -> Any:
     """`part` with some fields changed, checked again."""
     try:
         return type(part)(
-            **{name: getattr(part, name) for name in type(part).model_fields} | fields
+            **{name: getattr(part, name) for name in type(part).__pydantic_fields__} | fields
         )
     except SceneError as error:
         raise SceneError(error.message, (setting,)) from None

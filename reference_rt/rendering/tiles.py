@@ -1,7 +1,9 @@
 """The kernels of a tile: what each thread of `render` runs.
 
-A tile is the pixels begin <= k < end, counted along rows.  Each kernel takes samples first to
-last - 1 of these pixels, of spp in all, and writes the pixels' rows of its output arrays.
+A tile is the pixels begin <= k < end, counted along rows.  Each kernel adds samples first to
+last - 1 of these pixels to its sums, whose row 0 is of pixel `begin`.  Samples are added one after
+another, so that the sums have the same bits however the samples are divided among calls.
+`accumulation` turns sums into means.
 """
 
 import math
@@ -145,17 +147,15 @@ def render_tile(
     film_filter: Any,
     sampler_setup: Any,
     shape: tuple[int, int],
-    spp: int,
     out: FloatArray,
-    variance: FloatArray | None,
+    m2: FloatArray | None,
     begin: int,
     end: int,
     first: int,
     last: int,
 ) -> None:
-    """Radiance: its sum over samples in out (n, 3), which the last of all `spp` samples turns into
-    the mean.  variance (n, 3), if any: M2, the sum of squared deviations, which the last sample
-    turns into the variance of the mean."""
+    """Radiance: its sum over samples in out (n, 3), and the sum of squared deviations from the mean
+    in m2 (n, 3), if any."""
     scratch = Scratch(
         rays=RayBlock(local_floats(RAY_FLOATS)),
         totals=local_floats(VECTOR_FLOATS),
@@ -191,20 +191,18 @@ def render_tile(
         radiances(integrator, scene, samplers, n, scratch)
         for k in range(n):
             pixel, sample = samplers.pixels[k], samplers.numbers[k]
+            i = pixel - begin
             one = vector_of(scratch.totals, 0, k) * weights[k]
-            total = row(out, pixel) + one
-            _add_to_m2(variance, pixel, sample, one, total)
-            if sample + 1 == spp:
-                total = total / spp
-                _m2_to_variance(variance, pixel, spp)
-            out[pixel, 0], out[pixel, 1], out[pixel, 2] = total
+            total = row(out, i) + one
+            _add_to_m2(m2, i, sample, one, total)
+            out[i, 0], out[i, 1], out[i, 2] = total
 
 
 @kernel
-def _add_to_m2(m2: FloatArray | None, pixel: int, sample: int, one: Vec3, total: Vec3) -> None:
-    """Update M2, the sum of squared deviations from the mean, with sample number `sample`, whose
-    value is `one`; total: the sum including it.  Youngs & Cramer 1971: only squares are added, so
-    that nothing cancels."""
+def _add_to_m2(m2: FloatArray | None, i: int, sample: int, one: Vec3, total: Vec3) -> None:
+    """Update row i of M2, the sum of squared deviations from the mean, with sample number `sample`,
+    whose value is `one`; total: the sum including it.  Youngs & Cramer 1971: only squares are
+    added, so that nothing cancels."""
     if m2 is None:
         return
     if len(m2) == 0:
@@ -213,23 +211,9 @@ def _add_to_m2(m2: FloatArray | None, pixel: int, sample: int, one: Vec3, total:
         count = sample + 1.0
         off = one * count - total
         scale = 1.0 / (count * sample)
-        m2[pixel, 0] += off.x * off.x * scale
-        m2[pixel, 1] += off.y * off.y * scale
-        m2[pixel, 2] += off.z * off.z * scale
-
-
-@kernel
-def _m2_to_variance(m2: FloatArray | None, pixel: int, spp: int) -> None:
-    """Turn M2 into the variance of the mean of spp samples; a single sample has no estimate."""
-    if m2 is None:
-        return
-    if len(m2) == 0:
-        return
-    if spp < 2:
-        return
-    scale = 1.0 / (spp * (spp - 1.0))
-    for k in range(3):
-        m2[pixel, k] *= scale
+        m2[i, 0] += off.x * off.x * scale
+        m2[i, 1] += off.y * off.y * scale
+        m2[i, 2] += off.z * off.z * scale
 
 
 @entry_kernel
@@ -239,19 +223,20 @@ def first_hits_tile(
     film_filter: Any,
     sampler_setup: Any,
     shape: tuple[int, int],
-    spp: int,
     albedos: FloatArray,
     normals: FloatArray,
+    positions: FloatArray,
     begin: int,
     end: int,
     first: int,
     last: int,
 ) -> None:
-    """Mean albedo and shading normal at the first hits of the rays of `render_tile`, into albedos
-    (n, 3) and normals (n, 3)."""
+    """Albedo, shading normal and position at the first hits of the rays of `render_tile`: their
+    sums over samples in albedos, normals and positions (n, 3)."""
     for pixel in range(begin, end):
         y, x = pixel // shape[0], pixel % shape[0]
-        albedo, normal = row(albedos, pixel), row(normals, pixel)
+        i = pixel - begin
+        albedo, normal, position = row(albedos, i), row(normals, i), row(positions, i)
         for sample in range(first, last):
             sampler = start_sample(sampler_setup, pixel, sample)
             seen = _film_ray(view, film_filter, sampler, shape, x, y)
@@ -262,10 +247,10 @@ def first_hits_tile(
                 own = colour_at(scene.materials.shown, point.material, at)
                 albedo = albedo + own * seen.weight
                 normal = normal + point.ns * seen.weight
-        if last == spp:
-            albedo, normal = albedo / spp, normal / spp
-        albedos[pixel, 0], albedos[pixel, 1], albedos[pixel, 2] = albedo
-        normals[pixel, 0], normals[pixel, 1], normals[pixel, 2] = normal
+                position = position + point.p * seen.weight
+        albedos[i, 0], albedos[i, 1], albedos[i, 2] = albedo
+        normals[i, 0], normals[i, 1], normals[i, 2] = normal
+        positions[i, 0], positions[i, 1], positions[i, 2] = position
 
 
 @entry_kernel
@@ -286,7 +271,8 @@ def aov_tile(
         y, x = pixel // width, pixel % width
         ray = camera_ray(_view_of(view), (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
         found = cast(scene, ray)
-        out[pixel, 0], out[pixel, 1], out[pixel, 2] = found.colour
-        out[pixel, 3] = found.distance
-        out[pixel, 4], out[pixel, 5], out[pixel, 6] = found.n
-        out[pixel, 7], out[pixel, 8], out[pixel, 9] = found.id, found.u, found.v
+        i = pixel - begin
+        out[i, 0], out[i, 1], out[i, 2] = found.colour
+        out[i, 3] = found.distance
+        out[i, 4], out[i, 5], out[i, 6] = found.n
+        out[i, 7], out[i, 8], out[i, 9] = found.id, found.u, found.v

@@ -16,10 +16,10 @@ from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Call
+from reference_rt.rendering.accumulation import Job, jobs_of
 from reference_rt.rendering.compile_cost import cost, operation_of
-from reference_rt.rendering.kernels import Job, Linked, Specialised
+from reference_rt.rendering.kernels import Linked, Specialised
 from reference_rt.rendering.query.ahead import query_calls
-from reference_rt.rendering.render import jobs_of
 from reference_rt.rendering.warm_up_scenes import scenes
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
@@ -38,7 +38,7 @@ def specialised_calls(scene: BuiltScene) -> list[Call]:
 def _picture(scene: BuiltScene) -> tuple[list[Job], SceneTables, Any, Any]:
     # Of one pixel: the number of pixels changes no type.
     film = scene.film.model_copy(update={"width": 1, "height": 1})
-    jobs, _ = jobs_of(scene.model_copy(update={"film": film}))
+    jobs = jobs_of(scene.model_copy(update={"film": film}))
     return jobs, scene.tables, scene.camera.setup(1, 1), film.filter.setup()
 
 

@@ -28,7 +28,7 @@ from reference_rt.cameras.film import (
     TentFilter,
 )
 from reference_rt.integrators import Whitted
-from reference_rt.lights import Constant, Directional, EnvironmentMap, Point, Spot
+from reference_rt.lights import Constant, Directional, EnvironmentMap, Point, Projector, Spot
 from reference_rt.lights.selection.choice import FEW
 from reference_rt.materials import (
     Blend,
@@ -42,6 +42,7 @@ from reference_rt.materials import (
     Phong,
     Plastic,
     Principled,
+    PrincipledThin,
     RoughConductor,
     RoughDielectric,
     RoughPlastic,
@@ -91,6 +92,7 @@ _LEAVES = {
     "plastic": Plastic(),
     "rough plastic": RoughPlastic(),
     "principled": Principled(),
+    "principled thin": PrincipledThin(),
     "phong": Phong(diffuse=(0.1, 0.1, 0.1)),
 }
 """Every BSDF."""
@@ -104,6 +106,12 @@ _NESTED = {
 
 _LAMPS = (
     Spot(origin=(0.0, 3.0, 0.0), target=(0.0, 0.0, 0.0), intensity=(1.0, 1.0, 1.0)),
+    Projector(
+        origin=(0.0, 3.0, 0.0),
+        target=(0.0, 0.0, 0.0),
+        up=(0.0, 0.0, 1.0),
+        irradiance=(1.0, 1.0, 1.0),
+    ),
     Directional(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0)),
     *(Point(position=(k, 3.0, 0.0), intensity=(1.0, 1.0, 1.0)) for k in range(FEW)),
 )

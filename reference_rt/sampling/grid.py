@@ -16,11 +16,12 @@ def _square(n: int) -> int:
 
 
 class Grid(Description):
-    """The centres of n x n equal cells of the pixel; every other number is 1/2."""
+    """The centres of n x n equal cells of the pixel, without random numbers: for deterministic
+    integrators."""
 
     type: Literal["grid"] = "grid"
     spp: Annotated[int, Field(ge=1, le=2**31), AfterValidator(_square)] = 1
-    """Samples per pixel: a square number."""
+    """Samples per pixel: the square of a whole number."""
 
     def setup(self) -> "GridSetup":
         return GridSetup(math.isqrt(self.spp))

@@ -13,12 +13,13 @@ _32 = np.uint64(32)
 
 
 class Independent(Description):
-    """Independent uniform numbers: the plain Monte Carlo baseline."""
+    """Independent uniform random numbers: the plain Monte Carlo baseline."""
 
     type: Literal["independent"] = "independent"
     spp: Annotated[int, Field(ge=1, le=2**31)] = 16
     """Samples per pixel."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """Selects the random numbers: pictures of different seeds are independent."""
 
     def setup(self) -> "IndependentSetup":
         return IndependentSetup(np.uint64(self.seed))

@@ -31,12 +31,14 @@ PASCAL_MASKS = (np.uint64(0xFFFF0000), _ODD_8, _ODD_4, _ODD_2, _ODD_1)
 
 
 class Sobol(Description):
-    """Owen-scrambled Sobol' points: stratified, unbiased, best in powers of two."""
+    """Owen-scrambled Sobol' points: stratified and unbiased, with the least noise for powers of
+    two."""
 
     type: Literal["sobol"] = "sobol"
     spp: Annotated[int, Field(ge=1, le=2**31)] = 16
-    """Samples per pixel."""
+    """Samples per pixel; powers of two have the least noise."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """Selects the random numbers: pictures of different seeds are independent."""
 
     def setup(self) -> "SobolSetup":
         return SobolSetup(np.uint64(self.seed))

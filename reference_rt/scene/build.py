@@ -80,7 +80,7 @@ def _texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
         parts.setdefault(code, []).append(table)
         kinds.append(code)
         rows.append(len(parts[code]) - 1)
-        maps.append(texture.uv.matrix())
+        maps.append(texture.uv.coefficients())
         greatest.append(module.greatest(table))
     tables = {
         field: _joined(module, parts[code]) if code in parts else None

@@ -52,7 +52,7 @@ def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lig
     tables: dict[str, Any] = {}
     for code, field, description, module in TABLES:
         found: list[Any] = [light for light in scene.lights if isinstance(light, description)]
-        tables[field] = join([light.tabulate() for light in found]) if found else None
+        tables[field] = join([light.tabulate(palette) for light in found]) if found else None
         if found:
             kinds += [code] * len(found)
             rows += range(len(found))
@@ -138,6 +138,8 @@ def _tree(lights: Lights, geometry: Geometry, power: FloatArray) -> LightTree | 
         parts.append(bounds.of_points(lights.points))
     if lights.spots is not None:
         parts.append(bounds.of_spots(lights.spots))
+    if lights.projectors is not None:
+        parts.append(bounds.of_projectors(lights.projectors))
     columns = (np.concatenate(column)[placed] for column in zip(*parts, strict=True))
     return build(LightBounds(*columns), placed, len(kind))
 

@@ -46,26 +46,32 @@ class SceneModel(Description):
     """Everything that determines a picture.  Right-handed world; linear sRGB; scene units."""
 
     description: str = ""
-    """A line for people."""
+    """One line about the scene, for people."""
     camera: AnyCamera = Perspective()
+    """The view.  Default: a perspective camera at [0, 0, 1] that looks at the origin, 45 degrees
+    wide."""
     film: Film = Film()
+    """Size of the picture, reconstruction filter and additional layers."""
     sampler: AnySampler | None = None
-    """Where samples lie; none: Sobol' points for path tracing, pixel centres otherwise."""
+    """The samples of each pixel.  Default: `sobol` for `path` and `direct`, `grid` (pixel centres)
+    for `whitted` and `ray_cast`."""
     integrator: AnyIntegrator = PathTracing()
+    """How light is computed.  Default: path tracing."""
     textures: dict[str, AnyTexture] = Field(default_factory=dict)
-    """Textures by name, which parameters of materials take."""
+    """Textures by name, which parameters of materials refer to."""
     materials: dict[str, AnyMaterial] = Field(default_factory=dict)
-    """Materials by name."""
+    """Materials by name, which shapes and other materials refer to."""
     shapes: tuple[AnyShape, ...] = Field(default=(), strict=False)
+    """All surfaces and solids; the index of a shape is its place in this list, from 0."""
     groups: dict[str, Annotated[tuple[AnyShape, ...], Field(strict=False, min_length=1)]] = Field(
         default_factory=dict
     )
-    """Shapes by name, stored once, which shapes of type `instance` draw."""
+    """Lists of shapes by name, stored once, which shapes of type `instance` draw."""
     hierarchy: Literal["auto", "sah", "median", "spatial", "none"] = "auto"
-    """How rays are led to shapes: by surface area heuristic, median split, spatial splits, or each
-    shape in turn; auto: the first, where the shapes are not few.  Pictures are the same."""
+    """The acceleration structure: a BVH by surface area heuristic, median split or spatial splits,
+    or none.  Default: `sah`, but `none` for a few shapes.  The picture does not depend on it."""
     lights: tuple[AnyLight, ...] = Field(default=(), strict=False)
-    """Lights that are not shapes; a shape with an emissive material is a light too."""
+    """Lights that are not shapes; a shape with an emissive material is a light, too."""
 
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: "tuple[str, str] | None" = PrivateAttr(default=None)
@@ -87,6 +93,8 @@ class SceneModel(Description):
                     material_paths(name, self.materials)
                 except ValueError as error:
                     raise SceneError(str(error), ("materials", name)) from None
+        for i, light in enumerate(self.lights):
+            self._check_textures(light, "lights", i)
         if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
             raise SceneError("more than one environment; expected at most one", ("lights",))
         if isinstance(self.sampler, Grid) and not self.integrator.deterministic:
@@ -97,12 +105,15 @@ class SceneModel(Description):
             )
         return self
 
+    def _check_textures(self, part: Description, *path: str | int) -> None:
+        """Check that the textures that a material or a light names exist."""
+        for field, texture in texture_names(part).items():
+            if texture not in self.textures:
+                raise SceneError(no_such("texture", texture, self.textures), (*path, *field))
+
     def _check_parts(self, name: str, material: Material) -> None:
         """Check that the textures and materials that a material names exist and fit."""
-        for field, texture in texture_names(material).items():
-            if texture not in self.textures:
-                message = no_such("texture", texture, self.textures)
-                raise SceneError(message, ("materials", name, field))
+        self._check_textures(material, "materials", name)
         bases: tuple[str, ...] = ()
         if isinstance(material, Emissive):
             bases = ("base",)

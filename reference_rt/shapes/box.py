@@ -29,7 +29,7 @@ from reference_rt.shapes.shape import (
 
 
 class Box(Shape):
-    """The cube [-1, 1]³, outward normals, where its transform takes it."""
+    """The cube [-1, 1]³ with outward normals.  A transform may give it any size and place."""
 
     type: Literal["box"] = "box"
 

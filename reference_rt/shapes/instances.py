@@ -17,11 +17,11 @@ from reference_rt.shapes.shape import Shape, Tangents
 
 
 class Instance(Shape):
-    """The shapes of a group of the scene, where the transform takes them."""
+    """A copy of a group's shapes, which are stored once, under a transform."""
 
     type: Literal["instance"] = "instance"
     group: str
-    """A key of the scene's groups."""
+    """Name of the group in the scene's `groups`."""
 
 
 class Instances(NamedTuple):

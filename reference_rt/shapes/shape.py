@@ -39,10 +39,11 @@ class Shape(Description):
     """A shape of the scene: what it is made of and where it stands."""
 
     material: str | None = None
-    """A key of the scene's materials; none means diffuse grey of reflectance 0.5, in a group or a
-    solid that of the whole."""
+    """Name of the material.  Default: that of the group or the solid that the shape is in, else
+    diffuse grey of reflectance 0.5."""
     transform: Transform = ()
-    """Steps from the shape's own coordinates to the world's, the first one first."""
+    """Steps from the shape's own coordinates to the world's (in a group: to the group's), the first
+    one first.  Default: none."""
 
     def tabulate(self, context: TabulationContext) -> Any:
         """This shape as rows of its table.  Raises ValueError (what is wrong, what was
@@ -78,24 +79,24 @@ class Solid(Shape):
     """
 
     of: Annotated[tuple["AnyOperand", ...], Field(strict=False, min_length=1)]  # type: ignore[name-defined]  # noqa: F821
-    """The operands: shapes that enclose space, or trees of them."""
+    """The operands, at least one: shapes that enclose space, or solids again."""
     # `AnyOperand` names every type of shape: `shapes/csg/description.py` completes the models.
 
 
 class Union(Solid):
-    """All points of any operand."""
+    """The solid of all points that are in any operand."""
 
     type: Literal["union"] = "union"
 
 
 class Intersection(Solid):
-    """The points that all operands share."""
+    """The solid of the points that are in all operands."""
 
     type: Literal["intersection"] = "intersection"
 
 
 class Difference(Solid):
-    """The points of the first operand that are in none of the others."""
+    """The solid of the points of the first operand that are in none of the others."""
 
     type: Literal["difference"] = "difference"
 

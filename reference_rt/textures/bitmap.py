@@ -22,19 +22,21 @@ _CLAMP, _MIRROR = 1, 2
 
 
 class Bitmap(Texture):
-    """An image; (u, v) = (0, 0) is its lower left corner, (1, 1) its upper right one."""
+    """An image: (u, v) = (0, 0) is its lower left corner, (1, 1) its upper right one."""
 
     type: Literal["bitmap"] = "bitmap"
     file: str
-    """.exr, .hdr, .pfm, .npy, .png, .jpg and what Pillow reads besides, relative to the scene."""
+    """The image, relative to the scene file: .exr, .hdr, .pfm, .npy, .png, .jpg and other formats
+    that Pillow reads."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
+    """The colour between texel centres: interpolated, or that of the nearest texel."""
     wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
-    """What lies beyond (0, 1)."""
+    """The colour outside of [0, 1]: the image repeated, its rim, or the image mirrored."""
     encoding: Literal["auto", "srgb", "raw"] = "auto"
-    """srgb: values are decoded to linear ones; raw: used as they are; auto: srgb for files of
-    integers, raw for files of floats."""
+    """`srgb`: values are decoded to linear ones.  `raw`: values are used as they are.  `auto`:
+    `srgb` for files of integers, `raw` for files of floats."""
     scale: Positive = 1.0
-    """A factor for linear values: lamps and heights may need values above 1."""
+    """A factor of the linear values: radiance and heights may need values above 1."""
 
     def tabulate(self, folder: Path, out: FloatArray | None = None) -> "Bitmaps":
         """One row of the table.  out (n, 3): if it is large enough, texels are written to its

@@ -14,12 +14,15 @@ from reference_rt.textures.texture import Texture
 
 
 class Checker(Texture):
-    """Two colours: `first` where u and v lie in the same half of their unit intervals, `second`
-    where they do not."""
+    """Two colours in squares: `first` where u and v lie in the same half of their unit intervals,
+    `second` elsewhere."""
 
     type: Literal["checker"] = "checker"
     first: Colour = (0.4, 0.4, 0.4)
+    """Colour where u and v are in the same half of their unit intervals: linear sRGB of at least 0.
+    """
     second: Colour = (0.2, 0.2, 0.2)
+    """Colour of the other fields: linear sRGB of at least 0."""
 
     def tabulate(self, folder: Path) -> "Checkers":
         return Checkers(np.array([self.first]), np.array([self.second]))

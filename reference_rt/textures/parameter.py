@@ -57,17 +57,30 @@ UnitParameter = Annotated[
 ]
 """A number from 0 to 1, or the name of a texture, of which the luminance is used."""
 
+DoubleUnitParameter = Annotated[
+    float | str,
+    MayBeTexture(),
+    _or_name(_number(0.0, 2.0)),
+    _schema({"type": "number", "minimum": 0, "maximum": 2}),
+]
+"""The same from 0 to 2."""
+
 TextureName = Annotated[str, MayBeTexture()]
 """The name of a texture."""
 
 
-def texture_names(description: Description) -> dict[str, str]:
-    """The names of the textures that a description's fields refer to, by field."""
-    found = {}
-    for field, info in type(description).model_fields.items():
+def texture_names(description: Description) -> dict[tuple[str | int, ...], str]:
+    """The names of the textures that a description's fields refer to, by key path: the field, and
+    for one of several values its number."""
+    found: dict[tuple[str | int, ...], str] = {}
+    for field, info in type(description).__pydantic_fields__.items():
         value = getattr(description, field)
-        if isinstance(value, str) and any(isinstance(m, MayBeTexture) for m in info.metadata):
-            found[field] = value
+        if not any(isinstance(m, MayBeTexture) for m in info.metadata):
+            continue
+        if isinstance(value, str):
+            found[(field,)] = value
+        elif isinstance(value, tuple):
+            found |= {(field, k): x for k, x in enumerate(value) if isinstance(x, str)}
     return found
 
 
@@ -104,6 +117,12 @@ class Palette:
         if isinstance(value, str):
             return Numbers(np.zeros(1), np.array([self.number(value, most)]))
         return Numbers(np.array([value], dtype=np.float64), np.array([-1]))
+
+    def brightest(self, value: tuple[float, float, float] | str) -> float:
+        """A colour's luminance; of a texture an upper bound, its largest value."""
+        if isinstance(value, str):
+            return float(self.greatest[self.numbers_of[value]])
+        return float(luminance(Vec3(*value)))
 
     def number(self, name: str, most: float) -> int:
         """The index of the texture `name`.  Raises ValueError if it has values above `most`."""

@@ -1,10 +1,10 @@
 """What all textures share: the base description, the codes of their tables, and the uv map."""
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
@@ -33,16 +33,33 @@ Pair = Annotated[
 """Two numbers, or one for both."""
 
 
+_Row = Annotated[tuple[float, float, float], Field(strict=False)]
+
+
 class UvMap(Description):
-    """From surface coordinates to texture coordinates: scaled, then rotated, then translated."""
+    """The map from surface coordinates to texture coordinates: scaled, then rotated, then moved; or
+    any affine map."""
 
     scale: Pair = (1.0, 1.0)
+    """Factors of u and v: one number for both, or two.  Larger ones make the pattern smaller."""
     rotate: float = 0.0
-    """Angle in degrees, counterclockwise in (u, v)."""
+    """Angle in degrees, counter-clockwise in (u, v), after scaling."""
     offset: Pair = (0.0, 0.0)
+    """Added to u and v at last: one number for both, or two."""
+    matrix: Annotated[tuple[_Row, _Row], Field(strict=False)] | None = None
+    """Two rows of three in place of all these: u' = a u + b v + c, v' = d u + e v + f."""
 
-    def matrix(self) -> FloatArray:
+    @model_validator(mode="after")
+    def _one_of(self) -> Self:
+        others = self.scale, self.rotate, self.offset
+        if self.matrix is not None and others != ((1.0, 1.0), 0.0, (0.0, 0.0)):
+            raise ValueError("has 'matrix' and others; expected it alone, or scale, rotate, offset")
+        return self
+
+    def coefficients(self) -> FloatArray:
         """(6,): u' = m0 u + m1 v + m2, v' = m3 u + m4 v + m5."""
+        if self.matrix is not None:
+            return np.array(self.matrix, dtype=np.float64).ravel()
         degrees = self.rotate % 360.0
         turn = math.radians(degrees)
         # Quarter turns are exact.
@@ -59,7 +76,7 @@ class Texture(Description):
     """A colour, or through its luminance a number, for every point of a surface."""
 
     uv: UvMap = UvMap()
-    """The map from the surface's coordinates to the texture's."""
+    """The map from the surface's coordinates (u, v) to the texture's.  Default: none."""
 
     def tabulate(self, folder: Any) -> Any:
         """One row of the texture's table.  Raises ValueError (what is wrong, what was expected)."""

@@ -13,13 +13,13 @@ from reference_rt.textures.texture import Texture
 
 
 class VertexColours(Texture):
-    """The colours of a mesh's vertices; the `uv` map is ignored."""
+    """The colours of a mesh's vertices, interpolated; the `uv` map is ignored."""
 
     type: Literal["vertex_colours"] = "vertex_colours"
     without: Colour = (0.5, 0.5, 0.5)
-    """The colour of shapes without vertex colours."""
+    """The colour of shapes without vertex colours: linear sRGB of at least 0."""
     scale: Positive = 1.0
-    """A factor for vertex colours."""
+    """A factor of the vertex colours."""
 
     def tabulate(self, folder: Path) -> "VertexColourTable":
         return VertexColourTable(np.array([self.without]), np.array([self.scale]))

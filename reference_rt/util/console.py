@@ -87,6 +87,12 @@ class ProgressLine(Bar):
             if not self.is_terminal and seconds > _PATIENCE:
                 self.line(f"{words}: {seconds:.1f} s")
 
+    def note(self, text: str) -> None:
+        """Shows a few words beside the bar of the present step, on a terminal."""
+        for what, task in self._tasks.items():
+            words = _WORDS.get(what, what)
+            self._bar.update(task, description=f"{words}, {text}" if text else words)
+
     def compiling(self, done: int, total: int) -> None:
         """The step "compile", by the numbers of kernels that are compiled, and of all."""
         self("compile", done / total)

@@ -93,3 +93,9 @@ class ReferenceUnavailableError(ReferenceRtError):
     """The reference renderer is missing or could not run."""
 
     exit_code = 4
+
+
+class WorkersError(ReferenceRtError):
+    """Processes or machines that a render was to be computed on are missing, differ, or died."""
+
+    exit_code = 4

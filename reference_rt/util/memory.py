@@ -30,3 +30,12 @@ def check_memory(needed: int, what: str) -> None:
             f"has {what}, which take {needed / 2**30:.1f} GiB of memory; expected at most the "
             f"{there / 2**30:.1f} GiB that there are"
         )
+
+
+def resident_memory() -> int | None:
+    """The bytes of memory that this process has now; None where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError, AttributeError):
+        return None

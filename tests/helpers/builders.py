@@ -188,11 +188,12 @@ lights:
 
 EVERY_LAW = """\
 camera: {type: perspective, eye: [0, 1.5, 6], target: [0, 0.2, 0], fov: 60}
-film: {width: 12, height: 8, filter: {type: mitchell}, layers: [albedo, normal]}
+film: {width: 12, height: 8, filter: {type: mitchell}, layers: [albedo, normal, position]}
 sampler: {type: sobol, spp: 2, seed: 3}
 integrator: {type: path, rr_depth: 2}
 textures:
   checks: {type: checker, first: [0.8, 0.7, 0.2], second: 0.3, uv: {scale: [6, 4], rotate: 20}}
+  oblique: {type: checker, first: 0.7, second: 0.3, uv: {matrix: [[4, 1, 0], [0.5, 3, 0.1]]}}
   image: {type: bitmap, file: image.png, uv: {scale: 3}}
   numbers: {type: bitmap, file: image.png, encoding: raw, wrap: mirror, uv: {offset: [0.2, 0.1]}}
   own: {type: vertex_colours}
@@ -203,7 +204,7 @@ materials:
   gold: {type: conductor, eta: [0.14, 0.37, 1.44], k: [3.98, 2.39, 1.6]}
   glass: {type: dielectric, transmittance: [0.9, 1, 0.9]}
   pane: {type: thin_dielectric}
-  brushed: {type: rough_conductor, eta: 0.2, k: 3, alpha: [0.1, 0.4]}
+  brushed: {type: rough_conductor, eta: 0.2, k: 3, alpha: [0.1, numbers]}
   cast: {type: rough_conductor, eta: 0.2, k: 3, distribution: beckmann, alpha: numbers}
   frosted: {type: rough_dielectric, alpha: 0.3}
   coat: {type: plastic, reflectance: image, nonlinear: true}
@@ -211,6 +212,9 @@ materials:
   car:
     {type: principled, base_colour: image, roughness: numbers, metallic: 0.3, anisotropic: 0.4,
      sheen: 0.4, sheen_tint: 0.5, clearcoat: 0.5, spec_trans: 0.2, spec_tint: 0.3, flatness: 0.2}
+  leaf:
+    {type: principled_thin, base_colour: image, roughness: 0.4, spec_trans: numbers, eta: 1.3,
+     sheen: 0.3, diff_trans: 0.7, anisotropic: 0.3}
   wax: {type: phong, ambient: 0.1, diffuse: 0.1, specular: 0.6, exponent: 20, mirror: 0.1}
   chalk: {type: phong, diffuse: 0.1, specular: [0.1, 0.2, 0.3], exponent: 30, half_vector: true}
 shapes:
@@ -229,6 +233,7 @@ shapes:
   - {type: sphere, center: [-0.6, 0, 0], radius: 0.5, material: dull}
   - {type: sphere, center: [0.6, 0, 0], radius: 0.5, material: car}
   - {type: sphere, center: [1.8, 0, 0], radius: 0.5, material: wax}
+  - {type: sphere, center: [4.2, 0, 0], radius: 0.5, material: leaf}
   - {type: sphere, center: [3, 0, 0], radius: 0.5, material: chalk}
 lights:
   - {type: point, position: [0, 4, 2], intensity: 9}
@@ -253,7 +258,7 @@ materials:
   mix: {type: blend, first: silver, second: grey, weight: 0.7}
   sheet: {type: two_sided, base: grey, back: mix}
   dents: {type: bump, base: sheet, height: numbers, scale: 0.1}
-  tiles: {type: normal_map, base: mix, normals: numbers}
+  tiles: {type: normal_map, base: mix, normals: numbers, use_shadowing_function: true}
   glow: {type: emissive, radiance: image, base: dents}
   lamp: {type: emissive, radiance: [3, 2, 1]}
 shapes:
@@ -274,6 +279,8 @@ lights:
   - {type: point, position: [3, 4, -2], intensity: 2}
   - {type: spot, origin: [0, 4, 0], target: [0, 0, 0], intensity: 9, cutoff_angle: 50}
   - {type: spot, origin: [5, 4, 3], target: [0, 0, 0], intensity: 9}
+  - {type: spot, origin: [-5, 4, 3], target: [0, 0, 0], intensity: 9, texture: image}
+  - {type: projector, origin: [0, 4, 5], target: [0, 0, 0], irradiance: image, fov: 70, aspect: 2}
   - {type: directional, direction: [1, -2, -1], irradiance: [0.3, 0.4, 0.5]}
   - type: environment_map
     file: image.png

@@ -48,7 +48,7 @@ def read(page, row, number=1):
 
 def shown(page):
     """Kinds of the pictures of the first case that show."""
-    figures = page.locator("#case-1 figure")
+    figures = page.locator("#case-1 .row figure")
     return [
         figures.nth(i).get_attribute("data-kind")
         for i in range(figures.count())

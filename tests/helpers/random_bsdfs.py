@@ -6,6 +6,7 @@ from leaf_checks import random_direction
 from reference_rt.materials.bsdfs.phong import Phong
 from reference_rt.materials.bsdfs.plastic import Plastic
 from reference_rt.materials.bsdfs.principled import Principled
+from reference_rt.materials.bsdfs.principled_thin import PrincipledThin
 from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic
 
 NUMBERS = (
@@ -63,3 +64,28 @@ def random_principled(n, seed, least=0.2):
             fields["eta"] = 0.7
         wo = random_direction(rng, k, front=fields["spec_trans"] == 0 or fields["metallic"] == 1)
         yield Principled(base_colour=rng.uniform(0, 1, 3).tolist(), **fields), wo
+
+
+THIN_NUMBERS = (
+    "anisotropic",
+    "spec_trans",
+    "spec_tint",
+    "sheen",
+    "sheen_tint",
+    "flatness",
+)
+
+
+def random_thin(n, seed, least=0.2):
+    """(description, wo): a third of the numbers 0 and a sixth 1; roughness from `least`; wo from
+    both sides."""
+    rng = np.random.default_rng(seed)
+    for k in range(n):
+        fields = {name: float(np.clip(rng.uniform(-0.67, 1.33), 0, 1)) for name in THIN_NUMBERS}
+        fields["roughness"] = rng.uniform(least, 1)
+        fields["anisotropic"] *= 0.8
+        fields["diff_trans"] = 2.0 * float(np.clip(rng.uniform(-0.67, 1.33), 0, 1))
+        # Microfacets that transmit are (0.65 eta - 0.35) times as rough.
+        fields["eta"] = float(rng.uniform(1.4, 2.5)) if k % 11 != 10 else 0.3
+        wo = random_direction(rng, k, front=False)
+        yield PrincipledThin(base_colour=rng.uniform(0, 1, 3).tolist(), **fields), wo

@@ -4,7 +4,7 @@ from builders import SCENES
 
 import reference_rt as rt
 
-LAYERS = ("albedo", "normal", "depth", "id", "variance")
+LAYERS = ("albedo", "normal", "position", "depth", "id", "variance")
 
 
 def small(name):

@@ -35,6 +35,7 @@ MATERIALS = {
     "plastic": rt.Plastic(),
     "rough plastic": rt.RoughPlastic(alpha=0.2),
     "principled": rt.Principled(roughness=0.4, metallic=0.5, clearcoat=0.5),
+    "principled thin": rt.PrincipledThin(spec_trans=0.5, diff_trans=1.0),
     "phong": rt.Phong(diffuse=0.1, specular=0.3, exponent=20.0),
     "lamp": rt.Emissive(radiance=tuple(RADIANCE)),
     "checks": rt.Diffuse(reflectance="white and black"),
@@ -80,6 +81,7 @@ _HIDDEN_SHAPES = (
 _HIDDEN_LIGHTS = (
     rt.Point(position=(0, -0.5, 0), intensity=0),
     rt.Spot(origin=(0, -0.5, 0), target=(0, -1, 0), intensity=0),
+    rt.Projector(origin=(0, -0.5, 0), target=(0, -1, 0), up=(1, 0, 0), irradiance=0),
     rt.Directional(direction=(0, 1, 0), irradiance=0),
     rt.Ambient(radiance=0),
 )

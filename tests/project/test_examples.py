@@ -1,5 +1,7 @@
 """The scripts of examples/ run, and print what their numbers must be."""
 
+import ast
+import json
 import re
 import runpy
 import sys
@@ -64,3 +66,40 @@ def test_batch(run, tmp_path):
 @pytest.mark.parametrize(("power", "verdict"), [("0.5", "agree"), ("0.4", "differ")])
 def test_gate_a_renderer(run, power, verdict):
     assert run("gate_a_renderer", power).startswith(verdict)
+
+
+NOTEBOOK = json.loads((ROOT / "examples/tour.ipynb").read_text(encoding="utf-8"))
+CODE = ["".join(c["source"]) for c in NOTEBOOK["cells"] if c["cell_type"] == "code"]
+
+
+def test_the_notebook_is_stored_without_outputs():
+    """They would be large, and change with every run."""
+    assert [c["outputs"] for c in NOTEBOOK["cells"] if c["cell_type"] == "code"] == [[]] * len(CODE)
+
+
+def cells_run(code):
+    """What each cell shows: the value of its last line, as in Jupyter."""
+    names = {"__name__": "__main__"}
+    for source in code:
+        *first, last = ast.parse(source).body
+        exec(compile(ast.Module(first, []), "tour.ipynb", "exec"), names)
+        if isinstance(last, ast.Expr):
+            yield eval(compile(ast.Expression(last.value), "tour.ipynb", "eval"), names)
+        else:
+            exec(compile(ast.Module([last], []), "tour.ipynb", "exec"), names)
+            yield None
+
+
+def test_tour(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    _, picture, fields, (t, shape, _), case = cells_run(CODE)
+    assert picture._repr_png_().startswith(b"\x89PNG")
+    assert "data:image/png" in picture._repr_html_()
+    assert all(fields.values())
+    assert (t[0], shape[0]) == (3.0, 0)
+    assert case.verdict == "agree"
+    page = case._repr_html_()
+    assert page.count("<img") == 3
+    assert "agree" in page
+    assert "reference_rt" not in repr(case)
+    assert repr(case).startswith("<Case scene: agree: no difference was found")

@@ -3,22 +3,18 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rich.table import Table
+from rich.console import RenderableType
 
 from comparisons.experiments.bench.row import LIMIT, Row
+from comparisons.report.terminal import fitted
 
 _COLUMNS = ("what", "ours", "against", "ratio", "quartiles", "goal", "met")
 
 
-def terminal(rows: Sequence[Row]) -> Table:
-    """The table for a terminal."""
-    table = Table(show_edge=False, pad_edge=False)
-    for name in _COLUMNS:
-        table.add_column(name, overflow="fold")
-    for row in rows:
-        cells = _cells(row)
-        table.add_row(*cells, style=None if row.met else "yellow")
-    return table
+def terminal(rows: Sequence[Row], width: int) -> RenderableType:
+    """The table for a terminal of so many columns."""
+    styles = [None if row.met else "yellow" for row in rows]
+    return fitted(width, _COLUMNS, [_cells(row) for row in rows], styles=styles)
 
 
 def markdown(

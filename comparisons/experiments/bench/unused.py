@@ -17,8 +17,9 @@ from reference_rt.jit.kernel import precompile, signature_of
 from reference_rt.lights import Constant
 from reference_rt.materials import AnyMaterial, Diffuse
 from reference_rt.rendering.picture import Picture
-from reference_rt.rendering.render import render, run_tiles
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.rendering.thread_pool import run_tiles
 from reference_rt.sampling import Sobol
 from reference_rt.shapes import Sphere
 

@@ -102,7 +102,8 @@ class Reached(NamedTuple):
 
 
 def time_to(points: Points, error: float, independent: bool = False) -> Reached | None:
-    """When the curve has come down to `error`; None where it is too short to tell, or rises.
+    """When the curve has come down to `error`; None where it is too short to tell, or rises, or
+    where its times do not.
 
     Between rungs by a line through the logarithms.  Beyond the last one by what theory has: of
     stratified samples one part of the variance falls as 1 / n, as that of independent ones does
@@ -140,11 +141,13 @@ def _continued(
     points: Points, times: FloatArray, falls: FloatArray, goal: float, independent: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Logarithms of seconds and samples (DRAWS,) at which curves reach `goal` beyond their last
-    rung; infinite where the measured one does not fall."""
+    rung; infinite where the measured one does not fall, or its seconds do not rise: more samples
+    would seem to cost nothing."""
     spp = points.spp[-LAST:]
     scatter = np.where(points.log_errors_error > 0.0, points.log_errors_error, 1.0)[-LAST:]
     falling = np.polyfit(np.log(spp), falls[0, -LAST:], 1, w=1.0 / scatter)[0] < 0.0
-    if not falling:
+    start, per_sample = linear_time(points.spp, points.seconds)
+    if not (falling and per_sample > 0.0):
         return np.full(DRAWS, np.inf), np.full(DRAWS, np.inf)
     terms = _one_term if independent else _two_terms
     a, c = terms(spp, np.exp(falls[:, -LAST:]), scatter * points.errors[-LAST:])
@@ -155,7 +158,6 @@ def _continued(
     for _ in range(50):
         x = x - ((a + c * x) * x * x - error) / ((2.0 * a + 3.0 * c * x) * x)
     log_spp = np.maximum(-2.0 * np.log(x), math.log(spp[-1]))
-    start, per_sample = linear_time(points.spp, points.seconds)
     log_seconds = np.log(start + per_sample * np.exp(log_spp)) + (times[:, -1] - times[0, -1])
     return log_seconds, log_spp
 

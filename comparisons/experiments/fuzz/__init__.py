@@ -3,6 +3,7 @@
 - `types.py`: the types of the scene schema, and which of them occur in a scene;
 - `fields.py`, `meshes.py`, `assets.py`: random values of fields, meshes, and files;
 - `parts.py`, `assemble.py`, `generate.py`: random parts, and the scene that is made of them;
+- `effort.py`: what scenes are made of, and how much work each is worth;
 - `check.py`: one scene through the rungs, `identities/` through changes that must not matter;
 - `reduce/`: a failing scene made small while it fails in the same way;
 - `worker.py`, `run.py`, `stored.py`: processes that may crash, and results that a run resumes;

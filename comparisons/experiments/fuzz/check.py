@@ -9,12 +9,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
 from comparisons.compare.judge import judge
 from comparisons.experiments.fuzz.data import Data
+from comparisons.experiments.fuzz.effort import DETERMINISTIC, Effort
 from comparisons.experiments.fuzz.finding import Checked, Finding, without_numbers
 from comparisons.experiments.fuzz.generate import parse
 from comparisons.experiments.fuzz.identities import IDENTITIES
@@ -37,33 +37,11 @@ from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError, SceneWarning
 
-DETERMINISTIC = ("film", "geometry", "direct", "whitted", "layers")
-"""Rungs without noise."""
-
-RUNGS = ("render", "identities", *DETERMINISTIC, "statistics")
-"""What a scene is put through, in this order."""
-
 FAILED = ("differ", "invalid")
 
 COARSE = 0.35
 """The cells along each side of meshes that stand in for shapes that Mitsuba lacks, as a fraction of
 those of other comparisons: a scene with a quadric takes a third of the time."""
-
-
-class Effort(BaseModel):
-    """rungs: some of RUNGS;  pixels: camera rays of geometry and Whitted;  light_pixels: of direct
-    light;  spp, replicates: of statistics;  identity_rays: that each identity traces;  every: the
-    statistics of each so many-th scene only."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    rungs: tuple[str, ...] = RUNGS
-    pixels: int = 48
-    light_pixels: int = 24
-    spp: int = 16
-    replicates: int = 8
-    identity_rays: int = 240
-    every: int = 4
 
 
 def check(data: Data, number: int, effort: Effort, folder: Path) -> Checked:

@@ -2,7 +2,6 @@
 
 import json
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,21 +9,13 @@ import numpy as np
 from comparisons.experiments.fuzz import parts
 from comparisons.experiments.fuzz.assemble import Assembly
 from comparisons.experiments.fuzz.data import Data, text_of
+from comparisons.experiments.fuzz.effort import Grammar
 from comparisons.experiments.fuzz.fields import Draw, rounded
 from comparisons.experiments.fuzz.types import GROUPS, kind_of
 from reference_rt.integrators import RayCast
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneWarning
-
-
-@dataclass(frozen=True)
-class Grammar:
-    """features: names of types and of GROUPS, of each of which every scene has one at least;
-    extreme: also far, tiny and thin ones."""
-
-    features: tuple[str, ...] = ()
-    extreme: bool = False
 
 
 def generate(seed: int, number: int, grammar: Grammar, folder: Path) -> Data:

@@ -86,11 +86,17 @@ def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> 
         shutil.copytree(Path(reference_rt.__file__).parent, package, ignore=skipped)
         (package / fault.file).write_text(text, encoding="utf-8")
         path = os.environ.get("PYTHONPATH", "")
+        environment = {
+            **os.environ,
+            "PYTHONPATH": f"{temporary}{os.pathsep}{path}".rstrip(os.pathsep),
+        }
+        # -P: do not import from the current folder, which may have a reference_rt.
+        command = [sys.executable, "-P", "-m", "reference_rt.cli"]
+        subprocess.run([*command, "warm-up"], env=environment, capture_output=True, check=False)
         words = ["--count", str(count), "--seed", str(seed), "--jobs", str(jobs), "--stop"]
         run = subprocess.run(
-            # -P: do not import from the current folder, which may have a reference_rt.
-            [sys.executable, "-P", "-m", "reference_rt.cli", "fuzz", *words, "--out", str(folder)],
-            env={**os.environ, "PYTHONPATH": f"{temporary}{os.pathsep}{path}".rstrip(os.pathsep)},
+            [*command, "fuzz", *words, "--out", str(folder)],
+            env=environment,
             capture_output=True,
             text=True,
             timeout=SECONDS,

@@ -4,8 +4,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from comparisons.experiments.fuzz.check import FAILED, Effort, of_rung
+from comparisons.experiments.fuzz.check import FAILED, of_rung
 from comparisons.experiments.fuzz.data import Data, text_of
+from comparisons.experiments.fuzz.effort import Effort
 from comparisons.experiments.fuzz.finding import Checked, Finding, without_numbers
 from comparisons.experiments.fuzz.request import Request
 from comparisons.experiments.fuzz.types import types_in

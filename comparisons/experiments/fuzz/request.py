@@ -5,10 +5,9 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from comparisons.experiments.fuzz.check import Effort
 from comparisons.experiments.fuzz.data import Data
+from comparisons.experiments.fuzz.effort import Effort, Grammar
 from comparisons.experiments.fuzz.finding import Finding
-from comparisons.experiments.fuzz.generate import Grammar
 
 
 class Request(BaseModel):

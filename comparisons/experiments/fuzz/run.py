@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from comparisons.experiments.fuzz import assets, stored
-from comparisons.experiments.fuzz.check import Effort
 from comparisons.experiments.fuzz.data import Data
+from comparisons.experiments.fuzz.effort import Effort, Grammar
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, without_numbers
-from comparisons.experiments.fuzz.generate import Grammar, generate
+from comparisons.experiments.fuzz.generate import generate
 from comparisons.experiments.fuzz.reduce import reduce
 from comparisons.experiments.fuzz.request import Request
 from comparisons.experiments.fuzz.types import types_in
@@ -149,9 +149,12 @@ def _checked(
             return
         requests = [_request(plan, number) for number in batch]
         fresh: dict[int, Checked] = {}
-        running = pool.run(requests, plan.jobs, plan.limit, lambda r, step: None, WORKER)
-        with contextlib.closing(running):
-            for outcome in running:
+        for tries_left in (1, 0):
+            late: list[Request] = []
+            for outcome in _outcomes(plan, requests):
+                if tries_left and LATE in (outcome.failure or ""):
+                    late.append(outcome.request)
+                    continue
                 if outcome.failure is not None:
                     stored.add(plan.out, _dead(outcome))
                 fresh |= reader.new()
@@ -159,6 +162,18 @@ def _checked(
                 yield fresh.pop(number) if number in fresh else _dead(outcome)
                 if is_late():
                     return
+            # Once more: the first time it may have compiled kernels, or the machine was busy.
+            requests = late
+
+
+LATE = "took longer than"
+"""In the failure of a request whose time was up."""
+
+
+def _outcomes(plan: Plan, requests: list[Request]) -> Iterator[pool.Outcome[Request]]:
+    running = pool.run(requests, plan.jobs, plan.limit, lambda r, step: None, WORKER)
+    with contextlib.closing(running):  # its processes end with it
+        yield from running
 
 
 def _dead(outcome: pool.Outcome[Request]) -> Checked:
@@ -251,7 +266,7 @@ def _outside(plan: Plan, request: Request) -> Reduced:
         one = request.model_copy(update={"task": "scene", "scene": candidate})
         one = one.model_copy(update={"out": plan.out / "tried"})
         one.out.mkdir(exist_ok=True)
-        limit = min(plan.limit, 30.0) if "took longer" not in wanted.cause else plan.limit / 2.0
+        limit = min(plan.limit, 30.0) if LATE not in wanted.cause else plan.limit / 2.0
         (outcome,) = pool.run([one], 1, limit, lambda r, step: None, WORKER)
         return outcome.failure is not None and without_numbers(outcome.failure) == wanted.cause
 

@@ -10,8 +10,9 @@ import os
 import sys
 
 from comparisons.experiments.fuzz import assets, stored
-from comparisons.experiments.fuzz.check import Effort, check
+from comparisons.experiments.fuzz.check import check
 from comparisons.experiments.fuzz.data import Data
+from comparisons.experiments.fuzz.effort import Effort
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced
 from comparisons.experiments.fuzz.generate import generate
 from comparisons.experiments.fuzz.pictures import pictures_of

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rich.table import Table
+from rich.console import RenderableType
 
 from comparisons.experiments.methods.run import Row
 from comparisons.experiments.methods.summary import (
@@ -14,27 +14,26 @@ from comparisons.experiments.methods.summary import (
     total,
 )
 from comparisons.experiments.methods.wording import nanoseconds, percent, units, with_unit
+from comparisons.report.terminal import fitted
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
-    """Tables of one family: its methods at ordinary and extreme settings, and the most extreme
-    setting of each series."""
-    return [_methods(rows), _series(rows)]
+def tables(rows: Sequence[Row], width: int) -> list[RenderableType]:
+    """Tables of one family for a terminal of so many columns: its methods at ordinary and extreme
+    settings, and the most extreme setting of each series."""
+    return [_methods(rows, width), _series(rows, width)]
 
 
-def _methods(rows: Sequence[Row]) -> Table:
-    table = Table(title=rows[0].family, title_justify="left", box=None)
-    table.add_column("method")
-    for kind in ("ordinary", "extreme"):
-        for what in ("ns/ray", "worst error, u", "wrong"):
-            table.add_column(f"{kind}\n{what}", justify="right")
+def _methods(rows: Sequence[Row], width: int) -> RenderableType:
+    whats = ("ns/ray", "worst error, u", "wrong")
+    names = [f"{kind}\n{what}" for kind in ("ordinary", "extreme") for what in whats]
+    lines = []
     for method in methods_of(rows):
         cells = [short(method)]
         for extreme in (False, True):
             some = total(row for row in of_method(rows, method) if row.extreme == extreme)
             cells += _cells(some)
-        table.add_row(*cells)
-    return table
+        lines.append(cells)
+    return fitted(width, ["method", *names], lines, right=names, title=rows[0].family)
 
 
 def _cells(some: Total | None) -> list[str]:
@@ -43,22 +42,19 @@ def _cells(some: Total | None) -> list[str]:
     return [nanoseconds(some.ns), units(some.worst), percent(some.share)]
 
 
-def _series(rows: Sequence[Row]) -> Table:
+def _series(rows: Sequence[Row], width: int) -> RenderableType:
     """At the last x of each series: the share of wrong answers; where that is zero, the worst
     error; where that is the same for all methods, the time."""
-    table = Table(title="most extreme setting of each series", title_justify="left", box=None)
-    table.add_column("series")
-    table.add_column("x", justify="right")
-    names = methods_of(rows)
-    for method in names:
-        table.add_column(short(method), justify="right")
+    methods, lines = methods_of(rows), []
     for series, some in series_of(rows).items():
         last = max(row.x for row in some)
-        there = [row for method in names for row in of_method(some, method) if row.x == last]
+        there = [row for method in methods for row in of_method(some, method) if row.x == last]
         same = len({row.errors.worst for row in there}) == 1
         x = f"{last:.0e}" if some[0].axis else ""
-        table.add_row(series, x, *(_end(row, same) for row in there))
-    return table
+        lines.append([series, x, *(_end(row, same) for row in there)])
+    names = ["x", *map(short, methods)]
+    title = "most extreme setting of each series"
+    return fitted(width, ["series", *names], lines, right=names, title=title)
 
 
 def _end(row: Row, same_error: bool) -> str:

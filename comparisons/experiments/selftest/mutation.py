@@ -1,27 +1,27 @@
 """Mutation testing: which seeded changes of the kernels' source does the harness catch?
 
-A mutant counts if it changes a picture of a small scene that runs the changed function; the rungs
-without pictures are then asked, with few rays and kernels in plain Python (`mutant_worker`).  What
-they miss, the pictures of a suite may still catch: the share is a lower bound.
+A mutant counts if it changes a picture of a small scene that runs the changed function.  Then the
+rungs without pictures are asked, with few rays and kernels in plain Python (`mutant_worker`), since
+that takes seconds.  What they miss is compiled, and compared with the budgets of the smoke suite,
+then with those of the standard suite.
 """
 
 import json
 import os
-import shutil
 import subprocess
-import sys
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from scipy import stats
 
-import reference_rt
 from comparisons.compare.compare import Say
+from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.mutants import Mutant, Place, functions_of, mutants
-from reference_rt.util.child_processes import tied
+from comparisons.experiments.selftest.patched import PACKAGE, run_patched, run_worker
+from comparisons.experiments.selftest.sensitivity import Budgets, compare_patched
 from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import replacing
 
@@ -48,17 +48,25 @@ MOST_SECONDS = 600.0
 """Time limit of one process: a mutant may loop."""
 
 
+WORKER = "comparisons.experiments.selftest.mutant_worker"
+PLAIN = {"NUMBA_DISABLE_JIT": "1", "REFERENCE_RT_MITSUBA_VARIANT": "scalar_rgb"}
+
+FEW_RAYS = "few rays"
+"""What catches a mutant in plain Python: fewer rays than any suite has."""
+
+
 @dataclass(frozen=True)
 class Fate:
     """What became of a mutant: outcome: "same" (no picture changes), "fails" (the renderer stops
-    with an error), "caught" or "survives";  rung, scene: where it was caught, or the scenes whose
-    pictures changed;  reason: of the rung."""
+    with an error), "caught" or "survives";  by: FEW_RAYS or the suite that catches it;  rung,
+    scene: where it was caught, or the scenes whose pictures changed;  reason: of the rung."""
 
     file: str
     function: str
     line: int
     what: str
     outcome: str
+    by: str
     rung: str
     scene: str
     reason: str
@@ -67,59 +75,86 @@ class Fate:
         return asdict(self)
 
 
-def mutation(count: int, seed: int, scenes: Path, say: Say) -> Iterator[Fate]:
-    """The fate of `count` mutants of the functions that SCENES run."""
-    package = Path(reference_rt.__file__).resolve().parent
+def mutation(
+    count: int, seed: int, scenes: Path, budgets: Budgets, say: Say, jobs: int = 2
+) -> Iterator[Fate]:
+    """The fate of `count` mutants of the functions that SCENES run, `jobs` at a time;  budgets: of
+    the suites, the small one first."""
     paths = [str((scenes / f"{name}.yaml").resolve()) for name in SCENES]
     say(f"pictures of {len(paths)} scenes")
-    right = _run(None, package, {"scenes": paths, "calls": True, "before": None})
-    runs: dict[Place, list[str]] = {}
-    for path, found in right.items():
-        for file, function in found.get("functions", ()):
-            if Path(file).is_relative_to(package):  # generated code is in no file
-                place = Path(file).relative_to(package).as_posix(), function
-                runs.setdefault(place, []).append(path)
-    places = [place for place in functions_of(package) if place in runs]
-    say(f"{len(places)} functions")
-    for mutant in mutants(package, places, count, seed):
-        yield _fate(mutant, package, runs[mutant.file, mutant.function], right)
+    with ThreadPoolExecutor(jobs) as pool:
+        tasks = [{"scenes": [path], "calls": True, "before": None} for path in paths]
+        right: dict[str, Any] = {}
+        for answer in pool.map(lambda task: run_worker(WORKER, task, PLAIN, None), tasks):
+            right |= answer
+        runs: dict[Place, list[str]] = {}
+        for path, found in right.items():
+            for file, function in found.get("functions", ()):
+                if Path(file).is_relative_to(PACKAGE):  # generated code is in no file
+                    place = Path(file).relative_to(PACKAGE).as_posix(), function
+                    runs.setdefault(place, []).append(path)
+        places = [place for place in functions_of(PACKAGE) if place in runs]
+        say(f"{len(places)} functions")
+
+        def fate(mutant: Mutant) -> Fate:
+            some = runs[mutant.file, mutant.function][:MOST_SCENES]
+            before = {path: right[path]["picture"] for path in some}
+            plain = by_few_rays(mutant, before)
+            return _by_suites(mutant, plain, scenes, budgets) if _survives(plain) else plain
+
+        yield from pool.map(fate, mutants(PACKAGE, places, count, seed))
+
+
+def _survives(fate: Fate) -> bool:
+    return fate.outcome == "survives"
 
 
 def summary(fates: Sequence[Fate]) -> str:
-    """The share that is caught of those that change a picture, with its 95 % confidence interval
-    (Clopper and Pearson 1934), and the survivors."""
-    caught = sum(fate.outcome == "caught" for fate in fates)
-    left = [fate for fate in fates if fate.outcome == "survives"]
-    n = caught + len(left)
-    low = float(stats.beta.ppf(0.025, caught, n - caught + 1)) if caught else 0.0
-    high = float(stats.beta.ppf(0.975, caught + 1, n - caught)) if left else 1.0
+    """The share that each suite catches of those that change a picture, and the survivors."""
+    left = [fate for fate in fates if _survives(fate)]
+    changing = [fate for fate in fates if fate.outcome in ("caught", "survives")]
     lines = [
-        f"{caught} of {n} mutants that change a picture are caught ({low:.0%} to {high:.0%}); "
-        f"{sum(f.outcome == 'same' for f in fates)} of {len(fates)} change none, "
-        f"{sum(f.outcome == 'fails' for f in fates)} stop the renderer"
+        f"{len(changing)} of {len(fates)} mutants change a picture; "
+        f"{sum(f.outcome == 'same' for f in fates)} change none, "
+        f"{sum(f.outcome == 'fails' for f in fates)} stop the renderer",
+        *(
+            f"{name} catches {_share(sum(f.by in by for f in changing), len(changing))}"
+            for name, by in (
+                ("few rays", (FEW_RAYS,)),
+                ("smoke", (FEW_RAYS, "smoke")),
+                ("standard", (FEW_RAYS, "smoke", "standard")),
+            )
+        ),
     ]
     lines += [f"- {f.file}:{f.line} {f.function}: {f.what} ({f.scene}; {f.reason})" for f in left]
     return "\n".join(lines) + "\n"
 
 
+def _share(caught: int, n: int) -> str:
+    """In words, with its 95 % confidence interval (Clopper and Pearson 1934)."""
+    low = float(stats.beta.ppf(0.025, caught, n - caught + 1)) if caught else 0.0
+    high = float(stats.beta.ppf(0.975, caught + 1, n - caught)) if caught < n else 1.0
+    return f"{caught} of {n} ({low:.0%} to {high:.0%})"
+
+
 def write(fates: Sequence[Fate], seed: int, out: Path) -> None:
     """Write mutants.json and mutants.md into the folder `out`."""
-    document = {"schema": 1, "seed": seed, "mutants": [fate.as_json() for fate in fates]}
+    document = {"schema": 2, "seed": seed, "mutants": [fate.as_json() for fate in fates]}
     texts = json.dumps(document, indent=1, ensure_ascii=False), summary(fates)
     for name, text in zip(FILES, texts, strict=True):
         with replacing(out / name) as temporary:
             temporary.write_text(text, encoding="utf-8")
 
 
-def _fate(mutant: Mutant, package: Path, paths: Sequence[str], right: Mapping[str, Any]) -> Fate:
-    some = list(paths[:MOST_SCENES])
-    before = {path: right[path]["picture"] for path in some}
+def by_few_rays(mutant: Mutant, before: Mapping[str, Any]) -> Fate:
+    """The fate of a mutant in plain Python;  before: the right pictures, by the scene's path."""
 
-    def fate(outcome: str, rung: str = "", scene: str = "", reason: str = "") -> Fate:
-        return Fate(*mutant[:4], outcome, rung, scene, reason)
+    def fate(outcome: str, by: str = "", rung: str = "", scene: str = "", reason: str = "") -> Fate:
+        return Fate(*mutant[:4], outcome, by, rung, scene, reason)
 
+    task = {"scenes": list(before), "calls": False, "before": before}
     try:
-        found = _run(mutant, package, {"scenes": some, "calls": False, "before": before})
+        found = run_patched(mutant.file, mutant.text, WORKER, task, MOST_SECONDS, PLAIN)
     except subprocess.TimeoutExpired:
         return fate("fails", reason="takes too long")
     except ReferenceRtError as error:
@@ -133,40 +168,39 @@ def _fate(mutant: Mutant, package: Path, paths: Sequence[str], right: Mapping[st
     for one in changed:
         for rung, status, reason in one["rungs"]:
             if status in ("differ", "invalid", "error"):
-                return fate("caught", rung, one["scene"], reason)
+                return fate("caught", FEW_RAYS, rung, one["scene"], reason)
     said = "; ".join(f"{rung} {status}" for rung, status, _ in changed[0]["rungs"])
     return fate("survives", scene=", ".join(one["scene"] for one in changed), reason=said)
 
 
-def _run(mutant: Mutant | None, package: Path, task: Mapping[str, Any]) -> dict[str, Any]:
-    """Run the worker with a copy of the package that has the mutant, if any."""
-    with tempfile.TemporaryDirectory(prefix="reference_rt_mutant_") as folder:
-        there = Path(folder) / "reference_rt"
-        path = os.environ.get("PYTHONPATH", "")
-        if mutant is not None:
-            shutil.copytree(package, there, ignore=shutil.ignore_patterns("__pycache__"))
-            (there / mutant.file).write_text(mutant.text, encoding="utf-8")
-            path = f"{folder}{os.pathsep}{path}" if path else folder
-        run = subprocess.run(
-            [sys.executable, "-P", "-m", "comparisons.experiments.selftest.mutant_worker"],
-            input=json.dumps(task),
-            env={
-                **os.environ,
-                "PYTHONPATH": path,
-                "NUMBA_DISABLE_JIT": "1",
-                "REFERENCE_RT_MITSUBA_VARIANT": "scalar_rgb",
-            },
-            capture_output=True,
-            text=True,
-            timeout=None if mutant is None else MOST_SECONDS,
-            **tied(),
-            check=False,
-        )
-    if run.returncode != 0:
-        lines = [line for line in run.stderr.splitlines() if line.strip()]
-        raise ReferenceRtError(lines[-1] if lines else f"exit code {run.returncode}")
-    found: dict[str, Any] = json.loads(run.stdout)
-    return found
+def _by_suites(mutant: Mutant, fate: Fate, scenes: Path, budgets: Budgets) -> Fate:
+    """What the suites say, in each scene whose picture changed, to a mutant that few rays miss."""
+    said = []
+    threads = max(1, (os.cpu_count() or 1) // 2)
+    for scene in fate.scene.split(", "):
+        fault = SourceFault(mutant.what, scene, mutant.file, "", "")
+        of_scene = {suite: by_scene[scene] for suite, by_scene in budgets.items()}
+        try:
+            found = compare_patched(fault, mutant.text, of_scene, scenes, threads, True)
+        except (subprocess.TimeoutExpired, ReferenceRtError) as error:
+            reason = str(error)
+            return replace(fate, outcome="caught", by="smoke", rung="error", reason=reason[:200])
+        if found[-1].caught:
+            one = found[-1]
+            caught = replace(fate, outcome="caught", by=one.suite, rung=one.rung, scene=scene)
+            return replace(caught, reason=one.strength)
+        said += [f"{one.suite} {one.verdict}: {one.strength}" for one in found]
+    return replace(fate, reason="; ".join(said))
 
 
-__all__ = ["FILES", "Fate", "mutation", "summary", "write"]
+__all__ = [
+    "FEW_RAYS",
+    "FILES",
+    "PLAIN",
+    "WORKER",
+    "Fate",
+    "by_few_rays",
+    "mutation",
+    "summary",
+    "write",
+]

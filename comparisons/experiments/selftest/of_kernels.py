@@ -29,12 +29,12 @@ FAULTS = (
         "normal = normal + point.ns * seen.weight", "normal = normal + point.n * seen.weight",
     ),
     SourceFault(
-        "variance of one sample", LAYERS, "rendering/tiles.py",
-        "    scale = 1.0 / (spp * (spp - 1.0))\n", "    scale = 1.0 / (spp - 1.0)\n",
+        "variance of one sample", LAYERS, "rendering/accumulation.py",
+        "np.divide(1.0, spp * (spp - 1.0))", "np.divide(1.0, spp - 1.0)",
     ),
     SourceFault(
-        "variance over n for n - 1", LAYERS, "rendering/tiles.py",
-        "    scale = 1.0 / (spp * (spp - 1.0))\n", "    scale = 1.0 / (spp * (spp - 0.0))\n",
+        "variance over n for n - 1", LAYERS, "rendering/accumulation.py",
+        "np.divide(1.0, spp * (spp - 1.0))", "np.divide(1.0, spp * (spp - 0.0))",
     ),
     SourceFault(
         "weights of a filter ignored", "filter_lanczos", "rendering/tiles.py",
@@ -114,12 +114,12 @@ FAULTS = (
         "    a, b = 2.0 * lens[0] - 1.0, 2.0 * lens[1] - 1.0\n",
     ),
     SourceFault(
-        "one edge too many", "camera_thin_lens", "integrators/path.py",
+        "one edge too many", "cornell_box", "integrators/path.py",
         "            if depth + 1 >= path.max_depth:\n",
         "            if depth + 1 >= path.max_depth + 1:\n",
     ),
     SourceFault(
-        "roulette that compensates too little", "caustic_glass", "integrators/path.py",
+        "roulette that compensates too little", "colour_bleeding", "integrators/path.py",
         "        throughput = throughput * (1.0 / survival)\n",
         "        throughput = throughput * (1.0 / max(survival, 0.8))\n",
     ),

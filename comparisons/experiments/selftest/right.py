@@ -226,6 +226,14 @@ def _pareto(rng: np.random.Generator, count: int) -> FloatArray:
     return np.asarray(pictures)
 
 
+def _two_values(rng: np.random.Generator, count: int) -> FloatArray:
+    """Pixels that are lit or not, some seldom, beside others that are up to 1e4 times as bright."""
+    fixed = np.random.default_rng(5)
+    chance = fixed.random((SIDE, SIDE, 3)) ** 6
+    bright = 10.0 ** fixed.uniform(-2.0, 2.0, (SIDE, SIDE, 1))
+    return np.asarray(bright * (rng.random((count, SIDE, SIDE, 3)) < chance))
+
+
 def _fireflies(scenes: Path) -> Draw:
     """One sample in 1e4 has half of the energy."""
 
@@ -246,6 +254,16 @@ def _synthetic(
         return law(rng, counts[0]), law(rng, counts[1])
 
     return RightCase(kind, name, False, lambda scenes: draw)
+
+
+def _against_means(name: str, law: Law) -> RightCase:
+    """As at a gate: 32 pictures against 16 that have 16 times as many samples each."""
+
+    def draw(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+        means = [law(rng, 16).mean(axis=0) for _ in range(REPLICATES)]
+        return law(rng, 2 * REPLICATES), np.stack(means)
+
+    return RightCase(KINDS[9], f"{name}, 32 to 16 means of 16", False, lambda scenes: draw)
 
 
 def _drawn(kind: str, name: str, draw: Draw) -> RightCase:
@@ -273,6 +291,8 @@ CASES: tuple[RightCase, ...] = (
     _scene(KINDS[8], "caustic_glass", Budget(size=(32, 24), spp=64)),
     _synthetic(KINDS[8], "caustic of infinite variance", _pareto),
     _scene(KINDS[9], "cornell_box", Budget(size=(32, 32), spp=8, reference_spp=64)),
+    _against_means("caustic of infinite variance", _pareto),
+    _against_means("pixels of two values", _two_values),
     _scene(KINDS[10], "cornell_box", _SMALL, (4, 24)),
     _scene(KINDS[10], "colour_bleeding", _SMALL, (20, 6)),
     _scene(KINDS[11], "environment", Budget(size=(40, 25), spp=16)),

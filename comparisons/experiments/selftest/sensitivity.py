@@ -1,28 +1,23 @@
 """Plants faults and compares the faulty renderer with each suite's budgets."""
 
-import json
 import os
-import shutil
 import subprocess
-import sys
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 
-import reference_rt
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Say, Subject, gather
 from comparisons.compare.judge import Evidence, judge, of_replicates
 from comparisons.experiments.selftest.compared import compared
 from comparisons.experiments.selftest.fault import Fault, PictureFault, SceneFault, SourceFault
 from comparisons.experiments.selftest.finding import Finding, finding
+from comparisons.experiments.selftest.patched import PACKAGE, run_patched
 from comparisons.results.case import Case
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
 
 Budgets = Mapping[str, Mapping[str, Budget]]
@@ -84,8 +79,7 @@ def _altered(evidence: Evidence, fault: PictureFault, budget: Budget) -> Case:
 
 def patched_text(fault: SourceFault) -> str:
     """The patched source.  Raises StaleFaultError."""
-    file = Path(reference_rt.__file__).parent / fault.file
-    text = file.read_text(encoding="utf-8")
+    text = (PACKAGE / fault.file).read_text(encoding="utf-8")
     if text.count(fault.old) != 1:
         raise StaleFaultError(
             f"selftest: '{fault.name}': the text that it replaces occurs {text.count(fault.old)} "
@@ -98,31 +92,32 @@ def _patched(
     fault: SourceFault, budgets: Mapping[str, Budget], scenes: Path, threads: int
 ) -> list[Finding]:
     """Compare a patched copy of the renderer with Mitsuba, in its own process."""
-    text = patched_text(fault)
-    with tempfile.TemporaryDirectory(prefix="reference_rt_selftest_") as folder:
-        package = Path(folder) / "reference_rt"
-        skipped = shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc")
-        shutil.copytree(Path(reference_rt.__file__).parent, package, ignore=skipped)
-        (package / fault.file).write_text(text, encoding="utf-8")
-        task = {
-            "fault": fault.name,
-            "scenes": str(scenes.resolve()),
-            "budgets": {suite: budget.model_dump() for suite, budget in budgets.items()},
-            "threads": threads,
-        }
-        run = subprocess.run(
-            # -P: do not import from the current folder, which may have a reference_rt.
-            [sys.executable, "-P", "-m", "comparisons.experiments.selftest.source_worker"],
-            input=json.dumps(task),
-            env={**os.environ, "PYTHONPATH": folder, "REFERENCE_RT_CACHE": f"{folder}/cache"},
-            capture_output=True,
-            text=True,
-            timeout=MOST_SECONDS,
-            **tied(),
-            check=False,
-        )
-    if run.returncode != 0:
-        lines = [line for line in run.stderr.splitlines() if line.strip()]
-        reason = lines[-1] if lines else f"exit code {run.returncode}"
-        raise ReferenceRtError(f"selftest: '{fault.name}' could not be compared: {reason}")
-    return [Finding(**fields) for fields in json.loads(run.stdout)]
+    try:
+        return compare_patched(fault, patched_text(fault), budgets, scenes, threads)
+    except subprocess.TimeoutExpired:
+        why = f"it took more than {MOST_SECONDS:.0f} s"
+    except ReferenceRtError as error:
+        why = str(error)
+    raise ReferenceRtError(f"selftest: '{fault.name}' could not be compared: {why}")
+
+
+def compare_patched(
+    fault: SourceFault,
+    text: str,
+    budgets: Mapping[str, Budget],
+    scenes: Path,
+    threads: int,
+    until_caught: bool = False,
+) -> list[Finding]:
+    """The findings of the suites where the fault's file has `text`, in their order;  until_caught:
+    leave out the suites after the first that catches it.  Raises as `run_patched`."""
+    task = {
+        "fault": asdict(fault),
+        "scenes": str(scenes.resolve()),
+        "budgets": {suite: budget.model_dump() for suite, budget in budgets.items()},
+        "threads": threads,
+        "until_caught": until_caught,
+    }
+    worker = "comparisons.experiments.selftest.source_worker"
+    answer = run_patched(fault.file, text, worker, task, MOST_SECONDS)
+    return [Finding(**fields) for fields in answer]

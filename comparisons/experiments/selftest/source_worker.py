@@ -9,23 +9,26 @@ from pathlib import Path
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject
-from comparisons.experiments.selftest import FAULTS
 from comparisons.experiments.selftest.compared import compared
+from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.finding import finding
 from reference_rt.rendering.scene import Scene
 
 
 def main() -> None:
-    """{"fault", "scenes", "budgets": {suite: budget}} on standard input."""
+    """{"fault", "scenes", "budgets": {suite: budget}, "threads", "until_caught"} on standard
+    input."""
     task = json.load(sys.stdin)
-    fault = next(f for f in FAULTS if f.name == task["fault"])
+    fault = SourceFault(**task["fault"])
     scene = Scene.load(Path(task["scenes"]) / f"{fault.scene}.yaml")
     found = []
     for suite, fields in task["budgets"].items():
         budget = Budget.model_validate(fields)
         case = compared(Subject(scene), budget, task["threads"])
-        found.append(finding(fault, suite, case).as_json())
-    json.dump(found, sys.stdout)
+        found.append(finding(fault, suite, case))
+        if task["until_caught"] and found[-1].caught:
+            break
+    json.dump([one.as_json() for one in found], sys.stdout)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
 """The rate of false alarms: verdicts about right renderers, over many seeds."""
 
+import multiprocessing
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -52,14 +54,25 @@ class Alarms:
         return asdict(self)
 
 
-def specificity(
-    runs: int, scenes: Path, say: Say, cases: Sequence[RightCase] = CASES
-) -> Sequence[Alarms]:
-    """`runs` verdicts about each case."""
-    return [alarms_of(case, runs, scenes, say) for case in cases]
+def specificity(runs: int, scenes: Path, say: Say, jobs: int = 2) -> list[Alarms]:
+    """`runs` verdicts about each of CASES, in so many processes: most of the time is NumPy's, which
+    uses one core."""
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        tasks = [pool.submit(_of_case, number, runs, scenes) for number in range(len(CASES))]
+        found = []
+        for task in tasks:
+            found.append(task.result())
+            one = found[-1]
+            say(f"{one.kind}, {one.name}: {one.false_alarms} false alarms in {runs} runs")
+    return found
 
 
-def alarms_of(case: RightCase, runs: int, scenes: Path, say: Say) -> Alarms:
+def _of_case(number: int, runs: int, scenes: Path) -> Alarms:
+    """Of the case with this number: cases hold functions, which cannot be sent to a process."""
+    return alarms_of(CASES[number], runs, scenes)
+
+
+def alarms_of(case: RightCase, runs: int, scenes: Path) -> Alarms:
     """`runs` verdicts about the case, each with random numbers of its own."""
     draw = case.prepare(scenes)
     verdicts: Counter[str] = Counter()
@@ -71,7 +84,6 @@ def alarms_of(case: RightCase, runs: int, scenes: Path, say: Say) -> Alarms:
             reasons[": ".join(part.strip() for part in reason.split(":")[:2])] += 1
     alarms = sum(reasons.values())
     upper = float(stats.beta.ppf(0.95, alarms + 1, runs - alarms)) if alarms < runs else 1.0
-    say(f"{case.kind}, {case.name}: {alarms} false alarms in {runs} runs")
     return Alarms(
         case.kind, case.name, case.rendered, runs, alarms, dict(reasons), dict(verdicts), upper
     )

@@ -1,4 +1,4 @@
-"""Plugins for Mitsuba: materials that it lacks or approximates, and Whitted's ray tracing.
+"""Plugins for Mitsuba: materials, views and integrators that it lacks or approximates.
 
 Each module has `register(mi)`, which defines a class and registers it with Mitsuba: the classes
 derive from classes of a variant, so this runs after every `set_variant`.  Plugins follow Mitsuba's
@@ -9,10 +9,17 @@ variants.  BSDFs share the class of `base`.  To add a plugin: a module with `reg
 
 from typing import Any
 
-from comparisons.mitsuba.plugins import exact_beckmann, exact_coat, mixtures, phong, whitted
+from comparisons.mitsuba.plugins import (
+    exact_beckmann,
+    exact_coat,
+    mixtures,
+    phong,
+    view_rectangle,
+    whitted,
+)
 
 
 def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
-    for plugin in (exact_beckmann, exact_coat, mixtures, phong, whitted):
+    for plugin in (exact_beckmann, exact_coat, mixtures, phong, view_rectangle, whitted):
         plugin.register(mi)

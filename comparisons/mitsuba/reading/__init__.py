@@ -21,6 +21,7 @@ from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed, parse_dict, parse_file
 from comparisons.mitsuba.reading.sensors import read_sensor
 from comparisons.mitsuba.reading.shapes import read_shape
+from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import SceneWarning
 
@@ -69,10 +70,12 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
     if len(integrators) > 1:
         raise integrators[1].error("is a second integrator; expected one")
     integrator, layers = read_integrator(reading, integrators[0] if integrators else None)
+    sampler: AnySampler | None
     camera, film, sampler = read_sensor(reading, sensors[0] if sensors else None)
     root.finish()
-    if integrator.deterministic:
-        sampler = None  # type: ignore[assignment]
+    if integrator.deterministic != isinstance(sampler, Grid):
+        # Points on a grid are for what is not random, and the others for what is.
+        sampler = None if integrator.deterministic else Sobol(spp=sampler.spp)
     with root.checking():
         scene = cls(
             camera=camera,

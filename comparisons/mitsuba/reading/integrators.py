@@ -4,11 +4,21 @@ from typing import Any
 
 from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.node import Node
-from reference_rt.integrators import AnyIntegrator, Direct, Path, RayCast
+from reference_rt.integrators import AnyIntegrator, Direct, Path, RayCast, Whitted
+from reference_rt.lights import Ambient
 from reference_rt.materials import Mask, ThinDielectric
 
-LAYERS = {"depth": "depth", "sh_normal": "normal", "albedo": "albedo", "shape_index": "id"}
+LAYERS = {
+    "depth": "depth", "sh_normal": "normal", "albedo": "albedo", "position": "position",
+    "shape_index": "id",
+}  # fmt: skip
 """Which of our film's layers shows an AOV."""
+
+SHOWN = {
+    "albedo": "colour", "depth": "distance", "geo_normal": "normal", "shape_index": "id",
+    "uv": "uv",
+}  # fmt: skip
+"""What ray casting shows for an AOV without another integrator."""
 
 MOST_ROULETTE = 4096
 """Our largest `rr_depth`."""
@@ -39,6 +49,8 @@ def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator,
                     "Mitsuba counts the distance from the near clipping plane and 0 for no hit, "
                     "ours from the eye and infinity",
                 )
+            case "whitted":
+                found = _whitted(reading, node)
             case "moment":
                 found, layers = _inside(reading, node)
                 reading.note(node, "its moments are left out: ours is the picture inside it")
@@ -61,6 +73,19 @@ def _path(node: Node) -> Path:
     return Path(max_depth=None if depth < 0 else depth, rr_depth=min(roulette, MOST_ROULETTE))
 
 
+def _whitted(reading: Reading, node: Node) -> Whitted:
+    """Of our plugin, in files that we have written."""
+    node.ignore("components", "unlit")
+    ambient = tuple(node.number(f"ambient_{c}", 0.0) for c in "rgb")
+    if any(ambient):
+        reading.lights.append(Ambient(radiance=ambient))  # type: ignore[arg-type]
+    default = Whitted()
+    return Whitted(
+        max_depth=node.integer("max_depth", default.max_depth),
+        min_contribution=node.number("min_contribution", default.min_contribution),
+    )
+
+
 def _check_surfaces(reading: Reading, node: Node) -> None:
     """Without media `volpath` is `path`, but that its shadow rays pass surfaces that bend none."""
     for name, material in reading.materials.items():
@@ -80,8 +105,12 @@ def _direct(node: Node) -> Direct:
 def _aov(reading: Reading, node: Node) -> tuple[AnyIntegrator, tuple[str, ...]]:
     """The integrator inside, or ray casting, and the layers for AOVs."""
     layers: list[str] = []
+    kinds: list[str] = []
     for token in node.text("aovs", "").replace(",", " ").split():
         kind = token.partition(":")[2]
+        kinds.append(kind)
+        if kind in SHOWN and kind not in LAYERS and not node.has_children("Integrator"):
+            continue
         if kind not in LAYERS:
             raise node.error(
                 f"'aovs' has '{token}', which is not supported; expected of: {', '.join(LAYERS)}"
@@ -89,6 +118,8 @@ def _aov(reading: Reading, node: Node) -> tuple[AnyIntegrator, tuple[str, ...]]:
         if LAYERS[kind] not in layers:
             layers.append(LAYERS[kind])
     found, _ = _inside(reading, node)
+    if isinstance(found, RayCast) and len(kinds) == 1:
+        found = RayCast(show=SHOWN.get(kinds[0], "colour"))  # type: ignore[arg-type]
     return found, tuple(layers) if not isinstance(found, RayCast) else ()
 
 

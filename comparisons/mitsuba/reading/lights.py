@@ -1,5 +1,6 @@
 """Emitters of Mitsuba scenes.  Colours are radiance, intensity or irradiance as in Mitsuba."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -7,10 +8,24 @@ import numpy as np
 
 from comparisons.mitsuba.reading.colours import Rgb, colour
 from comparisons.mitsuba.reading.context import Reading
+from comparisons.mitsuba.reading.films import Frame
 from comparisons.mitsuba.reading.node import Node, triple
-from comparisons.mitsuba.reading.textures import colour_or_texture
+from comparisons.mitsuba.reading.sensors import angle
+from comparisons.mitsuba.reading.textures import colour_or_texture, projected
+from comparisons.mitsuba.reading.written import as_transform
+from comparisons.mitsuba.similar import is_similarity
 from reference_rt.core.arrays import FloatArray
-from reference_rt.lights import AnyLight, Constant, Directional, EnvironmentMap, Point, Spot
+from reference_rt.core.image_files import open_image
+from reference_rt.lights import (
+    AnyLight,
+    Constant,
+    Directional,
+    EnvironmentMap,
+    Point,
+    Projector,
+    Spot,
+)
+from reference_rt.textures import Bitmap
 
 TOLERANCE = 1e-5
 """Of a rotation, relative."""
@@ -53,19 +68,71 @@ def _point(reading: Reading, node: Node) -> AnyLight:
 
 
 def _spot(reading: Reading, node: Node) -> AnyLight:
-    if node.has("texture"):
-        raise node.error("'texture' is not supported; expected none")
     m = node.transform()
-    _similarity(node, m[:, :3])
+    rotation = _similarity(node, m[:, :3])
     axis = m[:, 2] / np.linalg.norm(m[:, 2])
     cutoff = node.number("cutoff_angle", 20.0)
+    image: dict[str, Any] = {}
+    if node.has("texture"):
+        texture = projected(reading, node, "texture", 1.0)
+        if not isinstance(texture, str):
+            raise node.error("'texture' is a colour, which Mitsuba refuses, too; expected an image")
+        _check_upright(node, rotation)
+        image = {"texture": texture, "up": triple(-rotation[:, 1])}
+    look, _ = node.looks()
+    if look is not None and image:
+        x, y, z = look.up
+        image["up"] = (-x, -y, -z)
     return Spot(
-        origin=triple(m[:, 3]),
-        target=triple(m[:, 3] + axis),
+        **image,
+        origin=triple(m[:, 3]) if look is None else look.origin,
+        target=triple(m[:, 3] + axis) if look is None else look.target,
         intensity=_plain(node, "intensity"),
         cutoff_angle=cutoff,
         beam_width=node.number("beam_width", 0.75 * cutoff),
     )
+
+
+def _projector(reading: Reading, node: Node) -> AnyLight:
+    m, (look, scale) = node.transform(), node.looks()
+    # What is taller than the image's pixels is a scale of y alone.
+    tall = float(np.linalg.norm(m[:, 1]) / np.linalg.norm(m[:, 2]))
+    if look is not None:
+        tall = scale[1]
+    elif abs(tall - 1.0) <= TOLERANCE:
+        tall = 1.0
+    rotation = _similarity(node, m[:, :3] / np.array([1.0, tall, 1.0]))
+    _check_upright(node, rotation)
+    origin, target, up = look or (
+        triple(m[:, 3]),
+        triple(m[:, 3] + rotation[:, 2]),
+        triple(rotation[:, 1]),
+    )
+    irradiance = projected(reading, node, "irradiance", 1.0, "emission")
+    width, height = 1, 1
+    if isinstance(irradiance, str) and isinstance(reading.textures[irradiance], Bitmap):
+        file = reading.parsed.folder / reading.textures[irradiance].file
+        image = open_image(file)
+        width, height = image.width, image.height
+    fov, wide = angle(node, Frame(width, height, 0, 0, width, height))
+    # Mitsuba's intensity is pi times that of the irradiance at distance 1.
+    return Projector(
+        origin=origin,
+        target=target,
+        up=up,
+        irradiance=irradiance,
+        scale=math.pi * node.number("scale", 1.0),
+        fov=fov["fov"] if fov["fov_axis"] == "x" else math.degrees(2.0 * math.atan(wide)),
+        aspect=width / height / tall,
+    )
+
+
+def _check_upright(node: Node, rotation: FloatArray) -> None:
+    """Raise SceneError for a map that mirrors the image."""
+    if np.linalg.det(rotation) < 0.0:
+        raise node.error(
+            "'to_world' mirrors the image, which is not supported; expected a rotation"
+        )
 
 
 def _directional(reading: Reading, node: Node) -> AnyLight:
@@ -91,7 +158,10 @@ def _envmap(reading: Reading, node: Node) -> AnyLight:
     rotation = _similarity(node, linear)
     turn: Any = ()
     if not np.array_equal(rotation, np.eye(3)):
-        turn = ({"matrix": np.column_stack([rotation, np.zeros(3)]).tolist()},)
+        of_axes = np.column_stack([linear, np.zeros(3)])
+        turn = as_transform(node.written(), of_axes)
+        if "matrix" in turn[0] and len(turn) == 1 and not is_similarity(linear):
+            turn = ({"matrix": np.column_stack([rotation, np.zeros(3)]).tolist()},)
     return EnvironmentMap(
         file=reading.relative(reading.file(node)), scale=node.number("scale", 1.0), transform=turn
     )
@@ -112,6 +182,7 @@ def _similarity(node: Node, linear: FloatArray) -> FloatArray:
 _READERS: dict[str, Callable[[Reading, Node], AnyLight]] = {
     "point": _point,
     "spot": _spot,
+    "projector": _projector,
     "directional": _directional,
     "constant": _constant,
     "envmap": _envmap,

@@ -6,6 +6,7 @@ from typing import Any
 from comparisons.mitsuba.reading.colours import index_of_refraction, metal
 from comparisons.mitsuba.reading.context import Reading, unused
 from comparisons.mitsuba.reading.node import Node
+from comparisons.mitsuba.reading.principled import phong, principled, principled_thin
 from comparisons.mitsuba.reading.textures import colour_or_texture, number_or_texture, texture_name
 from reference_rt.materials import (
     Blend,
@@ -18,7 +19,6 @@ from reference_rt.materials import (
     Mirror,
     NormalMap,
     Plastic,
-    Principled,
     RoughConductor,
     RoughDielectric,
     RoughPlastic,
@@ -112,13 +112,6 @@ def _roughness(reading: Reading, node: Node) -> dict[str, Any]:
             raise node.error("expected 'alpha', or 'alpha_u' and 'alpha_v'")
         along_u = number_or_texture(reading, node, "alpha_u", 0.1)
         along_v = number_or_texture(reading, node, "alpha_v", 0.1)
-        if isinstance(along_u, str) or isinstance(along_v, str):
-            if along_u != along_v:
-                raise node.error(
-                    "'alpha_u' and 'alpha_v' as different textures are not supported; expected "
-                    "two numbers, or one texture 'alpha'"
-                )
-            return {"distribution": distribution, "alpha": along_u}
         return {"distribution": distribution, "alpha": (along_u, along_v)}
     alpha = number_or_texture(reading, node, "alpha", 0.1)
     return {"distribution": distribution, "alpha": alpha}
@@ -176,31 +169,6 @@ def _rough_plastic(reading: Reading, node: Node) -> Material:
     return RoughPlastic(**_coat(reading, node), **roughness, alpha=alpha)
 
 
-_NUMBERS = (
-    "roughness", "metallic", "spec_tint", "anisotropic", "sheen", "sheen_tint", "clearcoat",
-    "clearcoat_gloss", "spec_trans", "flatness",
-)  # fmt: skip
-
-
-def _principled(reading: Reading, node: Node) -> Material:
-    # How lobes are sampled does not change the picture.
-    node.ignore(
-        "main_specular_sampling_rate",
-        "clearcoat_sampling_rate",
-        "diffuse_reflectance_sampling_rate",
-    )
-    values: dict[str, Any] = {}
-    if node.has("eta") and node.has("specular"):
-        raise node.error("has both 'eta' and 'specular'; expected one of them")
-    if node.has("eta"):
-        values["eta"] = node.number("eta", 1.5)
-    else:
-        values["specular"] = node.number("specular", 0.5)
-    for name in _NUMBERS:
-        values[name] = number_or_texture(reading, node, name, 0.5 if name == "roughness" else 0.0)
-    return Principled(base_colour=colour_or_texture(reading, node, "base_color", 0.5), **values)
-
-
 def _blend(reading: Reading, node: Node) -> Material:
     if not node.has("weight"):
         raise node.error("has no 'weight'; expected a number or a texture")
@@ -232,26 +200,18 @@ def _null(reading: Reading, node: Node) -> Material:
     return Mask(base=black(reading), opacity=0.0)
 
 
-def _plain_law(node: Node) -> None:
-    """Bump and normal maps: ours neither flip normals nor shadow, which Mitsuba's do by default."""
-    wrong = [
-        key for key in ("flip_invalid_normals", "use_shadowing_function") if node.flag(key, True)
-    ]
-    if wrong:
-        raise node.error(
-            f"'{wrong[0]}', on by default, is not supported; expected "
-            f'<boolean name="{wrong[0]}" value="false"/>'
-        )
+def _tilt(node: Node) -> dict[str, Any]:
+    """The options of bump and normal maps: on by default, unlike ours."""
+    return {key: node.flag(key, True) for key in ("flip_invalid_normals", "use_shadowing_function")}
 
 
 def _bump(reading: Reading, node: Node) -> Material:
-    _plain_law(node)
     (base,) = _nested(reading, node, 1, 1)
     texture = node.only("Texture")
     if texture is None:
         raise node.error("has no texture; expected one")
     height = texture_name(reading, texture, as_number=True)
-    return Bump(base=base, height=height, scale=node.number("scale", 1.0))
+    return Bump(base=base, height=height, scale=node.number("scale", 1.0), **_tilt(node))
 
 
 def _normal_map(reading: Reading, node: Node) -> Material:
@@ -263,8 +223,7 @@ def _normal_map(reading: Reading, node: Node) -> Material:
         return found
     if not isinstance(normals, str):
         raise node.error("'normalmap' is a colour, or not given; expected a texture")
-    _plain_law(node)
-    return NormalMap(base=base, normals=normals)
+    return NormalMap(base=base, normals=normals, **_tilt(node))
 
 
 _READERS: dict[str, Reader] = {
@@ -276,9 +235,11 @@ _READERS: dict[str, Reader] = {
     "roughdielectric": _rough_dielectric,
     "plastic": _plastic,
     "roughplastic": _rough_plastic,
-    "principled": _principled,
+    "principled": principled,
+    "principledthin": principled_thin,
     "blendbsdf": _blend,
     "mask": _mask,
+    "textbook_phong": phong,
     "twosided": _two_sided,
     "null": _null,
     "bumpmap": _bump,

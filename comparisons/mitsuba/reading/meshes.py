@@ -14,6 +14,7 @@ from comparisons.mitsuba.reading import serialized
 from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import scalar
+from comparisons.mitsuba.reading.written import as_transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.transform import Affine, apply_points
 from reference_rt.shapes import Mesh
@@ -66,7 +67,24 @@ def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
     }
     if names:
         surface = _coloured(node, surface, names, path)
-    return finished(surface, flip, reading.uses_uv(material), material)
+    found = finished(surface, flip, reading.uses_uv(material), material)
+    is_made = data.normals is None and not flat
+    if names or flip or is_made or np.linalg.det(m[:, :3]) < 0.0 or not _is_normal(m, of_normals):
+        return found
+    assert found.faces is not None
+    if not np.array_equal(found.faces, data.faces):
+        return found
+    # As the file has it, under the author's transform.
+    normals = None if found.normals is None else data.normals
+    steps: Any = as_transform(node.written(), m)
+    update = {"vertices": data.vertices, "normals": normals, "uv": uv, "transform": steps}
+    return Mesh(faces=data.faces, face_normals=normals is None, material=material, **update)
+
+
+def _is_normal(m: Affine, of_normals: FloatArray) -> bool:
+    """Whether `of_normals` is the inverse transpose of m: see `Node.maps`."""
+    product = m[:, :3] @ of_normals.T
+    return bool(np.abs(product - np.eye(3)).max() <= 1e-9)
 
 
 def _data(reading: Reading, node: Node, path: Path, index: int = 0) -> MeshData:

@@ -11,7 +11,7 @@ import numpy as np
 
 from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.node import Node
-from reference_rt.lights import Constant, Directional, EnvironmentMap, Point, Spot
+from reference_rt.lights import Constant, Directional, EnvironmentMap, Point, Projector, Spot
 from reference_rt.materials import NormalMap
 
 MIRROR = np.diag([-1.0, 1.0, 1.0])
@@ -29,6 +29,11 @@ def mirror_scene(reading: Reading, node: Node) -> None:
                 "'to_world' mirrors the picture, which is not supported together with normal maps "
                 f"('{name}'); expected a rotation: mirror the picture instead"
             )
+    if any(isinstance(x, Projector) or getattr(x, "texture", None) for x in reading.lights):
+        raise node.error(
+            "'to_world' mirrors the picture, which is not supported together with lights that "
+            "project images; expected a rotation: mirror the picture instead"
+        )
     reading.shapes = [_moved(shape) for shape in reading.shapes]
     reading.lights = [_light(light) for light in reading.lights]
     reading.note(

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.mitsuba.reading.parse import Parsed
+from comparisons.mitsuba.reading.written import LookAt, Step, Written
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine, invert
 from reference_rt.util.errors import SceneError
@@ -43,12 +44,17 @@ class Node:
 
     # ---- errors ---------------------------------------------------------------------------------
 
-    def error(self, message: str) -> SceneError:
-        """An error about this element, with file, line, column and plugin."""
+    @property
+    def _place(self) -> str:
         import mitsuba as mi
 
+        state = self._parsed.state
+        return str(mi.parser.file_location(state, state.nodes[self.index]))
+
+    def error(self, message: str) -> SceneError:
+        """An error about this element, with file, line, column and plugin."""
         what = f"{self.kind.lower()} '{self.plugin}'"
-        place = mi.parser.file_location(self._parsed.state, self._parsed.state.nodes[self.index])
+        place = self._place
         found = _PLACE.match(place)
         if found is None:
             return SceneError(f"{what}: {message}", file=place)
@@ -211,6 +217,26 @@ class Node:
             raise self.error(f"'{key}': {error}") from None
         return m[:3], of_normals
 
+    def written(self, key: str = "to_world") -> Written | None:
+        """The steps of a transform as the file has them; None for a dictionary, and for what is not
+        known."""
+        found = _PLACE.match(self._place)
+        if found is None:
+            return None
+        # Mitsuba counts columns from 1, of the name after "<".
+        place = int(found["line"]), int(found["col"]) - 2
+        return self._parsed.transforms(found["file"].strip('"')).get(place, {}).get(key)
+
+    def looks(self) -> tuple[LookAt | None, tuple[float, ...]]:
+        """The <lookat> of to_world, and the scale before it, (1, 1, 1) for none; None for any other
+        transform."""
+        steps = self.written() or ()
+        first = steps[0] if len(steps) == 2 else Step("scale", (1.0, 1.0, 1.0))
+        last = steps[-1] if 1 <= len(steps) <= 2 else None
+        if isinstance(last, LookAt) and isinstance(first, Step) and first.kind == "scale":
+            return last, first.numbers
+        return None, (1.0, 1.0, 1.0)
+
     # ---- nested elements ------------------------------------------------------------------------
 
     def children(self, *kinds: str) -> list["Node"]:
@@ -232,6 +258,12 @@ class Node:
                     f"'{key}' is an object of Mitsuba's already; expected its dictionary"
                 )
         return found
+
+    def has_children(self, kind: str) -> bool:
+        """Whether there is a nested element of this kind."""
+        values = (self._props[key] for key in self._keys)
+        references = (v for v in values if type(v).__name__ == "ResolvedReference")
+        return any(Node(self._parsed, v.index()).kind == kind for v in references)
 
     def only(self, *kinds: str) -> "Node | None":
         """The nested element of these kinds, if there is one.  Raises SceneError for several."""

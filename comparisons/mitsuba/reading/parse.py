@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from comparisons.mitsuba.reading.written import Transforms, transforms_of
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError
 from reference_rt.util.files import read_input
 
@@ -27,13 +28,22 @@ class Parsed(NamedTuple):
 
     state: `mitsuba.parser.ParserState`, upgraded to Mitsuba 3 and its references resolved;  file:
     the name for messages;  folder: where relative file names count from, first;  resolve: the
-    file that Mitsuba finds for a name.
+    file that Mitsuba finds for a name;  defaults: values for <default> elements;  written: see
+    `transforms`.
     """
 
     state: Any
     file: str
     folder: Path
     paths: tuple[Path, ...]
+    defaults: Mapping[str, str]
+    written: dict[str, Transforms]
+
+    def transforms(self, file: str) -> Transforms:
+        """The transforms of a file as they are written."""
+        if file not in self.written:
+            self.written[file] = transforms_of(Path(file), self.defaults)
+        return self.written[file]
 
     def resolve(self, name: str) -> Path:
         """The file that Mitsuba finds under this name: below the scene's folder, those of its
@@ -100,14 +110,14 @@ def parse_file(path: Path, defaults: Mapping[str, str]) -> Parsed:
         paths = tuple(Path(str(resolver[k])) for k in range(added))
     finally:
         mi.set_file_resolver(old)
-    return Parsed(state, str(path), folder, paths)
+    return Parsed(state, str(path), folder, paths, defaults, {})
 
 
 def parse_dict(scene: Mapping[str, Any], folder: Path) -> Parsed:
     """Parse a dictionary for `mitsuba.load_dict`.  Raises SceneError."""
     mi = module()
     state = _upgraded(mi, None, lambda config: mi.parser.parse_dict(config, dict(scene)))
-    return Parsed(state, "<dict>", folder, ())
+    return Parsed(state, "<dict>", folder, (), {}, {})
 
 
 def _upgraded(mi: Any, path: Path | None, parse: Any) -> Any:

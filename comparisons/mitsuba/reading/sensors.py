@@ -9,53 +9,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.mitsuba.reading.context import Reading
+from comparisons.mitsuba.reading.films import Frame, read_film, read_sampler
 from comparisons.mitsuba.reading.mirrored import MIRROR, mirror_scene
 from comparisons.mitsuba.reading.node import Node
 from reference_rt.cameras import AnyCamera, Orthographic, Perspective, ThinLens
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.filters import (
-    AnyFilter,
-    BoxFilter,
-    CatmullRomFilter,
     GaussianFilter,
-    LanczosFilter,
-    MitchellFilter,
-    TentFilter,
 )
 from reference_rt.core.transform import Affine
-from reference_rt.sampling import AnySampler, Independent, Sobol
+from reference_rt.sampling import AnySampler, Independent
 
 TOLERANCE = 1e-5
 """Of a rotation."""
 
+NEAR, FAR = 1e-9, 1e9
+"""Clipping planes that cut nothing."""
+
 CLIP = {"near_clip": 1e-2, "far_clip": 1e4}
 """Mitsuba's defaults."""
-
-
-class Frame(NamedTuple):
-    """The size in pixels of the whole film, and of the window of it that is rendered."""
-
-    width: int
-    height: int
-    left: int
-    top: int
-    crop_width: int
-    crop_height: int
-
-    @property
-    def is_cropped(self) -> bool:
-        return (self.crop_width, self.crop_height) != (self.width, self.height)
-
-    def window(self, half: float, shift: tuple[float, float] = (0.0, 0.0)) -> tuple[float, ...]:
-        """The view rectangle [l, r, b, t], where the whole film is 2 `half` wide and its pixels are
-        square;  shift: of the whole film, in widths to the right and heights down."""
-        tall = half * self.height / self.width
-        xs = (self.left, self.left + self.crop_width)
-        ys = (self.top + self.crop_height, self.top)
-        return (
-            *((2.0 * (x / self.width + shift[0]) - 1.0) * half for x in xs),
-            *((1.0 - 2.0 * (y / self.height + shift[1])) * tall for y in ys),
-        )
 
 
 class View(NamedTuple):
@@ -78,8 +50,8 @@ def read_sensor(reading: Reading, node: Node | None) -> View:
         raise medium.unsupported("expected a scene without media")
     # The shutter has no effect: nothing moves.
     node.ignore("shutter_open", "shutter_close")
-    frame, film = _film(node.only("Film"))
-    sampler = _sampler(node.only("Sampler"))
+    frame, film = read_film(node.only("Film"))
+    sampler = read_sampler(node.only("Sampler"))
     with node.checking():
         camera = _CAMERAS[node.plugin](reading, node, frame)
     node.finish()
@@ -108,6 +80,8 @@ def _place(reading: Reading, node: Node, rigid: bool = True) -> tuple[dict[str, 
     if np.linalg.det(unit) < 0.0:
         mirror_scene(reading, node)
         m, unit = MIRROR @ m, MIRROR @ unit
+    elif (look := node.looks()[0]) is not None:
+        return {"eye": look.origin, "target": look.target, "up": look.up}, m
     eye = m[:, 3]
     # A target far away in units of the eye's coordinates: the direction must not be lost.
     distance = max(1.0, float(np.abs(eye).max()))
@@ -117,7 +91,7 @@ def _place(reading: Reading, node: Node, rigid: bool = True) -> tuple[dict[str, 
 def _clip(reading: Reading, node: Node) -> float:
     """Ours have no clipping planes.  The far one."""
     values = {key: node.number(key, default) for key, default in CLIP.items()}
-    if values != CLIP:
+    if values != CLIP and (values["near_clip"] > NEAR or values["far_clip"] < FAR):
         reading.note(
             node,
             f"near_clip {values['near_clip']:g} and far_clip {values['far_clip']:g} are left out: "
@@ -129,7 +103,7 @@ def _clip(reading: Reading, node: Node) -> float:
 _AXES = ("x", "y", "diagonal", "smaller", "larger")
 
 
-def _angle(node: Node, frame: Frame) -> tuple[dict[str, Any], float]:
+def angle(node: Node, frame: Frame) -> tuple[dict[str, Any], float]:
     """fov and fov_axis, and the tangent of half of the angle across the film's width."""
     if node.has("fov"):
         if node.has("focal_length"):
@@ -171,7 +145,7 @@ def _perspective(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     place, _ = _place(reading, node)
     _clip(reading, node)
     node.ignore("focus_distance")  # Mitsuba reads it for every projective camera
-    values, half = _angle(node, frame)
+    values, half = angle(node, frame)
     shift = tuple(node.number(f"principal_point_offset_{axis}", 0.0) for axis in "xy")
     if frame.is_cropped or any(shift):
         values = {"view": frame.window(half, shift)}  # type: ignore[arg-type]
@@ -181,7 +155,7 @@ def _perspective(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
 def _thin_lens(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     place, _ = _place(reading, node)
     far = _clip(reading, node)
-    values, half = _angle(node, frame)
+    values, half = angle(node, frame)
     if frame.is_cropped:
         values = {"view": frame.window(half)}
     if not node.has("aperture_radius"):
@@ -197,97 +171,28 @@ def _orthographic(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     _clip(reading, node)
     node.ignore("focus_distance")
     right, up, _ = np.linalg.norm(m[:, :3], axis=0).tolist()
+    look, scale = node.looks()
+    if look is not None:
+        right, up = map(abs, scale[:2])
     if not frame.is_cropped and right == up:
         return Orthographic(**place, width=2.0 * right)
     l, r, b, t = frame.window(1.0)
     return Orthographic(**place, view=(l * right, r * right, b * up, t * up))
 
 
-_CAMERAS = {"perspective": _perspective, "thinlens": _thin_lens, "orthographic": _orthographic}
+def _view_rectangle(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
+    """Of our plugin, in files that we have written."""
+    place, _ = _place(reading, node)
+    l, r, b, t = (node.number(name, 0.0) for name in ("left", "right", "bottom", "top"))
+    radius, focus = node.number("aperture_radius", 0.0), node.number("focus_distance", 1.0)
+    if radius == 0.0:
+        return Perspective(**place, view=(l, r, b, t))
+    return ThinLens(**place, view=(l, r, b, t), aperture_radius=radius, focus_distance=focus)
 
 
-# ---- film and sampler ---------------------------------------------------------------------------
-
-
-def _film(node: Node | None) -> tuple[Frame, Film]:
-    if node is None:
-        frame = Frame(768, 576, 0, 0, 768, 576)
-        return frame, Film(width=768, height=576, filter=GaussianFilter())
-    if node.plugin != "hdrfilm":
-        raise node.unsupported("expected hdrfilm")
-    # They concern the file that Mitsuba writes, or how it samples.
-    node.ignore("file_format", "pixel_format", "component_format", "sample_border", "banner")
-    node.ignore("compensate")
-    width, height = node.integer("width", 768), node.integer("height", 576)
-    frame = Frame(
-        width,
-        height,
-        node.integer("crop_offset_x", 0),
-        node.integer("crop_offset_y", 0),
-        node.integer("crop_width", width),
-        node.integer("crop_height", height),
-    )
-    inside = (
-        min(frame.left, frame.top) >= 0
-        and min(frame.crop_width, frame.crop_height) >= 1
-        and frame.left + frame.crop_width <= width
-        and frame.top + frame.crop_height <= height
-    )
-    if not inside:
-        raise node.error(
-            f"its window of {frame.crop_width} x {frame.crop_height} pixels at ({frame.left}, "
-            f"{frame.top}) is not inside the film of {width} x {height}; expected one that is"
-        )
-    with node.checking():
-        film = Film(
-            width=frame.crop_width,
-            height=frame.crop_height,
-            filter=_filter(node.only("ReconstructionFilter")),
-        )
-    node.finish()
-    return frame, film
-
-
-def _filter(node: Node | None) -> AnyFilter:
-    if node is None:
-        return GaussianFilter()
-    with node.checking():
-        found = _named_filter(node)
-    node.finish()
-    return found
-
-
-def _named_filter(node: Node) -> AnyFilter:
-    match node.plugin:
-        case "box":
-            return BoxFilter()
-        case "tent":
-            return TentFilter(radius=node.number("radius", 1.0))
-        case "gaussian":
-            return GaussianFilter(stddev=node.number("stddev", 0.5))
-        case "mitchell":
-            third = 1.0 / 3.0
-            return MitchellFilter(b=node.number("B", third), c=node.number("C", third))
-        case "catmullrom":
-            return CatmullRomFilter()
-        case "lanczos":
-            return LanczosFilter(lobes=node.integer("lobes", 3))
-    raise node.unsupported("expected one of: box, tent, gaussian, mitchell, catmullrom, lanczos")
-
-
-_STRATIFIED = ("stratified", "multijitter", "orthogonal", "ldsampler")
-
-
-def _sampler(node: Node | None) -> AnySampler:
-    """Which points are taken does not change the expected picture: ours are the Sobol' points, or
-    independent ones."""
-    if node is None:
-        return Independent(spp=4)
-    if node.plugin not in ("independent", *_STRATIFIED):
-        raise node.unsupported(f"expected one of: {', '.join(('independent', *_STRATIFIED))}")
-    node.ignore("jitter", "strength")
-    with node.checking():
-        kind = Independent if node.plugin == "independent" else Sobol
-        sampler = kind(spp=node.integer("sample_count", 4), seed=node.integer("seed", 0))
-    node.finish()
-    return sampler
+_CAMERAS = {
+    "perspective": _perspective,
+    "thinlens": _thin_lens,
+    "orthographic": _orthographic,
+    "view_rectangle": _view_rectangle,
+}

@@ -9,7 +9,9 @@ from comparisons.mitsuba.reading.context import Reading, unused
 from comparisons.mitsuba.reading.lights import emission
 from comparisons.mitsuba.reading.materials import material_name
 from comparisons.mitsuba.reading.meshes import Surface, finished, mesh, placed
-from comparisons.mitsuba.reading.node import Node, triple
+from comparisons.mitsuba.reading.node import Node
+from comparisons.mitsuba.reading.written import as_transform
+from comparisons.mitsuba.similar import is_similarity
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine
 from reference_rt.materials import Emissive
@@ -90,7 +92,8 @@ def _instance(reading: Reading, node: Node, in_group: bool) -> Shape:
     if group is None or group.plugin != "shapegroup":
         raise node.error("has no shape group; expected a reference to one")
     m = node.transform()
-    found = Instance(group=group_name(reading, group), transform=_steps(m))
+    steps: Any = as_transform(node.written(), m)
+    found = Instance(group=group_name(reading, group), transform=steps)
     node.finish()
     return found
 
@@ -100,7 +103,7 @@ def _instance(reading: Reading, node: Node, in_group: bool) -> Shape:
 
 def _steps(m: Affine) -> Any:
     """The map as our transform."""
-    return () if np.array_equal(m, np.eye(3, 4)) else ({"matrix": m.tolist()},)
+    return as_transform(None, m)
 
 
 def _compose(*maps: FloatArray) -> Affine:
@@ -119,7 +122,11 @@ def _sphere(reading: Reading, node: Node, material: str | None) -> Shape:
     center, radius = node.vector("center", (0.0, 0.0, 0.0)), node.number("radius", 1.0)
     if not radius > 0.0:
         raise node.error(f"'radius' is {radius:g}; expected more than 0")
-    m = _compose(node.transform(), _scaled(np.array(center), radius * np.eye(3)))
+    placed_by, flips = node.transform(), node.flag("flip_normals")
+    if not flips and is_similarity(placed_by[:, :3]) and np.linalg.det(placed_by[:, :3]) > 0.0:
+        steps: Any = as_transform(node.written(), placed_by)
+        return Sphere(center=center, radius=radius, transform=steps, material=material)
+    m = _compose(placed_by, _scaled(np.array(center), radius * np.eye(3)))
     linear = m[:, :3]
     lengths = np.linalg.norm(linear, axis=0)
     gram = linear.T @ linear
@@ -129,11 +136,9 @@ def _sphere(reading: Reading, node: Node, material: str | None) -> Shape:
             "expected a uniform scale, or an instance of a group with the sphere"
         )
     # A map that mirrors turns Mitsuba's spheres inside out, but not its cylinders (measured).
-    if node.flag("flip_normals") != bool(np.linalg.det(linear) < 0.0):
+    if flips != bool(np.linalg.det(linear) < 0.0):
         form = (-1.0, -1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
         return _turned(reading, node, material, form, (-1.5, -1.5, -1.5), (1.5, 1.5, 1.5), m)
-    if np.array_equal(linear, lengths[0] * np.eye(3)):
-        return Sphere(center=triple(m[:, 3]), radius=float(lengths[0]), material=material)
     return Sphere(transform=_steps(_orthogonal(m, lengths[0])), material=material)
 
 
@@ -151,7 +156,8 @@ def _cylinder(reading: Reading, node: Node, material: str | None) -> Shape:
     if not (radius > 0.0 and length > 0.0):
         raise node.error("'radius' or the distance from 'p0' to 'p1' is 0; expected more")
     turn = _frame((p1 - p0) / length)
-    m = _compose(node.transform(), _scaled(p0, turn @ np.diag([radius, radius, length])))
+    placed_by = node.transform()
+    m = _compose(placed_by, _scaled(p0, turn @ np.diag([radius, radius, length])))
     linear = m[:, :3]
     gram = linear.T @ linear
     wanted = np.diag([gram[0, 0], gram[0, 0], gram[2, 2]])
@@ -160,6 +166,16 @@ def _cylinder(reading: Reading, node: Node, material: str | None) -> Shape:
         raise node.error(
             "'to_world' makes it oblique or elliptic, which Mitsuba renders as a round cylinder "
             "with a warning; expected one that scales its radius uniformly"
+        )
+    if not node.flag("flip_normals") and p0[2] < p1[2] and not (p0[:2].any() or p1[:2].any()):
+        steps: Any = as_transform(node.written(), placed_by)
+        return Cylinder(
+            radius=radius,
+            z_min=float(p0[2]),
+            z_max=float(p1[2]),
+            capped=False,
+            transform=steps,
+            material=material,
         )
     if node.flag("flip_normals"):
         form = (-1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -199,21 +215,21 @@ def _turned(
     )
 
 
-def _flat(node: Node) -> Affine:
-    """to_world of a shape in the plane z = 0; flipping its normal mirrors z."""
+def _flat(node: Node) -> Any:
+    """The transform of a shape in the plane z = 0; flipping its normal mirrors z."""
     m = node.transform()
     if node.flag("flip_normals"):
-        m = _compose(m, _scaled(np.zeros(3), np.diag([1.0, 1.0, -1.0])))
-    return m
+        return _steps(_compose(m, _scaled(np.zeros(3), np.diag([1.0, 1.0, -1.0]))))
+    return as_transform(node.written(), m)
 
 
 def _rectangle(reading: Reading, node: Node, material: str | None) -> Shape:
     node.ignore("face_normals")
-    return Rectangle(transform=_steps(_flat(node)), material=material)
+    return Rectangle(transform=_flat(node), material=material)
 
 
 def _disk(reading: Reading, node: Node, material: str | None) -> Shape:
-    return Disk(transform=_steps(_flat(node)), material=material)
+    return Disk(transform=_flat(node), material=material)
 
 
 def _cube(reading: Reading, node: Node, material: str | None) -> Shape:
@@ -221,7 +237,8 @@ def _cube(reading: Reading, node: Node, material: str | None) -> Shape:
     flip = node.flag("flip_normals")
     m, of_normals = node.maps()
     if not (flip or reading.uses_uv(material)):
-        return Box(transform=_steps(m), material=material)
+        steps: Any = as_transform(node.written(), m)
+        return Box(transform=steps, material=material)
     surface = Surface(_CUBE, _CUBE_FACES, _CUBE_NORMALS, _CUBE_UV)
     return finished(placed(surface, m, of_normals, smooth=False), flip, True, material)
 

@@ -13,11 +13,14 @@ import numpy as np
 from comparisons.mitsuba.reading.colours import SPECTRA, Rgb, colour, constant, luminance
 from comparisons.mitsuba.reading.context import Reading, unused
 from comparisons.mitsuba.reading.node import Node
+from comparisons.mitsuba.reading.written import FLIP as FLIP_STEPS
+from comparisons.mitsuba.reading.written import Step, Written
 from reference_rt.core.arrays import FloatArray
 from reference_rt.textures import Bitmap, Checker, Texture, VertexColours
 from reference_rt.textures.texture import UvMap
 
-_FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+"""The map of (u, v) to (u, 1 - v)."""
 
 TOLERANCE = 1e-6
 """Relative to the map's size: XML has about seven digits, and Mitsuba's scenes are float32."""
@@ -56,15 +59,30 @@ def number_or_texture(reading: Reading, node: Node, key: str, default: float) ->
     return luminance(colour(node, key, default))
 
 
-def texture_name(reading: Reading, node: Node, as_number: bool) -> str:
+def projected(
+    reading: Reading, node: Node, key: str, default: float | Rgb, use: str = "reflectance"
+) -> Rgb | str:
+    """`colour_or_texture` for a light that projects it: (0, 0) is the upper left corner of the
+    image in Mitsuba, the lower left one in ours."""
+    if node.has(key) and node.kind_of(key) == "ResolvedReference":
+        value = node.take(key)
+        if value.kind == "Texture" and value.plugin not in SPECTRA:
+            return texture_name(reading, value, as_number=False, is_projected=True)
+        if value.kind == "Texture":
+            return constant(value)
+        raise node.error(f"'{key}' is a {value.kind.lower()}; expected a texture")
+    return colour(node, key, default, use)
+
+
+def texture_name(reading: Reading, node: Node, as_number: bool, is_projected: bool = False) -> str:
     """The name of a texture of `reading`, which is read if it is not yet.
 
-    as_number: whether its luminance stands for a number.
+    as_number: whether its luminance stands for a number;  is_projected: see `projected`.
     """
-    key = ("texture", node.index, as_number and node.plugin == "checkerboard")
+    key = ("texture", node.index, as_number and node.plugin == "checkerboard", is_projected)
     if key not in reading.names:
         with node.checking():
-            texture = _texture(reading, node, as_number)
+            texture = _texture(reading, node, as_number, is_projected)
         name = unused(node.name, node.plugin, reading.textures)
         reading.textures[name] = texture
         if isinstance(texture, VertexColours):
@@ -74,17 +92,17 @@ def texture_name(reading: Reading, node: Node, as_number: bool) -> str:
     return reading.names[key]
 
 
-def _texture(reading: Reading, node: Node, as_number: bool) -> Texture:
+def _texture(reading: Reading, node: Node, as_number: bool, is_projected: bool) -> Texture:
     if node.plugin == "bitmap":
-        return _bitmap(reading, node)
+        return _bitmap(reading, node, is_projected)
     if node.plugin == "checkerboard":
-        return _checker(node, as_number)
+        return _checker(node, as_number, is_projected)
     if node.plugin == "mesh_attribute":
         return _attribute(node)
     raise node.unsupported("expected bitmap, checkerboard, mesh_attribute or a colour")
 
 
-def _bitmap(reading: Reading, node: Node) -> Bitmap:
+def _bitmap(reading: Reading, node: Node, is_projected: bool) -> Bitmap:
     node.ignore("accel")
     for key in ("bitmap", "data"):
         if node.has(key):
@@ -96,17 +114,19 @@ def _bitmap(reading: Reading, node: Node) -> Bitmap:
         filter=node.choice("filter_type", "bilinear", ("bilinear", "nearest")),
         wrap=node.choice("wrap_mode", "repeat", ("repeat", "mirror", "clamp")),
         encoding="raw" if node.flag("raw") else "auto",
-        uv=uv_map(node, _FLIP @ _to_uv(node)),
+        uv=_uv(node, is_image=True, is_projected=is_projected),
     )
 
 
-def _checker(node: Node, as_number: bool) -> Checker:
+def _checker(node: Node, as_number: bool, is_projected: bool) -> Checker:
     first, second = colour(node, "color0", 0.4), colour(node, "color1", 0.2)
     if as_number:
         # Mitsuba's `eval_1` exchanges the two colours of its `eval` (src/textures/checkerboard.cpp,
         # 3.9.1).
         first, second = (luminance(second),) * 3, (luminance(first),) * 3
-    return Checker(first=first, second=second, uv=uv_map(node, _to_uv(node)))
+    return Checker(
+        first=first, second=second, uv=_uv(node, is_image=False, is_projected=is_projected)
+    )
 
 
 def _attribute(node: Node) -> VertexColours:
@@ -134,13 +154,51 @@ def _to_uv(node: Node) -> FloatArray:
     return m
 
 
-def uv_map(node: Node, m: FloatArray) -> UvMap:
-    """The map m (3, 3), homogeneous, as scale, rotation and offset.  Raises SceneError for one that
-    shears."""
+def _uv(node: Node, is_image: bool, is_projected: bool) -> UvMap:
+    """The texture's map in our coordinates.  is_image: its v is 0 at the top;  is_projected: so is
+    that of the places where it is looked up."""
+    m, steps = _to_uv(node), node.written("to_uv") or ()
+    own = steps[2 if is_projected else 0 : -2 if is_image else len(steps)]
+    flips = (FLIP_STEPS if is_projected else ()), (FLIP_STEPS if is_image else ())
+    if steps and (*flips[0], *own, *flips[1]) == steps:
+        found = _of_steps(own)
+        if found is not None:
+            return found
+    if is_projected:
+        m = m @ FLIP
+    return uv_map(FLIP @ m if is_image else m)
+
+
+def _of_steps(steps: Written) -> UvMap | None:
+    """A scale, a rotation and a translation, or a matrix alone; None for anything else."""
+    found: dict[str, Any] = {}
+    order = ["scale", "rotate", "translate"]
+    for step in steps:
+        if not isinstance(step, Step):
+            return None
+        if step.kind == "matrix" and len(steps) == 1:
+            a, b, _, c, d, e, _, f = step.numbers[:8]
+            return UvMap(matrix=((a, b, c), (d, e, f)))
+        if step.kind not in order:
+            return None
+        order = order[order.index(step.kind) + 1 :]
+        x, y, z = step.numbers[:3]
+        if step.kind == "rotate":
+            if (x, y, z) != (0.0, 0.0, 1.0):
+                return None
+            found["rotate"] = step.numbers[3]
+        else:
+            found["scale" if step.kind == "scale" else "offset"] = (x, y)
+    return UvMap(**found)
+
+
+def uv_map(m: FloatArray) -> UvMap:
+    """The map m (3, 3), homogeneous, as scale, rotation and offset; one that shears as a matrix."""
     a, b = m[:2, 0], m[:2, 1]
     size = float(np.hypot(*a) + np.hypot(*b))
     if abs(float(a @ b)) > TOLERANCE * size**2:
-        raise node.error("'to_uv' shears; expected a scale, then a rotation, then a translation")
+        first, second = m[:2].tolist()
+        return UvMap(matrix=(tuple(first), tuple(second)))
     along = a if np.hypot(*a) > 0.0 else np.array([b[1], -b[0]])
     # A turn of at most a right angle: then the scale of u is positive only if it is in XML, too.
     angle = math.degrees(math.atan2(along[1], along[0]))

@@ -18,7 +18,7 @@ from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
 from comparisons.mitsuba.csg import Operand, SolidCounterpart
 from comparisons.mitsuba.scene import light_id, shape_id
-from comparisons.mitsuba.stand_ins import MitsubaShape, Plugin, same_uv
+from comparisons.mitsuba.stand_ins import MitsubaShape, Plugin
 from comparisons.mitsuba.translate.cameras import translate_camera
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.film import translate_film, translate_sampler
@@ -73,7 +73,7 @@ def _instanced_group(found: _Translated) -> InstancedGroup | None:
     names = [
         name for name, mi_shape in found.mi_shapes.items() if mi_shape.plugin.group is not None
     ]
-    if len(names) <= MOST_INSTANCES:
+    if len(names) <= MOST_INSTANCES or mitsuba().variant().startswith("scalar"):
         return None
     mi_shapes = {name: found.mi_shapes.pop(name) for name in names}
     instances = {name: found.plain.pop(name) for name in names}
@@ -162,7 +162,7 @@ def _add(
                 reach=reach,
             )
             plugins = translate_shape(leaf.shape, site)
-            if site.textured and any(plugin.uv is not same_uv for plugin in plugins):
+            if site.textured and not all(plugin.has_our_uv for plugin in plugins):
                 kind = type(leaf.shape).__name__
                 raise UntranslatableError(f"{kind} under a texture, with other uv,", "shape")
             if member.tree is None:
@@ -193,4 +193,4 @@ def _named(
     return values, mi_shapes
 
 
-__all__ = ["UntranslatableError", "load", "to_mitsuba"]
+__all__ = ["MOST_INSTANCES", "UntranslatableError", "load", "to_mitsuba"]

@@ -31,6 +31,8 @@ def translate_camera(camera: Any, film: Film) -> dict[str, Any]:
 
 @translate_camera.register
 def _(camera: Perspective, film: Film) -> dict[str, Any]:
+    if camera.view is not None and not _is_square(camera, film):
+        return _rectangle(camera, film)
     offset_x, offset_y = _principal_point(camera)
     return {
         "type": "perspective",
@@ -43,8 +45,10 @@ def _(camera: Perspective, film: Film) -> dict[str, Any]:
 
 @translate_camera.register
 def _(camera: ThinLens, film: Film) -> dict[str, Any]:
-    if max(map(abs, _principal_point(camera))) > UNIT_ROUNDOFF:
-        raise UntranslatableError("ThinLens, whose 'view' is off the axis,", "camera")
+    off_axis = max(map(abs, _principal_point(camera))) > UNIT_ROUNDOFF
+    if camera.view is not None and (off_axis or not _is_square(camera, film)):
+        lens = {"aperture_radius": camera.aperture_radius, "focus_distance": camera.focus}
+        return {**_rectangle(camera, film), **lens}
     return {
         "type": "thinlens",
         **_angle(camera, film),
@@ -72,18 +76,27 @@ def _(camera: Orthographic, film: Film) -> dict[str, Any]:
 
 
 def _angle(camera: CentralCamera, film: Film) -> dict[str, Any]:
-    """The field of view.  Raises UntranslatableError for pixels that are not square."""
+    """The field of view, of square pixels."""
     if camera.view is None:
         fov, axis = camera.angle
         return {"fov": fov, "fov_axis": axis}
+    l, r, _, _ = camera.rectangle(film.width, film.height)
+    return _spanning((r - l) / 2.0)
+
+
+def _is_square(camera: CentralCamera, film: Film) -> bool:
+    """Whether pixels are square, as Mitsuba's are."""
     l, r, b, t = camera.rectangle(film.width, film.height)
     oblong = (r - l) / (t - b) * (film.height / film.width)
-    if not abs(oblong - 1.0) <= UNIT_ROUNDOFF:
-        name = type(camera).__name__
-        raise UntranslatableError(
-            f"{name}, whose pixels are not square as Mitsuba's are,", "camera"
-        )
-    return _spanning((r - l) / 2.0)
+    return abs(oblong - 1.0) <= UNIT_ROUNDOFF
+
+
+def _rectangle(camera: CentralCamera, film: Film) -> dict[str, Any]:
+    """Our plugin `comparisons.mitsuba.plugins.view_rectangle`."""
+    edges = camera.rectangle(film.width, film.height)
+    named = zip(("left", "right", "bottom", "top"), edges, strict=True)
+    place = _place(camera)["to_world"]
+    return {"type": "view_rectangle", "to_world": place, **dict(named)}
 
 
 def _spanning(half: float) -> dict[str, Any]:
@@ -108,5 +121,5 @@ def _place(
     u, v, w = camera.basis
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([-right * u, up * v, -w, np.add(camera.eye, shift)])
-    to_world = mitsuba().ScalarTransform4f(matrix)
+    to_world = mitsuba().ScalarTransform4d(matrix)
     return {"to_world": to_world, "near_clip": NEAR, "far_clip": FAR}

@@ -15,7 +15,7 @@ class UntranslatableError(ReferenceRtError):
 
     def __init__(self, part: Any, kind: str) -> None:
         name = part if isinstance(part, str) else type(part).__name__
-        self.part = name
+        self.part, self.kind = name, kind
         super().__init__(
             f"the {kind} {name} cannot be compared: comparisons.mitsuba.translate has no "
             "translation for it"

@@ -1,5 +1,6 @@
 """Lights that are not shapes -> Mitsuba."""
 
+import math
 from functools import singledispatch
 from typing import Any
 
@@ -7,8 +8,16 @@ import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.textures import TranslationContext, rgb
-from reference_rt.lights import Ambient, Constant, Directional, EnvironmentMap, Point, Spot
+from comparisons.mitsuba.translate.textures import TranslationContext, projected, rgb
+from reference_rt.lights import (
+    Ambient,
+    Constant,
+    Directional,
+    EnvironmentMap,
+    Point,
+    Projector,
+    Spot,
+)
 
 
 @singledispatch
@@ -28,9 +37,14 @@ def _(light: Point, context: TranslationContext) -> dict[str, Any]:
 @translate_light.register
 def _(light: Spot, context: TranslationContext) -> dict[str, Any]:
     beam = 0.75 * light.cutoff_angle if light.beam_width is None else light.beam_width
-    axis = np.subtract(light.target, light.origin)
-    # Any vector that is not parallel to the axis: the light is rotationally symmetric.
-    up = np.eye(3)[int(np.argmin(np.abs(axis)))].tolist()
+    texture: dict[str, Any] = {}
+    if light.texture is None:
+        # Any vector that is not parallel to the axis: the light is rotationally symmetric.
+        up = np.eye(3)[int(np.argmin(np.abs(light.axis)))].tolist()
+    else:
+        # Mitsuba's images hang upside down: u to the left and v upwards, from the top row.
+        up = [-x for x in light.up]
+        texture = {"texture": projected(light.texture, context)}
     return {
         "type": "spot",
         "to_world": mitsuba()
@@ -39,6 +53,29 @@ def _(light: Spot, context: TranslationContext) -> dict[str, Any]:
         "intensity": rgb(light.intensity),
         "cutoff_angle": light.cutoff_angle,
         "beam_width": beam,
+        **texture,
+    }
+
+
+@translate_light.register
+def _(light: Projector, context: TranslationContext) -> dict[str, Any]:
+    """Mitsuba's irradiance is ours over pi, and the image's shape that of its pixels: what is left
+    of ours stretches the light's own coordinates."""
+    irradiance = projected(light.irradiance, context)
+    pixels = irradiance["bitmap"].size() if "bitmap" in irradiance else (1, 1)
+    stretch = float(pixels[0]) / float(pixels[1]) / light.aspect
+    look = (
+        mitsuba()
+        .ScalarTransform4f()
+        .look_at(list(light.origin), list(light.target), list(light.up))
+    )
+    return {
+        "type": "projector",
+        "to_world": look @ mitsuba().ScalarTransform4f().scale([1.0, stretch, 1.0]),
+        "irradiance": irradiance,
+        "scale": light.scale / math.pi,
+        "fov": light.fov,
+        "fov_axis": "x",
     }
 
 

@@ -151,6 +151,20 @@ def _(material: rt.Principled, context: TranslationContext) -> dict[str, Any]:
 
 
 @translate_material.register
+def _(material: rt.PrincipledThin, context: TranslationContext) -> dict[str, Any]:
+    numbers = (
+        "roughness", "anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness",
+        "diff_trans",
+    )  # fmt: skip
+    return {
+        "type": "principledthin",
+        "base_color": colour(material.base_colour, context),
+        "eta": material.eta,
+        **{name: number(getattr(material, name), context) for name in numbers},
+    }
+
+
+@translate_material.register
 def _(material: rt.Phong, context: TranslationContext) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.phong`."""
     colours = ("ambient", "diffuse", "specular", "mirror")

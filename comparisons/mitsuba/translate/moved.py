@@ -9,7 +9,7 @@ from comparisons.geometry.frame import Frame, frame_for
 from comparisons.geometry.sizes import ShapeSizes
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.core.transform import Scale, Translate
-from reference_rt.lights import Point, Spot
+from reference_rt.lights import Point, Projector, Spot
 from reference_rt.materials import Bump
 from reference_rt.rendering.scene import Scene
 
@@ -78,6 +78,9 @@ def _(camera: ThinLens, scale: float) -> dict[str, Any]:
 
 def _light(light: Any, frame: Frame) -> Any:
     """A light, moved; intensity grows with scale², as irradiance falls with distance²."""
+    if isinstance(light, Projector):
+        places = {"origin": _point(light.origin, frame), "target": _point(light.target, frame)}
+        return light.model_copy(update={"scale": light.scale * frame.scale**2, **places})
     if not isinstance(light, Point | Spot):
         return light
     brighter = tuple(x * frame.scale**2 for x in light.intensity)

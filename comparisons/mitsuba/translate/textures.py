@@ -1,6 +1,6 @@
 """Textures -> Mitsuba, parameters that may be textures, and the `TranslationContext`."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import singledispatch
 from pathlib import Path
@@ -17,6 +17,9 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.textures import Bitmap, Checker, Texture, VertexColours
 from reference_rt.textures.texture import UvMap
 
+FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+"""The map of (u, v) to (u, 1 - v): v = 0 is the top row of Mitsuba's images, the bottom of ours."""
+
 VERTEX_COLOUR, VERTEX_LUMINANCE = "vertex_color", "vertex_luminance"
 """Names of mesh attributes."""
 
@@ -26,7 +29,8 @@ class TranslationContext:
     """The context of a translation: the scene's materials and textures, by name; the folder of its
     files;  has_colours: whether the material belongs to a mesh with vertex colours;  native: use
     Mitsuba's own materials even where our plugins are more exact;  images: cache of Mitsuba's
-    bitmaps."""
+    bitmaps;  in_file: the texture with a name, as colours or as numbers, in a scene
+    file;  None: in memory."""
 
     materials: Mapping[str, Material]
     textures: Mapping[str, Texture]
@@ -34,6 +38,7 @@ class TranslationContext:
     has_colours: bool = False
     native: bool = False
     images: dict[Any, Any] = field(default_factory=dict)
+    in_file: Callable[[str, "TranslationContext", bool], dict[str, Any]] | None = None
 
     @classmethod
     def of(cls, scene: Scene, native: bool = False) -> Self:
@@ -49,8 +54,24 @@ def colour(value: tuple[float, float, float] | str, context: TranslationContext)
     """A colour, or the texture with that name.  Raises UntranslatableError, ValueError for a file
     that cannot be used."""
     if isinstance(value, str):
-        return translate_texture(context.textures[value], value, context, False)
+        return _translated(value, context, False)
     return rgb(value)
+
+
+def _translated(name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
+    if context.in_file is not None:
+        return context.in_file(name, context, as_number)
+    return translate_texture(context.textures[name], name, context, as_number)
+
+
+def projected(
+    value: tuple[float, float, float] | str, context: TranslationContext
+) -> dict[str, Any]:
+    """The same for a light that projects it: Mitsuba's v is 0 at the top of such an image."""
+    found = colour(value, context)
+    if "to_uv" in found:
+        found["to_uv"] = _to_uv(np.array(found["to_uv"].matrix, np.float64) @ FLIP)
+    return found
 
 
 def number(value: float | str, context: TranslationContext) -> float | dict[str, Any]:
@@ -60,7 +81,7 @@ def number(value: float | str, context: TranslationContext) -> float | dict[str,
     0.2126).  Raises as `colour` does.
     """
     if isinstance(value, str):
-        return translate_texture(context.textures[value], value, context, True)
+        return _translated(value, context, True)
     return value
 
 
@@ -122,8 +143,6 @@ def _image(texels: FloatArray, as_number: bool) -> Any:
 
 
 def _lookup(image: Any, filter_type: str, wrap: str, uv: UvMap) -> dict[str, Any]:
-    # Mitsuba's v = 0 is the top row.
-    flipped = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
     return {
         "type": "bitmap",
         "bitmap": image,
@@ -131,12 +150,12 @@ def _lookup(image: Any, filter_type: str, wrap: str, uv: UvMap) -> dict[str, Any
         "format": "variant",  # never half floats
         "filter_type": filter_type,
         "wrap_mode": wrap,
-        "to_uv": _to_uv(flipped @ _homogeneous(uv)),
+        "to_uv": _to_uv(FLIP @ _homogeneous(uv)),
     }
 
 
 def _homogeneous(uv: UvMap) -> FloatArray:
-    return np.vstack([uv.matrix().reshape(2, 3), [0.0, 0.0, 1.0]])
+    return np.vstack([uv.coefficients().reshape(2, 3), [0.0, 0.0, 1.0]])
 
 
 def _to_uv(matrix: FloatArray) -> Any:

@@ -12,6 +12,7 @@ from comparisons.mitsuba.translate.textures import (
     number,
     rgb,
 )
+from reference_rt.core.image_files import open_image
 from reference_rt.materials import (
     Blend,
     Bump,
@@ -76,8 +77,12 @@ def _(material: TwoSided, context: TranslationContext) -> dict[str, Any]:
     return bsdf
 
 
-# By default Mitsuba's bump and normal maps flip normals that face away, and apply a shadowing term.
-_PLAIN = {"flip_invalid_normals": False, "use_shadowing_function": False}
+def _tilt(material: Bump | NormalMap) -> dict[str, Any]:
+    """The options that both have; Mitsuba's are on by default."""
+    return {
+        "flip_invalid_normals": material.flip_invalid_normals,
+        "use_shadowing_function": material.use_shadowing_function,
+    }
 
 
 @translate_material.register
@@ -90,17 +95,23 @@ def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
         # Mitsuba mixes a local normal with a world-space tangent (src/bsdfs/bumpmap.cpp).
         raise UntranslatableError("Bump over a material with a grain", "material")
     height = number(material.height, context)
-    m = texture.uv.matrix()
-    if (m[1] != 0.0 or m[3] != 0.0) and not _is_square(height):
+    m = texture.uv.coefficients()
+    if (m[1] != 0.0 or m[3] != 0.0) and not _is_square(texture, context):
         # Mitsuba rotates the gradient before it multiplies by width and height
         # (src/textures/bitmap.cpp).
         raise UntranslatableError("Bump by a turned image that is not square", "material")
-    return {"type": "bumpmap", "scale": material.scale, "height": height, "bsdf": base, **_PLAIN}
+    return {
+        "type": "bumpmap",
+        "scale": material.scale,
+        "height": height,
+        "bsdf": base,
+        **_tilt(material),
+    }
 
 
-def _is_square(height: Any) -> bool:
-    size = height["bitmap"].size()
-    return bool(size[0] == size[1])
+def _is_square(texture: Bitmap, context: TranslationContext) -> bool:
+    image = open_image(context.folder / texture.file)
+    return image.width == image.height
 
 
 def _leaves(material: Material, context: TranslationContext) -> list[Material]:
@@ -117,7 +128,7 @@ def _(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
     if not isinstance(texture, Bitmap):
         raise UntranslatableError("NormalMap of a texture that is no image", "material")
     normals = colour(material.normals, context)
-    return {"type": "normalmap", "normalmap": normals, "bsdf": base, **_PLAIN}
+    return {"type": "normalmap", "normalmap": normals, "bsdf": base, **_tilt(material)}
 
 
 def parts_of(name: str | None, context: TranslationContext) -> dict[str, Any]:

@@ -34,6 +34,9 @@ SCALES = (1, 8)
 """Sides of the squares, in pixels, whose means are tested: single pixels show what changes from
 pixel to pixel, larger squares have less noise."""
 
+FIELDS = {"normal": "ns", "position": "p"}
+"""The field of a hit that a layer is the mean of."""
+
 AT_ONCE = 1 << 18
 """Rays that Mitsuba traces in one call."""
 
@@ -58,8 +61,8 @@ def expected(
     side: int,
     seed: int,
 ) -> dict[str, FloatArray]:
-    """Means (height, width, 3) over side² rays of each pixel of what Mitsuba hits: "albedo"
-    and "normal", through `film_filter`."""
+    """Means (height, width, 3) over side² rays of each pixel of what Mitsuba hits: "albedo",
+    "normal" and "position", through `film_filter`."""
     width, height = scene.film.width, scene.film.height
     points, seen = FilmPoints(film_filter), Seen(scene, sizes)
     rng = np.random.default_rng([seed, 2])
@@ -75,7 +78,7 @@ def expected(
         o, d = sensor_rays(counterpart, film, rng.uniform(size=(len(each), 2)))
         hits = trace(counterpart, o, d)
         for name in names:
-            value = seen.colours(hits) if name == "albedo" else hits.ns
+            value = seen.colours(hits) if name == "albedo" else getattr(hits, FIELDS[name])
             weighted = value.reshape(len(pixels), samples, 3) * weight[..., None]
             sums[name][pixels] = weighted.mean(axis=1)
     return {name: values.reshape(height, width, 3) for name, values in sums.items()}

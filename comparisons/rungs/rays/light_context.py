@@ -6,11 +6,25 @@ from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import DIRECTIONAL, POINT, SPOT, Directional, Point, Spot
+from reference_rt.lights import (
+    DIRECTIONAL,
+    POINT,
+    PROJECTOR,
+    SPOT,
+    Directional,
+    Point,
+    Projector,
+    Spot,
+)
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 
-POINT_LIKE: dict[int, type] = {POINT: Point, SPOT: Spot, DIRECTIONAL: Directional}
+POINT_LIKE: dict[int, type] = {
+    POINT: Point,
+    SPOT: Spot,
+    PROJECTOR: Projector,
+    DIRECTIONAL: Directional,
+}
 """Descriptions of the lights without extent, by kind: from a point each has one direction, which
 Mitsuba's emitter itself gives."""
 

@@ -123,7 +123,7 @@ def slopes_of(
 
 
 def _has_image(context: LightContext, light: int) -> bool:
-    """Whether a texture makes the radiance of a light vary over it."""
+    """Whether a texture makes the radiance of a light vary over it, or with the direction."""
     kind, scene = kind_of(context, light), context.scene
     if kind == ENVIRONMENT:
         return any(isinstance(described, EnvironmentMap) for described in scene.lights)

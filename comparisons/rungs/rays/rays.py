@@ -8,6 +8,7 @@ from comparisons.geometry.float32 import round32
 from comparisons.geometry.frame import Frame
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.rungs.rays.camera import camera_rays, pixel_centres
+from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
@@ -34,6 +35,13 @@ def pixel_rays(scene: Scene, frame: Frame, most: int) -> Rays:
     """Camera rays through at most `most` pixel centres, rounded to float32 in the frame."""
     o, d = camera_rays(scene, *pixel_centres(scene.film, most))
     return Rays(frame.rounded(o), round32(d))
+
+
+def described(film: Film, most: int, rays: Rays, k: int) -> str:
+    """Ray `k` in words, with its pixel if it is a camera ray: those of `pixel_rays` come first."""
+    x, y = pixel_centres(film, most)
+    of = f"the ray of pixel ({int(x[k])}, {int(y[k])})" if k < len(x) else "the ray"
+    return f"{of} from {rays.o[k].tolist()} along {rays.d[k].tolist()}"
 
 
 def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, seed: int) -> Rays:

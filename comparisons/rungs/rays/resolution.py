@@ -21,7 +21,7 @@ from comparisons.rungs.rays.rays import Rays, mixed_rays
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import Directional, Point, Spot
+from reference_rt.lights import Directional, Point, Projector, Spot
 from reference_rt.materials import Dielectric, RoughDielectric, ThinDielectric
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
@@ -194,7 +194,9 @@ def _ways(
     random /= np.linalg.norm(random, axis=1)[:, None]
     random *= np.where(np.sum(random * front, axis=1) < 0.0, -1.0, 1.0)[:, None]
     found = [random]
-    lights = [light for light in scene.lights if isinstance(light, Directional | Point | Spot)]
+    lights = [
+        light for light in scene.lights if isinstance(light, Directional | Point | Projector | Spot)
+    ]
     for light in lights[:MOST_LIGHTS]:
         if isinstance(light, Directional):
             to_light = np.broadcast_to(-np.array(light.direction), d.shape)

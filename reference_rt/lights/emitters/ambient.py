@@ -6,8 +6,9 @@ from reference_rt.core.model import Colour, Description
 
 
 class Ambient(Description):
-    """What `phong` materials add as k_a I_a under recursive ray tracing; nothing else sees it."""
+    """The textbook's ambient light: a `phong` material adds k_a I_a under `whitted`.  No other
+    material or integrator uses it."""
 
     type: Literal["ambient"] = "ambient"
     radiance: Colour
-    """W sr^-1 m^-2, linear sRGB."""
+    """The ambient radiance I_a: W sr^-1 m^-2, linear sRGB."""

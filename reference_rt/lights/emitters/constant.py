@@ -17,11 +17,11 @@ PDF = 0.25 / math.pi
 
 
 class Constant(Description):
-    """Shines equally from infinitely far away on all sides."""
+    """The same radiance from every direction, infinitely far away."""
 
     type: Literal["constant"] = "constant"
     radiance: Colour
-    """W sr^-1 m^-2, linear sRGB."""
+    """Radiance from every direction: W sr^-1 m^-2, linear sRGB."""
 
     def tabulate(self) -> "Environment":
         return Environment(Vec3(*self.radiance))

@@ -10,17 +10,20 @@ from reference_rt.core.model import Colour, Description, Direction
 from reference_rt.core.vec3 import Vec3, luminance, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.light import LightSample
+from reference_rt.textures import NO_TEXTURES, Palette
 
 
 class Directional(Description):
-    """Light that travels along `direction` everywhere."""
+    """Parallel light from infinitely far away, such as the sun's without its size."""
 
     type: Literal["directional"] = "directional"
     direction: Direction
+    """The direction in which light travels, away from its source: world coordinates, of any length
+    but 0."""
     irradiance: Colour
-    """On a plane across the light, W m^-2, linear sRGB."""
+    """Irradiance on a plane perpendicular to the light: W m^-2, linear sRGB."""
 
-    def tabulate(self) -> "Directionals":
+    def tabulate(self, palette: Palette = NO_TEXTURES) -> "Directionals":
         away = np.array(self.direction) / math.hypot(*self.direction)
         return Directionals(-away[None], np.array([self.irradiance]))
 

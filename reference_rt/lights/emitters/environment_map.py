@@ -24,17 +24,20 @@ from reference_rt.textures.image_file import read_image
 
 
 class EnvironmentMap(Description):
-    """An image around the scene, infinitely far away: its top row towards +y, its middle towards
-    +z, what is right of the middle towards -x."""
+    """Radiance from infinitely far away by an image of all directions (latitude and longitude).
+
+    Its top row is +y, its middle +z; right of the middle is -x.
+    """
 
     type: Literal["environment_map"] = "environment_map"
     file: str
-    """.exr, .hdr, .pfm, .npy (radiance as it is), or .png, .jpg and what Pillow reads besides
-    (sRGB), relative to the scene; twice as wide as high, usually."""
+    """The image, relative to the scene file: .exr, .hdr, .pfm, .npy (linear radiance), or .png,
+    .jpg and other formats that Pillow reads (sRGB).  Usually twice as wide as high."""
     scale: Positive = 1.0
-    """What the image's values are multiplied by: W sr^-1 m^-2, linear sRGB."""
+    """A factor of the image's values, which gives W sr^-1 m^-2, linear sRGB."""
     transform: Transform = ()
-    """Turns and mirrors the map; steps that do more are an error."""
+    """Steps that rotate or mirror the map, the first one first; steps that scale or translate are
+    an error.  Default: +y is up."""
 
     def tabulate(self, folder: Path) -> "EnvironmentMaps":
         """One row.  Raises ValueError (what is wrong, what was expected)."""

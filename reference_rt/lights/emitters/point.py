@@ -10,17 +10,19 @@ from reference_rt.core.model import Colour, Description, Vector
 from reference_rt.core.vec3 import Vec3, luminance, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.light import LightSample, from_position
+from reference_rt.textures import NO_TEXTURES, Palette
 
 
 class Point(Description):
-    """A point that shines equally to all sides."""
+    """A point that emits the same intensity in all directions."""
 
     type: Literal["point"] = "point"
     position: Vector
+    """Where it is: [x, y, z] in world coordinates, in scene units."""
     intensity: Colour
-    """Radiant intensity, W sr^-1, linear sRGB."""
+    """Radiant intensity in every direction: W sr^-1, linear sRGB."""
 
-    def tabulate(self) -> "Points":
+    def tabulate(self, palette: Palette = NO_TEXTURES) -> "Points":
         return Points(np.array([self.position]), np.array([self.intensity]))
 
 

@@ -13,7 +13,9 @@ import numpy as np
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, cross, dot, length, luminance, normalize
 from reference_rt.jit.kernel import kernel
+from reference_rt.lights.emitters import projector
 from reference_rt.lights.emitters.point import Points
+from reference_rt.lights.emitters.projector import Projectors
 from reference_rt.lights.emitters.spot import Spots
 from reference_rt.shapes import DISK, RECTANGLE, TABLES, TRIANGLE, Shapes
 from reference_rt.shapes.meshes.triangle_table import geometric_normals
@@ -69,9 +71,17 @@ def of_points(points: Points) -> LightBounds:
 
 def of_spots(spots: Spots) -> LightBounds:
     none = np.zeros(len(spots.position))
-    intensity = np.asarray(luminance(Vec3(*spots.intensity.T)))
+    intensity = np.asarray(luminance(Vec3(*spots.intensity.T)) * spots.brightest)
     return LightBounds(
         spots.position, spots.position, spots.axis, none, spots.cutoff, none, intensity
+    )
+
+
+def of_projectors(found: Projectors) -> LightBounds:
+    none = np.zeros(len(found.position))
+    return LightBounds(
+        *(found.position, found.position, found.axis),
+        *(none, projector.reach(found), none, projector.intensity(found)),
     )
 
 

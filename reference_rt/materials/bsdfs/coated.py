@@ -15,15 +15,17 @@ class Coated(Material):
     smooth: ClassVar[bool] = True
     type: str  # first, so that `to_json` writes it first
     reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
-    """Of the base."""
+    """Diffuse reflectance of the base: linear sRGB from 0 to 1, or a texture."""
     specular: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
+    """A factor of the light that the coat reflects: linear sRGB from 0 to 1, or a texture.  The
+    default, 1, is physical."""
     interior_ior: Positive = 1.5
     """Index of refraction of the coat."""
     exterior_ior: Positive = 1.0
-    """Index of refraction around it."""
+    """Index of refraction outside the coat."""
     nonlinear: bool = False
-    """Whether the base colours the light at every bounce, so that colours saturate."""
+    """Whether `reflectance` colours the light at every bounce below the coat, so that colours
+    saturate."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:

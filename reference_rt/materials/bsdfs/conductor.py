@@ -12,7 +12,7 @@ from reference_rt.textures import At, Colours, Palette, colour_at
 
 
 class Conductor(Metal):
-    """A smooth metal; its back is black."""
+    """A smooth metal; black from behind."""
 
     delta: ClassVar[bool] = True
     type: Literal["conductor"] = "conductor"

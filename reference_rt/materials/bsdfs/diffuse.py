@@ -10,12 +10,13 @@ from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, co
 
 
 class Diffuse(Material):
-    """Scatters equally to all sides of its front; its back is black."""
+    """An ideally matte surface: radiance is the same in all directions; black from behind."""
 
     smooth: ClassVar[bool] = True
     uses_u_lobe: ClassVar[bool] = False
     type: Literal["diffuse"] = "diffuse"
     reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
+    """Fraction of the light that is scattered: linear sRGB from 0 to 1, or a texture."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:

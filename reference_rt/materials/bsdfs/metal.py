@@ -27,11 +27,14 @@ class Metal(Material):
 
     type: str  # first, so that `to_json` writes it first
     eta: Index
-    """The index of refraction, relative to what is outside."""
+    """Real part of the index of refraction for red, green and blue, relative to the medium outside;
+    above 0."""
     k: Colour
-    """The extinction coefficient: the imaginary part of the index."""
+    """Extinction coefficient for red, green and blue: the imaginary part of the index; at least 0.
+    """
     reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
+    """A factor of the reflected light: linear sRGB from 0 to 1, or a texture.  The default, 1, is
+    physical."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:

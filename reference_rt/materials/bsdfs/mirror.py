@@ -9,11 +9,12 @@ from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, co
 
 
 class Mirror(Material):
-    """A perfect mirror with a colour (the textbook's k_r); its back is black."""
+    """A perfect mirror with a colour; black from behind."""
 
     delta: ClassVar[bool] = True
     type: Literal["mirror"] = "mirror"
     reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
+    """Fraction of the light that is reflected, k_r: linear sRGB from 0 to 1, or a texture."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:

@@ -41,23 +41,27 @@ from reference_rt.textures import At, ColourParameter, Colours, Palette, colour_
 
 
 class Phong(Material):
-    """Ambient, diffuse and specular constants, and a mirror; its back is black."""
+    """The textbook's local shading, without 1/π: ambient, diffuse and specular terms, and a mirror;
+    black from behind."""
 
     smooth: ClassVar[bool] = True
     delta: ClassVar[bool] = True
     type: Literal["phong"] = "phong"
     ambient: ColourParameter = (0.0, 0.0, 0.0)
-    """k_a: of the ambient light, in Whitted's integrator."""
+    """k_a, the factor of the `ambient` light under `whitted`: linear sRGB of at least 0, or a
+    texture."""
     diffuse: ColourParameter
-    """k_d."""
+    """k_d, the factor of n·l, without 1/π: linear sRGB of at least 0, or a texture."""
     specular: ColourParameter = (0.0, 0.0, 0.0)
-    """k_s."""
+    """k_s, the factor of the highlight: linear sRGB of at least 0, or a texture."""
     exponent: Positive = 32.0
-    """p: how narrow the highlight is."""
+    """p, the exponent of the highlight's cosine: larger ones make it narrower; above 0."""
     half_vector: bool = False
-    """Whether the highlight is where the half vector is near the normal."""
+    """Whether the highlight's cosine is that of normal and half vector (Blinn) rather than that of
+    light and mirrored direction."""
     mirror: ColourParameter = (0.0, 0.0, 0.0)
-    """k_r: of what is seen in the mirrored direction."""
+    """k_r, the factor of the radiance in the mirrored direction: linear sRGB of at least 0, or a
+    texture."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:

@@ -35,13 +35,13 @@ from reference_rt.textures import At, Colours, Palette, colour_at
 
 
 class Plastic(Coated):
-    """A diffuse base under a smooth clear coat; its back is black."""
+    """A diffuse base under a smooth clear coat; black from behind."""
 
     delta: ClassVar[bool] = True
     type: Literal["plastic"] = "plastic"
     nonlinear: bool = False
-    """Whether the base colours the light at every bounce, so that colours saturate; otherwise
-    `reflectance` is what the base looks like under its coat."""
+    """Whether `reflectance` colours the light at every bounce below the coat, so that colours
+    saturate.  Otherwise `reflectance` is the colour as seen through the coat."""
 
     def tabulate(self, palette: Palette) -> "Plastics":
         eta = relative_index(self.interior_ior, self.exterior_ior)

@@ -72,36 +72,38 @@ _SHEEN = 0.1
 
 
 class Principled(Material):
-    """Numbers from 0 to 1, or textures of them, but for `specular` and `eta`."""
+    """Burley's principled material, from plaster to metal and glass, in Mitsuba's form."""
 
     smooth: ClassVar[bool] = True
     type: Literal["principled"] = "principled"
     base_colour: ReflectanceParameter = (0.5, 0.5, 0.5)
+    """Colour of the diffuse lobe and of metal: linear sRGB from 0 to 1, or a texture."""
     roughness: UnitParameter = 0.5
-    """The root of the microfacets' alpha, which counts as 0.001 where it is below."""
+    """Square root of the GGX roughness alpha, from 0 to 1; alpha is at least 0.001."""
     metallic: UnitParameter = 0.0
-    """Of the way to a metal of this colour."""
+    """Blends from a dielectric (0) to a metal of the base colour (1)."""
     specular: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
-    """Mirrored at normal incidence, over 8 %: 0.5 where `eta` is not given either.  0 counts as
-    0.001 with `spec_trans`."""
+    """Reflectance at normal incidence over 0.08, from 0 to 1.  Default, without `eta`: 0.5.  With
+    `spec_trans`, 0 counts as 0.001."""
     eta: Positive | None = None
-    """Index of refraction inside over outside.  1 counts as 1.001 with `spec_trans`."""
+    """Instead of `specular`: index of refraction inside over outside.  With `spec_trans`, 1 counts
+    as 1.001."""
     spec_tint: UnitParameter = 0.0
-    """How much a dielectric's highlight has of the base colour."""
+    """How far the base colour tints a dielectric's highlight, from 0 to 1."""
     anisotropic: UnitParameter = 0.0
-    """How much longer the highlight is across than along u."""
+    """How far the highlight is stretched along the direction of u, from 0 to 1."""
     sheen: UnitParameter = 0.0
-    """Of cloth, at grazing angles."""
+    """Strength of a lobe at grazing angles, as of cloth, from 0 to 1."""
     sheen_tint: UnitParameter = 0.0
-    """How much of the base colour it has."""
+    """How far the base colour tints the sheen, from 0 to 1."""
     clearcoat: UnitParameter = 0.0
-    """A second, colourless highlight."""
+    """Strength of a second, colourless highlight, from 0 to 1."""
     clearcoat_gloss: UnitParameter = 0.0
-    """How narrow it is: alpha is from 0.1 to 0.001."""
+    """How narrow that highlight is: 0 is an alpha of 0.1, 1 one of 0.001."""
     spec_trans: UnitParameter = 0.0
-    """Of the way from a diffuse inside to a clear one."""
+    """Blends from a diffuse inside (0) to one that refracts (1)."""
     flatness: UnitParameter = 0.0
-    """Of the way to a look of light that scatters under the surface."""
+    """Blends the diffuse lobe towards an approximation of subsurface scattering, from 0 to 1."""
 
     @model_validator(mode="after")
     def _one_index(self) -> "Principled":

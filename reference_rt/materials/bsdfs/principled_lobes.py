@@ -78,7 +78,7 @@ def _lerp(a: Vec3, b: Vec3, t: float) -> Vec3:
 
 
 @kernel
-def _tint(base: Vec3) -> Vec3:
+def tint(base: Vec3) -> Vec3:
     """The colour without its luminance; white for black."""
     y = luminance(base)
     return base / y if y > 0.0 else Vec3(1.0, 1.0, 1.0)
@@ -99,7 +99,7 @@ def facet(s: Surface, refraction: Refraction) -> Facet:
         r0 = (s.eta - 1.0) / (s.eta + 1.0)
         rise = schlick_weight(refraction.thin)
         plain = one * ((1.0 - s.metallic) * (1.0 - s.spec_tint) * f)
-        tinted = _lerp(_tint(s.base) * (r0 * r0), one, rise)
+        tinted = _lerp(tint(s.base) * (r0 * r0), one, rise)
         metal = _lerp(s.base, one, rise)
         mirrored = plain + tinted * ((1.0 - s.metallic) * s.spec_tint) + metal * s.metallic
     if f == 0.0:
@@ -136,7 +136,7 @@ def diffuse(s: Surface, wo: Vec3, wi: Vec3, cos_d: float) -> Vec3:
 def sheen_colour(s: Surface) -> Vec3:
     """Of all but the metallic part."""
     white = Vec3(1.0, 1.0, 1.0)
-    return _lerp(white, _tint(s.base), s.sheen_tint) * (s.sheen * (1.0 - s.metallic))
+    return _lerp(white, tint(s.base), s.sheen_tint) * (s.sheen * (1.0 - s.metallic))
 
 
 @kernel

@@ -11,7 +11,10 @@ class Rough(Material):
 
     smooth: ClassVar[bool] = True
     distribution: Distribution = "ggx"
+    """The distribution of microfacet normals: GGX (Trowbridge-Reitz) or Beckmann."""
     alpha: AlphaParameter = (0.1, 0.1)
+    """Roughness: the root mean square slope for `beckmann`.  A number, two [along u, along v], or a
+    texture; above 0, at most 10.  Below 1e-4 it counts as 1e-4."""
 
     @property
     def oriented(self) -> bool:

@@ -28,7 +28,7 @@ from reference_rt.textures import At, Colours, Palette, colour_at
 
 
 class RoughConductor(Rough, Metal):
-    """A rough metal; its back is black."""
+    """A rough metal, by microfacets; black from behind."""
 
     uses_u_lobe: ClassVar[bool] = False
     type: Literal["rough_conductor"] = "rough_conductor"

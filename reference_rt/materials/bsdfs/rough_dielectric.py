@@ -41,7 +41,7 @@ from reference_rt.textures import At, Colours, Palette, colour_at
 
 
 class RoughDielectric(Rough, Transparent):
-    """A rough boundary of two transparent media; the normal points to the exterior."""
+    """A rough boundary of transparent media, by microfacets; the normal points to the exterior."""
 
     type: Literal["rough_dielectric"] = "rough_dielectric"
 

@@ -55,12 +55,14 @@ _LEAST_MIRRORED = 1e-3
 
 
 class RoughPlastic(Coated):
-    """A diffuse base under a rough clear coat; its back is black."""
+    """A diffuse base under a rough clear coat, by microfacets; black from behind."""
 
     type: Literal["rough_plastic"] = "rough_plastic"
     distribution: Distribution = "ggx"
+    """The distribution of the coat's microfacet normals: GGX (Trowbridge-Reitz) or Beckmann."""
     alpha: float = Field(default=0.1, gt=0.0, le=MAX_ALPHA)
-    """Roughness, the same in all directions; below MIN_ALPHA it counts as that."""
+    """Roughness of the coat, the same in all directions: above 0, at most 10.  Below 1e-4 it counts
+    as 1e-4."""
 
     def tabulate(self, palette: Palette) -> "RoughPlastics":
         eta = relative_index(self.interior_ior, self.exterior_ior)

@@ -21,6 +21,7 @@ from reference_rt.materials.bsdfs import (
     phong,
     plastic,
     principled,
+    principled_thin,
     rough_conductor,
     rough_dielectric,
     rough_plastic,
@@ -33,6 +34,7 @@ from reference_rt.materials.bsdfs.mirror import Mirror, Mirrors
 from reference_rt.materials.bsdfs.phong import Phong, Phongs
 from reference_rt.materials.bsdfs.plastic import Plastic, Plastics
 from reference_rt.materials.bsdfs.principled import Principled, Principleds
+from reference_rt.materials.bsdfs.principled_thin import PrincipledThin, ThinPrincipleds
 from reference_rt.materials.bsdfs.rough_conductor import RoughConductor, RoughConductors
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, RoughDielectrics
 from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic, RoughPlastics
@@ -62,7 +64,8 @@ from reference_rt.textures import At
     ROUGH_PLASTIC,
     PRINCIPLED,
     PHONG,
-) = range(11)
+    PRINCIPLED_THIN,
+) = range(12)
 CLEAR, BLACK = 100, 101
 
 
@@ -80,6 +83,7 @@ class Leaves(NamedTuple):
     rough_plastics: RoughPlastics | None
     principleds: Principleds | None
     phongs: Phongs | None
+    thin_principleds: ThinPrincipleds | None
 
 
 TABLES: tuple[tuple[int, str, type[Material], type, Any], ...] = (
@@ -94,6 +98,7 @@ TABLES: tuple[tuple[int, str, type[Material], type, Any], ...] = (
     (ROUGH_PLASTIC, "rough_plastics", RoughPlastic, RoughPlastics, rough_plastic),
     (PRINCIPLED, "principleds", Principled, Principleds, principled),
     (PHONG, "phongs", Phong, Phongs, phong),
+    (PRINCIPLED_THIN, "thin_principleds", PrincipledThin, ThinPrincipleds, principled_thin),
 )
 """(code, field of Leaves, description, table, module with its kernels)."""
 
@@ -114,7 +119,7 @@ _last = by_code.in_turn(_code)
 @kernel
 def only(leaves: Leaves) -> int:
     """The code of the only table, for scenes with one: a constant, so that branches vanish."""
-    code: int = _last(leaves, PHONG)
+    code: int = _last(leaves, PRINCIPLED_THIN)
     return code
 
 

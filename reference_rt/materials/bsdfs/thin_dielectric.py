@@ -19,9 +19,10 @@ class ThinDielectric(Transparent):
     interior_ior: Positive = 1.5
     """Index of refraction of the pane."""
     exterior_ior: Positive = 1.0
-    """Index of refraction on both its sides."""
+    """Index of refraction of the medium on both sides."""
     transmittance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the light that passes is multiplied with."""
+    """A factor of the light that passes: linear sRGB from 0 to 1, or a texture.  The default, 1, is
+    physical."""
 
 
 @kernel

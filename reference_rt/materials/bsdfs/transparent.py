@@ -16,13 +16,15 @@ class Transparent(Material):
 
     type: str  # first, so that `to_json` writes it first
     interior_ior: Positive = 1.5
-    """Index of refraction behind the normal."""
+    """Index of refraction of the interior, behind the normal."""
     exterior_ior: Positive = 1.0
-    """Index of refraction on the normal's side."""
+    """Index of refraction of the exterior, which the normal points to."""
     reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the mirrored light is multiplied with: 1 is physical."""
+    """A factor of the reflected light: linear sRGB from 0 to 1, or a texture.  The default, 1, is
+    physical."""
     transmittance: ReflectanceParameter = (1.0, 1.0, 1.0)
-    """What the refracted light is multiplied with."""
+    """A factor of the refracted light: linear sRGB from 0 to 1, or a texture.  The default, 1, is
+    physical."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:

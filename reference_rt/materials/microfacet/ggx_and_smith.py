@@ -44,34 +44,41 @@ def _alpha(value: Any) -> Any:
     if isinstance(value, str):
         return value
     both = list(value) if isinstance(value, list | tuple) else [value, value]
-    if len(both) != 2 or any(isinstance(a, bool) or not isinstance(a, int | float) for a in both):
+    wrong = (isinstance(a, bool) or not isinstance(a, int | float | str) for a in both)
+    if len(both) != 2 or any(wrong):
         raise ValueError(
             "expected a number, two of them [alpha_u, alpha_v], or the name of a texture"
         )
     for a in both:
-        if not 0.0 < a <= MAX_ALPHA:  # also refuses NaN
+        if not isinstance(a, str) and not 0.0 < a <= MAX_ALPHA:  # also refuses NaN
             raise ValueError(f"expected a roughness above 0 and at most {MAX_ALPHA:g}, got {a:g}")
-    return tuple(float(a) for a in both)
+    return tuple(a if isinstance(a, str) else float(a) for a in both)
 
 
 _ALPHA = {"type": "number", "exclusiveMinimum": 0, "maximum": MAX_ALPHA}
+_NAME = {"type": "string", "description": "the name of a texture"}
 
 AlphaParameter = Annotated[
-    Annotated[tuple[float, float], Strict(False)] | str,
+    Annotated[tuple[float | str, float | str], Strict(False)] | str,
     MayBeTexture(),
     BeforeValidator(_alpha),
     WithJsonSchema(
         {
             "anyOf": [
                 _ALPHA,
-                {"type": "array", "items": _ALPHA, "minItems": 2, "maxItems": 2},
-                {"type": "string", "description": "the name of a texture"},
+                {
+                    "type": "array",
+                    "items": {"anyOf": [_ALPHA, _NAME]},
+                    "minItems": 2,
+                    "maxItems": 2,
+                },
+                _NAME,
             ]
         }
     ),
 ]
-"""Roughness above 0: a number, [alpha_u, alpha_v], or the name of a texture.  What is below
-MIN_ALPHA, zeros of a texture too, counts as MIN_ALPHA."""
+"""Roughness above 0: a number, the name of a texture, or two of these, [alpha_u, alpha_v].  What is
+below MIN_ALPHA, zeros of a texture too, counts as MIN_ALPHA."""
 
 Distribution = Literal["ggx", "beckmann"]
 
@@ -85,7 +92,9 @@ class Roughnesses(NamedTuple):
 
 
 def roughnesses(
-    distribution: Distribution, alpha: tuple[float, float] | str, palette: Palette
+    distribution: Distribution,
+    alpha: tuple[float | str, float | str] | str,
+    palette: Palette,
 ) -> Roughnesses:
     """One row.  Raises ValueError for a texture with values above MAX_ALPHA."""
     along_x, along_y = (alpha, alpha) if isinstance(alpha, str) else alpha

@@ -14,6 +14,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Frame, Vec3, cross, dot, max_abs, normalize
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.frame import frame_along
+from reference_rt.materials.nested.terminator import facing
 from reference_rt.materials.nested.wrappers import Wrapper
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import Palette, TextureName
@@ -21,19 +22,26 @@ from reference_rt.textures.lookup import At, lookup_gradient
 
 
 class Bump(Wrapper):
-    """Its base, under normals that tilt as if the surface were raised along them by a texture's
-    luminance.
+    """A material whose normals are tilted as if the surface were raised by a texture's luminance.
 
-    Only a bitmap with the filter `bilinear` has slopes: a checker's steps have none, nor have
-    colours of vertices.
+    The texture is a bitmap with the filter `bilinear`: others have no slope.
     """
 
     type: Literal["bump"] = "bump"
     base: str
+    """Name of the material whose normals are tilted."""
     height: TextureName
-    """A texture; of an image file of integers, most likely one with `encoding: raw`."""
+    """Name of the texture whose luminance is the height.  An image file of integers usually needs
+    `encoding: raw`."""
     scale: float = 1.0
-    """What a luminance of 1 stands for, in units of the scene, also for the copies of a group."""
+    """The height of a luminance of 1, in scene units; negative ones press in.  The transform of an
+    instance does not change it."""
+    flip_invalid_normals: bool = False
+    """Whether a tilted normal that faces away from the viewer is turned about the surface's own
+    normal until it does not (Mitsuba's default)."""
+    use_shadowing_function: bool = False
+    """Whether light fades towards grazing angles where the normal is tilted, in place of a hard
+    line (Estevez, Lecocq & Stein 2019; Mitsuba's default)."""
 
     @property
     def oriented(self) -> bool:
@@ -41,23 +49,34 @@ class Bump(Wrapper):
 
     def tabulate(self, palette: Palette) -> "Bumps":
         texture = palette.number(self.height, math.inf)
-        return Bumps(np.array([texture]), np.array([self.scale], dtype=np.float64))
+        return Bumps(
+            np.array([texture]),
+            np.array([self.scale], dtype=np.float64),
+            np.array([int(self.flip_invalid_normals)]),
+            np.array([int(self.use_shadowing_function)]),
+        )
 
 
 class Bumps(NamedTuple):
-    """texture (n,): the number of the height's; scale (n,)."""
+    """texture (n,): the number of the height's; scale (n,); flips (n,), shadows (n,): 1 for
+    `flip_invalid_normals`, `use_shadowing_function`, else 0."""
 
     texture: IntArray
     scale: FloatArray
+    flips: IntArray
+    shadows: IntArray
 
 
 @kernel
-def basis(bumps: Bumps, i: int, at: At, tangents: Tangents) -> Frame:
-    """The tilted frame, its s along dp/du; frame and tangents are in coordinates of the shading
+def basis(bumps: Bumps, i: int, at: At, tangents: Tangents, wo: Vec3) -> Frame:
+    """The tilted frame, its s along dp/du; frame, tangents and wo are in coordinates of the shading
     frame."""
     dhdu, dhdv = lookup_gradient(bumps.texture[i], at)
     scale = bumps.scale[i]
-    return frame_along(tilted(scale * dhdu, scale * dhdv, tangents), tangents.dpdu)
+    n = tilted(scale * dhdu, scale * dhdv, tangents)
+    if bumps.flips[i] != 0:
+        n = facing(n, wo)
+    return frame_along(n, tangents.dpdu)
 
 
 @kernel

@@ -26,6 +26,7 @@ from reference_rt.materials.nested.paths import (
     WEIGHT,
     MaterialPath,
 )
+from reference_rt.materials.nested.terminator import shadowing, shadowing_alpha2
 from reference_rt.materials.shading import Shading
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Numbers, Palette, Textures, number_at
@@ -54,11 +55,12 @@ class FlattenedMaterials(NamedTuple):
 class FlattenedLeaf(NamedTuple):
     """A flattened leaf at a point.  weight: from 0 to 1;  basis: its frame, in coordinates of the
     shading frame;  side: 0 if its frame is not tilted by a bump or normal map, else 1, or -1 if it
-    is flipped to the other side."""
+    is flipped to the other side;  alpha2: of `terminator.shadowing`, 0 for none."""
 
     weight: float
     basis: Frame
     side: float
+    alpha2: float
 
 
 class FlattenedBuilder:
@@ -123,8 +125,9 @@ class FlattenedBuilder:
         )
 
 
-SIZE = 11
-"""Floats of a flattened leaf in the scratch buffer: weight, s, t and n of the basis, side."""
+SIZE = 12
+"""Floats of a flattened leaf in the scratch buffer: weight, s, t and n of the basis, side, alpha2.
+"""
 
 
 flattened_materials = Linkable()
@@ -178,7 +181,7 @@ def _prepare(
     for k in range(flat_leaves.number[m]):
         found = _leaf_at_hit(flat_leaves, flat_leaves.first[m] + k, shading, at)
         buffer = shading.flat_leaves[SIZE * k : SIZE * (k + 1)]
-        buffer[0], buffer[10] = found.weight, found.side
+        buffer[0], buffer[10], buffer[11] = found.weight, found.side, found.alpha2
         buffer[1], buffer[2], buffer[3] = found.basis.s
         buffer[4], buffer[5], buffer[6] = found.basis.t
         buffer[7], buffer[8], buffer[9] = found.basis.n
@@ -193,7 +196,7 @@ def leaf_at(shading: Shading, k: int) -> FlattenedLeaf:
         Vec3(buffer[4], buffer[5], buffer[6]),
         Vec3(buffer[7], buffer[8], buffer[9]),
     )
-    return FlattenedLeaf(buffer[0], basis, buffer[10])
+    return FlattenedLeaf(buffer[0], basis, buffer[10], buffer[11])
 
 
 @kernel
@@ -201,7 +204,7 @@ def _leaf_at_hit(
     flat_leaves: FlattenedMaterials, k: int, shading: Shading, at: At
 ) -> FlattenedLeaf:
     """Runs the steps of flattened leaf k of the scene, for `shading.wo`."""
-    weight, side, tilted = 1.0, 1.0, False
+    weight, side, tilted, alpha2 = 1.0, 1.0, False, 0.0
     basis = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
     begin = flat_leaves.step_first[k]
     for s in range(begin, begin + flat_leaves.step_count[k]):
@@ -224,16 +227,23 @@ def _leaf_at_hit(
             local = Tangents(
                 to_local(basis, shading.tangents.dpdu), to_local(basis, shading.tangents.dpdv)
             )
+            wo = to_local(basis, shading.wo)
             if code == BUMP:
-                tilted_basis = _bumped(flat_leaves.bumps, i, at, local)
+                tilted_basis = _bumped(flat_leaves.bumps, i, at, local, wo)
+                shadows = _shadows(flat_leaves.bumps, i)
             else:
-                tilted_basis = _mapped(flat_leaves.normal_maps, i, shading, local)
+                tilted_basis = _mapped(flat_leaves.normal_maps, i, shading, local, wo)
+                shadows = _shadows(flat_leaves.normal_maps, i)
+            if shadows:
+                # Steps before this one may at most have flipped the frame: the angle that light
+                # makes with its normal is that with the shading normal.
+                alpha2 = shadowing_alpha2(tilted_basis.n)
             basis = Frame(
                 to_world(basis, tilted_basis.s),
                 to_world(basis, tilted_basis.t),
                 to_world(basis, tilted_basis.n),
             )
-    return FlattenedLeaf(weight, basis, side if tilted else 0.0)
+    return FlattenedLeaf(weight, basis, side if tilted else 0.0, alpha2)
 
 
 @kernel
@@ -249,17 +259,26 @@ def _identity() -> Frame:
 
 
 @kernel
-def _bumped(bumps: Bumps | None, i: int, at: At, tangents: Tangents) -> Frame:
+def _bumped(bumps: Bumps | None, i: int, at: At, tangents: Tangents, wo: Vec3) -> Frame:
     if bumps is None:
         return _identity()
-    return bump.basis(bumps, i, at, tangents)
+    return bump.basis(bumps, i, at, tangents, wo)
 
 
 @kernel
-def _mapped(maps: NormalMaps | None, i: int, shading: Shading, tangents: Tangents) -> Frame:
+def _mapped(
+    maps: NormalMaps | None, i: int, shading: Shading, tangents: Tangents, wo: Vec3
+) -> Frame:
     if maps is None:
         return _identity()
-    return normal_map.basis(maps, i, shading.at, tangents)
+    return normal_map.basis(maps, i, shading.at, tangents, wo)
+
+
+@kernel
+def _shadows(maps: Any, i: int) -> bool:
+    if maps is None:
+        return False
+    return bool(maps.shadows[i] != 0)
 
 
 @kernel
@@ -269,3 +288,11 @@ def scatters_from(leaf: FlattenedLeaf, wi: Vec3) -> bool:
     if leaf.side == 0.0:
         return True
     return leaf.side * wi.z * to_local(leaf.basis, wi).z > 0.0
+
+
+@kernel
+def shadow_of(leaf: FlattenedLeaf, wi: Vec3) -> float:
+    """The factor, 1 for none, on light from the local `wi` where the leaf's frame is tilted."""
+    if leaf.alpha2 == 0.0:
+        return 1.0
+    return shadowing(leaf.alpha2, wi)

@@ -11,6 +11,7 @@ from reference_rt.materials.nested.flattened import (
     flattened_materials,
     leaf_at,
     scatters_from,
+    shadow_of,
 )
 from reference_rt.materials.shading import Shading
 
@@ -31,7 +32,7 @@ def eval_pdf_nested(
             kind, i = flat_leaves.kind[first + k], flat_leaves.row[first + k]
             one = bsdf.eval_pdf(leaves, kind, i, shading.at, wo_in, wi_in)
             if scatters_from(leaf, wi):
-                value = value + one.value * leaf.weight
+                value = value + one.value * (leaf.weight * shadow_of(leaf, wi))
             elif flat_leaves.number[m] == 1:  # `sample` rejects such directions
                 continue
             density += one.density * leaf.weight
@@ -78,9 +79,11 @@ def sample_nested(
     if drawn.is_delta:
         # weight / total is the probability of the layer, by which its contribution is divided.
         probability = drawn.pdf * (leaf.weight / total)
-        return BsdfSample(wi, drawn.weight * total, probability, drawn.eta, True)
+        weight = drawn.weight * (total * shadow_of(leaf, wi))
+        return BsdfSample(wi, weight, probability, drawn.eta, True)
     if count == 1:
-        return BsdfSample(wi, drawn.weight * total, drawn.pdf, drawn.eta, False)
+        weight = drawn.weight * (total * shadow_of(leaf, wi))
+        return BsdfSample(wi, weight, drawn.pdf, drawn.eta, False)
     # Any of the layers could have sampled this direction: use the sum of their densities.
     found = eval_pdf_nested(flat_leaves, leaves, shading, wi)
     if not found.density > 0.0:
@@ -136,4 +139,4 @@ def branches_nested(
 def _let(leaf: FlattenedLeaf, wi: Vec3, factor: Vec3) -> Vec3:
     if not scatters_from(leaf, wi):
         return Vec3(0.0, 0.0, 0.0)
-    return factor * leaf.weight
+    return factor * (leaf.weight * shadow_of(leaf, wi))

@@ -18,31 +18,39 @@ class Wrapper(Material):
 
 
 class Mask(Wrapper):
-    """Lets the share 1 - opacity of the light pass straight on.
+    """A material with holes: the share 1 - opacity of the light passes straight on.
 
-    Shadow rays take it for opaque, as they do glass: light of points and of spots does not pass,
-    that of surfaces and environments is found by scattered rays.
+    Shadow rays take it for opaque, as they do glass.  So light of points and spots does not pass;
+    light of surfaces and environments does, by scattered rays.
     """
 
     type: Literal["mask"] = "mask"
     base: str
+    """Name of the material where the mask is opaque."""
     opacity: UnitParameter = 0.5
+    """The fraction of light that meets `base`: from 0 (not there) to 1, or a texture's luminance.
+    """
 
 
 class TwoSided(Wrapper):
-    """Scatters on both sides: like `base` in front; behind like `back`, or like `base` too."""
+    """A material for both sides: `base` in front, `back` behind."""
 
     bases: ClassVar[tuple[str, ...]] = ("base", "back")
     type: Literal["two_sided"] = "two_sided"
     base: str
+    """Name of the material of the front, which the normal points to."""
     back: str | None = None
+    """Name of the material of the back.  Default: `base`."""
 
 
 class Blend(Wrapper):
-    """(1 - weight) first + weight second."""
+    """A mixture of two materials: (1 - weight) first + weight second."""
 
     bases: ClassVar[tuple[str, ...]] = ("first", "second")
     type: Literal["blend"] = "blend"
     first: str
+    """Name of the material of weight 1 - `weight`."""
     second: str
+    """Name of the material of weight `weight`."""
     weight: UnitParameter = 0.5
+    """The share of `second`: from 0 to 1, or a texture's luminance."""

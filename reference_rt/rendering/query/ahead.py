@@ -38,9 +38,12 @@ _RAYS = _VECTORS, _VECTORS
 
 def query_calls(scene: BuiltScene) -> list[Call]:
     """The linked kernels that queries of a scene need, besides those of its pictures."""
-    linker = Linker()
-    for operations in (ONE_BY_ONE, BLOCKS, CROSSING, OCCLUDED, OCCLUDED_BY_BLOCKS, SOLIDS):
-        geometry_of(linker, scene.tables.geometry, operations)
+    linker, geometry = Linker(), scene.tables.geometry
+    wanted = [ONE_BY_ONE, BLOCKS, CROSSING, OCCLUDED, OCCLUDED_BY_BLOCKS]
+    if geometry.solids is not None:  # else the operation does not compile
+        wanted.append(SOLIDS)
+    for operations in wanted:
+        geometry_of(linker, geometry, operations)
     rays = Link(0), *_RAYS
     materials, textures = EMPTY_SCENE.materials, EMPTY_SCENE.textures
     lights = EMPTY_SCENE.lights, EMPTY_SCENE.shapes

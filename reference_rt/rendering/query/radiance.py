@@ -14,10 +14,11 @@ from reference_rt.integrators import AnyIntegrator, Path, RayCast
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
+from reference_rt.rendering.accumulation import mean_and_variance, radiance_job
 from reference_rt.rendering.kernels import Running
 from reference_rt.rendering.query.linked import link_to_scene
 from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
-from reference_rt.rendering.render import radiance_job, run_tiles
+from reference_rt.rendering.thread_pool import run_tiles
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.sampling import Independent
 from reference_rt.scene.build import BuiltScene
@@ -136,12 +137,18 @@ def estimate(
     sampler = Independent(spp=spp, seed=seed)
     o, d, valid = _unit(rays)
     n = len(o)
-    mean, variance = np.zeros((n, 3)), np.zeros((n, 3))
+    sums = {"colour": np.zeros((n, 3)), "m2": np.zeros((n, 3))}
     threads = threads or os.cpu_count() or 1
     if n > 0:
-        job = radiance_job(setup, sampler, (n, 1), mean, variance)
+        job = radiance_job(setup, sampler, (n, 1), has_variance=True)
         with Running([job], tables, GivenRays(o, d), None, threads) as running:
-            run_tiles(running.run(0), (), n, spp, threads, lambda what, fraction: None)
+            kernel = running.run(0)
+
+            def add(begin: int, end: int, first: int, last: int) -> None:
+                kernel({name: a[begin:end] for name, a in sums.items()}, begin, end, first, last)
+
+            run_tiles(add, (), n, spp, threads, lambda what, fraction: None)
+    mean, variance = mean_and_variance(sums, spp)
     if spp == 1:
         variance[:] = math.inf
     mean[~valid], variance[~valid] = 0.0, 0.0

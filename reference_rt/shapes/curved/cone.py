@@ -12,20 +12,23 @@ from reference_rt.shapes.shape import Shape, TabulationContext
 
 
 class Cone(Shape):
-    """x² + y² <= r(z)² from z = 0, where r is `radius`, to z = `height`, where it is `top_radius`
-    (0: the apex), linear between, where its transform takes it; normals point outwards, at the apex
-    along the axis.
+    """A cone or truncated cone about the z axis, from z = 0 to z = `height`; outward normals, at an
+    apex along the axis.
 
-    Texture coordinates: around from +x and up from z = 0, each from 0 to 1; on a cap x and y over
-    the square around the wider one.  Faces: 0 the side, 3 the bottom, 6 the top.
+    Surface coordinates: u around from +x, v up from z = 0, each from 0 to 1; on a cap x and y over
+    the square around the wider one.  Faces: 0 is the side, 3 the bottom, 6 the top.
     """
 
     type: Literal["cone"] = "cone"
     radius: Positive = 1.0
+    """Radius at z = 0, before the transform, in scene units."""
     height: Positive = 1.0
+    """Height along z, before the transform, in scene units."""
     top_radius: Annotated[float, Field(ge=0)] = 0.0
+    """Radius at z = `height`, at least 0, before the transform; 0, the default, makes an apex."""
     capped: bool = True
-    """Whether this is a solid, closed by disks; else it is the side alone, seen from both sides."""
+    """Whether it is a solid, closed by disks.  Otherwise it is the side alone, seen from both
+    sides."""
 
     def tabulate(self, context: TabulationContext) -> Quadrics:
         r, top = Fraction(self.radius), Fraction(self.top_radius)

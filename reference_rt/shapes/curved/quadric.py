@@ -27,31 +27,34 @@ from reference_rt.shapes.shape import Shape, TabulationContext
 
 
 class Quadric(Shape):
-    """The surface f = 0 inside a box, f(x, y, z) = A x² + B y² + C z² + D xy + E yz + F xz + G x +
-    H y + I z + J; its normal is the gradient of f, so that its front is where f > 0.
+    """The surface f = 0 inside a box; the front is where f > 0.
 
-    Planes (A to F zero) and pairs of planes are quadrics like any other; but along one plane of a
-    pair f vanishes, so that where a ray there meets the other is hard to tell.  An f that does not
-    change its sign (a constant; a sum of squares, which vanishes at a point or on a line at most; a
-    square, which a plane touches) bounds nothing: an error, but capped, where it means the whole
-    box if f <= 0 everywhere, and else nothing.
+    f(x, y, z) = A x² + B y² + C z² + D xy + E yz + F xz + G x + H y + I z + J.  Planes and pairs of
+    planes are quadrics like any other.
+
+    An f that does not change its sign bounds nothing, which is an error: a constant, a square, a
+    sum of squares.  If `capped`, it is the whole box where f <= 0 everywhere, and nothing
+    otherwise.
     """
 
     type: Literal["quadric"] = "quadric"
     coefficients: Coefficients
-    """[A, B, C, D, E, F, G, H, I, J]."""
+    """The ten coefficients [A, B, C, D, E, F, G, H, I, J] of f, before the transform."""
     lower: Vector
-    """The corner of the clip box with the smallest coordinates, in the shape's own."""
+    """The corner of the clip box with the smallest coordinates, before the transform."""
     upper: Vector
-    """The opposite corner."""
+    """The corner of the clip box with the largest coordinates, before the transform."""
     capped: bool = False
-    """Whether this is the solid f <= 0 in the box, closed by the box's faces; else it is the
+    """Whether it is the solid f <= 0 in the box, closed by the box's faces.  Otherwise it is the
     surface alone."""
 
     @model_validator(mode="after")
     def _has_a_box(self) -> Self:
         if not all(a < b for a, b in zip(self.lower, self.upper, strict=True)):
-            raise ValueError("expected each coordinate of 'lower' to be below that of 'upper'")
+            raise ValueError(
+                "expected each coordinate of 'lower' to be below that of 'upper', "
+                f"got {list(self.lower)} and {list(self.upper)}"
+            )
         return self
 
     def tabulate(self, context: TabulationContext) -> "Quadrics":

@@ -39,7 +39,9 @@ class Sphere(Shape):
 
     type: Literal["sphere"] = "sphere"
     center: Vector = (0.0, 0.0, 0.0)
+    """The centre [x, y, z], before the transform, in scene units."""
     radius: Positive = 1.0
+    """The radius, before the transform, in scene units."""
 
     def tabulate(self, context: TabulationContext) -> "Spheres | Quadrics":
         m = self.map_in(context)

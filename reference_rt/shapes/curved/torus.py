@@ -24,13 +24,13 @@ from reference_rt.shapes.shape import Shape, Spans, TabulationContext, Tangents
 
 
 class Torus(Shape):
-    """A ring about the z axis, closed and solid; its outward normal is the front."""
+    """A ring about the z axis; outward normals."""
 
     type: Literal["torus"] = "torus"
     major_radius: Positive = 1.0
-    """R, from the axis to the middle of the tube."""
+    """R, from the axis to the middle of the tube, before the transform, in scene units."""
     minor_radius: Positive = 0.25
-    """r, of the tube; less than R."""
+    """r, the radius of the tube, less than R, before the transform."""
 
     def tabulate(self, context: TabulationContext) -> "Tori":
         if not self.minor_radius < self.major_radius:

@@ -23,7 +23,7 @@ from reference_rt.shapes.shape import (
 
 
 class Disk(Shape):
-    """The unit disk at z = 0 with normal +z, where its transform takes it."""
+    """The unit disk at z = 0 with normal +z.  A transform may give it any size and place."""
 
     type: Literal["disk"] = "disk"
 

@@ -14,8 +14,7 @@ from reference_rt.shapes.shape import Shape, Spans, TabulationContext, Tangents,
 
 
 class Plane(Shape):
-    """The plane z = 0 with normal +z, where its transform takes it; as a solid, all that lies
-    below."""
+    """The infinite plane z = 0 with normal +z; as a solid, the half-space below it."""
 
     type: Literal["plane"] = "plane"
 

@@ -62,12 +62,12 @@ Ring = Annotated[tuple[RingPoint, ...], Field(strict=False), BeforeValidator(_ri
 
 
 class Polygon(Shape):
-    """What rings enclose; all their points in one plane, those of two numbers at z = 0.
+    """A flat area with any outline: concave, with holes, or self-intersecting.  All points lie in
+    one plane; points of two numbers lie at z = 0.
 
-    Normal: the area that the rings go round counter-clockwise, less that which they go round
-    clockwise, is positive seen against it before the transform (as for a triangle, the front stays
-    the front under one that mirrors space).  Where these are equal, as in a figure eight, the first
-    turn of the first ring is counter-clockwise.
+    The front is the side from which the rings enclose more area counter-clockwise than clockwise.
+    If both are equal, as in a figure eight, the first turn of the first ring is counter-clockwise.
+    Under a transform that mirrors space the front stays the front.
     """
 
     type: Literal["polygon"] = "polygon"
@@ -75,9 +75,9 @@ class Polygon(Shape):
     """Rings of points [x, y] or [x, y, z], closed by themselves: the first point is not repeated.
     They may cross and touch themselves and each other."""
     fill: Literal["even_odd", "nonzero"] = "even_odd"
-    """What is inside: points that a line to infinity leaves by crossing an odd number of edges (a
-    ring in a ring is a hole), or points that the rings go round a number of times that is not 0 (a
-    hole is a ring in a ring the other way round)."""
+    """What is inside.  `even_odd`: points that a line to infinity leaves by crossing an odd number
+    of edges, so that a ring in a ring is a hole.  `nonzero`: points that the rings wind around, so
+    that only an opposite ring is a hole."""
 
     def tabulate(self, context: TabulationContext) -> "Polygons":
         m = self.map_in(context)

@@ -43,7 +43,7 @@ _LEAST_HEIGHT = 2.0**-500
 
 
 class Rectangle(Shape):
-    """The square [-1, 1]² at z = 0 with normal +z, where its transform takes it."""
+    """The square [-1, 1]² at z = 0 with normal +z.  A transform may give it any size and place."""
 
     type: Literal["rectangle"] = "rectangle"
 

@@ -25,10 +25,11 @@ _LONGEST = 60
 
 
 class Mesh(Shape):
-    """The triangles of a file, or of arrays, with vertex normals, texture coordinates and colours.
+    """Triangles of a file, or of arrays, with optional vertex normals, texture coordinates and
+    colours.
 
-    Geometric normals follow the winding in the file: under a transform that mirrors space the front
-    stays the front, and what is closed does not turn inside out.
+    Geometric normals follow the winding of the vertices.  Under a transform that mirrors space the
+    front stays the front, so that closed meshes do not turn inside out.
     """
 
     array_fields: ClassVar[frozenset[str]] = frozenset(
@@ -37,23 +38,24 @@ class Mesh(Shape):
 
     type: Literal["mesh"] = "mesh"
     file: str | None = None
-    """An .obj or .ply file, or another that `shapes.mesh_files` reads; a relative name counts from
-    the scene file's folder.  Without one: `vertices` and `faces`."""
+    """The file, relative to the scene file: .obj, .ply, .stl, .off, .gltf, .glb and other formats
+    that trimesh reads.  Without one: `vertices` and `faces`."""
     vertices: Floats3 | None = None
-    """Positions (n, 3)."""
+    """Positions (n, 3), before the transform, in scene units."""
     faces: Integers3 | None = None
     """Triangles (m, 3): indices of vertices from 0, counter-clockwise seen from the front."""
     normals: Floats3 | None = None
-    """Vertex normals (n, 3) of any length but 0."""
+    """Vertex normals (n, 3) of any length but 0, before the transform.  Default: none; shading
+    normals are geometric."""
     uv: Floats2 | None = None
-    """Texture coordinates (n, 2); (0, 0) is the lower left corner of a picture."""
+    """Texture coordinates (n, 2); (0, 0) is the lower left corner of an image."""
     colours: Floats3 | None = None
     """Vertex colours (n, 3), linear sRGB of at least 0."""
     face_normals: bool = False
-    """Shade with each triangle's own normal, whatever the file has."""
+    """Whether to shade with each triangle's geometric normal, and to ignore vertex normals."""
     smooth: bool = False
-    """Make vertex normals where the file has none: those of the faces around a vertex, weighted by
-    angle, in the mesh's own coordinates.  Vertices of the same position and uv are one."""
+    """Whether to compute vertex normals where there are none: the mean of the faces around a
+    vertex, weighted by angle, before the transform.  Vertices of equal position and uv are one."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

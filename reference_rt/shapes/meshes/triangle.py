@@ -39,13 +39,16 @@ from reference_rt.shapes.shape import (
 
 
 class Triangle(Shape):
-    """A triangle; its normal is (v1 - v0) x (v2 - v0), before the transform: under one that mirrors
-    space its front stays its front."""
+    """A triangle; its normal is (v1 - v0) x (v2 - v0).  Under a transform that mirrors space its
+    front stays its front."""
 
     type: Literal["triangle"] = "triangle"
     v0: Vector
+    """The first vertex [x, y, z], before the transform, in scene units."""
     v1: Vector
+    """The second vertex, counter-clockwise seen from the front."""
     v2: Vector
+    """The third vertex."""
 
     def tabulate(self, context: TabulationContext) -> "Triangles":
         m = self.map_in(context)

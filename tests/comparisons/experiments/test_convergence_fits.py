@@ -107,6 +107,15 @@ def test_times_that_cannot_be_determined():
     assert time_to(points([], [], []), 0.1) is None
 
 
+@pytest.mark.parametrize("seconds", [[0.07] * 3, [0.08, 0.07, 0.07], [0.07, 0.02, 0.01]])
+def test_times_that_do_not_rise_with_the_samples_are_not_continued(seconds):
+    """A renderer whose start takes all the time, or a machine that was busy at first: its time to a
+    small error would be that of its last rung."""
+    spp = np.array([1.0, 2.0, 4.0])
+    assert time_to(points(spp, seconds, 1.0 / spp), 0.01) is None
+    assert time_to(points(spp, seconds, 1.0 / spp), 0.3).how == "interpolated"
+
+
 def test_time_lies_within_its_band():
     """Measured curves of eight replicates: the band of the time to an error about eight times below
     that of the last rung holds the true time in 95 % of 200 runs (four standard deviations of a

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from comparisons.experiments.fuzz import assets, check
-from comparisons.experiments.fuzz.check import Effort
+from comparisons.experiments.fuzz.effort import DETERMINISTIC, Effort, Grammar
 from comparisons.experiments.fuzz.finding import Finding, without_numbers
-from comparisons.experiments.fuzz.generate import Grammar, generate, parse
+from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.worker import alike, effort_for
 from reference_rt.rendering.render import render
 from reference_rt.util.errors import ReferenceUnavailableError
@@ -52,7 +52,7 @@ def test_what_differs_from_the_reference_is_found(files):
         ({"materials": {"grey": {"type": "diffuse", "reflectance": 0.6}}}, "direct", "values"),
     ):
         other = parse({**BALL, **change}, "theirs", files)
-        results = check.compare(ours, FEW, check.DETERMINISTIC, other)
+        results = check.compare(ours, FEW, DETERMINISTIC, other)
         bad = next(r for r in results if r.status == "differ")
         found = check.of_rung(bad)
         assert found.rung == rung

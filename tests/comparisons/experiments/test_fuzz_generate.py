@@ -9,8 +9,9 @@ from pydantic import Field
 from comparisons.experiments.fuzz import assets, fields, types
 from comparisons.experiments.fuzz.coverage import coverage, table
 from comparisons.experiments.fuzz.data import shapes_of, text_of
+from comparisons.experiments.fuzz.effort import Grammar
 from comparisons.experiments.fuzz.fields import Draw, Names
-from comparisons.experiments.fuzz.generate import Grammar, generate, parse
+from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.meshes import CLOSED, DAMAGES, OPEN, mesh
 from comparisons.experiments.fuzz.types import GROUPS, all_types, possible_pairs, types_in
 from reference_rt.core.model import Positive

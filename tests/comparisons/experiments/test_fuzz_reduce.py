@@ -4,7 +4,8 @@ import pytest
 
 from comparisons.experiments.fuzz import assets
 from comparisons.experiments.fuzz.data import shapes_of, text_of
-from comparisons.experiments.fuzz.generate import Grammar, generate, parse
+from comparisons.experiments.fuzz.effort import Grammar
+from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.plain import without_textures
 from comparisons.experiments.fuzz.reduce import reduce
 from comparisons.experiments.fuzz.reduce.edits import without_unused

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from comparisons.commands.fuzz import fuzz
 from comparisons.experiments.fuzz import run as running
 from comparisons.experiments.fuzz import stored, summary
-from comparisons.experiments.fuzz.check import Effort
+from comparisons.experiments.fuzz.effort import Effort
 from comparisons.experiments.fuzz.finding import Checked
 from comparisons.experiments.fuzz.page import write_page
 from comparisons.experiments.fuzz.planted import Planted, source_faults

@@ -6,11 +6,19 @@ from pathlib import Path
 
 import pytest
 
-import reference_rt
 from comparisons.experiments.selftest.mutants import functions_of, mutants
-from comparisons.experiments.selftest.mutation import SCENES, Fate, summary, write
+from comparisons.experiments.selftest.mutation import (
+    FEW_RAYS,
+    PLAIN,
+    SCENES,
+    WORKER,
+    Fate,
+    by_few_rays,
+    summary,
+    write,
+)
+from comparisons.experiments.selftest.patched import PACKAGE, run_worker
 
-PACKAGE = Path(reference_rt.__file__).parent
 ROOT = Path(__file__).parents[3]
 
 
@@ -74,18 +82,35 @@ def test_every_kind_of_change(tmp_path: Path, line: str, changes: set[str]) -> N
     assert all(m.function == "f" for m in found)
 
 
-def test_counting(tmp_path: Path) -> None:
-    def fate(outcome: str) -> Fate:
-        return Fate("f.py", "g", 7, "a + b -> a - b", outcome, "direct", "s", "why")
+def fate(outcome: str, by: str = "") -> Fate:
+    return Fate("f.py", "g", 7, "a + b -> a - b", outcome, by, "direct", "s", "why")
 
-    fates = [*[fate("caught")] * 18, *[fate("survives")] * 2, fate("same"), fate("fails")]
+
+def test_shares_are_of_mutants_that_change_a_picture_and_a_suite_has_more_rays(tmp_path: Path):
+    fates = [*[fate("caught", FEW_RAYS)] * 15, *[fate("caught", "smoke")] * 2]
+    fates += [fate("caught", "standard"), *[fate("survives")] * 2, fate("same"), fate("fails")]
     text = summary(fates)
-    assert text.startswith("18 of 20 mutants that change a picture are caught (68% to 99%)")
+    assert text.startswith("20 of 22 mutants change a picture; 1 change none, 1 stop the renderer")
+    assert "\nfew rays catches 15 of 20 " in text
+    assert "\nsmoke catches 17 of 20 " in text
+    assert "\nstandard catches 18 of 20 (68% to 99%)" in text
     assert text.count("- f.py:7 g: a + b -> a - b") == 2
     write(fates, 4, tmp_path)
     assert (tmp_path / "mutants.md").read_text() == text
-    assert summary([fate("caught")]).startswith("1 of 1")
-    assert summary([]).startswith("0 of 0")
+    assert "smoke catches 1 of 1" in summary([fate("caught", "smoke")])
+    assert "smoke catches 0 of 0" in summary([])
+
+
+@pytest.mark.slow
+def test_few_rays_catch_mutants_of_spheres_and_a_copy_without_a_change_is_the_same() -> None:
+    path = str(ROOT / "scenes" / "material_blend.yaml")
+    right = run_worker(WORKER, {"scenes": [path], "calls": True, "before": None}, PLAIN, None)
+    before = {path: right[path]["picture"]}
+    of_spheres = [p for p in functions_of(PACKAGE) if p[0] == "shapes/curved/sphere.py"]
+    found = mutants(PACKAGE, of_spheres, 6, 0)
+    assert "caught" in {by_few_rays(mutant, before).outcome for mutant in found}
+    same = found[0]._replace(text=(PACKAGE / found[0].file).read_text(encoding="utf-8"))
+    assert by_few_rays(same, before).outcome == "same"
 
 
 def test_the_scenes_exist() -> None:

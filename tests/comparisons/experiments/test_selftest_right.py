@@ -44,14 +44,14 @@ def test_synthetic_pictures_are_pictures_and_new_for_each_seed(case: RightCase):
 @pytest.mark.parametrize("case", of(case for case in CASES if not case.rendered))
 def test_right_synthetic_pictures_are_not_called_wrong(case: RightCase):
     """A few seeds; a thousand in the slow test."""
-    found = alarms_of(case, 2, SCENES, silent)
+    found = alarms_of(case, 2, SCENES)
     assert found.false_alarms == 0, found.reasons
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", of(CASES))
 def test_false_alarms_of_a_right_renderer(case: RightCase):
-    found = alarms_of(case, 1000, SCENES, silent)
+    found = alarms_of(case, 1000, SCENES)
     assert found.holds, found.reasons
 
 
@@ -68,7 +68,7 @@ def test_wrong_pictures_are_counted_as_alarms_of_a_case_that_should_be_right():
 
         return wrong
 
-    found = alarms_of(RightCase(right.kind, "wrong", False, prepare), 5, SCENES, silent)
+    found = alarms_of(RightCase(right.kind, "wrong", False, prepare), 5, SCENES)
     assert found.false_alarms == 5
     assert found.reasons == {"statistics: the image mean differs": 5}
     assert found.upper == 1.0
@@ -127,6 +127,6 @@ def test_what_holds(caught, half, holds):
 
 @pytest.mark.slow
 def test_calibration_of_five_scenes():
-    found = calibration(300, SCENES, silent)
+    found = calibration(300, SCENES)
     assert len(found) == 5
     assert all(one.holds for one in found), found

@@ -181,10 +181,10 @@ def test_blends_with_mirrors_keep_their_light(first: str) -> None:
             "grain",
         ),
         (
-            "materials: {m: {type: diffuse, reflectance: c}}\n"
+            "materials: {m: {type: emissive, radiance: c}}\n"
             "textures: {c: {type: checker}}\n"
-            "shapes: [{type: torus, material: m, major_radius: 1, minor_radius: 0.3}]",
-            "Torus",
+            "shapes: [{type: box, material: m}]",
+            "Box",
         ),
     ],
 )

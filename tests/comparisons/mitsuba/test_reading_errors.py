@@ -104,12 +104,10 @@ REFUSED = {
     on_sphere('type="diffuse"><rgb name="reflectance" value="2 0 0"/>'): "'diffuse': reflectance: ",
     on_sphere('type="conductor"><string name="material" value="Xx"/>'): "'material' is 'Xx'",
     on_sphere('type="dielectric"><string name="int_ior" value="jam"/>'): "'int_ior' is 'jam'",
-    on_sphere(
-        'type="bumpmap"><texture type="checkerboard"/><bsdf type="diffuse"/>'
-    ): 'value="false',
+    on_sphere('type="bumpmap"><bsdf type="diffuse"/>'): "has no texture",
     shape('<medium type="homogeneous" name="interior"/>'): "without media",
     shape('<emitter type="point"/>'): "expected 'area'",
-    '<emitter type="projector"/>': "emitter 'projector': is not supported",
+    '<emitter type="projector">' + map_of('<scale x="-1"/>') + "</emitter>": "mirrors the image",
     '<emitter type="sunsky"/>': "emitter 'sunsky': is not supported",
     '<emitter type="point">'
     + map_of('<translate x="1" y="0" z="0"/>')

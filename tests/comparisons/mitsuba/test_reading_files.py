@@ -152,7 +152,7 @@ def test_nothing_is_written_for_a_broken_scene(folder):
     assert result.exit_code == SceneError.exit_code
     assert "there is no file" in result.output
     assert not (folder / "out").exists()
-    assert run(folder / "scene.xml", "-o", folder / "a.xml").exit_code == UsageError.exit_code
+    assert run(folder / "scene.xml", "-o", folder / "a.obj").exit_code == UsageError.exit_code
     assert run(folder / "scene.xml", "-o", out, "-D", "spp").exit_code == UsageError.exit_code
 
 

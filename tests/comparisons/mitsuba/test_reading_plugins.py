@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mitsuba_dicts import both_scenes, deviations, rays_at, theirs_along
+from mitsuba_rows import BSDFS, CLAY, EMITTERS, WIDE, bitmap, rgb
 from PIL import Image
 
 from comparisons.mitsuba.backend import backend, mitsuba
@@ -23,10 +24,6 @@ APPROXIMATE = 0.03
 light (README, and the tests of documented deviations)."""
 
 
-def rgb(*values: float) -> dict[str, Any]:
-    return {"type": "rgb", "value": list(values)}
-
-
 @pytest.fixture(scope="module")
 def images(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("images")
@@ -34,138 +31,6 @@ def images(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, shape in (("colour", (5, 7, 3)), ("sky", (8, 16, 3)), ("grey", (6, 4))):
         Image.fromarray(rng.integers(20, 255, shape, dtype=np.uint8)).save(folder / f"{name}.png")
     return folder
-
-
-def bitmap(name: str, **values: Any) -> dict[str, Any]:
-    return {"type": "bitmap", "filename": name, **values}
-
-
-def to_uv() -> Any:
-    return mitsuba().ScalarTransform3f().translate([0.2, 0.3]).rotate(30).scale([2, -3])
-
-
-def checkers(**values: Any) -> dict[str, Any]:
-    return {"type": "checkerboard", **values}
-
-
-CLAY = {"type": "diffuse", "reflectance": 0.8}
-PLAIN = {"flip_invalid_normals": False, "use_shadowing_function": False}
-GREY = bitmap("grey.png", raw=True)
-
-BSDFS: dict[str, Any] = {
-    "default": None,
-    "diffuse": {"type": "diffuse"},
-    "diffuse_rgb": {"type": "diffuse", "reflectance": rgb(0.8, 0.3, 0.1)},
-    "diffuse_bitmap": {"type": "diffuse", "reflectance": bitmap("colour.png", to_uv=to_uv)},
-    "diffuse_nearest": {
-        "type": "diffuse",
-        "reflectance": bitmap("colour.png", filter_type="nearest", wrap_mode="mirror", to_uv=to_uv),
-    },
-    "diffuse_clamp": {
-        "type": "diffuse",
-        "reflectance": bitmap("colour.png", wrap_mode="clamp", raw=True, to_uv=to_uv),
-    },
-    "diffuse_checkers": {"type": "diffuse", "reflectance": checkers(color0=0.7, to_uv=to_uv)},
-    "diffuse_constant": {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.3}},
-    "mirror": {"type": "conductor", "specular_reflectance": rgb(0.9, 0.5, 0.1)},
-    "gold": {"type": "conductor", "material": "Au"},
-    "metal": {"type": "conductor", "eta": rgb(0.2, 1, 1.5), "k": rgb(3, 2, 1)},
-    "rough_mirror": {"type": "roughconductor", "distribution": "ggx"},
-    "rough_metal": {"type": "roughconductor", "material": "Cu", "alpha": 0.2},
-    "rough_copper": {
-        "type": "roughconductor",
-        "material": "Cu",
-        "distribution": "GGX",
-        "alpha": 0.3,
-    },
-    "grained": {
-        "type": "roughconductor",
-        "distribution": "ggx",
-        "alpha_u": 0.4,
-        "alpha_v": 0.1,
-        "eta": 0.3,
-        "k": 2.0,
-    },
-    "rough_textured": {
-        "type": "roughconductor",
-        "distribution": "ggx",
-        "alpha": GREY,
-        "material": "Al",
-    },
-    "glass": {"type": "dielectric"},
-    "diamond": {
-        "type": "dielectric",
-        "int_ior": "diamond",
-        "ext_ior": "water",
-        "specular_transmittance": rgb(0.9, 0.8, 0.7),
-    },
-    "pane": {"type": "thindielectric", "specular_reflectance": 0.7},
-    "frosted": {"type": "roughdielectric", "distribution": "ggx", "alpha": 0.2},
-    "frosted_default": {"type": "roughdielectric"},
-    "plastic": {"type": "plastic", "diffuse_reflectance": rgb(0.8, 0.3, 0.1)},
-    "plastic_nonlinear": {
-        "type": "plastic",
-        "nonlinear": True,
-        "int_ior": 1.6,
-        "diffuse_reflectance": bitmap("colour.png"),
-    },
-    "rough_plastic": {"type": "roughplastic", "diffuse_reflectance": rgb(0.8, 0.3, 0.1)},
-    "rough_plastic_ggx": {
-        "type": "roughplastic",
-        "distribution": "ggx",
-        "alpha": 0.25,
-        "nonlinear": True,
-    },
-    "principled": {
-        "type": "principled",
-        "base_color": rgb(0.8, 0.3, 0.1),
-        "roughness": 0.3,
-        "metallic": 0.4,
-        "specular": 0.6,
-        "spec_tint": 0.3,
-        "sheen": 0.5,
-        "sheen_tint": 0.4,
-        "clearcoat": 0.5,
-        "clearcoat_gloss": 0.3,
-        "flatness": 0.2,
-        "anisotropic": 0.5,
-    },
-    "principled_default": {"type": "principled"},
-    "principled_glass": {
-        "type": "principled",
-        "base_color": bitmap("colour.png"),
-        "roughness": GREY,
-        "spec_trans": 0.7,
-        "eta": 1.4,
-    },
-    "blend": {
-        "type": "blendbsdf",
-        "weight": 0.3,
-        "first": CLAY,
-        "second": {"type": "roughconductor", "alpha": 0.3, "distribution": "ggx"},
-    },
-    "blend_checkers": {
-        "type": "blendbsdf",
-        "weight": checkers(color0=0.9, color1=0.1, to_uv=to_uv),
-        "first": CLAY,
-        "second": {"type": "diffuse", "reflectance": 0.1},
-    },
-    "mask": {"type": "mask", "opacity": 0.6, "inside": CLAY},
-    "mask_textured": {"type": "mask", "opacity": GREY, "inside": CLAY},
-    "mask_default": {"type": "mask", "inside": CLAY},
-    "two_sided": {"type": "twosided", "inside": CLAY},
-    "two_sides": {"type": "twosided", "front": CLAY, "inside": {"type": "plastic"}},
-    "null": {"type": "null"},
-    "bump": {"type": "bumpmap", "height": GREY, "scale": 0.1, "inside": CLAY, **PLAIN},
-    "normals": {
-        "type": "normalmap",
-        "normalmap": bitmap("colour.png", raw=True, to_uv=to_uv),
-        "inside": CLAY,
-        **PLAIN,
-    },
-}
-
-WIDE = ("rough_plastic", "rough_plastic_ggx", "rough_metal", "frosted_default")
 
 
 def shape(kind: str) -> dict[str, Any]:
@@ -205,33 +70,6 @@ def test_light_of_bsdfs_is_that_of_mitsuba(name, kind, images):
     assert np.abs(found).max() < MOST
     # A shift of the mean of all rays, in standard errors of that mean.
     assert abs(found.mean()) * np.sqrt(found.size / 3) < MOST
-
-
-def place() -> Any:
-    return mitsuba().ScalarTransform4f().look_at([1, 1.5, 2], [0.1, 0.2, 0], [0, 1, 0.1])
-
-
-EMITTERS: dict[str, dict[str, Any]] = {
-    "point": {"type": "point", "position": [1, 2, 1], "intensity": rgb(3, 2, 1)},
-    "point_placed": {"type": "point", "to_world": place, "intensity": 2.0},
-    "spot": {"type": "spot", "to_world": place, "intensity": rgb(5, 7, 6)},
-    "spot_wide": {
-        "type": "spot",
-        "to_world": place,
-        "cutoff_angle": 50.0,
-        "beam_width": 5.0,
-        "intensity": 4.0,
-    },
-    "directional": {"type": "directional", "direction": [1, -2, -1], "irradiance": rgb(2, 1, 3)},
-    "directional_placed": {"type": "directional", "to_world": place},
-    "constant": {"type": "constant"},
-    "constant_spectrum": {
-        "type": "constant",
-        "radiance": {"type": "spectrum", "value": [(400.0, 1.0), (500.0, 2.0), (700.0, 0.5)]},
-    },
-    "envmap": {"type": "envmap", "filename": "sky.png"},
-    "envmap_placed": {"type": "envmap", "filename": "sky.png", "scale": 2.5, "to_world": place},
-}
 
 
 @pytest.mark.parametrize("name", EMITTERS)

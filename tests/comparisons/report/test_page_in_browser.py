@@ -155,7 +155,7 @@ def test_what_is_not_finite_is_magenta_and_readable(show):
 def test_the_views(show):
     page = show(case(Images(grey(0.25), grey(1.0), grey(0.1))))
     pixel(page, "z", 0, 0)
-    assert shown(page) == ["candidate", "reference", "difference", "z"]
+    assert shown(page) == ["candidate", "reference", "difference", "z", "flip"]
     page.keyboard.press("2")
     assert shown(page) == ["candidate"]
     page.keyboard.press("f")
@@ -165,15 +165,16 @@ def test_the_views(show):
     page.keyboard.press("4")
     assert shown(page) == ["candidate", "reference"]
     page.keyboard.press("5")
-    for kind in ("reference", "difference", "z", "candidate"):
+    for kind in ("reference", "difference", "z", "flip", "candidate"):
         page.keyboard.press("f")
         assert shown(page) == [kind]
-        style = page.evaluate(f"getComputedStyle(document.querySelector('.{kind} canvas'))")
+        drawing = "img" if kind == "flip" else "canvas"
+        style = page.evaluate(f"getComputedStyle(document.querySelector('.{kind} {drawing}'))")
         assert style["imageRendering"] == "pixelated"
     page.locator("#which").select_option("z")
     assert shown(page) == ["z"]
     page.get_by_label("side by side", exact=True).check()
-    assert len(shown(page)) == 4
+    assert len(shown(page)) == 5
     page.keyboard.press("f")
     assert page.get_by_label("flip", exact=True).is_checked()
 
@@ -185,7 +186,7 @@ def test_blinking(show):
         page.wait_for_selector(f"body[data-which={kind}]")
         assert shown(page) == [kind]
     page.keyboard.press("1")
-    assert len(shown(page)) == 3
+    assert shown(page) == ["candidate", "reference", "difference", "flip"]
 
 
 def test_a_single_view_says_what_a_case_lacks(show):

@@ -121,7 +121,7 @@ def test_pictures_that_lost_detail_say_where_they_are_read(show):
     noise[0, 21, 10] = math.nan
     images = Images(*noise)
     # Room for what stands around the pictures, for half of them, and not for all.
-    most = 100_000
+    most = 125_000
     page = show(case(images, verdict="agree"), report={"most_bytes": most})
     factor = json.loads(page.locator("script.data").inner_text())["factor"]
     assert factor > 1
@@ -138,7 +138,8 @@ def test_without_a_script_tables_and_thumbnails_show(show):
     page = show(
         case(Images(grey(0.25), grey(1.0), grey(0.1)), again="again"), java_script_enabled=False
     )
-    assert shown(page) == ["candidate", "reference", "difference"]
+    assert shown(page) == ["candidate", "reference", "difference", "flip"]
+    assert page.locator("svg.histogram").count() == 2
     assert page.locator("#case-1 .rungs").is_visible()
     assert not page.locator(".toolbar").is_visible()
     assert not page.get_by_role("button", name="copy").is_visible()

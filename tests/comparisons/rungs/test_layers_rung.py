@@ -18,7 +18,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Sobol
 from reference_rt.scene.build import build_tables
 
-ALL = ("albedo", "normal", "depth", "id", "variance")
+ALL = ("albedo", "normal", "position", "depth", "id", "variance")
 
 SCENE = """
 camera: {type: perspective, eye: [0.3, 1.4, 5], target: [0, 0.6, 0], fov: 40}

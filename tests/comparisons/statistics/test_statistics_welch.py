@@ -1,5 +1,7 @@
 """The tests behind the statistical rung: their laws, levels and power."""
 
+import math
+
 import numpy as np
 import pytest
 from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
@@ -9,7 +11,14 @@ from comparisons.statistics import Known, compare
 from comparisons.statistics.cells import chance_of_parting, image_test, pixel_test, tile_test
 from comparisons.statistics.sides import known_side, side_of
 from comparisons.statistics.uniformity import uniformity
-from comparisons.statistics.welch import Error, bias_test, quantiles, satterthwaite, welch_errors
+from comparisons.statistics.welch import (
+    Error,
+    bias_test,
+    noise_ratio,
+    quantiles,
+    satterthwaite,
+    welch_errors,
+)
 
 # Welch's test itself
 
@@ -159,12 +168,35 @@ def test_ranks_are_uniform_whatever_the_noise():
 def test_blocks_may_depend_on_each_other():
     """Noise that all blocks of a picture share: their ranks are one rank, and prove nothing."""
     rng = np.random.default_rng(0)
+    tested = 0
     for _ in range(60):
         brightness = 1.0 + 0.3 * rng.standard_normal((2, 16, 1, 1, 1))
         a, b = brightness + 0.01 * rng.standard_normal((2, 16, 16, 16, 3))
         found = uniformity(side_of(a), side_of(b), NONE)
-        assert not found.wide
-        assert not found.narrow
+        if found is not None:  # one noise for all pixels: its spread alone may look unequal
+            tested += 1
+            assert not found.wide
+            assert not found.narrow
+    assert tested > 55
+
+
+@pytest.mark.parametrize(("each", "is_tested"), [(1, True), (2, True), (8, False), (64, False)])
+def test_ranks_are_left_out_where_pictures_have_unequal_samples(each, is_tested):
+    rng = np.random.default_rng(0)
+    a = 1.0 + 0.3 * rng.standard_normal((16, HEIGHT, WIDTH, 3))
+    b = 1.0 + 0.3 / math.sqrt(each) * rng.standard_normal((16, HEIGHT, WIDTH, 3))
+    for one, two in ((a, b), (b, a)):
+        assert (uniformity(side_of(one), side_of(two), NONE) is not None) == is_tested
+
+
+@pytest.mark.parametrize("each", [1, 3, 16, 100])
+def test_the_ratio_of_the_noise_is_that_of_the_median_pixel(each):
+    rng = np.random.default_rng(1)
+    a = 1.0 + rng.standard_normal((5, 64, 64, 3))
+    b = 1.0 + rng.standard_normal((9, 64, 64, 3)) / math.sqrt(each)
+    a[:, :8], b[:, 8:12] = 1.0, 1.0  # without noise on one side
+    assert noise_ratio(side_of(a), side_of(b)) == pytest.approx(each, rel=0.1)
+    assert noise_ratio(side_of(b), side_of(a)) == pytest.approx(1.0 / each, rel=0.1)
 
 
 def test_differences_within_the_margin_are_not_too_wide():

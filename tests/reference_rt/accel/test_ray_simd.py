@@ -21,8 +21,8 @@ from reference_rt.core.ray_block import (
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.jit.simd import VECTOR_WIDTH
+from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.kernels import Running
-from reference_rt.rendering.render import jobs_of
 from reference_rt.shapes import box
 from reference_rt.shapes.curved import sphere
 from reference_rt.shapes.flat import rectangle
@@ -165,10 +165,11 @@ def test_paths_together_are_paths_one_by_one(spp):
         sampler=rt.Sobol(spp=spp, seed=3),
         integrator=rt.Path(rr_depth=12),
     )
-    jobs, layers = jobs_of(lit)
+    jobs, total = jobs_of(lit), np.zeros((12 * 9, 3))
     view, film_filter = lit.camera.setup(12, 9), lit.film.filter.setup()
     with Running(jobs, lit.tables, view, film_filter, 1) as running:
         for pixel in range(12 * 9):
             for sample in range(spp):
-                running.run(0)(pixel, pixel + 1, sample, sample + 1)
-    assert np.array_equal(rt.render(lit).colour, layers["colour"])
+                sums = {"colour": total[pixel : pixel + 1]}
+                running.run(0)(sums, pixel, pixel + 1, sample, sample + 1)
+    assert np.array_equal(rt.render(lit).colour, total.reshape(9, 12, 3) / spp)

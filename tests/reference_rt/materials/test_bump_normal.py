@@ -23,6 +23,7 @@ from reference_rt.textures.texture import BITMAP, CHECKER, UvMap
 
 PALETTE = Palette({"t": 0}, [5.0])
 PLAIN = UvMap()
+UP = Vec3(0.0, 0.0, 1.0)
 FLAT = Tangents(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0))
 
 
@@ -31,7 +32,7 @@ def texture(texels, uv=PLAIN, nearest=0, wrap=0):
     height, width, _ = texels.shape
     numbers = (np.array([k]) for k in (0, width, height, nearest, wrap))
     bitmaps = Bitmaps(texels.reshape(-1, 3).astype(float), *numbers)
-    return Textures(np.array([BITMAP]), np.array([0]), uv.matrix()[None], None, bitmaps, None)
+    return Textures(np.array([BITMAP]), np.array([0]), uv.coefficients()[None], None, bitmaps, None)
 
 
 def at(textures, u, v):
@@ -46,12 +47,12 @@ def ramp(along_u, along_v, n=8):
 
 def bumped(textures, tangents, u=0.5, v=0.4, scale=1.0):
     table = Bump(base="b", height="t", scale=scale).tabulate(PALETTE)
-    return bump.basis(table, 0, at(textures, u, v), tangents)
+    return bump.basis(table, 0, at(textures, u, v), tangents, UP)
 
 
 def mapped(textures, tangents, u=0.5, v=0.4):
     table = NormalMap(base="b", normals="t").tabulate(PALETTE)
-    return normal_map.basis(table, 0, at(textures, u, v), tangents)
+    return normal_map.basis(table, 0, at(textures, u, v), tangents, UP)
 
 
 def assert_basis(frame, n):
@@ -77,7 +78,7 @@ def test_gradient_is_the_slope_of_the_lookup(nearest, wrap):
         )
         textures = texture(rng.random((3, 5, 3)), uv, nearest, wrap)
         u, v = rng.uniform(-1, 2, 2)
-        m = uv.matrix()
+        m = uv.coefficients()
         x = (m[0] * u + m[1] * v + m[2]) * 5 - 0.5 * (1 - nearest)
         y = (m[3] * u + m[4] * v + m[5]) * 3 - 0.5 * (1 - nearest)
         if min(x % 1, -x % 1, y % 1, -y % 1) < 1e-4:
@@ -100,7 +101,12 @@ def test_gradient_is_the_slope_of_the_lookup(nearest, wrap):
 def test_checkers_have_no_slope():
     colours = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 1.0, 1.0]])
     textures = Textures(
-        np.array([CHECKER]), np.array([0]), PLAIN.matrix()[None], Checkers(*colours), None, None
+        np.array([CHECKER]),
+        np.array([0]),
+        PLAIN.coefficients()[None],
+        Checkers(*colours),
+        None,
+        None,
     )
     assert lookup_gradient(0, at(textures, 0.5, 0.5)) == (0.0, 0.0)
     assert bumped(textures, FLAT).n == (0.0, 0.0, 1.0)
@@ -195,7 +201,7 @@ def test_normal_maps_that_change_nothing():
 def _bases(bumps, maps, textures, u, v, tangents, out):
     at = At(textures, u, v, Vec3(-1.0, -1.0, -1.0))
     for k, frame in enumerate(
-        (bump.basis(bumps, 0, at, tangents), normal_map.basis(maps, 0, at, tangents))
+        (bump.basis(bumps, 0, at, tangents, UP), normal_map.basis(maps, 0, at, tangents, UP))
     ):
         out[k, 0], out[k, 1], out[k, 2] = frame.s
         out[k, 3], out[k, 4], out[k, 5] = frame.t

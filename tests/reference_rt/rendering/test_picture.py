@@ -14,7 +14,7 @@ from reference_rt.core.exr import read_exr
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.settings import with_settings
 
-LAYERS = ("albedo", "normal", "depth", "id", "variance")
+LAYERS = ("albedo", "normal", "position", "depth", "id", "variance")
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_a_notebook_has_all_layers(picture):
 
 
 def test_repr_is_short(picture):
-    assert repr(picture).startswith("<Picture 12 x 9: colour, albedo, normal, depth, id, variance")
+    assert repr(picture).startswith(f"<Picture 12 x 9: colour, {', '.join(LAYERS)}")
     assert len(repr(picture)) < 100
 
 

@@ -19,13 +19,13 @@ from reference_rt.lights.selection.tree import light_trees
 from reference_rt.materials.bsdfs.tables import by_code as bsdfs
 from reference_rt.materials.nested.flattened import FlattenedMaterials, flattened_materials
 from reference_rt.rendering import kernels
+from reference_rt.rendering.accumulation import radiance_job
 from reference_rt.rendering.kernels import Linked
 from reference_rt.rendering.query import tracing
 from reference_rt.rendering.query.ahead import query_calls
 from reference_rt.rendering.query.camera import camera_kernel
 from reference_rt.rendering.query.light import direct_light
 from reference_rt.rendering.query.solid_crossings import crossings as solid_crossings
-from reference_rt.rendering.render import radiance_job
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.warm_up import (
     cost,
@@ -81,8 +81,8 @@ def test_what_the_tests_have_for_every_type(write, known, tmp_path):
 def test_radiance_along_given_rays(integrator, known):
     """By the same drivers: the rays are in the place of the camera's."""
     tables = rt.Scene(shapes=(rt.Sphere(),), integrator=integrator).tables
-    out, rays = np.zeros((4, 3)), GivenRays(np.zeros((4, 3)), np.ones((4, 3)))
-    job = radiance_job(integrator.setup(), rt.Independent(spp=2), (4, 1), out, np.zeros((4, 3)))
+    rays = GivenRays(np.zeros((4, 3)), np.ones((4, 3)))
+    job = radiance_job(integrator.setup(), rt.Independent(spp=2), (4, 1), has_variance=True)
     assert described(set(Linked([job], tables, rays, None).calls) - set(known)) == set()
 
 
@@ -121,6 +121,16 @@ shapes:
 - {type: rectangle}
 lights: [{type: constant, radiance: 1}]
 """
+
+
+@pytest.mark.parametrize("solids", [False, True])
+def test_operations_on_solids_are_compiled_where_there_are_some(solids):
+    """They do not compile for a geometry without, and `warm-up` would fail."""
+    text = (
+        SOLID if solids else "shapes: [{type: rectangle}]\nlights: [{type: constant, radiance: 1}]"
+    )
+    names = {kernel.__name__ for kernel, _ in query_calls(rt.Scene.parse(text))}
+    assert any(name.startswith("crossings_of_solid") for name in names) == solids
 
 
 def test_queries_call_these_kernels():

@@ -110,7 +110,7 @@ TOGETHER = [
 ]  # fmt: skip
 
 LIGHTS = [
-    ("type: laser", "", "unknown type 'laser'; expected one of: point, spot, directional,"),
+    ("type: laser", "", "unknown type 'laser'; expected one of: point, spot, projector,"),
     ("type: constant, radiance: t", ".radiance", "expected one number or three [r, g, b]"),
     ("type: ambient, radiance: .nan", ".radiance", "expected numbers of at least 0"),
     ("type: directional, direction: [0, 0, 0], irradiance: 1", ".direction", "expected a"),
@@ -148,7 +148,7 @@ REST = [
      "all; expected light_samples or bsdf_samples above 0"),
     ("integrator: {type: path, sampling: all}", "integrator.sampling", "expected 'both', 'lights'"),
     ("integrator: {type: direct}\nsampler: {type: grid}", "sampler.type", "'direct' needs random"),
-    ("film: {layers: [ghosts]}", "film.layers[0]", "expected 'albedo', 'normal', 'depth', 'id'"),
+    ("film: {layers: [ghosts]}", "film.layers[0]", "expected 'albedo', 'normal', 'position'"),
     ("film: {filter: {type: mitchell, b: 2}}", "film.filter.b", "expected less than or equal to 1"),
     ("film: {filter: {type: lanczos, lobes: 0}}", "film.filter.lobes", "expected greater than or "),
     ("shapes: [{type: rectangle, transform: [{scale: 1.0e-200}]}]", "shapes[0]", "the rectangle's "

@@ -97,7 +97,8 @@ filters = st.one_of(
     st.builds(rt.CatmullRomFilter),
     st.builds(rt.LanczosFilter, lobes=st.integers(1, 64)),
 )
-names = st.lists(st.sampled_from(["albedo", "normal", "depth", "id", "variance"]), unique=True)
+LAYERS = ["albedo", "normal", "position", "depth", "id", "variance"]
+names = st.lists(st.sampled_from(LAYERS), unique=True)
 integrators = st.one_of(
     st.builds(rt.Direct, light_samples=st.integers(1, 9), bsdf_samples=st.integers(0, 9)),
     st.builds(rt.Path, sampling=st.sampled_from(["both", "lights", "bsdf"])),

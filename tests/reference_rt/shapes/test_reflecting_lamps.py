@@ -14,6 +14,7 @@ import reference_rt as rt
 from reference_rt.core.transform import Matrix, compose
 from reference_rt.core.vec3 import Vec3
 from reference_rt.lights.emitters import point as point_light
+from reference_rt.lights.emitters import projector as projector_light
 from reference_rt.lights.emitters import spot as spot_light
 from reference_rt.rendering import query
 from reference_rt.shapes import TABLES
@@ -199,11 +200,13 @@ def test_lights_without_size_at_the_very_point():
     """No direction leads to them."""
     p = Vec3(0.1, 0.2, 0.3)
     spot = rt.Spot(origin=p, target=(0.0, 0.0, 0.0), intensity=(1.0, 1.0, 1.0))
-    lights = (
-        (point_light, rt.Point(position=p, intensity=(1.0, 1.0, 1.0))),
-        (spot_light, spot),
+    projector = rt.Projector(origin=p, target=(0.0, 0.0, 0.0), irradiance=(1.0, 1.0, 1.0))
+    point = rt.Point(position=p, intensity=(1.0, 1.0, 1.0))
+    samples = (
+        point_light.sample(point.tabulate(), 0, p),
+        spot_light.sample(spot.tabulate(), 0, None, p),
+        projector_light.sample(projector.tabulate(), 0, None, p),
     )
-    for module, light in lights:
-        found = module.sample(light.tabulate(), 0, p)
+    for found in samples:
         assert found.pdf == 0.0
         assert found.wi == (0.0, 0.0, 0.0)

@@ -163,7 +163,7 @@ def test_gradient_is_the_difference_of_what_is_looked_up(tmp_path):
         by_v = (light(straight, u, v + step) - light(straight, u, v - step)) / (2 * step)
         # Rounding of luminance, below 2^-52, over the step, and of places, times slopes up to 7.
         assert lookup_gradient(0, at) == pytest.approx((by_u, by_v), rel=0, abs=1e-10)
-        m = turned.matrix()
+        m = turned.coefficients()
         there = m[0] * u + m[1] * v + m[2], m[3] * u + m[4] * v + m[5]
         along = lookup_gradient(0, At(straight, *there, NO_COLOUR))
         expected = (m[0] * along[0] + m[3] * along[1], m[1] * along[0] + m[4] * along[1])
@@ -225,17 +225,17 @@ def test_vertex_colours_of_a_mesh(tmp_path):
 
 
 def test_uv_maps_scale_then_turn_then_move():
-    m = UvMap(scale=(2.0, 3.0), rotate=90.0, offset=(0.5, -0.25)).matrix()
+    m = UvMap(scale=(2.0, 3.0), rotate=90.0, offset=(0.5, -0.25)).coefficients()
     # (1, 0) -> (2, 0) -> (0, 2) -> (0.5, 1.75); (0, 1) -> (0, 3) -> (-3, 0) -> (-2.5, -0.25)
     assert m.tolist() == [0.0, -3.0, 0.5, 2.0, 0.0, -0.25]
-    assert UvMap(scale=4.0).matrix().tolist() == [4.0, 0.0, 0.0, 0.0, 4.0, 0.0]
-    turned = UvMap(rotate=30.0).matrix()
+    assert UvMap(scale=4.0).coefficients().tolist() == [4.0, 0.0, 0.0, 0.0, 4.0, 0.0]
+    turned = UvMap(rotate=30.0).coefficients()
     assert turned == pytest.approx([math.sqrt(0.75), -0.5, 0.0, 0.5, math.sqrt(0.75), 0.0])
     for quarter, expected in ((180.0, [-1, 0, 0, 0, -1, 0]), (-90.0, [0, 1, 0, -1, 0, 0]),
                               (3600090.0, [0, -1, 0, 1, 0, 0])):  # fmt: skip
-        assert UvMap(rotate=quarter).matrix().tolist() == expected
+        assert UvMap(rotate=quarter).coefficients().tolist() == expected
     for degrees in (1e9, 1e22, -1e300):
-        m = UvMap(rotate=degrees).matrix()
+        m = UvMap(rotate=degrees).coefficients()
         assert m[[0, 1]] == pytest.approx(m[[4, 3]] * (1, -1), abs=1e-15)
         assert m[0] * m[4] - m[1] * m[3] == pytest.approx(1.0, rel=1e-15)
 
@@ -243,7 +243,7 @@ def test_uv_maps_scale_then_turn_then_move():
 def test_a_mapped_texture_is_the_texture_at_the_mapped_place(tmp_path):
     uv = UvMap(scale=(2.0, 0.5), rotate=40.0, offset=(0.3, 0.1))
     textures = tables_of(tmp_path, straight=raw(), mapped=raw(uv=uv))
-    m = uv.matrix()
+    m = uv.coefficients()
     for u, v in np.random.default_rng(17).uniform(-1, 2, (50, 2)):
         at = m[0] * u + m[1] * v + m[2], m[3] * u + m[4] * v + m[5]
         assert np.array_equal(ask(textures, u, v, 1), ask(textures, *at, 0))

@@ -22,7 +22,7 @@ _band: Any = render_tile
 
 
 def _job(scene: rt.Scene) -> tuple[Any, FloatArray]:
-    """All of `render_tile`'s arguments but the last four, and the sums (n, 3) that it writes."""
+    """The arguments of `render_tile` before its sums, and these, (n, 3)."""
     film, sampler, integrator = scene.film, scene.resolved_sampler, scene.integrator
     assert not isinstance(integrator, rt.RayCast)
     shape = (film.width, film.height)
@@ -34,11 +34,13 @@ def _job(scene: rt.Scene) -> tuple[Any, FloatArray]:
         film.filter.setup(),
         sampler.setup(),
         shape,
-        sampler.spp,
-        out,
-        None,
     )
     return arguments, out
+
+
+def _add(arguments: Any, out: FloatArray, begin: int, end: int, first: int, last: int) -> None:
+    """Add samples first to last - 1 of these pixels to their sums."""
+    _band(*arguments, out[begin:end], None, begin, end, first, last)
 
 
 def in_bands(scene: rt.Scene, size: int, rng: np.random.Generator) -> FloatArray:
@@ -51,8 +53,8 @@ def in_bands(scene: rt.Scene, size: int, rng: np.random.Generator) -> FloatArray
         cut = int(rng.integers(0, spp + 1))
         for first, last in ((0, cut), (cut, spp)):
             if first < last:
-                _band(*arguments, begin, end, first, last)
-    return out.reshape(scene.film.height, scene.film.width, 3)
+                _add(arguments, out, begin, end, first, last)
+    return out.reshape(scene.film.height, scene.film.width, 3) / spp
 
 
 def bands(draw: Draw, x: float) -> Outcomes:
@@ -77,7 +79,7 @@ def carry_on(folder: Path, first: float, last: float) -> None:
             out[:] = np.load(file)
         begin, end = (round(share * len(out)) for share in (first, last))
         if begin < end:
-            _band(*arguments, begin, end, 0, scene.resolved_sampler.spp)
+            _add(arguments, out, begin, end, 0, scene.resolved_sampler.spp)
         np.save(file, out)
 
 
@@ -94,7 +96,7 @@ def interrupted(draw: Draw, x: float) -> Outcomes:
 
     def pictures(scene: rt.Scene, name: str) -> tuple[FloatArray, FloatArray]:
         found = np.load(draw.folder / f"{name}.npy").reshape(scene.film.height, -1, 3)
-        return rt.render(scene).colour, found
+        return rt.render(scene).colour, found / scene.resolved_sampler.spp
 
     return {OURS: over(draw, pictures)}
 

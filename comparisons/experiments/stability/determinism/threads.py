@@ -11,8 +11,7 @@ from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load
 
-# The package has a function of this name.
-_module: Any = importlib.import_module("reference_rt.rendering.render")
+_module: Any = importlib.import_module("reference_rt.rendering.thread_pool")
 
 Outcomes = dict[str, Outcome]
 

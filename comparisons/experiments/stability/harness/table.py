@@ -4,8 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rich.table import Table
-from rich.text import Text
+from rich.console import RenderableType
 
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Effort
 from comparisons.experiments.stability.harness.families import family
@@ -19,6 +18,7 @@ from comparisons.experiments.stability.harness.summary import (
     summarise,
     total,
 )
+from comparisons.report.terminal import fitted
 from comparisons.report.values import power_of_ten
 
 COLUMNS = ("family", "series", "to", "cases", "failures", "worst", "ours", "Mitsuba", "others")
@@ -80,19 +80,16 @@ def number(value: float) -> str:
     return power_of_ten(value)
 
 
-def terminal(found: Sequence[Found]) -> Table:
-    """For people at a terminal."""
-    table = Table(show_edge=False, pad_edge=False)
-    for name in COLUMNS:
-        if name != "failures":  # the other columns say where each fails
-            table.add_column(name, overflow="fold", justify="right" if name == "cases" else "left")
+def terminal(found: Sequence[Found], width: int) -> RenderableType:
+    """For people at a terminal of so many columns."""
+    names = [name for name in COLUMNS if name != "failures"]  # the others say where each fails
+    rows, styles = [], []
     for name, series in summaries(found).items():
         for one in series:
-            style = None if one.holds else "bold red"
             _, series_name, to, cases, _, *rest = cells(name, one)
-            row = (name, series_name, to, cases, *rest)
-            table.add_row(*map(Text, row), style=style)
-    return table
+            rows.append((f"{name} {series_name}", to, cases, *rest))
+            styles.append(None if one.holds else "bold red")
+    return fitted(width, names[1:], rows, styles=styles, right=("cases",))
 
 
 def markdown(

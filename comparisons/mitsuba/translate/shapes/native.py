@@ -72,7 +72,7 @@ def _ellipsoid(shape: Sphere, site: Site) -> Plugin:
         value=lambda p: np.asarray(np.linalg.norm(p - center, axis=-1) - radius),
         gradient=lambda p: np.asarray(p - center),
     )
-    return stand_in(shape, [Patch(point, CELLS)], surface, None, site)
+    return stand_in(shape, [Patch(point, CELLS, has_uv=True)], surface, None, site)
 
 
 @translate_shape.register

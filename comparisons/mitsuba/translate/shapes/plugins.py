@@ -35,10 +35,10 @@ class Site(NamedTuple):
 
 
 def to_world(linear: FloatArray, offset: FloatArray) -> Any:
-    """p -> linear p + offset; Mitsuba rounds the matrix to float32."""
+    """p -> linear p + offset, in float64; Mitsuba rounds it when it makes the shape."""
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([linear, offset])
-    return mitsuba().ScalarTransform4f(matrix)
+    return mitsuba().ScalarTransform4d(matrix)
 
 
 def instance_of(name: str, member: Any, m: Affine, site: Site) -> Plugin:

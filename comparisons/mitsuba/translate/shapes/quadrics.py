@@ -1,14 +1,16 @@
 """Cylinders, which Mitsuba has; cones and other quadrics, for which meshes stand in."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
+from comparisons.mitsuba.translate.shapes.around import around_z
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
 from comparisons.mitsuba.translate.shapes.caps import cap_faces
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
-from comparisons.mitsuba.translate.shapes.meshes import placed
+from comparisons.mitsuba.translate.shapes.meshes import Soup, placed
 from comparisons.mitsuba.translate.shapes.plugins import (
     Site,
     curved_instance,
@@ -42,7 +44,7 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
     unit = _followed(m, np.array([r, r, height]), shape.z_min)
     least = np.linalg.svd(m[:, :2], compute_uv=False)[-1] * r
     if least * THIN < site.reach and in_float32(least) > 0.0:
-        patch = Patch(_side(r, r, shape.z_min, height), SIDE)
+        patch = Patch(_side(r, r, shape.z_min, height), SIDE, has_uv=True)
         side = stand_in(shape, [patch], _round(r, 0.0), None, site)
     elif _is_round(unit[:, :3]):
         place = to_world(unit[:, :3], unit[:, 3])
@@ -73,6 +75,8 @@ def _disk(
     m: transform.Affine, radius: float, z: float, face: int, reach: float, site: Site
 ) -> Plugin:
     """A cap across the axis; its uv are x and y over a square of half side `reach`."""
+    if site.textured:
+        return _disk_of_triangles(m, radius, z, face, reach, site)
     place = _followed(m, np.array([radius, radius, radius]), z)
     plugin = {
         "type": "disk",
@@ -89,10 +93,28 @@ def _disk(
     return Plugin(plugin, suffix=f"_cap{face}", faces=np.array([face]), uv=over_square)
 
 
+def _disk_of_triangles(
+    m: transform.Affine, radius: float, z: float, face: int, reach: float, site: Site
+) -> Plugin:
+    """The same with our uv, which Mitsuba's disk has not."""
+    around = SIDE[0]
+    phi = 2.0 * np.pi * np.arange(around) / around
+    rim = radius * np.column_stack([np.cos(phi), np.sin(phi)])
+    flat = np.vstack([np.zeros((1, 2)), rim])
+    k = np.arange(around)
+    faces = np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % around])
+    if (face == BOTTOM) != bool(np.linalg.det(m[:, :3]) < 0.0):
+        faces = faces[:, ::-1]
+    positions = transform.apply_points(m, np.column_stack([flat, np.full(len(flat), z)]))
+    soup = Soup(positions, uvs=0.5 * (1.0 + flat / reach), faces=faces)
+    mesh = soup.mesh(site.parts)
+    return Plugin(mesh, suffix=f"_cap{face}", faces=soup.all_of_face(face), uv=same_uv)
+
+
 @translate_shape.register
 def _(shape: Cone, site: Site) -> list[Plugin]:
     bottom, top, height = shape.radius, shape.top_radius, shape.height
-    patch = Patch(_side(bottom, top, 0.0, height), SIDE)
+    patch = Patch(_side(bottom, top, 0.0, height), SIDE, has_uv=True)
     found = [stand_in(shape, [patch], _round(bottom, (top - bottom) / height), None, site)]
     if shape.capped:
         m, reach = shape.map_in(site.place), max(bottom, top)
@@ -142,7 +164,7 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
     found = []
     patches = patches_of(matrix, linear, j, box)
     if patches:
-        found.append(stand_in(shape, patches, surface, box, site))
+        found.append(stand_in(shape, patches, surface, box, site, partial(around_z, box=box)))
     if shape.capped:
         key = ("caps", id(shape))
         if key not in site.shared:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,11 +23,13 @@ Box = tuple[FloatArray, FloatArray]
 class Patch(NamedTuple):
     """A parametric patch of a surface, with u, v in [0, 1].
 
-    point(u, v): arrays of one shape -> (..., 3);  cells: their numbers along u and v.
+    point(u, v): arrays of one shape -> (..., 3);  cells: their numbers along u and v;  has_uv:
+    whether u and v are the texture coordinates of our shape.
     """
 
     point: Callable[[FloatArray, FloatArray], FloatArray]
     cells: tuple[int, int]
+    has_uv: bool = False
 
 
 class Implicit(NamedTuple):
@@ -40,18 +42,19 @@ class Implicit(NamedTuple):
 def meshed(patches: Sequence[Patch], surface: Implicit, box: Box | None, fineness: float) -> Soup:
     """Patches as triangles that face where f grows, with f's normals, clipped to a box;  fineness:
     factor on the numbers of cells."""
-    positions, normals, faces = [], [], []
+    positions, normals, uvs, faces = [], [], [], []
     count = 0
     for patch in patches:
         cells = tuple(max(1, round(n * fineness)) if n > 1 else 1 for n in patch.cells)
-        grid = patch.point(
-            *np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in cells), indexing="ij")
-        )
+        u, v = np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in cells), indexing="ij")
+        grid = patch.point(u, v)
         n = _grid_normals(surface.gradient(grid))
         flat_grid, flat_normals = grid.reshape(-1, 3), n.reshape(-1, 3)
         some = _grid_faces(*cells)
         if box is not None:
             flat_grid, flat_normals, some = clipped(flat_grid, flat_normals, some, box)
+        elif patch.has_uv:
+            uvs.append(np.column_stack([u.ravel(), v.ravel()]))
         corners = flat_grid[some]
         winding = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         front = flat_normals[some].sum(axis=1)
@@ -61,7 +64,8 @@ def meshed(patches: Sequence[Patch], surface: Implicit, box: Box | None, finenes
         normals.append(flat_normals)
         faces.append(some + count)
         count += len(flat_grid)
-    return Soup(np.concatenate(positions), np.concatenate(normals), faces=np.concatenate(faces))
+    uv = np.concatenate(uvs) if len(uvs) == len(positions) else None
+    return Soup(np.concatenate(positions), np.concatenate(normals), uv, faces=np.concatenate(faces))
 
 
 _fineness = ContextVar("fineness", default=1.0)
@@ -80,12 +84,17 @@ def coarser(factor: float) -> Iterator[None]:
 
 
 def stand_in(
-    shape: Shape, patches: Sequence[Patch], surface: Implicit, box: Box | None, site: Site
+    shape: Shape,
+    patches: Sequence[Patch],
+    surface: Implicit,
+    box: Box | None,
+    site: Site,
+    with_uv: Callable[[Soup], Soup] | None = None,
 ) -> Plugin:
     """The mesh that stands in for a shape, and its error in the scene; patches, surface and box are
-    in the shape's own coordinates."""
+    in the shape's own coordinates.  with_uv: adds texture coordinates, where there is a texture."""
     own = transform.affine(shape.transform)
-    key = ("stand-in", id(shape))
+    key: tuple[Any, ...] = ("stand-in", id(shape))
     if key not in site.shared:
         fineness = _fineness.get()
         soup = meshed(patches, surface, box, fineness)
@@ -94,6 +103,11 @@ def stand_in(
         name, ratio = type(shape).__name__.lower(), coarse / sag if sag > 0.0 else 1.0
         site.shared[key] = soup, StandIn(name, len(soup.faces), sag, turn, ratio)
     soup, found = site.shared[key]
+    if with_uv is not None and site.textured:
+        key = (*key, "uv")
+        if key not in site.shared:
+            site.shared[key] = with_uv(soup)
+        soup = site.shared[key]
     m = transform.compose(own, site.place.outer)
     # The maps after the shape's own stretch distances, and turn angles, at most by these factors.
     stretch = np.linalg.svd(site.place.outer[:, :3], compute_uv=False)
@@ -102,7 +116,9 @@ def stand_in(
     )
     mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
     plugin = placed(soup, key, m, mirrored, site)
-    return plugin._replace(faces=soup.all_of_face(0), stand_in=found)
+    return plugin._replace(
+        faces=soup.all_of_face(0), stand_in=found, uv_of_mesh=soup.uvs is not None
+    )
 
 
 MEASURED = 50_000

@@ -33,4 +33,4 @@ def _(shape: Torus, site: Site) -> list[Plugin]:
         value=lambda p: from_tube(p)[1] - minor,
         gradient=lambda p: from_tube(p)[0] / from_tube(p)[1][..., None],
     )
-    return [stand_in(shape, [Patch(point, CELLS)], surface, None, site)]
+    return [stand_in(shape, [Patch(point, CELLS, has_uv=True)], surface, None, site)]

@@ -1,0 +1,42 @@
+"""`comparisons.compare(scene)`: one scene against Mitsuba, from Python."""
+
+import os
+from collections.abc import Callable
+from dataclasses import fields
+
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, compare_scene
+from comparisons.compare.looks import FIRST, SECONDS
+from comparisons.compare.notebook import NotebookCase
+from comparisons.mitsuba.backend import mitsuba
+from reference_rt.rendering.scene import Scene
+from reference_rt.rendering.settings import with_settings
+
+
+def compare_one(
+    scene: Scene | str | os.PathLike[str],
+    *,
+    spp: int | None = None,
+    size: tuple[int, int] | None = None,
+    seed: int | None = None,
+    replicates: int = FIRST,
+    time_limit: float | None = SECONDS,
+    limit: float = Budget().limit,
+    threads: int | None = None,
+    say: Callable[[str], None] | None = None,
+) -> NotebookCase:
+    """Render a scene, or a scene file, by reference_rt and by Mitsuba, and judge the difference.
+
+    spp, size, seed: None for the scene's own.  replicates: independent pictures by each renderer at
+    the first look; their number is doubled until the question is decided or `time_limit` seconds
+    have passed; None: one look.  limit: the smallest relative bias of the image mean that must be
+    detectable.  threads: ours, None for all cores.  say: called with a line about each step.
+
+    Mitsuba runs in this process.  Raises SceneError, ReferenceUnavailableError.
+    """
+    loaded = scene if isinstance(scene, Scene) else Scene.load(os.fspath(scene))
+    loaded = with_settings(loaded, spp=spp, size=size, seed=seed)
+    mitsuba()
+    budget = Budget(replicates=replicates, seconds=time_limit, limit=limit)
+    case = compare_scene(Subject(loaded), budget, say or (lambda line: None), threads)
+    return NotebookCase(**{field.name: getattr(case, field.name) for field in fields(case)})

@@ -1,0 +1,79 @@
+"""A camera with any view rectangle as a Mitsuba sensor: `{"type": "view_rectangle"}`.
+
+Mitsuba's own cameras have square pixels, and its thin lens looks along its axis.  Counterpart of
+`reference_rt.cameras.Perspective` and `ThinLens` with a `view`: rays start at the eye, or on a lens
+around it, and pass a rectangle of any shape, anywhere in front of it.
+"""
+
+from typing import Any
+
+import numpy as np
+
+
+def register(mi: Any) -> None:
+    """Define the sensor for the current variant, and register it."""
+
+    class ViewRectangle(mi.Sensor):  # type: ignore[misc]
+        """Parameters: to_world, a rigid map whose columns are left, up, forward and the eye, as of
+        Mitsuba's cameras; left, right, bottom and top, the edges of the view rectangle at distance
+        1; aperture_radius, 0 for none; focus_distance, to the plane in focus."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            m = np.array(properties["to_world"].matrix, np.float64)
+            across, up, forward, eye = -m[:3, 0], m[:3, 1], m[:3, 2], m[:3, 3]
+            l, r, b, t = (properties[name] for name in ("left", "right", "bottom", "top"))
+            self.eye = mi.Point3f(*eye.tolist())
+            self.corner = mi.Vector3f(*(forward + l * across + t * up).tolist())
+            self.along = mi.Vector3f(*((r - l) * across).tolist())
+            self.down = mi.Vector3f(*((b - t) * up).tolist())
+            self.across, self.up = mi.Vector3f(*across.tolist()), mi.Vector3f(*up.tolist())
+            self.radius = properties.get("aperture_radius", 0.0)
+            self.focus = properties.get("focus_distance", 1.0)
+
+        def sample_ray(
+            self,
+            time: Any,
+            wavelength_sample: Any,
+            position_sample: Any,
+            aperture_sample: Any,
+            active: Any = True,
+        ) -> tuple[Any, Any]:
+            """A ray through a point of the film, from (0, 0), the upper left corner, to (1, 1)."""
+            d = self.corner + self.along * position_sample.x + self.down * position_sample.y
+            o = self.eye
+            if self.radius > 0.0:
+                lens = self.radius * mi.warp.square_to_uniform_disk_concentric(aperture_sample)
+                shift = self.up * lens.y - self.across * lens.x  # x is to the left
+                o, d = o + shift, d * self.focus - shift
+            ray = mi.Ray3f(o, normalized(d), time, mi.Color0f())
+            return ray, mi.Color3f(1.0)
+
+        def sample_ray_differential(
+            self,
+            time: Any,
+            wavelength_sample: Any,
+            position_sample: Any,
+            aperture_sample: Any,
+            active: Any = True,
+        ) -> tuple[Any, Any]:
+            """The same; without differentials."""
+            ray, weight = self.sample_ray(
+                time, wavelength_sample, position_sample, aperture_sample, active
+            )
+            return mi.RayDifferential3f(ray), weight
+
+        def bbox(self) -> Any:
+            """Of the eye."""
+            eye = mi.ScalarPoint3f(*np.array(self.eye).ravel().tolist())
+            return mi.ScalarBoundingBox3f(eye)
+
+        def to_string(self) -> str:
+            return "ViewRectangle[]"
+
+    def normalized(d: Any) -> Any:
+        import drjit as dr
+
+        return dr.normalize(d)
+
+    mi.register_sensor("view_rectangle", ViewRectangle)

@@ -1,0 +1,224 @@
+"""Camera, film, sampler, integrator and lights of a scene as elements of a Mitsuba scene file."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from comparisons.mitsuba.reading.written import LookAt, Step
+from comparisons.mitsuba.translate.cameras import FAR, NEAR, translate_camera
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.film import translate_film
+from comparisons.mitsuba.translate.integrators import translate_integrator
+from comparisons.mitsuba.translate.lights import ambient_of
+from comparisons.mitsuba.writing.element import Element, Rgb, Vector, matrix_step
+from comparisons.mitsuba.writing.surfaces import OURS, Surfaces
+from reference_rt.cameras import Orthographic, Perspective, ThinLens
+from reference_rt.cameras.film import Film
+from reference_rt.core import transform
+from reference_rt.integrators import RayCast, Whitted
+from reference_rt.lights import (
+    Ambient,
+    Constant,
+    Directional,
+    EnvironmentMap,
+    Point,
+    Projector,
+    Spot,
+)
+from reference_rt.materials import most_branches
+from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid, Sobol
+
+AOVS = {
+    "depth": "depth", "normal": "sh_normal", "albedo": "albedo", "position": "position",
+    "id": "shape_index",
+}  # fmt: skip
+"""Mitsuba's AOV for a layer of our film."""
+
+CAST = {"colour": "albedo", "normal": "geo_normal", "id": "shape_index", "uv": "uv"}
+"""Mitsuba's AOV for what ray casting shows, but for distances."""
+
+
+def sensor(scene: Scene, surfaces: Surfaces) -> Element:
+    """The camera, with film and sampler.  Raises UntranslatableError."""
+    camera = scene.camera
+    look = LookAt(camera.eye, camera.target, camera.up)
+    clip = {"near_clip": NEAR, "far_clip": FAR}
+    is_plain = isinstance(camera, Perspective | ThinLens) and camera.view is None
+    if is_plain:
+        assert isinstance(camera, Perspective | ThinLens)
+        fov, axis = camera.angle
+        values: dict[str, Any] = {"fov": float(fov), "fov_axis": axis, "to_world": (look,), **clip}
+        if isinstance(camera, ThinLens):
+            values["aperture_radius"] = camera.aperture_radius
+            values["focus_distance"] = camera.focus
+        plugin = "thinlens" if isinstance(camera, ThinLens) else "perspective"
+    elif isinstance(camera, Orthographic) and camera.view is None:
+        half = (2.0 if camera.width is None else camera.width) / 2.0
+        plugin, values = "orthographic", {"to_world": (_scaled(half), look), **clip}
+    else:
+        found = translate_camera(camera, scene.film)
+        plugin = found.pop("type")
+        if plugin == "view_rectangle":
+            surfaces.note(OURS.format("sensor", plugin))
+        m = np.array(found.pop("to_world").matrix, np.float64)[:3]
+        values = {**found, "to_world": (matrix_step(m),)}
+    return Element("sensor", plugin, values, [_film(scene.film), _sampler(scene)])
+
+
+def _scaled(half: float) -> Step:
+    return Step("scale", (half, half, 1.0))
+
+
+def _film(film: Film) -> Element:
+    found = translate_film(film)
+    rfilter = found.pop("rfilter")
+    plugin, name = found.pop("type"), rfilter.pop("type")
+    return Element("film", plugin, found, [Element("rfilter", name, rfilter)])
+
+
+def _sampler(scene: Scene) -> Element:
+    sampler = scene.resolved_sampler
+    if isinstance(sampler, Grid):
+        values = {"sample_count": sampler.spp, "jitter": False}
+        return Element("sampler", "stratified", values)
+    # Mitsuba's sequence of the kind that Sobol' points are.
+    plugin = "ldsampler" if isinstance(sampler, Sobol) else "independent"
+    values = {"sample_count": sampler.spp, "seed": sampler.seed}
+    return Element("sampler", plugin, values)
+
+
+def integrator(scene: Scene, surfaces: Surfaces) -> Element:
+    """The integrator, inside another one for layers.  Raises UntranslatableError."""
+    chosen = scene.integrator
+    if isinstance(chosen, RayCast):
+        if chosen.show == "distance":
+            return Element("integrator", "depth")
+        return Element("integrator", "aov", {"aovs": f"{chosen.show}:{CAST[chosen.show]}"})
+    values = dict(translate_integrator(chosen) or {})
+    found = Element("integrator", values.pop("type"), values)
+    if isinstance(chosen, Whitted):
+        ambient = ambient_of(scene.lights)
+        names = ("ambient_r", "ambient_g", "ambient_b")
+        values |= {k: x for k, x in zip(names, ambient, strict=True) if x != 0.0}
+        values["components"] = 2 * int(most_branches(scene.tables.materials))
+        surfaces.note(OURS.format("integrator", "whitted"))
+    if getattr(chosen, "sampling", "both") != "both":
+        surfaces.note("'sampling' of the integrator is left out: the mean is the same")
+    layers = [name for name in scene.film.layers if name in AOVS]
+    if "variance" in scene.film.layers:
+        surfaces.note("the layer 'variance' is left out: Mitsuba has none")
+    if layers:
+        aovs = ", ".join(f"{name}:{AOVS[name]}" for name in layers)
+        return Element("integrator", "aov", {"aovs": aovs}, [found])
+    return found
+
+
+def lights(scene: Scene, surfaces: Surfaces) -> list[Element]:
+    """Those that are no shapes.  Raises UntranslatableError."""
+    found = []
+    for k, light in enumerate(scene.lights):
+        if not isinstance(light, Ambient):  # a parameter of our integrator
+            found.append(_light(light, k, surfaces))
+    return found
+
+
+def _light(light: Any, number: int, surfaces: Surfaces) -> Element:
+    match light:
+        case Point():
+            values: dict[str, Any] = {
+                "position": Vector(*light.position),
+                "intensity": Rgb(*light.intensity),
+            }
+        case Directional():
+            values = {
+                "direction": Vector(*light.direction),
+                "irradiance": Rgb(*light.irradiance),
+            }
+        case Constant():
+            values = {"radiance": Rgb(*light.radiance)}
+        case EnvironmentMap():
+            file = surfaces.files.copy(light.file, "lights", number, "file")
+            values = {"filename": file, "scale": light.scale}
+            if light.transform:
+                values["to_world"] = transform_steps(light.transform)
+            return Element("emitter", "envmap", values)
+        case Spot():
+            values = _spot(light, surfaces)
+        case Projector():
+            values = _projector(light, surfaces)
+        case _:
+            raise UntranslatableError(light, "light")
+    return Element("emitter", str(light.type), values)
+
+
+def _spot(light: Spot, surfaces: Surfaces) -> dict[str, Any]:
+    beam = 0.75 * light.cutoff_angle if light.beam_width is None else light.beam_width
+    # Mitsuba's images hang upside down.
+    x, y, z = (-c for c in light.up)
+    up = (x, y, z)
+    found: dict[str, Any] = {}
+    if light.texture is None:
+        x, y, z = np.eye(3)[int(np.argmin(np.abs(light.axis)))].tolist()
+        up = (x, y, z)
+    else:
+        texture = surfaces.texture(light.texture, surfaces.context, False, projected=True)
+        found["texture"] = surfaces.shared(texture)
+    return {
+        "to_world": (LookAt(light.origin, light.target, up),),
+        "intensity": Rgb(*light.intensity),
+        "cutoff_angle": float(light.cutoff_angle),
+        "beam_width": float(beam),
+        **found,
+    }
+
+
+def _projector(light: Projector, surfaces: Surfaces) -> dict[str, Any]:
+    pixels, irradiance = (1, 1), light.irradiance
+    value: Any
+    if isinstance(irradiance, str):
+        pixels = surfaces.pixels_of(irradiance)
+        texture = surfaces.texture(irradiance, surfaces.context, False, projected=True)
+        value = surfaces.shared(texture)
+    else:
+        value = Rgb(*irradiance)
+    shape = pixels[0] / pixels[1]
+    stretch = _such_that(shape / light.aspect, lambda x: shape / x == light.aspect)
+    look = LookAt(light.origin, light.target, light.up)
+    steps = (look,) if stretch == 1.0 else (Step("scale", (1.0, stretch, 1.0)), look)
+    scale = _such_that(light.scale / math.pi, lambda x: math.pi * x == light.scale)
+    return {
+        "to_world": steps,
+        "irradiance": value,
+        "scale": scale,
+        "fov": float(light.fov),
+        "fov_axis": "x",
+    }
+
+
+def _such_that(x: float, is_exact: Callable[[float], bool]) -> float:
+    """x, or a number next to it that the reader turns into exactly what we have."""
+    near = (x, math.nextafter(x, 0.0), math.nextafter(x, math.inf))
+    return next((y for y in near if is_exact(y)), x)
+
+
+def transform_steps(steps: Any) -> tuple[Step, ...]:
+    """Our transform as steps of Mitsuba's: a rotation about any axis but x, y and z as a matrix, as
+    Mitsuba does not make the axis a unit vector."""
+    found = []
+    for step in steps:
+        match step:
+            case transform.Translate(translate=v):
+                found.append(Step("translate", v))
+            case transform.Scale(scale=v):
+                found.append(Step("scale", v))
+            case transform.Rotate(rotate=turn) if sorted(map(abs, turn.axis)) == [0.0, 0.0, 1.0]:
+                found.append(Step("rotate", (*turn.axis, turn.degrees)))
+            case _:
+                found.append(matrix_step(step.matrix_of()))
+    return tuple(found)
+
+
+__all__ = ["integrator", "lights", "sensor", "transform_steps"]

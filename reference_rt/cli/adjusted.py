@@ -1,0 +1,60 @@
+"""The scene that a command is about: its argument, and options that change it."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from reference_rt.util.errors import SceneError, UsageError
+
+if TYPE_CHECKING:
+    from reference_rt.rendering.scene import Scene
+
+SceneArgument = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene, or a Mitsuba .xml one.")
+]
+
+_OPTIONS = (("spp",), ("size",), ("integrator",), ("seed",))
+"""Settings that errors of `with_settings` name."""
+
+
+def adjusted(
+    scene: "Scene",
+    spp: int | None = None,
+    size: str | None = None,
+    integrator: str | None = None,
+    seed: int | None = None,
+) -> "Scene":
+    """The scene with the options of the command line.  Raises UsageError."""
+    from reference_rt.rendering.settings import with_settings
+
+    pixels = None
+    if size is not None:
+        width, _, height = size.lower().partition("x")
+        if not all(n.isdecimal() and len(n) < 11 for n in (width, height)):
+            raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{size}'")
+        pixels = int(width), int(height)
+    try:
+        return with_settings(scene, spp=spp, size=pixels, integrator=integrator, seed=seed)
+    except SceneError as error:
+        if error.path in _OPTIONS:
+            raise UsageError(f"--{error.path[0]}: {error.message}") from None
+        raise
+
+
+@contextmanager
+def without_blas() -> Iterator[None]:
+    """Stop Numba from importing SciPy with its first kernel to look for BLAS: 0.1 s for a feature
+    that no kernel of ours uses."""
+    name = "scipy.linalg.cython_blas"
+    absent = name not in sys.modules
+    if absent:
+        sys.modules[name] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        if absent:
+            del sys.modules[name]

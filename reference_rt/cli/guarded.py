@@ -1,0 +1,95 @@
+"""What all commands share: errors as one line with an exit code, and safe printing."""
+
+import errno
+import functools
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TypeVar
+
+import typer
+
+from reference_rt.util.errors import (
+    ImageError,
+    ReferenceRtError,
+    SceneError,
+    SceneWarning,
+    printable,
+)
+from reference_rt.util.signals import dropped, exit_code_of
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_INTERRUPTED = "interrupted; nothing unfinished was written"
+
+
+def guarded(command: F) -> F:
+    """Report every error of a command as one line on standard error, with its exit code."""
+
+    @functools.wraps(command)
+    def run(*args: Any, **kwargs: Any) -> Any:
+        try:
+            with scene_warnings(lambda text: typer.echo(f"warning: {text}", err=True)):
+                return command(*args, **kwargs)
+        except ReferenceRtError as error:
+            others = error.others if isinstance(error, SceneError) else ()
+            *first, last = (error, *others)
+            for one in first:
+                with suppress(OSError):
+                    say(f"error: {one}", err=True)
+            _fail(str(last), error.exit_code)
+        except typer.Exit:
+            raise
+        except KeyboardInterrupt as error:
+            _fail(_INTERRUPTED, exit_code_of(error))
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            if (signal := dropped()) is not None:
+                _fail(_INTERRUPTED, exit_code_of(signal))
+            if is_output_lost(error):
+                _fail(lost_output(error), ImageError.exit_code)
+            message = " ".join(str(error).split())
+            _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
+
+    return run  # type: ignore[return-value]
+
+
+def say(text: str, err: bool = False) -> None:
+    """Print one line; unprintable characters are escaped."""
+    typer.echo(printable(text), err=err)
+
+
+def lost_output(error: BaseException) -> str:
+    """The message for a failed print."""
+    reason = getattr(error, "strerror", None)
+    return f"standard output cannot be written: {reason}; expected free space"
+
+
+def is_output_lost(error: BaseException) -> bool:
+    """Whether a print failed, as on a full disk.  Our output files raise ImageError instead."""
+    lost = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+    return isinstance(error, OSError) and error.errno in lost and error.filename is None
+
+
+@contextmanager
+def scene_warnings(report: Callable[[str], None]) -> Iterator[None]:
+    """Call `report` with the text of each `SceneWarning`; other warnings are Python's."""
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any, **to: Any) -> None:
+            if issubclass(category, SceneWarning):
+                report(str(message))
+            else:
+                others(message, category, *place, **to)
+
+        warnings.simplefilter("always", SceneWarning)
+        warnings.showwarning = show
+        yield
+
+
+def _fail(message: str, code: int) -> None:
+    with suppress(OSError):  # standard error may fail, too
+        say(f"error: {message}", err=True)
+    raise typer.Exit(code)

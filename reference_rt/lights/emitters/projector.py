@@ -1,0 +1,113 @@
+"""Projector: a point that throws an image, evenly bright on planes across its axis."""
+
+import math
+from typing import Annotated, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Description, Direction, Positive, Vector
+from reference_rt.core.vec3 import Vec3, length, row
+from reference_rt.jit.kernel import kernel
+from reference_rt.lights.emitters.projected import (
+    WHITE,
+    ProjectedImages,
+    colour_in,
+    place_in,
+    placed,
+)
+from reference_rt.lights.light import LightSample, from_position
+from reference_rt.textures import NO_TEXTURES, ColourParameter, Palette, Textures
+
+
+class Projector(Description):
+    """A point at `origin` that projects an image towards `target`, as a slide projector: the
+    reverse of a perspective camera.  A white image lights a plane across the axis evenly."""
+
+    type: Literal["projector"] = "projector"
+    origin: Vector
+    target: Vector
+    up: Direction = (0.0, 1.0, 0.0)
+    """Up in the image."""
+    irradiance: ColourParameter
+    """On a plane across the axis at distance 1, W m^-2, linear sRGB; or the name of a texture, its
+    (u, v) from (0, 0) at the lower left corner of the image, seen from the light, to (1, 1)."""
+    scale: Positive = 1.0
+    """A factor on the irradiance."""
+    fov: Annotated[float, Field(gt=0, lt=180)] = 45.0
+    """Degrees across the image's width."""
+    aspect: Positive = 1.0
+    """The image's width over its height."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not 0.0 < math.dist(self.origin, self.target) < math.inf:
+            raise ValueError("origin and target give no direction; expected two different points")
+        placed(self.axis, self.up, 1.0, 1.0, WHITE)
+        return self
+
+    @property
+    def axis(self) -> FloatArray:
+        """(3,): the unit direction in which it shines."""
+        found = np.subtract(self.target, self.origin) / math.dist(self.target, self.origin)
+        return np.asarray(found)
+
+    def tabulate(self, palette: Palette = NO_TEXTURES) -> "Projectors":
+        wide = math.tan(math.radians(self.fov) / 2.0)
+        irradiance = palette.colours(self.irradiance, math.inf)
+        return Projectors(
+            position=np.array([self.origin]),
+            axis=self.axis[None],
+            scale=np.array([self.scale]),
+            brightest=np.array([self.scale * palette.brightest(self.irradiance)]),
+            image=placed(self.axis, self.up, wide, wide / self.aspect, irradiance),
+        )
+
+
+class Projectors(NamedTuple):
+    """position (n, 3), unit axis (n, 3);  scale (n,): a factor on image (n), the irradiance at
+    distance 1;  brightest (n,): its largest luminance."""
+
+    position: FloatArray
+    axis: FloatArray
+    scale: FloatArray
+    brightest: FloatArray
+    image: ProjectedImages
+
+
+@kernel
+def sample(projectors: Projectors, i: int, textures: Textures | None, p: Vec3) -> LightSample:
+    """The one direction to the light: see `from_position`.  With E the irradiance at distance 1,
+    the intensity at the angle a from the axis is E / cos³ a: a plane across the axis at z gets
+    E / z² everywhere."""
+    position = row(projectors.position, i)
+    w = p - position
+    place = place_in(projectors.image, i, row(projectors.axis, i), w)
+    if not max(abs(place.x), abs(place.y)) <= 1.0:
+        return from_position(position, Vec3(0.0, 0.0, 0.0), 0.0, p)
+    secant = length(w) / place.z
+    colour = colour_in(projectors.image, i, textures, place)
+    brightness = projectors.scale[i] * (secant * secant * secant)
+    return from_position(position, colour * brightness, 1.0, p)
+
+
+def power(projectors: Projectors, scene_radius: float) -> FloatArray:
+    """Luminance of the power (n,), for the image's largest value everywhere: E times the area of
+    the image at distance 1."""
+    area = 4.0 * projectors.image.wide * projectors.image.tall
+    return np.asarray(area * projectors.brightest)
+
+
+def intensity(projectors: Projectors) -> FloatArray:
+    """(n,): the largest luminance of the radiant intensity, towards the image's corners."""
+    wide, tall = projectors.image.wide, projectors.image.tall
+    return np.asarray(projectors.brightest * (1.0 + wide * wide + tall * tall) ** 1.5)
+
+
+def reach(projectors: Projectors) -> FloatArray:
+    """(n,): the angle from the axis to the image's corners, in radians."""
+    return np.asarray(np.arctan(np.hypot(projectors.image.wide, projectors.image.tall)))
+
+
+__all__ = ["Projector", "Projectors", "intensity", "power", "reach", "sample"]

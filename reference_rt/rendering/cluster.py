@@ -1,0 +1,161 @@
+"""An executor of a Dask scheduler's workers: on this machine, on several, or of a batch system.
+
+Needs `distributed`, and `dask-jobqueue` for a batch system (the extra `cluster`).
+"""
+
+import importlib
+import time
+from concurrent.futures import CancelledError, Future
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from reference_rt.rendering.accumulation import Sums
+from reference_rt.rendering.prepared import Done
+from reference_rt.rendering.remote import SIZE, RemoteScene, compute_remotely
+from reference_rt.rendering.units import Unit
+from reference_rt.util.errors import UsageError, WorkersError
+from reference_rt.util.files import read_text
+
+_PATIENCE = 60.0
+"""Seconds to wait for a scheduler that has gone, and for the first worker of one that is new."""
+
+_COUNTED = 5.0
+"""Seconds between two counts of the workers, which come and go."""
+
+_BATCH_SYSTEMS = {
+    "slurm": "SLURMCluster",
+    "pbs": "PBSCluster",
+    "sge": "SGECluster",
+    "lsf": "LSFCluster",
+    "htcondor": "HTCondorCluster",
+    "oar": "OARCluster",
+    "moab": "MoabCluster",
+}
+
+
+class Cluster:
+    """An `executor.Executor`: the workers of a Dask scheduler, of any number of threads each."""
+
+    size = SIZE
+
+    def __init__(self, scene: RemoteScene, scheduler: str = "", file: Path | None = None) -> None:
+        """scheduler: its address, such as tcp://host:8786;  file: in its place, a description of a
+        batch system (see `batch_cluster`).  Raises UsageError, WorkersError."""
+        self._scene, self._address = scene, scheduler
+        self._cluster = None if file is None else batch_cluster(file)
+        self._distributed = _module("distributed")
+        self._client: Any = None
+        self._connect()
+        self._counted, self._threads = 0.0, 1
+
+    @property
+    def slots(self) -> int:
+        now = time.monotonic()
+        if now - self._counted > _COUNTED:
+            self._counted = now
+            with suppress(Exception):  # the scheduler may be gone for a moment
+                self._threads = max(1, sum(self._client.nthreads().values()))
+        return 2 * self._threads + 2
+
+    def submit(self, unit: Unit, sums: Sums) -> "Future[Done]":
+        given = sums if unit.first else None
+        try:
+            return self._submit(unit, given)
+        except Exception:  # the client has given up a scheduler that has gone
+            self._connect()
+            return self._submit(unit, given)
+
+    def recovers(self, error: BaseException) -> bool:
+        """A unit whose worker died, whose scheduler has gone, or which that gave up, is computed
+        again, by others."""
+        lost = (
+            CancelledError,
+            OSError,
+            self._distributed.KilledWorker,
+            self._distributed.comm.CommClosedError,
+            self._distributed.client.FutureCancelledError,
+        )
+        if not isinstance(error, lost):
+            return False
+        if self._client.status != "running":
+            self._connect()
+        return True
+
+    def progress(self, fraction: float) -> None:
+        pass
+
+    def stop(self) -> None:
+        with suppress(Exception):
+            self._executor.shutdown(wait=False, cancel_futures=True)
+
+    def close(self) -> None:
+        with suppress(Exception):
+            self._executor.shutdown(wait=False, cancel_futures=True)
+        for one in (self._client, self._cluster):
+            with suppress(Exception):
+                if one is not None:
+                    one.close()
+
+    def _submit(self, unit: Unit, sums: Sums | None) -> "Future[Done]":
+        found: Future[Done] = self._executor.submit(compute_remotely, self._scene, unit, sums)
+        return found
+
+    def _connect(self) -> None:
+        """A new client, once there is a scheduler and a worker."""
+        end = time.monotonic() + _PATIENCE
+        if self._client is not None:
+            with suppress(Exception):
+                self._client.close(timeout=1)
+        target = self._cluster if self._cluster is not None else self._address
+        while True:
+            try:
+                client = self._distributed.Client(target, timeout=5, set_as_default=False)
+                client.wait_for_workers(1, timeout=max(1.0, end - time.monotonic()))
+                break
+            except (OSError, TimeoutError, ValueError) as error:
+                if isinstance(error, ValueError) or time.monotonic() > end:
+                    raise WorkersError(
+                        f"{self._address or 'the batch system'}: no scheduler with a worker in "
+                        f"{_PATIENCE:.0f} s; expected `dask scheduler` and `dask worker` there"
+                    ) from None
+        self._client = client
+        # Not pure: a unit that is submitted again must be computed again.
+        self._executor = client.get_executor(pure=False)
+
+
+def batch_cluster(file: Path) -> Any:
+    """The workers of a batch system, as a YAML file describes them: `type` (slurm, pbs, sge, lsf,
+    htcondor, oar, moab), `jobs`, how many of them, and the options of dask-jobqueue's class, such
+    as queue, cores, memory, walltime.  Raises UsageError."""
+    try:
+        described = yaml.safe_load(read_text(file))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = " ".join(str(error).split())
+        raise UsageError(f"{file}: cannot be read: {reason}; expected YAML") from None
+    options = dict(described) if isinstance(described, dict) else {}
+    kind, jobs = options.pop("type", None), options.pop("jobs", None)
+    if kind not in _BATCH_SYSTEMS:
+        raise UsageError(f"{file}: type: expected one of {', '.join(_BATCH_SYSTEMS)}, got '{kind}'")
+    if not isinstance(jobs, int) or isinstance(jobs, bool) or jobs < 1:
+        raise UsageError(f"{file}: jobs: expected the number of jobs, at least 1, got '{jobs}'")
+    module = _module("dask_jobqueue")
+    try:
+        cluster = getattr(module, _BATCH_SYSTEMS[kind])(**options)
+        cluster.scale(jobs=jobs)
+    except (TypeError, ValueError, RuntimeError, OSError) as error:
+        reason = " ".join(str(error).split())
+        raise UsageError(f"{file}: {reason}; expected the options of dask-jobqueue") from None
+    return cluster
+
+
+def _module(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise UsageError(
+            f"{name.replace('_', '-')} is not installed; expected "
+            "`pip install 'reference-rt[cluster]'`"
+        ) from None

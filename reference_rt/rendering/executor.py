@@ -1,0 +1,70 @@
+"""Executors compute units: this process's threads here, other processes in `processes`, clusters in
+`cluster`.
+
+A unit's sums are copied to the executor and back, so that a unit is a function of what it is given:
+one that was lost can be computed again, and nothing is ever added twice.
+"""
+
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Protocol
+
+from reference_rt.rendering import thread_pool
+from reference_rt.rendering.accumulation import Sums
+from reference_rt.rendering.prepared import Done, Prepared
+from reference_rt.rendering.units import Unit
+
+
+class Executor(Protocol):
+    """size: samples of a unit that it likes best;  slots: units that keep it busy."""
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def slots(self) -> int: ...
+
+    def submit(self, unit: Unit, sums: Sums) -> "Future[Done]":
+        """Add the samples of a unit to the sums of its pixels, sooner or later."""
+
+    def recovers(self, error: BaseException) -> bool:
+        """Called for a unit that failed: whether it may be submitted again."""
+
+    def progress(self, fraction: float) -> None:
+        """Called in the main thread now and then, with the fraction of the picture that is done."""
+
+    def stop(self) -> None:
+        """Give up what is being computed, as soon as possible: it raises `StoppedError`."""
+
+    def close(self) -> None:
+        """End its threads and processes."""
+
+
+_AHEAD = 16
+"""Units of each thread: none waits while others are collected."""
+
+
+class Threads:
+    """An `Executor`: the threads of this process."""
+
+    def __init__(self, prepared: Prepared, threads: int, chunk: int) -> None:
+        """chunk: see `units`."""
+        self._prepared, self._chunk = prepared, chunk
+        self._stop = threading.Event()
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="tile")
+        self.size, self.slots = thread_pool.SAMPLES_PER_TILE, _AHEAD * threads
+
+    def submit(self, unit: Unit, sums: Sums) -> "Future[Done]":
+        return self._pool.submit(self._prepared.compute, unit, sums, self._chunk, self._stop)
+
+    def recovers(self, error: BaseException) -> bool:
+        return False
+
+    def progress(self, fraction: float) -> None:
+        self._prepared.running.progress(fraction)
+
+    def stop(self) -> None:
+        self._stop.set()
+
+    def close(self) -> None:
+        self._pool.shutdown(cancel_futures=True)

@@ -1,0 +1,325 @@
+"""The table of cases, links to what is shown, and the page by keyboard and on paper."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from page_in_browser import case, display, drawn, grey, pixel, point, shown
+
+from comparisons.results.case import Images, Metrics
+
+PICTURES = Images(grey(0.25), grey(1.0), grey(0.1))
+
+
+def measured(scene, verdict, flip, seconds, images=PICTURES):
+    metrics = Metrics(0.9, flip, 30.0, 0.5, 0.25, (0.0, 0.0, -0.01), 0)
+    made = case(images, scene, verdict)
+    times = {"candidate": {"render": seconds}}
+    return type(made)(**{**vars(made), "metrics": metrics, "seconds": times})
+
+
+FOUR = (
+    measured("b", "agree", 0.001, 3.0),
+    measured("d", "differ", 0.3, 20.0),
+    measured("a", "invalid", float("nan"), 100.0),
+    measured("c", "differ", 0.02, 1.0),
+)
+
+
+def names(page):
+    """The cases in the order of the table, which is that of the sections."""
+    listed = page.locator("nav tbody a").all_inner_texts()
+    assert [s.split()[0] for s in page.locator("section.case h2").all_inner_texts()] == listed
+    return "".join(listed)
+
+
+def head(page, name):
+    return page.locator("nav thead").get_by_role("button", name=name, exact=True)
+
+
+def test_sorting(show):
+    page = show(*FOUR)
+    assert names(page) == "adcb"
+    for column, expected in (("Scene", "abcd"), ("FLIP", "bcda"), ("Seconds", "cbda")):
+        head(page, column).focus()
+        page.keyboard.press("Enter")
+        assert names(page) == expected
+        (sorted_by,) = page.locator("nav [aria-sort=ascending]").all_inner_texts()
+        assert sorted_by.startswith(column)
+        assert page.locator("nav [aria-sort]").count() == 1
+    head(page, "FLIP").click()
+    head(page, "FLIP").click()
+    assert names(page) == "dcba"  # what has no number stays last
+    page.keyboard.press("n")
+    assert page.evaluate("document.activeElement.closest('.case').dataset.name") == "d"
+
+
+def test_thumbnails_in_the_table(show):
+    page = show(*FOUR, case(None, "without"))
+    images = page.locator("nav tbody img")
+    assert images.count() == 4
+    assert all(images.nth(k).evaluate("(image) => image.naturalWidth") == 12 for k in range(4))
+
+
+def test_passing_cases_of_a_long_page_are_collapsed(show):
+    many = [measured(f"s{k}", "agree" if k % 2 else "differ", 0.1, 1.0) for k in range(8)]
+    page = show(*many)
+    bodies = page.locator("section.case").evaluate_all(
+        "(all) => all.map((one) => [one.dataset.verdict, one.querySelector('.body').open])"
+    )
+    assert all(is_open == (verdict == "differ") for verdict, is_open in bodies)
+    assert page.locator("section.case", has_text="s1").locator(".headline").is_visible()
+    section = page.locator("section.case[data-name=s1]")
+    section.scroll_into_view_if_needed()
+    assert section.get_attribute("data-drawn") is None
+    section.locator("summary").first.focus()
+    page.keyboard.press("Enter")
+    page.wait_for_selector("section.case[data-name=s1][data-drawn]", state="attached")
+    page.get_by_role("button", name="expand all").click()
+    assert page.locator(".body:not([open])").count() == 0
+    page.get_by_role("button", name="collapse all").click()
+    assert page.locator(".body[open]").count() == 0
+    page.locator("nav a", has_text="s3").click()
+    assert page.locator("section.case[data-name=s3] .body").get_attribute("open") is not None
+
+
+def fragment(page, expected):
+    """The page's address, once it says so."""
+    page.wait_for_function(
+        """(expected) => {
+            const found = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
+            return Object.entries(expected).every(([k, v]) => found[k] === v);
+        }""",
+        arg=expected,
+    )
+    return page.evaluate("location.hash")
+
+
+@pytest.fixture
+def again(browser):
+    """Open the page in a new window, with another fragment; it must not complain."""
+    complaints, pages = [], []
+
+    def opened(page, fragment):
+        pages.append(browser.new_page(viewport={"width": 1200, "height": 900}))
+        pages[-1].on("console", lambda message: complaints.append(message.text))
+        pages[-1].on("pageerror", lambda error: complaints.append(str(error)))
+        pages[-1].goto(page.url.partition("#")[0] + fragment)
+        return pages[-1]
+
+    yield opened
+    for page in pages:
+        page.close()
+    assert complaints == []
+
+
+def test_an_address_shows_the_same_again(show, again):
+    odd = "odd & name=1 #ü"
+    page = show(*FOUR, measured(odd, "agree", 0.1, 1.0))
+    page.locator("nav a", has_text=odd).click()
+    pixel(page, "candidate", 0, 0, 5)
+    point(page, 7, 3, number=5)
+    page.keyboard.press("5")
+    page.locator("#which").select_option("z")
+    page.locator("#which").blur()
+    page.keyboard.press("+")
+    page.locator("#colours").select_option("log")
+    page.locator("#search").fill("odd")
+    head(page, "Seconds").click()
+    wanted = {"case": odd, "view": "single", "of": "z", "x": "7", "y": "3", "search": "odd"}
+    there = fragment(page, wanted | {"stops": "1", "colours": "log", "sort": "seconds"})
+    page = again(page, there)
+    fragment(page, wanted)
+    assert page.locator("body").get_attribute("data-mode") == "single"
+    assert page.locator("body").get_attribute("data-which") == "z"
+    assert page.locator("section.case:visible").count() == 1
+    page.wait_for_function(
+        "document.querySelector('section.case:not([hidden]) .place').textContent === 'x 7, y 3'"
+    )
+    assert page.locator("#stops-text").inner_text() == "+1"
+    assert page.locator("#colours").input_value() == "log"
+
+
+@pytest.mark.parametrize(
+    "fragment_",
+    ["#case=nothing", "#x=1&y=2", "#case=a&x=-5&y=1e9", "#view=<b>&of=?&sort=%", "#case-2", "#=&="],
+)
+def test_odd_addresses_do_no_harm(show, again, fragment_):
+    page = again(show(*FOUR), fragment_)
+    assert names(page) == "adcb"
+    assert page.locator("body").get_attribute("data-mode") == "side"
+
+
+def test_a_link_to_each_case(show):
+    page = show(*FOUR)
+    links = page.locator(".permalink").evaluate_all(
+        "(all) => all.map((a) => a.getAttribute('href'))"
+    )
+    assert links == [f"#case={name}" for name in "adcb"]
+
+
+# Pictures
+
+
+def test_the_slider_is_dragged_in_the_picture(show):
+    page = show(case(PICTURES))
+    page.keyboard.press("4")
+    pixel(page, "candidate", 0, 0)
+    box = page.locator("#case-1 .reference .frame").bounding_box()
+    middle = box["y"] + box["height"] / 2
+    for start, end in ((0.5, 0.2), (0.9, 0.75), (0.75, 1.2)):
+        page.mouse.move(box["x"] + start * box["width"], middle)
+        page.mouse.down()
+        page.mouse.move(box["x"] + end * box["width"], middle, steps=4)
+        page.mouse.up()
+        value = float(page.locator(".wipe input").input_value())
+        assert value == pytest.approx(100.0 * min(end, 1.0), abs=1.0)
+        page.mouse.move(box["x"], middle)  # without a button
+        assert float(page.locator(".wipe input").input_value()) == value
+
+
+@pytest.mark.parametrize("mode", "12345")
+def test_the_name_of_a_picture_is_in_view(show, mode):
+    page = show(case(PICTURES, sides=("theirs", "the baseline's")))
+    pixel(page, "candidate", 0, 0)
+    page.keyboard.press(mode)
+    titles = {"candidate": "theirs", "reference": "the baseline's"}
+    visible = shown(page)
+    for kind in visible:
+        tag = page.locator(f"#case-1 .{kind} .tag")
+        assert tag.is_visible()
+        assert tag.inner_text() == titles.get(kind, tag.inner_text()) != ""
+    if mode == "4":
+        left, right = (
+            page.locator(f"#case-1 .{kind} .tag").bounding_box()
+            for kind in ("candidate", "reference")
+        )
+        assert left["y"] == right["y"]
+        # One name is at the left edge, the other at the right one.
+        style = "(tag) => getComputedStyle(tag).textAlign"
+        assert page.locator("#case-1 .reference .tag").evaluate(style) == "right"
+
+
+def test_tone_mapping(show):
+    """In units of white: Reinhard's curve maps 4 to white; both are monotonic and start at 0."""
+    ramp = np.linspace(0.0, 8.0, 96).reshape(8, 12)[..., None] * np.ones(3)
+    page = show(case(Images(ramp, np.ones_like(ramp))))
+    for colours, curve in (
+        ("reinhard", lambda x: x * (1 + x / 16) / (1 + x)),
+        ("filmic", lambda x: x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)),
+    ):
+        page.locator("#colours").select_option(colours)
+        drawn(page, colours=colours)
+        for x, y in ((0, 0), (3, 0), (1, 1), (0, 4), (11, 7)):
+            expected = display(curve(ramp[y, x, 0]))
+            assert abs(pixel(page, "candidate", x, y)[0] - expected) <= 1
+
+
+# For everybody
+
+
+CONTRASTS = """() => {
+    const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+    const parts = (text) => text.match(/[\\d.]+/g).map(Number);
+    const luminance = ([r, g, b]) =>
+        0.2126 * linear(r / 255) + 0.7152 * linear(g / 255) + 0.0722 * linear(b / 255);
+    const behind = (element) => {
+        for (let one = element; one; one = one.parentElement) {
+            const colour = parts(getComputedStyle(one).backgroundColor);
+            if (colour.length === 3 || colour[3] === 1) return colour;
+        }
+        return [255, 255, 255];
+    };
+    const found = [];
+    for (const element of document.querySelectorAll("body *")) {
+        const text = [...element.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
+        if (!text || !element.checkVisibility()) continue;
+        if (element.closest("svg, .unseen, option")) continue;
+        const [a, b] = [parts(getComputedStyle(element).color), behind(element)].map(luminance);
+        const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+        if (contrast < 4.5) found.push(`${element.tagName}.${element.className}: ${contrast}`);
+    }
+    return found;
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_contrast(show, scheme):
+    verdicts = ("agree", "differ", "inconclusive", "invalid", "not-comparable", "unchanged")
+    cases = [measured(f"s{k}", verdict, 0.1, 1.0) for k, verdict in enumerate(verdicts)]
+    page = show(*cases, color_scheme=scheme)
+    page.get_by_role("button", name="expand all").click()
+    assert page.evaluate(CONTRASTS) == []
+
+
+def test_roles_for_screen_readers(show):
+    page = show(*FOUR)
+    for role in ("banner", "search", "navigation", "main"):
+        assert page.get_by_role(role).count() == 1
+    assert page.get_by_role("region").count() == len(FOUR)
+    assert page.get_by_role("table").count() >= 2
+    for kind in ("button", "link", "checkbox", "radio", "slider", "combobox", "searchbox", "img"):
+        for one in page.get_by_role(kind).all():
+            assert one.evaluate(
+                """(e) => [e.ariaLabel, e.alt, e.textContent, e.labels?.[0]?.textContent]
+                    .some((text) => text?.trim())"""
+            )
+    levels = page.locator("h1, h2, h3").evaluate_all(
+        "(all) => all.filter((e) => e.checkVisibility()).map((e) => Number(e.tagName[1]))"
+    )
+    assert levels[0] == 1
+    assert all(b - a <= 1 for a, b in pairwise(levels))
+
+
+def test_everything_is_reached_by_the_tab_key(show):
+    page = show(case(PICTURES, again="again"))
+    pixel(page, "candidate", 0, 0)
+    reached = set()
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        reached.add(
+            page.evaluate(
+                "(({activeElement: e}) => e.id || e.className || e.name || e.tagName)(document)"
+            )
+        )
+    assert {"search", "expand", "stops", "colours", "permalink", "row", "copy live"} <= reached
+
+
+def test_on_paper(show):
+    page = show(*FOUR)
+    pixel(page, "candidate", 0, 0)
+    page.emulate_media(media="print")
+    assert not page.locator(".toolbar").is_visible()
+    assert not page.locator("#case-1 .reading").is_visible()
+    assert page.locator("nav table").is_visible()
+    assert page.locator("#case-1 .candidate").is_visible()
+    assert page.evaluate("getComputedStyle(document.body).color") == "rgb(0, 0, 0)"
+    assert len(page.pdf()) > 1000
+
+
+def test_numbers_are_tables(show):
+    one = case(PICTURES)
+    numbers = {"rays": 7, "bias": {"R": 0.5, "G": 0.25, "B": 1.0}, "tiles": {"differ": 3}}
+    rung = one.rungs[0].__class__("geometry", "differ", "why", numbers)
+    page = show(type(one)(**{**vars(one), "rungs": (rung,)}))
+    rows = page.locator(".rungs .numbers tr").all_inner_texts()
+    assert [row.split() for row in rows] == [
+        ["rays", "7"],
+        ["bias", "0.5", "0.25", "1"],
+        ["tiles"],
+        ["differ", "3"],
+    ]
+
+
+def test_a_page_of_64_cases_is_light(show):
+    """In what it does at the start: no picture is decoded that is far from the window, and no
+    time is spent on collapsed cases."""
+    many = [measured(f"s{k}", "agree" if k else "differ", 0.1, 1.0) for k in range(64)]
+    page = show(*many)
+    assert page.locator("canvas").count() == 0
+    page.locator("nav a").first.click()
+    pixel(page, "candidate", 0, 0)
+    assert page.locator("[data-drawn]").count() == 1
+    assert page.locator("canvas").count() <= 4
+    assert json.loads(page.locator("#case-1").get_attribute("data-drawn"))["stops"] == 0

@@ -1,0 +1,139 @@
+"""`reference-rt preview`: to a file, to a terminal, to a window that is closed."""
+
+import re
+
+import numpy as np
+import pytest
+from builders import SCENES
+from PIL import Image
+from typer.testing import CliRunner
+
+import reference_rt as rt
+from reference_rt.cli import preview as previews
+from reference_rt.cli.main import app
+
+BOX = str(SCENES / "cornell_box.yaml")
+SMALL = ("--size", "12x8", "--spp", "4")
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["preview", BOX, *SMALL, *map(str, arguments)])
+
+
+def test_a_file_is_rewritten(tmp_path):
+    out = tmp_path / "new" / "a.png"
+    done = run("--to", out)
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout == ""
+    lines = done.stderr.splitlines()
+    assert lines[0] == f"{out}: 1 sample per pixel"
+    assert re.fullmatch(rf"{re.escape(str(out))}: 4 samples per pixel, noise [\d.]+ %", lines[-1])
+    assert list(out.parent.iterdir()) == [out]
+    image = Image.open(out)
+    assert image.size == (12, 8)
+    assert image.text["scene"] == "cornell_box"
+
+
+def test_without_a_display_the_file_is_beside_the_caller(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(previews, "_window", lambda scene: None)
+    assert run().exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["cornell_box.preview.png"]
+
+
+def test_little_noise_ends_it(tmp_path):
+    done = run("--to", tmp_path / "a.png", "--noise", "1000")
+    assert done.stderr.splitlines()[-1].split(": ")[1].startswith("2 samples")
+
+
+@pytest.mark.parametrize("place", ["terminal", "blocks", "sixel"])
+def test_a_terminal_is_cleared_once(place):
+    done = run("--to", place)
+    assert done.exit_code == 0
+    assert done.stdout.count("\x1b[2J") == 1
+    assert done.stdout.count("\x1b[H") == done.stdout.count("per pixel") >= 2
+    drawn = {"sixel": "\x1bPq", "blocks": "▀", "terminal": "▀"}[place]
+    assert done.stdout.count(drawn) >= 2
+
+
+@pytest.mark.parametrize(
+    ("to", "said"),
+    [
+        ("a.jpg", "--to: expected one of window, terminal, sixel, blocks or a .png file"),
+        ("screen", "--to: expected one of window, terminal, sixel, blocks or a .png file"),
+        ("window", "--to window: there is no display"),
+    ],
+)
+def test_wrong_places(to, said, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    done = run("--to", to)
+    assert done.exit_code == 2
+    assert done.stderr.startswith(f"error: {said}")
+
+
+class Root:
+    """A `tkinter.Tk` that the user closes after some updates."""
+
+    def __init__(self, updates):
+        self.updates, self.titles, self.ended = updates, [], False
+
+    def title(self, text):
+        self.titles.append(text)
+
+    def protocol(self, name, function):
+        assert name == "WM_DELETE_WINDOW"
+        self.function = function
+
+    def bind(self, key, function):
+        self.escape = function
+
+    def update(self):
+        self.updates -= 1
+        if self.updates == 0:
+            self.function()
+
+    def after(self, milliseconds):
+        assert milliseconds > 0
+
+    def destroy(self):
+        self.ended = True
+
+
+class Label:
+    def __init__(self, root, **options):
+        self.shown = []
+
+    def pack(self):
+        pass
+
+    def configure(self, image):
+        self.shown.append(image)
+
+
+@pytest.mark.parametrize("updates", [1, 3, 200])
+def test_a_window_that_is_closed_ends_it(updates, monkeypatch):
+    pytest.importorskip("tkinter")
+    monkeypatch.setattr("tkinter.Label", Label)
+    monkeypatch.setattr("PIL.ImageTk.PhotoImage", lambda image, master: np.asarray(image))
+    root = Root(updates)
+    window = previews.Window(root, "box")
+    scene = rt.Scene.load(BOX)
+    film = scene.film.model_copy(update={"width": 12, "height": 8})
+    previews.preview(scene.changed(film=film), window, 4, 0.0, 1)
+    assert root.ended
+    shown = window._label.shown
+    assert all(image.shape == (8, 12, 3) for image in shown)
+    if updates == 200:  # the picture was finished, and the window was left open
+        assert "4 samples" in root.titles[-1]
+
+
+def test_the_pixels_are_those_of_render(tmp_path):
+    """Of a scene without noise, so that both have the same picture."""
+    scene = str(SCENES / "spheres_whitted.yaml")
+    runner = CliRunner()
+    common = [scene, "--size", "9x6"]
+    shown, rendered = tmp_path / "a.png", tmp_path / "b.png"
+    assert runner.invoke(app, ["preview", *common, "--to", str(shown)]).exit_code == 0
+    assert runner.invoke(app, ["render", *common, "-o", str(rendered)]).exit_code == 0
+    assert (np.asarray(Image.open(shown)) == np.asarray(Image.open(rendered))).all()

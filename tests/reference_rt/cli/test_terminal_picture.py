@@ -1,0 +1,114 @@
+"""Pictures as text: decoded again, they are the pictures."""
+
+import re
+
+import numpy as np
+import pytest
+
+from reference_rt.cli.terminal_picture import half_blocks, says_sixels, sixels
+
+CELL = re.compile(r"\x1b\[38;2;(\d+);(\d+);(\d+);48;2;(\d+);(\d+);(\d+)m▀")
+
+
+def picture(rows, columns, colours=16):
+    """Random pixels of a few colours, so that a palette loses nothing."""
+    rng = np.random.default_rng(rows * 1000 + columns)
+    palette = rng.integers(0, 256, (colours, 3), dtype=np.uint8)
+    return palette[rng.integers(0, colours, (rows, columns))]
+
+
+def decoded_blocks(text):
+    """The pixels of half blocks."""
+    rows = []
+    for line in text.splitlines():
+        cells = np.array([[int(x) for x in cell] for cell in CELL.findall(line)])
+        assert CELL.sub("", line) == "\x1b[0m"
+        rows += [cells[:, :3], cells[:, 3:]]
+    return np.array(rows, np.uint8)
+
+
+def decoded_sixels(text):
+    """The picture of a sixel string, as a terminal paints it: colours in percent."""
+    body = re.fullmatch(r'\x1bPq"1;1;(\d+);(\d+)(.*)\x1b\\\n', text, re.DOTALL)
+    width, height = int(body[1]), int(body[2])
+    palette, image = {}, np.full((height + 6, width, 3), -1)
+    x = top = colour = 0
+    for token in re.finditer(r"#(\d+);2;(\d+);(\d+);(\d+)|#(\d+)|!(\d+)(.)|(\$)|(-)|(.)", body[3]):
+        if token[1]:
+            palette[int(token[1])] = [int(token[k]) for k in (2, 3, 4)]
+        elif token[5]:
+            colour = int(token[5])
+        elif token[8]:
+            x = 0
+        elif token[9]:
+            x, top = 0, top + 6
+        else:
+            count, character = (int(token[6]), token[7]) if token[6] else (1, token[10])
+            bits = ord(character) - 63
+            assert 0 <= bits < 64
+            for k in range(6):
+                if bits >> k & 1:
+                    image[top + k, x : x + count] = palette[colour]
+            x += count
+            assert x <= width
+    assert (image[height:] == -1).all()
+    return image[:height]
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(2, 3), (8, 12), (6, 1)])
+def test_half_blocks_are_the_pixels(rows, columns):
+    pixels = picture(rows, columns)
+    assert (decoded_blocks(half_blocks(pixels, 80, 24)) == pixels).all()
+
+
+def test_an_odd_last_row_is_padded_with_black():
+    pixels = picture(5, 4)
+    found = decoded_blocks(half_blocks(pixels, 80, 24))
+    assert (found[:5] == pixels).all()
+    assert (found[5] == 0).all()
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(10, 5), (4, 50), (80, 1), (1, 1)])
+def test_large_pictures_fit(columns, rows):
+    text = half_blocks(picture(90, 160), columns, rows)
+    found = decoded_blocks(text)
+    assert len(text.splitlines()) <= rows
+    assert found.shape[1] <= columns
+
+
+def test_scaling_down_keeps_the_mean():
+    pixels = picture(64, 64)
+    found = decoded_blocks(half_blocks(pixels, 16, 8))
+    expected = pixels.reshape(16, 4, 16, 4, 3).mean(axis=(1, 3))
+    assert np.abs(found - expected).max() <= 1.0  # each of two passes rounds to integers
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (6, 8), (13, 20), (31, 7)])
+def test_sixels_are_the_pixels(rows, columns):
+    pixels = picture(rows, columns)
+    found = decoded_sixels(sixels(pixels, 80, 24))
+    # The palette is in whole percent: half a percent is 1.3 of 255.
+    assert np.abs(found * 2.55 - pixels).max() <= 1.3
+
+
+def test_large_pictures_fit_as_sixels(monkeypatch):
+    monkeypatch.setattr("reference_rt.cli.terminal_picture._cell", lambda: (4, 8))
+    found = decoded_sixels(sixels(picture(300, 300), 10, 5))
+    assert found.shape[:2] == (40, 40)
+    assert (found >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("answer", "draws"),
+    [
+        (b"\x1b[?62;4;22c", True),
+        (b"\x1b[?63;1;2;4c", True),
+        (b"\x1b[?62;22c", False),
+        (b"\x1b[?4c", False),  # the first number is the model: a VT132
+        (b"\x1b[?64;14;44c", False),
+        (b"\x1b[?62;4;22", False),  # cut off
+        (b"", False),
+    ],
+)
+def test_what_the_terminal_says(answer, draws):
+    assert says_sixels(answer) is draws

@@ -1,0 +1,106 @@
+"""Every field of every description says what it means, at run time and in the JSON Schema."""
+
+import importlib
+import pkgutil
+import re
+
+import pytest
+
+import reference_rt as rt
+from reference_rt.core.field_texts import field_texts
+from reference_rt.core.model import Description
+
+MOST_WORDS = 30
+"""Words of a sentence."""
+
+
+def descriptions():
+    """All classes of descriptions, those that only others inherit from included."""
+    for module in pkgutil.walk_packages(rt.__path__, "reference_rt."):
+        if not module.name.endswith((".methods", "__main__")):
+            importlib.import_module(module.name)
+    found, waiting = [], [Description]
+    while waiting:
+        cls = waiting.pop()
+        waiting += cls.__subclasses__()
+        if cls.__module__.startswith("reference_rt."):
+            found.append(cls)
+    return sorted(set(found), key=lambda cls: cls.__qualname__)
+
+
+ALL = descriptions()
+FIELDS = [(cls, name) for cls in ALL for name in cls.__pydantic_fields__ if name != "type"]
+FIELDS += [
+    (cls, "type") for cls in ALL if "type" in cls.__annotations__ and not cls.__subclasses__()
+]
+
+
+def test_there_are_all():
+    assert len(ALL) > 60
+    assert len(FIELDS) > 200
+    used = rt.json_schema()["$defs"]
+    assert set(used) <= {cls.__name__ for cls in ALL}
+
+
+@pytest.mark.parametrize(("cls", "name"), FIELDS, ids=lambda x: getattr(x, "__name__", x))
+def test_a_field_has_a_text(cls, name):
+    text = cls.model_fields[name].description
+    assert text
+    assert text == field_texts(cls)[name]
+    assert text.rstrip().endswith(".")
+    for sentence in re.split(r"(?<=[.:;])\s", text):
+        assert len(sentence.split()) <= MOST_WORDS
+
+
+def properties(schema):
+    """(type, field, property) of everything in the JSON Schema."""
+    for name, part in {"Scene": schema, **schema["$defs"]}.items():
+        for field, found in part.get("properties", {}).items():
+            yield name, field, found
+
+
+def test_the_schema_has_the_same_texts():
+    classes = {cls.__name__: cls for cls in ALL}
+    found = list(properties(rt.json_schema()))
+    assert len(found) > 250
+    for name, field, part in found:
+        assert part.get("description") == classes[name].model_fields[field].description
+
+
+def test_every_class_says_what_it_is():
+    for cls in ALL:
+        assert cls.__doc__
+        assert cls.__doc__ != cls.__base__.__doc__
+
+
+def test_a_docstring_of_ones_own_replaces_an_inherited_one():
+    inherited = rt.RoughPlastic.model_fields["nonlinear"].description
+    assert rt.Plastic.model_fields["nonlinear"].description.startswith(inherited)
+    assert rt.Plastic.model_fields["nonlinear"].description != inherited
+    assert "`sphere`" in rt.Sphere.model_fields["type"].description
+
+
+def test_a_class_without_a_source_file_has_no_texts():
+    names = {}
+    code = "class Typed(Description):\n    x: float = 1.0\n    'Not in a file.'\n"
+    exec(code, {"Description": Description, "__name__": "typed_at_a_prompt"}, names)
+    assert field_texts(names["Typed"]) == {}
+    assert names["Typed"].model_fields["x"].description is None
+
+
+class Local(Description):
+    """Defined in a module of its own."""
+
+    x: float = 1.0
+    """Here."""
+
+
+def test_classes_of_other_modules_have_texts():
+    class Inner(Local):
+        y: float = 1.0
+        """There."""
+
+    assert {n: f.description for n, f in Inner.model_fields.items()} == {
+        "x": "Here.",
+        "y": "There.",
+    }
