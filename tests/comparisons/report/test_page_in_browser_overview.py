@@ -166,7 +166,9 @@ def test_the_slider_is_dragged_in_the_picture(show):
     page = show(case(PICTURES))
     page.keyboard.press("4")
     pixel(page, "candidate", 0, 0)
-    box = page.locator("#case-1 .reference .frame").bounding_box()
+    frame = page.locator("#case-1 .reference .frame")
+    frame.scroll_into_view_if_needed()
+    box = frame.bounding_box()
     middle = box["y"] + box["height"] / 2
     for start, end in ((0.5, 0.2), (0.9, 0.75), (0.75, 1.2)):
         page.mouse.move(box["x"] + start * box["width"], middle)
