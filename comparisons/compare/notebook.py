@@ -12,6 +12,7 @@ from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
 from comparisons.report.values import shown
 from comparisons.results.case import Case, FloatArray, Images
 from comparisons.results.headline import headline
+from comparisons.results.naming import named
 from comparisons.runs.provenance import provenance
 from comparisons.statistics.metrics import encode, nonfinite_pixels, white_level
 
@@ -35,10 +36,10 @@ class NotebookCase(Case):
     def _repr_html_(self) -> str:
         """The verdict, the pictures, and a line for each rung."""
         colour = "#a81b1b" if self.verdict in FAILED else "#1a6b35"
-        sentence = escape(headline(self))
+        sentence = escape(named(headline(self), self.sides))
         rows = "".join(
             f"<tr><td>{escape(rung.name)}</td><td>{SIGNS[rung.status]} {rung.status}</td>"
-            f'<td style="text-align:left">{escape(rung.reason)}</td></tr>'
+            f'<td style="text-align:left">{escape(named(rung.reason, self.sides))}</td></tr>'
             for rung in self.rungs
         )
         numbers = "" if self.metrics is None else self._numbers()

@@ -23,6 +23,7 @@ from comparisons.report.thumbnails import Thumbnail, Thumbnails, thumbnails
 from comparisons.report.values import shown
 from comparisons.results.case import RUNGS, Case, Metrics, Status, how_many
 from comparisons.results.headline import headline
+from comparisons.results.naming import named
 
 MOST_BYTES = 15_000_000
 """Default size limit of a page: it can still be mailed, and opens without a wait."""
@@ -143,9 +144,10 @@ def _view(case: Case, mapped: bool) -> dict[str, Any]:
     seconds = {_side(who, case): times for who, times in case.seconds.items()}
     return {
         "case": case,
+        "told": lambda text: named(text, case.sides),
         "failed": case.verdict in FAILED,
         "rank": ORDER.index(case.verdict),
-        "headline": headline(case),
+        "headline": named(headline(case), case.sides),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
         "figures": _figures(case, pictures, mapped) if pictures else [],

@@ -11,6 +11,7 @@ from comparisons.report import terminal
 from comparisons.report.ci.ranking import ranked
 from comparisons.results.case import WARNING, Case, how_many
 from comparisons.results.headline import first_difference, headline
+from comparisons.results.naming import named
 from comparisons.results.verdict import PASSING
 from comparisons.suites.worker import Request
 from reference_rt.util.console import Bar
@@ -56,7 +57,7 @@ class Display(Bar):
         line = Text.assemble(f"{case.scene}: ", (case.verdict, _STYLES[case.verdict]))
         line.append(f" ({remark})")
         if self._steps or case.verdict not in PASSING:
-            line.append(f": {headline(case)}\n  {case.reason}")
+            line.append(named(f": {headline(case)}\n  {case.reason}", case.sides))
         self._console.print(line, soft_wrap=True)
         self._bar.advance(self._task)
         self._show()
@@ -90,7 +91,7 @@ def summarise(
                 case.scene,
                 Text(case.verdict, _STYLES[case.verdict]),
                 "" if case.cause is None else case.cause.name,
-                first_difference(case),
+                named(first_difference(case), case.sides),
                 f"{walls[case.scene]:.1f}" if case.scene in walls else "",
             )
             for case in shown

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.results.case import Case, Metrics, RungResult
+from comparisons.results.case import Case, Images, Metrics, RungResult
 from comparisons.statistics.metrics import encode
 
 SIZE = 12, 8
@@ -89,3 +89,23 @@ def centre(page, x, y):
     return box["x"] + (x + 0.5) * box["width"] / SIZE[0], box["y"] + (y + 0.5) * box[
         "height"
     ] / SIZE[1]
+
+
+# A page of several cases
+
+PICTURES = Images(grey(0.25), grey(1.0), grey(0.1))
+
+
+def measured(scene, verdict, flip, seconds, images=PICTURES):
+    metrics = Metrics(0.9, flip, 30.0, 0.5, 0.25, (0.0, 0.0, -0.01), 0)
+    made = case(images, scene, verdict)
+    times = {"candidate": {"render": seconds}}
+    return type(made)(**{**vars(made), "metrics": metrics, "seconds": times})
+
+
+FOUR = (
+    measured("b", "agree", 0.001, 3.0),
+    measured("d", "differ", 0.3, 20.0),
+    measured("a", "invalid", float("nan"), 100.0),
+    measured("c", "differ", 0.02, 1.0),
+)
