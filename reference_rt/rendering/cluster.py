@@ -4,6 +4,7 @@ Needs `distributed`, and `dask-jobqueue` for a batch system (the extra `cluster`
 """
 
 import importlib
+import math
 import time
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
@@ -20,7 +21,8 @@ from reference_rt.util.errors import UsageError, WorkersError
 from reference_rt.util.files import read_text
 
 _PATIENCE = 60.0
-"""Seconds to wait for a scheduler that has gone, and for the first worker of one that is new."""
+"""Seconds to wait for a scheduler and its first worker.  A batch system may let jobs wait for days:
+for these there is no limit."""
 
 _COUNTED = 5.0
 """Seconds between two counts of the workers, which come and go."""
@@ -48,8 +50,13 @@ class Cluster:
         self._cluster = None if file is None else batch_cluster(file)
         self._distributed = _module("distributed")
         self._client: Any = None
-        self._connect()
+        self._executor: Any = None
         self._counted, self._threads = 0.0, 1
+        try:
+            self._connect()
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def slots(self) -> int:
@@ -105,7 +112,8 @@ class Cluster:
 
     def _connect(self) -> None:
         """A new client, once there is a scheduler and a worker."""
-        end = time.monotonic() + _PATIENCE
+        patience = _PATIENCE if self._cluster is None else math.inf
+        end = time.monotonic() + patience
         if self._client is not None:
             with suppress(Exception):
                 self._client.close(timeout=1)
@@ -113,7 +121,8 @@ class Cluster:
         while True:
             try:
                 client = self._distributed.Client(target, timeout=5, set_as_default=False)
-                client.wait_for_workers(1, timeout=max(1.0, end - time.monotonic()))
+                left = None if patience == math.inf else max(1.0, end - time.monotonic())
+                client.wait_for_workers(1, timeout=left)
                 break
             except (OSError, TimeoutError, ValueError) as error:
                 if isinstance(error, ValueError) or time.monotonic() > end:
@@ -137,7 +146,7 @@ def batch_cluster(file: Path) -> Any:
         raise UsageError(f"{file}: cannot be read: {reason}; expected YAML") from None
     options = dict(described) if isinstance(described, dict) else {}
     kind, jobs = options.pop("type", None), options.pop("jobs", None)
-    if kind not in _BATCH_SYSTEMS:
+    if not isinstance(kind, str) or kind not in _BATCH_SYSTEMS:
         raise UsageError(f"{file}: type: expected one of {', '.join(_BATCH_SYSTEMS)}, got '{kind}'")
     if not isinstance(jobs, int) or isinstance(jobs, bool) or jobs < 1:
         raise UsageError(f"{file}: jobs: expected the number of jobs, at least 1, got '{jobs}'")

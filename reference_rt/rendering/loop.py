@@ -54,7 +54,7 @@ class Saving(NamedTuple):
     if that fails."""
 
     after: float = math.inf
-    every: float = 5.0
+    every: float = 1.0
     needed: bool = False
 
 

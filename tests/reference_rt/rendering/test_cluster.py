@@ -1,0 +1,206 @@
+"""Renders by the workers of a Dask scheduler: the same bits, whatever dies meanwhile."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+from small_scenes import same, small
+
+import reference_rt as rt
+from reference_rt.rendering.cluster import Cluster, batch_cluster
+from reference_rt.rendering.session import Session
+from reference_rt.util.errors import UsageError, WorkersError
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours
+
+
+class Machines:
+    """A scheduler and workers, each a process, as on several machines."""
+
+    def __init__(self, folder):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.address, self.folder = f"tcp://127.0.0.1:{self.port}", folder
+        self.processes, self.workers = [], []
+        self.start_scheduler()
+
+    def _start(self, *command):
+        log = (self.folder / f"log-{len(self.processes)}").open("w")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli." + command[0], *command[1:]],
+            stdout=log, stderr=log, cwd=self.folder,
+        )  # fmt: skip
+        self.processes.append(process)
+        return process
+
+    def start_scheduler(self):
+        self.scheduler = self._start(
+            "dask_scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard"
+        )
+
+    def start_worker(self):
+        command = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--memory-limit", "0")
+        self.workers.append(self._start("dask_worker", self.address, *command))
+
+    def end(self):
+        for process in self.processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def machines(tmp_path):
+    found = Machines(tmp_path)
+    yield found
+    found.end()
+
+
+def rendered(scene, address, watch=lambda: None, size=1 << 14):
+    def workers(remote):
+        cluster = Cluster(remote, address)
+        cluster.size = size
+        return cluster
+
+    with Session(scene, workers=workers) as session:
+        session.run(lambda what, fraction: None, watch)
+        return session.picture()
+
+
+@pytest.fixture(scope="module")
+def box():
+    scene = small("cornell_box").changed(sampler=rt.Sobol(spp=200))
+    return scene.changed(film=scene.film.model_copy(update={"width": 64, "height": 64}))
+
+
+def test_workers_that_die(machines, box):
+    """Two of three, one of them replaced."""
+    for _ in range(3):
+        machines.start_worker()
+    times = []
+
+    def watch():
+        times.append(time.monotonic())
+        if len(times) in (15, 30):
+            machines.workers[len(times) // 15 - 1].send_signal(signal.SIGKILL)
+            if len(times) == 30:
+                machines.start_worker()
+
+    assert same(rendered(box, machines.address, watch), rt.render(box))
+
+
+def test_a_scheduler_that_restarts(machines, box):
+    """With its workers, as a batch system does it."""
+    machines.start_worker()
+    scene, times = box.changed(sampler=rt.Sobol(spp=2000)), []
+
+    def watch():
+        times.append(time.monotonic())
+        if len(times) == 40:
+            machines.scheduler.kill()
+            machines.scheduler.wait()
+            machines.workers[0].kill()
+            machines.start_scheduler()
+            machines.start_worker()
+
+    assert same(rendered(scene, machines.address, watch), rt.render(scene))
+    assert len(times) > 40
+
+
+def test_no_scheduler(box, monkeypatch):
+    monkeypatch.setattr("reference_rt.rendering.cluster._PATIENCE", 1.0)
+    with pytest.raises(WorkersError, match="no scheduler with a worker"):
+        rendered(box, "tcp://127.0.0.1:1")
+
+
+@pytest.mark.slow
+def test_a_worker_killed_every_five_seconds_for_a_minute(machines, box):
+    """Of four; each is replaced; the scheduler is restarted once."""
+    for _ in range(4):
+        machines.start_worker()
+    scene = box.changed(sampler=rt.Sobol(spp=40000))
+    began = last = time.monotonic()
+    killed, restarted = [], []
+
+    def watch():
+        nonlocal last
+        now = time.monotonic()
+        if now - last < 5.0 or now - began > 65.0:
+            return
+        last = now
+        alive = [worker for worker in machines.workers if worker.poll() is None]
+        if now - began > 30.0 and not restarted:
+            restarted.append(now)
+            machines.scheduler.kill()
+            machines.scheduler.wait()
+            machines.start_scheduler()
+            for worker in alive:
+                worker.kill()
+                machines.start_worker()
+        elif alive:
+            alive[0].kill()
+            killed.append(now)
+            machines.start_worker()
+
+    assert same(rendered(scene, machines.address, watch), rt.render(scene))
+    assert len(killed) >= 8
+    assert restarted
+
+
+# ---- descriptions of batch systems --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[1, 2", "cannot be read"),
+        ("jobs: 3", "type: expected one of slurm, pbs"),
+        ("{type: [slurm], jobs: 3}", "type: expected one of slurm, pbs"),
+        ("{type: slurm}", "jobs: expected the number of jobs"),
+        ("{type: slurm, jobs: 0}", "jobs: expected the number of jobs"),
+        ("{type: slurm, jobs: true}", "jobs: expected the number of jobs"),
+        ("{type: slurm, jobs: 1, colour: red}", "expected the options of dask-jobqueue"),
+    ],
+)
+def test_wrong_descriptions(text, said, tmp_path):
+    if "red" in text:
+        pytest.importorskip("dask_jobqueue")
+    file = tmp_path / "slurm.yaml"
+    file.write_text(text)
+    with pytest.raises(UsageError, match=said):
+        batch_cluster(file)
+    with pytest.raises(UsageError, match="cannot be read"):
+        batch_cluster(tmp_path / "nowhere.yaml")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell script stands for Slurm")
+def test_jobs_of_slurm(tmp_path, box, monkeypatch):
+    """`sbatch` that runs the job at once, as Slurm does when a machine is free."""
+    pytest.importorskip("dask_jobqueue")
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    log = tmp_path / "sbatch.log"
+    (tools / "sbatch").write_text(
+        f'#!/bin/sh\ncp "$1" {log}\nsetsid sh {log} > {tmp_path}/job.log 2>&1 &\n'
+        f'echo $! > {tmp_path}/pid\necho "Submitted batch job 77"\n'
+    )
+    (tools / "scancel").write_text(f"#!/bin/sh\nkill -- -$(cat {tmp_path}/pid)\n")
+    for name in ("sbatch", "scancel"):
+        (tools / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tools}:{os.environ['PATH']}")
+    file = tmp_path / "slurm.yaml"
+    file.write_text(
+        f"type: slurm\njobs: 1\ncores: 1\nprocesses: 1\nmemory: 1GB\nqueue: long\n"
+        f"walltime: '01:00:00'\ninterface: lo\npython: {sys.executable}\n"
+        f"local_directory: {tmp_path}\n"
+    )
+    with Session(box, workers=lambda remote: Cluster(remote, file=file)) as session:
+        session.run(lambda what, fraction: None)
+        assert same(session.picture(), rt.render(box))
+    assert "#SBATCH -p long" in log.read_text()
