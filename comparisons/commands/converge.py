@@ -8,6 +8,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Fresh, out_folder
+from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import SceneError, UsageError, printable
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 @guarded
 def converge(
     scenes: Annotated[
-        list[Path], typer.Argument(metavar="SCENE...", help="Scene files: .yaml or .json.")
+        list[Path], typer.Argument(metavar="SCENE...", help="Scene files: .yaml, .json or .xml.")
     ],
     out: Annotated[Path, out_folder("results.json, .csv and report.html", "DIR")] = Path(
         "out/converge"
@@ -52,6 +53,7 @@ def converge(
         bool, typer.Option(help="Time process start-up, with empty and with full kernel caches.")
     ] = True,
     fresh: Fresh = False,
+    define: Defaults = None,
 ) -> None:
     """Measure error against run time of reference_rt and of Mitsuba.
 
@@ -69,7 +71,7 @@ def converge(
         from comparisons.experiments.convergence.summary import again, lines_of
         from comparisons.results.case import INTERRUPTED
         from comparisons.runs.provenance import provenance
-        from comparisons.suites.work import folder_name, read
+        from comparisons.suites.work import Changes, folder_name, read
     from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable
 
@@ -83,7 +85,8 @@ def converge(
         starts=starts,
     )
     chosen(settings.only)
-    described = [read(path) for path in scenes]
+    changes = Changes(defaults=by_name(define))
+    described = [read(path, changes.on(path)) for path in scenes]
     names = [printable(path.stem) for path in scenes]
     if double := [name for name in names if names.count(name) > 1]:
         raise UsageError(f"two scenes have the name '{double[0]}'; expected different names")

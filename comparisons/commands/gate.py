@@ -10,6 +10,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Baselines, Fixed, GitHub, JUnit, Layer, NoiseFree, Threads
+from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.main import adjusted, guarded, say
 from reference_rt.util.errors import ReferenceRtError, UsageError, printable
 
@@ -104,6 +105,7 @@ def gate(
     junit: JUnit = None,
     github: GitHub = False,
     threads: Threads = None,
+    define: Defaults = None,
 ) -> None:
     """Compare another renderer's pictures with our rendering, a reference or a baseline.
 
@@ -138,7 +140,7 @@ def gate(
         raise UsageError("--size: only applies to --scene; expected that too")
     if scene is None and command is None and spp is not None:
         raise UsageError("--spp: only applies to --scene or --command; expected one of them")
-    described = None if scene is None else adjusted(Scene.load(scene), spp, size)
+    described = None if scene is None else adjusted(Scene.load(scene, by_name(define)), spp, size)
     run, rounds = None, Rounds()
     if command is not None:
         noiseless = noise_free or (described is not None and is_noise_free(described))

@@ -10,6 +10,7 @@ import typer
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Fresh, GitHub, JUnit, Scenes
 from comparisons.results.rungs import COMPARED
+from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.main import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -44,6 +45,7 @@ def suite(
     junit: JUnit = None,
     github: GitHub = False,
     scenes: Scenes = Path("scenes"),
+    define: Defaults = None,
 ) -> None:
     """Compare all scenes of a folder with Mitsuba.
 
@@ -56,13 +58,15 @@ def suite(
         from comparisons.suites.display import summarise
         from comparisons.suites.run import Options, Run, run_suite
         from comparisons.suites.suite import load_suite, plan
+        from comparisons.suites.work import Changes
     from reference_rt.util.files import check_writable
 
     rungs = tuple(rung or ())
     if unknown := [name for name in rungs if name not in COMPARED]:
         raise UsageError(f"--rung: expected one of {', '.join(COMPARED)}, got '{unknown[0]}'")
     source = load_suite(name)
-    planned = plan(source, scenes, tuple(only or ()), rungs)
+    changes = Changes(defaults=by_name(define))
+    planned = plan(source, scenes, tuple(only or ()), rungs, changes)
     folder = out or Path("out") / source.name
     jobs = jobs or min(os.cpu_count() or 1, MOST_JOBS)
     threads = max((os.cpu_count() or 1) // jobs, 1)

@@ -8,7 +8,7 @@ It imports nothing but pytest until it is used.
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,6 +63,7 @@ class ImageGate:
         limit: float = 0.005,
         noise_free: bool = False,
         rim: int = 0,
+        defaults: Mapping[str, str] | None = None,
     ) -> "Case":
         """Fail the test unless `candidate` agrees with the scene, the baseline or the reference.
 
@@ -73,7 +74,8 @@ class ImageGate:
         accept` wrote;  reference: pictures, like `candidate`;  variance: a file with the variance
         of a single reference;  limit: the smallest relative bias of the image mean that must be
         detectable;  noise_free: the candidates were rendered without random numbers;  rim: how many
-        of the outermost pixels are left out on each side.
+        of the outermost pixels are left out on each side;  defaults: values for the <default>
+        elements of a Mitsuba scene.
 
         Pictures that are too noisy to tell fail too.  Returns the
         `comparisons.results.case.Case`.
@@ -96,7 +98,7 @@ class ImageGate:
             folder = self._folder()
             given = _pictures(candidate, folder)
             judge = Request(
-                scene=None if scene is None else Scene.load(self._root / scene),
+                scene=None if scene is None else Scene.load(self._root / scene, defaults),
                 references=tuple(p for p, _ in _pictures(reference)),
                 variance=None if variance is None else Path(variance),
                 baseline=baseline,

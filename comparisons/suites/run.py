@@ -198,6 +198,8 @@ def _again(work: Work, source: Source, options: Options) -> str:
     command += ["--only", work.name, "--fresh", "--out", str(options.out / "again")]
     if work.path.parent != Path("scenes"):
         command += ["--scenes", str(work.path.parent)]
+    for name, value in work.changes.defaults.items():
+        command += ["-D", f"{name}={value}"]
     return shlex.join(command)
 
 

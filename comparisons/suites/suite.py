@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, field_validator
 
 from comparisons.compare.budget import Budget
-from comparisons.suites.work import Plan, Work, control_name, read
+from comparisons.suites.work import Changes, Plan, Work, control_name, read
 from reference_rt.core.model import Description, Positive
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene import yaml_text
@@ -115,16 +115,22 @@ def parse_suite(text: str, file: str) -> Suite:
 
 
 def plan(
-    source: Source, folder: Path, only: tuple[str, ...] = (), rungs: tuple[str, ...] = ()
+    source: Source,
+    folder: Path,
+    only: tuple[str, ...] = (),
+    rungs: tuple[str, ...] = (),
+    changes: Changes | None = None,
 ) -> Plan:
     """The cases of a suite for a folder of scenes, ordered by name.  Reads all the scenes.
 
     only: shell patterns, one of which the name of a case must match;  rungs: only these, empty:
-    all.  An invalid scene is a case too.  Raises SceneError if the suite names a scene that does
-    not exist, UsageError if there is nothing to run.
+    all;  changes: to the scenes, as far as they apply.  An invalid scene is a case too.  Raises
+    SceneError if the suite names a scene that does not exist, UsageError if there is nothing to
+    run.
     """
     suite = source.suite
-    scenes = _scenes(folder)
+    changes = changes or Changes()
+    scenes = _scenes(folder, changes)
     work: list[Work] = []
     skipped: dict[str, str] = {}
     for part, control in ((suite, False), (suite.controls, True)):
@@ -142,7 +148,7 @@ def plan(
                 skipped[case] = entry.skip
                 continue
             budget = entry.over(part.defaults).model_copy(update={"control": control})
-            work.append(Work(case, path, scene, budget))
+            work.append(Work(case, path, scene, budget, changes.on(path)))
     if not work:
         raise UsageError(
             f"nothing to run: no case matches {', '.join(only)}" if only else "nothing to run"
@@ -150,7 +156,7 @@ def plan(
     return Plan(tuple(sorted(work, key=lambda w: w.name)), skipped)
 
 
-def _scenes(folder: Path) -> _Scenes:
+def _scenes(folder: Path, changes: Changes) -> _Scenes:
     """The scenes of a folder by case name.  Budgets name scenes without the file's suffix;
     therefore of two files with the same name only the first is valid."""
     if not folder.is_dir():
@@ -162,7 +168,7 @@ def _scenes(folder: Path) -> _Scenes:
             reason = f"has the same name as {found[name][0].name}; expected a unique name"
             found[path.name] = path, SceneError(reason, file=str(path))
         else:
-            found[name] = path, read(path)
+            found[name] = path, read(path, changes.on(path))
     if not found:
         raise UsageError(
             f"--scenes: '{folder}' holds no scene; expected .yaml, .json or .xml files"

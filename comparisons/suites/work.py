@@ -4,7 +4,7 @@ import re
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -23,6 +23,12 @@ class Changes(BaseModel):
     size: str | None = None
     seed: int | None = None
     defaults: dict[str, str] = Field(default_factory=dict)
+
+    def on(self, path: Path) -> Self:
+        """The changes that apply to a file: only Mitsuba's have defaults."""
+        if path.suffix.lower() == ".xml":
+            return self
+        return self.model_copy(update={"defaults": {}})
 
     def load(self, path: Path) -> Scene:
         """The scene in the file at `path`, changed.  Raises SceneError, UsageError."""

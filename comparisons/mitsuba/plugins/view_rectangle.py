@@ -23,11 +23,11 @@ def register(mi: Any) -> None:
             m = np.array(properties["to_world"].matrix, np.float64)
             across, up, forward, eye = -m[:3, 0], m[:3, 1], m[:3, 2], m[:3, 3]
             l, r, b, t = (properties[name] for name in ("left", "right", "bottom", "top"))
-            self.eye = mi.Point3f(*eye.tolist())
-            self.corner = mi.Vector3f(*(forward + l * across + t * up).tolist())
-            self.along = mi.Vector3f(*((r - l) * across).tolist())
-            self.down = mi.Vector3f(*((b - t) * up).tolist())
-            self.across, self.up = mi.Vector3f(*across.tolist()), mi.Vector3f(*up.tolist())
+            # Plain numbers: an array that is kept would be of the size of the first rays.
+            self.eye = eye.tolist()
+            self.corner = (forward + l * across + t * up).tolist()
+            self.along, self.down = ((r - l) * across).tolist(), ((b - t) * up).tolist()
+            self.across, self.up = across.tolist(), up.tolist()
             self.radius = properties.get("aperture_radius", 0.0)
             self.focus = properties.get("focus_distance", 1.0)
 
@@ -40,11 +40,13 @@ def register(mi: Any) -> None:
             active: Any = True,
         ) -> tuple[Any, Any]:
             """A ray through a point of the film, from (0, 0), the upper left corner, to (1, 1)."""
-            d = self.corner + self.along * position_sample.x + self.down * position_sample.y
-            o = self.eye
+            d = mi.Vector3f(self.corner) + mi.Vector3f(self.along) * position_sample.x
+            d += mi.Vector3f(self.down) * position_sample.y
+            o = mi.Point3f(self.eye)
             if self.radius > 0.0:
                 lens = self.radius * mi.warp.square_to_uniform_disk_concentric(aperture_sample)
-                shift = self.up * lens.y - self.across * lens.x  # x is to the left
+                # Their x is to the left.
+                shift = mi.Vector3f(self.up) * lens.y - mi.Vector3f(self.across) * lens.x
                 o, d = o + shift, d * self.focus - shift
             ray = mi.Ray3f(o, normalized(d), time, mi.Color0f())
             return ray, mi.Color3f(1.0)
@@ -65,8 +67,7 @@ def register(mi: Any) -> None:
 
         def bbox(self) -> Any:
             """Of the eye."""
-            eye = mi.ScalarPoint3f(*np.array(self.eye).ravel().tolist())
-            return mi.ScalarBoundingBox3f(eye)
+            return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(self.eye))
 
         def to_string(self) -> str:
             return "ViewRectangle[]"

@@ -11,6 +11,7 @@ from comparisons.results.stored_case import read_case
 from comparisons.results.verdict import exit_code
 from comparisons.suites.keys import case_key, files_digest
 from comparisons.suites.suite import BUILT_IN, load_suite, parse_suite, plan
+from comparisons.suites.work import Changes
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, UsageError
 
@@ -122,6 +123,24 @@ def test_only_those_that_fit_a_pattern(tmp_path, patterns, expected):
     scenes(scenes(tmp_path, "aa", "ab"), "b", text=NOISY)
     planned = plan(suite("about: x\ncontrols: {}\n"), tmp_path, patterns)
     assert [work.name for work in planned.work] == expected
+
+
+MITSUBA = """<scene version="3.0.0"><default name="spp" value="4"/><integrator type="path"/>
+<sensor type="perspective"><sampler type="independent">
+<integer name="sample_count" value="$spp"/></sampler></sensor><shape type="sphere"/></scene>"""
+
+
+def test_defaults_are_for_scenes_of_mitsuba(tmp_path):
+    folder = scenes(tmp_path, "a", text=NOISY)
+    (tmp_path / "b.xml").write_text(MITSUBA)
+    changes = Changes(defaults={"spp": "9"})
+    planned = plan(suite("about: x\n"), folder, changes=changes)
+    ours, theirs = planned.work
+    assert isinstance(ours.scene, Scene)
+    assert ours.changes.defaults == {}
+    assert theirs.scene.resolved_sampler.spp == 9
+    assert theirs.changes.load(theirs.path).resolved_sampler.spp == 9
+    assert plan(suite("about: x\n"), folder).work[1].scene.resolved_sampler.spp == 4
 
 
 def test_nothing_to_run_is_no_success(tmp_path):

@@ -14,6 +14,7 @@ import numpy as np
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes.meshes.files.data import RawMesh, fans, linear
+from reference_rt.shapes.meshes.files.obj_regular import Regular, numbered, parse
 
 Triple = tuple[int, int, int]
 
@@ -66,6 +67,42 @@ def read(content: bytes) -> RawMesh:
     An index may only refer to lines before it.  Normals and uv that not all corners have, and
     colours that not all vertices have, are ignored.
     """
+    found = parse(content)
+    return read_lines(content) if found is None else _of_regular(found)
+
+
+def _of_regular(found: Regular) -> RawMesh:
+    """The mesh of a regular file."""
+    others: dict[str, None] = {}
+    for line in found.rest:
+        words = line.partition(b"#")[0].split()
+        kind = words[0] if words else b""
+        if kind == b"s":
+            if words[1:] not in ([b"off"], [b"0"]):
+                others["s (smoothing groups)"] = None
+        elif kind not in _NAMES_ONLY:
+            others[_keyword(kind)] = None
+    first, vertex = numbered(found.corners)
+    v, vt, vn = found.corners[first].T
+    has_normals, has_uv = len(found.normals) > 0, len(found.uv) > 0
+    if has_normals and (vn >= 0).all():
+        others.pop("s (smoothing groups)", None)
+    if has_normals and not (vn >= 0).all():
+        others["vn of some corners"] = None
+    if has_uv and not (vt >= 0).all():
+        others["vt of some corners"] = None
+    return RawMesh(
+        found.positions[v],
+        fans(vertex, found.counts),
+        found.normals[vn] if has_normals and (vn >= 0).all() else None,
+        found.uv[vt] if has_uv and (vt >= 0).all() else None,
+        None,
+        tuple(others),
+    )
+
+
+def read_lines(content: bytes) -> RawMesh:
+    """The same, line by line: any file.  Raises ValueError with the line."""
     vertex_of = _Corners()
     rows = vertex_of.rows
     colours, corners, counts = array("d"), array("q"), array("q")
