@@ -253,10 +253,12 @@ def _link(targets: list[str]) -> str:
 
 
 def _array(value: Mapping[str, Any], targets: list[str]) -> str:
-    items = value.get("items", {})
+    items = value.get("items") or value.get("prefixItems", [{}])[0]
     least, most = value.get("minItems"), value.get("maxItems")
     if targets:
         return f"a list of {_link(targets)}"
+    if items.get("type") == "array" and least == most and most is not None:
+        return f"{most} rows of {_array(items, [])}"
     if items.get("type") == "array":
         return f"a list of {_array(items, [])}"
     if "enum" in items:

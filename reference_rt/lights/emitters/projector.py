@@ -27,16 +27,19 @@ class Projector(Description):
 
     type: Literal["projector"] = "projector"
     origin: Vector
+    """Where it is: [x, y, z] in world coordinates, in scene units."""
     target: Vector
+    """A point on the axis: [x, y, z] in world coordinates, not the origin."""
     up: Direction = (0.0, 1.0, 0.0)
-    """Up in the image."""
+    """Up in the image: [x, y, z] in world coordinates, not along the axis."""
     irradiance: ColourParameter
-    """On a plane across the axis at distance 1, W m^-2, linear sRGB; or the name of a texture, its
-    (u, v) from (0, 0) at the lower left corner of the image, seen from the light, to (1, 1)."""
+    """Irradiance of a plane across the axis at distance 1: W m^-2, linear sRGB, or a texture.  Its
+    (u, v) is (0, 0) at the lower left corner of the image, seen from the light, and (1, 1) at the
+    opposite one."""
     scale: Positive = 1.0
-    """A factor on the irradiance."""
+    """A factor of the irradiance."""
     fov: Annotated[float, Field(gt=0, lt=180)] = 45.0
-    """Degrees across the image's width."""
+    """Angle in degrees across the image's width, above 0 and below 180."""
     aspect: Positive = 1.0
     """The image's width over its height."""
 

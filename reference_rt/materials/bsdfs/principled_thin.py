@@ -57,29 +57,30 @@ _SHEEN = 0.1
 
 
 class PrincipledThin(Material):
-    """Numbers from 0 to 1, or textures of them, but for `eta` and `diff_trans`."""
+    """The principled material of thin sheets, such as leaves and panes; the same on both sides."""
 
     smooth: ClassVar[bool] = True
     type: Literal["principled_thin"] = "principled_thin"
     base_colour: ReflectanceParameter = (0.5, 0.5, 0.5)
+    """Colour of the diffuse lobes: linear sRGB from 0 to 1, or a texture."""
     roughness: UnitParameter = 0.5
-    """The root of the microfacets' alpha, which counts as 0.001 where it is below."""
+    """Square root of the GGX roughness alpha, from 0 to 1; alpha is at least 0.001."""
     anisotropic: UnitParameter = 0.0
-    """How much longer the highlight is across than along u."""
+    """How far the highlight is stretched along the direction of u, from 0 to 1."""
     spec_trans: UnitParameter = 0.0
-    """Of the way from a diffuse sheet to a pane."""
+    """Blends from a diffuse sheet (0) to a pane (1)."""
     eta: Positive = 1.5
     """Index of refraction of the pane over that of its surroundings."""
     spec_tint: UnitParameter = 0.0
-    """How much a pane's highlight has of the base colour."""
+    """How far the base colour tints the pane's highlight, from 0 to 1."""
     sheen: UnitParameter = 0.0
-    """Of cloth, at grazing angles."""
+    """Strength of a lobe at grazing angles, as of cloth, from 0 to 1."""
     sheen_tint: UnitParameter = 0.0
-    """How much of the base colour it has."""
+    """How far the base colour tints the sheen, from 0 to 1."""
     flatness: UnitParameter = 0.0
-    """Of the way to the approximation of light that scatters below the surface."""
+    """Blends the diffuse lobe towards an approximation of subsurface scattering, from 0 to 1."""
     diff_trans: DoubleUnitParameter = 0.0
-    """How much of the diffuse light passes, from 0, none, over 1, half of it, to 2, all."""
+    """The diffuse light that passes, from 0 (none) over 1 (half of it) to 2 (all)."""
 
     @property
     def colour(self) -> tuple[float, float, float] | str:
