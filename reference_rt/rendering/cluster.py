@@ -24,6 +24,10 @@ _PATIENCE = 60.0
 """Seconds to wait for a scheduler and its first worker.  A batch system may let jobs wait for days:
 for these there is no limit."""
 
+_WORKERS_OF_SIZE, _LARGEST = 32, SIZE << 4
+"""Threads of workers that units of SIZE keep busy, while client and scheduler take 5 to 10 ms for
+each (measured); samples of the largest units, of ten seconds."""
+
 _COUNTED = 5.0
 """Seconds between two counts of the workers, which come and go."""
 
@@ -40,8 +44,6 @@ _BATCH_SYSTEMS = {
 
 class Cluster:
     """An `executor.Executor`: the workers of a Dask scheduler, of any number of threads each."""
-
-    size = SIZE
 
     def __init__(self, scene: RemoteScene, scheduler: str = "", file: Path | None = None) -> None:
         """scheduler: its address, such as tcp://host:8786;  file: in its place, a description of a
@@ -66,6 +68,18 @@ class Cluster:
             with suppress(Exception):  # the scheduler may be gone for a moment
                 self._threads = max(1, sum(self._client.nthreads().values()))
         return 2 * self._threads + 2
+
+    @property
+    def size(self) -> int:
+        """Larger for more workers: client and scheduler take milliseconds for each unit."""
+        size = SIZE
+        while size * _WORKERS_OF_SIZE < SIZE * self.slots // 2 and size < _LARGEST:
+            size *= 2
+        return size
+
+    @property
+    def samples_of_pass(self) -> int:
+        return 2 * self.slots * self.size
 
     def submit(self, unit: Unit, sums: Sums) -> "Future[Done]":
         given = sums if unit.first else None

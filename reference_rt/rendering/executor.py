@@ -16,13 +16,17 @@ from reference_rt.rendering.units import Unit
 
 
 class Executor(Protocol):
-    """size: samples of a unit that it likes best;  slots: units that keep it busy."""
+    """size: samples of a unit that it likes best;  slots: units that keep it busy;
+    samples_of_pass: samples of all pixels with which a pass keeps it busy."""
 
     @property
     def size(self) -> int: ...
 
     @property
     def slots(self) -> int: ...
+
+    @property
+    def samples_of_pass(self) -> int: ...
 
     def submit(self, unit: Unit, sums: Sums) -> "Future[Done]":
         """Add the samples of a unit to the sums of its pixels, sooner or later."""
@@ -46,6 +50,8 @@ _AHEAD = 16
 
 class Threads:
     """An `Executor`: the threads of this process."""
+
+    samples_of_pass = 0  # passes of 16 samples are shown sooner
 
     def __init__(self, prepared: Prepared, threads: int, chunk: int) -> None:
         """chunk: see `units`."""

@@ -85,10 +85,17 @@ class Loop:
         saving: Saving = NEVER,
         at_once: bool = False,
     ) -> None:
-        """at_once: see `units.plan`."""
+        """at_once: whether nobody sees the picture before it is done: it has as few passes as may
+        be.  Otherwise passes have work for all slots, except with a limit to the error: what is
+        checked after each pass must not depend on the number of workers."""
         self._frame, self._executor, self._limits, self._saving = frame, executor, limits, saving
         self._spp = spp
-        self._units = plan(frame.done, frame.pixels, spp, executor.size, at_once)
+        least = 1
+        if at_once:
+            least = spp
+        elif limits.error == 0.0:
+            least = min(spp, executor.samples_of_pass // frame.pixels)
+        self._units = plan(frame.done, frame.pixels, spp, executor.size, least)
         self._planned: Unit | None = None
         self._todo: deque[Unit] = deque()
         self._pass = 0

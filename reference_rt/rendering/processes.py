@@ -27,6 +27,7 @@ class Processes:
     def __init__(self, scene: RemoteScene, workers: int) -> None:
         self._scene, self._workers, self._deaths = scene, workers, 0
         self.slots = 2 * workers + 1
+        self.samples_of_pass = 2 * self.slots * SIZE
         self._pool = self._start()
 
     def submit(self, unit: Unit, sums: Sums) -> "Future[Done]":

@@ -68,7 +68,7 @@ class Session:
         """threads, tables, compiling, specialised: see `render.render`;  limits: what ends it
         early;  memory: bytes that this process may take; None: as much as it needs, with all
         pixels in memory;  workers: what computes it, other than this process;  at_once: see
-        `units.plan`.  Raises SceneError, UsageError, WorkersError."""
+        `Loop`.  Raises SceneError, UsageError, WorkersError."""
         _check(scene, memory)
         threads = threads or os.cpu_count() or 1
         prepared: Prepared | None = None

@@ -55,32 +55,31 @@ def chunk_of(pixels: int) -> int:
     return chunk
 
 
-def passes(spp: int, chunk: int) -> Iterator[int]:
+def passes(spp: int, chunk: int, least: int = _FIRST) -> Iterator[int]:
     """Samples per pixel after each pass, up to spp.
 
     A pass adds a quarter of the samples so far: pixels that a limit stops within a pass have nearly
-    the same noise, and there are few passes.  All end at a multiple of 16 samples, except the last.
+    the same noise, and there are few passes.  It adds at least `least`.  All end at a multiple of
+    16 samples, except the last.
     """
     done = 0
+    least = max(_FIRST, -(-least // _FIRST) * _FIRST)
     most = max(_FIRST, _MOST_SAMPLES // chunk)
     while done < spp:
-        done = min(spp, done + min(most, max(_FIRST, done // 4 // _FIRST * _FIRST)))
+        done = min(spp, done + min(most, max(least, done // 4 // _FIRST * _FIRST)))
         yield done
 
 
-def plan(done: IntArray, pixels: int, spp: int, size: int, at_once: bool = False) -> Iterator[Unit]:
+def plan(done: IntArray, pixels: int, spp: int, size: int, least: int = _FIRST) -> Iterator[Unit]:
     """The units that are left of a picture, pass by pass, along the pixels.
 
     done: samples of each chunk so far;  size: samples of a unit, as far as passes and chunks allow;
-    at_once: whether a pass has as many samples as it may: for a picture that nobody sees before it
-    is done.
+    least: see `passes`.
     """
     chunk = chunk_of(pixels)
     planned = done.copy()
-    most = max(_FIRST, _MOST_SAMPLES // chunk)
-    ends = range(most, spp + most, most) if at_once else passes(spp, chunk)
-    for end in ends:
-        yield from _pass(planned, pixels, min(end, spp), size, chunk)
+    for end in passes(spp, chunk, least):
+        yield from _pass(planned, pixels, end, size, chunk)
 
 
 def _pass(planned: IntArray, pixels: int, last: int, size: int, chunk: int) -> Iterator[Unit]:

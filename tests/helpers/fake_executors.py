@@ -38,6 +38,8 @@ class Fake:
     for good.
     """
 
+    samples_of_pass = 0
+
     def __init__(self, pixels, size=4096, slots=6, late=0.0, lost=0.0, broken=None, seed=1):
         self.size, self.slots, self.chunk = size, slots, chunk_of(pixels)
         self.late, self.lost, self.broken = late, lost, broken

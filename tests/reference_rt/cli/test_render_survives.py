@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 from builders import SCENES
@@ -42,12 +41,14 @@ def start(*arguments):
 
 
 def killed(times, tmp_path, arguments, most):
-    """Kill a render so often, at random moments, and return the fractions that it began with."""
+    """Kill a render so often, after up to `most` tenths of a second of rendering, and return the
+    fractions that it began with."""
     choose, begun = random.Random(24), []
     for _ in range(times):
         process, fraction = start(*arguments)
         begun.append(fraction)
-        time.sleep(choose.uniform(0.0, most))
+        for _ in range(choose.randrange(most)):
+            process.stdout.readline()
         process.kill()
         process.communicate(timeout=240)
     return begun
@@ -68,12 +69,12 @@ def check_killed(times, size, most, tmp_path):
 
 
 def test_killed_at_three_moments(tmp_path):
-    check_killed(3, "160x160", 4.0, tmp_path)
+    check_killed(3, "256x256", 40, tmp_path)
 
 
 @pytest.mark.slow
 def test_killed_at_fifty_moments(tmp_path):
-    check_killed(50, "512x512", 2.5, tmp_path)
+    check_killed(50, "512x512", 25, tmp_path)
 
 
 def test_interrupted_and_resumed(tmp_path):
@@ -118,7 +119,7 @@ def test_limits_and_previews(tmp_path):
     assert done.exit_code == 0
     assert re.search(r"; target error reached: \d+ of 100000 .*; relative error \d", done.stderr)
     options = ("--size", "32x32", "--spp", 10**7)
-    done = run("render", BOX, "-o", out, *options, "--time-limit", "2s", "--preview", preview)
+    done = run("render", BOX, "-o", out, *options, "--time-limit", "5s", "--preview", preview)
     assert done.exit_code == 0
     assert re.search(r"; time limit reached: .* of 10000000 samples per pixel", done.stderr)
     assert preview.read_bytes().startswith(b"\x89PNG")

@@ -62,11 +62,15 @@ def machines(tmp_path):
     found.end()
 
 
-def rendered(scene, address, watch=lambda: None, size=1 << 14):
+class Small(Cluster):
+    """Units so small that there are many."""
+
+    size = 1 << 14
+
+
+def rendered(scene, address, watch=lambda: None):
     def workers(remote):
-        cluster = Cluster(remote, address)
-        cluster.size = size
-        return cluster
+        return Small(remote, address)
 
     with Session(scene, workers=workers) as session:
         session.run(lambda what, fraction: None, watch)

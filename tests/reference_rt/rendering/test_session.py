@@ -116,7 +116,7 @@ def test_damaged_files_are_computed_again(box, whole, tmp_path):
 
 
 def test_a_partial_picture_says_so(box, tmp_path):
-    with Session(box.changed(sampler=rt.Sobol(spp=10**6)), limits=Limits(seconds=1.0)) as session:
+    with Session(box.changed(sampler=rt.Sobol(spp=10**6)), limits=Limits(seconds=4.0)) as session:
         session.run(silent)
         session.save(tmp_path / "out.exr")
         taken = session.taken

@@ -28,13 +28,13 @@ def carried_out(done, units, chunk):
     spp=st.integers(1, 200),
     size=st.integers(1, 1 << 22),
     seed=st.integers(0, 99),
-    at_once=st.booleans(),
+    least=st.integers(0, 100),
 )
-def test_every_sample_once(pixels, spp, size, seed, at_once):
+def test_every_sample_once(pixels, spp, size, seed, least):
     chunk = chunk_of(pixels)
     rng = np.random.default_rng(seed)
     done = rng.choice([0, 0, 0, 16, 37, spp], -(-pixels // chunk)).clip(0, spp)
-    units = list(plan(done, pixels, spp, size, at_once))
+    units = list(plan(done, pixels, spp, size, least))
     assert (carried_out(done, units, chunk) == spp).all()
     for unit in units:
         assert unit.end <= pixels
