@@ -103,6 +103,7 @@ def slopes_of(
     queries: list[tuple[Rays, tuple[float, float]]] = []
     if is_steep(context.scene):
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
+        radius = radius + _slip(context, hits)
         queries += [(other, u) for other in moved(rays, radius)]
     if _has_image(context, light):
         for step in (-U_STEP, U_STEP):
@@ -122,6 +123,14 @@ def _has_image(context: LightContext, light: int) -> bool:
         return any(isinstance(described, EnvironmentMap) for described in scene.lights)
     emissive = (m for m in scene.materials.values() if isinstance(m, Emissive))
     return kind == AREA and any(isinstance(m.radiance, str) for m in emissive)
+
+
+def _slip(context: LightContext, hits: Intersections) -> FloatArray:
+    """(n,): how far textures are shifted on meshes that stand in for the shapes that are hit."""
+    slip = np.zeros(len(context.scene.shapes) + 1)
+    for shape, found in context.counterpart.stand_ins().items():
+        slip[shape] = max(s.slip for s in found)
+    return np.asarray(slip[hits.shape])
 
 
 def stand_ins(context: LightContext, hits: Intersections) -> tuple[FloatArray, FloatArray]:
