@@ -1,7 +1,7 @@
 """`reference-rt convert`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -18,10 +18,16 @@ def convert(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="A .yaml, .json or (for Mitsuba) .xml file.")
     ],
+    to: Annotated[
+        Literal["scene", "json"],
+        typer.Option(
+            help="scene: by the file's suffix; json: everything resolved, shapes as triangles."
+        ),
+    ] = "scene",
     define: Defaults = None,
 ) -> None:
-    """Write a scene in our format, or as a Mitsuba scene (.xml), with its meshes and images in a
-    folder beside it.
+    """Write a scene in our format, as a Mitsuba scene (.xml), or as data for other renderers
+    (--to json), with its meshes and images in a folder beside it.
 
     Scenes in our format render without Mitsuba.
     """
@@ -29,11 +35,12 @@ def convert(
         from comparisons.mitsuba.reading.write import check_name, write_scene
         from comparisons.mitsuba.writing import write_xml
         from comparisons.mitsuba.writing.files import folder_of
+        from comparisons.mitsuba.writing.resolved import write_resolved
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 
-    is_mitsuba = output.suffix.lower() == ".xml"
-    if not is_mitsuba:
+    is_mitsuba = output.suffix.lower() == ".xml" and to == "scene"
+    if to == "scene" and not is_mitsuba:
         check_name(output)
     check_writable(output)
     found = Scene.load(scene, by_name(define))
@@ -41,6 +48,8 @@ def convert(
         count, notes = write_xml(found, output)
         for note in notes:
             say(f"note: {note}", err=True)
+    elif to == "json":
+        count = write_resolved(found, output)
     else:
         count = write_scene(found, output)
     files = f", and {count} files in {folder_of(output)}" if count else ""

@@ -104,7 +104,8 @@ class Counterpart:
         for mi_shape in self.all_mi_shapes():
             if mi_shape.plugin.stand_in is not None:
                 one = mi_shape.plugin.stand_in
-                one = one._replace(sag=one.sag / self.frame.scale)
+                scale = self.frame.scale
+                one = one._replace(sag=one.sag / scale, slip=one.slip / scale)
                 found.setdefault(mi_shape.shape, []).append(one)
         return found
 

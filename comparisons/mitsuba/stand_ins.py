@@ -17,7 +17,8 @@ class StandIn(NamedTuple):
 
     name: of the shape;  triangles: their number;  sag: the largest distance between mesh and
     surface, in scene units;  turn: the largest angle between their normals, in radians;  ratio: the
-    sag of a mesh with half as many triangles along each side, over this one's.
+    sag of a mesh with half as many triangles along each side, over this one's;  slip: the largest
+    distance, in scene units, by which a texture is shifted, as uv are interpolated.
     """
 
     name: str
@@ -25,6 +26,7 @@ class StandIn(NamedTuple):
     sag: float
     turn: float
     ratio: float
+    slip: float = 0.0
 
 
 class Extent(NamedTuple):

@@ -14,6 +14,7 @@ from comparisons.mitsuba.plugins import (
     exact_coat,
     mixtures,
     phong,
+    textured_area,
     view_rectangle,
     whitted,
 )
@@ -21,5 +22,9 @@ from comparisons.mitsuba.plugins import (
 
 def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
-    for plugin in (exact_beckmann, exact_coat, mixtures, phong, view_rectangle, whitted):
+    plugins = (
+        *(exact_beckmann, exact_coat, mixtures, phong),
+        *(textured_area, view_rectangle, whitted),
+    )
+    for plugin in plugins:
         plugin.register(mi)

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.integrators import read_integrator
-from comparisons.mitsuba.reading.lights import read_light
+from comparisons.mitsuba.reading.lights import belongs_to_shape, read_light
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed, parse_dict, parse_file
 from comparisons.mitsuba.reading.sensors import read_sensor
@@ -64,7 +64,7 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
             raise node.unsupported("expected a scene without media")
         if node.kind == "Shape":
             read_shape(reading, node)
-        elif node.kind == "Emitter" and node.plugin != "area":  # which belongs to a shape
+        elif node.kind == "Emitter" and not belongs_to_shape(node):
             read_light(reading, node)
     integrators = [node for node in found if node.kind == "Integrator"]
     if len(integrators) > 1:

@@ -31,9 +31,14 @@ TOLERANCE = 1e-5
 """Of a rotation, relative."""
 
 
+def belongs_to_shape(node: Node) -> bool:
+    """Whether an emitter is a lamp's; the second plugin is ours."""
+    return node.plugin in ("area", "textured_area")
+
+
 def emission(reading: Reading, node: Node) -> Rgb | str:
     """The radiance of a shape's emitter.  Raises SceneError for all but `area`."""
-    if node.plugin != "area":
+    if not belongs_to_shape(node):
         raise node.unsupported("expected 'area', as the emitter of a shape")
     node.ignore("sampling_weight")  # which lights are sampled does not change the picture
     radiance = colour_or_texture(reading, node, "radiance", 1.0, "emission")

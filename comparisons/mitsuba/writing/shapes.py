@@ -16,7 +16,7 @@ from comparisons.mitsuba.translate.shapes import Site, translate_shape
 from comparisons.mitsuba.translate.wrappers import is_textured
 from comparisons.mitsuba.writing.element import Element, Reference, Rgb, Vector, matrix_step
 from comparisons.mitsuba.writing.files import ATTRIBUTE, ply
-from comparisons.mitsuba.writing.surfaces import Surfaces
+from comparisons.mitsuba.writing.surfaces import OURS, Surfaces
 from comparisons.mitsuba.writing.views import transform_steps
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
@@ -114,7 +114,11 @@ class Shapes:
             radiance = Rgb(*found["value"]) if is_plain else self.surfaces.shared(found)
         else:
             radiance = Rgb(*material.radiance)
-        element.children.append(Element("emitter", "area", {"radiance": radiance}))
+        plugin = "area"
+        if element.plugin == "ply" and isinstance(radiance, Reference):
+            plugin = "textured_area"  # Mitsuba's own would sample it by uv
+            self.surfaces.note(OURS.format("emitter", plugin))
+        element.children.append(Element("emitter", plugin, {"radiance": radiance}))
         return element
 
     def _mesh(self, shape: Mesh, values: dict[str, Any]) -> Element:

@@ -108,7 +108,8 @@ def slopes_of(
     if is_steep(context.scene):
         sag, of_normal = stand_ins(context, hits)
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
-        queries += [(other, u) for other in moved(rays, radius + sag)]
+        apart = sag + _slip(context, hits)
+        queries += [(other, u) for other in moved(rays, radius + apart)]
         if of_normal.any():
             queries += [(other, u) for other in turned(rays, hits.p, 2.0 * of_normal)]
     if _has_image(context, light):
@@ -129,6 +130,14 @@ def _has_image(context: LightContext, light: int) -> bool:
         return any(isinstance(described, EnvironmentMap) for described in scene.lights)
     emissive = (m for m in scene.materials.values() if isinstance(m, Emissive))
     return kind == AREA and any(isinstance(m.radiance, str) for m in emissive)
+
+
+def _slip(context: LightContext, hits: Intersections) -> FloatArray:
+    """(n,): how far textures are shifted on meshes that stand in for the shapes that are hit."""
+    slip = np.zeros(len(context.scene.shapes) + 1)
+    for shape, found in context.counterpart.stand_ins().items():
+        slip[shape] = max(s.slip for s in found)
+    return np.asarray(slip[hits.shape])
 
 
 def stand_ins(context: LightContext, hits: Intersections) -> tuple[FloatArray, FloatArray]:

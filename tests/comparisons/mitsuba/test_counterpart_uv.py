@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from builders import SCENES
 
 from comparisons.mitsuba.scene import first_hits
 from comparisons.mitsuba.translate import load
+from comparisons.rungs import direct
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 
@@ -55,3 +57,15 @@ def test_uv_are_ours(name: str, placed: str) -> None:
     off[:, 0] = np.minimum(off[:, 0], np.abs(1.0 - off[:, 0]))
     assert np.quantile(off, 0.99) < 2e-4
     assert (off > 2e-3).any(axis=1).mean() < 0.005
+
+
+def test_light_on_them_is_compared() -> None:
+    """A bitmap on each: within float32's bound, and how far uv are off between vertices."""
+    scene = Scene.load(SCENES / "textured_curves.yaml")
+    scene = scene.changed(film=scene.film.model_copy(update={"width": 32, "height": 24}))
+    counterpart = load(scene)
+    slips = [s.slip for found in counterpart.stand_ins().values() for s in found]
+    assert len(slips) == 7
+    assert 0.0 < max(slips) < 1e-4
+    rung = direct(scene, scene.tables, counterpart, 2000)
+    assert rung.status == "agree", rung.reason

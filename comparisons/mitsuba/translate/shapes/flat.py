@@ -56,7 +56,17 @@ def _web(rings: int) -> IntArray:
 
 @translate_shape.register
 def _(shape: Polygon, site: Site) -> list[Plugin]:
-    """The fill rule is applied by independent code, Clipper2 in manifold3d."""
+    soup = polygon_soup(shape)
+    m = transform.compose(transform.affine(shape.transform), site.place.outer)
+    placed = soup.moved(m, transform.flips_orientation(m))
+    heights = heights_of(placed.positions[placed.faces])
+    mesh = placed.mesh(site.parts)
+    return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv, heights=heights)]
+
+
+def polygon_soup(shape: Polygon) -> Soup:
+    """The polygon in its own coordinates: the fill rule is applied by independent code, Clipper2 in
+    manifold3d."""
     points = np.array([p for ring in shape.rings for p in ring])
     middle = points.mean(axis=0)
     # The normal is the direction in which the points spread least.
@@ -72,12 +82,7 @@ def _(shape: Polygon, site: Site) -> list[Plugin]:
     positions = np.empty((len(filled), 3))
     positions[:, kept] = flat
     positions[:, axis] = middle[axis] - (flat - middle[kept]) @ n[kept] / n[axis]
-    soup = Soup(positions, uvs=filled, faces=faces)
-    m = transform.compose(transform.affine(shape.transform), site.place.outer)
-    placed = soup.moved(m, transform.flips_orientation(m))
-    heights = heights_of(placed.positions[placed.faces])
-    mesh = placed.mesh(site.parts)
-    return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv, heights=heights)]
+    return Soup(positions, uvs=filled, faces=faces)
 
 
 DIGITS = 2.0**20

@@ -112,13 +112,29 @@ def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
     if "emitter" in site.parts and soup.normals is not None:
         # The shining side follows the geometric normal in ours, the shading normal in Mitsuba.
         raise UntranslatableError("Mesh that shines and has vertex normals", "shape")
-    if "emitter" in site.parts and site.coloured["emitter"]["radiance"]["type"] != "rgb":
-        # Mitsuba samples textured lights by uv, which a mesh may use twice or never (measured with
-        # all vertices at one uv: two thirds of the light were lost).
-        raise UntranslatableError("Mesh that shines by a texture", "shape")
+    if "emitter" in site.parts:
+        site = _with_exact_light(site)
     key = ("mesh", id(shape))
     plugin = placed(soup, key, site.place.outer, site.mirrored, site)
     return [plugin._replace(uv=same_uv, faces=soup.numbers)]
+
+
+def _with_exact_light(site: Site) -> Site:
+    """The site with our plugin `comparisons.mitsuba.plugins.textured_area` for a textured lamp.
+
+    Mitsuba samples textured lights by uv, which a mesh may use twice or never (measured with all
+    vertices at one uv: two thirds of the light were lost).  Raises UntranslatableError.
+    """
+    kind = site.coloured["emitter"]["radiance"]["type"]
+    if kind == "rgb":
+        return site
+    if kind == "mesh_attribute":  # which depends on the triangle, not on uv
+        raise UntranslatableError("Mesh that shines by colours of its vertices", "shape")
+    parts, coloured = (
+        {**of, "emitter": {**of["emitter"], "type": "textured_area"}}
+        for of in (site.parts, site.coloured)
+    )
+    return site._replace(parts=parts, coloured=coloured)
 
 
 def placed(soup: Soup, key: Any, m: transform.Affine, mirrored: bool, site: Site) -> Plugin:

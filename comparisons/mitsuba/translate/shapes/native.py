@@ -60,6 +60,12 @@ def _(shape: Sphere, site: Site) -> list[Plugin]:
 
 def _ellipsoid(shape: Sphere, site: Site) -> Plugin:
     """A thin ellipsoid as a mesh: float32 is more exact for its corners than for its quadratic."""
+    patches, surface = sphere_surface(shape)
+    return stand_in(shape, patches, surface, None, site)
+
+
+def sphere_surface(shape: Sphere) -> tuple[list[Patch], Implicit]:
+    """The surface in its own coordinates."""
     center, radius = np.array(shape.center), shape.radius
 
     def point(u: FloatArray, v: FloatArray) -> FloatArray:
@@ -72,7 +78,7 @@ def _ellipsoid(shape: Sphere, site: Site) -> Plugin:
         value=lambda p: np.asarray(np.linalg.norm(p - center, axis=-1) - radius),
         gradient=lambda p: np.asarray(p - center),
     )
-    return stand_in(shape, [Patch(point, CELLS, has_uv=True)], surface, None, site)
+    return [Patch(point, CELLS, has_uv=True)], surface
 
 
 @translate_shape.register
@@ -116,11 +122,17 @@ def _(shape: Box, site: Site) -> list[Plugin]:
 
 
 def _box_of_triangles(m: Affine, site: Site) -> Plugin:
-    """A box with our uv: on each face the two other coordinates in the order x, y, z, from 0 to
-    1."""
+    """A box with our uv."""
     if "emitter" in site.parts:
         # As a Whitted light a mesh has one point for each triangle.
         raise UntranslatableError("emissive material with a texture on a Box", "material")
+    soup = box_of_triangles(m)
+    return Plugin(soup.mesh(site.parts), faces=np.repeat(np.arange(6), 2), uv=same_uv)
+
+
+def box_of_triangles(m: Affine) -> Soup:
+    """The box under a map, with our uv: on each face the two other coordinates in the order x, y,
+    z, from 0 to 1."""
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     positions, faces = np.empty((6, 4, 3)), []
     for face in range(6):
@@ -133,8 +145,7 @@ def _box_of_triangles(m: Affine, site: Site) -> Plugin:
         outward = sign * (-1.0 if axis == 1 else 1.0) * np.linalg.det(m[:, :3])
         faces.append(triangles if outward > 0.0 else triangles[:, ::-1])
     uvs = np.tile(square, (6, 1))
-    soup = Soup(apply_points(m, positions.reshape(-1, 3)), uvs=uvs, faces=np.concatenate(faces))
-    return Plugin(soup.mesh(site.parts), faces=np.repeat(np.arange(6), 2), uv=same_uv)
+    return Soup(apply_points(m, positions.reshape(-1, 3)), uvs=uvs, faces=np.concatenate(faces))
 
 
 def _middle_axis(edges: FloatArray) -> int:

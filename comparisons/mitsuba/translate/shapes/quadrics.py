@@ -8,7 +8,7 @@ import numpy as np
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.around import around_z
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
-from comparisons.mitsuba.translate.shapes.caps import cap_faces
+from comparisons.mitsuba.translate.shapes.caps import cap_faces, region
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import Soup, placed
 from comparisons.mitsuba.translate.shapes.plugins import (
@@ -18,7 +18,7 @@ from comparisons.mitsuba.translate.shapes.plugins import (
     is_similarity,
     to_world,
 )
-from comparisons.mitsuba.translate.shapes.stand_ins import Implicit, Patch, stand_in
+from comparisons.mitsuba.translate.shapes.stand_ins import Box, Implicit, Patch, stand_in
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes import Cone, Cylinder, Quadric
@@ -27,6 +27,9 @@ SIDE = (4096, 8)
 """Cells around a cone and along its side.  That is straight, but Mitsuba's hit on a triangle of
 length L and height h is off by some u L² / h along the triangle: with one cell along the side by
 1e-4 of it, seen at a grazing angle by a hundredth."""
+
+RINGS = 32
+"""Cells along the side of a textured cone."""
 
 THIN = 64.0
 """Cylinders this many times smaller than the scene are meshes in llvm variants: Mitsuba solves its
@@ -44,8 +47,8 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
     unit = _followed(m, np.array([r, r, height]), shape.z_min)
     least = np.linalg.svd(m[:, :2], compute_uv=False)[-1] * r
     if least * THIN < site.reach and in_float32(least) > 0.0:
-        patch = Patch(_side(r, r, shape.z_min, height), SIDE, has_uv=True)
-        side = stand_in(shape, [patch], _round(r, 0.0), None, site)
+        patch, surface = side_surface(shape, site.textured)
+        side = stand_in(shape, [patch], surface, None, site)
     elif _is_round(unit[:, :3]):
         place = to_world(unit[:, :3], unit[:, 3])
         plugin = {"type": "cylinder", "to_world": place, **site.parts}
@@ -97,16 +100,8 @@ def _disk_of_triangles(
     m: transform.Affine, radius: float, z: float, face: int, reach: float, site: Site
 ) -> Plugin:
     """The same with our uv, which Mitsuba's disk has not."""
-    around = SIDE[0]
-    phi = 2.0 * np.pi * np.arange(around) / around
-    rim = radius * np.column_stack([np.cos(phi), np.sin(phi)])
-    flat = np.vstack([np.zeros((1, 2)), rim])
-    k = np.arange(around)
-    faces = np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % around])
-    if (face == BOTTOM) != bool(np.linalg.det(m[:, :3]) < 0.0):
-        faces = faces[:, ::-1]
-    positions = transform.apply_points(m, np.column_stack([flat, np.full(len(flat), z)]))
-    soup = Soup(positions, uvs=0.5 * (1.0 + flat / reach), faces=faces)
+    flat = disk_soup(z, radius, face, reach)
+    soup = flat.moved(m, bool(np.linalg.det(m[:, :3]) < 0.0))
     mesh = soup.mesh(site.parts)
     return Plugin(mesh, suffix=f"_cap{face}", faces=soup.all_of_face(face), uv=same_uv)
 
@@ -114,14 +109,26 @@ def _disk_of_triangles(
 @translate_shape.register
 def _(shape: Cone, site: Site) -> list[Plugin]:
     bottom, top, height = shape.radius, shape.top_radius, shape.height
-    patch = Patch(_side(bottom, top, 0.0, height), SIDE, has_uv=True)
-    found = [stand_in(shape, [patch], _round(bottom, (top - bottom) / height), None, site)]
+    patch, surface = side_surface(shape, site.textured)
+    found = [stand_in(shape, [patch], surface, None, site)]
     if shape.capped:
         m, reach = shape.map_in(site.place), max(bottom, top)
         found.append(_disk(m, bottom, 0.0, BOTTOM, reach, site))
         if top > 0.0:
             found.append(_disk(m, top, height, TOP, reach, site))
     return found
+
+
+def side_surface(shape: Cone | Cylinder, textured: bool = False) -> tuple[Patch, Implicit]:
+    """The side in its own coordinates.  textured: in rings, where it narrows little, so that uv are
+    almost linear."""
+    cells = (SIDE[0], RINGS) if textured else SIDE
+    if isinstance(shape, Cylinder):
+        r, low, height = shape.radius, shape.z_min, shape.z_max - shape.z_min
+        return Patch(_side(r, r, low, height), cells, has_uv=True), _round(r, 0.0)
+    bottom, top, height = shape.radius, shape.top_radius, shape.height
+    patch = Patch(_side(bottom, top, 0.0, height), cells, has_uv=True)
+    return patch, _round(bottom, (top - bottom) / height)
 
 
 def _side(
@@ -152,6 +159,25 @@ def _round(radius: float, slope: float) -> Implicit:
 
 @translate_shape.register
 def _(shape: Quadric, site: Site) -> list[Plugin]:
+    patches, surface, box = quadric_surface(shape)
+    found = []
+    if patches:
+        found.append(stand_in(shape, patches, surface, box, site, partial(around_z, box=box)))
+    if shape.capped:
+        key = ("caps", id(shape))
+        if key not in site.shared:
+            site.shared[key] = cap_faces(surface.value, box)
+        soup, faces = site.shared[key]
+        if len(faces) > 0:
+            m = shape.map_in(site.place)
+            mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
+            plugin = placed(soup, key, m, mirrored, site)
+            found.append(plugin._replace(suffix="_caps", faces=faces, uv=same_uv, faceted=True))
+    return found
+
+
+def quadric_surface(shape: Quadric) -> tuple[list[Patch], Implicit, Box]:
+    """The surface in its own coordinates, and the box that it is clipped to."""
     a, b, c, d, e, f, g, h, i, j = shape.coefficients
     matrix = np.array([[a, d / 2, f / 2], [d / 2, b, e / 2], [f / 2, e / 2, c]])
     linear = np.array([g, h, i])
@@ -161,18 +187,19 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
         return np.asarray(np.einsum("...i,ij,...j->...", p, matrix, p) + p @ linear + j)
 
     surface = Implicit(value, lambda p: np.asarray(2.0 * p @ matrix + linear))
-    found = []
-    patches = patches_of(matrix, linear, j, box)
-    if patches:
-        found.append(stand_in(shape, patches, surface, box, site, partial(around_z, box=box)))
-    if shape.capped:
-        key = ("caps", id(shape))
-        if key not in site.shared:
-            site.shared[key] = cap_faces(value, box)
-        soup, faces = site.shared[key]
-        if len(faces) > 0:
-            m = shape.map_in(site.place)
-            mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
-            plugin = placed(soup, key, m, mirrored, site)
-            found.append(plugin._replace(suffix="_caps", faces=faces, uv=same_uv, faceted=True))
-    return found
+    return patches_of(matrix, linear, j, box), surface, box
+
+
+def disk_soup(z: float, radius: float, face: int, reach: float) -> Soup:
+    """A cap across the axis; its uv are x and y over a square of half side `reach`.
+
+    Of squares: a fan of thin triangles loses half of float32's digits between its corners.
+    """
+
+    def value(uv: FloatArray) -> FloatArray:
+        return np.asarray((reach * reach) * np.sum((2.0 * uv - 1.0) ** 2, axis=-1) - radius**2)
+
+    triangles = region(value)
+    uv = (triangles[:, ::-1] if face == BOTTOM else triangles).reshape(-1, 2)
+    positions = np.column_stack([reach * (2.0 * uv - 1.0), np.full(len(uv), z)])
+    return Soup(positions, uvs=uv)

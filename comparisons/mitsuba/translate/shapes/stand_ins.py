@@ -108,11 +108,18 @@ def stand_in(
         if key not in site.shared:
             site.shared[key] = with_uv(soup)
         soup = site.shared[key]
+    if site.textured and soup.uvs is not None:
+        key = (*key, "slip")
+        if key not in site.shared:
+            site.shared[key] = measured_slip(soup, patches[0], box)
+        found = found._replace(slip=site.shared[key])
     m = transform.compose(own, site.place.outer)
     # The maps after the shape's own stretch distances, and turn angles, at most by these factors.
     stretch = np.linalg.svd(site.place.outer[:, :3], compute_uv=False)
     found = found._replace(
-        sag=float(found.sag * stretch[0]), turn=float(found.turn * stretch[0] / stretch[-1])
+        sag=float(found.sag * stretch[0]),
+        turn=float(found.turn * stretch[0] / stretch[-1]),
+        slip=float(found.slip * np.linalg.svd(m[:, :3], compute_uv=False)[0]),
     )
     mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
     plugin = placed(soup, key, m, mirrored, site)
@@ -152,6 +159,28 @@ def measured_error(soup: Soup, surface: Implicit, m: transform.Affine) -> tuple[
         angle = np.arctan2(cross, np.sum(n * gradient, axis=1)[known])
         sag, turn = max(sag, distance.max(initial=0.0)), max(turn, angle.max(initial=0.0))
     return float(sag), float(turn)
+
+
+def measured_slip(soup: Soup, patch: Patch, box: Box | None) -> float:
+    """The largest distance, in the shape's own coordinates, between a point of the mesh and the one
+    of the surface that has its interpolated uv: of a patch with these uv, or of a surface around
+    the z axis of a box."""
+    assert soup.uvs is not None
+    faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
+    largest = 0.0
+    for weights in WEIGHTS:
+        q = np.einsum("k,fki->fi", weights, soup.positions[faces])
+        u, v = np.einsum("k,fki->fi", weights, soup.uvs[faces]).T
+        if box is None:
+            off = np.linalg.norm(patch.point(u, v) - q, axis=1)
+        else:
+            half = 0.5 * (box[1] - box[0])
+            x, y = ((q - 0.5 * (box[0] + box[1])) / half)[:, :2].T
+            turn = np.abs(np.arctan2(y, x) / (2.0 * np.pi) - u) % 1.0
+            turn = np.minimum(turn, 1.0 - turn)
+            off = 2.0 * np.pi * turn * np.hypot(x, y) * half[:2].max()
+        largest = max(largest, float(off.max(initial=0.0)))
+    return largest
 
 
 def _grid_normals(gradient: FloatArray) -> FloatArray:

@@ -15,6 +15,12 @@ CELLS = (768, 384)
 
 @translate_shape.register
 def _(shape: Torus, site: Site) -> list[Plugin]:
+    patches, surface = torus_surface(shape)
+    return [stand_in(shape, patches, surface, None, site)]
+
+
+def torus_surface(shape: Torus) -> tuple[list[Patch], Implicit]:
+    """The surface in its own coordinates."""
     major, minor = shape.major_radius, shape.minor_radius
 
     def point(u: FloatArray, v: FloatArray) -> FloatArray:
@@ -33,4 +39,4 @@ def _(shape: Torus, site: Site) -> list[Plugin]:
         value=lambda p: from_tube(p)[1] - minor,
         gradient=lambda p: from_tube(p)[0] / from_tube(p)[1][..., None],
     )
-    return [stand_in(shape, [Patch(point, CELLS, has_uv=True)], surface, None, site)]
+    return [Patch(point, CELLS, has_uv=True)], surface
