@@ -153,7 +153,7 @@ def _check_resumed(session: Session) -> None:
 def _write(session: Session, output: Path, limits: Limits, code: int) -> str:
     """Write the picture, unless it is one of an interruption that lacks pixels; what to say."""
     taken, loop, film = session.taken, session.loop, session.scene.film
-    stored = session.store is not None and session.store.exists()
+    stored = session.store is not None and session.store.is_used
     goes_on = f"; --resume goes on from {loop.fraction:.0%}" if stored else ""
     if taken.fewest == 0:
         if code:

@@ -60,6 +60,11 @@ class Checkpoint:
         """Whether there is any file of a band, usable or not."""
         return any(self.folder.glob("band-*.samples"))
 
+    @property
+    def is_used(self) -> bool:
+        """Whether this run has written a band, or may have read one."""
+        return bool(self._written) or (self._resume and self.exists())
+
     def path(self, k: int) -> Path:
         """The file of band k."""
         return self.folder / f"band-{k:06d}.samples"

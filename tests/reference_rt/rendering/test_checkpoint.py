@@ -55,7 +55,12 @@ def test_without_resume_only_own_files_are_read(tmp_path):
     store(tmp_path).write(0, band(1))
     fresh = store(tmp_path, resume=False)
     assert fresh.read(0, empty()) is None
+    assert fresh.exists()
+    assert not fresh.is_used
+    assert store(tmp_path).is_used
+    assert not store(tmp_path / "elsewhere").is_used
     fresh.write(0, band(2))
+    assert fresh.is_used
     assert same(fresh.read(0, empty()), band(2))
 
 
