@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.around import around_z
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
@@ -97,18 +98,28 @@ def _disk_of_triangles(
     m: transform.Affine, radius: float, z: float, face: int, reach: float, site: Site
 ) -> Plugin:
     """The same with our uv, which Mitsuba's disk has not."""
-    around = SIDE[0]
+    around, rings = SIDE
     phi = 2.0 * np.pi * np.arange(around) / around
     rim = radius * np.column_stack([np.cos(phi), np.sin(phi)])
-    flat = np.vstack([np.zeros((1, 2)), rim])
+    flat = np.vstack([np.zeros((1, 2)), *(ring / rings * rim for ring in range(1, rings + 1))])
     k = np.arange(around)
-    faces = np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % around])
+    following = (k + 1) % around
+    fans = [np.column_stack([np.zeros_like(k), 1 + k, 1 + following])]
+    for inner in range(1, 1 + around * (rings - 1), around):
+        a, b = inner + k, inner + following
+        fans += [np.column_stack([a, a + around, b + around]), np.column_stack([a, b + around, b])]
+    faces = np.concatenate(fans)
     if (face == BOTTOM) != bool(np.linalg.det(m[:, :3]) < 0.0):
         faces = faces[:, ::-1]
     positions = transform.apply_points(m, np.column_stack([flat, np.full(len(flat), z)]))
     soup = Soup(positions, uvs=0.5 * (1.0 + flat / reach), faces=faces)
-    mesh = soup.mesh(site.parts)
-    return Plugin(mesh, suffix=f"_cap{face}", faces=soup.all_of_face(face), uv=same_uv)
+    return Plugin(
+        soup.mesh(site.parts),
+        suffix=f"_cap{face}",
+        faces=soup.all_of_face(face),
+        uv=same_uv,
+        heights=heights_of(positions[faces]),
+    )
 
 
 @translate_shape.register
