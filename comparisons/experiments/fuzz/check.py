@@ -101,7 +101,7 @@ def _guarded(name: str, found: Checked, task: Callable[[], str | Finding | None]
         return False
     if isinstance(result, Finding):
         found.findings.append(result)
-        found.rungs[name] = "differ"
+        found.rungs.setdefault(result.rung, "differ")
         return False
     if result is not None:
         found.rungs[name] = result

@@ -27,6 +27,20 @@ def _with_operands(shape: Data) -> Iterator[Data]:
         yield from _with_operands(operand)
 
 
+def named_in(part: Any) -> Iterator[tuple[Data, str]]:
+    """Every field of a part that is a text but for its type, at any depth, with the data that it
+    belongs to: some are names of materials and textures."""
+    if isinstance(part, dict):
+        for key, value in part.items():
+            if isinstance(value, str) and key != "type":
+                yield part, key
+            else:
+                yield from named_in(value)
+    elif isinstance(part, list):
+        for value in part:
+            yield from named_in(value)
+
+
 def text_of(scene: Data) -> str:
     """YAML, one line for each shape, material, light and so on."""
     lines: list[str] = []

@@ -33,4 +33,4 @@ class Effort(BaseModel):
     spp: int = 16
     replicates: int = 8
     identity_rays: int = 240
-    every: int = 4
+    every: int = 2

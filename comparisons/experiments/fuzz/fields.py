@@ -206,6 +206,7 @@ RANGES: dict[str, Callable[[Draw], Any]] = {
     "constant.radiance": lambda draw: draw.log(0.1, 1.0),
     "ambient.radiance": lambda draw: draw.log(0.05, 0.3),
     "irradiance": lambda draw: draw.log(0.5, 3.0),
+    "projector.irradiance": lambda draw: draw.log(10.0, 60.0),
     "intensity": lambda draw: draw.log(10.0, 60.0),
     "cutoff_angle": lambda draw: draw.between(25.0, 80.0),
     "beam_width": lambda draw: draw.between(5.0, 19.9),

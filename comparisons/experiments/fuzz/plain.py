@@ -1,6 +1,6 @@
 """A scene without what Mitsuba lacks, so that the rest of it can be compared nevertheless."""
 
-from comparisons.experiments.fuzz.data import Data, copy_of
+from comparisons.experiments.fuzz.data import Data, copy_of, named_in
 from comparisons.experiments.fuzz.reduce.edits import renamed, without_unused
 
 GREY = 0.5
@@ -26,4 +26,10 @@ def without_textures(scene: Data) -> Data:
         if isinstance(material.get("alpha"), list):
             material["alpha"] = material["alpha"][0]
         material.pop("anisotropic", None)
+    for light in found.get("lights", ()):
+        for at, key in [*named_in(light)]:
+            if at[key] in textures:
+                at[key] = GREY
+        if isinstance(light.get("texture"), float):  # a factor that need not be there
+            del light["texture"]
     return without_unused(found)

@@ -5,7 +5,7 @@ from typing import Any
 
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
-from reference_rt.lights import Directional, Point, Spot
+from reference_rt.lights import Directional, Point, Projector, Spot
 from reference_rt.scene.model import SceneModel
 
 
@@ -37,7 +37,9 @@ def counts_lights_often(scene: SceneModel) -> bool:
     whatever `emitter_samples` is), so that they are as many times too bright.  The mean does not
     depend on the number, and the counterpart has one."""
     integrator = scene.integrator
-    points = any(isinstance(light, Point | Spot | Directional) for light in scene.lights)
+    points = any(
+        isinstance(light, Point | Spot | Projector | Directional) for light in scene.lights
+    )
     return points and isinstance(integrator, Direct) and integrator.light_samples > 1
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.fuzz.data import Data, shapes_of
+from comparisons.experiments.fuzz.data import Data, named_in, shapes_of
 from comparisons.experiments.fuzz.finding import Finding
 from comparisons.experiments.fuzz.identities.rays import Bench, bench, ray_words, words
 from comparisons.geometry.frame import Frame
@@ -48,21 +48,16 @@ def renamed(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
     for section in ("materials", "textures", "groups"):
         table = data.get(section, {})
         data[section] = {f"z{name}": table[name] for name in reversed(table)}
-    for material in data["materials"].values():
-        _rename_fields(material, data)
+    names = {*data["materials"], *data["textures"]}
+    for part in (*data["materials"].values(), *data.get("lights", ())):
+        for at, key in [*named_in(part)]:
+            if f"z{at[key]}" in names:
+                at[key] = f"z{at[key]}"
     for shape in shapes_of(data):
         for field in ("material", "group"):
             if shape.get(field) is not None:
                 shape[field] = f"z{shape[field]}"
     return _same_picture("renamed", scene, _again(scene, data))
-
-
-def _rename_fields(material: Data, data: Data) -> None:
-    """Every text in a material but its type is a name, or a word that no name has."""
-    names = {*data["materials"], *data["textures"]}
-    for field, value in material.items():
-        if field != "type" and isinstance(value, str) and f"z{value}" in names:
-            material[field] = f"z{value}"
 
 
 def threads(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:

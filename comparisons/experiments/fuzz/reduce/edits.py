@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from comparisons.experiments.fuzz.data import Data, copy_of, shapes_of
+from comparisons.experiments.fuzz.data import Data, copy_of, named_in, shapes_of
 
 Edit = Callable[[Data], Iterator[Data]]
 
@@ -18,6 +18,8 @@ def without_unused(scene: Data) -> Data:
     while True:
         before = copy_of(found)
         used = {s[k] for s in shapes_of(found) for k in ("material", "group") if s.get(k)}
+        for light in found.get("lights", ()):
+            used |= {at[key] for at, key in named_in(light)}
         for name, material in found.get("materials", {}).items():
             used |= {v for k, v in material.items() if isinstance(v, str) and k != "type"}
             used |= {name} if name in used else set()

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.around import around_z
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
@@ -102,8 +103,13 @@ def _disk_of_triangles(
     """The same with our uv, which Mitsuba's disk has not."""
     flat = disk_soup(z, radius, face, reach)
     soup = flat.moved(m, bool(np.linalg.det(m[:, :3]) < 0.0))
-    mesh = soup.mesh(site.parts)
-    return Plugin(mesh, suffix=f"_cap{face}", faces=soup.all_of_face(face), uv=same_uv)
+    return Plugin(
+        soup.mesh(site.parts),
+        suffix=f"_cap{face}",
+        faces=soup.all_of_face(face),
+        uv=same_uv,
+        heights=heights_of(soup.positions[soup.faces]),
+    )
 
 
 @translate_shape.register
