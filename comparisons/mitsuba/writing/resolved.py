@@ -10,7 +10,7 @@ from typing import Any
 
 from comparisons.geometry.flatten import Leaf, Tree, copies_of
 from comparisons.mitsuba.writing.files import Files, check_name, ply, write_files
-from comparisons.mitsuba.writing.tessellated import tessellated
+from comparisons.mitsuba.writing.tessellated import is_closed, tessellated
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens
 from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.core import transform
@@ -150,6 +150,7 @@ class _Document:
                     "of": kind,
                     "triangles": len(found.mesh.faces),
                     "distance": found.distance,
+                    "closed": is_closed(found.mesh),
                 }
             )
         return self.known[id(shape)]

@@ -12,9 +12,6 @@ from comparisons.mitsuba.translate.shapes.flat import polygon_soup
 from comparisons.mitsuba.translate.shapes.meshes import Soup
 from comparisons.mitsuba.translate.shapes.native import box_of_triangles, sphere_surface
 from comparisons.mitsuba.translate.shapes.quadrics import (
-    BOTTOM,
-    TOP,
-    disk_soup,
     quadric_surface,
     side_surface,
 )
@@ -97,7 +94,7 @@ def _soups(shape: Shape, m: transform.Affine) -> tuple[list[Soup], float]:
         case Cylinder() | Cone():
             patch, surface = side_surface(shape)
             soups, distance = _curved([patch], surface, None, m)
-            return soups + (_caps(shape) if shape.capped else []), distance
+            return soups + (_caps(shape, patch) if shape.capped else []), distance
         case Box():
             return [box_of_triangles(np.eye(3, 4))], 0.0
         case Polygon():
@@ -116,17 +113,56 @@ def _curved(
     patches: Sequence[Patch], surface: Implicit, box: Limits | None, m: transform.Affine
 ) -> tuple[list[Soup], float]:
     soup = meshed(patches, surface, box, 1.0)
-    return [soup], measured_error(soup, surface, m)[0]
+    return [_welded(soup)], measured_error(soup, surface, m)[0]
 
 
-def _caps(shape: Cylinder | Cone) -> list[Soup]:
+GRID = 1e-9
+"""Vertices of one place, over the size of the mesh: apart by rounding where a patch meets itself.
+"""
+
+
+def _welded(soup: Soup) -> Soup:
+    """The mesh with vertices of one place at the very same place, so that it is closed, and without
+    the triangles that lose their area."""
+    size = float(np.ptp(soup.positions, axis=0).max())
+    places = np.round(soup.positions / (GRID * size)).astype(np.int64)
+    _, first, number = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    number = number.ravel()
+    corners = number[soup.faces]
+    kept = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return Soup(
+        soup.positions[first][number], soup.normals, soup.uvs, soup.colours, soup.faces[kept]
+    )
+
+
+def is_closed(mesh: MeshData) -> bool:
+    """Whether each edge of a triangle is, the other way round, that of another; by position."""
+    _, number = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    corners = number.ravel()[mesh.faces]
+    a, b = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    n = int(corners.max()) + 1
+    return np.array_equal(np.sort(a * n + b), np.sort(b * n + a))
+
+
+def _caps(shape: Cylinder | Cone, side: Patch) -> list[Soup]:
+    """Fans about the axis, whose rims are those of the side."""
     if isinstance(shape, Cylinder):
-        ends = ((shape.z_min, shape.radius, BOTTOM), (shape.z_max, shape.radius, TOP))
-        reach = shape.radius
+        radii, reach = (shape.radius, shape.radius), shape.radius
     else:
-        ends = ((0.0, shape.radius, BOTTOM), (shape.height, shape.top_radius, TOP))
-        reach = max(shape.radius, shape.top_radius)
-    return [disk_soup(z, r, face, reach) for z, r, face in ends if r > 0.0]
+        radii = shape.radius, shape.top_radius
+        reach = max(radii)
+    u = np.arange(side.cells[0]) / side.cells[0]
+    k = np.arange(len(u))
+    found = []
+    for v, radius in zip((0.0, 1.0), radii, strict=True):
+        if radius == 0.0:
+            continue
+        rim = side.point(u, np.full_like(u, v))
+        positions = np.vstack([[[0.0, 0.0, rim[0, 2]]], rim])
+        faces = np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % len(k)])
+        faces = faces if v == 1.0 else faces[:, ::-1]
+        found.append(Soup(positions, uvs=0.5 * (1.0 + positions[:, :2] / reach), faces=faces))
+    return found
 
 
 def _disk() -> Soup:

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import reference_rt as rt
 from comparisons.commands.convert import convert
 from comparisons.mitsuba.writing.resolved import FORMAT, write_resolved
+from comparisons.mitsuba.writing.tessellated import is_closed, tessellated
 from comparisons.rungs.rays.camera import camera_rays
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
@@ -110,3 +111,24 @@ def test_the_command(tmp_path):
     assert (tmp_path / "a_files").is_dir()
     found = CliRunner().invoke(main, [scene, "--to", "json", "-o", str(tmp_path / "a.yaml")])
     assert found.exit_code != 0
+
+
+SOLID = (
+    rt.Box(),
+    rt.Sphere(radius=0.7),
+    rt.Sphere(transform=({"scale": (1.0, -0.4, 2.0)},)),
+    rt.Cylinder(radius=0.3, z_min=-1.0, z_max=0.5),
+    rt.Cone(radius=0.6, height=1.1),
+    rt.Cone(radius=0.6, top_radius=0.2, height=1.1),
+    rt.Torus(major_radius=1.0, minor_radius=0.3),
+)
+
+
+@pytest.mark.parametrize("shape", SOLID, ids=lambda s: s.type)
+def test_what_encloses_space_is_closed(shape, tmp_path):
+    """Our own set operations take them for operands."""
+    found = tessellated(shape, tmp_path)
+    assert is_closed(found.mesh)
+    mesh = rt.Mesh(vertices=found.mesh.vertices, faces=found.mesh.faces)
+    assert Scene(shapes=(Union(of=(mesh, rt.Box(transform=({"scale": 0.1},)))),)).tables
+    assert not is_closed(tessellated(rt.Rectangle(), tmp_path).mesh)
