@@ -254,7 +254,7 @@ def test_the_schema_says_what_a_view_is():
     view = rt.json_schema()["$defs"]["Perspective"]["properties"]["view"]
     array, _ = view["anyOf"]
     assert (array["minItems"], array["maxItems"]) == (4, 4)
-    assert "[l, r, b, t]" in view["description"]
+    assert "[left, right, bottom, top]" in view["description"]
 
 
 def test_no_direction_is_ever_nan():
