@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from comparisons.experiments.fuzz import assets, check
-from comparisons.experiments.fuzz.effort import DETERMINISTIC, Effort, Grammar
+from comparisons.experiments.fuzz.effort import DETERMINISTIC, Effort
 from comparisons.experiments.fuzz.finding import Finding, without_numbers
-from comparisons.experiments.fuzz.generate import generate, parse
+from comparisons.experiments.fuzz.generate import parse
 from comparisons.experiments.fuzz.worker import alike, effort_for
 from reference_rt.rendering.render import render
 from reference_rt.util.errors import ReferenceUnavailableError
@@ -57,7 +57,8 @@ def test_what_differs_from_the_reference_is_found(files):
         found = check.of_rung(bad)
         assert found.rung == rung
         assert found.cause.startswith(cause)
-        assert "ray from" in found.detail
+        assert "differ" in found.detail
+        assert "the first: " in found.detail
 
 
 def test_refused_scenes_are_found_as_such(files):
@@ -112,13 +113,14 @@ def test_a_difference_that_noise_made_does_not_count(files, monkeypatch):
 
 
 def test_what_mitsuba_lacks_is_left_out_of_the_comparison(files):
-    textured = generate(3, 1, Grammar(("checker", "torus", "diffuse")), files)
-    textured["materials"] = {"m": {"type": "diffuse", "reflectance": "t"}}
-    textured["textures"] = {"t": {"type": "checker"}}
-    textured["shapes"] = [{"type": "torus", "material": "m"}]
-    textured["lights"] = BALL["lights"]
-    textured["integrator"] = {"type": "path"}
-    found = check.check(textured, 1, FEW.model_copy(update={"rungs": ("geometry",)}), files)
+    named = {"type": "normal_map", "normals": "t", "base": "grey"}  # of a texture without an image
+    scene = {
+        **BALL,
+        "textures": {"t": {"type": "checker"}},
+        "materials": {**BALL["materials"], "m": named},
+        "shapes": [{"type": "sphere", "material": "m"}],
+    }
+    found = check.check(scene, 1, FEW.model_copy(update={"rungs": ("geometry",)}), files)
     assert found.rungs == {"plain": "compared", "geometry": "agree"}
 
 
