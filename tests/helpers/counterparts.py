@@ -53,6 +53,9 @@ materials:
   car:
     {type: principled, base_colour: image, roughness: numbers, metallic: 0.3, anisotropic: 0.4,
      sheen: 0.4, sheen_tint: 0.5, clearcoat: 0.5, spec_trans: 0.2, spec_tint: 0.3, flatness: 0.2}
+  petal:
+    {type: principled_thin, base_colour: image, roughness: numbers, anisotropic: 0.4,
+     sheen: 0.4, sheen_tint: 0.5, spec_trans: 0.4, spec_tint: 0.3, flatness: 0.2}
   wax: {type: phong, diffuse: 0.1, specular: 0.3, exponent: 20, mirror: 0.1}
   leaf: {type: mask, base: grey, opacity: numbers}
   mix: {type: blend, first: brushed, second: floor, weight: numbers}

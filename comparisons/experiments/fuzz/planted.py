@@ -92,7 +92,9 @@ def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> 
         }
         # -P: do not import from the current folder, which may have a reference_rt.
         command = [sys.executable, "-P", "-m", "reference_rt.cli"]
-        subprocess.run([*command, "warm-up"], env=environment, capture_output=True, check=False)
+        subprocess.run(
+            [*command, "warm-up"], env=environment, capture_output=True, **tied(), check=False
+        )
         words = ["--count", str(count), "--seed", str(seed), "--jobs", str(jobs), "--stop"]
         run = subprocess.run(
             [*command, "fuzz", *words, "--out", str(folder)],

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import comparisons.commands.register
 import comparisons.experiments.convergence.methods
 import comparisons.mitsuba.backend
-import reference_rt.rendering.render
+import reference_rt.rendering.prepared
 import reference_rt.scene.build
 from reference_rt.cli.main import app
 
@@ -42,17 +42,33 @@ ARGUMENTS = {
     "stability": [],
     "explain": [SCENE],
     "convert": [SCENE],
+    "preview": [SCENE],
+    "fuzz": ["--count", "1"],
     "doctor": [],
     "schema": [],
     "warm-up": [],
 }
 """What each command needs besides its outputs."""
 
-INPUTS = {"scene", "scenes", "candidates", "reference", "variance", "folder", "mesh", "unused"}
+INPUTS = {
+    "scene",
+    "scenes",
+    "candidates",
+    "reference",
+    "variance",
+    "folder",
+    "mesh",
+    "unused",
+    "cluster",
+}
 """Parameters that name what is read."""
 
 FILES = {
     ("render", "output"): ["x.exr"],
+    ("render", "preview"): ["x.png"],
+    ("render", "checkpoint"): ["x"],
+    ("fuzz", "out"): ["fuzz.json", "fuzz.html"],
+    ("fuzz", "junit"): [""],
     ("convert", "output"): ["x.yaml"],
     ("compare", "out"): ["results.json", "report.html", "cases/x"],
     ("suite", "out"): ["results.json", "report.html", "cases/x"],
@@ -106,7 +122,7 @@ def idle(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
     for module, name in (
         (reference_rt.scene.build, "build_tables"),
-        (reference_rt.rendering.render, "build_tables"),
+        (reference_rt.rendering.prepared, "build_tables"),
         (comparisons.mitsuba.backend, "mitsuba"),
         (subprocess, "Popen"),
         (subprocess, "run"),
@@ -133,7 +149,8 @@ def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
     command, option, file, how, tmp_path
 ):
     out = tmp_path / "out"
-    named = out / file if command in ("render", "convert") else out
+    named = out / file if option in ("output", "preview") else out
+    needed = ["--output", "picture.png"] if command == "render" and option != "output" else []
     target = out / file if file else out
     if how == "a file on the way":
         blocker = target.parent if file else (tmp_path / "file")
@@ -146,9 +163,8 @@ def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
         named = Path("/proc/none") / named.relative_to(tmp_path)
     (tmp_path / "run" / "cases").mkdir(parents=True)  # for `report`
     before = set(tmp_path.rglob("*"))
-    result = CliRunner().invoke(
-        app, [command, *ARGUMENTS[command], f"--{option}", str(named)], catch_exceptions=False
-    )
+    words = [command, *ARGUMENTS[command], *needed, f"--{option}", str(named)]
+    result = CliRunner().invoke(app, words, catch_exceptions=False)
     told = result.stderr.splitlines()
     assert [line for line in told if line.startswith("error: ")] == told, result.output
     assert len(told) == 1

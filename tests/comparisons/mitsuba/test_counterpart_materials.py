@@ -25,7 +25,7 @@ SMOOTH = ("silver", "gold", "glass", "pane")
 """Perfectly smooth: there is nothing to evaluate."""
 
 MATERIALS = (
-    "grey", "floor", "brushed", "cast", "frosted", "coat", "dull", "car", "wax", "leaf", "mix",
+    "grey", "floor", "brushed", "cast", "frosted", "coat", "dull", "car", "petal", "wax", "leaf", "mix",
     "sheet", "dents", "tiles", "lamp",
 )  # fmt: skip
 

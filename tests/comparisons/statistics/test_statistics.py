@@ -75,7 +75,7 @@ def test_agreement_needs_an_interval_within_the_limit():
     off = replace(image, difference=only_green * (0.00505 * image.scale - image.half_width))
     assert not off.differs.any()
     assert _decide(found, 0.005, "")[0] == "agree"
-    status, reason = _decide(replace(found, image=off), 0.005, "")
+    status, reason = _decide(replace(found, image=off), 0.005, "it takes about twice")
     assert status == "inconclusive"
     assert ", not within ±0.5 %; it takes about" in reason
 

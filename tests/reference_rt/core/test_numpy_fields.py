@@ -31,6 +31,11 @@ REQUIRED = {
         "transform": [{"rotate": {"axis": [0.0, 1.0, 0.0], "degrees": 30.0}}],
     },
     "Point": {"position": [1.0, 2.0, 3.0], "intensity": [0.5, 0.25, 1.0]},
+    "Projector": {
+        "origin": [1.0, 2.0, 3.0],
+        "target": [0.0, 0.0, 1.0],
+        "irradiance": [0.5, 0.25, 1.0],
+    },
     "Spot": {
         "origin": [1.0, 2.0, 3.0],
         "target": [0.0, 0.0, 1.0],
