@@ -73,3 +73,10 @@ and `test_properties_of_rays` (every kind of BVH and none).
 To add a way: a branch in `block_query` or `array_query`, leaves by `leaf.nearest_of_leaf`, and a
 test against `geometry.closest_hit`.
 """
+
+# Operations are numbered as they are defined, and cached kernels contain the numbers: whatever is
+# imported first, these modules are imported in this order.
+from reference_rt.accel import block_query as block_query
+from reference_rt.accel import geometry as geometry
+from reference_rt.accel import next_crossing as next_crossing
+from reference_rt.accel.packet import traversal as traversal

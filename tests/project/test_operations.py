@@ -8,43 +8,66 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import reference_rt
 
 _NUMBERS = """
-import importlib, json, pkgutil, sys
+import importlib, json, pkgutil, random, sys
 import reference_rt
+names = [one.name for one in pkgutil.walk_packages(reference_rt.__path__, "reference_rt.")]
+names = [name for name in names if not name.endswith("__main__")]
+order = sys.argv[1]
+if order == "reversed":
+    names.reverse()
+elif order.isdigit():
+    random.Random(int(order)).shuffle(names)
+elif order:
+    getattr(reference_rt, order)
+for name in names:
+    importlib.import_module(name)
+
 from reference_rt.jit import by_code, links
-
-def numbers():
-    found = {}
-    for name, module in sorted(sys.modules.items()):
-        if name.startswith("reference_rt"):
-            for value in vars(module).values():
-                if isinstance(value, by_code.ByCode | links.Linkable):
-                    key = ",".join(value.operations)
-                    found[key] = [o.number for o in value.operations.values()]
-    return found
-
-before = numbers()
-for one in pkgutil.walk_packages(reference_rt.__path__, "reference_rt."):
-    if not one.name.endswith("__main__"):
-        importlib.import_module(one.name)
-print(json.dumps([before, numbers()]))
+found = {}
+for name, module in sorted(sys.modules.items()):
+    if name.startswith("reference_rt"):
+        for value in vars(module).values():
+            if isinstance(value, by_code.ByCode | links.Linkable):
+                key = ",".join(sorted(value.operations))
+                found[key] = {o.name: o.number for o in value.operations.values()}
+print(json.dumps(found))
 """
 
 
-def test_importing_the_package_defines_all_operations():
-    """So the order is that of the imports in the sources, which the name of the cache's folder
-    covers."""
+def numbers(order: str) -> dict[str, dict[str, int]]:
+    """By group and operation, in a process that imports all modules in this order: a public name
+    first, "reversed", or shuffled with a seed."""
     done = subprocess.run(
-        [sys.executable, "-c", _NUMBERS],
+        [sys.executable, "-c", _NUMBERS, order],
         cwd=Path(reference_rt.__file__).parents[1],
         capture_output=True,
         text=True,
         check=True,
     )
-    before, after = json.loads(done.stdout)
-    assert before == after
-    assert len(before) > 5
-    for numbers in before.values():
-        assert numbers == list(range(1, len(numbers) + 1))
+    found: dict[str, dict[str, int]] = json.loads(done.stdout)
+    return found
+
+
+@pytest.fixture(scope="module")
+def usual() -> dict[str, dict[str, int]]:
+    return numbers("")
+
+
+def test_numbers_count_from_one(usual: dict[str, dict[str, int]]) -> None:
+    assert len(usual) > 5
+    for group in usual.values():
+        assert sorted(group.values()) == list(range(1, len(group) + 1))
+
+
+@pytest.mark.parametrize(
+    "order", ["reversed", *"0123", "Scene", "render", "query", "build_tables", "Box", "textbook"]
+)
+def test_numbers_do_not_depend_on_what_is_imported_first(
+    order: str, usual: dict[str, dict[str, int]]
+) -> None:
+    assert numbers(order) == usual

@@ -65,7 +65,7 @@ def test_light_on_them_is_compared() -> None:
     scene = scene.changed(film=scene.film.model_copy(update={"width": 32, "height": 24}))
     counterpart = load(scene)
     slips = [s.slip for found in counterpart.stand_ins().values() for s in found]
-    assert len(slips) == 7
+    assert len(slips) == 6  # all but the cylinder, which Mitsuba has
     assert 0.0 < max(slips) < 1e-4
     rung = direct(scene, scene.tables, counterpart, 2000)
     assert rung.status == "agree", rung.reason

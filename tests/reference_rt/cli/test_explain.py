@@ -71,7 +71,7 @@ def test_everything_is_used(tmp_path):
     assert set(SHAPES) | {"solids", "instances", "hierarchy"} <= set(shapes)
     assert set(MATERIALS) | {f"textures: {name}" for _, name, _, _ in TEXTURES} <= set(laws)
     assert {*LIGHTS, *WRAPPERS, "tangents"} <= set(lights)
-    assert laws["film layers"] == "albedo, normal"
+    assert laws["film layers"] == "albedo, normal, position"
     assert lights["film layers"] == "depth, id, variance"
     assert lights["light tree"].startswith(f"{(tables.lights.tree.light >= 0).sum()} lights")
     assert lights["environment"].startswith("a map of 4 x 3 pixels")
