@@ -7,7 +7,7 @@ import numpy as np
 from comparisons.geometry.flatten import Copy, copies_of, place_of
 from comparisons.geometry.frame import OURS, Frame
 from reference_rt.core import transform
-from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.arrays import Bounds, FloatArray, IdArray, IntArray
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import TABLES
@@ -36,7 +36,7 @@ class LeafSizes:
             return _quadric_features(self.table, p, primitive)
         return np.asarray(self._faces[np.clip(self.row_of(primitive), 0, len(self._faces) - 1)])
 
-    def row_of(self, primitive: IntArray) -> IntArray:
+    def row_of(self, primitive: IntArray | IdArray) -> IntArray | IdArray:
         """The rows (n,) of the table for the faces `primitive`: faces of a mesh are numbered as in
         its file, and the table lacks those without area."""
         if self.field != "triangles":
@@ -106,7 +106,7 @@ class ShapeSizes:
         numbers = enumerate(self._parts[_name(copy)])
         return {part: self.leaves[number] for part, number in numbers if number >= 0}
 
-    def reach_of(self, shape: IntArray) -> FloatArray:
+    def reach_of(self, shape: IntArray | IdArray) -> FloatArray:
         """(n,): the reach of the shapes with these indices, 0 for -1."""
         return np.asarray(np.append(self.reach, 0.0)[shape])
 

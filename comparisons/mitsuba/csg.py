@@ -17,7 +17,7 @@ from comparisons.mitsuba.hits import BoolArray, MitsubaHits, assign, misses, rea
 from comparisons.mitsuba.scene import first_hits
 from comparisons.mitsuba.stand_ins import MitsubaShape
 from reference_rt.core import transform
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.shapes import Plane
 from reference_rt.shapes.shape import TabulationContext
 
@@ -164,7 +164,7 @@ class SolidCounterpart:
         return self._facing(result, d, evaluated(self.tree, states))
 
     def meets(
-        self, o: FloatArray, d: FloatArray, part: IntArray, t: FloatArray, primitive: IntArray
+        self, o: FloatArray, d: FloatArray, part: IdArray, t: FloatArray, primitive: IdArray
     ) -> BoolArray:
         """(n,): whether the ray crosses face `primitive` of operand `part` at t, within float32's
         bound."""

@@ -3,7 +3,7 @@
 It is resampled from the replicates: a random half of each side's against the other half.  Their
 difference d* has mean zero whatever the sides' means are, and has the tails of the noise and the
 correlation of neighbouring pixels.  The sides' noise may have different strength: d* is added to a
-weighted mean of both pictures, split in proportion to their variances.  For Gaussian noise these
+weighted mean of both pictures, split in proportion to their variances in the tile.  For Gaussian noise these
 pairs are distributed as the given pair would be without bias.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from scipy import stats
 
 from comparisons.results.case import FloatArray, Images
-from comparisons.statistics.metrics import LocalErrors, local_errors
+from comparisons.statistics.metrics import local_errors, relative_squares
 from comparisons.statistics.scales import HALF, TILE, tile_sums
 from comparisons.statistics.sides import side_of
 from comparisons.statistics.unmet import share_unmet, unmet_variance
@@ -75,30 +75,47 @@ def noise_alone(
     Exposure is set by the weighted mean of both pictures, which is the same in all draws.
     """
     rng = np.random.default_rng(seed)
-    variances = [float((x.var(axis=0, ddof=1) / len(x)).mean()) for x in replicates]
-    # The candidate's share of the variance.
-    share = variances[0] / sum(variances) if sum(variances) else 0.5
+    share = _share(replicates)
     middle = (1.0 - share) * images.candidate + share * images.reference
     height, width = images.reference.shape[:2]
     tiles = math.ceil(height / TILE) * math.ceil(width / TILE)
 
-    def errors(difference: FloatArray) -> LocalErrors:
-        drawn = Images(middle + share * difference, middle - (1.0 - share) * difference)
-        return local_errors(drawn, middle)
+    def pair(difference: FloatArray) -> Images:
+        return Images(middle + share * difference, middle - (1.0 - share) * difference)
 
-    drawn = []
+    drawn, excess = [], []
     for k in range(max(2, math.ceil(TILES / tiles))):
         difference = _contrast(rng, replicates[0]) - _contrast(rng, replicates[1])
-        drawn.append(errors(difference))
+        drawn.append(local_errors(pair(difference), middle))
+        turned = relative_squares(pair(-difference), middle)
+        excess.append(float(np.maximum(turned - drawn[k].relative2, 0.0).mean()))
         if k == 0:
-            more = errors(math.sqrt(NOISE_LIMIT) * difference)
+            more = local_errors(pair(math.sqrt(NOISE_LIMIT) * difference), middle)
     expected, highest = np.empty(5), np.empty(5)
     for k, maps in enumerate(zip(*drawn, strict=True)):
         expected[k] = np.mean(maps)
         allowance = max(0.0, float(more[k].mean() - maps[0].mean()))
         highest[k] = expected[k] + allowance + _scatter(np.stack(maps))
-    found = np.array([m.mean() for m in errors(images.candidate - images.reference)])
+    # relMSE divides by the reference: a firefly of the candidate counts a million times what one of
+    # the reference does, and the few draws may have all fireflies on the reference's side.
+    highest[-1] += np.mean(excess)
+    found = np.array(
+        [m.mean() for m in local_errors(pair(images.candidate - images.reference), middle)]
+    )
     return found, expected, highest
+
+
+def _share(replicates: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """(height, width, 1): the candidate's share of the variance of each pixel's tile.  By tiles,
+    since one firefly has more variance than all the rest of a picture."""
+    ours, both = (
+        _tile_sums(np.asarray(sum(x.var(axis=0, ddof=1) / len(x) for x in sides)))
+        for sides in (replicates[:1], replicates)
+    )
+    share = np.divide(ours, both, out=np.full_like(both, 0.5), where=both > 0.0)
+    height, width = replicates[0].shape[1:3]
+    share = share.reshape(math.ceil(height / TILE), -1)
+    return share.repeat(TILE, axis=0).repeat(TILE, axis=1)[:height, :width, None]
 
 
 def _contrast(rng: np.random.Generator, pictures: FloatArray) -> FloatArray:

@@ -102,15 +102,20 @@ def local_errors(images: Images, measure: FloatArray | None = None) -> LocalErro
     measure = b if measure is None else measure
     white = white_level(measure)
     encoded_a, encoded_b = encode(a, white), encode(b, white)
-    squared = (a - b) ** 2
-    weight = b**2 + RELMSE_EPSILON * measure.mean() ** 2
     return LocalErrors(
         _dissimilarity(encoded_a, encoded_b),
         _flip(a, b, white, flip_exposures(measure / white)),
         ((encoded_a - encoded_b) ** 2).mean(axis=-1),
-        squared.mean(axis=-1),
-        ratio(squared, weight).mean(axis=-1),
+        ((a - b) ** 2).mean(axis=-1),
+        relative_squares(images, measure),
     )
+
+
+def relative_squares(images: Images, measure: FloatArray) -> FloatArray:
+    """(height, width): `LocalErrors.relative2`."""
+    weight = images.reference**2 + RELMSE_EPSILON * measure.mean() ** 2
+    relative = ratio((images.candidate - images.reference) ** 2, weight)
+    return np.asarray(relative.mean(axis=-1))
 
 
 def flip_map(images: Images) -> FloatArray:

@@ -67,35 +67,41 @@ def trace_packet(
     them.
 
     waiting: rays in the queue;  filled: hits in `found`, whose rays' indices are in `numbers`.
-    Returns both as they are afterwards.  Hits come in any order; the call for the last of the n
-    rays empties the queue.
+    Returns both as they are afterwards.  Hits come in any order, misses are left out; the call for
+    the last of the n rays empties the queue.
     """
     end = min(begin + PACKET_SIZE, len(o))
     outcome = INCOHERENT
     if end == begin + PACKET_SIZE:
         outcome = closest_of_packet(geometry, o, d, begin, work.packet, work.hits)
-    for i in range(begin, end):
-        hit = Hit(math.inf, -1, -1, 0.0, 0.0, -1)
-        if outcome == FOUND:
-            hit = hit_of(geometry, ray_of(work.packet, i - begin), work.hits, i - begin)
-        elif outcome == INCOHERENT:
+    if outcome == FOUND:
+        for j in range(PACKET_SIZE):
+            hit = hit_of(geometry, ray_of(work.packet, j), work.hits, j)
+            filled = _add_hit(found, numbers, filled, hit, begin + j)
+    elif outcome == INCOHERENT:
+        for i in range(begin, end):
             ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
             if valid:
                 put_ray(work.rays, waiting, ray)
                 work.numbers[waiting] = i
                 waiting += 1
-                continue
-        _put_hit(found, filled, hit)
-        numbers[filled] = i
-        filled += 1
     if waiting > BLOCK - PACKET_SIZE or end == len(o):
         closest_hits(geometry, work.rays, work.hits, waiting)
         for j in range(waiting):
-            _put_hit(found, filled, hit_of(geometry, ray_of(work.rays, j), work.hits, j))
-            numbers[filled] = work.numbers[j]
-            filled += 1
+            hit = hit_of(geometry, ray_of(work.rays, j), work.hits, j)
+            filled = _add_hit(found, numbers, filled, hit, work.numbers[j])
         waiting = 0
     return waiting, filled
+
+
+@kernel
+def _add_hit(found: Primitives, numbers: IntArray, filled: int, hit: Hit, ray: int) -> int:
+    """Append the hit of a ray, unless it is a miss; how many there are then."""
+    if hit.kind < 0:
+        return filled
+    _put_hit(found, filled, hit)
+    numbers[filled] = ray
+    return filled + 1
 
 
 @kernel

@@ -207,27 +207,23 @@ class HitIds(NamedTuple):
 
     shape: index in the scene;  instance: number of the copy, -1 outside groups;  part: number of
     the operand in its solid, or of the shape in its group, else 0;  face: number of the triangle in
-    its mesh, or of the shape's face;  u, v: the surface coordinates.
+    its mesh, or of the shape's face.
     """
 
     shape: int
     instance: int
     part: int
     face: int
-    u: float
-    v: float
 
 
 @geometries.operation
-def owner(geometry: Geometry, ray: Ray, hit: Hit) -> HitIds:
-    """The ids and surface coordinates of a hit, for layers and queries; path tracing needs none."""
-    local, seen, _ = _in_primitive_space(geometry, ray, hit)
+def owner(geometry: Geometry, hit: Hit) -> HitIds:
+    """The ids of a hit, for layers and queries; path tracing needs none."""
     number = any_shape.owner(geometry.shapes, hit.kind, hit.row)
     shape, part = _shape_and_part(geometry.parts, number)
     shape, copy = _in_scene(geometry.instances, hit.instance, shape)
     face = any_shape.face(geometry.shapes, hit)
-    u, v = any_shape.uv(geometry.shapes, local, seen)
-    return HitIds(shape, copy, part, face, u, v)
+    return HitIds(shape, copy, part, face)
 
 
 class Coordinates(NamedTuple):

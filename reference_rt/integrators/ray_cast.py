@@ -2,7 +2,7 @@
 
 from typing import ClassVar, Literal, NamedTuple
 
-from reference_rt.accel.geometry import closest_hit, colour, owner
+from reference_rt.accel.geometry import closest_hit, colour, coordinates, owner
 from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3, length
@@ -51,8 +51,8 @@ def cast(scene: SceneTables, ray: Ray) -> Cast:
     if hit.kind < 0:
         return Cast(nothing, hit.t, nothing, -1, 0.0, 0.0)
     point = surface(scene, ray, hit)
-    whose = owner(scene.geometry, ray, hit)
+    whose, where = owner(scene.geometry, hit), coordinates(scene.geometry, ray, hit)
     at = texture_place(scene.textures, scene.geometry, ray, hit)
     own = colour_at(scene.materials.shown, point.material, at)
     shown = colour(shapes_of(scene), hit, own)
-    return Cast(shown, hit.t * length(ray.d), point.n, whose.shape, whose.u, whose.v)
+    return Cast(shown, hit.t * length(ray.d), point.n, whose.shape, where.u, where.v)

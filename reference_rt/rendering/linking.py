@@ -141,7 +141,7 @@ def _geometry(
     if integrator in ("direct", "whitted"):
         wanted |= {"occluded"}
     if integrator == "ray_cast":
-        wanted |= {"owner"}
+        wanted |= {"owner", "coordinates"}
     if geometry.parts is not None or geometry.instances is not None:
         wanted |= {"surface"}
     if is_textured:

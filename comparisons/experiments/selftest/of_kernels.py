@@ -18,7 +18,7 @@ FAULTS = (
     ),
     SourceFault(
         "id of layers one too large", LAYERS, "integrators/ray_cast.py",
-        "whose.shape, whose.u", "whose.shape + 1, whose.u",
+        "whose.shape, where.u", "whose.shape + 1, where.u",
     ),
     SourceFault(
         "albedo of layers without the filter's weight", LAYERS, "rendering/tiles.py",

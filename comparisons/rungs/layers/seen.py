@@ -12,7 +12,7 @@ from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.film import translate_filter
 from comparisons.mitsuba.translate.textures import TranslationContext, translate_texture
 from reference_rt.cameras.filters import Filter
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.materials import Diffuse, Wrapper
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures import VertexColours
@@ -71,7 +71,7 @@ class _Looked(NamedTuple):
     leaf: LeafSizes
     rows: IntArray
     uv: FloatArray
-    primitive: IntArray
+    primitive: IdArray
     local: FloatArray
 
 

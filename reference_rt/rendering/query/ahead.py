@@ -22,6 +22,7 @@ from reference_rt.rendering.query.tracing import (
     BLOCKS,
     CROSSING,
     ONE_BY_ONE,
+    SURFACES,
     closest,
     closest_of_few,
     cross,
@@ -39,7 +40,7 @@ _RAYS = _VECTORS, _VECTORS
 def query_calls(scene: BuiltScene) -> list[Call]:
     """The linked kernels that queries of a scene need, besides those of its pictures."""
     linker, geometry = Linker(), scene.tables.geometry
-    wanted = [ONE_BY_ONE, BLOCKS, CROSSING, OCCLUDED, OCCLUDED_BY_BLOCKS]
+    wanted = [ONE_BY_ONE, BLOCKS, CROSSING, OCCLUDED, OCCLUDED_BY_BLOCKS, SURFACES]
     if geometry.solids is not None:  # else the operation does not compile
         wanted.append(SOLIDS)
     for operations in wanted:

@@ -1,6 +1,7 @@
 """First hits of arrays of rays: which kernels trace how many of them."""
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,13 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.query.linked import Linked, link_to_geometry
 from reference_rt.rendering.query.tracing import (
     BLOCKS,
-    BUFFER,
     CROSSING,
     EVERY_RAY,
     FEW,
+    IDS,
     NO_LIMIT,
     ONE_BY_ONE,
+    SURFACES,
     HitArrays,
     closest,
     closest_of_few,
@@ -24,15 +26,18 @@ from reference_rt.rendering.query.tracing import (
     describe,
     empty_hits,
     empty_primitives,
+    no_primitives,
 )
 
 
 class FirstHits:
     """Traces the first hits of the n rays of a query, which may be divided into blocks."""
 
-    def __init__(self, scene: SceneTables, n: int) -> None:
+    def __init__(self, scene: SceneTables, n: int, surfaces: bool) -> None:
         self._scene, self._is_few = scene, n <= FEW
-        self._linked = link_to_geometry(scene, *(ONE_BY_ONE if self._is_few else BLOCKS))
+        self._described = SURFACES if surfaces else IDS
+        traversal = ONE_BY_ONE if self._is_few else BLOCKS
+        self._linked = link_to_geometry(scene, *traversal, *self._described)
 
     def trace(
         self,
@@ -53,14 +58,15 @@ class FirstHits:
         elif rows:
             found = trace_in_ray_order(geometry, o, d, t_max, out)
         else:
-            buffer = empty_primitives(BUFFER), np.empty(BUFFER, np.int64)
+            buffer = empty_primitives(MOST_ADDED), np.empty(MOST_ADDED, np.int64)
             closest(geometry, o, d, t_max, *buffer, out)
         if t_min is not None:
             again = np.flatnonzero(out.t <= t_min)
             if len(again) > 0:
                 limits = np.full(len(o), math.inf) if t_max is NO_LIMIT else t_max
                 rays = o[again], d[again], t_min[again], limits[again]
-                _replace(self._scene, rays, again, found, out)
+                crossed = link_to_geometry(self._scene, *CROSSING, *self._described)
+                _replace(crossed, rays, again, found, out)
         return found
 
 
@@ -70,26 +76,26 @@ def trace_in_ray_order(
     """First hits by `closest`, into `out`; also as primitives, in the order of the rays."""
     size = len(o) + MOST_ADDED
     unordered, numbers = empty_primitives(size), np.empty(size, np.int64)
-    closest(geometry, o, d, t_max, unordered, numbers, out)
-    found = empty_primitives(len(o))
+    count = closest(geometry, o, d, t_max, unordered, numbers, out)
+    found = no_primitives(len(o))
     for ordered, values in zip(found, unordered, strict=True):
-        ordered[numbers[: len(o)]] = values[: len(o)]
+        ordered[numbers[:count]] = values[:count]
     return found
 
 
 def _replace(
-    scene: SceneTables,
+    crossed: Linked,
     rays: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     which: IntArray,
     found: Primitives,
     out: HitArrays,
 ) -> None:
     """Replaces the hits `which` by the first crossings of rays (o, d, t_min, t_max)."""
-    crossed = link_to_geometry(scene, *CROSSING)
     beyond = first_beyond(crossed, *rays)
     hits = empty_hits(len(which), len(out.p) > 0)
     describe(crossed.tables, rays[0], rays[1], EVERY_RAY, rays[3], beyond, hits)
-    for whole, part in zip((*found, *out), (*beyond, *hits), strict=True):
+    pairs: Iterable[tuple[Any, Any]] = zip((*found, *out), (*beyond, *hits), strict=True)
+    for whole, part in pairs:
         if len(whole) > 0:
             whole[which] = part
 
@@ -103,8 +109,7 @@ def first_beyond(
     met, rays, counts = empty_primitives(n), np.empty(n, np.int64), np.empty(n, np.int64)
     cross(crossed.tables, o, d, t_min, t_max, 0, 1, counts, rays, met)
     m = int(counts.sum())
-    found = empty_primitives(n)
-    found.codes[:] = -1
+    found = no_primitives(n)
     for whole, part in zip(found, met, strict=True):
         whole[rays[:m]] = part[:m]
     return found

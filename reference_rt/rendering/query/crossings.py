@@ -15,6 +15,7 @@ from reference_rt.rendering.query.rays import in_blocks, rays_of
 from reference_rt.rendering.query.tracing import (
     CROSSING,
     NO_LIMIT,
+    SURFACES,
     HitArrays,
     cross,
     describe,
@@ -67,7 +68,7 @@ def crossings(
     starts = np.zeros(n) if rays.t_min is None else rays.t_min
     ends = np.full(n, math.inf) if rays.t_max is None else rays.t_max
     counts = np.zeros(n, np.int64)
-    crossed = link_to_geometry(scene, *CROSSING)
+    crossed = link_to_geometry(scene, *CROSSING, *SURFACES)
     parts: dict[int, list[tuple[IntArray, HitArrays]]] = {}
 
     def trace(k: slice) -> None:

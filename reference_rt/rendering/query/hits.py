@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from reference_rt.accel.array_query import occluded_one_by_one, occluded_rays
 from reference_rt.accel.geometry import Geometry
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.query.batches import FirstHits, first_beyond, trace_in_ray_order
@@ -19,6 +19,7 @@ from reference_rt.rendering.query.tracing import (
     BLOCKS,
     CROSSING,
     FEW,
+    IDS,
     NO_LIMIT,
     empty_hits,
     empty_primitives,
@@ -43,10 +44,10 @@ class Hits:
     """
 
     t: FloatArray
-    shape: IntArray
-    primitive: IntArray
-    part: IntArray
-    instance: IntArray
+    shape: IdArray
+    primitive: IdArray
+    part: IdArray
+    instance: IdArray
 
     @property
     def hit(self) -> BoolArray:
@@ -86,7 +87,7 @@ def occluded_of_few(
 def _trace(scene: SceneTables, rays: Rays, threads: int | None, surfaces: bool) -> list[Any]:
     """The columns of `HitArrays`, in the shape of the given rays."""
     low, high, n = rays.t_min, rays.t_max, len(rays.o)
-    out, query = empty_hits(n, surfaces), FirstHits(scene, n)
+    out, query = empty_hits(n, surfaces), FirstHits(scene, n, surfaces)
 
     def trace(k: slice) -> None:
         query.trace(
@@ -190,7 +191,7 @@ def closest_primitives(
     """See `Closest`."""
     o, d = checked_rays(origins, directions)
     found, out = empty_primitives(len(o)), empty_hits(len(o), surfaces=False)
-    traced = link_to_geometry(scene, *BLOCKS)
+    traced = link_to_geometry(scene, *BLOCKS, *IDS)
 
     def trace(k: slice) -> None:
         met = trace_in_ray_order(traced.tables, o[k], d[k], NO_LIMIT, rows_of(out, k))

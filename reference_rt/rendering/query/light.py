@@ -258,7 +258,7 @@ def light_pdf(
         ("t_min", numbers("t_min", t_min), 0),
     )
     rays = rays_of(p, d, low if low.any() else 0.0)
-    out, query = np.empty(len(p)), FirstHits(scene, len(p))
+    out, query = np.empty(len(p)), FirstHits(scene, len(p), surfaces=False)
     surfaces, sources = link_to_geometry(scene, "surface"), _linked_lights(scene)
 
     def density(k: slice) -> None:

@@ -95,7 +95,9 @@ def _of_shapes(geometry: Geometry, operations: Iterable[str]) -> set[str]:
     if "surface" in asked:
         wanted |= {"surface"}
     if "owner" in asked:
-        wanted |= {"owner", "face", "uv"}
+        wanted |= {"owner", "face"}
+    if "coordinates" in asked:
+        wanted |= {"uv", "colour"}
     if geometry.parts is not None:
         wanted |= {"owner"}
     if geometry.solids is not None:

@@ -16,10 +16,10 @@ from reference_rt.accel.array_query import (
     trace_packet,
 )
 from reference_rt.accel.crossing_order import nothing_at
-from reference_rt.accel.geometry import Geometry, owner, surface
+from reference_rt.accel.geometry import Geometry, coordinates, owner, surface
 from reference_rt.accel.next_crossing import next_crossing
 from reference_rt.accel.packet.packet import PACKET_SIZE
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.core.ray import BLOCK, Hit, at
 from reference_rt.core.ray_block import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, HitBlock, RayBlock
 from reference_rt.core.scaled_ray import is_representable, scaled
@@ -31,10 +31,10 @@ class HitArrays(NamedTuple):
     """The arrays of `Intersections`, which kernels fill; p, n, ns and uv may be left empty."""
 
     t: FloatArray
-    shape: IntArray
-    primitive: IntArray
-    part: IntArray
-    instance: IntArray
+    shape: IdArray
+    primitive: IdArray
+    part: IdArray
+    instance: IdArray
     p: FloatArray
     n: FloatArray
     ns: FloatArray
@@ -44,7 +44,7 @@ class HitArrays(NamedTuple):
 def empty_hits(n: int, surfaces: bool) -> HitArrays:
     """Uninitialised arrays for n hits, with or without p, n, ns and uv."""
     m = n if surfaces else 0
-    shape, primitive, part, instance = np.empty((4, n), np.int64)
+    shape, primitive, part, instance = np.empty((4, n), np.int32)
     p, normal, ns = np.empty((3, m, 3))
     return HitArrays(np.empty(n), shape, primitive, part, instance, p, normal, ns, np.empty((m, 2)))
 
@@ -52,6 +52,11 @@ def empty_hits(n: int, surfaces: bool) -> HitArrays:
 def empty_primitives(n: int) -> Primitives:
     """Uninitialised arrays for n hits."""
     return Primitives(np.empty(n), np.empty((n, 3), np.int64), np.empty((n, 2)))
+
+
+def no_primitives(n: int) -> Primitives:
+    """n misses."""
+    return Primitives(np.full(n, math.inf), np.full((n, 3), -1), np.zeros((n, 2)))
 
 
 def rows_of(arrays: Any, k: slice | IntArray) -> Any:
@@ -66,14 +71,20 @@ NO_LIMIT = np.empty(0)
 """In place of t_max for each ray: no limit."""
 
 
-BLOCKS = ("closest_hits", "closest_of_packet", "surface", "owner")
-"""The operations of `closest`."""
+IDS = ("owner",)
+"""The operations that describe hits without p, n, ns and uv."""
 
-ONE_BY_ONE = ("closest_hit", "surface", "owner")
-"""Those of `closest_of_few` and `describe`."""
+SURFACES = (*IDS, "surface", "coordinates")
+"""Those that describe hits with them."""
 
-CROSSING = ("next_crossing", "surface", "owner")
-"""Those of `cross` and `describe`."""
+BLOCKS = ("closest_hits", "closest_of_packet")
+"""Those of `closest`, besides."""
+
+ONE_BY_ONE = ("closest_hit",)
+"""Those of `closest_of_few`."""
+
+CROSSING = ("next_crossing",)
+"""Those of `cross`."""
 
 
 @entry_kernel
@@ -85,12 +96,12 @@ def closest(
     found: Primitives,
     numbers: IntArray,
     out: HitArrays,
-) -> None:
-    """First hits of rays, into `out`.
+) -> int:
+    """First hits of rays, into `out`; returns how many of them are in `found`.
 
-    found, numbers: buffers of at least MOST_ADDED entries.  With len(o) + MOST_ADDED entries they
-    keep all hits.  Hits are described while they are in the processor's cache: a separate pass
-    over all of them took a third longer (measured).
+    found, numbers: buffers of at least MOST_ADDED entries for hits and their rays.  With len(o) +
+    MOST_ADDED entries they keep all hits.  Hits are described while they are in the processor's
+    cache: a separate pass over all of them took a third longer (measured).
     """
     work = TraceScratch(
         RayBlock(local_floats(RAY_FLOATS)),
@@ -102,20 +113,21 @@ def closest(
         work.rays.numbers[k] = 1.0  # lanes without a ray are traced too
     waiting, filled = 0, 0
     for begin in range(0, len(o), PACKET_SIZE):
-        waiting, filled = trace_packet(geometry, o, d, begin, work, waiting, found, numbers, filled)
-        if filled > len(numbers) - MOST_ADDED or begin + PACKET_SIZE >= len(o):
-            for k in range(filled):
-                _describe(geometry, o, d, numbers[k], t_max, found, k, out, numbers[k])
+        for i in range(begin, min(begin + PACKET_SIZE, len(o))):
+            _put_miss(out, i)
+        if filled > len(numbers) - MOST_ADDED:
             filled = 0
+        first = filled
+        waiting, filled = trace_packet(geometry, o, d, begin, work, waiting, found, numbers, filled)
+        for k in range(first, filled):
+            _describe(geometry, o, d, numbers[k], t_max, found, k, out, numbers[k])
+    return filled
 
 
 @entry_kernel
 def closest_of_few(geometry: Geometry, o: FloatArray, d: FloatArray, found: Primitives) -> None:
     closest_one_by_one(geometry, o, d, found)
 
-
-BUFFER = 256
-"""Size of the buffers of `closest` that need not keep all hits: 14 KiB, which stay in the cache."""
 
 FEW = 1 << 12
 """Up to this many rays are traced one by one: `closest` has the same result some milliseconds
@@ -136,6 +148,7 @@ def describe(
     (len(o),) or `NO_LIMIT`."""
     for i in range(len(out.t)):
         r = rays[i] if len(rays) > 0 else i
+        _put_miss(out, i)
         _describe(geometry, o, d, r, t_max, found, i, out, i)
 
 
@@ -158,32 +171,30 @@ def _describe(
     out: HitArrays,
     i: int,
 ) -> None:
-    """Write hit k, of ray r, to row i of `out`: the one place where internal codes become shape
-    indices."""
-    if found.codes[k, 0] < 0:
-        _put_miss(out, i)
+    """Write hit k, of ray r, to row i of `out`, which is a miss so far: the one place where
+    internal codes become shape indices."""
+    hit = hit_of(found, k)
+    if hit.kind < 0:
         return
     ray, unit, _ = scaled(row(o, r), row(d, r), math.inf)
-    hit = hit_of(found, k)
-    t = hit.t * unit
+    t, p = hit.t * unit, at(ray, hit.t)
     if len(t_max) > 0 and not t < t_max[r]:
-        _put_miss(out, i)
         return
-    p = at(ray, hit.t)
-    if len(out.p) > 0:
+    if len(out.p) == 0:
+        if not is_representable(t, p):
+            return
+    else:
         point = surface(geometry, ray, hit)
-        p = point.p
+        if not is_representable(t, point.p):
+            return
+        where = coordinates(geometry, ray, hit)
         out.p[i, 0], out.p[i, 1], out.p[i, 2] = point.p
         out.n[i, 0], out.n[i, 1], out.n[i, 2] = point.n
         out.ns[i, 0], out.ns[i, 1], out.ns[i, 2] = point.ns
-    if not is_representable(t, p):
-        _put_miss(out, i)
-        return
-    whose = owner(geometry, ray, hit)
+        out.uv[i, 0], out.uv[i, 1] = where.u, where.v
+    whose = owner(geometry, hit)
     out.t[i], out.shape[i], out.primitive[i] = t, whose.shape, whose.face
     out.part[i], out.instance[i] = whose.part, whose.instance
-    if len(out.p) > 0:
-        out.uv[i, 0], out.uv[i, 1] = whose.u, whose.v
 
 
 @kernel

@@ -85,6 +85,19 @@ def test_noise_alone_agrees_often(picture, noise, count) -> None:
         assert result.status == "agree", result.reason
 
 
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_firefly_of_either_side_agrees(side: int) -> None:
+    """In any replicate: a picture of 64 tiles has two draws, and in a quarter of the replicates
+    both turn the firefly to the same side."""
+    rng, picture = np.random.default_rng(5), np.full((128, 128, 3), 0.5)
+    sides = [gaussian(rng, picture, 8) for _ in range(2)]
+    for replicate in range(8):
+        lit = [x.copy() for x in sides]
+        lit[side][replicate, 70, 31] += 3e3
+        result = judged(*lit)
+        assert result.status == "agree", result.reason
+
+
 def test_what_noise_gives_is_what_is_found(picture: FloatArray) -> None:
     """The expectation, given the noise, is that of new pictures: within its own scatter."""
     rng = np.random.default_rng(2)

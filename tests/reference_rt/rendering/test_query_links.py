@@ -182,7 +182,7 @@ def test_links_last_as_long_as_the_query():
     """Though the links of other scenes have taken their place."""
     scene = rt.Scene(shapes=(rt.Sphere(radius=0.5), rt.Box()))
     o, d = np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 0.0, -1.0]])
-    traced_later = batches.FirstHits(scene.tables, 1)
+    traced_later = batches.FirstHits(scene.tables, 1, surfaces=True)
     for _ in range(linked.SCENES):
         rt.Scene(shapes=(rt.Sphere(),)).intersect(o, d)
     taken = [np.full(n, -1) for n in range(1, 500)]  # the memory of links that are no more

@@ -101,9 +101,10 @@ def _in_scene(scene, o, d, out):
         if hit.kind >= 0:
             point = geometry.surface(scene, ray, hit)
             tangents = geometry.tangents(scene, ray, hit)
-            owner = geometry.owner(scene, ray, hit)
+            owner = geometry.owner(scene, hit)
+            where = geometry.coordinates(scene, ray, hit)
             number = owner.face + 100 * owner.part + 10000 * owner.shape
-            _write(out[k], hit.t, number, point, owner.u, owner.v, tangents)
+            _write(out[k], hit.t, number, point, where.u, where.v, tangents)
 
 
 @geometry.kernel

@@ -43,7 +43,7 @@ def _follow(geometry: Geometry, o: FloatArray, d: FloatArray, out: IntArray) -> 
             hit = closest_hit(geometry, ray)
             if hit.kind < 0:
                 break
-            out[i, k] = owner(geometry, ray, hit).shape
+            out[i, k] = owner(geometry, hit).shape
             ray = ray_from(surface(geometry, ray, hit), ray.d)
 
 
