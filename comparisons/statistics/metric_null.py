@@ -3,8 +3,8 @@
 It is resampled from the replicates: a random half of each side's against the other half.  Their
 difference d* has mean zero whatever the sides' means are, and has the tails of the noise and the
 correlation of neighbouring pixels.  The sides' noise may have different strength: d* is added to a
-weighted mean of both pictures, split in proportion to their variances in the tile.  For Gaussian noise these
-pairs are distributed as the given pair would be without bias.
+weighted mean of both pictures, split in proportion to their variances in the tile.  For Gaussian
+noise these pairs are distributed as the given pair would be without bias.
 """
 
 import math

@@ -13,7 +13,6 @@ one with a sheen, or flatness 1, 1.7; a saturated sheen, whose tint has luminanc
 sheen, no coat) is never above 1: measured on grids of parameters, which the tests repeat.
 """
 
-import math
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -24,6 +23,7 @@ from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.principled_lobes import (
+    SHEEN_ALBEDO,
     Facet,
     Surface,
     coat,
@@ -32,16 +32,16 @@ from reference_rt.materials.bsdfs.principled_lobes import (
     diffuse,
     facet,
     fresnel_at,
+    microfacets,
     sample_coat,
     sheen,
     sheen_colour,
+    upwards,
     visible_normals,
 )
 from reference_rt.materials.material import INV_PI, NO_SAMPLE, BsdfSample, Material, Scattered
 from reference_rt.materials.microfacet.fresnel import Refraction, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import (
-    GGX,
-    Microfacets,
     g1,
     half_vector,
     refract,
@@ -60,15 +60,9 @@ from reference_rt.textures import (
     number_at,
 )
 
-_MIN_ALPHA = 1e-3
-"""Mitsuba's: smaller ones count as this."""
-
 _LEAST_MAIN = 0.05
 """The least reflectance that the main lobe's probability assumes: at grazing angles it reflects
 all."""
-
-_SHEEN = 0.1
-"""The albedo of a white sheen at grazing angles, where it is brightest (measured)."""
 
 
 class Principled(Material):
@@ -164,9 +158,6 @@ class Principleds(NamedTuple):
 def _surface(table: Principleds, i: int, at: At, side: float) -> Surface:
     """The parameters of row i at the texture coordinates `at`, for wo.z = side."""
     roughness = number_at(table.roughness, i, at)
-    aspect = math.sqrt(1.0 - 0.9 * number_at(table.anisotropic, i, at))
-    alpha = roughness * roughness
-    m = Microfacets(GGX, max(_MIN_ALPHA, alpha / aspect), max(_MIN_ALPHA, alpha * aspect))
     metallic, spec_trans = number_at(table.metallic, i, at), number_at(table.spec_trans, i, at)
     eta = float(table.eta[i])
     return Surface(
@@ -184,14 +175,8 @@ def _surface(table: Principleds, i: int, at: At, side: float) -> Surface:
         eta if side > 0.0 else 1.0 / eta,
         eta,
         side > 0.0,
-        m,
+        microfacets(roughness, number_at(table.anisotropic, i, at)),
     )
-
-
-@kernel
-def _upwards(v: Vec3, side: float) -> Vec3:
-    """`v` mirrored so that wo is above: the microfacets are the same from either side."""
-    return Vec3(v.x, v.y, -v.z) if side < 0.0 else v
 
 
 class _Shares(NamedTuple):
@@ -211,7 +196,7 @@ def _shares(s: Surface, wo: Vec3) -> _Shares:
         main = max(_LEAST_MAIN, max_component(flat.mirrored) + max_component(flat.refracted))
     if not s.front:
         return _Shares(0.0, 0.0, main)
-    cosine = s.diffuse * max_component(s.base) + _SHEEN * max_component(sheen_colour(s))
+    cosine = s.diffuse * max_component(s.base) + SHEEN_ALBEDO * max_component(sheen_colour(s))
     return _Shares(cosine, s.clearcoat * coat_fresnel(refraction.thin), main)
 
 
@@ -249,8 +234,8 @@ def eval_pdf(table: Principleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattere
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
-    s, wo = _surface(table, i, at, side), _upwards(wo, side)
-    value, density = _scattered(s, _shares(s, wo), wo, _upwards(wi, side))
+    s, wo = _surface(table, i, at, side), upwards(wo, side)
+    value, density = _scattered(s, _shares(s, wo), wo, upwards(wi, side))
     if side < 0.0 and s.transmitting == 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), density)
     return Scattered(value, density)
@@ -274,7 +259,7 @@ def sample(
     side = wo.z
     if side == 0.0:
         return NO_SAMPLE
-    s, wo = _surface(table, i, at, side), _upwards(wo, side)
+    s, wo = _surface(table, i, at, side), upwards(wo, side)
     shares = _shares(s, wo)
     u = u_lobe * (shares.cosine + shares.coat + shares.main)
     is_through = False
@@ -297,4 +282,4 @@ def sample(
     if not density > 0.0:
         return NO_SAMPLE
     weight = value * (1.0 / density)
-    return BsdfSample(_upwards(wi, side), weight, density, s.eta if is_through else 1.0, False)
+    return BsdfSample(upwards(wi, side), weight, density, s.eta if is_through else 1.0, False)

@@ -48,6 +48,26 @@ class Surface(NamedTuple):
     m: Microfacets
 
 
+SHEEN_ALBEDO = 0.1
+"""The albedo of a white sheen at grazing angles, where it is brightest (measured)."""
+
+_MIN_ALPHA = 1e-3
+"""Mitsuba's: smaller ones count as this."""
+
+
+@kernel
+def microfacets(roughness: float, anisotropic: float) -> Microfacets:
+    """GGX microfacets: alpha is the squared roughness, divided between u and v."""
+    aspect, alpha = math.sqrt(1.0 - 0.9 * anisotropic), roughness * roughness
+    return Microfacets(GGX, max(_MIN_ALPHA, alpha / aspect), max(_MIN_ALPHA, alpha * aspect))
+
+
+@kernel
+def upwards(v: Vec3, side: float) -> Vec3:
+    """`v` mirrored so that wo is above: the microfacets are the same from either side."""
+    return Vec3(v.x, v.y, -v.z) if side < 0.0 else v
+
+
 class Facet(NamedTuple):
     """mirrored, refracted: the factors on radiance of a microfacet of the main lobe, without the
     1 / eta²;  share, passing: the probabilities with which `sample` reflects and refracts."""

@@ -6,7 +6,6 @@ side, and GGX microfacets that reflect, and transmit without bending: what they 
 they reflect, mirrored to the other side.  The same from both sides.
 """
 
-import math
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -16,18 +15,20 @@ from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.principled_lobes import (
+    SHEEN_ALBEDO,
     Surface,
     diffuse,
+    microfacets,
     schlick_weight,
     sheen,
     sheen_colour,
     tint,
+    upwards,
     visible_normals,
 )
 from reference_rt.materials.material import INV_PI, NO_SAMPLE, BsdfSample, Material, Scattered
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import (
-    GGX,
     Microfacets,
     g1,
     half_vector,
@@ -46,14 +47,8 @@ from reference_rt.textures import (
 )
 from reference_rt.textures.parameter import DoubleUnitParameter
 
-_MIN_ALPHA = 1e-3
-"""Mitsuba's: smaller ones count as this."""
-
 _LEAST = 0.05
 """The least reflectance and transmittance that the specular lobes' probabilities assume."""
-
-_SHEEN = 0.1
-"""The albedo of a white sheen at grazing angles, where it is brightest (measured)."""
 
 
 class PrincipledThin(Material):
@@ -133,15 +128,9 @@ class Thin(NamedTuple):
 
 
 @kernel
-def _microfacets(roughness: float, aspect: float) -> Microfacets:
-    alpha = roughness * roughness
-    return Microfacets(GGX, max(_MIN_ALPHA, alpha / aspect), max(_MIN_ALPHA, alpha * aspect))
-
-
-@kernel
 def _thin(table: ThinPrincipleds, i: int, at: At) -> Thin:
     roughness = number_at(table.roughness, i, at)
-    aspect = math.sqrt(1.0 - 0.9 * number_at(table.anisotropic, i, at))
+    anisotropic = number_at(table.anisotropic, i, at)
     spec_trans = number_at(table.spec_trans, i, at)
     passing = 0.5 * number_at(table.diff_trans, i, at)
     eta = float(table.eta[i])
@@ -161,11 +150,13 @@ def _thin(table: ThinPrincipleds, i: int, at: At) -> Thin:
         eta,
         eta,
         True,
-        _microfacets(roughness, aspect),
+        microfacets(roughness, anisotropic),
     )
     # Two rough faces blur less than one: Burley 2015, figure 15.
     narrowed = (0.65 * eta - 0.35) * roughness
-    return Thin(surface, spec_trans, (1.0 - spec_trans) * passing, _microfacets(narrowed, aspect))
+    return Thin(
+        surface, spec_trans, (1.0 - spec_trans) * passing, microfacets(narrowed, anisotropic)
+    )
 
 
 class Pane(NamedTuple):
@@ -204,7 +195,7 @@ def _shares(t: Thin, wo: Vec3) -> _Shares:
     s = t.surface
     pane, base = _pane(t, wo.z), max_component(s.base)
     return _Shares(
-        s.diffuse * base + _SHEEN * max_component(sheen_colour(s)),
+        s.diffuse * base + SHEEN_ALBEDO * max_component(sheen_colour(s)),
         t.passing * base,
         max(t.spec_trans * _LEAST, max_component(pane.mirrored)),
         max(t.spec_trans * _LEAST, max_component(pane.passing)),
@@ -239,18 +230,13 @@ def _scattered(t: Thin, shares: _Shares, wo: Vec3, wi: Vec3) -> Scattered:
 
 
 @kernel
-def _upwards(v: Vec3, side: float) -> Vec3:
-    return Vec3(v.x, v.y, -v.z) if side < 0.0 else v
-
-
-@kernel
 def eval_pdf(table: ThinPrincipleds, i: int, at: At, wo: Vec3, wi: Vec3) -> Scattered:
     """f(wo, wi) |cos wi|, and the density of `sample`."""
     side = wo.z
     if side == 0.0 or wi.z == 0.0:
         return Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
-    t, wo = _thin(table, i, at), _upwards(wo, side)
-    return _scattered(t, _shares(t, wo), wo, _upwards(wi, side))
+    t, wo = _thin(table, i, at), upwards(wo, side)
+    return _scattered(t, _shares(t, wo), wo, upwards(wi, side))
 
 
 @kernel
@@ -262,7 +248,7 @@ def sample(
     side = wo.z
     if side == 0.0:
         return NO_SAMPLE
-    t, wo = _thin(table, i, at), _upwards(wo, side)
+    t, wo = _thin(table, i, at), upwards(wo, side)
     shares = _shares(t, wo)
     first, second = shares.cosine, shares.cosine + shares.behind
     third = second + shares.mirrored
@@ -287,7 +273,7 @@ def sample(
     value, density = _scattered(t, shares, wo, wi)
     if not density > 0.0:
         return NO_SAMPLE
-    return BsdfSample(_upwards(wi, side), value * (1.0 / density), density, 1.0, False)
+    return BsdfSample(upwards(wi, side), value * (1.0 / density), density, 1.0, False)
 
 
 __all__ = ["PrincipledThin", "ThinPrincipleds", "eval_pdf", "sample"]
