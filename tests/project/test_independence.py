@@ -15,7 +15,18 @@ PACKAGE = Path(reference_rt.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 FOREIGN = {"mitsuba", "drjit", "comparisons"}
 ALLOWED = {
-    *("numpy", "numba", "llvmlite", "pydantic", "yaml", "OpenEXR", "Imath", "PIL", "trimesh"),
+    *(
+        "numpy",
+        "numba",
+        "llvmlite",
+        "lazy_loader",
+        "pydantic",
+        "yaml",
+        "OpenEXR",
+        "Imath",
+        "PIL",
+        "trimesh",
+    ),
     *("typer", "rich", "platformdirs", "reference_rt"),
     *sys.stdlib_module_names,
 }

@@ -73,7 +73,7 @@ class Program:
     def _run(self, arguments: Sequence[str], cache: str | None) -> str:
         own = {} if cache is None else {"REFERENCE_RT_CACHE": str(self.folder / cache)}
         run = subprocess.run(
-            [sys.executable, "-m", "reference_rt.cli", *arguments],
+            [sys.executable, "-m", "reference_rt", *arguments],
             env=self.environment | own,
             capture_output=True,
             text=True,

@@ -33,7 +33,7 @@ def measure(setting: Setting) -> list[Row]:
 
 
 def _run(folder: Path, state: str, scenes: Path) -> float:
-    command = [sys.executable, "-m", "reference_rt.cli", "suite", SUITE]
+    command = [sys.executable, "-m", "reference_rt", "suite", SUITE]
     command += ["--jobs", str(JOBS), "-o", str(folder / state), "--scenes", str(scenes)]
     start = time.perf_counter()
     run = subprocess.run(

@@ -91,7 +91,7 @@ def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> 
             "PYTHONPATH": f"{temporary}{os.pathsep}{path}".rstrip(os.pathsep),
         }
         # -P: do not import from the current folder, which may have a reference_rt.
-        command = [sys.executable, "-P", "-m", "reference_rt.cli"]
+        command = [sys.executable, "-P", "-m", "reference_rt"]
         subprocess.run(
             [*command, "warm-up"], env=environment, capture_output=True, **tied(), check=False
         )

@@ -230,7 +230,7 @@ def test_a_picture_of_any_name(tmp_path, name):
     for suffix in (".exr", ".png"):
         out = tmp_path / f"{NAMES[name]}{suffix}"
         done = subprocess.run(
-            [sys.executable, "-m", "reference_rt.cli", "render", str(scene), "-o", str(out)],
+            [sys.executable, "-m", "reference_rt", "render", str(scene), "-o", str(out)],
             capture_output=True,
             env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
             check=False,

@@ -1,4 +1,4 @@
-"""`python -m reference_rt.cli`."""
+"""`python -m reference_rt`: the command line."""
 
 from reference_rt.cli.main import main
 
