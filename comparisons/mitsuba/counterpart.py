@@ -109,6 +109,11 @@ class Counterpart:
                 found.setdefault(mi_shape.shape, []).append(one)
         return found
 
+    def sags(self) -> dict[int, float]:
+        """The largest distance between a shape and the mesh that stands in for it, by the index of
+        the shape, in scene units."""
+        return {shape: max(s.sag for s in found) for shape, found in self.stand_ins().items()}
+
 
 def trace(
     counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT

@@ -72,7 +72,7 @@ def direct(
         reason = "no material has a diffuse or glossy lobe, so that lights are not sampled"
         return RungResult("direct", "not-applicable", reason)
     sizes = ShapeSizes(scene, counterpart.frame)
-    rays = mixed_rays(scene, tables, sizes, pixels, seed)
+    rays = mixed_rays(scene, tables, sizes, pixels, seed, counterpart.sags())
     hits = query.intersect(tables, rays.o, rays.d)
     context = LightContext(scene, tables, counterpart, rays, hits, sizes)
     lights = np.flatnonzero(choice.probability > 0.0)

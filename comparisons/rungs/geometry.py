@@ -58,7 +58,7 @@ def geometry(
     """
     camera = compare_camera(scene, counterpart, pixels)
     sizes = ShapeSizes(scene, counterpart.frame)
-    unaimed = mixed_rays(scene, tables, sizes, pixels, seed)
+    unaimed = mixed_rays(scene, tables, sizes, pixels, seed, counterpart.sags())
     aimed = aimed_rays(tables, sizes, len(unaimed.o), seed)
     rays = joined(unaimed, aimed)
     is_aimed = np.arange(len(rays.o)) >= len(unaimed.o)
@@ -202,8 +202,8 @@ def _traced(
     sizes = comparer.sizes
     reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))
     sag = np.zeros(len(sizes.reach) + 1)
-    for shape, found in counterpart.stand_ins().items():
-        sag[shape] = max(s.sag for s in found)
+    for shape, distance in counterpart.sags().items():
+        sag[shape] = distance
     radius = sizes.frame.delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
     radius += np.maximum(sag[ours.shape], sag[theirs.shape])
     return TracedRays(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))

@@ -17,7 +17,7 @@ from comparisons.experiments.fuzz.data import Data
 from comparisons.experiments.fuzz.effort import DETERMINISTIC, Effort
 from comparisons.experiments.fuzz.finding import Checked, Finding, without_numbers
 from comparisons.experiments.fuzz.generate import parse
-from comparisons.experiments.fuzz.identities import IDENTITIES
+from comparisons.experiments.fuzz.identities import IDENTITIES, Original
 from comparisons.experiments.fuzz.plain import without_textures
 from comparisons.experiments.fuzz.types import types_in
 from comparisons.mitsuba.translate.shapes.stand_ins import coarser
@@ -32,8 +32,6 @@ from reference_rt.materials import (
     RoughDielectric,
     RoughPlastic,
 )
-from reference_rt.rendering.picture import Picture
-from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError, SceneWarning
 
@@ -63,14 +61,12 @@ def _check(data: Data, found: Checked, effort: Effort, folder: Path) -> None:
         text = str(error.message)
         found.findings.append(Finding(rung="scene", cause=without_numbers(text), detail=str(error)))
         return
+    original = Original(scene, np.random.default_rng(found.number), effort.identity_rays)
     if "render" in effort.rungs:
-        _guarded("render", found, lambda: _render(scene, found))
+        _guarded("render", found, lambda: _render(original, found))
     if "identities" in effort.rungs and not found.findings:
-        rng = np.random.default_rng(found.number)
         for name, identity in IDENTITIES.items():
-            if not _guarded(
-                f"identity {name}", found, partial(identity, scene, rng, effort.identity_rays)
-            ):
+            if not _guarded(f"identity {name}", found, partial(identity, original)):
                 break
     only = tuple(rung for rung in DETERMINISTIC if rung in effort.rungs)
     if only and not found.findings:
@@ -108,9 +104,9 @@ def _guarded(name: str, found: Checked, task: Callable[[], str | Finding | None]
     return True
 
 
-def _render(scene: Scene, found: Checked) -> str | Finding:
+def _render(original: Original, found: Checked) -> str | Finding:
     """Our picture: every number finite, but distances, which are infinite for a miss."""
-    picture = render(scene, threads=1)
+    picture = original.picture
     found.lit = bool(np.any(picture.colour > 0.0)) if "colour" in picture.layers else True
     for name, layer in picture.layers.items():
         far = name in ("distance", "depth")
@@ -228,8 +224,3 @@ def pictures(scene: Scene, effort: Effort) -> Case:
 def _failed(case: Case) -> RungResult | None:
     black = "black"  # a picture without light is the generator's, and in both
     return next((r for r in case.rungs if r.status in FAILED and black not in r.reason), None)
-
-
-def as_picture(scene: Scene) -> Picture:
-    """Our picture of a scene, for people."""
-    return render(scene, threads=1)

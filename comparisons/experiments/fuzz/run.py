@@ -18,8 +18,9 @@ from comparisons.experiments.fuzz.types import types_in
 from comparisons.runs.processes import pool
 from reference_rt.util.errors import UsageError
 
-SECONDS = 120.0
-"""Time limit of a scene: sixty times as long as one usually takes; one that takes longer hangs."""
+SECONDS = 600.0
+"""Time limit of a scene, wall clock.  One takes 1 to 10 s of CPU time, and a process on a shared
+machine may get a twentieth of a core; one that takes longer hangs."""
 
 EACH = 3
 """Findings of one rung and cause that are reduced; more are counted."""

@@ -109,11 +109,14 @@ def _coated(
     rough: dict[str, Any],
 ) -> dict[str, Any]:
     """Mitsuba's own material, wrapped in `exact_coat`, which corrects its tables."""
-    base = colour(material.reflectance, context)
+    base, specular = (colour(of, context) for of in (material.reflectance, material.specular))
+    if "mesh_attribute" in (base["type"], specular["type"]):
+        # Mitsuba's plastics need the mean of their colours, which only its other textures have.
+        raise UntranslatableError(f"{type(material).__name__} with vertex colours", "material")
     nested = {
         "type": plugin,
         "diffuse_reflectance": base,
-        "specular_reflectance": colour(material.specular, context),
+        "specular_reflectance": specular,
         "nonlinear": material.nonlinear,
         **_indices(material),
         **rough,

@@ -1,5 +1,7 @@
 """The rays that the rungs compare: camera rays, random rays, and rays from hits."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -44,9 +46,19 @@ def described(film: Film, most: int, rays: Rays, k: int) -> str:
     return f"{of} from {rays.o[k].tolist()} along {rays.d[k].tolist()}"
 
 
-def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, seed: int) -> Rays:
+def mixed_rays(
+    scene: Scene,
+    tables: SceneTables,
+    sizes: ShapeSizes,
+    most: int,
+    seed: int,
+    sags: Mapping[int, float] = MappingProxyType({}),
+) -> Rays:
     """3 `most` rays: at most `most` camera rays, at most `most` in random directions from the hits
-    of these and others, and for the rest random rays through the scene's bounds."""
+    of these and others, and for the rest random rays through the scene's bounds.
+
+    sags: `Counterpart.sags`.
+    """
     camera = pixel_rays(scene, sizes.frame, most)
     if len(scene.shapes) == 0:
         return camera
@@ -57,10 +69,11 @@ def mixed_rays(scene: Scene, tables: SceneTables, sizes: ShapeSizes, most: int, 
     hit = np.flatnonzero(hits.shape >= 0)[:most]
     out = rng.normal(size=(len(hit), 3))
     out /= np.linalg.norm(out, axis=1)[:, None]
-    # Offset from the surface by Mitsuba's own epsilon: an origin within float32's error of a
-    # surface would be on no defined side of it.
+    # Offset from the surface, and from a mesh that stands in for it, by Mitsuba's own epsilon: an
+    # origin within float32's error of a surface would be on no defined side of it.
     side = np.sign(np.sum(out * hits.n[hit], axis=1))
-    height = side * sizes.frame.epsilon(hits.p[hit])
+    sag = np.array([sags.get(shape, 0.0) for shape in hits.shape[hit].tolist()])
+    height = side * (sizes.frame.epsilon(hits.p[hit]) + sag)
     start = hits.p[hit] + hits.n[hit] * height[:, None]
     from_hits = Rays(sizes.frame.rounded(start), round32(out))
     rest = 3 * most - len(camera.o) - len(hit)

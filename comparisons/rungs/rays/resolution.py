@@ -77,7 +77,7 @@ def resolution(
     """Trace rays from the hits of camera, random and secondary rays, and from those behind
     transparent surfaces: towards lights, at random, and straight through glass."""
     sizes = ShapeSizes(scene, counterpart.frame)
-    rays = mixed_rays(scene, tables, sizes, RAYS, seed)
+    rays = mixed_rays(scene, tables, sizes, RAYS, seed, counterpart.sags())
     d = rays.d
     ours, theirs = query.intersect(tables, rays.o, d), trace(counterpart, rays.o, d)
     # Only hits on which the tracers agree are starting points.

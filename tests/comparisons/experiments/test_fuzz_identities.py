@@ -9,7 +9,7 @@ import pytest
 from comparisons.experiments.fuzz import assets
 from comparisons.experiments.fuzz.finding import Finding
 from comparisons.experiments.fuzz.generate import parse
-from comparisons.experiments.fuzz.identities import IDENTITIES, rounded, same_bits
+from comparisons.experiments.fuzz.identities import IDENTITIES, Original, rounded, same_bits
 from reference_rt.rendering import query
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
@@ -55,7 +55,7 @@ def scene(tmp_path_factory):
 
 
 def result(name, scene, rays=240):
-    return IDENTITIES[name](scene, np.random.default_rng(4), rays)
+    return IDENTITIES[name](Original(scene, np.random.default_rng(4), rays))
 
 
 @pytest.mark.parametrize("name", IDENTITIES)

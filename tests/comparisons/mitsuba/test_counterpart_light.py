@@ -164,6 +164,9 @@ def test_blends_with_mirrors_keep_their_light(first: str) -> None:
     assert picture.mean() == pytest.approx(0.75, abs=5.0 * 0.5 / np.sqrt(64_000.0))
 
 
+BALL, BOX = "[1, 1, 1, 0, 0, 0, 0, 0, 0, -1]", "lower: [-1, -1, -1], upper: [1, 1, 1]"
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -185,6 +188,23 @@ def test_blends_with_mirrors_keep_their_light(first: str) -> None:
             "textures: {c: {type: checker}}\n"
             "shapes: [{type: box, material: m}]",
             "Box",
+        ),
+        *(
+            (
+                "materials: {b: {type: bump, base: m, height: w}, m: {type: diffuse},"
+                " t: {type: two_sided, base: b}}\n"
+                "textures: {w: {type: bitmap, file: heights.png}}\n"
+                f"shapes: [{{{shape}, material: t}}]",
+                f"{name} under a bump map",
+            )
+            for name, shape in (
+                ("Torus", "type: torus"),
+                ("Cone", "type: cone, top_radius: 0.8"),
+                (
+                    "Quadric",
+                    f"type: quadric, coefficients: {BALL}, {BOX}",
+                ),
+            )
         ),
     ],
 )

@@ -1,19 +1,17 @@
 """Changes of a scene that must not change what is seen: no second renderer is needed.
 
-An identity is a function of the scene, random numbers and a number of rays.  It returns "agree",
-None if it does not apply, or the `Finding`.  To add one: the function, in `same_bits.py` where
+An identity is a function of the `Original` scene.  It returns "agree", None if it does not apply,
+or the `Finding`.  To add one: the function, in `same_bits.py` where
 rounding is the same in both scenes, else in `rounded.py`; a line below.
 """
 
 from collections.abc import Callable
 
-import numpy as np
-
 from comparisons.experiments.fuzz.finding import Finding
 from comparisons.experiments.fuzz.identities import rounded, same_bits
-from reference_rt.rendering.scene import Scene
+from comparisons.experiments.fuzz.identities.rays import Original
 
-Identity = Callable[[Scene, np.random.Generator, int], str | Finding | None]
+Identity = Callable[[Original], str | Finding | None]
 
 IDENTITIES: dict[str, Identity] = {
     "written": same_bits.written,
@@ -28,4 +26,4 @@ IDENTITIES: dict[str, Identity] = {
 }
 """By name, in the order in which a scene is put through them."""
 
-__all__ = ["IDENTITIES", "Identity"]
+__all__ = ["IDENTITIES", "Identity", "Original"]

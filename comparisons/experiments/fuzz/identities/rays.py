@@ -1,5 +1,6 @@
-"""Random rays of a scene, and their hits in it."""
+"""The scene before it is changed: its picture, random rays, and their hits."""
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,9 @@ from comparisons.geometry.sizes import ShapeSizes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
+from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.query import Intersections
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 
 
@@ -43,6 +46,22 @@ def bench(scene: Scene, rng: np.random.Generator, n: int) -> Bench:
     o, d = o[kept], d[kept]
     size = float(np.abs([lower, upper]).max())
     return Bench(tables, o, d, query.intersect(tables, o, d), size)
+
+
+class Original:
+    """The scene before it is changed;  rng: draws the changes and the rays;  rays: how many.  The
+    picture and the hits of rays are computed once for all identities."""
+
+    def __init__(self, scene: Scene, rng: np.random.Generator, rays: int) -> None:
+        self.scene, self.rng, self.rays = scene, rng, rays
+
+    @cached_property
+    def picture(self) -> Picture:
+        return render(self.scene, threads=1, tables=self.scene.tables)
+
+    @cached_property
+    def bench(self) -> Bench:
+        return bench(self.scene, self.rng, self.rays)
 
 
 def words(hits: Intersections, k: int) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.fuzz.finding import Finding
-from comparisons.experiments.fuzz.identities.rays import Bench, bench, ray_words, words
+from comparisons.experiments.fuzz.identities.rays import Bench, Original, bench, ray_words, words
 from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.translate.moved import moved as in_frame
 from reference_rt.core import transform
@@ -14,7 +14,6 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
-from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Plane
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Solid
@@ -36,17 +35,18 @@ NORMAL = 1e-6
 curvature of ordinary scenes are below 1e-9; a wrong formula is off by 1e-3 and more."""
 
 
-def moved(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
+def moved(original: Original) -> str | Finding:
     """Everything moved by the same vector."""
-    offset = np.round(rng.uniform(-8.0, 8.0, 3), 3)
-    other = in_frame(scene, Frame(tuple((-offset).tolist()), 1.0))
-    at = bench(scene, rng, n)
+    at = original.bench
+    offset = np.round(original.rng.uniform(-8.0, 8.0, 3), 3)
+    other = in_frame(original.scene, Frame(tuple((-offset).tolist()), 1.0))
     hits = query.intersect(other.tables, at.o + offset, at.d)
     return _judged("moved", f"moved by {offset.tolist()}", at, hits, float(np.abs(offset).max()))
 
 
-def grouped(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding | None:
+def grouped(original: Original) -> str | Finding | None:
     """Shapes under one more map each, against an instance of a group of them under that map."""
+    scene, rng = original.scene, original.rng
     bounded = [s for s in scene.shapes if not isinstance(s, Plane)]
     if not bounded or any(isinstance(s, Solid) for s in bounded):
         return None
@@ -66,7 +66,7 @@ def grouped(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding | N
         tables = other.tables
     except SceneError:
         return None
-    at = bench(baked, rng, n)
+    at = bench(baked, rng, original.rays)
     hits = query.intersect(tables, at.o, at.d)
     return _judged("grouped", f"under the map {rows}", at, hits, 0.0)
 

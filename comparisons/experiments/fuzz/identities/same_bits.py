@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons.experiments.fuzz.data import Data, named_in, shapes_of
 from comparisons.experiments.fuzz.finding import Finding
-from comparisons.experiments.fuzz.identities.rays import Bench, bench, ray_words, words
+from comparisons.experiments.fuzz.identities.rays import Bench, Original, ray_words, words
 from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.translate.moved import moved
 from comparisons.rungs.rays.rays import pixel_rays
@@ -31,8 +31,9 @@ def _again(scene: Scene, data: Data) -> Scene:
     return Scene.parse(json.dumps(data), "other.json", scene.folder)
 
 
-def written(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
+def written(original: Original) -> str | Finding:
     """Written as YAML or JSON and read again, the scene is the same."""
+    scene = original.scene
     for what, text in (("YAML", scene.to_yaml()), ("JSON", scene.to_json())):
         again = Scene.parse(text, "again", scene.folder)
         if again != scene or again.digest() != scene.digest():
@@ -42,9 +43,9 @@ def written(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
     return "agree"
 
 
-def renamed(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
+def renamed(original: Original) -> str | Finding:
     """Other names for materials, textures and groups, defined in another order."""
-    data = _data(scene)
+    data = _data(original.scene)
     for section in ("materials", "textures", "groups"):
         table = data.get(section, {})
         data[section] = {f"z{name}": table[name] for name in reversed(table)}
@@ -57,34 +58,33 @@ def renamed(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
         for field in ("material", "group"):
             if shape.get(field) is not None:
                 shape[field] = f"z{shape[field]}"
-    return _same_picture("renamed", scene, _again(scene, data))
+    return _same_picture("renamed", original, _again(original.scene, data))
 
 
-def threads(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
+def threads(original: Original) -> str | Finding:
     """Two threads in place of one."""
-    return _same_picture("threads", scene, scene, 2)
+    return _same_picture("threads", original, original.scene, 2)
 
 
-def hierarchy(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
-    """Another acceleration structure: rays, and the picture for one of them."""
-    at = bench(scene, rng, n)
-    for kind in HIERARCHIES:
-        other = scene.changed(hierarchy=kind)
+def hierarchy(original: Original) -> str | Finding:
+    """Other acceleration structures, two of all: rays, and the picture for one of them."""
+    at = original.bench
+    for kind in original.rng.permutation(HIERARCHIES)[:2].tolist():
+        other = original.scene.changed(hierarchy=kind)
         hits = query.intersect(other.tables, at.o, at.d)
         bad = _unequal(at.hits, hits)
         if len(bad):
             return _of_rays(f"hierarchy {kind}", "hierarchy", at, hits, bad)
-    kind = HIERARCHIES[int(rng.integers(len(HIERARCHIES)))]
-    return _same_picture("hierarchy", scene, scene.changed(hierarchy=kind))
+    return _same_picture("hierarchy", original, other)
 
 
-def reordered(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding | None:
+def reordered(original: Original) -> str | Finding | None:
     """Shapes in another order."""
+    scene, at = original.scene, original.bench
     count = len(scene.shapes)
     if count < 2:
         return None
-    at = bench(scene, rng, n)
-    order = rng.permutation(count)
+    order = original.rng.permutation(count)
     other = scene.changed(shapes=tuple(scene.shapes[k] for k in order))
     hits = query.intersect(other.tables, at.o, at.d)
     old = np.append(order, -1)[hits.shape]
@@ -106,9 +106,9 @@ def _is_tie(scene: Scene, at: Bench, k: int, other: int) -> bool:
     return bool(found.t[0] == at.hits.t[k])
 
 
-def split(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding | None:
+def split(original: Original) -> str | Finding | None:
     """Meshes in two halves."""
-    data = _data(scene)
+    data = _data(original.scene)
     found = False
     shapes: list[Any] = []
     for shape in data.get("shapes", ()):
@@ -122,22 +122,22 @@ def split(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding | Non
     if not found:
         return None
     try:
-        other = _again(scene, data | {"shapes": shapes})
+        other = _again(original.scene, data | {"shapes": shapes})
         tables = other.tables
     except SceneError:  # a half without any area
         return None
-    at = bench(scene, rng, n)
+    at = original.bench
     hits = query.intersect(tables, at.o, at.d)
     bad = np.flatnonzero(_unlike(hits.t, at.hits.t))
     return _of_rays("split meshes", "split", at, hits, bad) if len(bad) else "agree"
 
 
-def scaled(scene: Scene, rng: np.random.Generator, n: int) -> str | Finding:
+def scaled(original: Original) -> str | Finding:
     """All lengths times a power of two: the same t along rays scaled likewise, and the same light
     of Whitted ray tracing."""
-    factor = 2.0 ** int(rng.integers(-6, 7))
+    scene, at = original.scene, original.bench
+    factor = 2.0 ** int(original.rng.integers(-6, 7))
     other = moved(scene, Frame((0.0, 0.0, 0.0), factor))
-    at = bench(scene, rng, n)
     hits = query.intersect(other.tables, factor * at.o, factor * at.d)
     bad = _unequal(at.hits, hits)
     if len(bad):
@@ -186,8 +186,8 @@ def _of_rays(how: str, identity: str, at: Bench, hits: Intersections, bad: Any) 
     )
 
 
-def _same_picture(name: str, scene: Scene, other: Scene, count: int = 1) -> str | Finding:
-    first, second = render(scene, threads=1), render(other, threads=count)
+def _same_picture(name: str, original: Original, other: Scene, count: int = 1) -> str | Finding:
+    first, second = original.picture, render(other, threads=count, tables=other.tables)
     for layer, values in first.layers.items():
         wrong = np.argwhere(_unlike(values, second.layers[layer]))
         if len(wrong):

@@ -190,7 +190,7 @@ def quadric_surface(shape: Quadric) -> tuple[list[Patch], Implicit, Box]:
     box = np.array(shape.lower), np.array(shape.upper)
 
     def value(p: FloatArray) -> FloatArray:
-        return np.asarray(np.einsum("...i,ij,...j->...", p, matrix, p) + p @ linear + j)
+        return np.asarray(np.sum((p @ matrix + linear) * p, axis=-1) + j)
 
     surface = Implicit(value, lambda p: np.asarray(2.0 * p @ matrix + linear))
     return patches_of(matrix, linear, j, box), surface, box
