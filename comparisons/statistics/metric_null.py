@@ -13,7 +13,7 @@ import numpy as np
 from scipy import stats
 
 from comparisons.results.case import FloatArray, Images
-from comparisons.statistics.metrics import local_errors, relative_squares
+from comparisons.statistics.metrics import LocalErrors, local_errors, relative_squares
 from comparisons.statistics.scales import HALF, TILE, tile_sums
 from comparisons.statistics.sides import side_of
 from comparisons.statistics.unmet import share_unmet, unmet_variance
@@ -32,6 +32,12 @@ drawn."""
 
 FEWEST = 4
 """Least number of replicates of a side for resampling: halves of fewer lack the tails."""
+
+FEWEST_PIXELS = 16
+"""Least effective number of pixels that have the noise of the squared difference.  Draws turn each
+replicate either way: three samples that met a lamp in one pixel then count once or thrice, and in
+the two draws of a large picture a single such pixel counts once in half of all cases, 16 such
+pixels in one of 65,536."""
 
 MOST_NOISE = 0.5
 """Largest noise of the pictures' difference, as a fraction of the median tile's radiance: with
@@ -70,7 +76,8 @@ def noise_alone(
     images: Images, replicates: tuple[FloatArray, FloatArray], seed: int = 0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Means of the `LocalErrors`, (5,) each: of the pictures, from noise alone, and the highest
-    that are permitted: those of NOISE_LIMIT times the noise, plus the scatter at LEVEL.
+    that are permitted: those of NOISE_LIMIT times the noise, plus the scatter at LEVEL.  These are
+    infinite where fewer than FEWEST_PIXELS have the noise: draws do not show how far it scatters.
 
     Exposure is set by the weighted mean of both pictures, which is the same in all draws.
     """
@@ -80,28 +87,29 @@ def noise_alone(
     height, width = images.reference.shape[:2]
     tiles = math.ceil(height / TILE) * math.ceil(width / TILE)
 
-    def pair(difference: FloatArray) -> Images:
-        return Images(middle + share * difference, middle - (1.0 - share) * difference)
+    def errors(difference: FloatArray) -> LocalErrors:
+        drawn = Images(middle + share * difference, middle - (1.0 - share) * difference)
+        return local_errors(drawn, middle)
 
-    drawn, excess = [], []
+    drawn = []
     for k in range(max(2, math.ceil(TILES / tiles))):
         difference = _contrast(rng, replicates[0]) - _contrast(rng, replicates[1])
-        drawn.append(local_errors(pair(difference), middle))
-        turned = relative_squares(pair(-difference), middle)
-        excess.append(float(np.maximum(turned - drawn[k].relative2, 0.0).mean()))
+        drawn.append(errors(difference))
         if k == 0:
-            more = local_errors(pair(math.sqrt(NOISE_LIMIT) * difference), middle)
+            more = errors(math.sqrt(NOISE_LIMIT) * difference)
     expected, highest = np.empty(5), np.empty(5)
     for k, maps in enumerate(zip(*drawn, strict=True)):
         expected[k] = np.mean(maps)
         allowance = max(0.0, float(more[k].mean() - maps[0].mean()))
         highest[k] = expected[k] + allowance + _scatter(np.stack(maps))
-    # relMSE divides by the reference: a firefly of the candidate counts a million times what one of
-    # the reference does, and the few draws may have all fireflies on the reference's side.
-    highest[-1] += np.mean(excess)
-    found = np.array(
-        [m.mean() for m in local_errors(pair(images.candidate - images.reference), middle)]
-    )
+    found = np.array([m.mean() for m in errors(images.candidate - images.reference)])
+    variance = np.asarray(sum(x.var(axis=0, ddof=1) / len(x) for x in replicates))
+    darker = np.minimum(images.candidate, images.reference)
+    relative = relative_squares(Images(darker + np.sqrt(variance), darker), middle)
+    # The other maps are bounded: no pixel has more than its share of them.
+    for k, noise in ((-2, variance.mean(axis=-1)), (-1, relative)):
+        if noise.sum() ** 2 < FEWEST_PIXELS * (noise**2).sum():
+            highest[k] = math.inf
     return found, expected, highest
 
 
