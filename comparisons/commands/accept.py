@@ -7,7 +7,8 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Baselines, Layer, NoiseFree
-from reference_rt.cli.main import adjusted, guarded, say
+from reference_rt.cli.adjusted import adjusted
+from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import SceneError, UsageError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import typer
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Fresh, out_folder
 from reference_rt.cli.defaults import Defaults, by_name
-from reference_rt.cli.main import guarded, say
+from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import SceneError, UsageError, printable
 
 if TYPE_CHECKING:

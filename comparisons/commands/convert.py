@@ -7,7 +7,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from reference_rt.cli.defaults import Defaults, by_name
-from reference_rt.cli.main import guarded, say
+from reference_rt.cli.guarded import guarded, say
 
 
 @guarded

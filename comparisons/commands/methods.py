@@ -8,7 +8,7 @@ import typer
 
 from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import out_folder
-from reference_rt.cli.main import guarded, say
+from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from reference_rt.cli.main import guarded, say
+from reference_rt.cli.guarded import guarded, say
 
 
 @guarded

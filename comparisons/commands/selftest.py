@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.options import Scenes, out_folder
-from reference_rt.cli.main import guarded
+from reference_rt.cli.guarded import guarded
 from reference_rt.util.errors import UsageError
 
 

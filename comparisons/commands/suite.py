@@ -11,7 +11,7 @@ from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import Fresh, GitHub, JUnit, Scenes
 from comparisons.results.rungs import COMPARED
 from reference_rt.cli.defaults import Defaults, by_name
-from reference_rt.cli.main import guarded, say
+from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
 MOST_JOBS = 4

@@ -26,7 +26,7 @@ from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
 from comparisons.results.sealed import sealed, unsealed
-from reference_rt.cli.main import adjusted
+from reference_rt.cli.adjusted import adjusted
 from reference_rt.core.exr import write_exr
 from reference_rt.core.model import Description
 from reference_rt.rendering.scene import Scene

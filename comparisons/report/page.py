@@ -28,18 +28,6 @@ from comparisons.results.naming import named
 MOST_BYTES = 15_000_000
 """Default size limit of a page: it can still be mailed, and opens without a wait."""
 
-ORDER: tuple[Status, ...] = (
-    "invalid",
-    "differ",
-    "inconclusive",
-    "not-comparable",
-    "not-applicable",
-    "reference-limited",
-    "agree",
-    "unchanged",
-)
-"""The order of cases on the page: those that need attention first."""
-
 FAILED = frozenset({"invalid", "differ", "inconclusive"})
 """Verdicts whose pictures are the last to lose detail."""
 
@@ -54,6 +42,9 @@ SIGNS: dict[Status, str] = {
     "unchanged": "=",
 }
 """Shown beside a verdict, so that it is recognised without its colour."""
+
+ORDER = tuple(SIGNS)
+"""The order of cases on the page: those that need attention first."""
 
 MOST_OPEN = 4
 """Cases of a page whose passing cases are shown whole, too; of longer pages they are collapsed."""

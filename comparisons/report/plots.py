@@ -14,11 +14,13 @@ import numpy.typing as npt
 
 from comparisons.report.values import power_of_ten
 
-PALETTE = ("#3b8ed0", "#d9662b", "#2f9e77", "#b65fbf", "#c9920e", "#d4527a", "#7a8794", "#5b6ee1")
-"""Colours of curves in turn; visible on white and on black."""
+PALETTE = ("#0072b2", "#d55e00", "#779966", "#cc0099", "#0099ee", "#995566", "#bb7799", "#bb3300")
+"""Colours of curves in turn: a contrast of at least 3 on white and on the dark page, and distinct
+for every kind of colour vision (CIEDE2000 of any two at least 10)."""
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-"""Markers of curves in turn, so that curves do not differ in colour alone."""
+"""Markers of curves in turn, so that curves do not differ in colour alone.  Earlier curves have
+larger, open markers and thicker lines, so that curves in the same place are all visible."""
 
 _INK = "#010203"
 """Placeholder for the page's text colour while matplotlib draws."""
@@ -88,13 +90,15 @@ def log_log(
         axes = figure.add_subplot()
         axes.set_xscale("log")
         axes.set_yscale("log")
-        drawn = [_draw(axes, curve, k) for k, curve in enumerate(curves)]
+        numbers = [k if c.colour is None else c.colour for k, c in enumerate(curves)]
+        last = max(numbers, default=0)
+        drawn = [_draw(axes, c, k, last - k) for c, k in zip(curves, numbers, strict=True)]
         _limit(axes, [points for points in drawn if len(points[0])], levels or {})
         bottom, top = axes.get_ylim()
         for name, y in (levels or {}).items():
             if bottom <= y <= top:
                 axes.axhline(y, color=_INK, linewidth=0.8, linestyle=":", alpha=0.7)
-                place = ((0.0, y), (3, 2), axes.get_yaxis_transform(), "offset points")
+                place = ((0.0, y), (3, 7), axes.get_yaxis_transform(), "offset points")
                 axes.annotate(name, *place, fontsize=8.5)
         left, right = axes.get_xlim()
         for name, x in (uprights or {}).items():
@@ -131,10 +135,12 @@ def _margins(figure: Any, rows: int, titled: bool) -> None:
     )
 
 
-def _draw(axes: Any, curve: Curve, place: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Draw a curve; return the points that can be shown."""
+def _draw(
+    axes: Any, curve: Curve, number: int, above: int
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Draw a curve of colour `number`, with `above` curves over it; return the points that can be
+    shown."""
     x, y = (np.asarray(values, dtype=np.float64) for values in (curve.x, curve.y))
-    number = place if curve.colour is None else curve.colour
     colour = PALETTE[number % len(PALETTE)]
     fits = np.isfinite(x) & (x > 0.0)
     if curve.low is not None and curve.high is not None:
@@ -146,14 +152,18 @@ def _draw(axes: Any, curve: Curve, place: int) -> tuple[npt.NDArray[Any], npt.ND
             x[banded], low[banded], high[banded], color=colour, alpha=0.18, linewidth=0.0
         )
     fits &= np.isfinite(y) & (y > 0.0)
+    above = min(above, 4)
     axes.plot(
         x[fits],
         y[fits],
         color=colour,
-        linewidth=1.1 if curve.dashed else 1.6,
+        linewidth=1.1 if curve.dashed else 1.3 + 0.6 * above,
         linestyle="--" if curve.dashed else "-",
         marker=MARKERS[number % len(MARKERS)] if curve.marked else None,
-        markersize=4.5,
+        markersize=4.5 + 1.6 * above,
+        markerfacecolor="none",
+        markeredgewidth=1.3,
+        clip_on=False,  # the limits are around the points
         label=curve.name or "_",
     )
     return x[fits], y[fits]

@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
-from comparisons.report.values import label, rows_of, shown
+from comparisons.report.values import label, rows_of, shown, typeset
 from reference_rt.util.errors import printable
 from reference_rt.util.files import replacing
 
@@ -15,7 +15,7 @@ from reference_rt.util.files import replacing
 def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -> Template:
     """The template `name` in a folder of `comparisons`; it may include files of `report`.
 
-    filters: in addition to `shown` and `label`.
+    filters: in addition to those of `values`.
     """
     environment = Environment(
         loader=ChoiceLoader([PackageLoader("comparisons", each) for each in (folder, "report")]),
@@ -24,7 +24,8 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"shown": shown, "label": label, "rows": rows_of, **filters}
+    environment.filters |= {"shown": shown, "label": label, "rows": rows_of}
+    environment.filters |= {"typeset": typeset, **filters}
     return environment.get_template(name)
 
 

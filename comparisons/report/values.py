@@ -1,6 +1,7 @@
 """Values as text for people."""
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -59,6 +60,20 @@ def percent(fraction: float) -> str:
 def label(name: object) -> str:
     """`worst_tile_x` -> `worst tile x`"""
     return str(name).replace("_", " ")
+
+
+def typeset(text: str) -> str:
+    """Formulas in plain text with the signs of print: 1e-6 -> 10⁻⁶, 2^40 -> 2⁴⁰, <= -> ≤."""
+    text = re.sub(r"\b(\d+(?:\.\d+)?)e([+-]?\d+)\b", _printed_power, text)
+    text = re.sub(r"\^(-?\d+)(?![\d.]*\w)", lambda found: _raised(int(found[1])), text)
+    for plain, printed in (("<=", "≤"), (">=", "≥"), (" - ", " − ")):
+        text = text.replace(plain, printed)
+    return text
+
+
+def _printed_power(found: re.Match[str]) -> str:
+    mantissa = "" if found[1] == "1" else f"{found[1]} × "
+    return f"{mantissa}10{_raised(int(found[2]))}"
 
 
 def _real(value: float, format_: str = ".4g") -> str:

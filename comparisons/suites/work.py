@@ -9,13 +9,13 @@ from typing import NamedTuple, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from comparisons.compare.budget import Budget
-from reference_rt.cli.main import adjusted
+from reference_rt.cli.adjusted import adjusted
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, SceneWarning, printable
 
 
 class Changes(BaseModel):
-    """Changes to a scene by command-line options; see `reference_rt.cli.main.adjusted`."""
+    """Changes to a scene by command-line options; see `reference_rt.cli.adjusted.adjusted`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

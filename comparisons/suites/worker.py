@@ -24,7 +24,7 @@ from comparisons.results.case import WARNING, Case
 from comparisons.results.stored_case import write_case
 from comparisons.runs.processes.protocol import carry_out, private_stdout, send
 from comparisons.suites.work import Changes
-from reference_rt.cli.main import scene_warnings
+from reference_rt.cli.guarded import scene_warnings
 from reference_rt.rendering.scene import Scene
 
 Runner = Callable[..., Case]

@@ -12,13 +12,9 @@ from typing import Annotated
 import typer
 
 from reference_rt.cli import render_options
-from reference_rt.cli.adjusted import SceneArgument, without_blas
-from reference_rt.cli.adjusted import adjusted as adjusted
+from reference_rt.cli.adjusted import SceneArgument, adjusted, without_blas
 from reference_rt.cli.defaults import Defaults, by_name
-from reference_rt.cli.guarded import guarded as guarded
-from reference_rt.cli.guarded import is_output_lost, lost_output
-from reference_rt.cli.guarded import say as say
-from reference_rt.cli.guarded import scene_warnings as scene_warnings
+from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
 from reference_rt.cli.preview_command import preview
 from reference_rt.util.errors import ImageError
 from reference_rt.util.signals import catch_signals, exit_code_of

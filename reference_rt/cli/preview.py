@@ -2,16 +2,23 @@
 
 import os
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
 from reference_rt.cli.guarded import say
+from reference_rt.cli.quantities import percentage
 from reference_rt.cli.terminal_picture import Pixels, draws_sixels, half_blocks, room, sixels
-from reference_rt.rendering.image import display, eight_bits, write_png
-from reference_rt.rendering.progressive import Stage, progressive
-from reference_rt.rendering.provenance import provenance
+from reference_rt.rendering.image import display, eight_bits
+from reference_rt.rendering.loop import Limits
+from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.scene import Scene
+from reference_rt.rendering.session import Session
+from reference_rt.rendering.settings import with_settings
+from reference_rt.scene.build import BuiltScene
+from reference_rt.scene.model import SceneModel
+from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import UsageError
 from reference_rt.util.files import check_writable
 
@@ -24,9 +31,9 @@ class Closed(Exception):  # noqa: N818 - it is no error
 
 
 class View(Protocol):
-    """A place where stages of a picture are shown."""
+    """A place where a picture is shown."""
 
-    def show(self, stage: Stage) -> None:
+    def show(self, picture: Picture) -> None:
         """Show the picture in place of the one before."""
 
     def pump(self) -> None:
@@ -36,27 +43,56 @@ class View(Protocol):
         """Return when the last picture need not be shown any more."""
 
 
-def preview(scene: Scene, view: View, spp: int, noise: float, threads: int | None) -> None:
-    """Show the picture until it has `spp` samples per pixel, or at most `noise` as the relative
-    standard error of a typical pixel, or until the view is closed."""
-    stages = progressive(scene, spp=spp, threads=threads, progress=lambda what, part: view.pump())
+def preview(scene: Scene, view: View, spp: int, error: float, threads: int | None) -> None:
+    """Show the picture until it has `spp` samples per pixel, or at most `error` as its relative
+    standard error, or until the view is closed.  Samplers without random numbers have their own
+    number of samples."""
+    scene = scene.changed(film=scene.film.model_copy(update={"layers": ()}))
     try:
-        for stage in stages:
-            view.show(stage)
-            if stage.noise <= noise:
-                break
+        # A picture of one sample is there at once; the first pass of another has 16.
+        for count in (1, spp) if _is_noisy(scene) else (None,):
+            _show(with_settings(scene, spp=count), view, error, threads)
         view.wait()
     except Closed:
         return
 
 
-def words(stage: Stage) -> str:
-    """A stage in a line."""
-    count = "1 sample" if stage.spp == 1 else f"{stage.spp} samples"
-    if stage.noise == 0.0:
-        return f"{count} per pixel, no noise"
-    known = f", noise {100.0 * stage.noise:.2g} %" if stage.noise < 1e3 else ""
-    return f"{count} per pixel{known}"
+def _show(scene: BuiltScene, view: View, error: float, threads: int | None) -> None:
+    """Render, and show the picture again and again: each second at first, later after a tenth of
+    the time so far."""
+    with ProgressLine() as progress:
+        limits = Limits(error=error) if _is_noisy(scene) else Limits()
+        session = Session(scene, threads=threads, compiling=progress.compiling, limits=limits)
+    began = due = time.monotonic()
+
+    def watch() -> None:
+        nonlocal due
+        view.pump()
+        now = time.monotonic()
+        picture = session.preview() if now >= due else None
+        if picture is not None and picture.taken is not None and picture.taken.fewest > 0:
+            view.show(picture)
+            due = now + max(1.0, (now - began) / 10.0)
+
+    with session:
+        session.run(lambda what, fraction: None, watch)
+        view.show(session.picture())
+
+
+def _is_noisy(scene: SceneModel) -> bool:
+    return hasattr(scene.resolved_sampler, "seed")
+
+
+def words(picture: Picture) -> str:
+    """The samples and the noise of a picture in a line."""
+    taken, scene = picture.taken, picture.scene
+    assert taken is not None
+    assert scene is not None
+    count = f"{taken.fewest} to {taken.most}" if taken.most > taken.fewest else f"{taken.most}"
+    text = f"{count} sample{'s' if taken.most > 1 else ''} per pixel"
+    if not _is_noisy(scene):
+        return f"{text}, no noise"
+    return text if taken.error is None else f"{text}, relative error {percentage(taken.error)}"
 
 
 def view_of(to: str, scene: Scene) -> View:
@@ -64,7 +100,7 @@ def view_of(to: str, scene: Scene) -> View:
     Raises UsageError."""
     if to == "":
         window = _window(scene)
-        return window or File(Path(f"{scene.name}.preview.png"), scene)
+        return window or File(Path(f"{scene.name}.preview.png"))
     if to == "window":
         window = _window(scene)
         if window is None:
@@ -75,24 +111,24 @@ def view_of(to: str, scene: Scene) -> View:
     if Path(to).suffix.lower() != ".png":
         known = ", ".join(PLACES)
         raise UsageError(f"--to: expected one of {known} or a .png file, got '{to}'")
-    return File(Path(to), scene)
+    return File(Path(to))
 
 
-def pixels_of(stage: Stage) -> Pixels:
+def pixels_of(picture: Picture) -> Pixels:
     """The picture as the command `render` would write it to a .png file."""
-    return eight_bits(display(stage.picture))
+    return eight_bits(display(picture))
 
 
 class File:
     """A PNG file, which viewers that watch their file show again whenever it is rewritten."""
 
-    def __init__(self, path: Path, scene: Scene) -> None:
+    def __init__(self, path: Path) -> None:
         check_writable(path)
-        self.path, self._header = path, provenance(scene)
+        self.path = path
 
-    def show(self, stage: Stage) -> None:
-        write_png(self.path, display(stage.picture), self._header)
-        say(f"{self.path}: {words(stage)}", err=True)
+    def show(self, picture: Picture) -> None:
+        picture.save(self.path)
+        say(f"{self.path}: {words(picture)}", err=True)
 
     def pump(self) -> None:
         """Nothing to do: files do not respond."""
@@ -112,11 +148,11 @@ class Terminal:
         self._draw = draw or (sixels if draws_sixels() else half_blocks)
         self._begun = False
 
-    def show(self, stage: Stage) -> None:
-        text = self._draw(pixels_of(stage), *room())
+    def show(self, picture: Picture) -> None:
+        text = self._draw(pixels_of(picture), *room())
         # Home, and the first time also clear: later pictures cover the one before.
         sys.stdout.write(("\x1b[H" if self._begun else "\x1b[2J\x1b[H") + text)
-        sys.stdout.write(f"\x1b[K{words(stage)}\n")
+        sys.stdout.write(f"\x1b[K{words(picture)}\n")
         sys.stdout.flush()
         self._begun = True
 
@@ -144,13 +180,13 @@ class Window:
         """Close the window; the next `pump` raises Closed."""
         self._open = False
 
-    def show(self, stage: Stage) -> None:
+    def show(self, picture: Picture) -> None:
         from PIL import Image, ImageTk
 
-        photo = ImageTk.PhotoImage(Image.fromarray(pixels_of(stage)), master=self._root)
+        photo = ImageTk.PhotoImage(Image.fromarray(pixels_of(picture)), master=self._root)
         self._label.configure(image=photo)
         self._photo = photo  # Tk itself holds no reference
-        self._root.title(f"{self._title}: {words(stage)}")
+        self._root.title(f"{self._title}: {words(picture)}")
         self.pump()
 
     def pump(self) -> None:

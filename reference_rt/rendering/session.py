@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
+from reference_rt.core.arrays import IntArray
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Report
@@ -152,15 +153,18 @@ class Session:
     def picture(self) -> Picture:
         """The picture so far, of a render whose pixels are all in memory."""
         assert self.frame.whole is not None
-        return self._picture(self.frame.whole, self.frame.samples(), self.taken)
+        return self._picture(self.frame.whole, self.frame.samples())
 
     def preview(self) -> Picture | None:
         """The picture a moment ago, while it is rendered; None if it must be asked for again."""
         found = self.loop.snapshot()
-        return None if found is None else self._picture(*found, self.taken)
+        return None if found is None else self._picture(*found)
 
-    def _picture(self, sums: Any, samples: Any, taken: Taken) -> Picture:
+    def _picture(self, sums: Any, samples: IntArray) -> Picture:
+        """The picture of some sums, which may be older than `taken`."""
         film = self.scene.film
+        counts = int(samples.min()), int(samples.max())
+        taken = Taken(*counts, samples_of(self.scene), self.loop.error)
         count = taken.fewest if taken.fewest == taken.most else samples
         layers = {
             name: layer.reshape(film.height, film.width, *layer.shape[1:])

@@ -8,6 +8,32 @@ from comparisons.statistics.metrics import encode
 SIZE = 12, 8
 
 
+CONTRASTS = """() => {
+    const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+    const parts = (text) => text.match(/[\\d.]+/g).map(Number);
+    const luminance = ([r, g, b]) =>
+        0.2126 * linear(r / 255) + 0.7152 * linear(g / 255) + 0.0722 * linear(b / 255);
+    const behind = (element) => {
+        for (let one = element; one; one = one.parentElement) {
+            const colour = parts(getComputedStyle(one).backgroundColor);
+            if (colour.length === 3 || colour[3] === 1) return colour;
+        }
+        return [255, 255, 255];
+    };
+    const found = [];
+    for (const element of document.querySelectorAll("body *")) {
+        const text = [...element.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
+        if (!text || !element.checkVisibility()) continue;
+        if (element.closest("svg, .unseen, option")) continue;
+        const [a, b] = [parts(getComputedStyle(element).color), behind(element)].map(luminance);
+        const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+        if (contrast < 4.5) found.push(`${element.tagName}.${element.className}: ${contrast}`);
+    }
+    return found;
+}"""
+"""Elements whose text has a contrast below 4.5, as text."""
+
+
 def case(images, scene="box", verdict="differ", reason="why", **more):
     metrics = Metrics(0.9, 0.1, 30.0, 0.5, 0.25, (0.0, 0.0, -0.01), 0)
     rungs = (RungResult("geometry", "agree", "holds", {"rays": 7}),)

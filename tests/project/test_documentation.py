@@ -77,6 +77,10 @@ def test_links_within_the_repository(page: Path) -> None:
     assert missing == []
 
 
+def test_no_page_has_both_sides_of_a_merge() -> None:
+    assert [path for path in PAGES if re.search("^(<{7}|>{7}) ", path.read_text(), re.M)] == []
+
+
 def test_every_scene_is_in_the_gallery() -> None:
     gallery = (ROOT / "docs/gallery.md").read_text(encoding="utf-8")
     names = [path.stem for path in (ROOT / "scenes").glob("*.yaml")]

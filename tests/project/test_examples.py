@@ -53,14 +53,30 @@ def test_lens(run):
     assert abs(float(near) - float(exact)) < 1e-3
 
 
-def test_batch(run, tmp_path):
+@pytest.fixture
+def folder(tmp_path):
+    """Of two scenes, and one that is none."""
     scene = (ROOT / "scenes/light_spot.yaml").read_text(encoding="utf-8")
     for name, text in (("a", scene), ("b", scene), ("c", "shapes: [{type: spher}]")):
         (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
-    said = run("batch", str(tmp_path), str(tmp_path / "sheet.png"))
+    return tmp_path
+
+
+def test_batch(run, folder):
+    said = run("batch", str(folder), str(folder / "sheet.png"))
     assert said.count("<Picture 80 x") == 2
     assert "c.yaml:1" in said
-    assert (tmp_path / "sheet.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "sheet.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.filterwarnings("default")  # of Dask's
+def test_cluster(run, folder):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(1, processes=False, dashboard_address=None) as cluster:
+        said = run("cluster", str(folder), str(folder / "out"), cluster.scheduler_address)
+    assert said.count("<Picture ") == 2
+    assert "c.yaml: " in said
+    assert sorted(path.name for path in (folder / "out").iterdir()) == ["a.exr", "b.exr"]
 
 
 @pytest.mark.parametrize(("power", "verdict"), [("0.5", "agree"), ("0.4", "differ")])

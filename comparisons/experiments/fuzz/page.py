@@ -32,7 +32,6 @@ def write_page(path: Path, plan: Plan, run: Run, provenance: Mapping[str, Any]) 
         findings=findings,
         rungs={name: counts.most_common() for name, counts in rungs.items()},
         coverage=coverage(checked.types for checked in run.scenes.values()),
-        settings=plan.settings,
-        provenance=provenance,
+        provenance={**provenance, "seed": plan.seed},
     )
     write(path, page)

@@ -156,6 +156,11 @@ def told(tmp_path_factory):
     return headline, page, json.loads((folder / "results.json").read_text()), curves
 
 
+def test_the_page_can_be_read_by_everybody(told, tmp_path, check_page):
+    (tmp_path / "page.html").write_text(told[1], encoding="utf-8")
+    check_page(tmp_path / "page.html")
+
+
 def cells(part):
     """(class, text) of each cell of a table."""
     found = re.findall(r"<td(?: class=\"(\w*)\")?[^>]*>(.*?)</td>", part, re.DOTALL)

@@ -98,6 +98,12 @@ def test_findings_of_one_cause_are_one(tmp_path, fake_workers):
     assert "{type: sphere}" in page
 
 
+def test_the_page_can_be_read_by_everybody(tmp_path, fake_workers, check_page):
+    plan = Plan(tmp_path, first=4, count=3, jobs=1)
+    write_page(tmp_path / "fuzz.html", plan, run(plan, quiet), {})
+    check_page(tmp_path / "fuzz.html")
+
+
 def test_it_stops_at_the_first_finding(tmp_path, fake_workers):
     found = run(Plan(tmp_path, first=4, count=100, jobs=1, stop=True), quiet)
     assert len(found.scenes) == 1

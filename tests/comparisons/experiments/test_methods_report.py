@@ -66,6 +66,11 @@ def test_totals_add_up(rows):
     assert set(series_of(robust)) == {"distance", "rim", "surface"}
 
 
+def test_the_page_can_be_read_by_everybody(rows, tmp_path, check_page):
+    write_page(tmp_path / "methods.html", rows, TINY, 5, {})
+    check_page(tmp_path / "methods.html")
+
+
 def test_the_page_stands_alone(rows, tmp_path):
     write_page(tmp_path / "methods.html", rows, TINY, 5, {"machine": "<here>"})
     page = (tmp_path / "methods.html").read_text(encoding="utf-8")

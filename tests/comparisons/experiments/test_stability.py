@@ -67,6 +67,11 @@ def test_limits_and_ratios(fakes, tmp_path):
     assert page.count("data:image/png") == 2  # Mitsuba's first failure, and ours there
 
 
+def test_the_page_can_be_read_by_everybody(fakes, tmp_path, check_page):
+    stability(tmp_path, "--family", "T1", "--family", "T3")
+    check_page(tmp_path / "stability.html")
+
+
 def test_what_was_found_is_kept_and_the_same_again(fakes, tmp_path):
     stability(tmp_path, "--family", "T1")
     first = json.loads((tmp_path / "results.json").read_text())

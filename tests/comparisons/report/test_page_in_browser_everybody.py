@@ -4,31 +4,7 @@ import json
 from itertools import pairwise
 
 import pytest
-from page_in_browser import FOUR, PICTURES, case, measured, pixel
-
-CONTRASTS = """() => {
-    const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
-    const parts = (text) => text.match(/[\\d.]+/g).map(Number);
-    const luminance = ([r, g, b]) =>
-        0.2126 * linear(r / 255) + 0.7152 * linear(g / 255) + 0.0722 * linear(b / 255);
-    const behind = (element) => {
-        for (let one = element; one; one = one.parentElement) {
-            const colour = parts(getComputedStyle(one).backgroundColor);
-            if (colour.length === 3 || colour[3] === 1) return colour;
-        }
-        return [255, 255, 255];
-    };
-    const found = [];
-    for (const element of document.querySelectorAll("body *")) {
-        const text = [...element.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
-        if (!text || !element.checkVisibility()) continue;
-        if (element.closest("svg, .unseen, option")) continue;
-        const [a, b] = [parts(getComputedStyle(element).color), behind(element)].map(luminance);
-        const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-        if (contrast < 4.5) found.push(`${element.tagName}.${element.className}: ${contrast}`);
-    }
-    return found;
-}"""
+from page_in_browser import CONTRASTS, FOUR, PICTURES, case, measured, pixel
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

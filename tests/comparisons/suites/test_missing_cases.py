@@ -10,8 +10,8 @@ from contextlib import suppress
 
 import pytest
 from junitparser import JUnitXml
+from report_page import case
 from suite_runs import processes, run_in, scenes, signal_in_the_next_case
-from test_ci import case
 
 from comparisons.report import write_report
 from comparisons.report.ci import github, junit
@@ -34,7 +34,7 @@ def test_how_many_are_there():
 
 def test_exit_code():
     assert exit_code(RAN, MISSING) == 1
-    assert exit_code([case("invalid", rung="scene")], MISSING) == 3
+    assert exit_code([case("invalid")], MISSING) == 3
     assert exit_code([], MISSING) == 4
 
 

@@ -12,7 +12,7 @@ from small_scenes import LAYERS, same, small
 import reference_rt as rt
 from reference_rt.core.exr import read_exr
 from reference_rt.rendering.framebuffer import Framebuffer
-from reference_rt.rendering.loop import Limits
+from reference_rt.rendering.loop import Limits, Snapshot
 from reference_rt.rendering.processes import Processes
 from reference_rt.rendering.remote import compute_remotely, remote_scene
 from reference_rt.rendering.session import Session, Storage
@@ -210,3 +210,14 @@ def test_workers_with_other_files_refuse(tmp_path, box):
 def test_a_framebuffer_has_what_its_samples_say():
     frame = Framebuffer({"colour": 3}, 100)
     assert frame.samples().tolist() == [0] * 100
+
+
+def test_a_preview_is_of_the_samples_of_its_moment(box):
+    """The render goes on between a snapshot and the picture that is made of it."""
+    with Session(box, threads=1) as session:
+        session.run(silent)
+        sums = {name: array / 2.0 for name, array in session.frame.whole.items()}
+        session.loop._snapshot = Snapshot(sums, session.frame.samples() // 2)
+        preview = session.preview()
+        assert (preview.taken.fewest, preview.taken.most, preview.taken.wanted) == (20, 20, 40)
+        assert np.array_equal(preview.colour, session.picture().colour)

@@ -4,6 +4,7 @@ import math
 
 from comparisons.experiments.stability.harness.summary import SeriesSummary, contestants, named
 from comparisons.report.plots import Curve, log_log
+from comparisons.report.values import typeset
 
 SIZE = (4.8, 3.7)
 """Inches."""
@@ -22,7 +23,7 @@ def of_series(one: SeriesSummary) -> list[str]:
     if not math.isinf(one.series.holds_to):
         ends["float64 ends"] = one.series.holds_to
     plots = []
-    axis = one.series.axis
+    axis = typeset(one.series.axis)
     if any(some.failures for f in one.found for some in f.outcomes.values()):
         seen = _least(one)
         curves = [_rates(one, name, k) for k, name in enumerate(names)]
@@ -30,9 +31,14 @@ def of_series(one: SeriesSummary) -> list[str]:
         plots.append(log_log(curves, axis, "share of cases", "Failures", level, SIZE, ends))
     if any(some.worst is not None for f in one.found for some in f.outcomes.values()):
         curves = [_errors(one, name, k) for k, name in enumerate(names)]
-        unit = f"worst error, {one.series.unit}" if one.series.unit else "worst error"
-        plots.append(log_log(curves, axis, unit, "Worst error", None, SIZE, ends))
+        plots.append(log_log(curves, axis, _error(one), "Worst error", None, SIZE, ends))
     return plots
+
+
+def _error(one: SeriesSummary) -> str:
+    """What the axis of errors shows: "error / the law's bound"."""
+    unit = typeset(one.series.unit) or "error"
+    return f"error / {unit.removeprefix('of ')}" if unit.startswith("of ") else unit
 
 
 def _rates(one: SeriesSummary, name: str, colour: int) -> Curve:

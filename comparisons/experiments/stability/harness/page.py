@@ -8,7 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from comparisons.experiments.stability.harness import charts, table
-from comparisons.experiments.stability.harness.core import OURS, Effort
+from comparisons.experiments.stability.harness.core import Effort
 from comparisons.experiments.stability.harness.families import family
 from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.results_json import again
@@ -17,9 +17,11 @@ from comparisons.experiments.stability.harness.summary import (
     SeriesSummary,
     contestants,
     named,
-    total,
 )
 from comparisons.report.templates import template, write
+
+_LOOKS = ("", "more", "count more", "count more", "more", "", "", "")
+"""CSS classes of the table's columns after the family: "more" is left out on small screens."""
 
 
 def write_page(
@@ -31,33 +33,19 @@ def write_page(
     provenance: Mapping[str, Any],
 ) -> None:
     """Write the page, at once or not at all; all text is escaped."""
-    everything = table.summaries(found)
     folder = "experiments/stability"
     page = template("stability.html.jinja", folder, number=table.number, named=named).render(
-        provenance=provenance,
-        effort=effort,
-        seed=seed,
-        columns=table.COLUMNS,
-        rows=[
-            (name, table.cells(name, one), one.holds)
-            for name, series in everything.items()
-            for one in series
-        ],
+        provenance={**provenance, "effort": effort, "seed": seed},
+        columns=list(zip(table.COLUMNS[1:], _LOOKS, strict=True)),
         families=[
             {
                 "definition": family(name),
-                "cases": getattr(total(_all(series), OURS), "cases", 0),
-                "holds": all(one.holds for one in series),
                 "series": [_series(name, one, pictures, effort, seed) for one in series],
             }
-            for name, series in everything.items()
+            for name, series in table.summaries(found).items()
         ],
     )
     write(path, page)
-
-
-def _all(series: Sequence[SeriesSummary]) -> list[Found]:
-    return [f for one in series for f in one.found]
 
 
 def _series(
@@ -65,6 +53,7 @@ def _series(
 ) -> dict[str, Any]:
     return {
         "summary": one,
+        "cells": table.cells(name, one)[1:],
         "definition": one.series,
         "plots": [Markup(svg) for svg in charts.of_series(one)],  # our own, not from outside
         "pictures": [

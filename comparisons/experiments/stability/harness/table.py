@@ -19,7 +19,7 @@ from comparisons.experiments.stability.harness.summary import (
     total,
 )
 from comparisons.report.terminal import fitted
-from comparisons.report.values import power_of_ten
+from comparisons.report.values import label, power_of_ten
 
 COLUMNS = ("family", "series", "to", "cases", "failures", "worst", "ours", "Mitsuba", "others")
 
@@ -34,17 +34,19 @@ def cells(name: str, one: SeriesSummary) -> list[str]:
     """Of one series, as text."""
     ours = total(one.found, OURS)
     others = [c for c in contestants(one.found) if c not in (OURS, MITSUBA)]
-    shown = [f"{named(c)} {where(one, c)}" for c in others]
+    shown: dict[str, list[str]] = {}
+    for c in others:
+        shown.setdefault(where(one, c), []).append(named(c))
     return [
         f"{name} {family(name).name}",
-        one.series.name,
+        label(one.series.name),
         f"{one.series.axis} {number(one.last)}" if one.series.axis else "",
         f"{ours.cases:,}" if ours else "–",
         f"{ours.failures:,}" if ours else "not measured",
         worst(one, OURS),
         where(one, OURS),
         where(one, MITSUBA),
-        ", ".join(shown),
+        "; ".join(f"{', '.join(names)}: {found}" for found, names in shown.items()),
     ]
 
 

@@ -22,7 +22,8 @@ import numba
 import numpy as np
 import typer
 
-from reference_rt.cli.main import adjusted, guarded
+from reference_rt.cli.adjusted import adjusted
+from reference_rt.cli.guarded import guarded
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import image

@@ -158,7 +158,7 @@ def _series(
             single = contestant == MITSUBA
             return shoot(contestant, kinds[0], extent(draw, x)._replace(single=single), draw)
 
-    return Series(name, sweep, about, run, unit="B", shoot=picture, **more)
+    return Series(name, sweep, about, run, unit="of the bound B", shoot=picture, **more)
 
 
 DISTANCES = (1e0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14)
