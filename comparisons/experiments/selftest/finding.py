@@ -54,8 +54,6 @@ LONGEST = 90
 
 
 def _strength(rung: str, numbers: dict[str, Any], reason: str) -> str:
-    if rung == "geometry" and numbers.get("mismatches"):  # else it is the camera
-        return f"{numbers['mismatches']:,} of {numbers['rays']:,} rays"
     if rung == "direct" and numbers.get("rays"):
         return f"{numbers['unexplained']:,} of {numbers['rays']:,} values"
     if rung == "whitted" and numbers.get("pixels"):
