@@ -12,7 +12,7 @@ import numpy as np
 from comparisons.mitsuba.stand_ins import Plugin, StandIn
 from comparisons.mitsuba.translate.shapes.cutting import cut_away
 from comparisons.mitsuba.translate.shapes.meshes import Soup, placed
-from comparisons.mitsuba.translate.shapes.plugins import Site
+from comparisons.mitsuba.translate.shapes.plugins import Site, with_mesh_light
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes.shape import Shape
@@ -113,6 +113,7 @@ def stand_in(
         if key not in site.shared:
             site.shared[key] = measured_slip(soup, patches[0], box)
         found = found._replace(slip=site.shared[key])
+    site = with_mesh_light(site, normals=True, stands_in=True)
     m = transform.compose(own, site.place.outer)
     # The maps after the shape's own stretch distances, and turn angles, at most by these factors.
     stretch = np.linalg.svd(site.place.outer[:, :3], compute_uv=False)
