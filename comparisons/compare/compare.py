@@ -17,7 +17,7 @@ from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.reading.reference import file_of, own_scene
+from comparisons.mitsuba.reading.reference import changes_to, file_of, own_scene
 from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, load
 from comparisons.mitsuba.translate.vertices import with_float32_vertices
 from comparisons.results.case import Case, RungResult
@@ -135,7 +135,7 @@ def _gather(
 
     notes = [*counterpart.notes(), *notes_of(scene)]
     if own is not None:
-        notes = [*counterpart.notes(), _OWN_FILE.format(file_of(scene))]
+        notes = [*counterpart.notes(), _OWN_FILE.format(file_of(scene)), *changes_to(scene)]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
     if moved > 0.0:
@@ -146,11 +146,9 @@ def _gather(
     films = (subject.scene.film, (subject.reference or subject.scene).film)
     found = _deterministic_rungs(scene, tables, counterpart, films, budget, only, say)
     pictured = not only or not {"statistics", "images"}.isdisjoint(only)
-    if counterpart.no_light_reason and not isinstance(scene.integrator, RayCast):
-        found += [
-            RungResult(name, "not-comparable", counterpart.no_light_reason)
-            for name in ("statistics", "images")
-        ]
+    reason = _no_pictures(counterpart, scene)
+    if reason:
+        found += [RungResult(name, "not-comparable", reason) for name in ("statistics", "images")]
         pictured = False
     if not pictured:
         return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
@@ -173,6 +171,14 @@ def _gather(
         lengths=path_lengths(judged_by, threads),
         looks=looked,
     )
+
+
+def _no_pictures(counterpart: Counterpart, scene: Scene) -> str:
+    """Why pictures cannot be compared; empty if they can."""
+    if isinstance(scene.integrator, RayCast):
+        return ""
+    noisy = not scene.integrator.deterministic
+    return counterpart.no_pictures_reason if noisy else counterpart.no_light_reason
 
 
 _OWN_FILE = (

@@ -78,5 +78,7 @@ def _pictures(scene: Scene, budget: Budget, seed: int) -> FloatArray:
         raise _NoLightError(counterpart.no_light_reason)
     if isinstance(scene.integrator, Whitted):
         return pictures.mitsuba_whitted(scene, build_tables(scene), counterpart)[np.newaxis]
+    if counterpart.no_pictures_reason:
+        raise _NoLightError(counterpart.no_pictures_reason)
     spp = scene.resolved_sampler.spp
     return mitsuba_scene.render(counterpart.mi_scene, budget.replicates, spp, seed).pictures

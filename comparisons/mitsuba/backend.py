@@ -206,9 +206,13 @@ def _version() -> str:
 # ---- results of earlier trials ------------------------------------------------------------------
 
 
+def cache_folder() -> Path:
+    """The folder of what is kept between runs."""
+    return Path(os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt"))
+
+
 def _memory_file() -> Path:
-    root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
-    return Path(root) / "mitsuba_llvm.json"
+    return cache_folder() / "mitsuba_llvm.json"
 
 
 def _remembered_proof(version: str, variant: str, path: str) -> str | None:
@@ -250,4 +254,14 @@ def _write_memory(memory: dict[str, str | None]) -> None:
         part.unlink(missing_ok=True)
 
 
-__all__ = ["LIBRARY", "Backend", "backend", "choose", "mitsuba", "prove", "scalar", "variant"]
+__all__ = [
+    "LIBRARY",
+    "Backend",
+    "backend",
+    "cache_folder",
+    "choose",
+    "mitsuba",
+    "prove",
+    "scalar",
+    "variant",
+]

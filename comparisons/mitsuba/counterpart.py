@@ -2,14 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from comparisons.geometry.frame import OURS, Frame
-from comparisons.mitsuba.backend import scalar
+from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.csg import SLIGHT, SolidCounterpart
 from comparisons.mitsuba.hits import MitsubaHits, assign_nearer, misses, read
+from comparisons.mitsuba.lit_scene import LitScene
+from comparisons.mitsuba.plugins.parameters import is_wide
 from comparisons.mitsuba.scene import first_hits
 from comparisons.mitsuba.stand_ins import Extent, MitsubaShape, StandIn
 from reference_rt.core.arrays import FloatArray
@@ -45,18 +48,29 @@ class Counterpart:
         """Mitsuba's sensors."""
         return self.mi_scene.sensors()
 
+    @cached_property
+    def lit(self) -> LitScene:
+        """Mitsuba's scene with the solids."""
+        return LitScene(self.mi_scene, self.solids)
+
     @property
     def no_light_reason(self) -> str:
         """Why light cannot be compared; empty if it can."""
-        if self.solids:
-            return (
-                "Mitsuba has no set operations (CSG): its hits of the operands are combined ray by "
-                "ray, but its integrators cannot render solids"
-            )
         if self.instanced_group is not None:
             count = len(self.instanced_group.mi_shapes)
             return f"{count} instances: Mitsuba takes minutes to compile its integrators for them"
         return ""
+
+    @property
+    def no_pictures_reason(self) -> str:
+        """Why pictures with noise cannot be compared; empty if they can."""
+        if self.solids and not is_wide(mitsuba()):
+            return (
+                "solids (CSG): Mitsuba's scalar variant would take hours for their pictures, which "
+                "our plugin traces ray by ray; its variant llvm_ad_rgb takes seconds "
+                "(docs/install.md)"
+            )
+        return self.no_light_reason
 
     def notes(self) -> list[str]:
         """Notes on a moved frame, and on meshes that stand in for shapes."""

@@ -56,14 +56,19 @@ class Operand(NamedTuple):
     leaf: Leaf
     place: TabulationContext
 
+    def reach(self) -> float:
+        """The largest coordinate on the operand; 0 for a plane, the corners of whose mesh are far
+        from where rays hit."""
+        if isinstance(self.leaf.shape, Plane):
+            return 0.0
+        box = self.mi_scene.bbox()
+        return float(np.abs([np.array(box.min), np.array(box.max)]).max())
+
     def walk(self, o: FloatArray, d: FloatArray) -> tuple[BoolArray, list[Crossings]]:
         """Whether rays start inside (n,), and all their crossings in order."""
         ids = {name: k for k, name in enumerate(self.mi_shapes)}
         mi_shapes = list(self.mi_shapes.values())
-        box = self.mi_scene.bbox()
-        reach = float(np.abs([np.array(box.min), np.array(box.max)]).max())
-        if isinstance(self.leaf.shape, Plane):
-            reach = 0.0  # the corners of its mesh are far from where rays hit
+        reach = self.reach()
         rays, origin = np.arange(len(o)), o.copy()
         length2 = np.sum(d * d, axis=1)
         found: list[Crossings] = []
@@ -116,16 +121,23 @@ class SolidCounterpart:
         mi_shape = next(iter(self.operands[0].mi_shapes.values()))
         return mi_shape.shape, mi_shape.instance
 
-    def near(self, o: FloatArray, d: FloatArray) -> IntArray:
-        """Indices (k,) of the rays that pass near any of the operands."""
+    def box(self) -> tuple[FloatArray, FloatArray] | None:
+        """The lower and upper corner (3,) of a box around all operands; None with a plane."""
         if any(isinstance(operand.leaf.shape, Plane) for operand in self.operands):
-            return np.arange(len(o))
+            return None
         boxes = [operand.mi_scene.bbox() for operand in self.operands]
         lower = np.min([np.array(b.min, np.float64) for b in boxes], axis=0)
         upper = np.max([np.array(b.max, np.float64) for b in boxes], axis=0)
         margin = 1e-3 * (upper - lower).max()
+        return lower - margin, upper + margin
+
+    def near(self, o: FloatArray, d: FloatArray) -> IntArray:
+        """Indices (k,) of the rays that pass near any of the operands."""
+        box = self.box()
+        if box is None:
+            return np.arange(len(o))
         with np.errstate(divide="ignore", invalid="ignore"):
-            a, b = (lower - margin - o) / d, (upper + margin - o) / d
+            a, b = (box[0] - o) / d, (box[1] - o) / d
         # A ray in a plane of the box: 0/0 sets no limit.
         t_in = np.nan_to_num(np.minimum(a, b), nan=-np.inf).max(axis=1)
         t_out = np.nan_to_num(np.maximum(a, b), nan=np.inf).min(axis=1)
@@ -231,14 +243,15 @@ class SolidCounterpart:
         return hits
 
 
-def evaluated(tree: Tree | int, states: BoolArray) -> BoolArray:
-    """(n,): whether points are inside the solid;  states (operands, n): inside each operand."""
+def evaluated(tree: Tree | int, states: Any) -> Any:
+    """Whether points are inside the solid;  states: whether they are inside each operand.  Values
+    are arrays of NumPy or Dr.Jit, or bools."""
     if isinstance(tree, int):
-        return np.asarray(states[tree])
-    values = [evaluated(part, states) for part in tree.of]
-    if tree.operation == "union":
-        return np.asarray(np.any(values, axis=0))
-    if tree.operation == "intersection":
-        return np.asarray(np.all(values, axis=0))
-    rest = np.zeros(len(values[0]), bool) if len(values) == 1 else np.any(values[1:], axis=0)
-    return np.asarray(values[0] & ~rest)
+        return states[tree]
+    first, *others = (evaluated(part, states) for part in tree.of)
+    for value in others:
+        if tree.operation == "union":
+            first = first | value
+        else:
+            first = first & (value if tree.operation == "intersection" else value ^ True)
+    return first

@@ -7,7 +7,8 @@ from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.plastic_error import base_error
 from comparisons.mitsuba.translate.integrators import counts_lights_often
 from comparisons.mitsuba.translate.textures import TranslationContext
-from comparisons.mitsuba.translate.wrappers import has_delta
+from comparisons.mitsuba.translate.wrappers import has_delta, is_wrong_in_mitsuba
+from reference_rt.integrators import Direct
 from reference_rt.materials import (
     Blend,
     Bump,
@@ -34,12 +35,19 @@ def notes_of(scene: Scene) -> list[str]:
                 f"'{name}': a relative error of {off:.2g} of its light is allowed for (tables, "
                 "float32: comparisons.mitsuba.accuracy)"
             )
-    if counts_lights_often(scene):
-        found.append(
-            "Mitsuba's direct illumination adds up its samples of lights without extent, which it "
-            "should average: its counterpart takes one"
-        )
-    return list(dict.fromkeys(note for note in found if note))
+    return list(dict.fromkeys(note for note in (*found, note_of_samples(scene)) if note))
+
+
+def note_of_samples(scene: Scene) -> str:
+    """The note on Mitsuba's error that `counts_lights_often` describes; empty without it."""
+    if not counts_lights_often(scene):
+        return ""
+    assert isinstance(scene.integrator, Direct)
+    return (
+        "Mitsuba's direct illumination adds up its samples of lights without extent, which it "
+        f"should average: with {scene.integrator.light_samples} of them these lights are as many "
+        "times too bright; compared with one sample, for which it is right"
+    )
 
 
 @singledispatch
@@ -112,7 +120,14 @@ def _(material: Mask, context: TranslationContext) -> str:
 @note_of.register(Bump)
 @note_of.register(NormalMap)
 def _(material: Bump | NormalMap, context: TranslationContext) -> str:
+    if isinstance(material, Bump) and is_wrong_in_mitsuba(material, context):
+        return (
+            "Mitsuba's bump maps are wrong over anisotropic materials, and by rotated images that "
+            "are not square: our plugin is used instead"
+        )
+    if material.flip_invalid_normals and material.use_shadowing_function:
+        return ""
     return (
         "Mitsuba's bump and normal maps run with flip_invalid_normals and use_shadowing_function "
-        "off"
+        "as the scene has them, not with both on as by default"
     )

@@ -166,10 +166,25 @@ def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicate
     return Replicates(np.stack(pictures), np.array(seconds))
 
 
+_APART = 1 << 20
+"""Difference of the seeds of a picture's parts: larger than that of any two pictures."""
+
+
 def picture(mi_scene: Any, spp: int, seed: int) -> FloatArray:
-    """One picture (height, width, 3)."""
-    # The conversion to an array forces the lazy evaluation.
-    return np.array(mitsuba().render(mi_scene, spp=spp, seed=seed), dtype=np.float64)[..., :3]
+    """One picture (height, width, 3); in parts of fewer samples where the integrator has a limit of
+    rays, `most_rays`."""
+    width, height = mi_scene.sensors()[0].film().crop_size()
+    limit = getattr(mi_scene.integrator(), "most_rays", None)
+    most = spp if limit is None else max(1, limit // (int(width) * int(height)))
+    total: Any = 0.0
+    for k, begun in enumerate(range(0, spp, most)):
+        count = min(most, spp - begun)
+        # The conversion to an array forces the lazy evaluation.
+        found = np.array(
+            mitsuba().render(mi_scene, spp=count, seed=(seed + k * _APART) % (1 << 32))
+        )
+        total = total + count / spp * found.astype(np.float64)[..., :3]
+    return np.asarray(total)
 
 
 __all__ = [

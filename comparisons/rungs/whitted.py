@@ -168,6 +168,7 @@ def plugin_radiance(
         for name, mi_shape in counterpart.mi_shapes.items()
         if mi_shape.instance >= 0 or not isinstance(mi_shape.leaf, SAMPLED)
     ]
+    boxes = [name for name, p in counterpart.mi_shapes.items() if isinstance(p.leaf, Box)]
     ambient = dict(
         zip(("ambient_r", "ambient_g", "ambient_b"), ambient_of(scene.lights), strict=True)
     )
@@ -177,12 +178,13 @@ def plugin_radiance(
         # Of each layer at most a mirrored and a refracted direction.
         "components": 2 * most_branches(tables.materials),
         "unlit": " ".join(unlit),
+        "boxes": " ".join(boxes),
     }
 
     def radiance(o: Any, d: Any) -> tuple[Any, ...]:
         # Loaded for each call: Dr.Jit makes the lights' data as wide as the first call's rays.
         plugin = mi.load_dict(described)
-        return (plugin.sample(counterpart.mi_scene, None, mi.Ray3f(mi.Point3f(o), d))[0],)
+        return (plugin.sample(counterpart.lit, None, mi.Ray3f(mi.Point3f(o), d))[0],)
 
     return lambda rays: for_rays(radiance, counterpart.frame.into(rays.o), rays.d)[0]
 

@@ -61,7 +61,7 @@ def ours(scene: Scene) -> FloatArray:
 def theirs(scene: Scene) -> FloatArray:
     """Mitsuba's; for Whitted ray tracing, what is hit: our plugin is slow in scalar variants."""
     counterpart = load(scene)
-    if isinstance(scene.integrator, RayCast | Whitted) or counterpart.no_light_reason:
+    if isinstance(scene.integrator, RayCast | Whitted) or counterpart.no_pictures_reason:
         cast = scene.changed(integrator=RayCast(show="normal"), sampler=Grid())
         return mitsuba_cast(cast, counterpart, render(cast, threads=1))[0]
     return mitsuba_scene.picture(counterpart.mi_scene, SPP, 1)

@@ -11,10 +11,12 @@ from typing import Any
 
 from comparisons.mitsuba.plugins import (
     exact_beckmann,
+    exact_bump,
     exact_coat,
+    mesh_area,
     mixtures,
+    path_of_solids,
     phong,
-    textured_area,
     view_rectangle,
     whitted,
 )
@@ -23,8 +25,8 @@ from comparisons.mitsuba.plugins import (
 def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
     plugins = (
-        *(exact_beckmann, exact_coat, mixtures, phong),
-        *(textured_area, view_rectangle, whitted),
+        *(exact_beckmann, exact_bump, exact_coat, mixtures, phong),
+        *(mesh_area, path_of_solids, view_rectangle, whitted),
     )
     for plugin in plugins:
         plugin.register(mi)

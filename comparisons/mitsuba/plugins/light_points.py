@@ -84,13 +84,16 @@ class BoxPoint(NamedTuple):
 LightPoint = FixedPoint | BoxPoint | SphereLight
 
 
-def light_points(mi: Any, scene: Any, unlit: Collection[str] = ()) -> list[LightPoint]:
-    """The points of all area lights of a scene, except shapes whose id is in `unlit`."""
+def light_points(
+    mi: Any, scene: Any, unlit: Collection[str] = (), boxes: Collection[str] = ()
+) -> list[LightPoint]:
+    """The points of all area lights of a scene, except shapes whose id is in `unlit`;  boxes: the
+    ids of boxes, which may be meshes: see `translate.shapes.native.box_of_triangles`."""
     found: list[LightPoint] = []
     for emitter in scene.emitters():
         shape = emitter.get_shape()
         if shape is not None and shape.id() not in unlit:
-            found += _points_of(mi, shape)
+            found += _points_of(mi, shape, shape.id() in boxes)
     return found
 
 
@@ -98,7 +101,7 @@ _FLAT = {"Rectangle": 4.0, "Disk": math.pi}
 """Untransformed areas of the plugins whose point is their centre."""
 
 
-def _points_of(mi: Any, shape: Any) -> list[LightPoint]:
+def _points_of(mi: Any, shape: Any, is_box: bool) -> list[LightPoint]:
     kind = shape.class_name()
     if kind == "Sphere":
         m = _to_world(mi, shape)
@@ -112,8 +115,8 @@ def _points_of(mi: Any, shape: Any) -> list[LightPoint]:
         return [_fixed(mi, shape, m[:3, 3], _FLAT[kind] * np.cross(m[:3, 0], m[:3, 1]))]
     values = mi.traverse(shape)
     vertices = np.array(values["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-    if kind == "Cube":
-        return [_box_point(mi, shape, vertices)]
+    if kind == "Cube" or is_box:
+        return [_box_point(mi, shape, vertices, *(_CUBE if kind == "Cube" else _MESH))]
     corners = vertices[np.array(values["faces"]).reshape(-1, 3)]
     return [
         _triangle_point(mi, shape, triangle) for triangle in corners if _double_area(triangle) > 0.0
@@ -144,12 +147,16 @@ def _triangle_point(mi: Any, shape: Any, corners: FloatArray) -> FixedPoint:
     return _fixed(mi, shape, p, 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0]))
 
 
-def _box_point(mi: Any, shape: Any, vertices: FloatArray) -> "BoxPoint":
+def _box_point(
+    mi: Any, shape: Any, vertices: FloatArray, front: list[int], back: list[int]
+) -> "BoxPoint":
     """The point at half of the cumulative area of the faces -x +x -y +y -z +z, starting half of the
     first face before the list."""
     center = vertices.mean(axis=0)
-    edges = _half_edges(vertices)
+    middle = vertices.reshape(6, 4, 3).mean(axis=1)
+    edges = 0.5 * (middle[front] - middle[back])
     normals = np.cross(edges[[1, 2, 0]], edges[[2, 0, 1]])
+    normals *= np.sign(np.linalg.det(edges))  # outwards, also where a map mirrors
     face_areas = 4.0 * np.linalg.norm(normals, axis=1)
     rest = float(face_areas.sum()) - 0.5 * float(face_areas[0])
     axis = 0
@@ -166,12 +173,6 @@ def _box_point(mi: Any, shape: Any, vertices: FloatArray) -> "BoxPoint":
     return BoxPoint(_fixed(mi, shape, p, n * sign * 2.0 * float(face_areas.sum())))
 
 
-def _half_edges(vertices: FloatArray) -> FloatArray:
-    """The half edges x, y, z (3, 3) of a cube plugin, whose 24 vertices are four for each face."""
-    middle = vertices.reshape(6, 4, 3).mean(axis=1)
-    return np.asarray(0.5 * (middle[list(_CUBE_FRONT)] - middle[list(_CUBE_BACK)]))
-
-
-_CUBE_FRONT, _CUBE_BACK = (2, 1, 3), (4, 0, 5)
-"""Indices of the faces +x +y +z and -x -y -z among the groups of four vertices
-(src/shapes/cube.cpp)."""
+_CUBE, _MESH = ([2, 1, 3], [4, 0, 5]), ([3, 4, 5], [0, 1, 2])
+"""The faces +x +y +z and -x -y -z among the groups of four vertices: of Mitsuba's cubes
+(src/shapes/cube.cpp), and of our meshes."""

@@ -15,8 +15,6 @@ and enough to hide a wrong direction.  Here the offset is float32's error.
 
 from typing import Any
 
-import numpy as np
-
 from comparisons.mitsuba.plugins import parameters, phong
 from comparisons.mitsuba.plugins.light_points import light_points
 
@@ -48,14 +46,6 @@ def leave(mi: Any, si: Any, d: Any, height: Any) -> Any:
     return mi.Ray3f(si.p + d * along + si.n * rest, d, si.time, si.wavelengths)
 
 
-def emitted(mi: Any, scene: Any, si: Any, active: Any) -> Any:
-    """The emitted radiance at a ray's hit, or of the environment for a miss."""
-    emitter = si.emitter(scene, active)
-    if emitter is None:  # scalar variants
-        return mi.Color3f(0.0)
-    return emitter.eval(si, active) & active if parameters.is_wide(mi) else emitter.eval(si, active)
-
-
 def without(mask: Any, other: Any) -> Any:
     """mask and not other; `~` would turn the plain bools of scalar variants into integers."""
     import drjit as dr
@@ -71,6 +61,7 @@ def register(mi: Any) -> None:
         """Parameters: max_depth, most reflections and refractions of a ray; min_contribution, the
         throughput below which a ray is not followed; components, at least as many as any BSDF has;
         unlit, the ids, separated by spaces, of emissive shapes that do not count as lights;
+        boxes, those of boxes;
         ambient_r, ambient_g, ambient_b, the ambient light's radiance."""
 
         def __init__(self, properties: Any) -> None:
@@ -78,7 +69,9 @@ def register(mi: Any) -> None:
             self.max_depth = properties.get("max_depth", 8)
             self.min_contribution = properties.get("min_contribution", 1e-4)
             self.components = range(properties.get("components", 2))
-            self.unlit = frozenset(properties.get("unlit", "").split())
+            self.unlit, self.boxes = (
+                frozenset(properties.get(name, "").split()) for name in ("unlit", "boxes")
+            )
             self.ambient = [properties.get(f"ambient_{c}", 0.0) for c in "rgb"]
             self.scene: Any = None
             self.lights: list[Any] = []
@@ -90,18 +83,19 @@ def register(mi: Any) -> None:
         def prepare(self, scene: Any) -> None:
             """Collect the lights, once per scene."""
             if self.scene is not scene:
-                self.scene, self.lights = scene, light_points(mi, scene, self.unlit)
+                self.scene = scene
+                self.lights = light_points(mi, scene, self.unlit, self.boxes)
                 delta = mi.EmitterFlags.Delta
                 self.points = [e for e in scene.emitters() if mi.has_flag(e.flags(), delta)]
                 self.cylinders = [s for s in scene.shapes() if s.class_name() == "Cylinder"]
                 self.perfect = [k for k in self.components if self.has_perfect(scene, k)]
-                bounds = np.abs([scene.bbox().min, scene.bbox().max])
-                self.reach = float(np.max(bounds[np.isfinite(bounds)], initial=0.0))
+                self.reach = scene.reach()
 
         def sample(
             self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
         ) -> tuple[Any, Any, list[Any]]:
-            """The radiance along `ray`, whether it hit anything, no further channels.
+            """The radiance along `ray`, whether it hit anything, no further channels; `scene` is a
+            `LitScene`.
 
             The ray tree is traversed depth first with all rays at once, masked to those that have
             the branch.
@@ -115,7 +109,7 @@ def register(mi: Any) -> None:
                 # every level compiles again.
                 dr.make_opaque(ray, weight, active)
                 si = scene.ray_intersect(ray, active)
-                total += weight * emitted(mi, scene, si, active)
+                total += weight * scene.emitted(si, active)
                 active &= si.is_valid()
                 valid = active if valid is None else valid
                 if not dr.any(active):
@@ -208,7 +202,7 @@ def register(mi: Any) -> None:
                 missing = dr.norm(target - si.p) * (1.0 - mi.math.ShadowEpsilon) - found.t
                 near = missing * dr.abs(dr.dot(ray.d, found.n)) <= 2.0 * height
                 visible = active & found.is_valid() & near & self.is_shape(found, light.shape)
-                radiance = emitted(mi, scene, found, visible)
+                radiance = scene.emitted(found, visible)
                 total += dr.select(visible, value * radiance * solid_angle, 0.0)
                 dr.eval(total)
             return total

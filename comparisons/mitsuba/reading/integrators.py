@@ -29,7 +29,10 @@ def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator,
     if node is None:
         return Path(), ()
     if node.flag("hide_emitters"):
-        raise node.error("'hide_emitters' is not supported; expected false")
+        raise node.error(
+            "'hide_emitters' is not supported, since Mitsuba 3.9.1 misplaces what lies behind "
+            "hidden lamps; expected false"
+        )
     node.ignore("timeout", "block_size", "samples_per_pass")  # of how it runs
     layers: tuple[str, ...] = ()
     with node.checking():

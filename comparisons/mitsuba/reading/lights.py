@@ -11,6 +11,7 @@ from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.films import Frame
 from comparisons.mitsuba.reading.node import Node, triple
 from comparisons.mitsuba.reading.sensors import angle
+from comparisons.mitsuba.reading.sunsky import read_sunsky
 from comparisons.mitsuba.reading.textures import colour_or_texture, projected
 from comparisons.mitsuba.reading.written import as_transform
 from comparisons.mitsuba.similar import is_similarity
@@ -33,7 +34,7 @@ TOLERANCE = 1e-5
 
 def belongs_to_shape(node: Node) -> bool:
     """Whether an emitter is a lamp's; the second plugin is ours."""
-    return node.plugin in ("area", "textured_area")
+    return node.plugin in ("area", "mesh_area")
 
 
 def emission(reading: Reading, node: Node) -> Rgb | str:
@@ -191,4 +192,5 @@ _READERS: dict[str, Callable[[Reading, Node], AnyLight]] = {
     "directional": _directional,
     "constant": _constant,
     "envmap": _envmap,
+    "sunsky": read_sunsky,
 }

@@ -1,12 +1,16 @@
 """The user's own file as the reference of a comparison: loaded by Mitsuba, and untouched but for
-the film's size and filter and the samples.  So our reading of the file is checked, too."""
+the film's size and filter, the samples, clipping planes, and what makes Mitsuba's own picture
+wrong (`changes_to`).  So our reading of the file is checked, too."""
 
 from pathlib import Path
 from typing import Any
 
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.notes import note_of_samples
 from comparisons.mitsuba.reading.parse import parse_file
+from comparisons.mitsuba.reading.sensors import CLIP
 from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.integrators import counts_lights_often
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
 
@@ -34,6 +38,7 @@ def own_scene(scene: Scene) -> Any:
     sensor = _first(state, mi.ObjectType.Sensor)
     if sensor is None:
         raise UntranslatableError("of a file that has none", "camera")
+    _open_clipping(state.nodes[sensor].props)
     film = _child(mi, state, sensor, mi.ObjectType.Film, "hdrfilm")
     _resize(state.nodes[film].props, scene)
     values = {"pixel_format": "rgb", "component_format": "float32", "file_format": "openexr"}
@@ -45,6 +50,8 @@ def own_scene(scene: Scene) -> Any:
     state.nodes[sampler].props = mi.Properties("independent")
     _child(mi, state, 0, mi.ObjectType.Integrator, "path")
     _without_moments(mi, state)
+    if counts_lights_often(scene):
+        _with_one_sample(mi, state)
     config = mi.parser.ParserConfig(mi.variant())
     config.merge_equivalent = config.merge_meshes = False
     old = mi.file_resolver()
@@ -59,6 +66,30 @@ def own_scene(scene: Scene) -> Any:
         raise ReferenceUnavailableError(f"Mitsuba does not load {path}: {reason}") from None
     finally:
         mi.set_file_resolver(old)
+
+
+def changes_to(scene: Scene) -> list[str]:
+    """What `own_scene` changes in the file beyond the film and the samples, for the report."""
+    path = file_of(scene)
+    assert path is not None
+    state = parse_file(path, scene.defaults).state
+    sensor = _first(state, mitsuba().ObjectType.Sensor)
+    found = [note_of_samples(scene)] if counts_lights_often(scene) else []
+    if sensor is not None and _open_clipping(state.nodes[sensor].props):
+        found.append("its camera's clipping planes are those of Mitsuba's default: ours has none")
+    return found
+
+
+def _open_clipping(sensor: Any) -> bool:
+    """Move clipping planes that cut more than Mitsuba's default ones to these; whether any does."""
+    planes = {key: float(sensor.get(key, default)) for key, default in CLIP.items()}
+    near, far = planes["near_clip"] > CLIP["near_clip"], planes["far_clip"] < CLIP["far_clip"]
+    if far and sensor.plugin_name() == "thinlens" and "focus_distance" not in sensor:
+        sensor["focus_distance"] = planes["far_clip"]
+    for key, cuts in (("near_clip", near), ("far_clip", far)):
+        if cuts:
+            sensor[key] = CLIP[key]
+    return near or far
 
 
 def _first(state: Any, kind: Any) -> int | None:
@@ -131,3 +162,12 @@ def _without_moments(mi: Any, state: Any) -> None:
             ]
             if inside:
                 root[key] = mi.Properties.ResolvedReference(inside[0])
+
+
+def _with_one_sample(mi: Any, state: Any) -> None:
+    """One sample of lights in direct illumination: its mean is right for no other number."""
+    for node in state.nodes:
+        if node.type == mi.ObjectType.Integrator and node.props.plugin_name() == "direct":
+            # The one name stands for both numbers of samples, and excludes the other.
+            name = "shading_samples" if "shading_samples" in node.props else "emitter_samples"
+            node.props[name] = 1

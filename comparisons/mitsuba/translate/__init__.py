@@ -22,12 +22,17 @@ from comparisons.mitsuba.stand_ins import MitsubaShape, Plugin
 from comparisons.mitsuba.translate.cameras import translate_camera
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.film import translate_film, translate_sampler
-from comparisons.mitsuba.translate.integrators import counts_lights_often, translate_integrator
+from comparisons.mitsuba.translate.integrators import (
+    counts_lights_often,
+    of_solids,
+    translate_integrator,
+)
 from comparisons.mitsuba.translate.lights import translate_light
 from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.mitsuba.translate.wrappers import coloured_parts_of, is_textured, parts_of
+from reference_rt.integrators import Direct, Path
 from reference_rt.rendering.scene import Scene
 
 # Without this Embree drops rays that hit a shared edge (Mitsuba issue 1149).
@@ -60,8 +65,16 @@ def load(scene: Scene, frame: Frame | None = None) -> Counterpart:
     found = _translated(moved(scene, frame))
     instanced_group = _instanced_group(found)
     plain = {**_groups(found.mi_shapes), **found.plain}
+    renders_solids = False
+    if found.solids and isinstance(scene.integrator, Path | Direct):
+        renders_solids = True
+        plain["integrator"] = of_solids(scene.integrator)
     mi_scene = mitsuba().load_dict(plain, optimize=False)
-    return Counterpart(mi_scene, found.mi_shapes, tuple(found.solids), instanced_group, frame)
+    solids = tuple(found.solids)
+    counterpart = Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame)
+    if renders_solids:
+        mi_scene.integrator().scene = counterpart.lit
+    return counterpart
 
 
 MOST_INSTANCES = 32

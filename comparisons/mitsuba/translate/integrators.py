@@ -43,6 +43,19 @@ def counts_lights_often(scene: SceneModel) -> bool:
     return points and isinstance(integrator, Direct) and integrator.light_samples > 1
 
 
+def of_solids(integrator: Path | Direct) -> dict[str, Any]:
+    """Our plugin `comparisons.mitsuba.plugins.path_of_solids` in place of Mitsuba's integrator, for
+    scenes with solids."""
+    if isinstance(integrator, Path):
+        return {**(translate_integrator(integrator) or {}), "type": "path_of_solids"}
+    return {
+        "type": "path_of_solids",
+        "max_depth": 2,
+        "samples_lights": integrator.light_samples > 0,
+        "samples_bsdfs": integrator.bsdf_samples > 0,
+    }
+
+
 @translate_integrator.register
 def _(integrator: Whitted) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.whitted`; the rung adds the parameters of lights."""

@@ -11,6 +11,7 @@ from comparisons.mitsuba.translate.textures import (
     depends_on_uv,
     number,
     rgb,
+    translate_texture,
 )
 from reference_rt.core.image_files import open_image
 from reference_rt.materials import (
@@ -25,6 +26,7 @@ from reference_rt.materials import (
     Wrapper,
 )
 from reference_rt.textures import Bitmap, VertexColours, texture_names
+from reference_rt.textures.texture import UvMap
 
 
 def _named(name: str, context: TranslationContext) -> dict[str, Any]:
@@ -91,22 +93,35 @@ def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
     texture = context.textures[material.height]
     if not isinstance(texture, Bitmap) or texture.filter != "bilinear":
         return base  # no slopes
-    if any(leaf.oriented for leaf in _leaves(material, context)):
-        # Mitsuba mixes a local normal with a world-space tangent (src/bsdfs/bumpmap.cpp).
-        raise UntranslatableError("Bump over a material with a grain", "material")
-    height = number(material.height, context)
-    m = texture.uv.coefficients()
-    if (m[1] != 0.0 or m[3] != 0.0) and not _is_square(texture, context):
-        # Mitsuba rotates the gradient before it multiplies by width and height
-        # (src/textures/bitmap.cpp).
-        raise UntranslatableError("Bump by a turned image that is not square", "material")
+    if is_wrong_in_mitsuba(material, context):
+        upright = texture.model_copy(update={"uv": UvMap()})
+        names = ("u_u", "u_v", "u_1", "v_u", "v_v", "v_1")
+        return {
+            "type": "exact_bump",
+            "scale": material.scale,
+            "height": translate_texture(upright, material.height, context, True),
+            "base": base,
+            **dict(zip(names, texture.uv.coefficients().tolist(), strict=True)),
+            **_tilt(material),
+        }
     return {
         "type": "bumpmap",
         "scale": material.scale,
-        "height": height,
+        "height": number(material.height, context),
         "bsdf": base,
         **_tilt(material),
     }
+
+
+def is_wrong_in_mitsuba(material: Bump, context: TranslationContext) -> bool:
+    """Whether Mitsuba's own bump map is wrong: see `comparisons.mitsuba.plugins.exact_bump`."""
+    texture = context.textures[material.height]
+    if not isinstance(texture, Bitmap) or context.native:
+        return False
+    m = texture.uv.coefficients()
+    is_turned = bool(m[1] != 0.0 or m[3] != 0.0)
+    has_grain = any(leaf.oriented for leaf in _leaves(material, context))
+    return has_grain or (is_turned and not _is_square(texture, context))
 
 
 def _is_square(texture: Bitmap, context: TranslationContext) -> bool:

@@ -95,9 +95,14 @@ class Shapes:
         return self._with_material(found, shape.material)
 
     def _with_material(
-        self, element: Element, name: str | None, has_colours: bool = False
+        self,
+        element: Element,
+        name: str | None,
+        has_colours: bool = False,
+        has_normals: bool = False,
     ) -> Element:
-        """The shape with its BSDF, and its emitter."""
+        """The shape with its BSDF, and its emitter;  has_colours, has_normals: of a mesh's
+        vertices."""
         if name is None:
             return element
         material = self.scene.materials[name]
@@ -115,8 +120,8 @@ class Shapes:
         else:
             radiance = Rgb(*material.radiance)
         plugin = "area"
-        if element.plugin == "ply" and isinstance(radiance, Reference):
-            plugin = "textured_area"  # Mitsuba's own would sample it by uv
+        if has_normals or (element.plugin == "ply" and isinstance(radiance, Reference)):
+            plugin = "mesh_area"  # Mitsuba's own is not exact there
             self.surfaces.note(OURS.format("emitter", plugin))
         element.children.append(Element("emitter", plugin, {"radiance": radiance}))
         return element
@@ -129,7 +134,8 @@ class Shapes:
         if shape.face_normals or (data.normals is None and not shape.smooth):
             values["face_normals"] = True
         found = Element("shape", "ply", values)
-        return self._with_material(found, shape.material, data.colours is not None)
+        has_normals = "face_normals" not in values
+        return self._with_material(found, shape.material, data.colours is not None, has_normals)
 
     def _mesh_file(self, shape: Mesh) -> str:
         data = shape.data(self.scene.folder)

@@ -6,7 +6,7 @@ import numpy as np
 
 from comparisons.geometry.frame import SHADOW_EPSILON
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.plugins.whitted import emitted, without
+from comparisons.mitsuba.plugins.whitted import without
 from comparisons.mitsuba.scene import for_rays, light_id
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of, number_of
@@ -24,7 +24,7 @@ def mitsuba_direct(
     emitter."""
     import drjit as dr
 
-    mi, scene, kind = mitsuba(), context.counterpart.mi_scene, kind_of(context, light)
+    mi, scene, kind = mitsuba(), context.counterpart.lit, kind_of(context, light)
     emitter = _point_emitter(context, light) if kind in POINT_LIKE else None
     is_far = kind in (ENVIRONMENT, DIRECTIONAL)
 
@@ -43,7 +43,7 @@ def mitsuba_direct(
             ray.maxt = dr.inf
             # The first hit along the unshortened shadow ray must be the front of the light itself.
             found = scene.ray_intersect(ray, visible)
-            radiance = emitted(mi, scene, found, visible)
+            radiance = scene.emitted(found, visible)
         local = si.to_local(wi)
         f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
         return dr.select(visible, f_cos * radiance, 0.0), local.z
@@ -57,7 +57,7 @@ def mitsuba_direct(
 def _point_emitter(context: LightContext, light: int) -> Any:
     """Mitsuba's emitter of a point, spot or directional light."""
     wanted = light_id(number_of(context, light))
-    for emitter in context.counterpart.mi_scene.emitters():
+    for emitter in context.counterpart.lit.emitters():
         if emitter.id() == wanted:
             return emitter
     raise LookupError(f"Mitsuba's scene has no emitter {wanted}")

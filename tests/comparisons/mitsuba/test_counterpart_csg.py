@@ -132,12 +132,6 @@ def test_solids_beside_shapes() -> None:
         assert geometry(scene, tables, load(other), pixels=200).status == "differ"
 
 
-def test_light_has_no_counterpart() -> None:
-    counterpart = load(scene_of(MIXED[0]))
-    assert "set operations" in counterpart.no_light_reason
-    assert load(scene_of(MIXED[2])).no_light_reason == ""
-
-
 GROUPS = """
 integrator: {type: ray_cast}
 groups:

@@ -108,7 +108,9 @@ REFUSED = {
     shape('<medium type="homogeneous" name="interior"/>'): "without media",
     shape('<emitter type="point"/>'): "expected 'area'",
     '<emitter type="projector">' + map_of('<scale x="-1"/>') + "</emitter>": "mirrors the image",
-    '<emitter type="sunsky"/>': "emitter 'sunsky': is not supported",
+    '<emitter type="sunsky"><texture name="albedo" type="checkerboard"/></emitter>': (
+        "'albedo' is a nested element"
+    ),
     '<emitter type="point">'
     + map_of('<translate x="1" y="0" z="0"/>')
     + '<point name="position" x="1" y="2" z="3"/></emitter>': "both 'position' and 'to_world'",

@@ -22,7 +22,7 @@ from comparisons.rungs.rays.camera import camera_rays
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 
-SOLIDS = ("csg_coincident", "csg_dice", "csg_inside", "csg_mesh", "csg_nested")
+SOLIDS = tuple(path.stem for path in SCENES.glob("csg_*.yaml"))
 """Mitsuba has no set operations."""
 
 APPROXIMATE = {

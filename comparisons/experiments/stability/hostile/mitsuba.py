@@ -50,7 +50,7 @@ def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
             counterpart = translate.load(
                 scene
             )  # which takes seconds for curved shapes, for our own part
-            if counterpart.no_light_reason:
+            if counterpart.no_pictures_reason:
                 return found
             clock.start()
             pixels = picture(counterpart.mi_scene, SAMPLES, 0)

@@ -7,7 +7,7 @@ from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.stand_ins import Extent, Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import Soup
-from comparisons.mitsuba.translate.shapes.plugins import Site
+from comparisons.mitsuba.translate.shapes.plugins import Site, with_mesh_light
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes import Plane, Polygon
@@ -39,7 +39,8 @@ def _(shape: Plane, site: Site) -> list[Plugin]:
     uvs = transform.apply_points(inverse, positions)[:, :2]
     soup = Soup(positions, uvs=uvs, faces=_web(len(radii)))
     extent = Extent(middle, float(radii[-1] * np.cos(np.pi / SIDES)))
-    return [Plugin(soup.mesh(site.parts), faces=soup.all_of_face(0), uv=same_uv, extent=extent)]
+    mesh = soup.mesh(with_mesh_light(site).parts)
+    return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv, extent=extent)]
 
 
 def _web(rings: int) -> IntArray:
@@ -60,7 +61,7 @@ def _(shape: Polygon, site: Site) -> list[Plugin]:
     m = transform.compose(transform.affine(shape.transform), site.place.outer)
     placed = soup.moved(m, transform.flips_orientation(m))
     heights = heights_of(placed.positions[placed.faces])
-    mesh = placed.mesh(site.parts)
+    mesh = placed.mesh(with_mesh_light(site).parts)
     return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv, heights=heights)]
 
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
-from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
-from comparisons.mitsuba.translate.shapes.plugins import Site, instance_of
+from comparisons.mitsuba.translate.shapes.plugins import Site, instance_of, with_mesh_light
 from comparisons.mitsuba.translate.textures import VERTEX_COLOUR, VERTEX_LUMINANCE
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -107,41 +106,18 @@ def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
     if key not in site.shared:
         site.shared[key] = _soup(shape.tabulate(TabulationContext(folder=site.place.folder)))
     soup: Soup = site.shared[key]
-    if soup.colours is not None and (soup.colours < 0.0).any() and site.coloured is not site.parts:
-        raise UntranslatableError("Mesh with colours of some of its vertices", "shape")
-    if "emitter" in site.parts and soup.normals is not None:
-        # The shining side follows the geometric normal in ours, the shading normal in Mitsuba.
-        raise UntranslatableError("Mesh that shines and has vertex normals", "shape")
-    if "emitter" in site.parts:
-        site = _with_exact_light(site)
+    site = with_mesh_light(site, normals=soup.normals is not None)
     key = ("mesh", id(shape))
     plugin = placed(soup, key, site.place.outer, site.mirrored, site)
     return [plugin._replace(uv=same_uv, faces=soup.numbers)]
 
 
-def _with_exact_light(site: Site) -> Site:
-    """The site with our plugin `comparisons.mitsuba.plugins.textured_area` for a textured lamp.
-
-    Mitsuba samples textured lights by uv, which a mesh may use twice or never (measured with all
-    vertices at one uv: two thirds of the light were lost).  Raises UntranslatableError.
-    """
-    kind = site.coloured["emitter"]["radiance"]["type"]
-    if kind == "rgb":
-        return site
-    if kind == "mesh_attribute":  # which depends on the triangle, not on uv
-        raise UntranslatableError("Mesh that shines by colours of its vertices", "shape")
-    parts, coloured = (
-        {**of, "emitter": {**of["emitter"], "type": "textured_area"}}
-        for of in (site.parts, site.coloured)
-    )
-    return site._replace(parts=parts, coloured=coloured)
-
-
 def placed(soup: Soup, key: Any, m: transform.Affine, mirrored: bool, site: Site) -> Plugin:
-    """Triangles under the map m: a mesh, or, with many copies, an instance of the one mesh for
-    `key`.  `mirrored`: see `Soup.moved`."""
+    """Triangles under the map m: a mesh, or, with many copies that do not emit, an instance of the
+    one mesh for `key`.  `mirrored`: see `Soup.moved`."""
     parts = site.parts if soup.colours is None else site.coloured
-    if site.copies == 1 or site.copies * len(soup.faces) <= MOST_TRIANGLES:
+    few = site.copies * len(soup.faces) <= MOST_TRIANGLES
+    if site.copies == 1 or few or "emitter" in site.parts:
         return Plugin(soup.moved(m, mirrored).mesh(parts))
     # Mitsuba transforms normals of instances as we do: the front stays the front.
     return instance_of(str(key), lambda: soup.mesh(parts), m, site)

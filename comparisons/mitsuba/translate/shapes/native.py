@@ -13,7 +13,6 @@ import numpy as np
 from comparisons.geometry.float32 import UNIT_ROUNDOFF
 from comparisons.mitsuba.hits import CURVED
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
-from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import Soup
 from comparisons.mitsuba.translate.shapes.plugins import (
@@ -22,6 +21,7 @@ from comparisons.mitsuba.translate.shapes.plugins import (
     in_float32,
     is_similarity,
     to_world,
+    with_mesh_light,
 )
 from comparisons.mitsuba.translate.shapes.stand_ins import Implicit, Patch, stand_in
 from reference_rt.core.arrays import FloatArray
@@ -42,8 +42,10 @@ def _(shape: Sphere, site: Site) -> list[Plugin]:
     if not is_similarity(m[:, :3]):
         m = m @ np.vstack([np.column_stack([shape.radius * np.eye(3), shape.center]), [0, 0, 0, 1]])
         least = float(np.linalg.svd(m[:, :3], compute_uv=False)[-1])
-        if in_float32(least) > 0.0 and CURVED * UNIT_ROUNDOFF * site.reach**2 > least**2:
-            # The error of Mitsuba's own sphere would exceed its thickness.
+        thin = in_float32(least) > 0.0 and CURVED * UNIT_ROUNDOFF * site.reach**2 > least**2
+        # The error of Mitsuba's own sphere would exceed its thickness, and its instances do not
+        # emit.
+        if thin or "emitter" in site.parts:
             return [_ellipsoid(shape, site)]
         return [curved_instance("sphere", m, site)._replace(uv=same_uv)]
     table: Any = shape.tabulate(site.place)
@@ -123,11 +125,9 @@ def _(shape: Box, site: Site) -> list[Plugin]:
 
 def _box_of_triangles(m: Affine, site: Site) -> Plugin:
     """A box with our uv."""
-    if "emitter" in site.parts:
-        # As a Whitted light a mesh has one point for each triangle.
-        raise UntranslatableError("emissive material with a texture on a Box", "material")
     soup = box_of_triangles(m)
-    return Plugin(soup.mesh(site.parts), faces=np.repeat(np.arange(6), 2), uv=same_uv)
+    mesh = soup.mesh(with_mesh_light(site).parts)
+    return Plugin(mesh, faces=np.repeat(np.arange(6), 2), uv=same_uv)
 
 
 def box_of_triangles(m: Affine) -> Soup:

@@ -41,6 +41,22 @@ def to_world(linear: FloatArray, offset: FloatArray) -> Any:
     return mitsuba().ScalarTransform4d(matrix)
 
 
+def with_mesh_light(site: Site, normals: bool = False, stands_in: bool = False) -> Site:
+    """The site with our plugin `comparisons.mitsuba.plugins.mesh_area` for a mesh that emits, where
+    Mitsuba's own emitter is not exact: with a texture, or with vertex normals.  stands_in: whether
+    these are a curved surface's."""
+    if "emitter" not in site.parts:
+        return site
+    more = {"type": "mesh_area", "by_normals": stands_in}
+
+    def exact(parts: dict[str, Any]) -> dict[str, Any]:
+        emitter = parts["emitter"]
+        plain = emitter["radiance"]["type"] == "rgb" and not normals
+        return parts if plain else {**parts, "emitter": {**emitter, **more}}
+
+    return site._replace(parts=exact(site.parts), coloured=exact(site.coloured))
+
+
 def instance_of(name: str, member: Any, m: Affine, site: Site) -> Plugin:
     """A Mitsuba shape (see `ShapeGroup.member`) under any affine map: an instance of a group of its
     own, one for each `name` and material."""

@@ -18,6 +18,7 @@ from comparisons.mitsuba.translate.shapes.plugins import (
     in_float32,
     is_similarity,
     to_world,
+    with_mesh_light,
 )
 from comparisons.mitsuba.translate.shapes.stand_ins import Box, Implicit, Patch, stand_in
 from reference_rt.core import transform
@@ -47,10 +48,12 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
     r, height = shape.radius, shape.z_max - shape.z_min
     unit = _followed(m, np.array([r, r, height]), shape.z_min)
     least = np.linalg.svd(m[:, :2], compute_uv=False)[-1] * r
-    if least * THIN < site.reach and in_float32(least) > 0.0:
+    is_round = _is_round(unit[:, :3])
+    is_thin = least * THIN < site.reach and in_float32(least) > 0.0
+    if is_thin or ("emitter" in site.parts and not is_round):  # Mitsuba's instances do not emit
         patch, surface = side_surface(shape, site.textured)
         side = stand_in(shape, [patch], surface, None, site)
-    elif _is_round(unit[:, :3]):
+    elif is_round:
         place = to_world(unit[:, :3], unit[:, 3])
         plugin = {"type": "cylinder", "to_world": place, **site.parts}
         side = Plugin(plugin, uv=same_uv, curved=in_float32(least))
@@ -104,7 +107,7 @@ def _disk_of_triangles(
     flat = disk_soup(z, radius, face, reach)
     soup = flat.moved(m, bool(np.linalg.det(m[:, :3]) < 0.0))
     return Plugin(
-        soup.mesh(site.parts),
+        soup.mesh(with_mesh_light(site).parts),
         suffix=f"_cap{face}",
         faces=soup.all_of_face(face),
         uv=same_uv,
@@ -177,7 +180,7 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
         if len(faces) > 0:
             m = shape.map_in(site.place)
             mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
-            plugin = placed(soup, key, m, mirrored, site)
+            plugin = placed(soup, key, m, mirrored, with_mesh_light(site))
             found.append(plugin._replace(suffix="_caps", faces=faces, uv=same_uv, faceted=True))
     return found
 

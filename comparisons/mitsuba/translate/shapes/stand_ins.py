@@ -13,7 +13,7 @@ from comparisons.mitsuba.stand_ins import Plugin, StandIn
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.shapes.cutting import cut_away
 from comparisons.mitsuba.translate.shapes.meshes import Soup, placed
-from comparisons.mitsuba.translate.shapes.plugins import Site
+from comparisons.mitsuba.translate.shapes.plugins import Site, with_mesh_light
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes.shape import Shape
@@ -119,6 +119,7 @@ def stand_in(
         if key not in site.shared:
             site.shared[key] = measured_slip(soup, patches[0], box)
         found = found._replace(slip=site.shared[key])
+    site = with_mesh_light(site, normals=True, stands_in=True)
     m = transform.compose(own, site.place.outer)
     # The maps after the shape's own stretch distances, and turn angles, at most by these factors.
     stretch = np.linalg.svd(site.place.outer[:, :3], compute_uv=False)
@@ -138,7 +139,9 @@ def _is_bumped(part: Any) -> bool:
     """Whether a bump map is among the parts of a shape."""
     if not isinstance(part, dict):
         return False
-    return part.get("type") == "bumpmap" or any(_is_bumped(inner) for inner in part.values())
+    return part.get("type") in ("bumpmap", "exact_bump") or any(
+        _is_bumped(inner) for inner in part.values()
+    )
 
 
 MEASURED = 50_000

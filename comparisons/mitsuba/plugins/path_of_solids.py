@@ -1,0 +1,122 @@
+"""Path tracing and direct illumination of scenes with CSG solids: `{"type": "path_of_solids"}`.
+
+Mitsuba's own integrators trace Mitsuba's scene, in which there are no solids.  This one traces a
+`LitScene`, and takes all else from Mitsuba: the camera, the film, random numbers, BSDFs and
+emitters.  The estimator is the textbook's: at each surface one sample of a light and one of the
+BSDF, combined with the power heuristic (Veach 1997).  Its mean is that of Mitsuba's `path` and
+`direct`.
+"""
+
+from typing import Any
+
+_MOST_RAYS = 1 << 20
+"""Rays that are traced together: each takes a kilobyte in wide variants."""
+
+_SURVIVAL = 0.95
+"""The highest survival probability of Russian roulette."""
+
+
+def register(mi: Any) -> None:
+    """Define the integrator for the current variant, and register it."""
+    import drjit as dr
+
+    def weight(pdf: Any, other: Any) -> Any:
+        """The power heuristic's weight of a sample with this density."""
+        return dr.select(pdf > 0.0, 1.0 / (1.0 + dr.square(other / pdf)), 0.0)
+
+    class PathOfSolids(mi.SamplingIntegrator):  # type: ignore[misc]
+        """Parameters: max_depth, most edges of a path, -1 for no limit;  rr_depth, edges after
+        which Russian roulette may end it;  samples_lights, samples_bsdfs: whether direct light is
+        sampled in this way.  `scene`, the `LitScene`, is set before rendering."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.max_depth = properties.get("max_depth", -1)
+            self.rr_depth = properties.get("rr_depth", 5)
+            self.samples_lights = properties.get("samples_lights", True)
+            self.samples_bsdfs = properties.get("samples_bsdfs", True)
+            self.scene: Any = None
+            self.most_rays = _MOST_RAYS
+
+        def sample(
+            self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
+        ) -> tuple[Any, Any, list[Any]]:
+            """The radiance along `ray`, whether it hit anything, no further channels.
+
+            All paths take their next edge together.
+            """
+            ray, active = mi.Ray3f(ray), mi.Mask(active)
+            total, throughput, eta = mi.Color3f(0.0), mi.Color3f(1.0), mi.Float(1.0)
+            before, bsdf_pdf, valid = dr.zeros(mi.Interaction3f), mi.Float(0.0), None
+            depth = 0
+            while depth != self.max_depth and dr.any(active):
+                si, of_solid = self.scene.trace(ray, active)
+                # Density 0: the ray is the camera's or of a delta lobe, and has no competitor.
+                light_pdf = mi.Float(0.0)
+                found = mi.DirectionSample3f(scene, si, before)
+                if depth > 0 and self.samples_lights:
+                    competes = active & (bsdf_pdf > 0.0) & (of_solid ^ True)
+                    light_pdf = scene.pdf_emitter_direction(before, found, competes)
+                    light_pdf = dr.select(competes, light_pdf, 0.0)
+                share = dr.select(bsdf_pdf > 0.0, weight(bsdf_pdf, light_pdf), 1.0)
+                total += throughput * share * self.scene.emitted(si, active)
+                active &= si.is_valid()
+                valid = active if valid is None else valid
+                depth += 1
+                if depth == self.max_depth:
+                    break
+                bsdf, context = si.bsdf(), mi.BSDFContext()
+                if self.samples_lights:
+                    total += throughput * self.next_event(scene, sampler, si, active)
+                if not self.samples_bsdfs:
+                    break
+                drawn, value = bsdf.sample(
+                    context, si, sampler.next_1d(active), sampler.next_2d(active), active
+                )
+                throughput *= value
+                eta *= drawn.eta
+                is_delta = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
+                bsdf_pdf = dr.select(is_delta, 0.0, drawn.pdf)
+                ray = si.spawn_ray(si.to_world(drawn.wo))
+                before = dr.zeros(mi.Interaction3f)
+                before.t, before.p, before.n = si.t, si.p, si.n
+                active &= dr.max(throughput) > 0.0
+                if depth >= self.rr_depth:
+                    survival = dr.minimum(dr.max(throughput) * dr.square(eta), _SURVIVAL)
+                    active &= sampler.next_1d(active) < survival
+                    throughput *= dr.select(active, 1.0 / survival, 0.0)
+                sampler.schedule_state()
+                dr.eval(ray, active, total, throughput, eta, bsdf_pdf, before)
+            return total, valid if valid is not None else active, []
+
+        def next_event(self, scene: Any, sampler: Any, si: Any, active: Any) -> Any:
+            """The direct light of one sampled point on a light."""
+            bsdf, context = si.bsdf(), mi.BSDFContext()
+            if not scene.emitters():
+                return mi.Color3f(0.0)
+            active = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+            drawn, radiance = scene.sample_emitter_direction(
+                si, sampler.next_2d(active), False, active
+            )
+            active &= drawn.pdf > 0.0
+            wo = si.to_local(drawn.d)
+            value, bsdf_pdf = bsdf.eval_pdf(context, si, wo, active)
+            share = dr.select(drawn.delta, 1.0, weight(drawn.pdf, bsdf_pdf))
+            if not self.samples_bsdfs:
+                share = 1.0
+            light = dr.select(active, value * radiance * share, 0.0)
+            active &= dr.max(light) > 0.0
+            # Mitsuba's rays to distant lights end beyond its own scene, which lacks the solids.
+            distant = mi.has_flag(drawn.emitter.flags(), mi.EmitterFlags.Infinite)
+            shadow = si.spawn_ray_to(drawn.p)
+            away = si.spawn_ray(drawn.d)
+            shadow = dr.select(distant, away, shadow)
+            return dr.select(self.scene.ray_test(shadow, active), 0.0, light)
+
+        def aov_names(self) -> list[str]:
+            return []
+
+        def to_string(self) -> str:
+            return f"PathOfSolids[max_depth={self.max_depth}]"
+
+    mi.register_integrator("path_of_solids", PathOfSolids)
