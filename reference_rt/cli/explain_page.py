@@ -1,5 +1,7 @@
 """The page that `reference-rt explain` prints."""
 
+from collections.abc import Iterable
+
 from rich.console import Console
 from rich.table import Table
 
@@ -22,7 +24,7 @@ def print_page(scene: Scene) -> None:
     console = Console()
     for title, lines in (
         ("used", used),
-        ("specialised away", pruned),
+        ("specialised away", _by_reason(pruned)),
         ("kernels", kernels_of(scene)),
         ("nearest to float64's limits", near),
         ("warning: beyond float64", beyond),
@@ -35,3 +37,11 @@ def print_page(scene: Scene) -> None:
             table.add_row(printable(what), printable(why))
         console.print(table)
         console.print()
+
+
+def _by_reason(lines: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The same with one line for each reason: a simple scene lacks thirty things for ten."""
+    names: dict[str, list[str]] = {}
+    for what, why in lines:
+        names.setdefault(why, []).append(what)
+    return [(", ".join(some), why) for why, some in names.items()]

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
+from dataclasses import replace
 
 import pytest
 from junitparser import JUnitXml
@@ -15,7 +16,7 @@ from suite_runs import processes, run_in, scenes, signal_in_the_next_case
 
 from comparisons.report import write_report
 from comparisons.report.ci import github, junit
-from comparisons.results.case import how_many
+from comparisons.results.case import RungResult, how_many
 from comparisons.results.verdict import exit_code
 from comparisons.suites.display import summarise
 
@@ -34,7 +35,8 @@ def test_how_many_are_there():
 
 def test_exit_code():
     assert exit_code(RAN, MISSING) == 1
-    assert exit_code([case("invalid")], MISSING) == 3
+    unread = replace(case("invalid"), rungs=(RungResult("scene", "invalid", "why"),))
+    assert exit_code([unread], MISSING) == 3
     assert exit_code([], MISSING) == 4
 
 
