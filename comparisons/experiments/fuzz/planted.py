@@ -14,6 +14,7 @@ from statistics import median
 from typing import Any
 
 import reference_rt
+from comparisons.experiments.fuzz.types import all_types
 from comparisons.experiments.selftest import FAULTS
 from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.sensitivity import patched_text
@@ -23,8 +24,8 @@ from reference_rt.util.files import replacing
 
 MOST_SCENES = 500
 
-SECONDS = 3600.0
-"""Time limit of the search for one fault, which compiles the kernels of the faulty renderer."""
+REDUCE = 600.0
+"""Seconds for the reduction of a finding: its scenes may need kernels that are not compiled yet."""
 
 FILE = "planted.json"
 
@@ -49,6 +50,13 @@ class Planted:
 def source_faults() -> list[SourceFault]:
     """The faults of the self-test that are planted in the source."""
     return [fault for fault in FAULTS if isinstance(fault, SourceFault)]
+
+
+def feature_of(fault: SourceFault) -> str:
+    """The type of the schema that the fault's file implements, which all scenes then have; empty
+    for a file that is no type's."""
+    stem = Path(fault.file).stem
+    return stem if stem in {name for _, name in all_types()} else ""
 
 
 def search(
@@ -77,7 +85,11 @@ def summary(found: Sequence[Planted]) -> str:
 
 
 def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> Planted:
-    """Run `reference-rt fuzz --stop` with a patched copy of the renderer."""
+    """Run `reference-rt fuzz --stop` with a patched copy of the renderer.
+
+    The copy compiles what its scenes need, into a cache of its own: `warm-up` would compile all
+    kernels, most of which no scene uses before the fault is found.
+    """
     text = patched_text(fault)
     folder = out.resolve() / "".join(c if c.isalnum() else "_" for c in fault.name)
     with tempfile.TemporaryDirectory(prefix="reference_rt_fuzz_") as temporary:
@@ -89,19 +101,18 @@ def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> 
         environment = {
             **os.environ,
             "PYTHONPATH": f"{temporary}{os.pathsep}{path}".rstrip(os.pathsep),
+            "REFERENCE_RT_CACHE": f"{temporary}/cache",
         }
-        # -P: do not import from the current folder, which may have a reference_rt.
-        command = [sys.executable, "-P", "-m", "reference_rt"]
-        subprocess.run(
-            [*command, "warm-up"], env=environment, capture_output=True, **tied(), check=False
-        )
         words = ["--count", str(count), "--seed", str(seed), "--jobs", str(jobs), "--stop"]
+        words += ["--reduce", str(REDUCE), "--out", str(folder)]
+        if feature := feature_of(fault):
+            words += ["--features", feature]
         run = subprocess.run(
-            [*command, "fuzz", *words, "--out", str(folder)],
+            # -P: do not import from the current folder, which may have a reference_rt.
+            [sys.executable, "-P", "-m", "reference_rt", "fuzz", *words],
             env=environment,
             capture_output=True,
             text=True,
-            timeout=SECONDS,
             cwd=temporary,  # workers import from the current folder first
             **tied(),
             check=False,

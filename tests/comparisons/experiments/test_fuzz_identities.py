@@ -69,16 +69,12 @@ def test_all_are_planted_below():
 
 @pytest.mark.parametrize("name", OF_PICTURES)
 def test_a_picture_that_changes_is_found(scene, name, monkeypatch):
-    made = []
-
-    def every_other_one(*arguments, **options):
+    def other(*arguments, **options):
         picture = render(*arguments, **options)
-        made.append(picture)
-        if len(made) % 2 == 0:
-            picture.layers["colour"][3, 4, 1] *= 1.0 + 2.0**-40
+        picture.layers["colour"][3, 4, 1] *= 1.0 + 2.0**-40
         return picture
 
-    monkeypatch.setattr(same_bits, "render", every_other_one)
+    monkeypatch.setattr(same_bits, "render", other)
     found = result(name, scene)
     assert isinstance(found, Finding)
     assert found.rung == f"identity {name}"

@@ -17,9 +17,10 @@ from comparisons.experiments.fuzz import stored, summary
 from comparisons.experiments.fuzz.effort import Effort
 from comparisons.experiments.fuzz.finding import Checked
 from comparisons.experiments.fuzz.page import write_page
-from comparisons.experiments.fuzz.planted import Planted, source_faults
+from comparisons.experiments.fuzz.planted import Planted, feature_of, source_faults
 from comparisons.experiments.fuzz.planted import summary as planted_summary
 from comparisons.experiments.fuzz.run import Plan, run
+from comparisons.experiments.fuzz.types import features as known
 from comparisons.experiments.selftest.sensitivity import patched_text
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import UsageError
@@ -139,6 +140,9 @@ def test_every_source_fault_can_be_planted():
     assert len(source_faults()) >= 15
     for fault in source_faults():
         assert patched_text(fault)
+    features = {feature_of(fault) for fault in source_faults()}
+    assert {"", "sphere", "dielectric", "environment_map"} <= features
+    known(tuple(features - {""}))
     some = [Planted("a", 3, "direct", "", 1, 9), Planted("b", 0), Planted("c", 5, "run", "", 3, 11)]
     assert planted_summary(some) == (
         "2 of 3 faults found, after 4 scenes (median); reduced to 2 shapes and 10 lines (median)"
