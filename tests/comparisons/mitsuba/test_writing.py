@@ -107,10 +107,12 @@ def test_scenes_with_stand_ins_are_hit_alike(name, tmp_path):
         warnings.simplefilter("ignore")
         write_xml(scene, tmp_path / "scene.xml")
         read = Scene.load(tmp_path / "scene.xml")
+        # In float32 the smallest triangles of a stand-in may lose their area, which is said here.
+        tables = [one.tables for one in (scene, read)]
     rng = np.random.default_rng(1)
     x, y = rng.uniform(0, scene.film.width, 400), rng.uniform(0, scene.film.height, 400)
     rays = camera_rays(scene, x, y)
-    ours, theirs = (query.intersect(one.tables, *rays).t for one in (scene, read))
+    ours, theirs = (query.intersect(one, *rays).t for one in tables)
     same = np.isclose(ours, theirs, rtol=1e-5, atol=0.0) | (ours == theirs)
     assert same.mean() > 0.98
 
