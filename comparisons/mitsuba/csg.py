@@ -205,7 +205,8 @@ class SolidCounterpart:
         n = t.shape[1]
         everything = np.arange(n)
         states = states.copy()
-        began = evaluated(self.tree, states)  # before the current group of crossings
+        # Copies: of a single operand, `evaluated` returns its row of the states.
+        began = evaluated(self.tree, states).copy()  # before the current group of crossings
         inside, candidate = began.copy(), np.full(n, -1)
         changed = np.full(n, -1)
         done = np.zeros(n, bool)
@@ -217,7 +218,7 @@ class SolidCounterpart:
             for number in np.unique(j[active]):
                 rays = everything[active & (j == number)]
                 states[whose[number], rays] = crossings[number].enters[column[number, rays]]
-            now = evaluated(self.tree, states)
+            now = evaluated(self.tree, states).copy()
             candidate = np.where(active & (now != inside), j, candidate)
             inside = np.where(active, now, inside)
             # A crossing ends its group if the next one is clearly further.

@@ -54,8 +54,8 @@ def register(mi: Any) -> None:
             """A point of the mesh, uniform by area; only its front shines."""
             self.prepare()
             index, rest = self.triangles.sample_reuse(sample.x, active)
-            b = mi.warp.square_to_uniform_triangle(mi.Point2f(rest, sample.y))
-            weights = (1.0 - b.x - b.y, b.x, b.y)
+            place = mi.warp.square_to_uniform_triangle(mi.Point2f(rest, sample.y))
+            weights = (1.0 - place.x - place.y, place.x, place.y)
             corners = mi.Vector3u(self.mesh.face_indices(index, active))
             a, b, c = (self.mesh.vertex_position(corner, active) for corner in corners)
             p = a * weights[0] + b * weights[1] + c * weights[2]
@@ -67,6 +67,7 @@ def register(mi: Any) -> None:
             si = dr.zeros(mi.SurfaceInteraction3f) if wide else mi.SurfaceInteraction3f()
             si.p, si.n, si.prim_index = p, n, index
             si.shape = mi.ShapePtr(self.mesh) if wide else self.mesh
+            si.uv = place  # Mitsuba's, and ours, where a mesh has none of its own
             if self.mesh.has_vertex_texcoords():
                 si.uv = self.mixed(self.mesh.vertex_texcoord, corners, weights, active)
             d = p - it.p

@@ -63,8 +63,10 @@ def sensor(scene: Scene, surfaces: Surfaces) -> Element:
         plugin = found.pop("type")
         if plugin == "view_rectangle":
             surfaces.note(OURS.format("sensor", plugin))
-        m = np.array(found.pop("to_world").matrix, np.float64)[:3]
-        values = {**found, "to_world": (matrix_step(m),)}
+        place: Step | LookAt = look
+        if plugin != "view_rectangle" or not isinstance(camera, Perspective | ThinLens):
+            place = matrix_step(np.array(found["to_world"].matrix, np.float64)[:3])
+        values = {**found, "to_world": (place,)}
     return Element("sensor", plugin, values, [_film(scene.film), _sampler(scene)])
 
 

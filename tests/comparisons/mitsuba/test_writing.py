@@ -36,10 +36,12 @@ APPROXIMATE = {
     "light_shapes": "meshes",
     "mesh_colours": "colours in float32",
     "mesh_knot": "normals are made unit again",
+    "needle": "ellipsoids are instances",
     "phong_spheres": "a plane that ends",
     "planet": "ellipsoids",
     "polygons_fill_rules": "meshes",
     "quadrics": "meshes",
+    "textured_curves": "meshes",
     "textured_room": "a box with a texture is a mesh",
     "tilted_lamps": "triangles",
     "tiny": "a capped cylinder is three shapes",
@@ -105,10 +107,12 @@ def test_scenes_with_stand_ins_are_hit_alike(name, tmp_path):
         warnings.simplefilter("ignore")
         write_xml(scene, tmp_path / "scene.xml")
         read = Scene.load(tmp_path / "scene.xml")
+        # In float32 the smallest triangles of a stand-in may lose their area, which is said here.
+        tables = [one.tables for one in (scene, read)]
     rng = np.random.default_rng(1)
     x, y = rng.uniform(0, scene.film.width, 400), rng.uniform(0, scene.film.height, 400)
     rays = camera_rays(scene, x, y)
-    ours, theirs = (query.intersect(one.tables, *rays).t for one in (scene, read))
+    ours, theirs = (query.intersect(one, *rays).t for one in tables)
     same = np.isclose(ours, theirs, rtol=1e-5, atol=0.0) | (ours == theirs)
     assert same.mean() > 0.98
 
