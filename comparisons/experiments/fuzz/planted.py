@@ -52,12 +52,12 @@ def source_faults() -> list[SourceFault]:
 
 
 def search(
-    faults: Sequence[SourceFault], out: Path, seed: int, jobs: int, count: int = MOST_SCENES
+    faults: Sequence[SourceFault], out: Path, seed: int, workers: int, count: int = MOST_SCENES
 ) -> Iterator[Planted]:
     """What becomes of each fault; writes FILE after each."""
     found: list[Planted] = []
     for fault in faults:
-        found.append(_search(fault, out / "planted", seed, jobs, count))
+        found.append(_search(fault, out / "planted", seed, workers, count))
         with replacing(out / FILE) as temporary:
             document = {"seed": seed, "planted": [one.as_json() for one in found]}
             temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
@@ -76,7 +76,7 @@ def summary(found: Sequence[Planted]) -> str:
     )
 
 
-def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> Planted:
+def _search(fault: SourceFault, out: Path, seed: int, workers: int, count: int) -> Planted:
     """Run `reference-rt fuzz --stop` with a patched copy of the renderer."""
     text = patched_text(fault)
     folder = out.resolve() / "".join(c if c.isalnum() else "_" for c in fault.name)
@@ -95,7 +95,7 @@ def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> 
         subprocess.run(
             [*command, "warm-up"], env=environment, capture_output=True, **tied(), check=False
         )
-        words = ["--count", str(count), "--seed", str(seed), "--jobs", str(jobs), "--stop"]
+        words = ["--count", str(count), "--seed", str(seed), "--workers", str(workers), "--stop"]
         run = subprocess.run(
             [*command, "fuzz", *words, "--out", str(folder)],
             env=environment,

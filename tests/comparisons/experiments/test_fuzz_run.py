@@ -23,6 +23,7 @@ from comparisons.experiments.fuzz.run import Plan, run
 from comparisons.experiments.selftest.sensitivity import patched_text
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import UsageError
+from reference_rt.util.workers import Threads
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -48,7 +49,7 @@ def test_a_scene_that_hangs_is_a_finding(tmp_path, fake_workers):
 
 
 def test_scenes_that_crash_or_raise_are_findings(tmp_path, fake_workers):
-    plan = Plan(tmp_path, count=7, jobs=2, shrink=0.0)
+    plan = Plan(tmp_path, count=7, workers=Threads(2), shrink=0.0)
     stored.add(tmp_path, Checked(number=3))  # it would hang
     told = []
     found = run(plan, told.append)
@@ -77,7 +78,7 @@ def test_a_crash_is_reduced_in_new_processes(tmp_path, fake_workers, monkeypatch
 
 
 def test_findings_of_one_cause_are_one(tmp_path, fake_workers):
-    plan = Plan(tmp_path, first=4, count=3, jobs=1)
+    plan = Plan(tmp_path, first=4, count=3, workers=Threads(1))
     found = run(plan, quiet)
     assert len(found.findings) == 2
     ((one, count),) = summary.distinct(found)
@@ -99,7 +100,7 @@ def test_findings_of_one_cause_are_one(tmp_path, fake_workers):
 
 
 def test_it_stops_at_the_first_finding(tmp_path, fake_workers):
-    found = run(Plan(tmp_path, first=4, count=100, jobs=1, stop=True), quiet)
+    found = run(Plan(tmp_path, first=4, count=100, workers=Threads(1), stop=True), quiet)
     assert len(found.scenes) == 1
     assert len(found.reduced) == 1
 
@@ -166,7 +167,7 @@ def test_another_renderer_is_compared_with_ours(tmp_path, wrong):
     command += " {scene} {output} {seed} {spp} " + wrong
     plan = Plan(
         tmp_path / "out",
-        jobs=1,
+        workers=Threads(1),
         command=command,
         scenes=(scene,),
         effort=Effort(spp=64, replicates=4),
@@ -183,7 +184,7 @@ def test_another_renderer_is_compared_with_ours(tmp_path, wrong):
 
 @pytest.mark.slow
 def test_a_run_of_two_minutes_finds_nothing(tmp_path):
-    found = run(Plan(tmp_path, seed=20260101, seconds=120.0, jobs=2, shrink=0.0), quiet)
+    found = run(Plan(tmp_path, seed=20260101, seconds=120.0, workers=Threads(2), shrink=0.0), quiet)
     assert found.findings == []
     assert len(found.scenes) >= 10
 
