@@ -1,19 +1,18 @@
 """`reference-rt converge`."""
 
+from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh, out_folder
+from comparisons.commands.options import ClusterFile, Fresh, Scheduler, out_folder
 from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import SceneError, UsageError, printable
-
-if TYPE_CHECKING:
-    from reference_rt.rendering.scene import Scene
 
 
 @guarded
@@ -53,6 +52,14 @@ def converge(
         bool, typer.Option(help="Time process start-up, with empty and with full kernel caches.")
     ] = True,
     fresh: Fresh = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Scenes at a time, each in a process: their times disturb each other."
+        ),
+    ] = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
     define: Defaults = None,
 ) -> None:
     """Measure error against run time of reference_rt and of Mitsuba.
@@ -63,17 +70,18 @@ def converge(
         from comparisons.experiments.convergence.curves import Curves
         from comparisons.experiments.convergence.data import Settings
         from comparisons.experiments.convergence.methods import chosen
+        from comparisons.experiments.convergence.one_scene import INVALID, curves_of
         from comparisons.experiments.convergence.outputs import write_results, write_table
         from comparisons.experiments.convergence.page import write_page
-        from comparisons.experiments.convergence.run import converge as converge_scene
-        from comparisons.experiments.convergence.run import prepared
-        from comparisons.experiments.convergence.store import Store, run_key
         from comparisons.experiments.convergence.summary import again, lines_of
         from comparisons.results.case import INTERRUPTED
+        from comparisons.runs.elsewhere import run_elsewhere
         from comparisons.runs.provenance import provenance
-        from comparisons.suites.work import Changes, folder_name, read
+        from comparisons.suites.work import Changes, folder_name
+    from reference_rt.cli.where import Where
     from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable
+    from reference_rt.util.workers import Processes
 
     settings = Settings(
         time_limit=time_limit,
@@ -86,35 +94,34 @@ def converge(
     )
     chosen(settings.only)
     changes = Changes(defaults=by_name(define))
-    described = [read(path, changes.on(path)) for path in scenes]
     names = [printable(path.stem) for path in scenes]
     if double := [name for name in names if names.count(name) > 1]:
         raise UsageError(f"two scenes have the name '{double[0]}'; expected different names")
-    invalid = False
     files = [out / name for name in ("results.json", "results.csv", "report.html")]
     check_writable(*files, out / "rungs" / "a rung")
     facts = provenance()
     found = [Curves(name, problem=INTERRUPTED) for name in names]
 
-    def curves_of(scene: "Scene | SceneError", name: str) -> Curves:
-        if isinstance(scene, SceneError):
-            raise scene
-        key = run_key(prepared(scene, settings), replicates)
-        store = Store(out / "rungs" / folder_name(name), key, fresh=fresh)
-        with ProgressLine() as progress:
+    tasks = [
+        (path.absolute(), changes, settings, (out / "rungs" / folder_name(name)).absolute(), fresh)
+        for path, name in zip(scenes, names, strict=True)
+    ]
 
-            def tell(what: str, part: float) -> None:
-                progress(what if what == "compile" else f"{name}: {what}", part)
+    def measured(where: Where) -> Iterator[tuple[int, Curves]]:
+        if where.is_elsewhere:
+            with closing(where.open(Processes)) as opened:
+                yield from enumerate(run_elsewhere(opened, curves_of, tasks))
+            return
+        for k, task in enumerate(tasks):
+            with ProgressLine() as progress:
 
-            return converge_scene(scene, settings, store, tell)
+                def tell(what: str, part: float, k: int = k) -> None:
+                    progress(what if what == "compile" else f"{names[k]}: {what}", part)
 
-    for k, (path, scene) in enumerate(zip(scenes, described, strict=True)):
-        try:
-            curves = curves_of(scene, names[k])
-        except SceneError as error:  # the other scenes have curves all the same
-            curves = Curves(names[k], problem=f"invalid: {error}")
-            invalid = True
-        found[k] = replace(curves, again=again(path, out, settings))
+                yield k, curves_of(*task, tell)
+
+    for k, curves in measured(Where(workers, scheduler, cluster)):
+        found[k] = replace(curves, scene=names[k], again=again(scenes[k], out, settings))
         # After each scene, so that an interruption loses none that is finished.
         write_results(files[0], found, settings, facts)
         write_table(files[1], found)
@@ -122,7 +129,7 @@ def converge(
         for line in lines_of(found[k]):
             say(line)
     say(", ".join(map(str, files)), err=True)
-    if invalid:
+    if any(curves.problem.startswith(INVALID) for curves in found):
         raise typer.Exit(SceneError.exit_code)
 
 

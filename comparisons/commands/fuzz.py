@@ -2,6 +2,7 @@
 
 import os
 import re
+from contextlib import closing
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,7 +10,13 @@ from typing import Annotated, Any
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import JUnit, out_folder
+from comparisons.commands.options import (
+    ClusterFile,
+    JUnit,
+    NumberOfWorkers,
+    Scheduler,
+    out_folder,
+)
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -63,9 +70,9 @@ def fuzz(
         float,
         typer.Option(min=0.0, metavar="SECONDS", help="Time to reduce a finding; 0: do not."),
     ] = 120.0,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="Parallel processes. (default: all cores)")
-    ] = None,
+    workers: NumberOfWorkers = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Remove stored results first, and check all again.")
     ] = False,
@@ -97,10 +104,15 @@ def fuzz(
         from comparisons.experiments.fuzz.stored import remove
         from comparisons.experiments.fuzz.types import features as known
         from comparisons.runs.provenance import provenance
+    from reference_rt.cli.where import Where
     from reference_rt.util.files import check_writable
+    from reference_rt.util.workers import Threads
 
+    where = Where(workers, scheduler, cluster)
     if planted is not None:
-        _plant(planted, out, seed, jobs or os.cpu_count() or 1)
+        if where.is_cluster:
+            raise UsageError("--planted: changes the renderer's sources here; expected --workers")
+        _plant(planted, out, seed, workers or os.cpu_count() or 1)
         return
     effort: dict[str, Any] = {} if rays is None else {"pixels": rays, "light_pixels": rays}
     if rungs is not None:
@@ -112,22 +124,24 @@ def fuzz(
     check_writable(out / "fuzz.json", page, *([junit] if junit else []))
     if fresh:
         remove(out)
-    plan = Plan(
-        out=out,
-        seed=seed,
-        count=count if count is not None or time is not None else 100,
-        seconds=seconds,
-        first=first,
-        jobs=jobs or os.cpu_count() or 1,
-        grammar=Grammar(names, extreme),
-        effort=Effort(**effort),
-        stop=stop,
-        command=renderer or "",
-        scenes=tuple(_data(path, out) for path in scene or ()),
-        shrink=reduce,
-    )
-    with Display(len(plan.scenes) or plan.count) as display:
-        found = run(plan, display.done, display.line)
+    scenes = tuple(_data(path, out) for path in scene or ())
+    with closing(where.open(Threads, os.cpu_count() or 1)) as opened:
+        plan = Plan(
+            out=out,
+            seed=seed,
+            count=count if count is not None or time is not None else 100,
+            seconds=seconds,
+            first=first,
+            workers=opened,
+            grammar=Grammar(names, extreme),
+            effort=Effort(**effort),
+            stop=stop,
+            command=renderer or "",
+            scenes=scenes,
+            shrink=reduce,
+        )
+        with Display(len(plan.scenes) or plan.count) as display:
+            found = run(plan, display.done, display.line)
     facts = provenance()
     summary.write(plan, found, facts, junit)
     write_page(page, plan, found, facts)
@@ -141,7 +155,7 @@ def fuzz(
     raise typer.Exit(1 if found.findings else 0)
 
 
-def _plant(pattern: str, out: Path, seed: int, jobs: int) -> None:
+def _plant(pattern: str, out: Path, seed: int, workers: int) -> None:
     """Search for planted faults, and say what became of each."""
     from comparisons.experiments.fuzz.planted import FILE, search, source_faults, summary
     from reference_rt.util.files import check_writable
@@ -151,7 +165,7 @@ def _plant(pattern: str, out: Path, seed: int, jobs: int) -> None:
         raise UsageError(f"--planted: no source fault matches {pattern}")
     check_writable(out / FILE)
     found = []
-    for one in search(faults, out, seed, jobs):
+    for one in search(faults, out, seed, workers):
         found.append(one)
         after = f"after {one.scenes} scenes: {one.rung}: {one.cause}" if one.scenes else "not found"
         say(f"{one.fault}: {after}; {one.shapes} shapes, {one.lines} lines")

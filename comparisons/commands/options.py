@@ -5,6 +5,9 @@ from typing import Annotated, Any
 
 import typer
 
+from reference_rt.cli.render_options import ClusterFile as ClusterFile
+from reference_rt.cli.render_options import Scheduler as Scheduler
+
 Baselines = Annotated[Path, typer.Option(metavar="DIR", help="The folder of baselines.")]
 
 Fixed = Annotated[
@@ -38,6 +41,11 @@ Scenes = Annotated[Path, typer.Option(metavar="DIR", help="The folder of scene f
 
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads. (default: all cores)")]
 
+
+NumberOfWorkers = Annotated[
+    int | None,
+    typer.Option("--workers", "--jobs", min=1, help="Processes at a time. (default: all cores)"),
+]
 
 TimeLimit = Annotated[
     float | None,

@@ -1,14 +1,18 @@
 """`reference-rt selftest`."""
 
+import os
+from collections.abc import Callable
+from contextlib import closing
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from comparisons.commands.options import Scenes, out_folder
+from comparisons.commands.options import ClusterFile, NumberOfWorkers, Scenes, Scheduler, out_folder
 from reference_rt.cli.guarded import guarded
 from reference_rt.util.errors import UsageError
+from reference_rt.util.workers import Workers
 
 
 @guarded
@@ -27,10 +31,21 @@ def selftest(
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Of the random changes.")] = 0,
     scenes: Scenes = Path("scenes"),
+    workers: NumberOfWorkers = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
 ) -> None:
     """Test the harness: plant faults and check that the suites catch them; count false alarms."""
+    from reference_rt.cli.where import Where
+    from reference_rt.util.workers import Processes
+
+    where = Where(workers, scheduler, cluster)
+
+    def opened() -> Workers:
+        return where.open(Processes, os.cpu_count() or 1)
+
     if mutants:
-        _mutate(mutants, seed, scenes, out)
+        _mutate(mutants, seed, scenes, out, opened)
         return
     from rich.console import Console
 
@@ -49,7 +64,8 @@ def selftest(
     def say(line: str) -> None:
         console.print(line, markup=False, soft_wrap=True)
 
-    outcome = run(faults, scenes, seeds, out, say, power)
+    with closing(opened()) as some:
+        outcome = run(faults, scenes, seeds, out, say, power, some)
     for suite in SUITES:
         caught, total = outcome.share(suite)
         say(f"{suite}: {caught} of {total} faults caught")
@@ -60,7 +76,7 @@ def selftest(
     raise typer.Exit(0 if outcome.holds else 1)
 
 
-def _mutate(count: int, seed: int, scenes: Path, out: Path) -> None:
+def _mutate(count: int, seed: int, scenes: Path, out: Path, opened: Callable[[], Workers]) -> None:
     """Mutation testing; writes what is known after each mutant."""
     from rich.console import Console
 
@@ -77,9 +93,10 @@ def _mutate(count: int, seed: int, scenes: Path, out: Path) -> None:
     by_suite = budgets_of(scenes)
     budgets = {suite: by_suite[suite] for suite in reversed(SUITES)}  # the small one first
     fates = []
-    for fate in mutation(count, seed, scenes, budgets, say):
-        fates.append(fate)
-        where = f" ({fate.by}, {fate.rung}, {fate.scene})" if fate.rung else ""
-        say(f"{fate.file}:{fate.line} {fate.what}: {fate.outcome}{where}")
-        write(fates, seed, out)
+    with closing(opened()) as workers:
+        for fate in mutation(count, seed, scenes, budgets, say, workers):
+            fates.append(fate)
+            where = f" ({fate.by}, {fate.rung}, {fate.scene})" if fate.rung else ""
+            say(f"{fate.file}:{fate.line} {fate.what}: {fate.outcome}{where}")
+            write(fates, seed, out)
     say(summary(fates))

@@ -1,6 +1,7 @@
 """`reference-rt stability`."""
 
 import os
+from contextlib import closing
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
@@ -8,7 +9,14 @@ from typing import Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh, out_folder, table_in
+from comparisons.commands.options import (
+    ClusterFile,
+    Fresh,
+    NumberOfWorkers,
+    Scheduler,
+    out_folder,
+    table_in,
+)
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -29,9 +37,9 @@ def stability(
         float | None, typer.Option(metavar="X", help="Only this setting; needs --series.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random scenes and rays.")] = 1,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="Parallel processes. (default: all cores)")
-    ] = None,
+    workers: NumberOfWorkers = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
     mitsuba: Annotated[
         bool, typer.Option("--mitsuba/--no-mitsuba", help="Measure Mitsuba too.")
     ] = True,
@@ -60,7 +68,9 @@ def stability(
         from comparisons.runs.provenance import ours, provenance
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
+    from reference_rt.cli.where import Where
     from reference_rt.util.files import check_writable
+    from reference_rt.util.workers import Threads
 
     names = tuple(dict.fromkeys(family or MODULES))
     if unknown := [name for name in names if name not in MODULES]:
@@ -82,13 +92,16 @@ def stability(
     effort: Effort = "full" if full else "quick"
     choice = Choice(names, effort, seed, series, at, not missing)
     facts = provenance() if not missing else ours() | {"mitsuba": f"takes no part: {missing}"}
-    processes = jobs or os.cpu_count() or 1
-    with Display(len(choice.settings())) as display:
+    where = Where(workers, scheduler, cluster)
+    with (
+        closing(where.open(Threads, os.cpu_count() or 1)) as opened,
+        Display(len(choice.settings())) as display,
+    ):
         display.line(f"seed {seed}; Mitsuba {facts['mitsuba']}")
-        found = run(choice, out, processes, display.done, fresh).found
+        found = run(choice, out, opened, display.done, fresh).found
         write(out, found, effort, seed, facts)
         display.line("pictures and page")
-        pictures = shoot(choice, found, out, processes)
+        pictures = shoot(choice, found, out, opened)
         write_page(page, found, pictures, effort, seed, facts)
     console = terminal.console()
     console.print(table.terminal(found, console.width))

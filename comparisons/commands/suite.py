@@ -2,20 +2,21 @@
 
 import os
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh, GitHub, JUnit, Scenes
+from comparisons.commands.options import ClusterFile, Fresh, GitHub, JUnit, Scenes, Scheduler
 from comparisons.results.rungs import COMPARED
 from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
-MOST_JOBS = 4
-"""Default limit of parallel processes: each takes up to 2 GB."""
+MOST_WORKERS = 4
+"""Default limit of processes at a time: each takes up to 2 GB."""
 
 
 @guarded
@@ -37,10 +38,17 @@ def suite(
             "--rung", "--tier", metavar="RUNG", help=f"Only this rung: {', '.join(COMPARED)}."
         ),
     ] = None,
-    jobs: Annotated[
+    workers: Annotated[
         int | None,
-        typer.Option(min=1, help=f"Parallel processes. (default: all cores, at most {MOST_JOBS})"),
+        typer.Option(
+            "--workers",
+            "--jobs",
+            min=1,
+            help=f"Processes at a time. (default: all cores, at most {MOST_WORKERS})",
+        ),
     ] = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
     fresh: Fresh = False,
     junit: JUnit = None,
     github: GitHub = False,
@@ -59,7 +67,9 @@ def suite(
         from comparisons.suites.run import Options, Run, run_suite
         from comparisons.suites.suite import load_suite, plan
         from comparisons.suites.work import Changes
+    from reference_rt.cli.where import Where
     from reference_rt.util.files import check_writable
+    from reference_rt.util.workers import Threads
 
     rungs = tuple(rung or ())
     if unknown := [name for name in rungs if name not in COMPARED]:
@@ -68,8 +78,10 @@ def suite(
     changes = Changes(defaults=by_name(define))
     planned = plan(source, scenes, tuple(only or ()), rungs, changes)
     folder = out or Path("out") / source.name
-    jobs = jobs or min(os.cpu_count() or 1, MOST_JOBS)
-    threads = max((os.cpu_count() or 1) // jobs, 1)
+    where, cores = Where(workers, scheduler, cluster), os.cpu_count() or 1
+    most = min(cores, MOST_WORKERS)
+    # A cluster has as many cases at a time as threads.
+    threads = 1 if where.is_cluster else max(cores // (workers or most), 1)
     files = {work.name: work.path.as_posix() for work in planned.work}
     on_github = github or github_actions.is_there()
     summary = github_actions.summary_path() if on_github else None
@@ -88,6 +100,7 @@ def suite(
         summarise(run.cases, run.walls, run.not_run, run.missing)
         say(f"{options.results}, {options.report}", err=True)
 
-    options = Options(folder, rungs, jobs, threads, fresh, tell=tell)
-    run = run_suite(source, planned, options)
+    with closing(where.open(Threads, most)) as opened:
+        options = Options(folder, rungs, opened, threads, fresh, tell=tell)
+        run = run_suite(source, planned, options)
     raise typer.Exit(exit_code(run.cases, run.missing))

@@ -81,13 +81,14 @@ def copies_of(scene: Scene) -> list[Copy]:
 
 def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple[str, Affine]]:
     """(group, map to the scene) of each copy that an instance expands to."""
-    outer = transform.compose(transform.affine(instance.transform), outer)
     shapes = scene.groups[instance.group]
-    if not all(isinstance(shape, Instance) for shape in shapes):
-        yield instance.group, outer
-    for shape in shapes:
-        if isinstance(shape, Instance):
-            yield from _expanded(scene, shape, outer)
+    for own in instance.maps(scene.folder):
+        inner = transform.compose(own, outer)
+        if not all(isinstance(shape, Instance) for shape in shapes):
+            yield instance.group, inner
+        for shape in shapes:
+            if isinstance(shape, Instance):
+                yield from _expanded(scene, shape, inner)
 
 
 def member_of(shape: Shape, number: int) -> Member:

@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+import importlib.metadata
 from pathlib import Path
 
 import reference_rt
@@ -22,3 +23,24 @@ def code_fingerprint(*excluded: str) -> str:
             digest.update(name.as_posix().encode() + b"\0")
             digest.update(hashlib.sha256(source.read_bytes()).digest())
     return digest.hexdigest()
+
+
+_PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit", "python-flint")
+"""What computes verdicts."""
+
+
+def package_versions() -> dict[str, str]:
+    """The versions of the packages that verdicts depend on; "" for one that is not installed."""
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = ""
+    return found
+
+
+@functools.cache
+def everything_fingerprint() -> str:
+    """The hash of all sources, and of the versions of packages."""
+    return hashlib.sha256(f"{code_fingerprint()} {package_versions()}".encode()).hexdigest()

@@ -1,7 +1,6 @@
 """Keys of stored cases: a hash of all that a case depends on."""
 
 import hashlib
-import importlib.metadata
 import json
 import os
 from collections.abc import Iterator
@@ -19,8 +18,6 @@ from reference_rt.util.files import read_input, read_text
 _APART = ("report", "commands", "gate", "experiments")
 """Folders of `comparisons` that do not affect the verdicts of a suite."""
 
-_PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
-
 
 def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Backend) -> str:
     """SHA-256 of the scene and the files it names, the budget, the requested rungs, our sources,
@@ -31,7 +28,7 @@ def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Back
         "budget": budget.model_dump(),
         "rungs": rungs,
         "sources": code_fingerprint(),
-        "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
+        "versions": fingerprint.package_versions(),
         "variant": backend.variant,
         "llvm": backend.llvm_path,
     }

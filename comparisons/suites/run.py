@@ -8,7 +8,7 @@ import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
@@ -26,6 +26,7 @@ from comparisons.suites.work import Plan, Work, folder_name
 from comparisons.suites.worker import Request
 from reference_rt.util.errors import ImageError, SceneError
 from reference_rt.util.files import check_writable
+from reference_rt.util.workers import Threads, Workers
 
 LOG = "stderr.txt"
 """In the folder of a case whose worker failed: what the worker wrote to stderr."""
@@ -48,14 +49,14 @@ class Run:
 
 @dataclass(frozen=True)
 class Options:
-    """out: folder of the results;  rungs: only these, empty: all;  jobs: parallel processes;
-    threads: of each process;  fresh: ignore stored cases;  steps: show each step of a case, not
-    only its result;  tell: called with the outcome, after an interruption too;  runner: see
-    `comparisons.suites.worker`."""
+    """out: folder of the results;  rungs: only these, empty: all;  workers: what runs cases, see
+    `pool.run`;  threads: of each process;  fresh: ignore stored cases;  steps: show each step of a
+    case, not only its result;  tell: called with the outcome, after an interruption too;  runner:
+    see `comparisons.suites.worker`."""
 
     out: Path
     rungs: tuple[str, ...] = ()
-    jobs: int = 1
+    workers: Workers = field(default_factory=lambda: Threads(1))
     threads: int | None = None
     fresh: bool = False
     steps: bool = False
@@ -78,7 +79,7 @@ def run_suite(source: Source, plan: Plan, options: Options) -> Run:
     work = tuple(w._replace(again=_again(w, source, options)) for w in plan.work)
     facts = {
         "suite": f"{source.name}: {source.suite.about}",
-        "jobs": options.jobs,
+        "workers": options.workers.threads,
         **({"rungs": ", ".join(options.rungs)} if options.rungs else {}),
         **{f"not run: {name}": why for name, why in plan.skipped.items()},
     }
@@ -222,7 +223,7 @@ def _outcomes(
         worker += ["--threads", str(options.threads)]
     if options.runner is not None:
         worker += ["--runner", options.runner]
-    running = pool.run(requests, options.jobs, seconds, display.doing, worker)
+    running = pool.run(requests, options.workers, seconds, display.doing, worker)
     # If the caller is interrupted, the pool is closed at once: no worker outlives this process.
     with contextlib.closing(running):
         yield from running

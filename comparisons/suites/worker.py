@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TextIO
+from typing import ClassVar, TextIO
 
 from pydantic import BaseModel, ConfigDict
 
@@ -40,6 +40,7 @@ class Request(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid")
+    output: ClassVar[str] = "folder"
 
     name: str
     scene: Path

@@ -85,13 +85,14 @@ def _placed(scene: Scene) -> Iterator[tuple[str, Shape, Affine]]:
 
     def of(name: str, shape: Shape, outer: Affine) -> Iterator[tuple[str, Shape, Affine]]:
         if isinstance(shape, Instance):
-            inner = transform.compose(transform.affine(shape.transform), outer)
-            for k, member in enumerate(scene.groups[shape.group]):
-                if isinstance(member, Mesh):
-                    if id(member) in seen:
-                        continue
-                    seen.add(id(member))
-                yield from of(f"{name}, {shape.group}[{k}]", member, inner)
+            for one in shape.maps(scene.folder):
+                inner = transform.compose(one, outer)
+                for k, member in enumerate(scene.groups[shape.group]):
+                    if isinstance(member, Mesh):
+                        if id(member) in seen:
+                            continue
+                        seen.add(id(member))
+                    yield from of(f"{name}, {shape.group}[{k}]", member, inner)
         elif isinstance(shape, Solid):
             for k, (leaf, inner, _, _) in enumerate(operands_of(shape, outer, None)):
                 yield f"{name}, operand {k}", leaf, inner

@@ -80,7 +80,8 @@ def render(
 
     Ctrl-C writes the picture so far, marked as partial in its header.
     """
-    from reference_rt.cli.render import Limited, Stored, Where, render_to_file
+    from reference_rt.cli.render import Limited, Stored, render_to_file
+    from reference_rt.cli.where import Where
     from reference_rt.rendering.image import check_suffix
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
@@ -89,7 +90,7 @@ def render(
     loaded = Scene.load(scene, by_name(define))
     description = adjusted(loaded, spp, size, integrator, seed)
     check_writable(output)
-    where = Where(threads, workers, scheduler, cluster)
+    where = Where(workers, scheduler, cluster, threads)
     limits = Limited(time_limit, target_error, memory)
     storage = Stored(checkpoint, no_checkpoint, resume, more_spp or 0)
     with without_blas():

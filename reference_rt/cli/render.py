@@ -1,6 +1,5 @@
 """`reference-rt render`: a picture in a file, with limits, checkpoints and previews."""
 
-import functools
 import math
 import time
 from contextlib import suppress
@@ -8,10 +7,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_of, share_of
+from reference_rt.cli.where import Where
 from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.rendering import image
+from reference_rt.rendering.executor import Remote
 from reference_rt.rendering.loop import Limits
-from reference_rt.rendering.processes import Processes
 from reference_rt.rendering.render_folders import delete_old
 from reference_rt.rendering.scene import Scene
 from reference_rt.rendering.session import Session, Storage, Workers
@@ -19,6 +19,7 @@ from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import check_writable
 from reference_rt.util.signals import exit_code_of
+from reference_rt.util.workers import Processes
 
 AFTER = 60.0
 """Seconds of rendering after which a render without --checkpoint is stored."""
@@ -74,30 +75,6 @@ class Limited(NamedTuple):
         return None if self.memory is None else bytes_of(self.memory, "--memory")
 
 
-class Where(NamedTuple):
-    """The options of the command line about what computes a render."""
-
-    threads: int | None = None
-    workers: int | None = None
-    scheduler: str | None = None
-    cluster: Path | None = None
-
-    def maker(self) -> Workers | None:
-        """What makes the executor; None: threads of this process.  Raises UsageError."""
-        names = ("threads", "workers", "scheduler", "cluster")
-        given = [name for name, one in zip(names, self, strict=True) if one is not None]
-        if len(given) > 1:
-            listed = " and ".join(f"--{name}" for name in given)
-            raise UsageError(f"{listed} contradict each other; expected one of them")
-        if self.workers is not None:
-            return functools.partial(Processes, workers=self.workers)
-        if self.scheduler is None and self.cluster is None:
-            return None
-        from reference_rt.rendering.cluster import Cluster
-
-        return functools.partial(Cluster, scheduler=self.scheduler or "", file=self.cluster)
-
-
 def render_to_file(
     scene: Scene,
     output: Path,
@@ -116,13 +93,13 @@ def render_to_file(
         image.check_suffix(preview)
         check_writable(preview)
     memory, limits, storage = limited.bytes(), limited.limits(), stored.storage()
-    workers = where.maker()
+    where.check()
     code = 0
     with ProgressLine() as progress:
         session = Session(
             scene,
             threads=where.threads,
-            workers=workers,
+            workers=_remote(where) if where.is_elsewhere else None,
             compiling=progress.compiling,
             limits=limits,
             storage=storage,
@@ -138,6 +115,10 @@ def render_to_file(
             if session.loop.save_error:
                 progress.line(f"warning: the checkpoint is not complete: {session.loop.save_error}")
             return _write(session, output, limits, code), code
+
+
+def _remote(where: Where) -> Workers:
+    return lambda scene: Remote(scene, where.open(Processes))
 
 
 def _check_resumed(session: Session) -> None:

@@ -1,5 +1,4 @@
-"""Executors compute units: this process's threads here, other processes in `processes`, clusters in
-`cluster`.
+"""Executors compute units: the threads of this process, or any workers (`util.workers`).
 
 A unit's sums are copied to the executor and back, so that a unit is a function of what it is given:
 one that was lost can be computed again, and nothing is ever added twice.
@@ -12,7 +11,9 @@ from typing import Protocol
 from reference_rt.rendering import thread_pool
 from reference_rt.rendering.accumulation import Sums
 from reference_rt.rendering.prepared import Done, Prepared
+from reference_rt.rendering.remote import SIZE, RemoteScene, compute_remotely
 from reference_rt.rendering.units import Unit
+from reference_rt.util.workers import Workers
 
 
 class Executor(Protocol):
@@ -74,3 +75,47 @@ class Threads:
 
     def close(self) -> None:
         self._pool.shutdown(cancel_futures=True)
+
+
+_THREADS_OF_SIZE, _LARGEST = 32, SIZE << 4
+"""Threads of workers that units of SIZE keep busy, while client and scheduler take 5 to 10 ms for
+each (measured); samples of the largest units, of ten seconds."""
+
+
+class Remote:
+    """An `Executor`: workers in other processes or on other machines."""
+
+    def __init__(self, scene: RemoteScene, workers: Workers) -> None:
+        self._scene, self._workers = scene, workers
+
+    @property
+    def slots(self) -> int:
+        return 2 * self._workers.threads + 1
+
+    @property
+    def size(self) -> int:
+        """Larger for more workers: client and scheduler take milliseconds for each unit."""
+        size = SIZE
+        while size * _THREADS_OF_SIZE < SIZE * self._workers.threads and size < _LARGEST:
+            size *= 2
+        return size
+
+    @property
+    def samples_of_pass(self) -> int:
+        return 2 * self.slots * self.size
+
+    def submit(self, unit: Unit, sums: Sums) -> "Future[Done]":
+        given = sums if unit.first else None
+        return self._workers.submit(compute_remotely, self._scene, unit, given)
+
+    def recovers(self, error: BaseException) -> bool:
+        return self._workers.recovers(error)
+
+    def progress(self, fraction: float) -> None:
+        pass
+
+    def stop(self) -> None:
+        self._workers.stop()
+
+    def close(self) -> None:
+        self._workers.close()

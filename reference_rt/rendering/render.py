@@ -1,19 +1,19 @@
 """`render`: from a scene, or a scene's file, to a picture."""
 
-import functools
 import math
 import os
 from pathlib import Path
 
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Report
+from reference_rt.rendering.executor import Remote
 from reference_rt.rendering.loop import Limits
 from reference_rt.rendering.picture import Picture
-from reference_rt.rendering.processes import Processes
 from reference_rt.rendering.session import Session, Storage
 from reference_rt.rendering.settings import with_settings
 from reference_rt.rendering.thread_pool import Progress
 from reference_rt.scene.build import BuiltScene
+from reference_rt.util.workers import Processes
 
 
 def render(
@@ -62,7 +62,7 @@ def render(
         compiling=compiling or (lambda done, total: say("compile", done / total)),
         specialised=specialised,
         limits=limits,
-        workers=None if workers is None else functools.partial(Processes, workers=workers),
+        workers=None if workers is None else lambda found: Remote(found, Processes(workers)),
         storage=None if checkpoint is None else Storage(Path(checkpoint)),
         at_once=limits == Limits() and checkpoint is None,
     ) as session:

@@ -42,7 +42,7 @@ class Storage(NamedTuple):
 
 
 Workers = Callable[[RemoteScene], Executor]
-"""Makes an executor of other processes: `processes.Processes` or `cluster.Cluster`."""
+"""Makes an executor of other processes or machines: `executor.Remote`."""
 
 
 class Session:

@@ -9,19 +9,19 @@ import numpy as np
 from reference_rt.accel.geometry import Geometry
 from reference_rt.accel.leaf import SOLID
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.core.transform import Affine, affine, identity, invert
+from reference_rt.core.transform import identity
 from reference_rt.scene.build_hierarchies import ExpandedInstance, HierarchyBuilder, TableRows
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes, csg
 from reference_rt.shapes.csg import NOT, OR, Solid
 from reference_rt.shapes.csg.tables import Parts, Solids
-from reference_rt.shapes.instances import Instance
+from reference_rt.shapes.instances import Instance, composed
 from reference_rt.shapes.meshes.topology import describe_boundary
 from reference_rt.shapes.shape import TabulationContext, outward
 
 _CODES = {table: code for code, _, table, _ in TABLES}
 
-MOST_INSTANCES = 1_000_000
+MOST_INSTANCES = 10_000_000
 """Instances that a group may expand to: each takes some 500 bytes while the scene is built."""
 
 
@@ -36,8 +36,7 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
     for i, shape in enumerate(scene.shapes):
         try:
             if isinstance(shape, Instance):
-                numbers, maps = work.expand(shape.group)
-                copies.append(ExpandedInstance(i, numbers, _composed(maps, _map_of(shape))))
+                copies.append(ExpandedInstance(i, *work.copies(shape)))
             else:
                 top.append(work.member(shape, i, None))
         except ValueError as error:
@@ -50,6 +49,7 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
             table = tables[field] = _concatenate(work.tables.pop(code))
             work.check_finite(table)
             bounds[code] = module.bounds(table)
+            del table
     if work.solids:
         bounds[SOLID] = _concatenated_bounds([solid.bounds for solid in work.solids])
     trees = HierarchyBuilder(scene.hierarchy, tables, bounds)
@@ -214,6 +214,13 @@ class _Assembly:
 
     # ---- groups ---------------------------------------------------------------------------------
 
+    def copies(self, instance: Instance, path: Sequence[str] = ()) -> tuple[IntArray, FloatArray]:
+        """Hierarchies (k,) and transforms (k, 3, 4) of an instance, nested ones included."""
+        trees, maps = self.expand(instance.group, path)
+        outer = instance.maps(self.scene.folder)
+        _check_count(len(trees) * len(outer))
+        return np.tile(trees, len(outer)), composed(maps, outer)
+
     def expand(self, name: str, path: Sequence[str] = ()) -> tuple[IntArray, FloatArray]:
         """Hierarchies (k,) and transforms (k, 3, 4) of a group's instance, nested ones included."""
         if name in path:
@@ -230,12 +237,10 @@ class _Assembly:
         for k, shape in enumerate(self.scene.groups[name]):
             try:
                 if isinstance(shape, Instance):
-                    inner_trees, inner = self.expand(shape.group, path)
+                    inner_trees, inner = self.copies(shape, path)
                     trees.append(inner_trees)
-                    count = sum(map(len, trees))
-                    if count > MOST_INSTANCES:
-                        raise ValueError(f"over {MOST_INSTANCES:,} copies; expected fewer")
-                    maps.append(_composed(inner, _map_of(shape)))
+                    maps.append(inner)
+                    _check_count(sum(map(len, trees)))
                 else:
                     owner = self.part(-1, k, shape.material).owner
                     self.paths[owner] = ("groups", name, k)
@@ -256,18 +261,9 @@ def _type_of(shape: Shape) -> str:
     return str(getattr(shape, "type", "shape"))
 
 
-def _map_of(instance: Instance) -> Affine:
-    outer = affine(instance.transform)
-    invert(outer)  # raises for singular maps
-    return outer
-
-
-def _composed(maps: FloatArray, outer: Affine) -> FloatArray:
-    """The composition of each map (k, 3, 4), followed by `outer`."""
-    result = np.empty_like(maps)
-    result[:, :, :3] = outer[:, :3] @ maps[:, :, :3]
-    result[:, :, 3] = maps[:, :, 3] @ outer[:, :3].T + outer[:, 3]
-    return result
+def _check_count(copies: int) -> None:
+    if copies > MOST_INSTANCES:
+        raise ValueError(f"over {MOST_INSTANCES:,} copies; expected fewer")
 
 
 def _concatenated_bounds(parts: Sequence[Bounds]) -> Bounds:

@@ -58,14 +58,18 @@ class HierarchyBuilder:
         self._new_rows: dict[int, IntArray] = {}
         self._scene: int | None = None
 
-    def add(self, references: Sequence[TableRows], whole: bool = False) -> int:
-        """Build a hierarchy over these, and return its number.  whole: reference each only once."""
+    def add(self, references: Sequence[TableRows], whole: bool = False, last: bool = False) -> int:
+        """Build a hierarchy over these, and return its number.  whole: reference each only once;
+        last: forget the bounds, no other one is built."""
         kinds, rows = _joined(references)
         lower, upper = self._bounds_of(kinds, rows)
         method: bvh.Method = "sah" if self.method == "auto" else self.method
         if whole and method == "spatial":
             method = "sah"
         nodes, order = bvh.build(lower, upper, method, self._corners(kinds, rows))
+        if last:
+            self.bounds.clear()
+        del lower, upper
         return self._append(nodes, kinds[order], rows[order])
 
     def finish(
@@ -82,19 +86,13 @@ class HierarchyBuilder:
             lower, upper = self._bounds_of(kinds, rows)
             finite = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
             del lower, upper  # `add` computes them again: two copies would double the memory
-            kinds_of = kinds[finite], kinds[~finite]
-            rows_of = rows[finite], rows[~finite]
             if finite.any():
-                self._scene = self.add(
-                    [
-                        TableRows(int(k), rows_of[0][kinds_of[0] == k])
-                        for k in _distinct(kinds_of[0])
-                    ]
-                )
+                bounded = [TableRows(k, rows[finite & (kinds == k)]) for k in _distinct(kinds)]
+                self._scene = self.add([some for some in bounded if len(some.rows)], last=True)
             if not finite.all():
                 everywhere = np.repeat([-np.inf, np.inf], 3)[None]
                 leaf = bvh.Nodes(everywhere, np.zeros(1, np.int64), np.array([(~finite).sum()]))
-                self._unbounded = self._append(leaf, kinds_of[1], rows_of[1])
+                self._unbounded = self._append(leaf, kinds[~finite], rows[~finite])
                 if self._scene is None:
                     self._scene, self._unbounded = self._unbounded, -1
         self._order_rows()
@@ -163,6 +161,8 @@ class HierarchyBuilder:
         present = _distinct(kinds)
         if len(present) == 1:
             low, high = self.bounds[present[0]]
+            if len(rows) == len(low) and np.array_equal(rows, np.arange(len(low))):
+                return low, high  # not copied: a large mesh
             return low[rows], high[rows]
         lower, upper = np.empty((2, len(kinds), 3))
         for kind in present:
@@ -205,20 +205,20 @@ class HierarchyBuilder:
         kinds = np.concatenate([np.zeros(0, np.int64), *self._kinds])
         rows = np.concatenate([np.zeros(0, np.int64), *self._rows])
         for code, field, table_type, module in TABLES:
-            table = self.tables[field]
-            if table is None:
+            if self.tables[field] is None:
                 continue
-            ragged = getattr(module, "RAGGED", ())
-            order = _first_named(rows[kinds == code], len(table.owner))
+            # Column by column, so that no two tables of a large mesh are in memory.
+            columns = self.tables[field]._asdict()
+            self.tables[field] = None
+            order = _first_named(rows[kinds == code], len(columns["owner"]))
             new_row = np.empty_like(order)
             new_row[order] = np.arange(len(order))
             self._new_rows[code] = new_row
-            self.tables[field] = table_type(
-                *(
-                    a if a is None or name in ragged else np.ascontiguousarray(a[order])
-                    for name, a in table._asdict().items()
-                )
-            )
+            ragged = getattr(module, "RAGGED", ())
+            for name in columns:
+                if columns[name] is not None and name not in ragged:
+                    columns[name] = np.ascontiguousarray(columns[name][order])
+            self.tables[field] = table_type(**columns)
             for tree_kinds, tree_rows in zip(self._kinds, self._rows, strict=True):
                 mine = tree_kinds == code
                 tree_rows[mine] = new_row[tree_rows[mine]]

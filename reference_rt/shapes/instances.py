@@ -1,9 +1,13 @@
 """Instances: copies of a group of shapes, which is stored once, each under its own map."""
 
+from pathlib import Path
 from typing import Literal, NamedTuple
+
+import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray, SurfacePoint
+from reference_rt.core.transform import FLAT, affine, flattens, singular
 from reference_rt.core.vec3 import length, normalize
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.placement import (
@@ -14,14 +18,61 @@ from reference_rt.shapes.placement import (
     world_vector,
 )
 from reference_rt.shapes.shape import Shape, Tangents
+from reference_rt.util.files import open_input
 
 
 class Instance(Shape):
-    """A copy of a group's shapes, which are stored once, under a transform."""
+    """A copy of a group's shapes, which are stored once, under a transform; or many copies."""
 
     type: Literal["instance"] = "instance"
     group: str
     """Name of the group in the scene's `groups`."""
+    file: str | None = None
+    """A NumPy file, .npy, relative to the scene file, with the affine matrices of n copies: (n, 3,
+    4), or (n, 4, 4) with the last rows 0 0 0 1.  Each is applied before `transform`.  Default: one
+    copy, under `transform` alone."""
+
+    def maps(self, folder: Path) -> FloatArray:
+        """The maps (n, 3, 4) of its copies;  folder: of the scene.  Raises ValueError for a file
+        that cannot be used, and for maps that flatten space."""
+        own = affine(self.transform)
+        if self.file is None:
+            if flattens(own):
+                raise ValueError(FLAT)
+            return own[None]
+        maps = composed(_read(folder / self.file), own[None])
+        if (flat := singular(maps)).any():
+            raise ValueError(f"matrix {flat.argmax()}: {FLAT}")
+        return maps
+
+
+def composed(maps: FloatArray, outer: FloatArray) -> FloatArray:
+    """The compositions (n k, 3, 4) of the maps (k, 3, 4), each followed by the first of `outer`
+    (n, 3, 4), then of all followed by the second, and so on."""
+    result = np.empty((len(outer), *maps.shape))
+    result[..., :3] = outer[:, None, :, :3] @ maps[:, :, :3]
+    result[..., 3] = maps[:, :, 3] @ outer[:, :, :3].swapaxes(1, 2) + outer[:, None, :, 3]
+    return result.reshape(-1, 3, 4)
+
+
+def _read(path: Path) -> FloatArray:
+    """The matrices (n, 3, 4) of a file."""
+    expected = "expected a .npy file of matrices (n, 3, 4) or (n, 4, 4)"
+    try:
+        with open_input(path) as file:
+            found = np.lib.format.read_array(file, allow_pickle=False)
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror}; {expected}") from None
+    except Exception as error:  # a damaged file makes NumPy raise almost anything
+        reason = " ".join(str(error).split())
+        raise ValueError(f"{path}: cannot be read: {reason}; {expected}") from None
+    if found.ndim != 3 or found.shape[1:] not in ((3, 4), (4, 4)) or found.dtype.kind not in "fiu":
+        raise ValueError(f"{path}: has {found.dtype} {found.shape}; {expected}")
+    if not len(found):
+        raise ValueError(f"{path}: has no matrices; expected at least one")
+    if found.shape[1] == 4 and np.any(found[:, 3] != (0, 0, 0, 1)):
+        raise ValueError(f"{path}: expected affine matrices, whose last rows are 0 0 0 1")
+    return np.asarray(found[:, :3], np.float64)
 
 
 class Instances(NamedTuple):

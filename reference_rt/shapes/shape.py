@@ -10,7 +10,7 @@ from pydantic import Field
 
 from reference_rt.core.arrays import Bounds, FloatArray
 from reference_rt.core.model import Description
-from reference_rt.core.transform import IDENTITY, Affine, Transform, affine, compose, invert
+from reference_rt.core.transform import FLAT, IDENTITY, Affine, Transform, affine, compose, flattens
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import VECTOR_WIDTH
@@ -68,7 +68,8 @@ class Shape(Description):
         if not self.transform and context.outer is IDENTITY:
             return IDENTITY  # the fast path: most shapes of a large scene
         m = compose(affine(self.transform), context.outer)
-        invert(m)
+        if flattens(m):
+            raise ValueError(FLAT)
         return m
 
 

@@ -43,8 +43,8 @@ def signal_in_the_next_case(
         assert process.poll() is None
         time.sleep(0.05)
     time.sleep(0.5)  # until the next case has begun
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-    workers = children.read_text().split() if children.exists() else []
+    tasks = Path(f"/proc/{process.pid}/task").glob("*/children")
+    workers = [child for children in tasks for child in children.read_text().split()]
     process.send_signal(number)
     return workers
 

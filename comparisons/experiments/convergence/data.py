@@ -1,5 +1,6 @@
 """Settings of a run, its reference, and its rungs."""
 
+import zlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +70,11 @@ class Reference:
     seconds: float = 0.0
 
     @property
+    def checksum(self) -> int:
+        """Of its pictures: another reference of the same scene has another one."""
+        return zlib.crc32(self.mean.tobytes())
+
+    @property
     def relmse(self) -> float:
         """The relMSE of its own noise."""
         return float((weights(self.mean) * self.variance).mean())
@@ -79,8 +85,9 @@ class Rung:
     """The replicates of a method at one number of samples.
 
     asked, spp: requested and actual samples per pixel;  seconds (replicates,): wall clock;  mse,
-    relmse (replicates,): see `estimates.errors`;  mean, variance (height, width, 3): over the
-    replicates; the variance is that of one.
+    relmse (replicates,): see `estimates.errors`;  mean, squares (height, width, 3): over the
+    replicates, the mean and the sum of squared deviations from it;  reference: checksum of the
+    reference of the errors.
     """
 
     asked: int
@@ -89,11 +96,17 @@ class Rung:
     mse: FloatArray
     relmse: FloatArray
     mean: FloatArray
-    variance: FloatArray
+    squares: FloatArray
+    reference: int = 0
 
     @property
     def replicates(self) -> int:
         return len(self.seconds)
+
+    @property
+    def variance(self) -> FloatArray:
+        """That of one replicate (height, width, 3)."""
+        return self.squares / max(self.replicates - 1, 1)
 
     @property
     def warm(self) -> FloatArray:

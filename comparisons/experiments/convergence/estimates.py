@@ -126,6 +126,8 @@ def against(rung: Rung, reference: Reference) -> Rung:
     Their mean is exact, from the mean and the variance of the replicates; the deviations of single
     replicates from it are kept, because a better reference changes them little.
     """
+    if rung.reference == reference.checksum:
+        return rung
     n = rung.replicates
     squared = (rung.mean - reference.mean) ** 2 + rung.variance * ((n - 1) / n) - reference.variance
     mse, relmse = squared.mean(), (weights(reference.mean) * squared).mean()
@@ -133,6 +135,7 @@ def against(rung: Rung, reference: Reference) -> Rung:
         rung,
         mse=rung.mse + (mse - rung.mse.mean()),
         relmse=rung.relmse + (relmse - rung.relmse.mean()),
+        reference=reference.checksum,
     )
 
 
@@ -149,7 +152,7 @@ class Accumulator:
         if done is not None:
             self.spp = done.spp
             self._mean += done.mean
-            self._squares += done.variance * (done.replicates - 1)
+            self._squares += done.squares
             columns = (done.seconds.tolist(), done.mse.tolist(), done.relmse.tolist())
             self._rows.extend(zip(*columns, strict=True))
 
@@ -168,5 +171,6 @@ class Accumulator:
     def rung(self) -> Rung:
         """The rung of the replicates added so far, at least one."""
         seconds, mse, relmse = np.array(self._rows).T
-        variance = self._squares / max(self.count - 1, 1)
-        return Rung(self.asked, self.spp, seconds, mse, relmse, self._mean.copy(), variance)
+        mean, squares = self._mean.copy(), self._squares.copy()
+        known = self._reference.checksum
+        return Rung(self.asked, self.spp, seconds, mse, relmse, mean, squares, known)

@@ -1,7 +1,6 @@
 """Stores finished rungs in a folder, so that they are not rendered again."""
 
 import hashlib
-import importlib.metadata
 import json
 import os
 import platform
@@ -10,23 +9,21 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from comparisons.experiments.convergence.data import Rung
 from comparisons.experiments.convergence.reference import key_of
 from comparisons.mitsuba.backend import backend
 from comparisons.results.sealed import read_arrays, sealed, unsealed, write_arrays
+from comparisons.runs.fingerprint import package_versions
 from comparisons.suites.keys import code_fingerprint, files_digest
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_text, replacing
 
-SCHEMA = 2
+SCHEMA = 3
 """Increased whenever what is stored, or its meaning, changes."""
 
-_ARRAYS = ("seconds", "mse", "relmse", "mean", "variance")
-"""The array fields of a rung, in order, after the two numbers."""
-
-_PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit")
+_NUMBERS = ("asked", "spp", "reference")
+_ARRAYS = ("seconds", "mse", "relmse", "mean", "squares")
+"""The fields of a rung."""
 
 
 def run_key(scene: Scene, replicates: int) -> str:
@@ -39,7 +36,7 @@ def run_key(scene: Scene, replicates: int) -> str:
         "files": files_digest(scene),
         "sources": code_fingerprint(),
         "reference": key_of(scene),
-        "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
+        "versions": package_versions(),
         "mitsuba": (chosen.variant, chosen.llvm_path),
         "machine": (platform.node(), platform.machine(), os.cpu_count()),
         "replicates": replicates,
@@ -67,20 +64,15 @@ class Store:
             return None
         kept = read_arrays(self._rung_path(method, asked))
         with suppress(KeyError):
-            arrays = [np.asarray(kept[name], np.float64) for name in _ARRAYS]
-            return Rung(int(kept["asked"]), int(kept["spp"]), *arrays)
+            numbers = {name: int(kept[name]) for name in _NUMBERS}
+            return Rung(**numbers, **{name: kept[name] for name in _ARRAYS})  # type: ignore[arg-type]
         return None
 
     def keep(self, method: str, rung: Rung) -> None:
-        """Store a rung, whole or not at all; its pictures as float32, whose rounding is far below
-        their noise.  Raises ImageError where the folder cannot be written."""
-        if self._folder is None:
-            return
-        arrays: dict[str, Any] = {name: getattr(rung, name) for name in _ARRAYS}
-        for name in ("mean", "variance"):
-            arrays[name] = arrays[name].astype(np.float32)
-        path = self._rung_path(method, rung.asked)
-        write_arrays(path, asked=rung.asked, spp=rung.spp, **arrays)
+        """Store a rung, whole or not at all and without rounding: a run that was killed ends with
+        the same bits.  Raises ImageError where the folder cannot be written."""
+        if self._folder is not None:
+            write_arrays(self._rung_path(method, rung.asked), **vars(rung))
 
     def _rung_path(self, method: str, asked: int) -> Path:
         assert self._folder is not None
@@ -95,9 +87,9 @@ class Store:
         return read_arrays(self._picture_path(name)).get("picture")
 
     def keep_picture(self, name: str, picture: Any) -> None:
-        """Store an array as float32."""
+        """Store an array."""
         if self._folder is not None:
-            write_arrays(self._picture_path(name), picture=np.asarray(picture, np.float32))
+            write_arrays(self._picture_path(name), picture=picture)
 
     def _picture_path(self, name: str) -> Path:
         assert self._folder is not None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.fuzz.data import Data
-from comparisons.experiments.stability.hostile.bases import MESHES
+from comparisons.experiments.stability.hostile.bases import COPIES, MESHES
 from comparisons.experiments.stability.hostile.bases import files as sound_files
 from reference_rt.core.exr import write_exr
 from reference_rt.util.files import replacing
@@ -25,6 +25,7 @@ FILES: dict[str, tuple[str, ...]] = {
     "bitmap": IMAGES,
     "environment_map": SKIES,
     "mesh": MESHES,
+    "instance": (COPIES,),
 }
 """Names of files by the type whose `file` they can be."""
 
@@ -53,7 +54,7 @@ def write(folder: Path) -> Path:
             Image.fromarray(rng.integers(low, high, (6, 6, 3)).astype(np.uint8)).save(
                 temporary, "PNG"
             )
-    for name in MESHES:
+    for name in (*MESHES, COPIES):
         if not (folder / name).exists():
             with replacing(folder / name) as temporary:
                 temporary.write_bytes(sound_files()[name])

@@ -60,12 +60,12 @@ def feature_of(fault: SourceFault) -> str:
 
 
 def search(
-    faults: Sequence[SourceFault], out: Path, seed: int, jobs: int, count: int = MOST_SCENES
+    faults: Sequence[SourceFault], out: Path, seed: int, workers: int, count: int = MOST_SCENES
 ) -> Iterator[Planted]:
     """What becomes of each fault; writes FILE after each."""
     found: list[Planted] = []
     for fault in faults:
-        found.append(_search(fault, out / "planted", seed, jobs, count))
+        found.append(_search(fault, out / "planted", seed, workers, count))
         with replacing(out / FILE) as temporary:
             document = {"seed": seed, "planted": [one.as_json() for one in found]}
             temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
@@ -84,7 +84,7 @@ def summary(found: Sequence[Planted]) -> str:
     )
 
 
-def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> Planted:
+def _search(fault: SourceFault, out: Path, seed: int, workers: int, count: int) -> Planted:
     """Run `reference-rt fuzz --stop` with a patched copy of the renderer.
 
     The copy compiles what its scenes need, into a cache of its own: `warm-up` would compile all
@@ -103,7 +103,7 @@ def _search(fault: SourceFault, out: Path, seed: int, jobs: int, count: int) -> 
             "PYTHONPATH": f"{temporary}{os.pathsep}{path}".rstrip(os.pathsep),
             "REFERENCE_RT_CACHE": f"{temporary}/cache",
         }
-        words = ["--count", str(count), "--seed", str(seed), "--jobs", str(jobs), "--stop"]
+        words = ["--count", str(count), "--seed", str(seed), "--workers", str(workers), "--stop"]
         words += ["--reduce", str(REDUCE), "--out", str(folder)]
         if feature := feature_of(fault):
             words += ["--features", feature]

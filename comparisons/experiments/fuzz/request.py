@@ -1,7 +1,7 @@
 """What a worker of the fuzzer is asked for."""
 
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict
 
@@ -17,6 +17,7 @@ class Request(BaseModel):
     renderer (`renderer.py`);  seconds: of a reduction."""
 
     model_config = ConfigDict(extra="forbid")
+    output: ClassVar[str] = "out"
 
     task: Literal["scene", "reduce"] = "scene"
     number: int

@@ -17,6 +17,7 @@ from comparisons.experiments.fuzz.request import Request
 from comparisons.experiments.fuzz.types import types_in
 from comparisons.runs.processes import pool
 from reference_rt.util.errors import UsageError
+from reference_rt.util.workers import Threads, Workers
 
 SECONDS = 600.0
 """Time limit of a scene, wall clock.  One takes 1 to 10 s of CPU time, and a process on a shared
@@ -37,16 +38,16 @@ FEW = 40
 @dataclass(frozen=True)
 class Plan:
     """out: folder of the results;  count, seconds: of scenes and wall clock, whichever ends first;
-    first: the number of the first scene;  jobs: parallel processes;  stop: at the first finding;
-    command: another renderer's;  scenes: data in place of generated scenes;  shrink: seconds for
-    the reduction of a finding, 0: none;  limit: seconds of a scene."""
+    first: the number of the first scene;  workers: what checks scenes, see `pool.run`;  stop: at
+    the first finding;  command: another renderer's;  scenes: data in place of generated scenes;
+    shrink: seconds for the reduction of a finding, 0: none;  limit: seconds of a scene."""
 
     out: Path
     seed: int = 0
     count: int | None = None
     seconds: float | None = None
     first: int = 0
-    jobs: int = 1
+    workers: Workers = field(default_factory=lambda: Threads(1))
     grammar: Grammar = field(default_factory=Grammar)
     effort: Effort = field(default_factory=Effort)
     stop: bool = False
@@ -139,7 +140,7 @@ def _checked(
 ) -> Iterator[Checked]:
     """What comes of the scenes, as they end."""
     numbers = _numbers(plan, done)
-    size = BATCH if plan.seconds is None else 20 * plan.jobs
+    size = BATCH if plan.seconds is None else 20 * plan.workers.threads
 
     def is_late() -> bool:
         return plan.seconds is not None and time.monotonic() - start > plan.seconds
@@ -172,7 +173,7 @@ LATE = "took longer than"
 
 
 def _outcomes(plan: Plan, requests: list[Request]) -> Iterator[pool.Outcome[Request]]:
-    running = pool.run(requests, plan.jobs, plan.limit, lambda r, step: None, WORKER)
+    running = pool.run(requests, plan.workers, plan.limit, lambda r, step: None, WORKER)
     with contextlib.closing(running):  # its processes end with it
         yield from running
 
@@ -225,7 +226,7 @@ def _reduce_all(plan: Plan, found: Run, say: Callable[[str], None]) -> None:
     ]
     inside = [r for r in requests if not _died(r)]
     limit = 3.0 * plan.shrink + plan.limit
-    running = pool.run(inside, plan.jobs, limit, lambda r, step: None, WORKER)
+    running = pool.run(inside, plan.workers, limit, lambda r, step: None, WORKER)
     with contextlib.closing(running):
         for outcome in running:
             if outcome.failure is not None:
@@ -268,7 +269,7 @@ def _outside(plan: Plan, request: Request) -> Reduced:
         one = one.model_copy(update={"out": plan.out / "tried"})
         one.out.mkdir(exist_ok=True)
         limit = min(plan.limit, 30.0) if LATE not in wanted.cause else plan.limit / 2.0
-        (outcome,) = pool.run([one], 1, limit, lambda r, step: None, WORKER)
+        (outcome,) = pool.run([one], plan.workers, limit, lambda r, step: None, WORKER)
         return outcome.failure is not None and without_numbers(outcome.failure) == wanted.cause
 
     try:

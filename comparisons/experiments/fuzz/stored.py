@@ -18,6 +18,7 @@ FINDINGS = "findings"
 def add(folder: Path, checked: Checked) -> None:
     """Append what came of a scene.  Processes append whole lines at the same time."""
     line = checked.model_dump_json().encode() + b"\n"
+    folder.mkdir(parents=True, exist_ok=True)
     file = os.open(folder / SCENES, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
     try:
         os.write(file, line)

@@ -10,7 +10,6 @@ import json
 import os
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,8 +21,10 @@ from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.mutants import Mutant, Place, functions_of, mutants
 from comparisons.experiments.selftest.patched import PACKAGE, run_patched, run_worker
 from comparisons.experiments.selftest.sensitivity import Budgets, compare_patched
+from comparisons.runs.elsewhere import run_elsewhere
 from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import replacing
+from reference_rt.util.workers import Workers
 
 SCENES = (
     *("cornell_box", "colour_bleeding", "caustic_glass", "soft_shadows", "veach_mis"),
@@ -76,33 +77,43 @@ class Fate:
 
 
 def mutation(
-    count: int, seed: int, scenes: Path, budgets: Budgets, say: Say, jobs: int = 2
+    count: int, seed: int, scenes: Path, budgets: Budgets, say: Say, workers: Workers
 ) -> Iterator[Fate]:
-    """The fate of `count` mutants of the functions that SCENES run, `jobs` at a time;  budgets: of
-    the suites, the small one first."""
+    """The fate of `count` mutants of the functions that SCENES run;  budgets: of the suites, the
+    small one first."""
     paths = [str((scenes / f"{name}.yaml").resolve()) for name in SCENES]
     say(f"pictures of {len(paths)} scenes")
-    with ThreadPoolExecutor(jobs) as pool:
-        tasks = [{"scenes": [path], "calls": True, "before": None} for path in paths]
-        right: dict[str, Any] = {}
-        for answer in pool.map(lambda task: run_worker(WORKER, task, PLAIN, None), tasks):
-            right |= answer
-        runs: dict[Place, list[str]] = {}
-        for path, found in right.items():
-            for file, function in found.get("functions", ()):
-                if Path(file).is_relative_to(PACKAGE):  # generated code is in no file
-                    place = Path(file).relative_to(PACKAGE).as_posix(), function
-                    runs.setdefault(place, []).append(path)
-        places = [place for place in functions_of(PACKAGE) if place in runs]
-        say(f"{len(places)} functions")
+    right: dict[str, Any] = {}
+    runs: dict[Place, list[str]] = {}
+    for path, (found, places) in zip(
+        paths, run_elsewhere(workers, _right, ((path,) for path in paths)), strict=True
+    ):
+        right |= found
+        for place in places:
+            runs.setdefault(place, []).append(path)
+    places = [place for place in functions_of(PACKAGE) if place in runs]
+    say(f"{len(places)} functions")
+    tasks = []
+    for mutant in mutants(PACKAGE, places, count, seed):
+        some = runs[mutant.file, mutant.function][:MOST_SCENES]
+        before = {path: right[path]["picture"] for path in some}
+        tasks.append((mutant, before, scenes.resolve(), budgets))
+    yield from run_elsewhere(workers, _fate, tasks)
 
-        def fate(mutant: Mutant) -> Fate:
-            some = runs[mutant.file, mutant.function][:MOST_SCENES]
-            before = {path: right[path]["picture"] for path in some}
-            plain = by_few_rays(mutant, before)
-            return _by_suites(mutant, plain, scenes, budgets) if _survives(plain) else plain
 
-        yield from pool.map(fate, mutants(PACKAGE, places, count, seed))
+def _right(path: str) -> tuple[dict[str, Any], list[Place]]:
+    """The picture of a scene, and the functions of the package that it runs."""
+    task = {"scenes": [path], "calls": True, "before": None}
+    found = run_worker(WORKER, task, PLAIN, None)
+    files = [(Path(file), function) for file, function in found[path].get("functions", ())]
+    # Generated code is in no file.
+    own = [(file, function) for file, function in files if file.is_relative_to(PACKAGE)]
+    return found, [(file.relative_to(PACKAGE).as_posix(), function) for file, function in own]
+
+
+def _fate(mutant: Mutant, before: dict[str, Any], scenes: Path, budgets: Budgets) -> Fate:
+    plain = by_few_rays(mutant, before)
+    return _by_suites(mutant, plain, scenes, budgets) if _survives(plain) else plain
 
 
 def _survives(fate: Fate) -> bool:

@@ -17,6 +17,7 @@ from comparisons.experiments.selftest.specificity import Alarms, specificity
 from comparisons.runs.provenance import provenance
 from comparisons.suites.suite import load_suite, plan
 from reference_rt.util.files import replacing
+from reference_rt.util.workers import Workers
 
 SUITES = ("standard", "smoke")
 
@@ -65,12 +66,18 @@ def budgets_of(scenes: Path) -> Budgets:
 
 
 def run(
-    faults: Sequence[Fault], scenes: Path, seeds: int, out: Path, say: Say, with_power: bool
+    faults: Sequence[Fault],
+    scenes: Path,
+    seeds: int,
+    out: Path,
+    say: Say,
+    with_power: bool,
+    workers: Workers,
 ) -> Outcome:
     """Plant `faults`, then count false alarms over `seeds` seeds; writes files after each step."""
     budgets = budgets_of(scenes)
     outcome = Outcome()
-    for found in sensitivity(faults, budgets, scenes, say):
+    for found in sensitivity(faults, budgets, scenes, workers):
         outcome.findings.append(found)
         said = f"{found.rung}, {found.strength}" if found.caught else f"MISSED: {found.strength}"
         say(f"{found.fault} ({found.suite}): {said}")
@@ -81,7 +88,7 @@ def run(
         outcome.calibrations = calibration(CALIBRATED, scenes, say)
         _write(out, outcome)
     if seeds:
-        outcome.alarms = specificity(seeds, scenes, say)
+        outcome.alarms = specificity(seeds, scenes, say, workers)
         _write(out, outcome)
     return outcome
 

@@ -3,22 +3,23 @@
 import os
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 
 from comparisons.compare.budget import Budget
-from comparisons.compare.compare import Say, Subject, gather
+from comparisons.compare.compare import Subject, gather
 from comparisons.compare.judge import Evidence, judge, of_replicates
 from comparisons.experiments.selftest.compared import compared
 from comparisons.experiments.selftest.fault import Fault, PictureFault, SceneFault, SourceFault
 from comparisons.experiments.selftest.finding import Finding, finding
 from comparisons.experiments.selftest.patched import PACKAGE, run_patched
 from comparisons.results.case import Case
+from comparisons.runs.elsewhere import run_elsewhere
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceRtError
+from reference_rt.util.workers import Workers
 
 Budgets = Mapping[str, Mapping[str, Budget]]
 """Budgets by suite and scene."""
@@ -32,7 +33,7 @@ class StaleFaultError(ReferenceRtError):
 
 
 def sensitivity(
-    faults: Sequence[Fault], budgets: Budgets, scenes: Path, say: Say, jobs: int = 2
+    faults: Sequence[Fault], budgets: Budgets, scenes: Path, workers: Workers
 ) -> Iterator[Finding]:
     """The finding of each suite for each fault, as they are made."""
     right = {}
@@ -50,17 +51,13 @@ def sensitivity(
                 subject = Subject(fault.change(scene), scene)
                 yield finding(fault, suite, compared(subject, budget))
     sources = [fault for fault in faults if isinstance(fault, SourceFault)]
-    threads = max(1, (os.cpu_count() or 1) // jobs)
-    with ThreadPoolExecutor(jobs) as pool:
-        tasks = [
-            pool.submit(
-                _patched, fault, {s: b[fault.scene] for s, b in budgets.items()}, scenes, threads
-            )
-            for fault in sources
-        ]
-        for fault, task in zip(sources, tasks, strict=True):
-            say(f"waiting for: {fault.name}")
-            yield from task.result()
+    threads = max(1, (os.cpu_count() or 1) // workers.threads)
+    tasks = [
+        (fault, {s: b[fault.scene] for s, b in budgets.items()}, scenes.resolve(), threads)
+        for fault in sources
+    ]
+    for found in run_elsewhere(workers, _patched, tasks):
+        yield from found
 
 
 def _silent(step: str) -> None:

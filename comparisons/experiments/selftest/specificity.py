@@ -1,9 +1,7 @@
 """The rate of false alarms: verdicts about right renderers, over many seeds."""
 
-import multiprocessing
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,8 @@ from comparisons.gate.gate import LIMIT, gate_pictures, look
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference
 from comparisons.results.case import FloatArray
+from comparisons.runs.elsewhere import run_elsewhere
+from reference_rt.util.workers import Workers
 
 ALLOWED = 1e-3
 """Allowed false alarms per case."""
@@ -54,16 +54,13 @@ class Alarms:
         return asdict(self)
 
 
-def specificity(runs: int, scenes: Path, say: Say, jobs: int = 2) -> list[Alarms]:
-    """`runs` verdicts about each of CASES, in so many processes: most of the time is NumPy's, which
-    uses one core."""
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        tasks = [pool.submit(_of_case, number, runs, scenes) for number in range(len(CASES))]
-        found = []
-        for task in tasks:
-            found.append(task.result())
-            one = found[-1]
-            say(f"{one.kind}, {one.name}: {one.false_alarms} false alarms in {runs} runs")
+def specificity(runs: int, scenes: Path, say: Say, workers: Workers) -> list[Alarms]:
+    """`runs` verdicts about each of CASES: most of the time is NumPy's, which uses one core."""
+    tasks = ((number, runs, scenes.resolve()) for number in range(len(CASES)))
+    found = []
+    for one in run_elsewhere(workers, _of_case, tasks):
+        found.append(one)
+        say(f"{one.kind}, {one.name}: {one.false_alarms} false alarms in {runs} runs")
     return found
 
 

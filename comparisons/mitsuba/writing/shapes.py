@@ -171,7 +171,8 @@ class Shapes:
             name = self.surfaces.id_for(copy.group)
             self.groups[copy.group] = Element("shape", "shapegroup", {}, [*found], name)
         steps = transform_steps(shape.transform)
-        if copy.group != shape.group or len(self._copies_of(copy.shape)) > 1:
+        others = len(self._copies_of(copy.shape)) > 1 or shape.file is not None
+        if copy.group != shape.group or others:
             steps = (matrix_step(copy.outer),)
         values = {"to_world": steps} if steps else {}
         group = Reference(self.groups[copy.group].id)

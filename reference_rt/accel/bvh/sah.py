@@ -136,16 +136,19 @@ def _split_all(
 
 
 def build(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes, IntArray]:
-    """Nodes and references for primitives with boxes (n, 6).  With corners (n, 9), see
-    `reference_rt.accel.bvh.build`, spatial splits may cut them, into at most
+    """Nodes and references for primitives with boxes (n, 6), which are reordered.  With corners (n,
+    9), see `reference_rt.accel.bvh.build`, spatial splits may cut them, into at most
     spatial.MOST_REFERENCES n references."""
-    n = len(primitives)
-    m = n if corners is None else spatial.MOST_REFERENCES * n
-    refs, ids = np.empty((m, 6)), np.arange(m)
-    refs[:n] = primitives
+    n = m = len(primitives)
+    refs = primitives
+    if corners is not None:
+        m = spatial.MOST_REFERENCES * n
+        refs = np.empty((m, 6))
+        refs[:n] = primitives
+    ids = np.arange(m)
     nodes, references = new_nodes(m), np.empty(m, np.int64)
     jobs = np.empty((STACK_SIZE, 3), np.int64)
     count, used = _split_all(
         n, refs, ids, corners, jobs, new_bins(), spatial.new_parts(), nodes, references
     )
-    return trimmed(nodes, count), references[:used].copy()
+    return trimmed(nodes, count), references[:used]

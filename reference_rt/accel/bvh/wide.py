@@ -154,7 +154,8 @@ def joined(
         )
         node, reference = here.stop, reference + len(of_tree)
     codes = children[:, CHILDREN : CHILDREN + VECTOR_WIDTH].astype(np.int64)
-    references = np.column_stack([np.concatenate(kinds), np.concatenate(rows)]).astype(np.int32)
+    references = np.empty((sum(map(len, rows)), 2), np.int32)
+    references[:, 0], references[:, 1] = np.concatenate(kinds), np.concatenate(rows)
     corners = None if vertices is None else _corners_of(vertices, codes, references[:, 1])
     return Bvh(boxes, children.reshape(-1), frames, references, corners, -1)
 
@@ -185,7 +186,13 @@ def _corners_of(vertices: FloatArray, codes: IntArray, rows: Codes) -> FloatArra
     first, size = (-1 - leaves) >> 5, ((-1 - leaves) >> 1) & 15
     corners = np.zeros(9 * len(rows) + VECTOR_WIDTH)
     for s in range(1, LEAF_SHARE + 1):
-        at = first[size == s][:, None]
-        lanes = vertices[rows[at + np.arange(s)]].transpose(0, 2, 1)
-        corners[9 * at + np.arange(9 * s)] = lanes.reshape(len(at), 9 * s)
+        leaves = first[size == s][:, None]
+        for begin in range(0, len(leaves), _TOGETHER):
+            at = leaves[begin : begin + _TOGETHER]
+            lanes = vertices[rows[at + np.arange(s)]].transpose(0, 2, 1)
+            corners[9 * at + np.arange(9 * s)] = lanes.reshape(len(at), 9 * s)
     return corners
+
+
+_TOGETHER = 1 << 16
+"""Leaves whose corners are copied together: more only take more memory."""

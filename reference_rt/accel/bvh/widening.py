@@ -86,6 +86,10 @@ def _collapse(
     while waiting > 0:
         waiting -= 1
         node, row = jobs[waiting, 0], jobs[waiting, 1]
+        for k in range(VECTOR_WIDTH):
+            codes[row, k] = NOTHING
+            for j in range(3):
+                boxes[row, j, k], boxes[row, 3 + j, k] = np.inf, -np.inf
         # The binary node that a wide node is made of is always opened.
         opening[0], shares[0] = node, VECTOR_WIDTH
         top, lane, whole = 1, 0, True
@@ -150,17 +154,10 @@ def widened(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
     _plan(nodes, count, triangles, np.empty((n, VECTOR_WIDTH + 1)), choice)
     # Every wide node takes up at least one inner node.
     most = int((nodes.size == 0).sum())
-    boxes, codes = _empty(most)
-    made = _collapse(
-        nodes, start, count, triangles, choice, np.empty((most + 1, 2), np.int64), boxes, codes
-    )
-    return Wide(boxes[:made].copy(), codes[:made].copy())
-
-
-def _empty(n: int) -> tuple[FloatArray, IntArray]:
-    boxes = np.empty((n, 6, VECTOR_WIDTH))
-    boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
-    return boxes, np.full((n, VECTOR_WIDTH), NOTHING)
+    jobs = np.empty((most + 1, 2), np.int64)
+    boxes, codes = np.empty((most, 6, VECTOR_WIDTH)), np.empty((most, VECTOR_WIDTH), np.int64)
+    made = _collapse(nodes, start, count, triangles, choice, jobs, boxes, codes)
+    return Wide(boxes[:made], codes[:made])  # the rest was never written, and takes no memory
 
 
 def _leaf(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
@@ -186,6 +183,6 @@ def _leaf(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
         level = np.arange(len(rows) - parents, len(rows))
     codes = np.array(rows)[::-1]
     codes = np.where(codes >= 0, len(codes) - 1 - codes, codes)
-    boxes, _ = _empty(len(codes))
-    boxes = np.where((codes != NOTHING)[:, None], nodes.boxes[0][None, :, None], boxes)
+    empty = np.repeat([np.inf, -np.inf], 3)[None, :, None]
+    boxes = np.where((codes != NOTHING)[:, None], nodes.boxes[0][None, :, None], empty)
     return Wide(boxes, codes)

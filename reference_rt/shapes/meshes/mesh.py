@@ -13,7 +13,7 @@ from reference_rt.core.numpy_fields import AS_DIGEST, Floats2, Floats3, Integers
 from reference_rt.core.transform import IDENTITY, Affine
 from reference_rt.shapes.meshes.files import MeshData, read_mesh
 from reference_rt.shapes.meshes.files.data import RawMesh, checked
-from reference_rt.shapes.meshes.triangle_table import Triangles, facing, geometric_normals, soup
+from reference_rt.shapes.meshes.triangle_table import Triangles, facing, have_area, soup
 from reference_rt.shapes.meshes.vertex_normals import smooth_normals
 from reference_rt.shapes.shape import Shape, TabulationContext
 
@@ -99,8 +99,7 @@ class Mesh(Shape):
             context.warn(context.owner, f"{name}: {_ignored_message(data.ignored)}")
         vertices = transform.apply_points(m, data.vertices)[data.faces].reshape(-1, 9)
         # Triangles without area have no normal, and rays meet them by rounding alone: left out.
-        n = geometric_normals(vertices)
-        has_area = np.einsum("ij,ij->i", n, n) > 0.0
+        has_area = have_area(vertices)
         if not has_area.any():
             raise ValueError(f"{name}: no triangle has any area; expected one that has")
         faces, numbers = data.faces, None

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from reference_rt.core import transform
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
@@ -108,6 +109,19 @@ def geometric_normals(vertices: FloatArray) -> FloatArray:
     """Normals (n, 3), as long as twice the area, of vertices (n, 9)."""
     v = vertices.reshape(-1, 3, 3)
     return np.asarray(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]))
+
+
+def have_area(vertices: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which triangles (n, 9) have an area that float64 can hold: (n,)."""
+    found = np.empty(len(vertices), bool)
+    for begin in range(0, len(vertices), _TOGETHER):
+        n = geometric_normals(vertices[begin : begin + _TOGETHER])
+        found[begin : begin + _TOGETHER] = np.einsum("ij,ij->i", n, n) > 0.0
+    return found
+
+
+_TOGETHER = 1 << 18
+"""Triangles that are computed together: more only take more memory."""
 
 
 def areas(triangles: Triangles) -> FloatArray:

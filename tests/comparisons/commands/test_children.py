@@ -99,11 +99,11 @@ time.sleep(600)
 POOL = """
 import sys
 from comparisons.runs.processes.pool import run
-from comparisons.suites.worker import Request
+from reference_rt.util.workers import Threads
 class Asked:
     def model_dump_json(self):
         return "{}"
-for outcome in run([Asked()], 1, 600.0, lambda request, step: None, ["worker"]):
+for outcome in run([Asked()], Threads(1), 600.0, lambda request, step: None, ["worker"]):
     pass
 """
 

@@ -24,6 +24,7 @@ from comparisons.experiments.fuzz.types import features as known
 from comparisons.experiments.selftest.sensitivity import patched_text
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import UsageError
+from reference_rt.util.workers import Threads
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -49,7 +50,7 @@ def test_a_scene_that_hangs_is_a_finding(tmp_path, fake_workers):
 
 
 def test_scenes_that_crash_or_raise_are_findings(tmp_path, fake_workers):
-    plan = Plan(tmp_path, count=7, jobs=2, shrink=0.0)
+    plan = Plan(tmp_path, count=7, workers=Threads(2), shrink=0.0)
     stored.add(tmp_path, Checked(number=3))  # it would hang
     told = []
     found = run(plan, told.append)
@@ -78,7 +79,7 @@ def test_a_crash_is_reduced_in_new_processes(tmp_path, fake_workers, monkeypatch
 
 
 def test_findings_of_one_cause_are_one(tmp_path, fake_workers):
-    plan = Plan(tmp_path, first=4, count=3, jobs=1)
+    plan = Plan(tmp_path, first=4, count=3, workers=Threads(1))
     found = run(plan, quiet)
     assert len(found.findings) == 2
     ((one, count),) = summary.distinct(found)
@@ -100,13 +101,13 @@ def test_findings_of_one_cause_are_one(tmp_path, fake_workers):
 
 
 def test_the_page_can_be_read_by_everybody(tmp_path, fake_workers, check_page):
-    plan = Plan(tmp_path, first=4, count=3, jobs=1)
+    plan = Plan(tmp_path, first=4, count=3, workers=Threads(1))
     write_page(tmp_path / "fuzz.html", plan, run(plan, quiet), {})
     check_page(tmp_path / "fuzz.html")
 
 
 def test_it_stops_at_the_first_finding(tmp_path, fake_workers):
-    found = run(Plan(tmp_path, first=4, count=100, jobs=1, stop=True), quiet)
+    found = run(Plan(tmp_path, first=4, count=100, workers=Threads(1), stop=True), quiet)
     assert len(found.scenes) == 1
     assert len(found.reduced) == 1
 
@@ -176,7 +177,7 @@ def test_another_renderer_is_compared_with_ours(tmp_path, wrong):
     command += " {scene} {output} {seed} {spp} " + wrong
     plan = Plan(
         tmp_path / "out",
-        jobs=1,
+        workers=Threads(1),
         command=command,
         scenes=(scene,),
         effort=Effort(spp=64, replicates=4),
@@ -194,7 +195,7 @@ def test_another_renderer_is_compared_with_ours(tmp_path, wrong):
 @pytest.mark.slow
 def test_a_run_of_two_minutes_finds_nothing(tmp_path):
     """Two minutes of a core, for the same scenes on any machine."""
-    found = run(Plan(tmp_path, seed=20260101, count=60, jobs=2, shrink=0.0), quiet)
+    found = run(Plan(tmp_path, seed=20260101, count=60, workers=Threads(2), shrink=0.0), quiet)
     assert found.findings == []
     assert sorted(found.scenes) == [*range(60)]
 

@@ -12,11 +12,12 @@ from suite_runs import processes, run_in, scenes, signal_in_the_next_case
 from comparisons.compare.budget import Budget
 from comparisons.results.stored_case import read_case, read_stored_case
 from comparisons.results.verdict import exit_code
-from comparisons.runs.processes import pool
+from comparisons.runs.processes import child, pool
 from comparisons.suites import run
 from comparisons.suites.stored_results import read_stored_results
 from comparisons.suites.worker import Request
 from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.workers import Threads
 
 pytestmark = pytest.mark.usefixtures("fake_runners")
 
@@ -52,16 +53,16 @@ def processes_of(found, verdict):
 
 def test_a_process_that_hangs_is_ended(tmp_path):
     folder = scenes(tmp_path / "scenes", "a", "hang", "z")
-    found = run_in(tmp_path / "out", folder, "about: x\ncase_seconds: 5\n", jobs=2)
+    found = run_in(tmp_path / "out", folder, "about: x\ncase_seconds: 20\n", workers=Threads(2))
     assert [case.verdict for case in found.cases] == ["agree", "invalid", "agree"]
-    assert found.cases[1].reason.startswith("run: took longer than 5 s")
+    assert found.cases[1].reason.startswith("run: took longer than 20 s")
 
 
 def test_processes_are_shared_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(pool, "MOST_CASES", 2)
+    monkeypatch.setattr(child, "MOST_CASES", 2)
     names = [f"slow{k}" for k in range(2)] + [f"z{k}" for k in range(3)]
     folder = scenes(tmp_path / "scenes", *names)
-    found = run_in(tmp_path / "out", folder, jobs=2, threads=3)
+    found = run_in(tmp_path / "out", folder, workers=Threads(2), threads=3)
     pids = list(processes(found).values())
     assert pids[0] != pids[1]
     assert max(pids.count(pid) for pid in pids) == 2
@@ -75,7 +76,7 @@ def test_where_no_case_can_run_nothing_is_said_of_any(tmp_path):
     request = Request(name="a", scene=folder / "a.yaml", budget=Budget(), folder=tmp_path)
     worker = ("comparisons.suites.worker", "--runner", "no_such_module:f")
     with pytest.raises(ReferenceUnavailableError, match="no_such_module"):
-        list(pool.run([request], 1, 60.0, lambda *_: None, worker))
+        list(pool.run([request], Threads(1), 60.0, lambda *_: None, worker))
 
 
 INTERRUPTED = """

@@ -18,11 +18,13 @@ from reference_rt.core.transform import (
     apply_normals,
     apply_points,
     compose,
+    flattens,
     identity,
     invert,
     look_at,
     rotate,
     scale,
+    singular,
     translate,
 )
 
@@ -172,3 +174,22 @@ def test_look_at_refuses_what_it_cannot_do():
     with pytest.raises(ValueError, match="too far apart"):
         look_at((1e308, 0, 0), (-1e308, 0, 0), (0, 1, 0))
     look_at((0, 0, 0), (0, 1, 0), (1e-10, 1, 0))  # nearly parallel is a direction
+
+
+def test_one_map_and_many_are_singular_alike():
+    """And as the condition number says, near its limit too."""
+    rng = np.random.default_rng(11)
+    maps = rng.normal(size=(600, 3, 4)) * 10.0 ** rng.uniform(-150, 150, (600, 3, 1))
+    # From dependent rows to nearly dependent ones, about the limit.
+    maps[::3, 2, :3] = maps[::3, 0, :3] + maps[::3, 1, :3]
+    maps[::3, 2, 0] *= 1.0 + 2.0 ** -rng.uniform(30, 60, 200)
+    maps[1, 1, 1], maps[2, 0, 3], maps[4, 2] = np.nan, np.inf, 0.0
+    maps[5, 0, :3] = 1.7e308
+    found = singular(maps)
+    assert [flattens(m) for m in maps] == found.tolist()
+    for m, flat in zip(maps, found.tolist(), strict=True):
+        linear = m[:, :3]
+        norms = np.abs(linear).max(axis=1)
+        regular = np.isfinite(m).all() and (norms > 0.0).all()
+        assert flat == (not regular or np.linalg.cond(linear / norms[:, None]) > 2.0**52)
+    assert 30 < found.sum() < 570

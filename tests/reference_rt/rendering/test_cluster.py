@@ -2,57 +2,22 @@
 
 import os
 import signal
-import socket
-import subprocess
 import sys
 import time
 
 import pytest
+from machines import Machines
 from small_scenes import same, small
 
 import reference_rt as rt
-from reference_rt.rendering.cluster import Cluster, batch_cluster
+from reference_rt.rendering.executor import Remote
 from reference_rt.rendering.session import Session
+from reference_rt.util.cluster import Cluster, batch_cluster
 from reference_rt.util.errors import UsageError, WorkersError
 
 distributed = pytest.importorskip("distributed")
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours
-
-
-class Machines:
-    """A scheduler and workers, each a process, as on several machines."""
-
-    def __init__(self, folder):
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.port = free.getsockname()[1]
-        self.address, self.folder = f"tcp://127.0.0.1:{self.port}", folder
-        self.processes, self.workers = [], []
-        self.start_scheduler()
-
-    def _start(self, *command):
-        log = (self.folder / f"log-{len(self.processes)}").open("w")
-        process = subprocess.Popen(
-            [sys.executable, "-m", "distributed.cli." + command[0], *command[1:]],
-            stdout=log, stderr=log, cwd=self.folder,
-        )  # fmt: skip
-        self.processes.append(process)
-        return process
-
-    def start_scheduler(self):
-        self.scheduler = self._start(
-            "dask_scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard"
-        )
-
-    def start_worker(self):
-        command = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--memory-limit", "0")
-        self.workers.append(self._start("dask_worker", self.address, *command))
-
-    def end(self):
-        for process in self.processes:
-            process.kill()
-            process.wait()
 
 
 @pytest.fixture
@@ -62,7 +27,7 @@ def machines(tmp_path):
     found.end()
 
 
-class Small(Cluster):
+class Small(Remote):
     """Units so small that there are many."""
 
     size = 1 << 14
@@ -70,7 +35,7 @@ class Small(Cluster):
 
 def rendered(scene, address, watch=lambda: None):
     def workers(remote):
-        return Small(remote, address)
+        return Small(remote, Cluster(address))
 
     with Session(scene, workers=workers) as session:
         session.run(lambda what, fraction: None, watch)
@@ -118,7 +83,7 @@ def test_a_scheduler_that_restarts(machines, box):
 
 
 def test_no_scheduler(box, monkeypatch):
-    monkeypatch.setattr("reference_rt.rendering.cluster._PATIENCE", 1.0)
+    monkeypatch.setattr("reference_rt.util.cluster._PATIENCE", 1.0)
     with pytest.raises(WorkersError, match="no scheduler with a worker"):
         rendered(box, "tcp://127.0.0.1:1")
 
@@ -204,7 +169,7 @@ def test_jobs_of_slurm(tmp_path, box, monkeypatch):
         f"walltime: '01:00:00'\ninterface: lo\npython: {sys.executable}\n"
         f"local_directory: {tmp_path}\n"
     )
-    with Session(box, workers=lambda remote: Cluster(remote, file=file)) as session:
+    with Session(box, workers=lambda remote: Remote(remote, Cluster(file=file))) as session:
         session.run(lambda what, fraction: None)
         assert same(session.picture(), rt.render(box))
     assert "#SBATCH -p long" in log.read_text()

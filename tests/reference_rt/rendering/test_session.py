@@ -11,9 +11,9 @@ from small_scenes import LAYERS, same, small
 
 import reference_rt as rt
 from reference_rt.core.exr import read_exr
+from reference_rt.rendering.executor import Remote
 from reference_rt.rendering.framebuffer import Framebuffer
 from reference_rt.rendering.loop import Limits, Snapshot
-from reference_rt.rendering.processes import Processes
 from reference_rt.rendering.remote import compute_remotely, remote_scene
 from reference_rt.rendering.session import Session, Storage
 from reference_rt.rendering.units import BAND, Unit
@@ -176,7 +176,7 @@ def test_processes_change_no_bit(box, whole):
 
 def test_killed_processes_are_replaced(box, monkeypatch):
     """One is killed whenever something was computed since the last one died, six times."""
-    monkeypatch.setattr(Processes, "size", 1 << 14)
+    monkeypatch.setattr(Remote, "size", 1 << 14)
     killed, last = [], 0.0
 
     def kill(what, fraction):
@@ -194,7 +194,7 @@ def test_killed_processes_are_replaced(box, monkeypatch):
 
 
 def test_processes_that_cannot_live_end_the_render(box, monkeypatch):
-    monkeypatch.setattr("reference_rt.rendering.processes.compute_remotely", die)
+    monkeypatch.setattr("reference_rt.rendering.executor.compute_remotely", die)
     with pytest.raises(WorkersError, match="died 5 times"):
         rt.render(box, workers=1)
 

@@ -1,7 +1,6 @@
 """Measures the sweep points of families in worker processes; reads those that are stored."""
 
 import hashlib
-import importlib.metadata
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
@@ -18,16 +17,15 @@ from comparisons.experiments.stability.harness.result import Found
 from comparisons.experiments.stability.harness.summary import contestants, summarise
 from comparisons.experiments.stability.harness.worker import Request
 from comparisons.mitsuba.backend import backend
-from comparisons.runs.fingerprint import code_fingerprint
+from comparisons.runs.fingerprint import everything_fingerprint
 from comparisons.runs.processes import pool
 from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.workers import Workers
 
 WORKER = ("comparisons.experiments.stability.harness.worker",)
 
 SECONDS = {"quick": 300.0, "full": 1200.0}
 """Time limit of a point: many times what the slowest takes with cold kernels."""
-
-_PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit", "python-flint")
 
 
 @dataclass(frozen=True)
@@ -89,17 +87,11 @@ def mitsuba_is_there() -> str:
 
 def key_of(effort: Effort, seed: int) -> str:
     """Fingerprint: a stored result is valid where sources, versions, effort and seed are these."""
-    versions = {}
-    for name in _PACKAGES:
-        try:
-            versions[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            versions[name] = ""
-    parts = {"sources": code_fingerprint(), "versions": versions, "effort": effort, "seed": seed}
+    parts = {"sources": everything_fingerprint(), "effort": effort, "seed": seed}
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def run(choice: Choice, out: Path, jobs: int, report: Report, fresh: bool = False) -> Run:
+def run(choice: Choice, out: Path, workers: Workers, report: Report, fresh: bool = False) -> Run:
     """Measure what is not stored yet; each result is stored in `out`/settings at once."""
     key = f"{key_of(choice.effort, choice.seed)} {choice.mitsuba}"
     settings = choice.settings()
@@ -113,13 +105,13 @@ def run(choice: Choice, out: Path, jobs: int, report: Report, fresh: bool = Fals
         else:
             known[one.id, series.name, x] = done
             report(done, "measured before")
-    for found in _measured(requests, jobs, choice.effort):
+    for found in _measured(requests, workers, choice.effort):
         known[found.family, found.series, found.x] = found
         report(found, f"{found.seconds:.1f} s")
     return Run([known[one.id, series.name, x] for one, series, x in settings])
 
 
-def shoot(choice: Choice, found: Sequence[Found], out: Path, jobs: int) -> list[Picture]:
+def shoot(choice: Choice, found: Sequence[Found], out: Path, workers: Workers) -> list[Picture]:
     """Images of each series at the first x at which the first contestant other than ours fails and
     its image differs from ours: both."""
     key = f"{key_of(choice.effort, choice.seed)} {choice.mitsuba}"
@@ -131,7 +123,8 @@ def shoot(choice: Choice, found: Sequence[Found], out: Path, jobs: int) -> list[
             at = (one, series, places.pop(0), out / "pictures", key)
             pairs[one, series] = [_request(choice, *at, name) for name in (who, OURS)]
         wanted = [r for pair in pairs.values() for r in pair if _caption(r.out, key) is None]
-        with closing(pool.run(wanted, jobs, SECONDS["full"], lambda *_: None, WORKER)) as running:
+        limit = SECONDS["full"]
+        with closing(pool.run(wanted, workers, limit, lambda *_: None, WORKER)) as running:
             for _ in running:
                 pass
         for place, pair in pairs.items():
@@ -197,8 +190,8 @@ def _request(
     )
 
 
-def _measured(requests: Sequence[Request], jobs: int, effort: Effort) -> Iterator[Found]:
-    running = pool.run(requests, jobs, SECONDS[effort], lambda *_: None, WORKER)
+def _measured(requests: Sequence[Request], workers: Workers, effort: Effort) -> Iterator[Found]:
+    running = pool.run(requests, workers, SECONDS[effort], lambda *_: None, WORKER)
     with closing(running):
         for outcome in running:
             request = outcome.request

@@ -11,6 +11,7 @@ import tempfile
 import time
 import warnings
 from pathlib import Path
+from typing import ClassVar
 
 from PIL import Image
 from pydantic import BaseModel, ConfigDict
@@ -31,6 +32,7 @@ class Request(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid")
+    output: ClassVar[str] = "out"
 
     family: str
     series: str

@@ -12,6 +12,7 @@ import numpy as np
 Data = dict[str, Any]
 
 MESHES = ("ball.obj", "ball.ply", "ball_ascii.ply", "ball.stl", "ball.off", "ball.glb")
+COPIES = "copies.npy"
 IMAGES = ("tiles.png", "sky.exr", "sky.hdr", "sky.pfm", "sky.npy", "grey.tif", "photo.jpg")
 
 _TURN = {"rotate": {"axis": [1.0, 2.0, 3.0], "degrees": 33.0}}
@@ -42,6 +43,7 @@ SHAPES: Data = {
          "lower": [-1.0, -1.0, 0.0], "upper": [1.0, 1.0, 1.0], "capped": True},
         {"type": "torus", "major_radius": 1.0, "minor_radius": 0.3,
          "transform": [{"scale": [1.0, -1.5, 1.0]}]},
+        {"type": "instance", "group": "pair", "file": COPIES, "transform": [_TURN]},
         {"type": "mesh", "file": "ball.obj", "transform": [{"translate": [3.0, 1.0, 0.0]}]},
         {"type": "difference", "of": [
             {"type": "box", "transform": [{"scale": 0.5}]},
@@ -170,7 +172,19 @@ def files() -> dict[str, bytes]:
         options = {"encoding": "ascii"} if "ascii" in name else {}
         content = ball.export(file_type=kind, **options)
         found[name] = content.encode() if isinstance(content, str) else bytes(content)
-    return found | _images() | {"ball.gltf": _gltf(ball)}
+    return found | _images() | {"ball.gltf": _gltf(ball), COPIES: _copies()}
+
+
+def _copies() -> bytes:
+    """Three maps, one of which mirrors, near the origin."""
+    maps = np.zeros((3, 3, 4))
+    maps[:, :, :3] = [
+        np.diag(scales) for scales in ((1.0, 1.0, 1.0), (0.5, 0.8, 0.6), (-0.7, 1, 1))
+    ]
+    maps[1:, :, 3] = [0.9, 0.3, 0.0], [-0.8, 0.0, 0.4]
+    stream = io.BytesIO()
+    np.save(stream, maps)
+    return stream.getvalue()
 
 
 def _images() -> dict[str, bytes]:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.hostile.bases import IMAGES, MESHES
+from comparisons.experiments.stability.hostile.bases import COPIES, IMAGES, MESHES
 from comparisons.experiments.stability.hostile.damage import anything, number, pick
 from reference_rt.scene.model import json_schema
 
@@ -89,7 +89,8 @@ class _Writer:
         for key, part in schema.get("properties", {}).items():
             if key in _FROM_MEMORY and "file" in found:
                 continue
-            optional = key not in needed and key not in ("type", "file")
+            own_file = key == "file" and schema["title"] != "Instance"
+            optional = key not in needed and key != "type" and not own_file
             if optional and (depth > DEEPEST or self.rng.random() > _OPTIONAL):
                 continue
             if key in _WITH and _WITH[key] not in found:
@@ -123,7 +124,7 @@ class _Writer:
         if self.rng.random() < self.share:
             return anything(self.rng)
         if key.endswith("file"):
-            return pick(self.rng, MESHES if key == "Meshfile" else IMAGES)
+            return pick(self.rng, {"Meshfile": MESHES, "Instancefile": (COPIES,)}.get(key, IMAGES))
         return pick(self.rng, self.names)
 
     def _boolean(self, _: dict[str, Any], __: int, ___: str) -> Any:

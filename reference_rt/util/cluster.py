@@ -1,4 +1,4 @@
-"""An executor of a Dask scheduler's workers: on this machine, on several, or of a batch system.
+"""The workers of a Dask scheduler: on this machine, on several, or of a batch system.
 
 Needs `distributed`, and `dask-jobqueue` for a batch system (the extra `cluster`).
 """
@@ -6,27 +6,22 @@ Needs `distributed`, and `dask-jobqueue` for a batch system (the extra `cluster`
 import importlib
 import math
 import time
+from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
-from reference_rt.rendering.accumulation import Sums
-from reference_rt.rendering.prepared import Done
-from reference_rt.rendering.remote import SIZE, RemoteScene, compute_remotely
-from reference_rt.rendering.units import Unit
 from reference_rt.util.errors import UsageError, WorkersError
 from reference_rt.util.files import read_text
+
+T = TypeVar("T")
 
 _PATIENCE = 60.0
 """Seconds to wait for a scheduler and its first worker.  A batch system may let jobs wait for days:
 for these there is no limit."""
-
-_WORKERS_OF_SIZE, _LARGEST = 32, SIZE << 4
-"""Threads of workers that units of SIZE keep busy, while client and scheduler take 5 to 10 ms for
-each (measured); samples of the largest units, of ten seconds."""
 
 _COUNTED = 5.0
 """Seconds between two counts of the workers, which come and go."""
@@ -43,12 +38,12 @@ _BATCH_SYSTEMS = {
 
 
 class Cluster:
-    """An `executor.Executor`: the workers of a Dask scheduler, of any number of threads each."""
+    """`workers.Workers`: the workers of a Dask scheduler, of any number of threads each."""
 
-    def __init__(self, scene: RemoteScene, scheduler: str = "", file: Path | None = None) -> None:
+    def __init__(self, scheduler: str = "", file: Path | None = None) -> None:
         """scheduler: its address, such as tcp://host:8786;  file: in its place, a description of a
         batch system (see `batch_cluster`).  Raises UsageError, WorkersError."""
-        self._scene, self._address = scene, scheduler
+        self._address = scheduler
         self._cluster = None if file is None else batch_cluster(file)
         self._distributed = _module("distributed")
         self._client: Any = None
@@ -61,36 +56,25 @@ class Cluster:
             raise
 
     @property
-    def slots(self) -> int:
+    def threads(self) -> int:
         now = time.monotonic()
         if now - self._counted > _COUNTED:
             self._counted = now
             with suppress(Exception):  # the scheduler may be gone for a moment
                 self._threads = max(1, sum(self._client.nthreads().values()))
-        return 2 * self._threads + 2
+        return self._threads
 
-    @property
-    def size(self) -> int:
-        """Larger for more workers: client and scheduler take milliseconds for each unit."""
-        size = SIZE
-        while size * _WORKERS_OF_SIZE < SIZE * self.slots // 2 and size < _LARGEST:
-            size *= 2
-        return size
-
-    @property
-    def samples_of_pass(self) -> int:
-        return 2 * self.slots * self.size
-
-    def submit(self, unit: Unit, sums: Sums) -> "Future[Done]":
-        given = sums if unit.first else None
+    def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[T]":
+        found: Future[T]
         try:
-            return self._submit(unit, given)
+            found = self._executor.submit(function, *arguments)
         except Exception:  # the client has given up a scheduler that has gone
             self._connect()
-            return self._submit(unit, given)
+            found = self._executor.submit(function, *arguments)
+        return found
 
     def recovers(self, error: BaseException) -> bool:
-        """A unit whose worker died, whose scheduler has gone, or which that gave up, is computed
+        """A function whose worker died, whose scheduler has gone, or which that gave up, is run
         again, by others."""
         lost = (
             CancelledError,
@@ -105,9 +89,6 @@ class Cluster:
             self._connect()
         return True
 
-    def progress(self, fraction: float) -> None:
-        pass
-
     def stop(self) -> None:
         with suppress(Exception):
             self._executor.shutdown(wait=False, cancel_futures=True)
@@ -119,10 +100,6 @@ class Cluster:
             with suppress(Exception):
                 if one is not None:
                     one.close()
-
-    def _submit(self, unit: Unit, sums: Sums | None) -> "Future[Done]":
-        found: Future[Done] = self._executor.submit(compute_remotely, self._scene, unit, sums)
-        return found
 
     def _connect(self) -> None:
         """A new client, once there is a scheduler and a worker."""
@@ -145,7 +122,7 @@ class Cluster:
                         f"{_PATIENCE:.0f} s; expected `dask scheduler` and `dask worker` there"
                     ) from None
         self._client = client
-        # Not pure: a unit that is submitted again must be computed again.
+        # Not pure: a function that is submitted again must be run again.
         self._executor = client.get_executor(pure=False)
 
 
