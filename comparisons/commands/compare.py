@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fixed, Fresh, Threads, TimeLimit, out_folder
+from comparisons.commands.options import AllowMissing, Fixed, Fresh, Threads, TimeLimit, out_folder
 from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.guarded import guarded
 from reference_rt.util.errors import UsageError
@@ -44,6 +44,7 @@ def compare(
     threads: Threads = None,
     fresh: Fresh = False,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
 
@@ -61,7 +62,9 @@ def compare(
         from comparisons.suites.run import Options, Run, run_cases
         from comparisons.suites.work import Changes, plan_of_files
 
-    changes = Changes(spp=spp, size=size, seed=seed, defaults=by_name(define))
+    changes = Changes(
+        spp=spp, size=size, seed=seed, defaults=by_name(define), allow_missing=allow_missing
+    )
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
     budget = (
@@ -86,7 +89,8 @@ def _command(path: Path, changes: "Changes", given: Mapping[str, float | bool | 
     """The command that repeats one case alone;  given: other options."""
     import shlex
 
-    options = {**changes.model_dump(exclude={"defaults"}), **given}
+    options = {**changes.model_dump(exclude={"defaults", "allow_missing"}), **given}
+    options["allow-missing"] = changes.allow_missing or None
     words = [
         f"--{name}"
         if value is True

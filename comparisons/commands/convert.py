@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import AllowMissing
 from reference_rt.cli.defaults import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 
@@ -25,6 +26,7 @@ def convert(
         ),
     ] = "scene",
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
 ) -> None:
     """Write a scene in our format, as a Mitsuba scene (.xml), or as data for other renderers
     (--to json), with its meshes and images in a folder beside it.
@@ -43,7 +45,7 @@ def convert(
     if to == "scene" and not is_mitsuba:
         check_name(output)
     check_writable(output)
-    found = Scene.load(scene, by_name(define))
+    found = Scene.load(scene, by_name(define), allow_missing)
     if is_mitsuba:
         count, notes = write_xml(found, output)
         for note in notes:

@@ -47,6 +47,14 @@ NumberOfWorkers = Annotated[
     typer.Option("--workers", "--jobs", min=1, help="Processes at a time. (default: all cores)"),
 ]
 
+AllowMissing = Annotated[
+    bool,
+    typer.Option(
+        "--allow-missing",
+        help="Leave out or replace what of an .xml scene is not supported, in both renderers.",
+    ),
+]
+
 TimeLimit = Annotated[
     float | None,
     typer.Option(

@@ -33,9 +33,10 @@ class InstancedGroup(NamedTuple):
 class Counterpart:
     """A scene's counterpart in Mitsuba.
 
-    mi_scene: Mitsuba's scene, without solids and instanced group;  pieces: the primitives that its
-    shapes represent, by id;  solids: counterparts of CSG solids;  crowd: the instances, if there
-    are many, else None;  frame: the coordinates of all these, and of the lengths in them.
+    mi_scene: Mitsuba's scene, without solids and instanced group;  mi_shapes: what its shapes
+    represent, by id;  solids: counterparts of CSG solids;  instanced_group: the instances, if there
+    are many, else None;  frame: the coordinates of all these, and of the lengths in them;
+    has_our_integrator: whether a picture is rendered by `plugins.path_of_solids`.
     """
 
     mi_scene: Any
@@ -43,6 +44,7 @@ class Counterpart:
     solids: tuple[SolidCounterpart, ...] = ()
     instanced_group: InstancedGroup | None = None
     frame: Frame = OURS
+    has_our_integrator: bool = False
 
     def sensors(self) -> Any:
         """Mitsuba's sensors."""
@@ -64,11 +66,11 @@ class Counterpart:
     @property
     def no_pictures_reason(self) -> str:
         """Why pictures with noise cannot be compared; empty if they can."""
-        if self.solids and not is_wide(mitsuba()):
+        if self.has_our_integrator and not is_wide(mitsuba()):
+            what = "solids (CSG)" if self.solids else "masks that are partly opaque"
             return (
-                "solids (CSG): Mitsuba's scalar variant would take hours for their pictures, which "
-                "our plugin traces ray by ray; its variant llvm_ad_rgb takes seconds "
-                "(docs/install.md)"
+                f"{what}: Mitsuba's scalar variant would take hours for their pictures, which our "
+                "plugin traces ray by ray; its variant llvm_ad_rgb takes seconds (docs/install.md)"
             )
         return self.no_light_reason
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.plastic_error import base_error
-from comparisons.mitsuba.translate.integrators import counts_lights_often
+from comparisons.mitsuba.translate.integrators import counts_lights_often, squares_opacity
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.mitsuba.translate.wrappers import has_delta, is_wrong_in_mitsuba
 from reference_rt.integrators import Direct
@@ -35,7 +35,18 @@ def notes_of(scene: Scene) -> list[str]:
                 f"'{name}': a relative error of {off:.2g} of its light is allowed for (tables, "
                 "float32: comparisons.mitsuba.accuracy)"
             )
-    return list(dict.fromkeys(note for note in (*found, note_of_samples(scene)) if note))
+    found += [note_of_samples(scene), note_of_masks(scene)]
+    return list(dict.fromkeys(note for note in found if note))
+
+
+def note_of_masks(scene: Scene) -> str:
+    """The note on Mitsuba's error that `squares_opacity` describes; empty without it."""
+    if not squares_opacity(scene):
+        return ""
+    return (
+        "Mitsuba's path tracer multiplies samples of lights by the opacity of a mask twice; our "
+        "own, which runs in Mitsuba, takes its place"
+    )
 
 
 def note_of_samples(scene: Scene) -> str:

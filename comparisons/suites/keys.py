@@ -40,6 +40,7 @@ def files_digest(scene: Scene) -> str:
     digest = hashlib.sha256()
     if (own := file_of(scene)) is not None:  # Mitsuba reads it, too
         digest.update(read_input(own) + repr(sorted(scene.defaults.items())).encode())
+        digest.update(repr(scene.allows_missing).encode())
     for name, keys in sorted(dict(_named(scene.model_dump())).items()):
         for path in _with_parts(scene.folder / name):
             digest.update(os.fsencode(path.name) + b"\0")

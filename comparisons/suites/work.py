@@ -23,16 +23,18 @@ class Changes(BaseModel):
     size: str | None = None
     seed: int | None = None
     defaults: dict[str, str] = Field(default_factory=dict)
+    allow_missing: bool = False
 
     def on(self, path: Path) -> Self:
         """The changes that apply to a file: only Mitsuba's have defaults."""
         if path.suffix.lower() == ".xml":
             return self
-        return self.model_copy(update={"defaults": {}})
+        return self.model_copy(update={"defaults": {}, "allow_missing": False})
 
     def load(self, path: Path) -> Scene:
         """The scene in the file at `path`, changed.  Raises SceneError, UsageError."""
-        return adjusted(Scene.load(path, self.defaults), self.spp, self.size, None, self.seed)
+        scene = Scene.load(path, self.defaults, self.allow_missing)
+        return adjusted(scene, self.spp, self.size, None, self.seed)
 
 
 class Work(NamedTuple):

@@ -76,6 +76,7 @@ class SceneModel(Description):
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: "tuple[str, str] | None" = PrivateAttr(default=None)
     _defaults: dict[str, str] = PrivateAttr(default_factory=dict)
+    _allows_missing: bool = PrivateAttr(default=False)
     _warned: set[str] = PrivateAttr(default_factory=set)
 
     @model_validator(mode="after")
@@ -191,6 +192,11 @@ class SceneModel(Description):
         """The values of `load` for the <default> elements of its file."""
         return dict(self._defaults)
 
+    @property
+    def allows_missing(self) -> bool:
+        """Whether `load` was asked to leave out what it does not support."""
+        return self._allows_missing
+
     def error(self, message: str, *path: str | int) -> SceneError:
         """An error about the part at the key path, with file and line if the scene was read."""
         if self._source is None:
@@ -222,15 +228,23 @@ class SceneModel(Description):
     # ---- in -------------------------------------------------------------------------------------
 
     @classmethod
-    def load(cls, path: str | Path, defaults: Mapping[str, str] | None = None) -> Self:
+    def load(
+        cls,
+        path: str | Path,
+        defaults: Mapping[str, str] | None = None,
+        allow_missing: bool = False,
+    ) -> Self:
         """Read a .yaml, .yml or .json file, or with Mitsuba an .xml file of its own.
 
-        defaults: values for the <default> elements of an .xml file.  Raises SceneError (file, line,
-        key path, reason), ReferenceUnavailableError where Mitsuba is needed and missing.
+        defaults: values for the <default> elements of an .xml file;  allow_missing: leave out or
+        replace what of an .xml file is not supported, with a warning for each.  Raises SceneError
+        (file, line, key path, reason), ReferenceUnavailableError where Mitsuba is needed and
+        missing.
         """
         path = Path(path)
         if path.suffix.lower() not in readers.OWN:
-            found: Self = readers.reader_of(path).read_file(path, cls, defaults or {})
+            reader = readers.reader_of(path)
+            found: Self = reader.read_file(path, cls, defaults or {}, allow_missing)
             return found
         if defaults:
             raise SceneError("has no defaults; expected a Mitsuba scene, .xml", file=str(path))
@@ -279,7 +293,7 @@ class SceneModel(Description):
         fields = {name: getattr(self, name) for name in self.model_fields_set} | parts
         scene = type(self)(**fields)
         scene._folder, scene._source = self._folder, self._source
-        scene._defaults = self._defaults
+        scene._defaults, scene._allows_missing = self._defaults, self._allows_missing
         scene._warned = self._warned
         return scene
 

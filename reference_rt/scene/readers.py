@@ -3,8 +3,9 @@
 A package names a module in the entry-point group `reference_rt.scene_readers`, under the suffix
 without its dot.  The module has
 
-- `read_file(path, cls, defaults)`: the scene in a file, an object of `cls`; `defaults`: the values
-  of `-D name=value`, by name;
+- `read_file(path, cls, defaults, allow_missing)`: the scene in a file, an object of `cls`;
+  `defaults`: the values of `-D name=value`, by name; `allow_missing`: whether to leave out what is
+  not supported;
 - `read_dict(scene, cls, folder)`: the same from the program's own dictionaries.
 """
 

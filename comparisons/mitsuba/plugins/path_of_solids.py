@@ -1,6 +1,8 @@
-"""Path tracing and direct illumination of scenes with CSG solids: `{"type": "path_of_solids"}`.
+"""Path tracing and direct illumination of scenes with CSG solids, and path tracing of those with
+masks: `{"type": "path_of_solids"}`.
 
-Mitsuba's own integrators trace Mitsuba's scene, in which there are no solids.  This one traces a
+Mitsuba's own integrators trace Mitsuba's scene, in which there are no solids, and `path` is wrong
+for masks (`comparisons.mitsuba.translate.integrators.squares_opacity`).  This one traces a
 `LitScene`, and takes all else from Mitsuba: the camera, the film, random numbers, BSDFs and
 emitters.  The estimator is the textbook's: at each surface one sample of a light and one of the
 BSDF, combined with the power heuristic (Veach 1997).  Its mean is that of Mitsuba's `path` and

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.integrators import read_integrator
 from comparisons.mitsuba.reading.lights import belongs_to_shape, read_light
+from comparisons.mitsuba.reading.missing import leave_out_missing
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed, parse_dict, parse_file
 from comparisons.mitsuba.reading.sensors import read_sensor
@@ -28,13 +29,26 @@ from reference_rt.util.errors import SceneWarning
 M = TypeVar("M", bound=SceneModel)
 
 
-def read_file(path: Path, cls: type[M], defaults: Mapping[str, str] | None = None) -> M:
-    """The scene in an .xml file, an object of `cls`;  defaults: values for its <default> elements.
+def read_file(
+    path: Path,
+    cls: type[M],
+    defaults: Mapping[str, str] | None = None,
+    allow_missing: bool = False,
+) -> M:
+    """The scene in an .xml file, an object of `cls`;  defaults: values for its <default> elements;
+    allow_missing: whether to leave out what our scenes lack, with a warning for each.
 
     Raises SceneError, ReferenceUnavailableError without Mitsuba; warns of what is read otherwise.
     """
-    scene = _scene(parse_file(path, defaults or {}), cls)
+    parsed = parse_file(path, defaults or {})
+    if allow_missing:
+        scene, left_out = read_supported(parsed, cls)
+        for text in left_out:
+            warnings.warn(SceneWarning(text), stacklevel=3)
+    else:
+        scene = _scene(parsed, cls)
     scene._source, scene._defaults = (str(path), _WITHOUT_LINES), dict(defaults or {})
+    scene._allows_missing = allow_missing
     return scene
 
 
@@ -44,6 +58,11 @@ def read_dict(scene: Mapping[str, Any], cls: type[M], folder: Path | None = None
     found = _scene(parse_dict(scene, Path() if folder is None else folder), cls)
     found._source = None
     return found
+
+
+def read_supported(parsed: Parsed, cls: type[M]) -> tuple[M, list[str]]:
+    """The scene without what ours lack, which is left out of `parsed`, too; and what it was."""
+    return leave_out_missing(parsed, lambda: _scene(parsed, cls))
 
 
 def _scene(parsed: Parsed, cls: type[M]) -> M:
@@ -99,4 +118,4 @@ _WITHOUT_LINES = "]"
 
 _KINDS = ("Sensor", "Shape", "Emitter", "Integrator", "Medium", "Volume", "PhaseFunction")
 
-__all__ = ["read_dict", "read_file"]
+__all__ = ["read_dict", "read_file", "read_supported"]

@@ -29,6 +29,15 @@ def triple(vector: FloatArray) -> Triple:
     return x, y, z
 
 
+class MissingError(SceneError):
+    """A scene has what ours lack.  index: of the element;  key: of its parameter, "" for the
+    element itself."""
+
+    def __init__(self, error: SceneError, index: int, key: str = "") -> None:
+        super().__init__(error.message, (), error.file, error.line)
+        self.index, self.key = index, key
+
+
 class Node:
     """An element of the scene: `kind`, such as "BSDF", `plugin`, such as "diffuse", and `name`, its
     id or an empty text."""
@@ -64,9 +73,10 @@ class Node:
             line=int(found["line"]),
         )
 
-    def unsupported(self, advice: str = "") -> SceneError:
+    def unsupported(self, advice: str = "") -> "MissingError":
         """The error that this plugin has no place in our scenes."""
-        return self.error("is not supported" + (f"; {advice}" if advice else ""))
+        text = "is not supported" + (f"; {advice}" if advice else "")
+        return MissingError(self.error(text), self.index)
 
     @contextmanager
     def checking(self) -> Iterator[None]:
@@ -89,7 +99,8 @@ class Node:
             if type(value).__name__ == "ResolvedReference":
                 other = Node(self._parsed, value.index())
                 what += f" ({other.kind.lower()} '{other.plugin}')"
-            raise self.error(f"{what} is not supported here, or unknown; expected none")
+            text = f"{what} is not supported here, or unknown; expected none"
+            raise MissingError(self.error(text), self.index, key)
 
     # ---- parameters -----------------------------------------------------------------------------
 

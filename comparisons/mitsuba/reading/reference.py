@@ -1,16 +1,20 @@
 """The user's own file as the reference of a comparison: loaded by Mitsuba, and untouched but for
-the film's size and filter, the samples, clipping planes, and what makes Mitsuba's own picture
-wrong (`changes_to`).  So our reading of the file is checked, too."""
+the film's size and filter, the samples, clipping planes, what makes Mitsuba's own picture wrong
+(`changes_to`), and what `Scene.load` was asked to leave out.  So our reading of the file is
+checked, too."""
 
+import warnings
 from pathlib import Path
 from typing import Any
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.notes import note_of_samples
-from comparisons.mitsuba.reading.parse import parse_file
+from comparisons.mitsuba.lit_scene import LitScene
+from comparisons.mitsuba.notes import note_of_masks, note_of_samples
+from comparisons.mitsuba.reading import read_supported
+from comparisons.mitsuba.reading.parse import Parsed, parse_file
 from comparisons.mitsuba.reading.sensors import CLIP
 from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.integrators import counts_lights_often
+from comparisons.mitsuba.translate.integrators import counts_lights_often, squares_opacity
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
 
@@ -30,10 +34,8 @@ def own_scene(scene: Scene) -> Any:
     Raises SceneError, UntranslatableError for a size that the film's window cannot have,
     ReferenceUnavailableError for a file that Mitsuba does not load.
     """
-    path = file_of(scene)
-    assert path is not None
     mi = mitsuba()
-    parsed = parse_file(path, scene.defaults)
+    parsed, _ = _parsed(scene)
     state = parsed.state
     sensor = _first(state, mi.ObjectType.Sensor)
     if sensor is None:
@@ -52,32 +54,50 @@ def own_scene(scene: Scene) -> Any:
     _without_moments(mi, state)
     if counts_lights_often(scene):
         _with_one_sample(mi, state)
+    if squares_opacity(scene):
+        index = _first(state, mi.ObjectType.Integrator)
+        assert index is not None
+        state.nodes[index].props.set_plugin_name("path_of_solids")
     config = mi.parser.ParserConfig(mi.variant())
     config.merge_equivalent = config.merge_meshes = False
     old = mi.file_resolver()
     resolver = mi.FileResolver(old)
-    for folder in (path.parent, *reversed(parsed.paths)):
+    for folder in (parsed.folder, *reversed(parsed.paths)):
         resolver.prepend(str(folder))
     mi.set_file_resolver(resolver)
     try:
-        return mi.parser.instantiate(config, state)
+        found = mi.parser.instantiate(config, state)
     except RuntimeError as error:
         reason = " ".join(str(error).split())
-        raise ReferenceUnavailableError(f"Mitsuba does not load {path}: {reason}") from None
+        raise ReferenceUnavailableError(f"Mitsuba does not load {parsed.file}: {reason}") from None
     finally:
         mi.set_file_resolver(old)
+    if squares_opacity(scene):
+        found.integrator().scene = LitScene(found, ())
+    return found
 
 
 def changes_to(scene: Scene) -> list[str]:
     """What `own_scene` changes in the file beyond the film and the samples, for the report."""
-    path = file_of(scene)
-    assert path is not None
-    state = parse_file(path, scene.defaults).state
+    parsed, found = _parsed(scene)
+    state = parsed.state
     sensor = _first(state, mitsuba().ObjectType.Sensor)
-    found = [note_of_samples(scene)] if counts_lights_often(scene) else []
+    found += [note for note in (note_of_samples(scene), note_of_masks(scene)) if note]
     if sensor is not None and _open_clipping(state.nodes[sensor].props):
         found.append("its camera's clipping planes are those of Mitsuba's default: ours has none")
     return found
+
+
+def _parsed(scene: Scene) -> tuple[Parsed, list[str]]:
+    """The file of a scene, without what `Scene.load` was asked to leave out; and what it was."""
+    path = file_of(scene)
+    assert path is not None
+    parsed = parse_file(path, scene.defaults)
+    if not scene.allows_missing:
+        return parsed, []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they were issued when the scene was loaded
+        return parsed, read_supported(parsed, Scene)[1]
 
 
 def _open_clipping(sensor: Any) -> bool:

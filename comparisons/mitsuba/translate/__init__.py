@@ -25,6 +25,7 @@ from comparisons.mitsuba.translate.film import translate_film, translate_sampler
 from comparisons.mitsuba.translate.integrators import (
     counts_lights_often,
     of_solids,
+    squares_opacity,
     translate_integrator,
 )
 from comparisons.mitsuba.translate.lights import translate_light
@@ -65,14 +66,14 @@ def load(scene: Scene, frame: Frame | None = None) -> Counterpart:
     found = _translated(moved(scene, frame))
     instanced_group = _instanced_group(found)
     plain = {**_groups(found.mi_shapes), **found.plain}
-    renders_solids = False
-    if found.solids and isinstance(scene.integrator, Path | Direct):
-        renders_solids = True
-        plain["integrator"] = of_solids(scene.integrator)
+    integrator = scene.integrator
+    is_ours = bool(found.solids) or squares_opacity(scene)
+    if is_ours and isinstance(integrator, Path | Direct):
+        plain["integrator"] = of_solids(integrator)
     mi_scene = mitsuba().load_dict(plain, optimize=False)
     solids = tuple(found.solids)
-    counterpart = Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame)
-    if renders_solids:
+    counterpart = Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame, is_ours)
+    if is_ours and isinstance(integrator, Path | Direct):
         mi_scene.integrator().scene = counterpart.lit
     return counterpart
 

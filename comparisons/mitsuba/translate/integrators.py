@@ -6,6 +6,7 @@ from typing import Any
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
 from reference_rt.lights import Directional, Point, Projector, Spot
+from reference_rt.materials import Mask
 from reference_rt.scene.model import SceneModel
 
 
@@ -43,9 +44,18 @@ def counts_lights_often(scene: SceneModel) -> bool:
     return points and isinstance(integrator, Direct) and integrator.light_samples > 1
 
 
+def squares_opacity(scene: SceneModel) -> bool:
+    """Whether Mitsuba's integrator `path` would be wrong for a scene: on masks that are neither
+    opaque nor absent it multiplies samples of lights by the opacity twice.  A diffuse plane under a
+    point light then has a quarter of its light at an opacity of a half, where Mitsuba's BSDF and
+    its integrator `direct` give half of it (Mitsuba 3.9.1)."""
+    masks = [m for m in scene.materials.values() if isinstance(m, Mask)]
+    return isinstance(scene.integrator, Path) and any(m.opacity not in (0.0, 1.0) for m in masks)
+
+
 def of_solids(integrator: Path | Direct) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.path_of_solids` in place of Mitsuba's integrator, for
-    scenes with solids."""
+    scenes with solids, and with masks."""
     if isinstance(integrator, Path):
         return {**(translate_integrator(integrator) or {}), "type": "path_of_solids"}
     return {
