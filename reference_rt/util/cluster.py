@@ -11,6 +11,7 @@ from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
+from weakref import WeakSet
 
 import yaml
 
@@ -49,6 +50,7 @@ class Cluster:
         self._client: Any = None
         self._executor: Any = None
         self._counted, self._threads = 0.0, 1
+        self._scheduler_id, self._futures = "", WeakSet[Future[Any]]()
         try:
             self._connect()
         except BaseException:
@@ -62,7 +64,19 @@ class Cluster:
             self._counted = now
             with suppress(Exception):  # the scheduler may be gone for a moment
                 self._threads = max(1, sum(self._client.nthreads().values()))
+                self._give_up_lost()
         return self._threads
+
+    def _give_up_lost(self) -> None:
+        """Cancel what was submitted to a scheduler that has been replaced by a new one at its
+        address.  The client tells of most such futures, but not of those that it submitted while
+        the old one was ending (found under load: they never ended)."""
+        # A lambda: sent by value, so that the scheduler need not have this package.
+        found = self._client.run_on_scheduler(lambda dask_scheduler: str(dask_scheduler.id))
+        if self._scheduler_id not in ("", found):
+            for future in list(self._futures):
+                future.cancel()
+        self._scheduler_id = found
 
     def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[T]":
         found: Future[T]
@@ -71,6 +85,7 @@ class Cluster:
         except Exception:  # the client has given up a scheduler that has gone
             self._connect()
             found = self._executor.submit(function, *arguments)
+        self._futures.add(found)
         return found
 
     def recovers(self, error: BaseException) -> bool:

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import time
+from concurrent.futures import CancelledError, Future
 
 import pytest
 from machines import Machines
@@ -80,6 +81,35 @@ def test_a_scheduler_that_restarts(machines, box):
 
     assert same(rendered(scene, machines.address, watch), rt.render(scene))
     assert len(times) > 40
+
+
+def test_what_a_scheduler_took_along_is_given_up(machines, monkeypatch):
+    """Of a unit that was submitted while it was ending, the client never says anything."""
+    monkeypatch.setattr("reference_rt.util.cluster._COUNTED", 0.0)
+    machines.start_worker()
+    cluster = Cluster(machines.address)
+    try:
+        assert cluster.threads == 1
+        lost = Future()
+        cluster._futures.add(lost)
+        assert cluster.threads == 1
+        assert not lost.cancelled()
+        machines.scheduler.kill()
+        machines.scheduler.wait()
+        machines.workers[0].kill()
+        machines.start_scheduler()
+        machines.start_worker()
+        end = time.monotonic() + 60.0
+        while not lost.cancelled() and time.monotonic() < end:
+            assert cluster.threads >= 1
+            time.sleep(0.1)
+        assert lost.cancelled()
+        with pytest.raises(CancelledError) as caught:
+            lost.result()
+        assert cluster.recovers(caught.value)
+        assert cluster.submit(abs, -3).result(60.0) == 3
+    finally:
+        cluster.close()
 
 
 def test_no_scheduler(box, monkeypatch):
