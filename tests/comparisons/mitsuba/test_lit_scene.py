@@ -180,14 +180,15 @@ def check_means(a: np.ndarray, b: np.ndarray) -> None:
         assert (error < 0.02 * x.mean(axis=0)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "integrator",
     [
         "{type: path, max_depth: 4}",
         "{type: path}",
         "{type: direct}",
-        pytest.param("{type: direct, light_samples: 0}", marks=pytest.mark.slow),
-        pytest.param("{type: direct, bsdf_samples: 0}", marks=pytest.mark.slow),
+        "{type: direct, light_samples: 0}",
+        "{type: direct, bsdf_samples: 0}",
     ],
 )
 def test_without_solids_the_integrator_is_mitsubas(integrator: str) -> None:
@@ -238,6 +239,7 @@ def test_scalar_variants_take_too_long() -> None:
         assert counterpart.no_light_reason == ""
 
 
+@pytest.mark.slow
 def test_pictures_are_made_in_parts_of_few_rays() -> None:
     """The mean of parts with seeds of their own."""
     mi_scene = load(lit("union", (BOX, BALL), "grey")).mi_scene
