@@ -4,7 +4,6 @@ import hashlib
 import json
 import warnings
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -236,16 +235,14 @@ class SceneModel(Description):
     ) -> Self:
         """Read a .yaml, .yml or .json file, or with Mitsuba an .xml file of its own.
 
-        defaults: values for the <default> elements of an .xml file;  allow_missing: leave out or
-        replace what of an .xml file is not supported, with a warning for each.  Raises SceneError
-        (file, line, key path, reason), ReferenceUnavailableError where Mitsuba is needed and
-        missing.
+        defaults: values for the <default> elements of an .xml file;  allow_missing: leave out what
+        of it is not supported, with a warning for each.  Raises SceneError (file, line, key path,
+        reason), ReferenceUnavailableError where Mitsuba is needed and missing.
         """
         path = Path(path)
         if path.suffix.lower() not in readers.OWN:
-            reader = readers.reader_of(path)
-            found: Self = reader.read_file(path, cls, defaults or {}, allow_missing)
-            return found
+            read_file = readers.reader_of(path).read_file
+            return read_file(path, cls, defaults or {}, allow_missing)  # type: ignore[no-any-return]
         if defaults:
             raise SceneError("has no defaults; expected a Mitsuba scene, .xml", file=str(path))
         try:
@@ -262,7 +259,7 @@ class SceneModel(Description):
     def parse(cls, text: str, name: str = "<scene>", folder: Path | None = None) -> Self:
         """A scene from YAML or JSON text.  name: for errors;  folder: of the files it refers to."""
         try:
-            data = _load_data(text)
+            data = yaml_text.load_any(text)
         except yaml_text.MalformedError as error:
             raise SceneError(f"malformed: {error}", file=name, line=error.line) from None
         except RecursionError:
@@ -285,8 +282,8 @@ class SceneModel(Description):
     def from_mitsuba(cls, scene: Mapping[str, Any], folder: str | Path = ".") -> Self:
         """A scene from a dictionary for `mitsuba.load_dict`;  folder: of the files that it names.
         Raises as `load` does."""
-        found: Self = readers.reader_of(Path("scene.xml")).read_dict(scene, cls, Path(folder))
-        return found
+        read_dict = readers.reader_of(Path("scene.xml")).read_dict
+        return read_dict(scene, cls, Path(folder))  # type: ignore[no-any-return]
 
     def changed(self, **parts: Any) -> Self:
         """A copy of the scene with other parts (film=..., sampler=...), checked again."""
@@ -306,22 +303,6 @@ class SceneModel(Description):
     def to_yaml(self) -> str:
         """The scene as YAML text, which `parse` reads."""
         return yaml_text.dump(json.loads(self.to_json()))
-
-
-def _load_data(text: str) -> Any:
-    """Data from JSON or YAML 1.2.  Data only: tags create no objects."""
-    if text.lstrip().startswith("{"):
-        # Errors in either are reported by the YAML reader, with their line.  It cannot read all of
-        # JSON: it lacks surrogate pairs and control characters.
-        with suppress(ValueError):
-            return json.loads(text, object_pairs_hook=_distinct)
-    return yaml_text.load(text)
-
-
-def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    if len(dict(pairs)) < len(pairs):
-        raise ValueError("the same key twice")
-    return dict(pairs)
 
 
 def json_schema() -> dict[str, Any]:

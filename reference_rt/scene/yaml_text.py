@@ -6,9 +6,11 @@ is false, `010` is eight and `1:30` is ninety.  As in YAML 1.1, and beyond the c
 may have underscores or be binary (0b101), and `<<` merges mappings.
 """
 
+import json
 import math
 import re
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -294,3 +296,19 @@ def dump(data: Any) -> str:
         data, Dumper=_Dumper, default_flow_style=None, sort_keys=False, allow_unicode=True
     )
     return text
+
+
+def load_any(text: str) -> Any:
+    """Data from JSON or YAML 1.2.  Data only: tags create no objects."""
+    if text.lstrip().startswith("{"):
+        # Errors in either are reported by the YAML reader, with their line.  It cannot read all of
+        # JSON: it lacks surrogate pairs and control characters.
+        with suppress(ValueError):
+            return json.loads(text, object_pairs_hook=_distinct)
+    return load(text)
+
+
+def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError("the same key twice")
+    return dict(pairs)

@@ -141,7 +141,7 @@ def test_limits_and_previews(tmp_path):
         (["--checkpoint", "CK", "--no-checkpoint"], "--no-checkpoint contradicts --checkpoint"),
         (["--no-checkpoint", "--resume"], "--no-checkpoint: a render that goes on needs"),
         (["--checkpoint", "CK", "--more-spp", "1"], "--more-spp: CK has no samples"),
-        (["--threads", "2", "--workers", "2"], "--threads and --workers contradict each other"),
+        (["--threads", "2", "--workers", "2"], "--workers and --threads contradict each other"),
         (["--cluster", "nowhere.yaml"], "nowhere.yaml: cannot be read"),
     ],
 )

@@ -32,11 +32,12 @@ def test_with_a_broken_reader_too(monkeypatch):
 
 
 def test_a_reader_is_called_for_its_suffix(monkeypatch):
-    def read_file(path: Path, cls: type[Scene], defaults: dict[str, str]) -> Scene:
-        return cls(description=f"{path.name} {defaults}")
+    def read_file(path: Path, cls: type[Scene], defaults: dict[str, str], some: bool) -> Scene:
+        return cls(description=f"{path.name} {defaults} {some}")
 
     this = EntryPoint("abc", "test_readers", readers.GROUP)
     monkeypatch.setattr(readers.importlib.metadata, "entry_points", entries(this))
     monkeypatch.setattr(EntryPoint, "load", lambda self: type("M", (), {"read_file": read_file}))
-    assert Scene.load("x/a.ABC", {"n": "1"}).description == "a.ABC {'n': '1'}"
-    assert Scene.load("a.abc").description == "a.abc {}"
+    assert Scene.load("x/a.ABC", {"n": "1"}).description == "a.ABC {'n': '1'} False"
+    assert Scene.load("a.abc").description == "a.abc {} False"
+    assert Scene.load("a.abc", allow_missing=True).description == "a.abc {} True"
