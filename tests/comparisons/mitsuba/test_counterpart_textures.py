@@ -101,7 +101,6 @@ REQUIRED = {
 REFUSED = {
     ("plastic", "vertex_colours"),
     ("rough_plastic", "vertex_colours"),
-    ("emissive", "vertex_colours"),
     ("normal_map", "vertex_colours"),
     ("normal_map", "checker"),
 }
