@@ -27,7 +27,8 @@ MISSING = {
         "bsdf 'hair': is not supported, and replaced by 'diffuse' on both sides",
     ),
     "bsdf in bsdfs": (
-        '<shape type="sphere"><bsdf type="mask"><float name="opacity" value="1"/><bsdf type="measured">'
+        '<shape type="sphere"><bsdf type="mask"><float name="opacity" value="1"/>'
+        '<bsdf type="measured">'
         '<string name="filename" value="a.bsdf"/></bsdf></bsdf></shape>',
         "bsdf 'measured': is not supported, and replaced by 'diffuse' on both sides",
     ),
