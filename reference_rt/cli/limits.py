@@ -85,7 +85,7 @@ def _placed(scene: Scene) -> Iterator[tuple[str, Shape, Affine]]:
 
     def of(name: str, shape: Shape, outer: Affine) -> Iterator[tuple[str, Shape, Affine]]:
         if isinstance(shape, Instance):
-            for one in shape.maps(scene.folder):
+            for one in shape.maps(scene.folder)[:MOST]:
                 inner = transform.compose(one, outer)
                 for k, member in enumerate(scene.groups[shape.group]):
                     if isinstance(member, Mesh):

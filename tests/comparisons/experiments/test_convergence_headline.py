@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import comparisons.commands.register
 from comparisons.experiments.bench import equal_error
-from comparisons.experiments.convergence import run
+from comparisons.experiments.convergence import one_scene
 from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.estimates import Estimate
@@ -255,7 +255,7 @@ def test_an_invalid_scene_does_not_cost_the_others(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return curves_of(scene.name, ours=1.0)
 
-    monkeypatch.setattr(run, "converge", fake)
+    monkeypatch.setattr(one_scene, "converge", fake)
     sphere = "shapes: [{type: sphere}]\n"
     for name in ("ball", "box"):
         (tmp_path / f"{name}.yaml").write_text(sphere)
