@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import comparisons.commands.register
 from comparisons.experiments.bench import equal_error
-from comparisons.experiments.convergence import one_scene
+from comparisons.experiments.convergence import one_scene, run
 from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.estimates import Estimate
