@@ -34,10 +34,10 @@ FEWEST = 4
 """Least number of replicates of a side for resampling: halves of fewer lack the tails."""
 
 FEWEST_PIXELS = 16
-"""Least effective number of pixels that have the noise of the squared difference.  Draws turn each
-replicate either way: three samples that met a lamp in one pixel then count once or thrice, and in
-the two draws of a large picture a single such pixel counts once in half of all cases, 16 such
-pixels in one of 65,536."""
+"""Least effective number of pixels that must have the noise of the squared difference.  A draw turns
+each replicate either way, so that two samples that met a lamp in one pixel cancel in half of the
+draws.  Of a large picture there are two draws: they show none of that noise in a quarter of all
+cases if one pixel has it, and in 4^-16 of them if 16 have."""
 
 MOST_NOISE = 0.5
 """Largest noise of the pictures' difference, as a fraction of the median tile's radiance: with
