@@ -34,9 +34,9 @@ FEWEST = 4
 """Least number of replicates of a side for resampling: halves of fewer lack the tails."""
 
 FEWEST_PIXELS = 16
-"""Least effective number of pixels that must have the noise of the squared difference.  A draw turns
-each replicate either way, so that two samples that met a lamp in one pixel cancel in half of the
-draws.  Of a large picture there are two draws: they show none of that noise in a quarter of all
+"""Least effective number of pixels that must have the noise of the squared difference.  A draw
+turns each replicate either way, so that two samples that met a lamp in one pixel cancel in half of
+the draws.  Of a large picture there are two draws: they show none of that noise in a quarter of all
 cases if one pixel has it, and in 4^-16 of them if 16 have."""
 
 MOST_NOISE = 0.5
