@@ -8,7 +8,7 @@ from scipy import ndimage, stats
 from scipy.linalg import helmert
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import tile_sums
+from comparisons.statistics.scales import HALF, tile_sums
 
 FEWEST_PIXELS = 256
 """Least number of noisy pixels for these tests."""
@@ -144,15 +144,17 @@ def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
     replicate; None if that error does not look like noise.
 
     Both (replicates, height, width, 3).  Unlike the error of a wrong picture, noise is independent
-    between pixels, present everywhere, and unlike the picture and its gradient.  It must exceed
-    what the scatter of the replicates' own differences makes, which is large where all pixels use
-    the same random numbers.
+    between pixels, present everywhere, and unlike the picture and its gradient.  So is the rounding
+    of texels that one side stores as half floats: what that may make is subtracted.  The error must
+    exceed what the scatter of the replicates' own differences makes, which is large where all
+    pixels use the same random numbers.
     """
     sides = (candidate, reference)
     variances = [x.var(axis=0, ddof=1) for x in sides]
     own = variances[0].sum(axis=-1)
     difference = candidate.mean(axis=0) - reference.mean(axis=0)
     noise = sum(v.sum(axis=-1) / len(x) for v, x in zip(variances, sides, strict=True))
+    noise = noise + ((HALF * reference.mean(axis=0)) ** 2).sum(axis=-1)
     noisy = own > 1e-12 * float((reference**2).mean())
     if np.count_nonzero(noisy) < FEWEST_PIXELS:
         return None

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from planted import LAMP, STILL, replicates, scene
 
+from comparisons.rungs.input import COMMON
 from comparisons.statistics import Known, compare
 from comparisons.statistics.metric_null import noise_ratio
+from comparisons.statistics.shared_noise import common_noise
 
 SIDE = 48
 
@@ -49,6 +51,21 @@ def test_texels_may_be_stored_as_floats_of_any_kind(stored, noise, counts):
         for pair in ((candidate, reference), (reference, candidate)):
             result = compare(*pair)
             assert result.status in ("agree", "inconclusive"), result.reason
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("stored", STORED)
+def test_rounding_of_texels_is_no_shared_noise(stored, noise):
+    """It is the same in all replicates, independent between pixels, and unlike the picture."""
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        texels = stored(sky() * (0.7 + 0.01 * seed))
+        candidate = pictures(rng, texels, noise, 16)
+        reference = pictures(rng, sky() * (0.7 + 0.01 * seed), noise, 16)
+        for pair in ((candidate, reference), (reference, candidate)):
+            share = common_noise(*pair)
+            assert share is None or share < COMMON, seed
+            assert compare(*pair).status in ("agree", "inconclusive")
 
 
 @pytest.mark.parametrize("stored", STORED)
