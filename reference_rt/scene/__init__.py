@@ -6,7 +6,7 @@ file each for geometry, hierarchies, lights and materials.  `likely_mistakes` fi
 that probably are not what was meant.
 
 Contract: a description is checked when it is made; every error is a SceneError with file, line, key
-path and what was expected.  Tables are C-contiguous float64 or int64 arrays; a feature that the
-scene lacks is None, and its kernel branches are not compiled.  To add a field: in `SceneModel`,
-with its check, and in the `build_...` file whose table it changes.
+path and what was expected.  Tables are C-contiguous arrays, nearly all of float64 or int64; a
+feature that the scene lacks is None, and its kernel branches are not compiled.  To add a field: in
+`SceneModel`, with its check, and in the `build_...` file whose table it changes.
 """

@@ -1,8 +1,8 @@
 """Scene -> SceneTables: the only place that makes a scene's arrays.
 
-Every array is float64 or int64, C-contiguous and writable, so that scenes with the same features
-have the same Numba types and share compiled kernels.  A feature that the scene lacks is None, and
-its branches are removed when the kernels are compiled.
+Every array is C-contiguous and writable, and has the same type in all scenes, so that scenes with
+the same features have the same Numba types and share compiled kernels.  A feature that the scene
+lacks is None, and its branches are removed when the kernels are compiled.
 """
 
 from collections.abc import Sequence
@@ -72,7 +72,7 @@ def _texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
             table: Any
             if isinstance(texture, bitmap.Bitmap):
                 table = texture.tabulate(scene.folder, room[used:])
-                used += len(table.texels)
+                used += len(table.memory.codes8)
             else:
                 table = texture.tabulate(scene.folder)
         except ValueError as error:

@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.model import Positive
-from reference_rt.core.vec3 import Vec3, luminance, row
+from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.jit.kernel import kernel
-from reference_rt.textures.image_file import MOST_BYTES_PER_PIXEL, pixels_of, read_image
+from reference_rt.textures.texels import Bytes, Texels, joined, most_bytes, read_texels, room_of
 from reference_rt.textures.texture import Texture
 from reference_rt.util.memory import check_memory
 
@@ -38,68 +40,106 @@ class Bitmap(Texture):
     scale: Positive = 1.0
     """A factor of the linear values: radiance and heights may need values above 1."""
 
-    def tabulate(self, folder: Path, out: FloatArray | None = None) -> "Bitmaps":
-        """One row of the table.  out (n, 3): if it is large enough, texels are written to its
-        beginning.  Raises ValueError (what is wrong, what was expected)."""
-        texels = read_image(folder / self.file, self.encoding, self.scale, out)
-        height, width = texels.shape[:2]
-        return Bitmaps(
-            texels=texels.reshape(-1, 3),
-            first=np.array([0]),
-            width=np.array([width]),
-            height=np.array([height]),
-            filter=np.array([_FILTERS.index(self.filter)]),
-            wrap=np.array([_WRAPS.index(self.wrap)]),
-        )
+    def tabulate(self, folder: Path, out: Bytes | None = None) -> "Bitmaps":
+        """One row of the table.  out (n,): as in `read_texels`.  Raises ValueError (what is wrong,
+        what was expected)."""
+        texels = self.read(folder, out)
+        return table_of(texels, _FILTERS.index(self.filter), _WRAPS.index(self.wrap))
+
+    def read(self, folder: Path, out: Bytes | None = None) -> Texels:
+        """The image.  Raises ValueError (what is wrong, what was expected)."""
+        return read_texels(folder / self.file, self.encoding, self.scale, out)
+
+
+class Memory(NamedTuple):
+    """The same bytes as codes of 8 and 16 bits and as floats: (n,), (n / 2,), (n / 4,), (n / 8,).
+    A kernel then has the same type whatever the images hold."""
+
+    codes8: Bytes
+    codes16: npt.NDArray[np.uint16]
+    floats32: npt.NDArray[np.float32]
+    floats64: FloatArray
 
 
 class Bitmaps(NamedTuple):
-    """A table of n images.  texels: (m, 3) of all images, linear sRGB, rows from the top;  for each
-    image (n,): its first texel, width, height, filter (0 bilinear, 1 nearest), wrap (0 repeat,
-    1 clamp, 2 mirror)."""
+    """A table of n images.
 
-    texels: FloatArray
+    memory: the texels of all images, rows from the top;  decoded: linear values of codes, of all
+    images;  for each image (n,): the bytes of a value (of 1 and 2 they are codes), its channels (3,
+    of a grey image 1), the index of its first value in the memory of its type, and of code 0 in
+    `decoded`, a factor of floats, the largest linear value, width, height, filter (0 bilinear, 1
+    nearest), wrap (0 repeat, 1 clamp, 2 mirror).
+    """
+
+    memory: Memory
+    decoded: FloatArray
+    itemsize: IntArray
+    channels: IntArray
     first: IntArray
+    first_code: IntArray
+    scale: FloatArray
+    greatest: FloatArray
     width: IntArray
     height: IntArray
     filter: IntArray
     wrap: IntArray
 
 
-def room_for(textures: Iterable[Texture], folder: Path) -> FloatArray:
-    """An uninitialised array (m, 3) for the texels of all bitmaps among these.  Raises ValueError
-    where they would not fit into the machine's memory."""
-    files = [texture.file for texture in textures if isinstance(texture, Bitmap)]
-    pixels = sum(pixels_of(folder / file) for file in files)
-    check_memory(MOST_BYTES_PER_PIXEL * pixels, f"{len(files)} bitmaps of {pixels} pixels in all")
-    return np.empty((pixels, 3))
+def table_of(texels: Texels, filter_code: int, wrap: int) -> Bitmaps:
+    """The table of one image."""
+    height, width, channels = texels.values.shape
+    return Bitmaps(
+        _memory(texels.data),
+        decoded=texels.decoded,
+        itemsize=np.array([texels.values.itemsize]),
+        channels=np.array([channels]),
+        first=np.array([0]),
+        first_code=np.array([0]),
+        scale=np.array([texels.scale]),
+        greatest=np.array([texels.greatest]),
+        width=np.array([width]),
+        height=np.array([height]),
+        filter=np.array([filter_code]),
+        wrap=np.array([wrap]),
+    )
+
+
+def _memory(data: Bytes) -> Memory:
+    return Memory(data, data.view(np.uint16), data.view(np.float32), data.view(np.float64))
+
+
+def room_for(textures: Iterable[Texture], folder: Path) -> Bytes:
+    """An uninitialised array for the texels of all bitmaps among these.  Raises ValueError where
+    they would not fit into the machine's memory."""
+    bitmaps = [texture for texture in textures if isinstance(texture, Bitmap)]
+    size = 0
+    for one in bitmaps:
+        with suppress(ValueError):  # reading it tells
+            size += most_bytes(folder / one.file, one.encoding)
+    check_memory(size, f"{len(bitmaps)} bitmaps of {size} bytes in all")
+    return room_of(size)
 
 
 def join(parts: list[Bitmaps]) -> Bitmaps:
-    """One table from several; `first` is offset.
-
-    Texels are not copied where they already lie one after another in one whole array, as from
-    `room_for`: otherwise every image would be in memory twice.
-    """
-    counts = [len(part.texels) for part in parts]
-    starts = np.cumsum([0, *counts[:-1]])
-    moved = [
-        part._replace(first=part.first + start) for part, start in zip(parts, starts, strict=True)
-    ]
-    columns = [np.concatenate(column) for column in zip(*(part[1:] for part in moved), strict=True)]
-    whole = parts[0].texels.base
-    if whole is None or whole.shape != (sum(counts), 3):
-        whole = np.empty((sum(counts), 3))
-    for part, start in zip(parts, starts, strict=True):
-        place = whole[start : start + len(part.texels)]
-        if part.texels.ctypes.data != place.ctypes.data:
-            place[:] = part.texels
-    return Bitmaps(whole, *columns)
+    """One table from several of one image.  Images with the same linear values of codes share
+    them."""
+    sizes = [len(part.memory.codes8) for part in parts]
+    starts = np.cumsum([0, *sizes[:-1]])
+    columns = [np.concatenate(column) for column in zip(*(part[2:] for part in parts), strict=True)]
+    tables = {part.decoded.tobytes(): part.decoded for part in parts}
+    decoded = np.concatenate(list(tables.values()))
+    ends = np.cumsum([len(table) for table in tables.values()])
+    first_codes = dict(zip(tables, ends, strict=True))
+    whole = Bitmaps(_memory(joined([part.memory.codes8 for part in parts])), decoded, *columns)
+    return whole._replace(
+        first=starts // whole.itemsize,
+        first_code=np.array([first_codes[p.decoded.tobytes()] - len(p.decoded) for p in parts]),
+    )
 
 
 def greatest(bitmaps: Bitmaps) -> float:
     """The largest value of any channel."""
-    return float(bitmaps.texels.max())
+    return float(bitmaps.greatest.max())
 
 
 @kernel
@@ -114,11 +154,26 @@ def _wrapped(i: int, n: int, wrap: int) -> int:
 
 
 @kernel
+def _value(bitmaps: Bitmaps, i: int, k: int) -> float:
+    """The linear value at index k of image i."""
+    memory, itemsize, k = bitmaps.memory, bitmaps.itemsize[i], bitmaps.first[i] + k
+    if itemsize <= 2:
+        code = int(memory.codes8[k]) if itemsize == 1 else int(memory.codes16[k])
+        return float(bitmaps.decoded[bitmaps.first_code[i] + code])
+    stored = float(memory.floats32[k]) if itemsize == 4 else float(memory.floats64[k])
+    return float(bitmaps.scale[i] * stored)
+
+
+@kernel
 def texel(bitmaps: Bitmaps, i: int, x: int, y: int) -> Vec3:
     """The texel at column x, row y (from the top) of image i; beyond its edges by its `wrap`."""
     width, height, wrap = bitmaps.width[i], bitmaps.height[i], bitmaps.wrap[i]
     k = _wrapped(y, height, wrap) * width + _wrapped(x, width, wrap)
-    return row(bitmaps.texels, bitmaps.first[i] + k)
+    if bitmaps.channels[i] == 1:
+        grey = _value(bitmaps, i, k)
+        return Vec3(grey, grey, grey)
+    k = 3 * k
+    return Vec3(_value(bitmaps, i, k), _value(bitmaps, i, k + 1), _value(bitmaps, i, k + 2))
 
 
 class Patch(NamedTuple):

@@ -1,67 +1,64 @@
-"""Reading image files as linear sRGB texels."""
+"""Reading image files as linear sRGB."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
+from reference_rt.core.image_files.image_file import Curve, ImageFile
 from reference_rt.util.memory import check_memory
 
-MOST_BYTES_PER_PIXEL = 32
-"""The most memory per pixel for reading an image: 24 bytes for its texels, 8 for the reader."""
+Encoding = Literal["auto", "srgb", "raw"]
+
+READER = 8
+"""The most bytes per pixel that reading an image takes beside its values."""
 
 
-def read_image(
-    path: Path,
-    encoding: Literal["auto", "srgb", "raw"],
-    scale: float = 1.0,
-    out: FloatArray | None = None,
-) -> FloatArray:
-    """(height, width, 3) linear sRGB times `scale`, row 0 on top, finite and at least 0.
-
-    out (n, 3): if it is large enough, the colours are written to its beginning.  Raises ValueError
-    (what is wrong, what was expected).
-    """
-    from reference_rt.core.image_files import open_image  # importing Pillow is slow
-
-    try:
-        image = open_image(path)
+def read_image(path: Path, encoding: Encoding, scale: float = 1.0) -> FloatArray:
+    """(height, width, 3) linear sRGB times `scale`, row 0 on top, finite and at least 0.  Raises
+    ValueError (what is wrong, what was expected)."""
+    with reading(path) as image:
         pixels = image.height * image.width
-        check_memory(pixels * MOST_BYTES_PER_PIXEL, f"{image.width} x {image.height} pixels")
-        if out is None or len(out) < pixels:
-            out = np.empty((pixels, 3))
-        colours = out[:pixels].reshape(image.height, image.width, 3)
-        is_srgb = image.is_integer if encoding == "auto" else encoding == "srgb"
-        for rows, values, _ in image.strips(linear if is_srgb else None):
-            _check_values(values, rows.start)
+        check_memory((24 + READER) * pixels, f"{image.width} x {image.height} pixels")
+        colours = np.empty((image.height, image.width, 3))
+        for rows, values, _ in image.strips(curve_of(image, encoding)):
+            check_values(values, rows.start)
             with np.errstate(over="ignore"):
                 np.multiply(values, scale, out=colours[rows])
             if not np.isfinite(colours[rows]).all():
                 raise ValueError("a colour times the scale overflows; expected a smaller scale")
+    return colours
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[ImageFile]:
+    """The image in a file, while it is read.  Raises ValueError (the file, what is wrong, what was
+    expected) for all that goes wrong meanwhile."""
+    from reference_rt.core.image_files import open_image  # importing Pillow is slow
+
+    try:
+        yield open_image(path)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}; expected an image") from None
     except MemoryError:
         raise ValueError(f"{path}: does not fit into memory; expected a smaller image") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    return colours
 
 
-def pixels_of(path: Path) -> int:
-    """The number of pixels according to a file's header; 0 where it cannot be read."""
-    from reference_rt.core.image_files import open_image
-
-    try:
-        image = open_image(path)
-    except (ValueError, OSError):
-        return 0
-    return image.height * image.width
+def curve_of(image: ImageFile, encoding: Encoding) -> Curve | None:
+    """The function that decodes the image's values; None where they are linear."""
+    is_srgb = image.is_integer if encoding == "auto" else encoding == "srgb"
+    return linear if is_srgb else None
 
 
-def _check_values(values: FloatArray, first: int) -> None:
-    """Raises ValueError for colours (rows, width, 3), from row `first` on, that are negative or not
-    finite."""
+def check_values(values: npt.NDArray[Any], first: int) -> None:
+    """Raises ValueError for values (rows, width, channels), from row `first` on, that are negative
+    or not finite."""
     good = np.isfinite(values).all(axis=-1)
     if not good.all():
         y, x = np.argwhere(~good)[0]

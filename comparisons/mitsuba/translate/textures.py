@@ -118,9 +118,7 @@ def _(texture: Bitmap, name: str, context: TranslationContext, as_number: bool) 
     """From our own linear texels: the decoding of files is not compared."""
     key = (name, as_number)
     if key not in context.images:
-        table = texture.tabulate(context.folder)
-        shape = (int(table.height[0]), int(table.width[0]), 3)
-        context.images[key] = _image(table.texels.reshape(shape), as_number)
+        context.images[key] = _image(texture.read(context.folder).linear, as_number)
     return _lookup(context.images[key], texture.filter, texture.wrap, texture.uv)
 
 

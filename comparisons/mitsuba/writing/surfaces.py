@@ -155,9 +155,7 @@ class Surfaces:
             file = self.files.copy(texture.file, "textures", name, "file")
             raw = texture.encoding == "raw" or not is_integer
         else:
-            table = texture.tabulate(self.scene.folder)
-            shape = (int(table.height[0]), int(table.width[0]), 3)
-            file, raw = self._written(path.stem, table.texels.reshape(shape)), True
+            file, raw = self._written(path.stem, texture.read(self.scene.folder).linear), True
             self.note(f"the image {texture.file} is written as linear float32 values")
         return self._image(file, texture.filter, texture.wrap, first, texture, raw)
 

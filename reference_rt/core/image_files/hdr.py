@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.image_files.image_file import Curve, ImageFile, Strip, check_length
+from reference_rt.core.image_files.image_file import ImageFile, StoredStrip, check_length
 from reference_rt.util.files import open_input
 
 _HEADER = 4096
@@ -34,7 +34,7 @@ class HdrFile(ImageFile):
     exposure: tuple[float, ...] = (1.0, 1.0, 1.0)
     flips: tuple[bool, bool] = (False, False)
 
-    def strips(self, curve: Curve | None = None, with_opacity: bool = False) -> Iterator[Strip]:
+    def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
         with open_input(self.path) as file:
             file.seek(self.start)
             data = file.read()
@@ -52,12 +52,12 @@ class HdrFile(ImageFile):
                 at += math.prod(size)
                 if self.width > 1 and (rgbe[..., :3] == 1).all(axis=-1).any():
                     raise ValueError("has runs of the old kind; expected those since 1991, or none")
-            values = _radiance(rgbe) / np.array(self.exposure)
-            values = values if curve is None else curve(values)
+            values = (_radiance(rgbe) / np.array(self.exposure)).astype(self.kind)
             upwards, leftwards = self.flips
             if upwards:
                 rows = slice(self.height - rows.stop, self.height - rows.start)
-            yield Strip(rows, values[:: -1 if upwards else 1, :: -1 if leftwards else 1], None)
+            turned = values[:: -1 if upwards else 1, :: -1 if leftwards else 1]
+            yield StoredStrip(rows, turned, None)
         if at != len(data):
             raise ValueError(f"has {len(data) - at} bytes too many; expected {self.height} rows")
 
@@ -79,7 +79,9 @@ def open_hdr(path: Path) -> ImageFile:
     if size - start < least:
         raise ValueError("is truncated: too short for its size; expected whole scanlines")
     flips = match[1] == b"+", match[3] == b"-"
-    return HdrFile(path, width, height, bits=8, start=start, exposure=exposure, flips=flips)
+    # (m + 1/2) 2^e has nine bits, and its least exponent is a denormal float32's: it is exact.
+    kind = "float32" if exposure == (1.0, 1.0, 1.0) else "float64"
+    return HdrFile(path, width, height, kind, bits=8, start=start, exposure=exposure, flips=flips)
 
 
 def _radiance(rgbe: npt.NDArray[np.uint8]) -> FloatArray:

@@ -17,6 +17,19 @@ _STRIP = 1 << 14
 """Pixels converted at once: few enough that intermediate arrays take little memory."""
 
 
+class StoredStrip(NamedTuple):
+    """Some whole rows of an image as its file stores them.
+
+    rows: counted from the top;  values: (rows, width, 1) of grey images, else (rows, width, 3);
+    opacity: (rows, width), None where the file has none or it was not requested.  Integer codes of
+    8 or 16 bits, or floats.
+    """
+
+    rows: slice
+    values: npt.NDArray[Any]
+    opacity: npt.NDArray[Any] | None
+
+
 class Strip(NamedTuple):
     """Some whole rows of an image.
 
@@ -33,28 +46,50 @@ class Strip(NamedTuple):
 class ImageFile:
     """An image whose header has been read.
 
-    is_integer: whether values are integer codes of a display's transfer function, scaled to 0 to 1,
-    rather than linear floats;  bits: per channel in the file;  has_opacity: according to the
-    header;  text: the header's text entries, by name.
+    kind: NumPy's type that can hold the stored values: uint8 or uint16 for integer codes of a
+    display's transfer function, where the largest means 1, else float16, float32 or float64 for
+    linear values, of which strips may have a narrower one;  is_grey: whether there is one value per
+    pixel;  bits: per channel in the file;  has_opacity: according to the header;  text: the
+    header's text entries, by name.
     """
 
     path: Path
     width: int
     height: int
-    is_integer: bool = False
+    kind: str = "float32"
+    is_grey: bool = False
     bits: int = 32
     has_opacity: bool = False
     text: dict[str, str] = field(default_factory=dict)
 
-    def strips(self, curve: Curve | None = None, with_opacity: bool = False) -> Iterator[Strip]:
-        """All rows, in any order of strips; `curve` is applied to colours.  Raises ValueError,
-        OSError.
+    @property
+    def is_integer(self) -> bool:
+        return self.kind in ("uint8", "uint16")
+
+    def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
+        """All rows, in any order of strips.  Raises ValueError, OSError.
 
         Besides the strips this takes at most 8 bytes of memory per pixel, the allowance in
-        `textures.image_file` beside the 24 of a texel (except that OpenEXR decodes all channels of
+        `textures.image_file` beside those of a texel (except that OpenEXR decodes all channels of
         a file at once).
         """
         raise NotImplementedError
+
+    def strips(self, curve: Curve | None = None, with_opacity: bool = False) -> Iterator[Strip]:
+        """The same as colours; `curve` is applied to them."""
+        table = decoding(self.kind, curve) if self.is_integer else None
+        for rows, values, opacity in self.stored(with_opacity):
+            if table is not None:
+                colours = table[values]
+            else:
+                colours = as_float64(values)
+                colours = colours if curve is None else curve(colours)
+            if self.is_grey:
+                colours = np.repeat(colours, 3, axis=-1)
+            if opacity is not None:
+                opacity = as_float64(opacity)
+                opacity = opacity / np.iinfo(self.kind).max if self.is_integer else opacity
+            yield Strip(rows, colours, opacity)
 
     def row_ranges(self) -> Iterator[slice]:
         """The range of rows of each strip, from the top."""
@@ -63,23 +98,20 @@ class ImageFile:
             yield slice(start, min(start + step, self.height))
 
 
-def in_colour(values: npt.NDArray[Any], curve: Curve | None) -> FloatArray:
-    """(rows, width, 3) float64 from floats (rows, width, 3), or grey (rows, width)."""
-    found = as_float64(values)
-    found = found if curve is None else curve(found)
-    return np.repeat(found[..., None], 3, axis=-1) if found.ndim == 2 else found
-
-
 def as_float64(values: npt.NDArray[Any]) -> FloatArray:
     """A copy as float64; signalling NaNs, which would raise a warning, become quiet ones."""
     with np.errstate(invalid="ignore"):
         return np.array(values, dtype=np.float64)
 
 
-def decoding(bits: int, curve: Curve | None) -> FloatArray:
-    """(2^bits,): the decoded value of every integer code, as a lookup table."""
-    most = (1 << bits) - 1
-    values = np.arange(most + 1) / float(most)
+def decoding(kind: str, curve: Curve | None) -> FloatArray:
+    """(2^bits,): the linear value of every code of 8 or 16 bits, or of every half float by its
+    bits."""
+    if kind == "float16":
+        values = as_float64(np.arange(1 << 16, dtype=np.uint16).view(np.float16))
+    else:
+        most = int(np.iinfo(kind).max)
+        values = np.arange(most + 1) / float(most)
     return values if curve is None else curve(values)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.core.image_files.image_file import Curve, ImageFile, Strip, as_float64, in_colour
+from reference_rt.core.image_files.image_file import ImageFile, StoredStrip
 from reference_rt.util.files import open_input
 
 
@@ -18,7 +18,7 @@ class NpyFile(ImageFile):
 
     array: Any = None
 
-    def strips(self, curve: Curve | None = None, with_opacity: bool = False) -> Iterator[Strip]:
+    def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
         with open_input(self.path) as file:
             for rows in self.row_ranges():
                 found = self.array[rows]
@@ -26,9 +26,9 @@ class NpyFile(ImageFile):
                     # Read rather than mapped: rows that are done do not stay in memory.
                     file.seek(self.array.offset + rows.start * self.array.strides[0])
                     found = np.fromfile(file, found.dtype, found.size).reshape(found.shape)
-                opacity = as_float64(found[..., 3]) if self.has_opacity and with_opacity else None
-                colours = found if found.ndim == 2 else found[..., :3]
-                yield Strip(rows, in_colour(colours, curve), opacity)
+                opacity = found[..., 3] if self.has_opacity and with_opacity else None
+                values = found[..., None] if self.is_grey else found[..., :3]
+                yield StoredStrip(rows, values, opacity)
 
 
 def open_npy(path: Path) -> ImageFile:
@@ -39,10 +39,17 @@ def open_npy(path: Path) -> ImageFile:
             f"has the shape {array.shape}; expected (height, width), (height, width, 3), or with "
             "opacity (height, width, 4)"
         )
-    bits = 8 * array.dtype.itemsize
-    has_opacity = array.ndim == 3 and array.shape[2] == 4
     height, width = array.shape[:2]
-    return NpyFile(path, width, height, bits=bits, has_opacity=has_opacity, array=array)
+    return NpyFile(
+        path,
+        width,
+        height,
+        kind=f"float{min(64, 8 * array.dtype.itemsize)}",
+        is_grey=array.ndim == 2,
+        bits=8 * array.dtype.itemsize,
+        has_opacity=array.ndim == 3 and array.shape[2] == 4,
+        array=array,
+    )
 
 
 def map_npy(path: Path) -> npt.NDArray[Any]:

@@ -9,13 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from reference_rt.core.image_files.image_file import (
-    Curve,
-    ImageFile,
-    Strip,
-    check_length,
-    in_colour,
-)
+from reference_rt.core.image_files.image_file import ImageFile, StoredStrip, check_length
 from reference_rt.util.files import open_input
 
 _HEADER = 4096
@@ -26,22 +20,21 @@ _PATTERN = re.compile(rb"P([Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,32})\s")
 
 @dataclass(frozen=True)
 class PfmFile(ImageFile):
-    """start: byte offset of the pixels;  kind: NumPy's type of a number;  channels: 1 or 3."""
+    """start: byte offset of the pixels;  order: NumPy's type of a number with its byte order."""
 
     start: int = 0
-    kind: str = "<f4"
-    channels: int = 3
+    order: str = "<f4"
 
-    def strips(self, curve: Curve | None = None, with_opacity: bool = False) -> Iterator[Strip]:
-        row = self.width * self.channels
+    def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
+        channels = 1 if self.is_grey else 3
+        row = self.width * channels
         with open_input(self.path) as file:
             for rows in self.row_ranges():
                 # The file stores rows from the bottom up.
                 file.seek(self.start + 4 * row * (self.height - rows.stop))
-                values = np.fromfile(file, self.kind, row * (rows.stop - rows.start))
-                shape = (rows.stop - rows.start, self.width, self.channels)
-                upwards = values.reshape(shape if self.channels == 3 else shape[:2])
-                yield Strip(rows, in_colour(upwards[::-1], curve), None)
+                values = np.fromfile(file, self.order, row * (rows.stop - rows.start))
+                upwards = values.reshape(rows.stop - rows.start, self.width, channels)
+                yield StoredStrip(rows, upwards[::-1], None)
 
 
 def open_pfm(path: Path) -> ImageFile:
@@ -64,5 +57,5 @@ def open_pfm(path: Path) -> ImageFile:
         )
     if min(width, height) > 0:  # `open_image` refuses images without pixels
         check_length(size - match.end(), width * height * channels * 4)
-    kind = "<f4" if scale < 0.0 else ">f4"
-    return PfmFile(path, width, height, start=match.end(), kind=kind, channels=channels)
+    order = "<f4" if scale < 0.0 else ">f4"
+    return PfmFile(path, width, height, is_grey=channels == 1, start=match.end(), order=order)

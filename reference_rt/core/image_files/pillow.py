@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from reference_rt.core.arrays import FloatArray
-from reference_rt.core.image_files.image_file import Curve, ImageFile, Strip, decoding, in_colour
+from reference_rt.core.image_files.image_file import ImageFile, StoredStrip
 from reference_rt.util.files import open_input
 
 _SILENT = logging.NullHandler()
+
+_GREY = ("1", "L", "LA", "F")
+"""Modes with one value per pixel."""
 
 _GREY_OF_16 = ("I", "I;16", "I;16B", "I;16L")
 
@@ -31,42 +33,44 @@ class PillowFile(ImageFile):
     packed: str = ""
     gamma: float | None = None
 
-    def strips(self, curve: Curve | None = None, with_opacity: bool = False) -> Iterator[Strip]:
+    def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
+        with_opacity = with_opacity and self.has_opacity
         if self.bits == 16 and self.mode not in _GREY_OF_16:
-            yield from self._deep_strips(decoding(16, curve), with_opacity)
+            yield from self._deep_strips(with_opacity)
             return
-        values = None if self.mode == "F" else decoding(self.bits, curve)
         image = _decoded(self.path)
         for rows in self.row_ranges():
             part = image.crop((0, rows.start, self.width, rows.stop))
-            if values is None:
-                yield Strip(rows, in_colour(np.asarray(part), curve), None)
+            if not self.is_integer:
+                yield StoredStrip(rows, np.asarray(part)[..., None], None)
             elif self.bits == 16:
                 codes = np.asarray(part, np.int64)
                 if codes.min() < 0 or codes.max() > 65535:
                     raise ValueError("has grey values of more than 16 bits; expected 8 or 16")
-                yield Strip(rows, in_colour(values[codes], None), None)
+                yield StoredStrip(rows, codes.astype(np.uint16)[..., None], None)
+            elif self.is_grey and not with_opacity:
+                yield StoredStrip(rows, np.asarray(part.convert("L"))[..., None], None)
             else:
                 codes = np.asarray(part.convert("RGBA"))
-                opacity = codes[..., 3] / 255.0 if self.has_opacity and with_opacity else None
-                yield Strip(rows, values[codes[..., :3]], opacity)
+                values = codes[..., : 1 if self.is_grey else 3]
+                yield StoredStrip(rows, values, codes[..., 3] if with_opacity else None)
 
-    def _deep_strips(self, values: FloatArray, with_opacity: bool) -> Iterator[Strip]:
+    def _deep_strips(self, with_opacity: bool) -> Iterator[StoredStrip]:
         """The strips of a PNG file with several channels of 16 bits.
 
         Pillow decodes only the high byte of each.  With the raw mode set to little-endian it
         decodes the low byte: two passes give all 16 bits.  For grey with opacity the raw mode RGBA
         makes it decode all four bytes as four channels.
         """
-        if self.packed.startswith("LA"):
+        if self.is_grey:
             image = _decoded(self.path, "RGBA")
             for rows in self.row_ranges():
                 part = image.crop((0, rows.start, self.width, rows.stop))
-                pairs = np.asarray(part).astype(np.int64)
+                pairs = np.asarray(part).astype(np.uint16)
                 grey, alpha = (256 * pairs[..., k] + pairs[..., k + 1] for k in (0, 2))
-                yield Strip(rows, in_colour(values[grey], None), alpha / 65535.0)
+                yield StoredStrip(rows, grey[..., None], alpha if with_opacity else None)
             return
-        channels = 4 if with_opacity and self.has_opacity else 3
+        channels = 4 if with_opacity else 3
         high = np.empty((self.height, self.width, channels), np.uint8)
         image = _decoded(self.path)
         for rows in self.row_ranges():
@@ -76,9 +80,8 @@ class PillowFile(ImageFile):
         image = _decoded(self.path, self.packed.replace(";16B", ";16L"))
         for rows in self.row_ranges():
             part = image.crop((0, rows.start, self.width, rows.stop))
-            codes = 256 * high[rows].astype(np.int64) + np.asarray(part)[..., :channels]
-            opacity = codes[..., 3] / 65535.0 if channels == 4 else None
-            yield Strip(rows, values[codes[..., :3]], opacity)
+            codes = 256 * high[rows].astype(np.uint16) + np.asarray(part)[..., :channels]
+            yield StoredStrip(rows, codes[..., :3], codes[..., 3] if with_opacity else None)
 
 
 def open_with_pillow(path: Path) -> ImageFile:
@@ -99,12 +102,14 @@ def open_with_pillow(path: Path) -> ImageFile:
                 ".exr"
             )
         gamma = info.get("gamma") if is_png and "srgb" not in info else None
+        bits = 16 if is_deep or mode in _GREY_OF_16 else 32 if mode == "F" else 8
         return PillowFile(
             path,
             image.width,
             image.height,
-            is_integer=mode != "F",
-            bits=16 if is_deep or mode in _GREY_OF_16 else 32 if mode == "F" else 8,
+            kind="float32" if mode == "F" else f"uint{bits}",
+            is_grey=mode in (*_GREY, *_GREY_OF_16) or packed.startswith("LA;16"),
+            bits=bits,
             has_opacity=mode in ("RGBA", "LA", "PA", "La", "RGBa") or "transparency" in info,
             text={str(key): value for key, value in info.items() if isinstance(value, str)},
             mode=mode,

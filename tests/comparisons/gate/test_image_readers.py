@@ -1,6 +1,7 @@
 """Image readers: every kind of file, as a texture, an environment map and a candidate."""
 
 import io
+import math
 import zlib
 from pathlib import Path
 
@@ -14,7 +15,8 @@ import reference_rt as rt
 from comparisons.gate.pictures_in import read_candidate
 from reference_rt.core.image_files import open_image
 from reference_rt.scene.build import build_tables
-from reference_rt.textures.image_file import linear
+from reference_rt.textures.bitmap import texel
+from reference_rt.textures.image_file import linear, read_image
 from reference_rt.util import memory
 from reference_rt.util.errors import ImageError
 
@@ -118,8 +120,13 @@ def write(name, path):
 def bitmap_of(path):
     scene = rt.Scene(textures={"t": rt.Bitmap(file=str(path))})
     bitmaps = build_tables(scene).textures.bitmaps
-    assert bitmaps.texels.flags.c_contiguous
-    return bitmaps.texels.reshape(bitmaps.height[0], bitmaps.width[0], 3)
+    return texels_of(bitmaps, 0)
+
+
+def texels_of(bitmaps, i):
+    """(height, width, 3): all texels of an image, as kernels see them."""
+    rows, columns = range(bitmaps.height[i]), range(bitmaps.width[i])
+    return np.array([[texel(bitmaps, i, x, y) for x in columns] for y in rows])
 
 
 def environment_of(path):
@@ -219,9 +226,36 @@ def test_many_bitmaps_are_one_array(tmp_path):
     textures = {f"t{k}": rt.Bitmap(file=name) for k, name in enumerate(names)}
     (tmp_path / "scene.json").write_text(rt.Scene(textures=textures).to_json())
     bitmaps = build_tables(rt.Scene.load(tmp_path / "scene.json")).textures.bitmaps
-    expected = np.concatenate([KINDS[name][1].reshape(-1, 3) for name in names])
-    np.testing.assert_array_equal(bitmaps.texels, expected)
-    assert bitmaps.first.tolist() == [k * HEIGHT * WIDTH for k in range(4)]
+    for k, name in enumerate(names):
+        np.testing.assert_array_equal(texels_of(bitmaps, k), KINDS[name][1])
+    # Codes of a byte take one; two images share what they mean, and each begins at a float64.
+    values = 3 * HEIGHT * WIDTH
+    assert bitmaps.itemsize.tolist() == [4, 1, 4, 1]
+    assert len(bitmaps.memory.codes8) == 8 * sum(math.ceil(n * values / 8) for n in (4, 1, 4, 1))
+    assert len(bitmaps.decoded) == 256
+    assert bitmaps.memory.codes8.base is bitmaps.memory.floats64.base
+
+
+def test_one_scene_has_bitmaps_of_all_kinds(tmp_path):
+    """The same values as those of an array of float64, whatever their encoding and scale."""
+    rng = np.random.default_rng(3)
+    names = rng.permutation([*KINDS, *AS_TEXTURES])
+    textures = {}
+    for name in names:
+        write(name, tmp_path / name)
+        encoding, scale = rng.choice(["auto", "srgb", "raw"]), rng.choice([1.0, 0.7, 1e-5])
+        path = str(tmp_path / name)
+        textures[name] = rt.Bitmap(file=path, encoding=str(encoding), scale=float(scale))
+    bitmaps = build_tables(rt.Scene(textures=textures)).textures.bitmaps
+    for k, (name, texture) in enumerate(textures.items()):
+        expected = read_image(tmp_path / name, texture.encoding, texture.scale)
+        np.testing.assert_array_equal(texels_of(bitmaps, k), expected, err_msg=name)
+        np.testing.assert_array_equal(texture.read(tmp_path).linear, expected)
+        assert bitmaps.greatest[k] == expected.max()
+    assert set(bitmaps.itemsize.tolist()) == {1, 2, 4, 8}
+    assert set(bitmaps.channels.tolist()) == {1, 3}
+    # Of codes of 8 and of 16 bits and of half floats, two encodings and three scales each.
+    assert len(bitmaps.decoded) <= 6 * 256 + 12 * 65536
 
 
 # ---- memory -------------------------------------------------------------------------------------
@@ -237,19 +271,23 @@ def test_what_would_not_fit_into_memory_is_refused_by_its_header(tmp_path, consu
     picture[16:24] = huge + huge
     picture[29:33] = zlib.crc32(bytes(picture[12:29])).to_bytes(4, "big")
     (tmp_path / "a.png").write_bytes(picture)
-    said = "declares 524288 x 524288" if consumer is gate_of else "which take 8192.0 GiB of memory"
+    said = {
+        gate_of: "declares 524288 x 524288",
+        bitmap_of: "which take 2816.0 GiB of memory",  # three bytes a pixel, and eight to read it
+        environment_of: "which take 8192.0 GiB of memory",
+    }[consumer]
     with pytest.raises((rt.SceneError, ImageError), match=said):
         consumer(tmp_path / "a.png")
 
 
 def test_many_textures_that_would_not_fit_together(tmp_path, monkeypatch):
-    KINDS["float.exr"][0](tmp_path / "a.exr")
-    pixels = HEIGHT * WIDTH
-    monkeypatch.setattr(memory, "machine_memory", lambda: 3 * 32 * pixels)
-    textures = {f"t{k}": rt.Bitmap(file=str(tmp_path / "a.exr")) for k in range(3)}
+    KINDS["little.pfm"][0](tmp_path / "a.pfm")
+    size = 12 * HEIGHT * WIDTH
+    monkeypatch.setattr(memory, "machine_memory", lambda: 3 * size)
+    textures = {f"t{k}": rt.Bitmap(file=str(tmp_path / "a.pfm")) for k in range(3)}
     build_tables(rt.Scene(textures=textures))
-    textures["t3"] = rt.Bitmap(file=str(tmp_path / "a.exr"))
-    with pytest.raises(rt.SceneError, match=f"has 4 bitmaps of {4 * pixels} pixels in all"):
+    textures["t3"] = rt.Bitmap(file=str(tmp_path / "a.pfm"))
+    with pytest.raises(rt.SceneError, match=f"has 4 bitmaps of {4 * size} bytes in all"):
         build_tables(rt.Scene(textures=textures))
 
 

@@ -15,10 +15,11 @@ from reference_rt.materials.nested import bump, normal_map
 from reference_rt.materials.nested.bump import Bump
 from reference_rt.materials.nested.normal_map import NormalMap
 from reference_rt.shapes.shape import Tangents
-from reference_rt.textures.bitmap import Bitmaps
+from reference_rt.textures.bitmap import table_of
 from reference_rt.textures.checker import Checkers
 from reference_rt.textures.lookup import At, Textures, lookup, lookup_gradient
 from reference_rt.textures.parameter import Palette
+from reference_rt.textures.texels import Texels
 from reference_rt.textures.texture import BITMAP, CHECKER, UvMap
 
 PALETTE = Palette({"t": 0}, [5.0])
@@ -29,9 +30,9 @@ FLAT = Tangents(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0))
 
 def texture(texels, uv=PLAIN, nearest=0, wrap=0):
     """One bitmap with these texels (height, width, 3), the top row first."""
-    height, width, _ = texels.shape
-    numbers = (np.array([k]) for k in (0, width, height, nearest, wrap))
-    bitmaps = Bitmaps(texels.reshape(-1, 3).astype(float), *numbers)
+    values = np.array(texels, dtype=float)
+    stored = Texels(values.reshape(-1).view(np.uint8), values, np.zeros(0), 1.0, values.max())
+    bitmaps = table_of(stored, nearest, wrap)
     return Textures(np.array([BITMAP]), np.array([0]), uv.coefficients()[None], None, bitmaps, None)
 
 
