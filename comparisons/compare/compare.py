@@ -135,7 +135,8 @@ def _gather(
 
     notes = [*counterpart.notes(), *notes_of(scene)]
     if own is not None:
-        notes = [*counterpart.notes(), _OWN_FILE.format(file_of(scene)), *changes_to(scene)]
+        changes = dict.fromkeys([_OWN_FILE.format(file_of(scene)), *changes_to(scene)])
+        notes = [*counterpart.notes(), *changes]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
     if moved > 0.0:
@@ -182,8 +183,9 @@ def _no_pictures(counterpart: Counterpart, scene: Scene) -> str:
 
 
 _OWN_FILE = (
-    "Mitsuba's pictures are of {} itself, loaded by Mitsuba and changed in the film's size and "
-    "filter and in its samples only; the rungs below are of our translation of what we read"
+    "Mitsuba's pictures are of {} itself, loaded by Mitsuba; its film's size and filter and its "
+    "samples are changed, and what these notes name; the rungs below are of our translation of "
+    "what we read"
 )
 
 

@@ -144,7 +144,7 @@ def register(mi: Any) -> None:
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
             self.wrap(properties["nested"])
-            self.base = parameters.colour(mi, properties["reflectance"])
+            self.base = parameters.colour(mi, properties.get_texture("reflectance", 0.5))
             self.nonlinear = properties["nonlinear"]
             self.eta = float(properties["eta"])
             self.distribution = properties.get("distribution", "")

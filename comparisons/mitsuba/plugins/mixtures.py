@@ -27,11 +27,14 @@ def register(mi: Any) -> None:
         return found
 
     class MixtureBlend(base_class(mi)):  # type: ignore[misc]
-        """(1 - weight) first + weight second."""
+        """(1 - weight) first + weight second, the two nested materials."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
-            self.nested = (properties["first"], properties["second"])
+            # By any names, in order, as Mitsuba's own.
+            self.nested = tuple(
+                bsdf for _, bsdf in properties.objects() if isinstance(bsdf, mi.BSDF)
+            )
             self.weight = share(properties["weight"])
             self.first_count = self.nested[0].component_count()
             self.m_components = [
