@@ -26,6 +26,8 @@ class NpyFile(ImageFile):
                     # Read rather than mapped: rows that are done do not stay in memory.
                     file.seek(self.array.offset + rows.start * self.array.strides[0])
                     found = np.fromfile(file, found.dtype, found.size).reshape(found.shape)
+                if found.dtype.itemsize > 8:  # long doubles
+                    found = found.astype(np.float64)
                 opacity = found[..., 3] if self.has_opacity and with_opacity else None
                 values = found[..., None] if self.is_grey else found[..., :3]
                 yield StoredStrip(rows, values, opacity)

@@ -83,6 +83,7 @@ KINDS = {
     "float16.npy": (floats(lambda: npy(HALVES[..., :3].astype("<f2"))), HALVES[..., :3], None),
     "float32.npy": (floats(lambda: npy(COLOUR.astype(">f4"))), COLOUR, None),
     "float64.npy": (floats(lambda: npy(COLOUR)), COLOUR, None),
+    "longdouble.npy": (floats(lambda: npy(COLOUR.astype(np.longdouble))), COLOUR, None),
     "columns.npy": (floats(lambda: npy(np.asfortranarray(COLOUR))), COLOUR, None),
     "opacity.npy": (floats(lambda: npy(FLOATS)), COLOUR, FLOATS[..., 3]),
 }
