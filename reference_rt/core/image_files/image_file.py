@@ -99,8 +99,9 @@ class ImageFile:
 
 
 def as_float64(values: npt.NDArray[Any]) -> FloatArray:
-    """A copy as float64; signalling NaNs, which would raise a warning, become quiet ones."""
-    with np.errstate(invalid="ignore"):
+    """A copy as float64, without a warning: signalling NaNs become quiet ones, and long doubles
+    beyond its range infinite."""
+    with np.errstate(invalid="ignore", over="ignore"):
         return np.array(values, dtype=np.float64)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.core.image_files.image_file import ImageFile, StoredStrip
+from reference_rt.core.image_files.image_file import ImageFile, StoredStrip, as_float64
 from reference_rt.util.files import open_input
 
 
@@ -27,7 +27,7 @@ class NpyFile(ImageFile):
                     file.seek(self.array.offset + rows.start * self.array.strides[0])
                     found = np.fromfile(file, found.dtype, found.size).reshape(found.shape)
                 if found.dtype.itemsize > 8:  # long doubles
-                    found = found.astype(np.float64)
+                    found = as_float64(found)
                 opacity = found[..., 3] if self.has_opacity and with_opacity else None
                 values = found[..., None] if self.is_grey else found[..., :3]
                 yield StoredStrip(rows, values, opacity)
