@@ -25,7 +25,7 @@ from comparisons.suites.suite import Source
 from comparisons.suites.work import Plan, Work, folder_name
 from comparisons.suites.worker import Request
 from reference_rt.util.errors import ImageError, SceneError
-from reference_rt.util.files import check_writable
+from reference_rt.util.files import check_writable, delete_unfinished
 from reference_rt.util.workers import Threads, Workers
 
 LOG = "stderr.txt"
@@ -138,6 +138,7 @@ def run_cases(
             requests: list[Request] = []
             for work in plan.work:
                 request, done = _begun(work, options, chosen)
+                delete_unfinished(request.folder)
                 if done is None:
                     requests.append(request)
                 else:

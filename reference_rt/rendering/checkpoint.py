@@ -10,9 +10,7 @@ import functools
 import hashlib
 import json
 import struct
-import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,17 +20,13 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.framebuffer import Band
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
-from reference_rt.util.files import read_input, replacing
+from reference_rt.util.files import delete_unfinished, read_input, replacing
 
 _MAGIC = b"reference_rt samples 1\n"
 _HEAD = struct.Struct("<32sqq")
 """The digest of the render, the number of the band, and of bytes that follow the checksum."""
 
 _CHECKSUM_BYTES = 32
-
-_UNFINISHED_FOR = 3600.0
-"""Seconds after which a temporary file is deleted: writing takes seconds, so its writer was
-killed."""
 
 
 class Checkpoint:
@@ -53,7 +47,7 @@ class Checkpoint:
     def folder(self) -> Path:
         """The folder of this render."""
         folder = self._parent / self._digest.hex()[:16]
-        _delete_unfinished(folder)
+        delete_unfinished(folder)
         return folder
 
     def exists(self) -> bool:
@@ -110,15 +104,6 @@ def _checksum(head: bytes, payload: Any) -> bytes:
     digest = hashlib.blake2b(head, digest_size=_CHECKSUM_BYTES)
     digest.update(payload)
     return digest.digest()
-
-
-def _delete_unfinished(folder: Path) -> None:
-    """Errors are ignored: another process may be deleting the same files."""
-    with suppress(OSError):
-        for path in folder.glob(".*-band-*.samples"):
-            with suppress(OSError):
-                if time.time() - path.lstat().st_mtime > _UNFINISHED_FOR:
-                    path.unlink()
 
 
 def render_digest(scene: BuiltScene, tables: SceneTables) -> bytes:

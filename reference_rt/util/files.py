@@ -1,9 +1,11 @@
 """Reading regular files within limits, and writing files atomically: whole or not at all."""
 
 import errno
+import glob
 import os
 import secrets
 import stat
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -17,6 +19,12 @@ MOST_BYTES = 1 << 32
 MOST_TEXT = 1 << 28
 """The most bytes of a scene, a suite or a stored result: two million spheres in YAML.  Once read,
 such a scene takes about eight times as much memory: 2 GiB."""
+
+UNFINISHED_FOR = 3600.0
+"""Seconds after which a temporary file is deleted: writing takes seconds, so its writer was
+killed."""
+
+_TOKEN = "[0-9a-f]" * 8
 
 _KINDS = (
     (stat.S_ISFIFO, "is a pipe"),
@@ -105,14 +113,27 @@ def _temporary_beside(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+def delete_unfinished(folder: Path, name: str = "*") -> None:
+    """Delete the temporary files of `replacing` that killed processes left in a folder, for files
+    with this name or pattern.  Errors are ignored: another process may be deleting the same files.
+    """
+    with suppress(OSError):
+        for path in folder.glob(f".{_TOKEN}-{name}"):
+            with suppress(OSError):
+                if time.time() - path.lstat().st_mtime > UNFINISHED_FOR:
+                    path.unlink()
+
+
 def check_writable(*paths: Path) -> None:
     """Raises ImageError if one of these files could not be written.
 
     Every command calls this for all its output files before it starts to work, so that no long run
-    ends with results that cannot be stored.  Leaves no files or folders behind.
+    ends with results that cannot be stored.  Leaves no files or folders behind, and deletes what
+    killed processes left.
     """
     for path in paths:
         _check_writable(path)
+        delete_unfinished(path.parent, glob.escape(path.name))
 
 
 def _check_writable(path: Path) -> None:

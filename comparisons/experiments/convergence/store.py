@@ -16,7 +16,7 @@ from comparisons.results.sealed import read_arrays, sealed, unsealed, write_arra
 from comparisons.runs.fingerprint import package_versions
 from comparisons.suites.keys import code_fingerprint, files_digest
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.files import read_text, replacing
+from reference_rt.util.files import delete_unfinished, read_text, replacing
 
 SCHEMA = 3
 """Increased whenever what is stored, or its meaning, changes."""
@@ -55,6 +55,8 @@ class Store:
         if folder is not None and (fresh or self._read("key") != key):
             shutil.rmtree(folder, ignore_errors=True)
             self._write("key", key)
+        if folder is not None:
+            delete_unfinished(folder)
 
     # ---- rungs ----------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 results, file by file."""
 
 import json
+import os
 import random
 import signal
 import subprocess
@@ -43,7 +44,7 @@ def whole(out, folder, workers=None, runner=STEADY):
 def results(out):
     """All that a suite has written but for times and the commands to repeat it."""
     found = {}
-    for path in sorted((out / "cases").glob("*/*")):
+    for path in sorted((out / "cases").glob("*/[!.]*")):
         content = path.read_bytes()
         if path.name == CASE:
             record = json.loads(content)
@@ -78,6 +79,12 @@ def check_killed(times, cases, most, tmp_path):
     assert times // 2 < len(ran_in(folder)) <= cases + 2 * times
     whole(tmp_path / "expected", folder)
     assert results(out) == results(tmp_path / "expected")
+    # Files that a kill left half written are deleted by a later run, when nobody can be writing.
+    (out / "cases" / "case000" / ".0123abcd-case.json").touch()
+    for left in out.glob("**/.*"):
+        os.utime(left, (time.time() - 7200.0,) * 2)
+    assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+    assert not list(out.glob("**/.*"))
     assert len(results(out)[1]) == cases
 
 

@@ -153,14 +153,14 @@ def test_files_of_killed_writers_are_deleted(tmp_path):
     """Old ones; a clock that jumped back makes them look new, and they stay."""
     own = store(tmp_path)
     own.write(0, band())
-    ages = {"old": -7200.0, "new": -5.0, "future": 1e6}
+    ages = {"0123abcd": -7200.0, "00000001": -5.0, "00000002": 1e6}
     for name, age in ages.items():
         path = own.folder / f".{name}-band-000000.samples"
         path.touch()
         os.utime(path, (time.time() + age,) * 2)
     found = {path.name for path in store(tmp_path).folder.iterdir()}
     assert found == {
-        ".new-band-000000.samples", ".future-band-000000.samples", "band-000000.samples",
+        ".00000001-band-000000.samples", ".00000002-band-000000.samples", "band-000000.samples",
     }  # fmt: skip
 
 
