@@ -98,7 +98,8 @@ class Processes:
             if self._deaths >= _MOST_DEATHS:
                 raise WorkersError(
                     f"processes have died {self._deaths} times without computing anything, "
-                    "perhaps for lack of memory; expected fewer --workers"
+                    "perhaps for lack of memory; expected fewer --workers, or in a script of "
+                    "Python that its work begins below: if __name__ == '__main__'"
                 ) from None
             self._pool.shutdown(wait=False)
             self._pool = self._start()
