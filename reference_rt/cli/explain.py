@@ -21,6 +21,7 @@ from reference_rt.shapes import Mesh, Shape
 from reference_rt.shapes.csg import Solid
 from reference_rt.shapes.shape import TabulationContext
 from reference_rt.textures import TABLES as TEXTURE_TABLES
+from reference_rt.textures.bitmap import Memory
 
 Lines = list[tuple[str, str]]
 
@@ -178,8 +179,15 @@ def _textures(tables: SceneTables, used: Lines, pruned: Lines) -> None:
         if table is None:
             pruned.append((f"textures: {field}", "no texture of this kind"))
         else:
-            size = _bytes(sum(column.nbytes for column in table))
+            size = _bytes(_size(table))
             used.append((f"textures: {field}", f"{len(table[-1]):,} ({size})"))
+
+
+def _size(table: Any) -> int:
+    """The bytes of a table, whose columns may be tables."""
+    if isinstance(table, Memory):
+        return int(table.codes8.nbytes)  # the others are the same bytes
+    return sum(map(_size, table)) if isinstance(table, tuple) else int(table.nbytes)
 
 
 def _rows(table: Any) -> int:

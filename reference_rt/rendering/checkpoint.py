@@ -20,6 +20,7 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.framebuffer import Band
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
+from reference_rt.textures.bitmap import Memory
 from reference_rt.util.files import delete_unfinished, read_input, replacing
 
 _MAGIC = b"reference_rt samples 1\n"
@@ -129,6 +130,8 @@ def _parts(table: Any) -> Iterator[Any]:
     if isinstance(table, np.ndarray):
         yield f"{table.dtype.str}{table.shape}".encode()
         yield np.ascontiguousarray(table).data.cast("B") if table.size else b""
+    elif isinstance(table, Memory):
+        yield from _parts(table.codes8)  # the others are the same bytes
     elif isinstance(table, tuple):
         yield f"{type(table).__name__}{len(table)}".encode()
         for part in table:
