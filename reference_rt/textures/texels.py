@@ -48,6 +48,7 @@ def room_of(size: int) -> Bytes:
 
 
 def padded(size: int) -> int:
+    """The least multiple of WIDEST that is not below `size`."""
     return -(-size // WIDEST) * WIDEST
 
 
@@ -83,9 +84,7 @@ def read_texels(path: Path, encoding: Encoding, scale: float, out: Bytes | None 
         shape = image.height, image.width, first.values.shape[2]
         size = math.prod(shape) * np.dtype(kind).itemsize
         data = room_of(size) if out is None or len(out) < padded(size) else out[: padded(size)]
-        data[size:] = (
-            0  # what depends on all bytes, as a checkpoint's digest, is the same each time
-        )
+        data[size:] = 0  # for digests of all bytes, such as those of checkpoints
         texels = data[:size].view(kind).reshape(shape)
         greatest = 0.0
         for rows, values, _ in chain((first,), strips):

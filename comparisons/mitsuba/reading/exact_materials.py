@@ -17,31 +17,28 @@ from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.materials import Blend, Plastic, RoughConductor, RoughDielectric, RoughPlastic
 from reference_rt.rendering.scene import Scene
 
-PLUGINS: dict[type, tuple[str, ...]] = {
-    Blend: ("blendbsdf",),
-    Plastic: ("plastic",),
-    RoughPlastic: ("roughplastic",),
-    RoughConductor: ("roughconductor",),
-    RoughDielectric: ("roughdielectric",),
+PLUGINS: dict[type, str] = {
+    Blend: "blendbsdf",
+    Plastic: "plastic",
+    RoughPlastic: "roughplastic",
+    RoughConductor: "roughconductor",
+    RoughDielectric: "roughdielectric",
 }
 """Mitsuba's plugins by our material."""
 
 
-def notes_of_inexact(scene: Scene) -> dict[str, str]:
-    """The note on each plugin of Mitsuba whose error changes this scene, by the plugin's name."""
+def inexact(scene: Scene) -> list[tuple[str, str]]:
+    """Mitsuba's plugin, and the note on its error, of each material that Mitsuba has wrong."""
     context = TranslationContext.of(scene)
-    found = {}
-    for material in scene.materials.values():
-        note = note_of(material, context)
-        for plugin in PLUGINS.get(type(material), ()) if note else ():
-            found[plugin] = note
-    return found
+    materials = [m for m in scene.materials.values() if type(m) in PLUGINS]
+    notes = [(PLUGINS[type(m)], note_of(m, context)) for m in materials]
+    return [(plugin, note) for plugin, note in notes if note]
 
 
 def make_exact(parsed: Parsed, scene: Scene) -> None:
     """Replace these materials in the description of the file that `scene` was read from."""
-    plugins = notes_of_inexact(scene)
-    for index in range(len(parsed.state.nodes)):
+    plugins = {plugin for plugin, _ in inexact(scene)}
+    for index in range(len(parsed.state.nodes) if plugins else 0):
         node = Node(parsed, index)
         if node.kind != "BSDF" or node.plugin not in plugins:
             continue
@@ -93,4 +90,4 @@ def _wrap(state: Any, index: int, plugin: str, values: dict[str, Any]) -> None:
     state.nodes[index].props = outer
 
 
-__all__ = ["make_exact", "notes_of_inexact"]
+__all__ = ["inexact", "make_exact"]

@@ -11,7 +11,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.notes import note_of_masks, note_of_samples
 from comparisons.mitsuba.reading import read_supported
-from comparisons.mitsuba.reading.exact_materials import make_exact, notes_of_inexact
+from comparisons.mitsuba.reading.exact_materials import inexact, make_exact
 from comparisons.mitsuba.reading.parse import Parsed, parse_file
 from comparisons.mitsuba.reading.sensors import CLIP
 from comparisons.mitsuba.translate.errors import UntranslatableError
@@ -85,7 +85,7 @@ def changes_to(scene: Scene) -> list[str]:
     state = parsed.state
     sensor = _first(state, mitsuba().ObjectType.Sensor)
     found += [note for note in (note_of_samples(scene), note_of_masks(scene)) if note]
-    found += notes_of_inexact(scene).values()
+    found += dict.fromkeys(note for _, note in inexact(scene))
     if sensor is not None and _open_clipping(state.nodes[sensor].props):
         found.append("its camera's clipping planes are those of Mitsuba's default: ours has none")
     return found

@@ -62,6 +62,10 @@ MATERIALS = {
         "roughconductor", BECKMANN, number("alpha_u", 0.6), number("alpha_v", 0.2)
     ),
     "textured conductor": of("roughconductor", texture("alpha")),
+    "visible normals": of("roughconductor", '<boolean name="sample_visible" value="true"/>'),
+    "visible normals of plastic": of(
+        "roughplastic", '<boolean name="sample_visible" value="true"/>', number("int_ior", 2)
+    ),
     "rough glass": of("roughdielectric", number("alpha", 0.3)),
     "two-sided": of("twosided", of("roughplastic", number("alpha", 0.3), REFLECTANCE)),
     "blend of plastics": of("blendbsdf", number("weight", 0.4), of("plastic"), of("roughplastic")),
@@ -106,7 +110,7 @@ def test_the_exact_material_has_the_files_own_parameters(material: str, tmp_path
     scene = scene_of(tmp_path, material)
     assert changes_to(scene)
     off, error = difference(scene)
-    # Of 14 materials and 3 channels; 1e-4 for float32.
+    # Of 16 materials and 3 channels; 1e-4 for float32.
     assert abs(off) < 4.0 * error + 1e-4
     assert error < 3e-3  # a twelfth of what a blend with a mirror is off
 
@@ -119,6 +123,13 @@ def test_mitsubas_own_differs(
     monkeypatch.setattr(reference, "make_exact", lambda parsed, scene: None)
     off, error = difference(scene_of(tmp_path, material))
     assert abs(off) > 6.0 * error
+
+
+def test_each_of_several_materials_has_its_note(tmp_path: Path) -> None:
+    both = of("twosided", of("plastic"), of("plastic", HIGH))
+    (tmp_path / "own.xml").write_text(SCENE.format(both))
+    notes = changes_to(read_file(tmp_path / "own.xml", Scene))
+    assert len(notes) == len(set(notes)) == 2
 
 
 def test_what_mitsuba_has_right_stays(tmp_path: Path) -> None:
