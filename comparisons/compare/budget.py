@@ -31,6 +31,10 @@ class Budget(Description):
     rays in total."""
     light_pixels: Annotated[int, Field(ge=16)] = 1024
     """Camera rays of the rung of direct light."""
+    resolution: bool = True
+    """Whether it is measured how many secondary rays hit the wrong surface in Mitsuba
+    (`comparisons.rungs.rays.resolution`).  Without it such a scene is `differ` in place of
+    `reference-limited`."""
     limit: Annotated[float, Field(gt=0)] = 0.005
     """The smallest relative bias of the image mean that must be detectable."""
     control: bool = False

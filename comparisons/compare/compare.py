@@ -218,7 +218,9 @@ def _deterministic_rungs(
     not be reported as wrong light."""
     film_filters = films[0].filter, films[1].filter
     climbs: dict[str, Callable[[], RungResult]] = {
-        "geometry": lambda: ladder.geometry(scene, tables, counterpart, budget.pixels),
+        "geometry": lambda: ladder.geometry(
+            scene, tables, counterpart, budget.pixels, resolved=budget.resolution
+        ),
         "direct": lambda: ladder.direct(scene, tables, counterpart, budget.light_pixels),
         "whitted": lambda: ladder.whitted(scene, tables, counterpart, budget.pixels),
     }

@@ -165,7 +165,7 @@ def _trace(counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: fl
                 ),
             )
     for solid in counterpart.solids:
-        near = solid.near(o, d)
+        near = solid.box().near(o, d)
         if len(near) == 0:
             continue
         assign_nearer(found, near, solid.trace(o[near], d[near], tolerance))

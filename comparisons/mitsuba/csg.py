@@ -47,6 +47,29 @@ class Crossings(NamedTuple):
     at: MitsubaHits
 
 
+class Box(NamedTuple):
+    """lower, upper (3,): corners of a box."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    def near(self, o: FloatArray, d: FloatArray) -> IntArray:
+        """Indices (k,) of the rays that meet the box."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            a, b = (self.lower - o) / d, (self.upper - o) / d
+        # A ray in a plane of the box: 0/0 sets no limit.
+        t_in = np.nan_to_num(np.minimum(a, b), nan=-np.inf).max(axis=1)
+        t_out = np.nan_to_num(np.maximum(a, b), nan=np.inf).min(axis=1)
+        return np.flatnonzero((t_in <= t_out) & (t_out > 0.0))
+
+    def around(self, o: FloatArray) -> BoolArray:
+        """(n,): whether points are in the box."""
+        return np.asarray(((o >= self.lower) & (o <= self.upper)).all(axis=1))
+
+
+EVERYWHERE = Box(np.full(3, -np.inf), np.full(3, np.inf))
+
+
 class Operand(NamedTuple):
     """mi_scene: the operand's own Mitsuba scene;  pieces: its shapes, by id;  leaf, place: the
     primitive and its placement."""
@@ -55,6 +78,15 @@ class Operand(NamedTuple):
     mi_shapes: Mapping[str, MitsubaShape]
     leaf: Leaf
     place: TabulationContext
+
+    def box(self) -> Box:
+        """A box around it, larger by a thousandth than Mitsuba's."""
+        if isinstance(self.leaf.shape, Plane):
+            return EVERYWHERE
+        box = self.mi_scene.bbox()
+        lower, upper = np.array(box.min, np.float64), np.array(box.max, np.float64)
+        margin = 1e-3 * (upper - lower).max()
+        return Box(lower - margin, upper + margin)
 
     def reach(self) -> float:
         """The largest coordinate on the operand; 0 for a plane, the corners of whose mesh are far
@@ -69,10 +101,14 @@ class Operand(NamedTuple):
         ids = {name: k for k, name in enumerate(self.mi_shapes)}
         mi_shapes = list(self.mi_shapes.values())
         reach = self.reach()
-        rays, origin = np.arange(len(o)), o.copy()
+        box = self.box()
+        rays = box.near(o, d)
+        origin = o[rays]
         length2 = np.sum(d * d, axis=1)
         found: list[Crossings] = []
-        inside = self._inside(ids, mi_shapes, o, d)
+        inside = np.zeros(len(o), bool)
+        started = rays[box.around(origin)]
+        inside[started] = self._inside(ids, mi_shapes, o[started], d[started])
         within = inside.copy()
         for _ in range(MOST_CROSSINGS):
             if len(rays) == 0:
@@ -104,6 +140,8 @@ class Operand(NamedTuple):
         if isinstance(self.leaf.shape, Plane):
             to_local = transform.invert(self.leaf.shape.map_in(self.place))
             return transform.apply_points(to_local, o)[:, 2] < 0.0
+        if len(o) == 0:  # Dr.Jit does not accept empty arrays
+            return np.zeros(0, bool)
         behind = read(first_hits(self.mi_scene, ids, o, -d), mi_shapes, o)
         return np.asarray((behind.shape >= 0) & (np.sum(behind.n * d, axis=1) < 0.0))
 
@@ -121,27 +159,13 @@ class SolidCounterpart:
         mi_shape = next(iter(self.operands[0].mi_shapes.values()))
         return mi_shape.shape, mi_shape.instance
 
-    def box(self) -> tuple[FloatArray, FloatArray] | None:
-        """The lower and upper corner (3,) of a box around all operands; None with a plane."""
-        if any(isinstance(operand.leaf.shape, Plane) for operand in self.operands):
-            return None
-        boxes = [operand.mi_scene.bbox() for operand in self.operands]
-        lower = np.min([np.array(b.min, np.float64) for b in boxes], axis=0)
-        upper = np.max([np.array(b.max, np.float64) for b in boxes], axis=0)
-        margin = 1e-3 * (upper - lower).max()
-        return lower - margin, upper + margin
-
-    def near(self, o: FloatArray, d: FloatArray) -> IntArray:
-        """Indices (k,) of the rays that pass near any of the operands."""
-        box = self.box()
-        if box is None:
-            return np.arange(len(o))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            a, b = (box[0] - o) / d, (box[1] - o) / d
-        # A ray in a plane of the box: 0/0 sets no limit.
-        t_in = np.nan_to_num(np.minimum(a, b), nan=-np.inf).max(axis=1)
-        t_out = np.nan_to_num(np.maximum(a, b), nan=np.inf).min(axis=1)
-        return np.flatnonzero((t_in <= t_out) & (t_out > 0.0))
+    def box(self) -> Box:
+        """A box around all operands."""
+        boxes = [operand.box() for operand in self.operands]
+        return Box(
+            np.min([box.lower for box in boxes], axis=0),
+            np.max([box.upper for box in boxes], axis=0),
+        )
 
     def trace(self, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT) -> MitsubaHits:
         """The first hits of the solid's surface.

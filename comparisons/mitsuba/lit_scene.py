@@ -156,8 +156,6 @@ class _Solid:
         import drjit as dr
 
         mi, box = mitsuba(), self.solid.box()
-        if box is None:
-            return True
         d = dr.select(dr.abs(ray.d) < 1e-20, 1e-20, ray.d)
         a, b = ((mi.Vector3f(side.tolist()) - mi.Vector3f(ray.o)) / d for side in box)
         begin, end = dr.max(dr.minimum(a, b)), dr.min(dr.maximum(a, b))

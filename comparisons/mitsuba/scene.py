@@ -4,6 +4,7 @@ llvm and cuda variants process all rays at once, scalar variants one at a time: 
 `for_rays` work for both.
 """
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -66,7 +67,7 @@ def _scalars(mi: Any, column: npt.NDArray[Any]) -> list[Any]:
 
 def _scalar_result(value: Any) -> Any:
     # Unpacking takes a tenth of the time of `list(value)`.
-    return value if isinstance(value, (bool, int, float)) else [*value]
+    return value if isinstance(value, (bool, int, float, tuple)) else [*value]
 
 
 def _array(value: Any, n: int) -> npt.NDArray[Any]:
@@ -100,9 +101,12 @@ def first_hits(mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArr
     """
     mi = mitsuba()
     number = _shape_numbers(ids)
+    scalar = mi.variant().startswith("scalar")
 
     def hit(origin: Any, direction: Any) -> tuple[Any, ...]:
         si = mi_scene.ray_intersect(mi.Ray3f(mi.Point3f(origin), direction))
+        if scalar and si.t == math.inf:
+            return _MISS  # reading what a miss leaves unset takes half of its time
         return si.t, number(si), si.prim_index, si.p, si.n, si.sh_frame.n, si.uv
 
     t, number_found, prim, p, n, ns, uv = for_rays(hit, o, d)
@@ -111,6 +115,11 @@ def first_hits(mi_scene: Any, ids: Mapping[str, int], o: FloatArray, d: FloatArr
     for array in (prim, p, n, ns, uv):
         array[missed] = 0
     return RawHits(np.where(missed, np.inf, t), which, prim.astype(np.int64), p, n, ns, uv)
+
+
+_NOTHING = (0.0, 0.0, 0.0)
+_MISS = (math.inf, -1, 0, _NOTHING, _NOTHING, _NOTHING, _NOTHING[:2])
+"""What `first_hits` reads of a miss, in scalar variants."""
 
 
 def _shape_numbers(ids: Mapping[str, int]) -> Callable[[Any], Any]:

@@ -46,7 +46,13 @@ class TracedRays(NamedTuple):
 
 
 def geometry(
-    scene: Scene, tables: SceneTables, counterpart: Counterpart, pixels: int = PIXELS, seed: int = 0
+    scene: Scene,
+    tables: SceneTables,
+    counterpart: Counterpart,
+    pixels: int = PIXELS,
+    seed: int = 0,
+    *,
+    resolved: bool = True,
 ) -> RungResult:
     """Compare the cameras, and the first hits of rays: 3 `pixels` of the camera, at random and from
     hits, and as many that are aimed at edges, drawn with `seed`.
@@ -55,6 +61,8 @@ def geometry(
     normals and uv to be within float32's bound, or the arbiter to find that float32 cannot resolve
     the ray.  For what remains exact arithmetic decides which tracer is wrong.  Any-hit queries are
     compared with closest hits, and with rays through every triangle of meshes.
+
+    resolved: whether `resolution` is measured too.
     """
     camera = compare_camera(scene, counterpart, pixels)
     sizes = ShapeSizes(scene, counterpart.frame)
@@ -110,7 +118,7 @@ def geometry(
         "any_hit_mitsuba_wrong": shadows.mitsuba_wrong,
         **camera.numbers,
     }
-    if not isinstance(scene.integrator, RayCast):
+    if resolved and not isinstance(scene.integrator, RayCast):
         numbers["resolution"] = resolution(scene, tables, counterpart, seed)._asdict()
     if camera.problem:
         return RungResult("geometry", "differ", camera.problem, numbers)

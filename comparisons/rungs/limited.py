@@ -45,4 +45,4 @@ def _limit(result: RungResult) -> str:
     return ""
 
 
-__all__ = ["limited"]
+__all__ = ["OF_LIGHT", "limited"]

@@ -23,6 +23,7 @@ BALL = {
     ],
     "lights": [{"type": "point", "position": [2.0, 4.0, 3.0], "intensity": 30.0}],
 }
+budget_of = check.budget_of
 FEW = Effort(pixels=16, light_pixels=16, identity_rays=60, spp=4)
 
 
@@ -60,6 +61,33 @@ def test_what_differs_from_the_reference_is_found(files):
         assert found.cause.startswith(cause)
         assert "differ" in found.detail
         assert "the first: " in found.detail
+
+
+def test_light_that_mitsuba_cannot_resolve_is_no_difference(files, monkeypatch):
+    """What it resolves is measured only where light differs."""
+    measured = []
+    monkeypatch.setattr(
+        check, "budget_of", lambda *given: measured.append(given[2]) or budget_of(*given)
+    )
+    below_a_slab = [
+        {"type": "rectangle", "material": "grey", "transform": [{"scale": 2.0}]},
+        {
+            "type": "rectangle",
+            "material": "grey",
+            "transform": [{"scale": [1.0, 2.0, 1.0]}, {"translate": [-1.0, 0.0, 1e-5]}],
+        },
+    ]
+    darker = {"grey": {"type": "diffuse", "reflectance": 0.4}}
+    for shapes, status in ((below_a_slab, "reference-limited"), (BALL["shapes"], "differ")):
+        ours = parse({**BALL, "shapes": shapes}, "ours", files)
+        measured.clear()
+        assert {r.status for r in check.compare(ours, FEW, DETERMINISTIC)} == {"agree"}
+        assert measured == [False]
+        measured.clear()
+        other = parse({**BALL, "shapes": shapes, "materials": darker}, "theirs", files)
+        results = check.compare(ours, FEW, DETERMINISTIC, other)
+        assert {r.name: r.status for r in results}["direct"] == status
+        assert measured == [False, True]
 
 
 def test_refused_scenes_are_found_as_such(files):
