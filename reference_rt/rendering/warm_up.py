@@ -23,6 +23,7 @@ from reference_rt.rendering.query.ahead import query_calls
 from reference_rt.rendering.warm_up_scenes import scenes
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
+from reference_rt.shapes.meshes.files.obj_scanner import scan_call
 
 
 def picture_calls(scene: BuiltScene) -> list[Call]:
@@ -58,8 +59,9 @@ _CALLS: tuple[Callable[[BuiltScene], Iterable[Call]], ...] = (_pictures, query_c
 
 
 def linked_calls() -> list[Call]:
-    """All linked kernels, without duplicates, those that take longest to compile first."""
-    found: dict[Call, None] = {}
+    """All linked kernels and the scanner of .obj files, without duplicates, those that take longest
+    to compile first."""
+    found: dict[Call, None] = {scan_call(): None}
     for scene in scenes():
         for calls in _CALLS:
             found |= dict.fromkeys(calls(scene))

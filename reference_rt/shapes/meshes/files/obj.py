@@ -12,9 +12,9 @@ from itertools import chain
 
 import numpy as np
 
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes.meshes.files.data import RawMesh, fans, linear
-from reference_rt.shapes.meshes.files.obj_regular import Regular, numbered, parse
+from reference_rt.shapes.meshes.files.obj_scanner import NONE, Scanned, scan
 
 Triple = tuple[int, int, int]
 
@@ -22,6 +22,11 @@ _WIDTHS = {b"v": 3, b"vt": 2, b"vn": 3}
 
 _NAMES_ONLY = (b"", b"g", b"o")
 """Lines that do not change the surface: blank ones, names of groups and objects."""
+
+
+LARGE = 1 << 18
+"""Bytes of the smallest file that the compiled scanner reads: to load or compile it takes longer
+than to read a smaller one line by line."""
 
 
 class _Corners(dict[bytes, int]):
@@ -67,37 +72,24 @@ def read(content: bytes) -> RawMesh:
     An index may only refer to lines before it.  Normals and uv that not all corners have, and
     colours that not all vertices have, are ignored.
     """
-    found = parse(content)
-    return read_lines(content) if found is None else _of_regular(found)
+    found = scan(content) if len(content) >= LARGE else None
+    return read_lines(content) if found is None else _of_scanned(found)
 
 
-def _of_regular(found: Regular) -> RawMesh:
-    """The mesh of a regular file."""
+def _of_scanned(found: Scanned) -> RawMesh:
     others: dict[str, None] = {}
     for line in found.rest:
         words = line.partition(b"#")[0].split()
-        kind = words[0] if words else b""
-        if kind == b"s":
-            if words[1:] not in ([b"off"], [b"0"]):
-                others["s (smoothing groups)"] = None
-        elif kind not in _NAMES_ONLY:
-            others[_keyword(kind)] = None
-    first, vertex = numbered(found.corners)
-    v, vt, vn = found.corners[first].T
-    has_normals, has_uv = len(found.normals) > 0, len(found.uv) > 0
-    if has_normals and (vn >= 0).all():
-        others.pop("s (smoothing groups)", None)
-    if has_normals and not (vn >= 0).all():
-        others["vn of some corners"] = None
-    if has_uv and not (vt >= 0).all():
-        others["vt of some corners"] = None
-    return RawMesh(
-        found.positions[v],
-        fans(vertex, found.counts),
-        found.normals[vn] if has_normals and (vn >= 0).all() else None,
-        found.uv[vt] if has_uv and (vt >= 0).all() else None,
-        None,
-        tuple(others),
+        _note(words[0] if words else b"", words, others)
+    return _mesh(
+        found.positions,
+        found.uv,
+        found.normals,
+        found.colours,
+        found.triples,
+        found.corners,
+        found.counts,
+        others,
     )
 
 
@@ -128,35 +120,64 @@ def read_lines(content: bytes) -> RawMesh:
                 rows[b"vt"].extend(_uv(words))
                 if len(words) == 4 and float(words[3]) != 0.0:
                     others["w of vt"] = None
-            elif kind == b"s":
-                if words[1:] not in ([b"off"], [b"0"]):
-                    others["s (smoothing groups)"] = None
-            elif kind not in _NAMES_ONLY:
-                others[_keyword(kind)] = None
+            else:
+                _note(kind, words, others)
         except ValueError as error:
             raise ValueError(f"line {line}: {error}") from None
 
     triples = np.fromiter(chain.from_iterable(vertex_of.triples), np.int64)
-    v, vt, vn = triples.reshape(-1, 3).T
     positions, uv, normals = (_table(rows[kind], width) for kind, width in _WIDTHS.items())
     rgb = _table(colours, 3)
-    if len(normals) and np.all(vn >= 0):
+    coloured = len(rgb) == len(positions)
+    if len(rgb) and not coloured:
+        others["colours of some v"] = None
+    return _mesh(
+        positions,
+        uv,
+        normals,
+        rgb if coloured else None,
+        triples.reshape(-1, 3),
+        np.frombuffer(corners, np.int64),
+        np.frombuffer(counts, np.int64),
+        others,
+    )
+
+
+def _mesh(
+    positions: FloatArray,
+    uv: FloatArray,
+    normals: FloatArray,
+    colours: FloatArray | None,
+    triples: IntArray,
+    corners: IntArray,
+    counts: IntArray,
+    others: dict[str, None],
+) -> RawMesh:
+    """The mesh of a file's tables;  others: what is ignored besides incomplete tables."""
+    v, vt, vn = triples.T
+    of_all = {"vn": bool((vn != NONE).all()), "vt": bool((vt != NONE).all())}
+    if len(normals) and of_all["vn"]:
         others.pop("s (smoothing groups)", None)  # the normals contain them
-    for name, table, complete in (
-        ("vn of some corners", normals, np.all(vn >= 0)),
-        ("vt of some corners", uv, np.all(vt >= 0)),
-        ("colours of some v", rgb, len(rgb) == len(positions)),
-    ):
-        if len(table) and not complete:
-            others[name] = None
+    for name, table in (("vn", normals), ("vt", uv)):
+        if len(table) and not of_all[name]:
+            others[f"{name} of some corners"] = None
     return RawMesh(
         positions[v],
-        fans(np.frombuffer(corners, np.int64), np.frombuffer(counts, np.int64)),
-        normals[vn] if np.all(vn >= 0) else None,
-        uv[vt] if np.all(vt >= 0) else None,
-        linear(rgb[v]) if len(rgb) == len(positions) else None,
+        fans(corners, counts),
+        normals[vn] if of_all["vn"] else None,
+        uv[vt] if of_all["vt"] else None,
+        None if colours is None else linear(colours[v]),
         tuple(others),
     )
+
+
+def _note(kind: bytes, words: list[bytes], others: dict[str, None]) -> None:
+    """Note what a line has that is ignored."""
+    if kind == b"s":
+        if words[1:] not in ([b"off"], [b"0"]):
+            others["s (smoothing groups)"] = None
+    elif kind not in _NAMES_ONLY:
+        others[_keyword(kind)] = None
 
 
 def _keyword(kind: bytes) -> str:
