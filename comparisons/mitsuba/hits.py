@@ -66,6 +66,8 @@ def read(hits: RawHits, mi_shapes: Sequence[MitsubaShape], o: FloatArray) -> Mit
             uv = hits.uv[rows]
             found.uv[rows] = uv if plugin.uv is same_uv else plugin.uv(uv)
             found.has_uv[rows] = True
+        elif plugin.uv_of_mesh:  # for textures; between vertices they are interpolated
+            found.uv[rows] = hits.uv[rows]
         found.stands_in[rows] = plugin.faceted
         if plugin.heights is not None:
             found.height[rows] = plugin.heights[hits.prim[rows]]

@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.counterpart import Counterpart
-from comparisons.mitsuba.hits import rows_of
+from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext
-from comparisons.rungs.rays.light_error import bounds, slopes_of, stand_ins
+from comparisons.rungs.rays.light_error import bounds, of_stand_ins, slopes_of
 from comparisons.rungs.rays.mitsuba_light import is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -74,7 +73,8 @@ def direct(
     sizes = ShapeSizes(scene, counterpart.frame)
     rays = mixed_rays(scene, tables, sizes, pixels, seed, counterpart.sags())
     hits = query.intersect(tables, rays.o, rays.d)
-    context = LightContext(scene, tables, counterpart, rays, hits, sizes)
+    theirs = trace(counterpart, rays.o, rays.d)
+    context = LightContext(scene, tables, counterpart, rays, hits, theirs, sizes)
     lights = np.flatnonzero(choice.probability > 0.0)
     count = len(lights)
     tested = lights[np.unique(np.linspace(0, count - 1, min(count, LIGHTS)).round().astype(int))]
@@ -153,11 +153,12 @@ def _compare(
     if len(known) == 0:
         none = np.zeros((0, 3))
         return Outcome(0, known, none, none, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
-    rays, hits, target = rays.rows(known), rows_of(hits, known), target[known]
+    context, target = context.of(known), target[known]
+    rays, hits = context.rays, context.hits
     value = ours.contribution[known]
     theirs, their_cosine = mitsuba_direct(context, light, rays, target)
-    bound = bounds(context, light, rays, hits, target, (value, theirs, their_cosine), brightest)
-    bound += slopes_of(context, light, u, rays, hits, value)
+    bound = bounds(context, light, target, (value, theirs, their_cosine), brightest)
+    bound += slopes_of(context, light, u, value)
     error = np.abs(theirs - value).max(axis=1)
     wrong = np.flatnonzero(~(error <= bound))
 
@@ -169,11 +170,11 @@ def _compare(
         error = np.abs(there - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
         lit_differs = value[numbers].any(axis=1) == dark
-        now_dark = is_dark(context, light, rows_of(hits, numbers), target[numbers], offsets)
+        now_dark = is_dark(context.of(numbers), light, target[numbers], offsets)
         return np.asarray((error <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
     radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
-    radius += stand_ins(context, hits)[0]
+    radius += of_stand_ins(context, "sag")
     settled = arbiter.explained(wrong, radius[wrong], like_theirs)
     right = error <= bound
     left = wrong[~settled]

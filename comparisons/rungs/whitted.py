@@ -11,6 +11,7 @@ from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import ambient_of
@@ -149,6 +150,8 @@ def _moves(
     stand_ins = [s for some in counterpart.stand_ins().values() for s in some]
     if stand_ins:
         sag, turn = (max(getattr(s, name) for s in stand_ins) for name in ("sag", "turn"))
+        if tables.materials.oriented is not None:
+            turn += max(s.twist for s in stand_ins)
         found.append((found[0][0] + sag, angle + BENT * turn))
     return found
 
@@ -175,8 +178,7 @@ def plugin_radiance(
     described = {
         **(translate_integrator(integrator) or {}),
         **ambient,
-        # Of each layer at most a mirrored and a refracted direction.
-        "components": 2 * most_branches(tables.materials),
+        "components": MOST_COMPONENTS * most_branches(tables.materials),
         "unlit": " ".join(unlit),
         "boxes": " ".join(boxes),
     }

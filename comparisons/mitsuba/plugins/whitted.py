@@ -23,6 +23,10 @@ _ROUNDINGS = 8.0 * 2.0**-24
 `comparisons.geometry.float32.ROUNDINGS`, of which a third was measured."""
 
 
+MOST_COMPONENTS = 4
+"""Most components of a BSDF of Mitsuba that has no others nested in it: of `principled`."""
+
+
 def clearance(mi: Any, si: Any, reach: float, rough: Any) -> Any:
     """How far off its surface a ray starts; `reach` is the scene's largest coordinate.  At most
     Mitsuba's own ray epsilon, and as much where `rough`."""

@@ -32,7 +32,12 @@ from comparisons.mitsuba.translate.lights import translate_light
 from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
 from comparisons.mitsuba.translate.textures import TranslationContext
-from comparisons.mitsuba.translate.wrappers import coloured_parts_of, is_textured, parts_of
+from comparisons.mitsuba.translate.wrappers import (
+    coloured_parts_of,
+    is_oriented,
+    is_textured,
+    parts_of,
+)
 from reference_rt.integrators import Direct, Path
 from reference_rt.rendering.scene import Scene
 
@@ -155,7 +160,6 @@ def _add(
     reach: float,
 ) -> None:
     """Add the shapes of one copy to the result;  count: how many copies its group has."""
-    mirrored = bool(np.linalg.det(copy.outer[:, :3]) < 0.0)
     for number, member in enumerate(copy.members):
         name = shape_id(copy.shape)
         if copy.instance >= 0:
@@ -166,10 +170,10 @@ def _add(
             parts = parts_of(leaf.material, context)
             site = Site(
                 place=place,
-                mirrored=mirrored,
                 parts=parts,
                 coloured=coloured_parts_of(leaf.material, context) or parts,
                 textured=is_textured(leaf.material, context),
+                oriented=is_oriented(leaf.material, context),
                 material=leaf.material,
                 copies=count,
                 shared=shared,

@@ -1,5 +1,6 @@
 """Materials made of others -> Mitsuba, and the BSDF and emitter of a shape."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -168,15 +169,27 @@ def coloured_parts_of(name: str | None, context: TranslationContext) -> dict[str
 
 def is_textured(name: str | None, context: TranslationContext) -> bool:
     """Whether material `name` depends on a surface's uv or tangents."""
+
+    def has_uv(material: Material) -> bool:
+        names = texture_names(material).values()
+        return any(depends_on_uv(context.textures[t]) for t in names)
+
+    return is_oriented(name, context) or _any_part(name, context, has_uv)
+
+
+def is_oriented(name: str | None, context: TranslationContext) -> bool:
+    """Whether material `name` depends on a surface's tangents."""
+    return _any_part(name, context, lambda material: material.oriented)
+
+
+def _any_part(
+    name: str | None, context: TranslationContext, test: Callable[[Material], bool]
+) -> bool:
+    """Whether a material, or one that is nested in it, passes a test."""
     if name is None:
         return False
     material = context.materials[name]
-    if any(leaf.oriented for leaf in _leaves(material, context)):
-        return True
-    if any(depends_on_uv(context.textures[t]) for t in texture_names(material).values()):
-        return True
-    bases = _bases(material, context) if isinstance(material, Wrapper) else []
-    if isinstance(material, Emissive) and material.base is not None:
-        bases = [context.materials[material.base]]
-    names = {id(m): n for n, m in context.materials.items()}
-    return any(is_textured(names[id(base)], context) for base in bases)
+    inner = [getattr(material, field) for field in getattr(material, "bases", ())]
+    if isinstance(material, Emissive):
+        inner = [material.base]
+    return test(material) or any(_any_part(base, context, test) for base in inner)

@@ -202,10 +202,10 @@ class Shapes:
             parts["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": [1.0] * 3}}
         return Site(
             place=place,
-            mirrored=bool(np.linalg.det(copy.outer[:, :3]) < 0.0),
             parts=parts,
             coloured=parts,
             textured=is_textured(material, self.surfaces.context),
+            oriented=False,  # what it is for, errors of tangents, is not asked here
             material=material,
             copies=1,
             shared={},

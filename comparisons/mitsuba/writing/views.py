@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.reading.written import LookAt, Step
 from comparisons.mitsuba.translate.cameras import FAR, NEAR, translate_camera
 from comparisons.mitsuba.translate.errors import UntranslatableError
@@ -105,7 +106,7 @@ def integrator(scene: Scene, surfaces: Surfaces) -> Element:
         ambient = ambient_of(scene.lights)
         names = ("ambient_r", "ambient_g", "ambient_b")
         values |= {k: x for k, x in zip(names, ambient, strict=True) if x != 0.0}
-        values["components"] = 2 * int(most_branches(scene.tables.materials))
+        values["components"] = MOST_COMPONENTS * int(most_branches(scene.tables.materials))
         surfaces.note(OURS.format("integrator", "whitted"))
     if getattr(chosen, "sampling", "both") != "both":
         surfaces.note("'sampling' of the integrator is left out: the mean is the same")

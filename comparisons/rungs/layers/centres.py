@@ -110,7 +110,8 @@ def _errors(
             e = slide(comparer.sizes, rays.o, rays.d, ours, theirs.sag)
             if name == "normal":
                 n = np.where(theirs.stands_in[:, None], theirs.ns, theirs.n)
-                bound = e / comparer.sizes.feature_of(ours) + theirs.turn
+                feature = np.minimum(comparer.sizes.feature_of(ours), theirs.height)
+                bound = e / feature + theirs.turn
                 ratio = np.linalg.norm(values - n, axis=1) / bound
             else:
                 ratio = np.abs(column - theirs.t) / e  # directions are unit vectors
@@ -128,15 +129,20 @@ def _of_colours(
     values: FloatArray,
 ) -> FloatArray:
     """(n,): SLACK times the distance from the range of colours that Mitsuba's hits of rays next to
-    each have, over the tolerance."""
+    each have, over the tolerance.  A mesh that stands in for a shape shifts textures further than
+    float32 does."""
     seen = Seen(scene, sizes)
+    apart = np.zeros(len(scene.shapes) + 1)
+    for shape, found in counterpart.stand_ins().items():
+        apart[shape] = max(s.sag + s.slip for s in found)
     ratio = _outside(seen.colours(theirs, of_vertices=True), values)
     far = np.flatnonzero(ratio > 1.0)
     if len(far) == 0:
         return SLACK * ratio
     reach = np.full(len(far), sizes.reach.max(initial=0.0))
     some = rays.rows(far)
-    radius = 2.0 * sizes.frame.delta(some.o, theirs.p[far], reach)
+    delta = sizes.frame.delta(some.o, theirs.p[far], reach)
+    radius = 2.0 * (delta + apart[theirs.shape[far]])
     around = [
         seen.colours(trace(counterpart, some.o + radius[:, None] * move, some.d), of_vertices=True)
         for move in arbiter.directions(MOVES)

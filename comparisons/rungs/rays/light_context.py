@@ -4,7 +4,9 @@ from typing import Any, NamedTuple
 
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.rungs.rays.rays import Rays
+from reference_rt.core.arrays import IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import (
     DIRECTIONAL,
@@ -30,14 +32,24 @@ Mitsuba's emitter itself gives."""
 
 
 class LightContext(NamedTuple):
-    """The scene in both renderers, the rays, their hits, and the lengths behind the bounds."""
+    """The scene in both renderers, n rays, their hits in both, and the lengths behind the
+    bounds."""
 
     scene: Scene
     tables: SceneTables
     counterpart: Counterpart
     rays: Rays
     hits: Intersections
+    theirs: MitsubaHits
     sizes: ShapeSizes
+
+    def of(self, rows: IntArray) -> "LightContext":
+        """Of some of the rays."""
+        return self._replace(
+            rays=self.rays.rows(rows),
+            hits=rows_of(self.hits, rows),
+            theirs=rows_of(self.theirs, rows),
+        )
 
 
 def kind_of(context: LightContext, light: int) -> int:

@@ -14,7 +14,6 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import AREA, DIRECTIONAL, ENVIRONMENT, SPOT, EnvironmentMap, Spot
 from reference_rt.materials import Emissive
 from reference_rt.rendering import query
-from reference_rt.rendering.query import Intersections
 
 FAINTEST = 1e-12
 """Absolute error, as a fraction of the brightest hit of any light: far above where float32
@@ -24,6 +23,14 @@ REFRACTED = 4.0 * UNIT_ROUNDOFF
 """Absolute error of refracted light, as a fraction of the brightest refracted hit: where F is
 nearly 1, 1 - F keeps the rounding of F, some 4 u (measured: 15 % of a value of 5e-8)."""
 
+ROUNDED = 8.0 * UNIT_ROUNDOFF
+"""Absolute error of the squared sine at a microfacet: its normal, the product with a direction, and
+the square are rounded some eight times."""
+
+TURNS = 4.0
+"""A ray that is turned by an angle turns the half vector of a highlight by half of it, and that of
+refracted light by 1 / (1 + eta) of it or more: a quarter, for indices up to 3."""
+
 U_STEP = 2.0**-20
 """Step in (u, v) for the slope of textured lights: float32's error for a light ten times as far
 away as it is large."""
@@ -32,8 +39,6 @@ away as it is large."""
 def bounds(
     context: LightContext,
     light: int,
-    rays: Rays,
-    hits: Intersections,
     target: FloatArray,
     values: tuple[FloatArray, FloatArray, FloatArray],
     brightest: float,
@@ -45,8 +50,8 @@ def bounds(
     by 2 e / r; and the products round some 16 times.
     """
     value, theirs, their_cosine = values
-    sag, of_normal = stand_ins(context, hits)
-    e = slide(context.sizes, rays.o, rays.d, hits, sag)
+    rays, hits = context.rays, context.hits
+    e = slide(context.sizes, rays.o, rays.d, hits, of_stand_ins(context, "sag"))
     kind = kind_of(context, light)
     if kind in (ENVIRONMENT, DIRECTIONAL):
         w, distance = target, np.full(len(target), np.inf)
@@ -58,69 +63,114 @@ def bounds(
         # The cosine may be negative: refracted light arrives from behind.
         ours_full = np.nan_to_num(value.max(axis=1) / np.abs(cosine))
         theirs_full = np.nan_to_num(theirs.max(axis=1) / np.abs(their_cosine))
-    turn = 2.0 * e / context.sizes.feature_of(hits) + of_normal
+    turn = 2.0 * e / _feature(context) + of_stand_ins(context, "turn")
     relative = turn + 4.0 * e / distance + 16.0 * UNIT_ROUNDOFF
-    relative += _tables_of(context, hits)
+    relative += _tables_of(context)
     bound = np.maximum(ours_full, theirs_full) * relative + FAINTEST * brightest
     through = cosine * np.sum(rays.d * hits.ns, axis=1) > 0.0
     bound += np.where(through, REFRACTED * value[through].max(initial=0.0), 0.0)
+    bound += np.where(through, np.maximum(value, theirs).max(axis=1), 0.0) * _of_critical(
+        context, rays.d, w, hits.ns
+    )
     if kind == SPOT:
-        bound += value.max(initial=0.0) * _rim(context, light)
+        bound += np.maximum(value, theirs).max(axis=1) * _of_falloff(context, light)
     return np.asarray(bound)
 
 
-def _tables_of(context: LightContext, hits: Intersections) -> FloatArray:
+def _feature(context: LightContext) -> FloatArray:
+    """(n,): the smallest length on which the normals of the hit shapes change, in either
+    renderer."""
+    return np.minimum(context.sizes.feature_of(context.hits), context.theirs.height)
+
+
+def _tables_of(context: LightContext) -> FloatArray:
     """(n,): relative errors of tabulated materials, see `comparisons.mitsuba.accuracy`."""
     scene = context.scene
-    leaf = context.sizes.leaf_of(hits)
+    leaf = context.sizes.leaf_of(context.hits)
     names = [of.material for of in context.sizes.leaves]
     by_leaf = np.array([accuracy(scene, name) for name in names] + [0.0])
     return np.asarray(by_leaf[leaf])
 
 
-def _rim(context: LightContext, light: int) -> float:
-    """The error of Mitsuba's spot falloff: it computes the angle from the cosine, whose rounding
-    turns the angle by 4 u over its sine, and divides by the width of the rim."""
+def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatArray) -> FloatArray:
+    """(n,): the relative error, at most 1, of light along w that rough glass refracts to -d, of the
+    scene's glass with the largest.
+
+    Mitsuba computes the cosine c on the far side of the microfacet as a root of 1 - (eta sin)², of
+    whose digits all but c² / eta² cancel next to the critical angle.
+    """
+    leaves = context.tables.materials.leaves
+    tables = [table for table in (leaves.rough_dielectrics, leaves.principleds) if table]
+    found = np.zeros(len(d))
+    wo, wi = (v / np.linalg.norm(v, axis=1)[:, None] for v in (-d, w))
+    for index in np.unique([eta for table in tables for eta in table.eta]):
+        eta = np.where(np.sum(wo * n, axis=1) > 0.0, index, 1.0 / index)[:, None]
+        half = wo + eta * wi
+        length = np.linalg.norm(half, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            cosines = [np.abs(np.sum(v * half, axis=1)) / length for v in (wo, wi)]
+            error = ROUNDED * max(index, 1.0 / index) ** 2 / np.minimum(*cosines) ** 2
+        found = np.maximum(found, np.nan_to_num(error, nan=1.0))
+    return np.minimum(found, 1.0)
+
+
+def _of_falloff(context: LightContext, light: int) -> FloatArray:
+    """(n,): the relative error of Mitsuba's spot falloff, at most 1: it computes the angle from the
+    cosine, whose rounding turns the angle by 4 u over its sine, and divides by the width of the
+    rim; the falloff itself goes to 0 at the outer edge."""
     spot = described(context, light)
     assert isinstance(spot, Spot)
     beam = 0.75 * spot.cutoff_angle if spot.beam_width is None else spot.beam_width
     width, sine = np.radians(spot.cutoff_angle - beam), np.sin(np.radians(max(beam, 1.0)))
     if not (width > 0.0 and sine > 0.0):
-        return 0.0
-    return float(4.0 * UNIT_ROUNDOFF / (sine * width))
+        return np.zeros(len(context.theirs.height))
+    axis, out = np.subtract(spot.target, spot.origin), context.hits.p - spot.origin
+    across = np.linalg.norm(np.cross(axis, out), axis=1)
+    angle = np.arctan2(across, np.sum(axis * out, axis=1))
+    falloff = (np.radians(spot.cutoff_angle) - angle) / width
+    error = 4.0 * UNIT_ROUNDOFF / (sine * width)
+    return np.asarray(error / np.clip(falloff, error, 1.0))
 
 
 def slopes_of(
     context: LightContext,
     light: int,
     u: tuple[float, float],
-    rays: Rays,
-    hits: Intersections,
     value: FloatArray,
 ) -> FloatArray:
     """(n,): how much f cos L changes within float32's bound because of highlights and textures:
     measured with our tracer along moved rays, and at moved points of textured lights.
 
-    A mesh that stands in for a shape has other normals.  A normal turned by an angle turns the half
-    vector of a highlight as far as a ray does that is turned by twice the angle, or less.
+    A mesh that stands in for a shape has other normals, and other tangents, on which some materials
+    depend: as much changes along a ray that is turned by TURNS times the angle about the point.
     """
-    queries: list[tuple[Rays, tuple[float, float]]] = []
-    if is_steep(context.scene):
-        sag, of_normal = stand_ins(context, hits)
-        radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
-        apart = sag + _slip(context, hits)
-        queries += [(other, u) for other in moved(rays, radius + apart)]
-        if of_normal.any():
-            queries += [(other, u) for other in turned(rays, hits.p, 2.0 * of_normal)]
-    if _has_image(context, light):
-        for step in (-U_STEP, U_STEP):
-            queries += [(rays, (u[0] + step, u[1])), (rays, (u[0], u[1] + step))]
 
     def value_of(other: Rays, at: tuple[float, float]) -> Callable[[], FloatArray]:
         return lambda: query.direct_light(context.tables, other.o, other.d, light, at).contribution
 
+    queries: list[tuple[Rays, tuple[float, float]]] = []
+    rays, hits = context.rays, context.hits
+    bent = np.zeros(len(value))
+    if is_steep(context.scene):
+        angle = of_stand_ins(context, "turn")
+        if context.tables.materials.oriented is not None:
+            angle += of_stand_ins(context, "twist")
+        radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
+        angle += np.where(np.isfinite(context.theirs.height), radius / _feature(context), 0.0)
+        apart = of_stand_ins(context, "sag") + of_stand_ins(context, "slip")
+        queries += [(other, u) for other in moved(rays, radius + apart)]
+        if angle.any():
+            for other in turned(rays, hits.p, TURNS * angle):
+                there = query.intersect(context.tables, other.o, other.d)
+                same = np.linalg.norm(there.p - hits.p, axis=1) <= radius
+                change = np.abs(value_of(other, u)() - value).max(axis=1)
+                bent = np.maximum(bent, np.where(same, 2.0 * change, 0.0))
+    if _has_image(context, light):
+        for step in (-U_STEP, U_STEP):
+            queries += [(rays, (u[0] + step, u[1])), (rays, (u[0], u[1] + step))]
+
     others = [value_of(*query_) for query_ in queries]
-    return slopes(value, others, float(value.max(initial=0.0)))
+    return bent + slopes(value, others, float(value.max(initial=0.0)))
 
 
 def _has_image(context: LightContext, light: int) -> bool:
@@ -132,18 +182,10 @@ def _has_image(context: LightContext, light: int) -> bool:
     return kind == AREA and any(isinstance(m.radiance, str) for m in emissive)
 
 
-def _slip(context: LightContext, hits: Intersections) -> FloatArray:
-    """(n,): how far textures are shifted on meshes that stand in for the shapes that are hit."""
-    slip = np.zeros(len(context.scene.shapes) + 1)
+def of_stand_ins(context: LightContext, field: str) -> FloatArray:
+    """(n,): a field of `StandIn`, of the meshes that stand in for the shapes that are hit; 0 for
+    other shapes."""
+    values = np.zeros(len(context.scene.shapes) + 1)
     for shape, found in context.counterpart.stand_ins().items():
-        slip[shape] = max(s.slip for s in found)
-    return np.asarray(slip[hits.shape])
-
-
-def stand_ins(context: LightContext, hits: Intersections) -> tuple[FloatArray, FloatArray]:
-    """(n,) each: the distance and the normal's angle between the shape that was hit and the mesh
-    that stands in for it; 0 without such a mesh."""
-    sag, turn = np.zeros((2, len(context.scene.shapes) + 1))
-    for shape, found in context.counterpart.stand_ins().items():
-        sag[shape], turn[shape] = max(s.sag for s in found), max(s.turn for s in found)
-    return sag[hits.shape], turn[hits.shape]
+        values[shape] = max(getattr(s, field) for s in found)
+    return np.asarray(values[context.hits.shape])

@@ -14,7 +14,6 @@ from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import DIRECTIONAL, ENVIRONMENT
 from reference_rt.rendering import query
-from reference_rt.rendering.query import Intersections
 
 
 def mitsuba_direct(
@@ -64,13 +63,19 @@ def _point_emitter(context: LightContext, light: int) -> Any:
 
 
 def is_dark(
-    context: LightContext, light: int, hits: Intersections, target: FloatArray, offsets: FloatArray
+    context: LightContext, light: int, target: FloatArray, offsets: FloatArray
 ) -> arbiter.BoolArray:
-    """(n,): whether Mitsuba's shadow ray, shortened by its epsilons, is blocked in our tracer."""
+    """(n,): whether Mitsuba's shadow ray, shortened by its epsilons, is blocked in our tracer.
+
+    It starts on that side of the surface to which Mitsuba's geometric normal tells it: on a mesh
+    that stands in for a curved shape, that of a flat triangle.
+    """
+    hits, theirs = context.hits, context.theirs
+    n = np.where((theirs.shape == hits.shape)[:, None], theirs.n, hits.n)
     kind = kind_of(context, light)
     is_far = kind in (ENVIRONMENT, DIRECTIONAL)
     w = target if is_far else target - hits.p
-    side = np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)
+    side = np.where(np.sum(w * n, axis=1) < 0.0, -1.0, 1.0)
     height = side * context.counterpart.frame.epsilon(hits.p)
     o = hits.p + hits.n * height[:, None] + offsets
     if is_far:

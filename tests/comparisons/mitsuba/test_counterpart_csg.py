@@ -190,3 +190,35 @@ def test_counterparts_in_the_scalar_variant(shapes: tuple[str, ...]) -> None:
     assert rung.status in ("agree", "reference-limited"), rung.reason
     assert rung.numbers["decided_ours"] == 0
     assert rung.numbers["hits"] > 30
+
+
+MESH = (
+    "{type: mesh, vertices: [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], "
+    "faces: [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]}"
+)
+CUBE, GROUND = "{type: box}", "{type: plane}"
+
+
+def mapped(shape: str, mirrored: bool) -> str:
+    steps = "{rotate: {axis: [1, 2, 3], degrees: 30}}"
+    if mirrored:
+        steps += ", {scale: [-1, 0.8, 0.9]}"
+    return f"{shape[:-1]}, transform: [{steps}]}}"
+
+
+@pytest.mark.parametrize("operand", [MESH, CUBE, ROD, GROUND, RING])
+@pytest.mark.parametrize("mirrored", range(16))
+def test_maps_that_mirror_leave_operands_their_inside(
+    coarse: None, scalar: None, operand: str, mirrored: int
+) -> None:
+    """Its own map, that of the solid, of a solid around that one, and of an instance."""
+    own, inner, outer, instance = (bool(mirrored >> k & 1) for k in range(4))
+    part = solid("intersection", "{type: sphere, radius: 0.9}", mapped(operand, own))
+    whole = mapped(solid("difference", mapped(part, inner), BALL), outer)
+    scene = Scene.parse(
+        "integrator: {type: ray_cast}\n"
+        f"groups: {{g: [{whole}]}}\n"
+        f"shapes: [{mapped('{type: instance, group: g}', instance)}]\n"
+    )
+    found = geometry(scene, build_tables(scene), load(scene), 300)
+    assert found.status == "agree", found.reason

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from builders import SCENES
 
+from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.scene import first_hits
 from comparisons.mitsuba.translate import load
-from comparisons.rungs import direct
+from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.shapes.stand_ins import coarser
+from comparisons.rungs import direct, layers
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 
@@ -69,3 +72,65 @@ def test_light_on_them_is_compared() -> None:
     assert 0.0 < max(slips) < 1e-4
     rung = direct(scene, scene.tables, counterpart)  # with more rays, see docs/verdict.md
     assert rung.status == "agree", rung.reason
+
+
+LIT = """
+camera: {{type: perspective, eye: [1, 2, 4], target: [0, 0, 0], fov: 45}}
+film: {{width: 24, height: 18}}
+integrator: {integrator}
+textures:
+  texels: {{type: checker, first: 0.2, second: [0.7, 0.3, 0.1], uv: {{scale: [8, 5], rotate: 48}}}}
+materials:
+  m: {material}
+shapes:
+  - {shape}
+lights:
+  - {{type: point, position: [1, 2, 3], intensity: 5}}
+  - {{type: directional, direction: [-1, -2, 0.3], irradiance: 2}}
+"""
+
+ANISOTROPIC = {
+    "metal": "{type: rough_conductor, eta: 0.2, k: 3, alpha: [0.06, 0.5]}",
+    "glass": "{type: rough_dielectric, interior_ior: 2.2, alpha: [0.4, 0.05]}",
+    "principled": "{type: principled, anisotropic: 0.9, roughness: 0.3, metallic: 0.5}",
+}
+
+
+def lit(name: str, placed: str, material: str, integrator: str) -> Scene:
+    shape = SHAPES[name].replace("material: m", f"material: m, transform: {MAPS[placed]}")
+    return Scene.parse(LIT.format(shape=shape, material=material, integrator=integrator))
+
+
+IRREGULAR = ("saddle", "tilted")
+"""Lines of constant z run towards the axis somewhere, where their tangents jump."""
+
+
+@pytest.mark.parametrize("name", IRREGULAR)
+def test_tangents_that_jump_have_no_counterpart(name: str) -> None:
+    with scalar(), coarser(0.35):
+        load(lit(name, "turned", "{type: diffuse, reflectance: texels}", "{type: path}"))
+        with pytest.raises(UntranslatableError, match="constant z"):
+            load(lit(name, "turned", ANISOTROPIC["metal"], "{type: path}"))
+
+
+@pytest.mark.parametrize("material", ANISOTROPIC)
+@pytest.mark.parametrize("placed", ["turned", "mirrored"])
+@pytest.mark.parametrize("name", [name for name in SHAPES if name not in IRREGULAR])
+def test_anisotropic_materials_on_them_are_compared(name: str, placed: str, material: str) -> None:
+    """Mitsuba's tangents are constant on each triangle of a mesh."""
+    scene = lit(name, placed, ANISOTROPIC[material], "{type: path}")
+    with scalar(), coarser(0.35):
+        counterpart = load(scene)
+        twists = [s.twist for found in counterpart.stand_ins().values() for s in found]
+        found = direct(scene, scene.tables, counterpart, 200)
+    assert all(twist > 0.0 for twist in twists)
+    assert found.status == "agree", found.reason
+
+
+@pytest.mark.parametrize("placed", MAPS)
+@pytest.mark.parametrize("name", SHAPES)
+def test_their_textures_are_seen_by_ray_casting(name: str, placed: str) -> None:
+    scene = lit(name, placed, "{type: diffuse, reflectance: texels}", "{type: ray_cast}")
+    with scalar(), coarser(0.35):
+        found = layers(scene, scene.tables, load(scene), (scene.film, scene.film))
+    assert found.status == "agree", found.reason

@@ -15,23 +15,29 @@ from reference_rt.shapes.shape import TabulationContext
 class Site(NamedTuple):
     """The placement and the material of a leaf.
 
-    place: the maps of its solid and its instance, applied after its own transform;  mirrored:
-    whether its instance mirrors space: triangles then keep their front, but reverse their corners;
-    parts: the BSDF and, if it is emissive, the emitter;  coloured: the same for a mesh with vertex
-    colours;  textured: whether the material depends on uv or tangents;  material: its name;
-    copies: the number of copies of the leaf;  shared: data shared by the leaves of one scene, by
-    key (a group, the triangles of a file);  reach: about the largest coordinate of the scene.
+    place: the maps of its solid and its instance, applied after its own transform;  parts: the BSDF
+    and, if it is emissive, the emitter;  coloured: the same for a mesh with vertex colours;
+    textured: whether the material depends on uv or tangents;  oriented: on tangents;  material: its
+    name;  copies: the number of copies of the leaf;  shared: data shared by the leaves of one
+    scene, by key (a group, the triangles of a file);  reach: about the largest coordinate of the
+    scene.
     """
 
     place: TabulationContext
-    mirrored: bool
     parts: dict[str, Any]
     coloured: dict[str, Any]
     textured: bool
+    oriented: bool
     material: str | None
     copies: int
     shared: dict[Any, Any]
     reach: float
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether its solids and its instance mirror space: triangles then keep their front, but
+        reverse their corners."""
+        return bool(np.linalg.det(self.place.outer[:, :3]) < 0.0)
 
 
 def to_world(linear: FloatArray, offset: FloatArray) -> Any:

@@ -1,0 +1,69 @@
+"""The rung of Whitted ray tracing follows every perfect direction of every material."""
+
+from pathlib import Path
+
+import pytest
+from counterparts import every_material
+
+from comparisons.mitsuba.backend import scalar
+from comparisons.mitsuba.translate import load
+from comparisons.rungs import whitted
+from reference_rt import Scene
+from reference_rt.cameras.film import Film
+from reference_rt.integrators import Whitted
+from reference_rt.materials import AnyMaterial, Blend, Mask
+from reference_rt.scene.build import build_tables
+
+MATERIALS = (
+    "silver", "gold", "glass", "pane", "grey", "floor", "brushed", "cast", "frosted", "coat",
+    "dull", "car", "petal", "wax", "leaf", "mix", "sheet", "dents", "tiles",
+)  # fmt: skip
+
+SHAPES = """
+camera: {type: perspective, eye: [0.4, 1, 4], target: [0, 0, 0], fov: 50}
+materials: {outer: {type: diffuse}, grey: {type: diffuse, reflectance: [0.2, 0.5, 0.7]}}
+shapes:
+  - {type: rectangle, material: outer, transform: [{rotate: {axis: [1, 2, 0], degrees: 9}}]}
+  - {type: sphere, material: grey, transform: [{translate: [0.3, 0, -2]}]}
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(image_folder: Path) -> Scene:
+    return every_material(image_folder)
+
+
+def reachable(scene: Scene, *names: str) -> dict[str, AnyMaterial]:
+    """These materials and those nested in them alone: of others might be one with more layers."""
+    found: dict[str, AnyMaterial] = {}
+    for name in names:
+        material = scene.materials[name]
+        inner = [getattr(material, field, None) for field in ("base", "back", "first", "second")]
+        found |= {name: material, **reachable(scene, *(n for n in inner if n is not None))}
+    return found
+
+
+def test_every_material_that_can_be_nested_is_there(scene: Scene) -> None:
+    assert {*MATERIALS, "lamp"} == set(scene.materials)
+
+
+@pytest.mark.parametrize("wrapper", ["mask", "blend"])
+@pytest.mark.parametrize("name", MATERIALS)
+def test_what_lies_behind_is_seen_through_it(scene: Scene, name: str, wrapper: str) -> None:
+    """Through a mask over it, and through a clear pane that it is blended with: of the components
+    of Mitsuba's BSDF that is the last, or one of the first."""
+    outer = {
+        "mask": Mask(base=name, opacity=0.3),
+        "blend": Blend(first="pane", second=name, weight=0.4),
+    }[wrapper]
+    shapes = Scene.parse(SHAPES)
+    seen = scene.changed(
+        camera=shapes.camera,
+        film=Film(width=7, height=6),
+        integrator=Whitted(max_depth=3),
+        materials={**reachable(scene, name, "pane", "grey"), "outer": outer},
+        shapes=shapes.shapes,
+    )
+    with scalar():
+        found = whitted(seen, build_tables(seen), load(seen))
+    assert found.status == "agree", found.reason
