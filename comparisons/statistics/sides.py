@@ -12,6 +12,9 @@ from comparisons.statistics.metrics import ratio
 from comparisons.statistics.rare import event, met_once
 from comparisons.statistics.scales import cell_means, cell_pixels, cell_sums
 
+FAINTEST = 1e-150
+"""Variances that are smaller count as none: their squares would be 0."""
+
 NEIGHBOURS = 5
 """Side in pixels of the square from which the noise of a pixel is estimated a second time."""
 
@@ -104,9 +107,9 @@ class Side:
         n for normal noise; about the number of fireflies if these have most of the variance. Known
         variances count as known with one degree of freedom each (Satterthwaite 1946).
         """
-        positive = np.where(variance > 0.0, variance, 1.0)
+        positive = np.where(variance > FAINTEST, variance, 1.0)
         if self.pictures is None:
-            return np.asarray(positive**2 / np.where(variance > 0.0, fourth, 1.0))
+            return np.asarray(positive**2 / np.where(variance > FAINTEST, fourth, 1.0))
         excess = pixels * fourth / (positive * (1.0 - 1.0 / self.count)) ** 2 - 1.0
         # The kurtosis is at least 1, but for rounding.
         return np.asarray(2.0 * pixels * (self.count - 1) / np.maximum(excess, 1.0))

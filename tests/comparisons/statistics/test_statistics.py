@@ -269,3 +269,19 @@ def test_numbers_are_json():
         assert result.numbers["mean_reference"]["R"] == pytest.approx(
             scene()[..., 0].mean(), rel=0.1
         )
+
+
+@pytest.mark.parametrize("exponent", [-320, -300, -200, -162, -155, -120, -80, -40])
+def test_light_too_faint_to_be_squared(exponent: int) -> None:
+    """The tail of a Beckmann lobe: variances, or their squares, are less than the least float64."""
+    rng = np.random.default_rng(6)
+    a, b = rng.uniform(0.5, 1.5, (2, 8, 24, 24, 3))
+    faint = 10.0**exponent * rng.uniform(0.0, 1.0, (2, 8, 24, 10, 3))
+    results = []
+    for some in (np.zeros_like(faint), faint):
+        a[:, :, :10], b[:, :, :10] = some
+        found = compare(a, b, limit=0.5)
+        assert np.isfinite(standard_error(a, b)).all()
+        results.append((found.status, found.numbers["relative_bias"]))
+    assert results[0][0] == results[1][0] == "agree"
+    assert results[1][1] == pytest.approx(results[0][1])
