@@ -1,5 +1,6 @@
 """Materials of a user's file for which Mitsuba 3.9.1 is wrong or approximate, replaced in Mitsuba's
-own description of the scene: blends with a perfect mirror, plastics, and Beckmann microfacets.
+own description of the scene: blends with a perfect mirror, plastics, Beckmann microfacets, and bump
+maps over anisotropic materials or by rotated images.
 
 A replacement keeps the element's own parameters, so that our reading of them is checked.
 `comparisons.mitsuba.plugins` proves and corrects each of these errors; `comparisons.mitsuba.notes`
@@ -13,12 +14,22 @@ from comparisons.mitsuba.notes import note_of
 from comparisons.mitsuba.reading.colours import index_of_refraction
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed
+from comparisons.mitsuba.reading.textures import to_uv
 from comparisons.mitsuba.translate.textures import TranslationContext
-from reference_rt.materials import Blend, Plastic, RoughConductor, RoughDielectric, RoughPlastic
+from comparisons.mitsuba.translate.wrappers import is_wrong_in_mitsuba
+from reference_rt.materials import (
+    Blend,
+    Bump,
+    Plastic,
+    RoughConductor,
+    RoughDielectric,
+    RoughPlastic,
+)
 from reference_rt.rendering.scene import Scene
 
 PLUGINS: dict[type, str] = {
     Blend: "blendbsdf",
+    Bump: "bumpmap",
     Plastic: "plastic",
     RoughPlastic: "roughplastic",
     RoughConductor: "roughconductor",
@@ -31,7 +42,11 @@ def inexact(scene: Scene) -> list[tuple[str, str]]:
     """Mitsuba's plugin, and the note on its error, of each material that Mitsuba has wrong."""
     context = TranslationContext.of(scene)
     materials = [m for m in scene.materials.values() if type(m) in PLUGINS]
-    notes = [(PLUGINS[type(m)], note_of(m, context)) for m in materials]
+    notes = [
+        (PLUGINS[type(m)], note_of(m, context))
+        for m in materials
+        if not isinstance(m, Bump) or is_wrong_in_mitsuba(m, context)
+    ]
     return [(plugin, note) for plugin, note in notes if note]
 
 
@@ -47,8 +62,36 @@ def make_exact(parsed: Parsed, scene: Scene) -> None:
             props.set_plugin_name("mixture_blend")
         elif node.plugin in ("plastic", "roughplastic"):
             _wrap(parsed.state, index, "exact_coat", _coat(node, props))
+        elif node.plugin == "bumpmap":
+            _bump(parsed.state, index, node)
         elif _distribution(props) == "beckmann":
             _wrap(parsed.state, index, "exact_beckmann", _alphas(props))
+
+
+def _bump(state: Any, index: int, node: Node) -> None:
+    """Replace a bump map.  Its image is looked up in its own coordinates: a copy of it without
+    `to_uv`, which the plugin applies itself, and to the slopes rightly."""
+    mi, props = mitsuba(), state.nodes[index].props
+    ((base, _),) = node.named_children("BSDF")
+    ((height, image),) = node.named_children("Texture")
+    m = to_uv(image)
+    copied = mi.parser.SceneNode()
+    old = state.nodes[props[height].index()]
+    copied.type, copied.props = old.type, mi.Properties(old.props)
+    if "to_uv" in copied.props:
+        del copied.props["to_uv"]
+    state.nodes.append(copied)
+    exact = mi.Properties("exact_bump")
+    exact.set_id(props.id())
+    exact["base"] = props[base]
+    exact["height"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
+    exact["scale"] = props.get("scale", 1.0)
+    for key in ("flip_invalid_normals", "use_shadowing_function"):
+        exact[key] = props.get(key, True)
+    for row, letter in enumerate("uv"):
+        for column, other in enumerate("uv1"):
+            exact[f"{letter}_{other}"] = float(m[row, column])
+    state.nodes[index].props = exact
 
 
 def _distribution(props: Any) -> str:

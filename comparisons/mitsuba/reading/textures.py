@@ -136,8 +136,8 @@ def _attribute(node: Node) -> VertexColours:
     return VertexColours(scale=node.number("scale", 1.0))
 
 
-def _to_uv(node: Node) -> FloatArray:
-    """(3, 3), homogeneous."""
+def to_uv(node: Node) -> FloatArray:
+    """The map of a texture's coordinates, (3, 3), homogeneous."""
     value = node.take("to_uv")
     if value is None:
         return np.eye(3)
@@ -157,7 +157,7 @@ def _to_uv(node: Node) -> FloatArray:
 def _uv(node: Node, is_image: bool, is_projected: bool) -> UvMap:
     """The texture's map in our coordinates.  is_image: its v is 0 at the top;  is_projected: so is
     that of the places where it is looked up."""
-    m, steps = _to_uv(node), node.written("to_uv") or ()
+    m, steps = to_uv(node), node.written("to_uv") or ()
     own = steps[2 if is_projected else 0 : -2 if is_image else len(steps)]
     flips = (FLIP_STEPS if is_projected else ()), (FLIP_STEPS if is_image else ())
     if steps and (*flips[0], *own, *flips[1]) == steps:

@@ -48,6 +48,16 @@ GGX = '<string name="distribution" value="ggx"/>'
 NONLINEAR = '<boolean name="nonlinear" value="true"/>'
 REFLECTANCE = '<rgb name="diffuse_reflectance" value="0.9, 0.6, 0.3"/>'
 
+BRUSHED = of("roughconductor", GGX, number("alpha_u", 0.5), number("alpha_v", 0.1))
+
+
+def bump_texture(steps: str = "") -> str:
+    raw = '<boolean name="raw" value="true"/>'
+    return (
+        f'<texture type="bitmap">{IMAGE}{raw}<transform name="to_uv">{steps}</transform></texture>'
+    )
+
+
 MATERIALS = {
     "mirror first": of("blendbsdf", number("weight", 0.6), MIRROR, WHITE),
     "mirror second": of("blendbsdf", number("weight", 0.6), WHITE, MIRROR),
@@ -68,10 +78,23 @@ MATERIALS = {
     ),
     "rough glass": of("roughdielectric", number("alpha", 0.3)),
     "two-sided": of("twosided", of("roughplastic", number("alpha", 0.3), REFLECTANCE)),
+    "bump over brushed metal": of("bumpmap", bump_texture(), BRUSHED, number("scale", 0.4)),
+    "bump by a rotated image": of("bumpmap", bump_texture("<rotate z='1' angle='30'/>"), WHITE),
+    "plain bump over both": of(
+        "bumpmap",
+        bump_texture("<scale x='2' y='3'/><rotate z='1' angle='-70'/>"),
+        number("scale", 0.2),
+        of("blendbsdf", number("weight", 0.3), WHITE, BRUSHED),
+        '<boolean name="flip_invalid_normals" value="false"/>',
+        '<boolean name="use_shadowing_function" value="false"/>',
+    ),
     "blend of plastics": of("blendbsdf", number("weight", 0.4), of("plastic"), of("roughplastic")),
 }
 
-FAR_OFF = ("mirror first", "mirror second", "textured weight", "high plastic", "rough plastic")
+FAR_OFF = (
+    "mirror first", "mirror second", "textured weight", "high plastic", "rough plastic",
+    "bump over brushed metal", "bump by a rotated image",
+)  # fmt: skip
 """Where Mitsuba's own is off by more than can be overlooked."""
 
 RAYS, SAMPLES = 64, 4096
