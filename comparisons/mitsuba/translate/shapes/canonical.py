@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from comparisons.mitsuba.hits import BoolArray
 from comparisons.mitsuba.translate.shapes.stand_ins import Box, Patch
 from reference_rt.core.arrays import FloatArray, IntArray
 
@@ -14,7 +15,11 @@ STRAIGHT = (2048, 4)
 `quadrics.SIDE` for why that has more than one."""
 
 ZERO = 1e-12
-"""An eigenvalue below this fraction of the largest counts as 0."""
+"""A slope below this fraction of the largest counts as 0."""
+
+FLAT = 1e-7
+"""An eigenvalue below this fraction of the largest counts as 0: that moves the surface by as much
+of the box's size, less than the mesh is off; the center would be too far away for float64."""
 
 Coordinates = tuple[FloatArray, FloatArray, FloatArray]
 Shape = Callable[[FloatArray, FloatArray], Coordinates]
@@ -22,8 +27,11 @@ Shape = Callable[[FloatArray, FloatArray], Coordinates]
 
 def patches_of(matrix: FloatArray, linear: FloatArray, constant: float, box: Box) -> list[Patch]:
     """Patches of x^T M x + l x + c = 0 that cover its part in a box; they may reach beyond it."""
+    middle = 0.5 * (box[0] + box[1])
+    constant = constant + float(middle @ matrix @ middle + linear @ middle)
+    linear = linear + 2.0 * matrix @ middle
     eigenvalues, axes = np.linalg.eigh(matrix)
-    eigenvalues[np.abs(eigenvalues) <= ZERO * np.abs(eigenvalues).max(initial=0.0)] = 0.0
+    eigenvalues[np.abs(eigenvalues) <= FLAT * np.abs(eigenvalues).max(initial=0.0)] = 0.0
     slopes = axes.T @ linear
     origin = np.zeros(3)
     square = eigenvalues != 0.0
@@ -42,48 +50,72 @@ def patches_of(matrix: FloatArray, linear: FloatArray, constant: float, box: Box
         axes[:, flat] = np.column_stack([rising, basis])
         origin[flat[0]] = -constant / slope
         constant = 0.0
-    middle = 0.5 * (box[0] + box[1])
-    reach = float(np.abs(axes.T @ middle - origin).max() + np.linalg.norm(box[1] - middle))
-    shapes = _shapes(eigenvalues, slope, flat, constant, reach)
+    reach = float(np.abs(origin).max() + np.linalg.norm(box[1] - middle))
+    shapes = _shapes(eigenvalues, slope, flat, constant, reach, -origin)
 
     def place(shape: Shape, u: FloatArray, v: FloatArray) -> FloatArray:
-        return np.asarray((np.stack(shape(u, v), axis=-1) + origin) @ axes.T)
+        return np.asarray((np.stack(shape(u, v), axis=-1) + origin) @ axes.T + middle)
 
     found = [narrowed(Patch(partial(place, shape), cells), box) for shape, cells in shapes]
     return [patch for patch in found if patch is not None]
 
 
+MOST_CELLS = 300_000
+"""Most cells of a patch that are tested for being near a box."""
+
+
 def narrowed(patch: Patch, box: Box) -> Patch | None:
-    """The patch, limited to parameters near the box; None if it does not come near."""
-    low, high = np.zeros(2), np.ones(2)
-    for _ in range(6):
-        sides = [np.linspace(a, b, 65) for a, b in zip(low, high, strict=True)]
-        p = patch.point(*np.meshgrid(*sides, indexing="ij"))
-        corners = np.stack([p[:-1, :-1], p[1:, :-1], p[:-1, 1:], p[1:, 1:]])
-        lower, upper = corners.min(axis=0), corners.max(axis=0)
-        # A cell's diagonal: more than its surface bulges out.
-        margin = np.linalg.norm(upper - lower, axis=-1, keepdims=True)
-        near = np.all((lower - margin <= box[1]) & (upper + margin >= box[0]), axis=-1)
-        if not near.any():
+    """The patch, limited to parameters near the box; None if it does not come near.
+
+    The cells of the patch that are near are split until most of their parts are near, too.  Of a
+    quadric whose center is far they may be 1e-6 of the patch, and first seem to be along all of its
+    straight lines.
+    """
+    size = 1.0 / 64.0
+    cells = size * np.stack(np.meshgrid(*2 * [np.arange(64.0)]), axis=-1).reshape(-1, 2)
+    split = 0.25 * np.stack(np.meshgrid(*2 * [np.arange(4.0)]), axis=-1).reshape(-1, 2)
+    while True:
+        near = _near(patch, cells, size, box)
+        cells = cells[near]
+        if len(cells) == 0:
             return None
-        before = high - low
-        for axis in (0, 1):
-            kept = np.flatnonzero(near.any(axis=1 - axis))
-            low[axis], high[axis] = sides[axis][kept[0]], sides[axis][kept[-1] + 1]
-        if np.all(high - low > 0.9 * before):
+        if near.mean() > 0.5 or len(split) * len(cells) > MOST_CELLS:
             break
-    size = high - low
+        cells = (cells[:, None] + size * split).reshape(-1, 2)
+        size *= 0.25
+    low = cells.min(axis=0)
+    sides = cells.max(axis=0) + size - low
 
     def point(u: FloatArray, v: FloatArray) -> FloatArray:
-        return patch.point(low[0] + size[0] * u, low[1] + size[1] * v)
+        return patch.point(low[0] + sides[0] * u, low[1] + sides[1] * v)
 
     return Patch(point, patch.cells)
 
 
+def _near(patch: Patch, cells: FloatArray, size: float, box: Box) -> BoolArray:
+    """Which of the cells, from (u, v) to (u, v) + size, may come near the box."""
+    halves = 0.5 * size * np.arange(3.0)
+    u, v = (
+        cells[:, k, None, None] + halves.reshape(shape) for k, shape in enumerate([(3, 1), (1, 3)])
+    )
+    p = patch.point(*np.broadcast_arrays(u, v)).reshape(len(cells), 9, 3)
+    lower, upper = p.min(axis=1), p.max(axis=1)
+    # Corners and middles of each cell have an extent along each axis: more than its surface bulges
+    # out between them.
+    margin = upper - lower
+    return np.asarray(np.all((lower - margin <= box[1]) & (upper + margin >= box[0]), axis=1))
+
+
 def _shapes(
-    eigenvalues: FloatArray, slope: float, flat: IntArray, constant: float, reach: float
+    eigenvalues: FloatArray,
+    slope: float,
+    flat: IntArray,
+    constant: float,
+    reach: float,
+    seen: FloatArray,
 ) -> list[tuple[Shape, tuple[int, int]]]:
-    """Patches of sum e_k z_k² + slope z_flat[0] + constant = 0 for |z_k| <= reach."""
+    """Patches of sum e_k z_k² + slope z_flat[0] + constant = 0 for |z_k| <= reach;  seen (3,): the
+    middle of what they must cover."""
     square = np.flatnonzero(eigenvalues)
     if len(square) == 0:
         return [(_ordered((flat[0], flat[1], flat[2]), _plane(0.0, reach)), (1, 1))]
@@ -92,12 +124,12 @@ def _shapes(
     e = eigenvalues[square]
     if len(square) == 2 and slope != 0.0:
         order = (int(square[0]), int(square[1]), int(flat[0]))
-        return [(_ordered(order, _paraboloid(e / -slope, reach)), CURVED)]
+        return [(_ordered(order, _paraboloid(e / -slope, reach, seen[list(order)])), CURVED)]
     if constant == 0.0:
-        return _cones(eigenvalues, square, reach)
+        return _cones(eigenvalues, square, reach, seen)
     mu = np.zeros(3)
     mu[square] = -e / constant  # sum mu z² = 1
-    return _with_center(mu, reach)
+    return _with_center(mu, reach, seen)
 
 
 def _ordered(order: tuple[int, int, int], shape: Shape) -> Shape:
@@ -109,6 +141,12 @@ def _ordered(order: tuple[int, int, int], shape: Shape) -> Shape:
         return x, y, z
 
     return placed
+
+
+def _angle(u: FloatArray, x: float, y: float) -> FloatArray:
+    """The angle of a turn, that of (x, y) in its middle: a patch that is narrowed to a part around
+    there must not be cut in two by the seam."""
+    return np.asarray(np.arctan2(y, x) + 2.0 * np.pi * (u - 0.5))
 
 
 def _plane(height: float, reach: float) -> Shape:
@@ -137,7 +175,7 @@ def _of_one(
     return [(_ordered(order, _plane(h, reach)), (1, 1)) for h in heights]
 
 
-def _paraboloid(k: FloatArray, reach: float) -> Shape:
+def _paraboloid(k: FloatArray, reach: float, seen: FloatArray) -> Shape:
     """z = k_0 x² + k_1 y²."""
     if k[0] * k[1] < 0.0:
 
@@ -150,14 +188,14 @@ def _paraboloid(k: FloatArray, reach: float) -> Shape:
     end = min(np.sqrt(reach), reach / a.min())
 
     def bowl(u: FloatArray, v: FloatArray) -> Coordinates:
-        phi, s = 2.0 * np.pi * u, end * v
+        phi, s = _angle(u, seen[0] / a[0], seen[1] / a[1]), end * v
         return a[0] * s * np.cos(phi), a[1] * s * np.sin(phi), np.sign(k[0]) * s * s
 
     return bowl
 
 
 def _cones(
-    eigenvalues: FloatArray, square: IntArray, reach: float
+    eigenvalues: FloatArray, square: IntArray, reach: float, seen: FloatArray
 ) -> list[tuple[Shape, tuple[int, int]]]:
     """sum e z² = 0: two nappes, or two planes that cross."""
     positive = eigenvalues[square] > 0.0
@@ -186,14 +224,16 @@ def _cones(
     for sign in (-1.0, 1.0):
 
         def nappe(u: FloatArray, v: FloatArray, sign: float = sign) -> Coordinates:
-            phi, s = 2.0 * np.pi * u, reach * v
+            phi, s = _angle(u, seen[i] / a, seen[j] / b), reach * v
             return a * s * np.cos(phi), b * s * np.sin(phi), sign * s
 
         nappes.append((_ordered((i, j, alone), nappe), STRAIGHT))
     return nappes
 
 
-def _with_center(mu: FloatArray, reach: float) -> list[tuple[Shape, tuple[int, int]]]:
+def _with_center(
+    mu: FloatArray, reach: float, seen: FloatArray
+) -> list[tuple[Shape, tuple[int, int]]]:
     """sum mu z² = 1, where at most one mu is zero: ellipsoids, hyperboloids, and cylinders."""
     positive = np.flatnonzero(mu > 0.0)
     rest = np.flatnonzero(mu <= 0.0)
@@ -201,7 +241,7 @@ def _with_center(mu: FloatArray, reach: float) -> list[tuple[Shape, tuple[int, i
     if len(positive) == 3:
 
         def ellipsoid(u: FloatArray, v: FloatArray) -> Coordinates:
-            phi, theta = 2.0 * np.pi * u, np.pi * v
+            phi, theta = _angle(u, seen[0] / a[0], seen[1] / a[1]), np.pi * v
             s = np.sin(theta)
             return a[0] * s * np.cos(phi), a[1] * s * np.sin(phi), a[2] * np.cos(theta)
 
@@ -212,7 +252,8 @@ def _with_center(mu: FloatArray, reach: float) -> list[tuple[Shape, tuple[int, i
         end = reach if straight else np.arcsinh(reach / a[k])
 
         def hyperboloid(u: FloatArray, v: FloatArray) -> Coordinates:
-            phi, s = 2.0 * np.pi * u, end * (2.0 * v - 1.0)
+            phi = _angle(u, seen[i] / a[i], seen[j] / a[j])
+            s = end * (2.0 * v - 1.0)
             wide, high = (1.0, s) if straight else (np.cosh(s), a[k] * np.sinh(s))
             return a[i] * wide * np.cos(phi), a[j] * wide * np.sin(phi), high
 
@@ -227,7 +268,7 @@ def _with_center(mu: FloatArray, reach: float) -> list[tuple[Shape, tuple[int, i
         if straight:
             s = end * (2.0 * u - 1.0)
             return sign * a[i] * np.cosh(s), a[j] * np.sinh(s), reach * (2.0 * v - 1.0)
-        phi, s = 2.0 * np.pi * u, end * v
+        phi, s = _angle(u, seen[j] / a[j], seen[k] / a[k]), end * v
         y, z = a[j] * np.sinh(s) * np.cos(phi), a[k] * np.sinh(s) * np.sin(phi)
         return sign * a[i] * np.cosh(s), y, z
 
