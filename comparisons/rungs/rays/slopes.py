@@ -12,6 +12,7 @@ from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray
+from reference_rt.lights import AnyLight, Projector, Spot
 from reference_rt.materials import Diffuse, Emissive, Material, Wrapper
 from reference_rt.rendering.scene import Scene
 
@@ -24,8 +25,8 @@ to the arbiter."""
 
 
 def is_steep(scene: Scene) -> bool:
-    """Whether any material has a glossy lobe, a texture, or is made of others: untextured diffuse
-    materials, lamps and perfect mirrors are not steep."""
+    """Whether any material has a glossy lobe, a texture, or is made of others, or a light projects
+    an image: untextured diffuse materials, lamps and perfect mirrors are not steep."""
 
     def is_flat(material: Material) -> bool:
         if isinstance(material, Emissive):
@@ -35,6 +36,13 @@ def is_steep(scene: Scene) -> bool:
         plain = isinstance(material, Diffuse) and not isinstance(material.reflectance, str)
         return plain or not material.smooth
 
+    def projects(light: AnyLight) -> bool:
+        if isinstance(light, Spot):
+            return light.texture is not None
+        return isinstance(light, Projector) and isinstance(light.irradiance, str)
+
+    if any(projects(light) for light in scene.lights):
+        return True
     return not all(is_flat(material) for material in scene.materials.values())
 
 

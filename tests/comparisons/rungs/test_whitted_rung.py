@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from counterparts import every_material
+from PIL import Image
 
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.translate import load
-from comparisons.rungs import whitted
+from comparisons.rungs import direct, whitted
 from reference_rt import Scene
 from reference_rt.cameras.film import Film
 from reference_rt.integrators import Whitted
@@ -67,3 +69,34 @@ def test_what_lies_behind_is_seen_through_it(scene: Scene, name: str, wrapper: s
     with scalar():
         found = whitted(seen, build_tables(seen), load(seen))
     assert found.status == "agree", found.reason
+
+
+PROJECTED = """
+camera: {{type: perspective, eye: [0, 0, 1], target: [0, 0, 0], fov: 90}}
+film: {{width: 48, height: 40}}
+integrator: {{type: whitted}}
+textures: {{image: {{type: bitmap, file: noise.png}}}}
+shapes:
+  - {{type: rectangle, transform: [{{scale: 3}}, {{rotate: {{axis: [1, 2, 0], degrees: 9}}}}]}}
+lights:
+  - {}
+"""
+
+LIGHTS = {
+    "projector": "{type: projector, origin: [0.2, 0.1, 1], target: [0, 0, 0], irradiance: image}",
+    "spot": "{type: spot, origin: [0.2, 0.1, 1], target: [0, 0, 0], cutoff_angle: 40, "
+    "intensity: 5, texture: image}",
+}
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+def test_projected_images(light: str, tmp_path: Path) -> None:
+    """Whose slopes amplify the error of a point, though the materials are flat."""
+    noise = np.random.default_rng(4).integers(0, 255, (512, 512, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(tmp_path / "noise.png")
+    scene = Scene.parse(PROJECTED.format(LIGHTS[light]), folder=tmp_path)
+    with scalar():
+        counterpart = load(scene)
+        for rung in (direct, whitted):
+            found = rung(scene, scene.tables, counterpart)
+            assert found.status == "agree", found.reason
