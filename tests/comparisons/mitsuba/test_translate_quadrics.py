@@ -30,7 +30,12 @@ def quadric(seed: int) -> Quadric:
     )
 
 
-@pytest.mark.parametrize("seed", range(60))
+FAST = 15
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(FAST), *(pytest.param(k, marks=pytest.mark.slow) for k in range(FAST, 200))]
+)
 def test_their_meshes_are_fine_wherever_their_centers_are(seed: int) -> None:
     scene = Scene(shapes=[quadric(seed)], integrator={"type": "ray_cast"})
     with scalar(), coarser(0.35):
