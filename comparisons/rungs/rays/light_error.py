@@ -117,7 +117,7 @@ def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatAr
 def _of_falloff(context: LightContext, light: int) -> FloatArray:
     """(n,): the relative error of Mitsuba's spot falloff, at most 1: it computes the angle from the
     cosine, whose rounding turns the angle by 4 u over its sine, and divides by the width of the
-    rim; the falloff itself goes to 0 at the outer edge."""
+    rim; the falloff itself goes to 0 at the outer edge, beyond which no light is excused."""
     spot = described(context, light)
     assert isinstance(spot, Spot)
     beam = 0.75 * spot.cutoff_angle if spot.beam_width is None else spot.beam_width
@@ -129,7 +129,7 @@ def _of_falloff(context: LightContext, light: int) -> FloatArray:
     angle = np.arctan2(across, np.sum(axis * out, axis=1))
     falloff = (np.radians(spot.cutoff_angle) - angle) / width
     error = 4.0 * UNIT_ROUNDOFF / (sine * width)
-    return np.asarray(error / np.clip(falloff, error, 1.0))
+    return np.where(falloff < -error, 0.0, error / np.clip(falloff, error, 1.0))
 
 
 def slopes_of(
