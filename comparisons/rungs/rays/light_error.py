@@ -93,11 +93,11 @@ def _tables_of(context: LightContext) -> FloatArray:
 
 
 def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatArray) -> FloatArray:
-    """(n,): the relative error, at most 1, of light along w that rough glass refracts to -d, of the
-    scene's glass with the largest.
+    """(n,): the relative error, at most 1, of light from w that rough glass refracts into -d.
 
-    Mitsuba computes the cosine c on the far side of the microfacet as a root of 1 - (eta sin)², of
-    whose digits all but c² / eta² cancel next to the critical angle.
+    Next to the critical angle Mitsuba loses digits: it computes the cosine c behind the microfacet
+    as a root of 1 - (eta sin)², of which a share of c² / eta² is left.  Where the scene has several
+    glasses, the largest error of any counts.
     """
     leaves = context.tables.materials.leaves
     tables = [table for table in (leaves.rough_dielectrics, leaves.principleds) if table]
