@@ -26,8 +26,8 @@ class MitsubaHits(Intersections):
     angle in radians, by which the hit surface and its shading normal may differ from those of our
     shape, beyond float32's common bound;  stands_in (n,): whether the hit is on a mesh that stands
     in for a curved surface, and has the geometric normal of a flat triangle;  height (n,): the
-    smallest height of the hit triangle, in scene units, where a flat shape is a mesh in Mitsuba, of
-    which our surface knows nothing; else infinite.
+    length of the hit triangle, in scene units, over which its normal and uv change, where a flat
+    shape is a mesh in Mitsuba, of which our surface knows nothing; else infinite.
     """
 
     has_uv: BoolArray

@@ -49,8 +49,8 @@ class Plugin(NamedTuple):
     whose quadratic Mitsuba solves in float32 (see `hits.CURVED`), else 0;  faceted: whether its
     triangles are so small that float32 turns their geometric normals, so that shading normals are
     compared;  heights: the smallest height of each triangle of a flat shape that we do not
-    triangulate;  uv_of_mesh: whether the vertices of a mesh that stands in have our uv, which
-    between them are interpolated.
+    triangulate, over its longest side in uv if that is less than 1;  uv_of_mesh: whether the
+    vertices of a mesh that stands in have our uv, which between them are interpolated.
     """
 
     value: Any

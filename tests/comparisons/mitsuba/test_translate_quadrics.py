@@ -34,7 +34,7 @@ FAST = 15
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(FAST), *(pytest.param(k, marks=pytest.mark.slow) for k in range(FAST, 80))]
+    "seed", [*range(FAST), *(pytest.param(k, marks=pytest.mark.slow) for k in range(FAST, 120))]
 )
 def test_their_meshes_are_fine_wherever_their_centers_are(seed: int) -> None:
     scene = Scene(shapes=[quadric(seed)], integrator={"type": "ray_cast"})

@@ -4,9 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.translate.shapes.cutting import cut_away
 from comparisons.mitsuba.translate.shapes.meshes import Soup
 from comparisons.mitsuba.translate.shapes.stand_ins import Box
+from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 
 LEVELS = 10
@@ -34,6 +36,19 @@ def cap_faces(value: Form, box: Box) -> tuple[Soup, IntArray]:
             numbers.append(np.full(len(triangles), 1 + axis + 3 * side))
     soup = Soup(np.concatenate(positions), np.concatenate(normals), np.concatenate(uvs))
     return soup, np.concatenate(numbers)
+
+
+def heights_over_uv(soup: Soup, m: transform.Affine) -> FloatArray:
+    """(faces,): the smallest height of each triangle, mapped by m, over its longest side in uv.
+
+    Float32 moves a hit by e across the triangle, and so its barycentrics by e over the height:
+    e over this length is by how much uv change.
+    """
+    assert soup.uvs is not None
+    uv = soup.uvs[soup.faces]
+    sides = np.linalg.norm(uv - np.roll(uv, 1, axis=1), axis=2).max(axis=1)
+    heights = heights_of(transform.apply_points(m, soup.positions)[soup.faces])
+    return np.asarray(np.divide(heights, sides, out=np.zeros_like(heights), where=sides > 0.0))
 
 
 def _on_face(xy: FloatArray, box: Box, axis: int, side: int) -> FloatArray:

@@ -9,7 +9,7 @@ from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.around import around_z
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
-from comparisons.mitsuba.translate.shapes.caps import cap_faces, region
+from comparisons.mitsuba.translate.shapes.caps import cap_faces, heights_over_uv, region
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import Soup, placed
 from comparisons.mitsuba.translate.shapes.plugins import (
@@ -181,7 +181,8 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
             m = shape.map_in(site.place)
             mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
             plugin = placed(soup, key, m, mirrored, with_mesh_light(site))
-            found.append(plugin._replace(suffix="_caps", faces=faces, uv=same_uv, faceted=True))
+            plugin = plugin._replace(suffix="_caps", faces=faces, uv=same_uv, faceted=True)
+            found.append(plugin._replace(heights=heights_over_uv(soup, m)))
     return found
 
 
