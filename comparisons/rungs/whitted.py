@@ -157,8 +157,9 @@ def _moves(
 
 
 SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
-"""Emissive shapes that are lights.  Other emissive shapes, and those in groups, are visible but
-light nothing in Whitted ray tracing."""
+"""Emissive shapes that are lights, unless a map makes a sphere an ellipsoid, for which a mesh stands
+in.  Other emissive shapes, and those in groups, are visible but light nothing in Whitted ray
+tracing."""
 
 
 def plugin_radiance(
@@ -169,7 +170,9 @@ def plugin_radiance(
     unlit = [
         name
         for name, mi_shape in counterpart.mi_shapes.items()
-        if mi_shape.instance >= 0 or not isinstance(mi_shape.leaf, SAMPLED)
+        if mi_shape.instance >= 0
+        or not isinstance(mi_shape.leaf, SAMPLED)
+        or mi_shape.plugin.stand_in is not None
     ]
     boxes = [name for name, p in counterpart.mi_shapes.items() if isinstance(p.leaf, Box)]
     ambient = dict(
@@ -183,9 +186,12 @@ def plugin_radiance(
         "boxes": " ".join(boxes),
     }
 
+    shared = mi.load_dict(described) if mi.variant().startswith("scalar") else None
+
     def radiance(o: Any, d: Any) -> tuple[Any, ...]:
-        # Loaded for each call: Dr.Jit makes the lights' data as wide as the first call's rays.
-        plugin = mi.load_dict(described)
+        # Wide variants load it for each call: Dr.Jit makes the lights' data as wide as the first
+        # call's rays.  Scalar variants call this for each ray.
+        plugin = mi.load_dict(described) if shared is None else shared
         return (plugin.sample(counterpart.lit, None, mi.Ray3f(mi.Point3f(o), d))[0],)
 
     return lambda rays: for_rays(radiance, counterpart.frame.into(rays.o), rays.d)[0]

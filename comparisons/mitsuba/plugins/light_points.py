@@ -118,18 +118,17 @@ def _points_of(mi: Any, shape: Any, is_box: bool) -> list[LightPoint]:
     if kind == "Cube" or is_box:
         return [_box_point(mi, shape, vertices, *(_CUBE if kind == "Cube" else _MESH))]
     corners = vertices[np.array(values["faces"]).reshape(-1, 3)]
-    return [
-        _triangle_point(mi, shape, triangle) for triangle in corners if _double_area(triangle) > 0.0
-    ]
+    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # Turk's square root warp: barycentrics sqrt(1/2) / 2 of the second and the third corner.
+    b = 0.5 * math.sqrt(0.5)
+    points = corners[:, 0] * (1.0 - 2.0 * b) + (corners[:, 1] + corners[:, 2]) * b
+    sized = np.flatnonzero(np.linalg.norm(areas, axis=1) > 0.0).tolist()
+    return [_fixed(mi, shape, points[k], areas[k]) for k in sized]
 
 
 def _to_world(mi: Any, shape: Any) -> FloatArray:
     matrix = mi.traverse(shape)["to_world"].matrix
     return np.array(matrix, dtype=np.float64).reshape(4, 4)
-
-
-def _double_area(corners: FloatArray) -> float:
-    return float(np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0])))
 
 
 def _fixed(mi: Any, shape: Any, p: FloatArray, area: FloatArray) -> FixedPoint:
@@ -138,13 +137,6 @@ def _fixed(mi: Any, shape: Any, p: FloatArray, area: FloatArray) -> FixedPoint:
     return FixedPoint(
         mi.Point3f(p.tolist()), mi.Vector3f((area / size).tolist()), mi.Float(size), shape
     )
-
-
-def _triangle_point(mi: Any, shape: Any, corners: FloatArray) -> FixedPoint:
-    """Turk's square root warp: barycentrics sqrt(1/2) / 2 of the second and the third corner."""
-    b = 0.5 * math.sqrt(0.5)
-    p = corners[0] * (1.0 - 2.0 * b) + (corners[1] + corners[2]) * b
-    return _fixed(mi, shape, p, 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0]))
 
 
 def _box_point(

@@ -83,6 +83,7 @@ def register(mi: Any) -> None:
             self.cylinders: list[Any] = []
             self.perfect: list[int] = []
             self.reach = 0.0
+            self.scalar = not parameters.is_wide(mi)
 
         def prepare(self, scene: Any) -> None:
             """Collect the lights, once per scene."""
@@ -200,6 +201,8 @@ def register(mi: Any) -> None:
                 target, solid_angle = light.seen_from(mi, dr, si.p)
                 ray = leave(mi, si, dr.normalize(target - si.p), height)
                 value = bsdf.eval(context, si, si.to_local(ray.d), active)
+                if self.scalar and dr.all(value * solid_angle == 0.0):
+                    continue  # a mesh may have hundreds of lights, of which half face away
                 found = scene.ray_intersect(ray, active)
                 # The ray sees the light if it hits it at the right distance.  The ray starts off
                 # its line, so the tolerance is taken along the light's normal.

@@ -9,6 +9,7 @@ from PIL import Image
 
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.translate import load
+from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import direct, whitted
 from reference_rt import Scene
 from reference_rt.cameras.film import Film
@@ -100,3 +101,46 @@ def test_projected_images(light: str, tmp_path: Path) -> None:
         for rung in (direct, whitted):
             found = rung(scene, scene.tables, counterpart)
             assert found.status == "agree", found.reason
+
+
+LAMPS = {
+    "sphere": "type: sphere",
+    "disk": "type: disk",
+    "rectangle": "type: rectangle",
+    "box": "type: box",
+    "triangle": "type: triangle, v0: [0, 0, 0], v1: [1, 0, 0], v2: [0, 1, 0]",
+    "polygon": "type: polygon, rings: [[[0, 0], [1, 0], [0.2, 1]]]",
+    "cylinder": "type: cylinder",
+    "cone": "type: cone",
+    "torus": "type: torus",
+    "quadric": "type: quadric, coefficients: [1, 1, 1, 0, 0, 0, 0, 0, 0, -1], "
+    "lower: [-1, -1, -1], upper: [1, 1, 1]",
+}
+
+MAPS = {
+    "as it is": "{scale: 1}",
+    "stretched": "{scale: [0.5, 0.8, 0.3]}, {rotate: {axis: [1, 2, 3], degrees: 40}}",
+}
+
+UNDER_A_LAMP = """
+camera: {{type: perspective, eye: [0, -6, 3], target: [0, 0, 0], up: [0, 0, 1]}}
+film: {{width: 12, height: 12}}
+integrator: {{type: whitted}}
+materials: {{lamp: {{type: emissive, radiance: 2}}}}
+shapes:
+  - {{type: rectangle, transform: [{{scale: 5}}, {{translate: [0, 0, -2]}}]}}
+  - {{{}, material: lamp, transform: [{}]}}
+lights: [{{type: point, position: [1, -3, 4], intensity: 3}}]
+"""
+
+
+@pytest.mark.parametrize("how", MAPS)
+@pytest.mark.parametrize("lamp", LAMPS)
+def test_lamps_of_every_shape(lamp: str, how: str) -> None:
+    """The same shapes are lights in both; of a mesh that stands in for a lamp no triangle is one,
+    and there would be thousands."""
+    scene = Scene.parse(UNDER_A_LAMP.format(LAMPS[lamp], MAPS[how]))
+    with scalar(), coarser(0.35):
+        found = whitted(scene, scene.tables, load(scene))
+    assert found.status == "agree", found.reason
+    assert found.numbers["explained"] == 0
