@@ -11,7 +11,14 @@ from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of
-from comparisons.rungs.rays.light_error import bounds, of_stand_ins, slopes_of
+from comparisons.rungs.rays.light_error import (
+    bounds,
+    is_beside,
+    magnified,
+    of_stand_ins,
+    slopes_of,
+    slopes_of_image,
+)
 from comparisons.rungs.rays.mitsuba_light import is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -160,6 +167,8 @@ def _compare(
     theirs, their_cosine = mitsuba_direct(context, light, rays, target)
     bound = bounds(context, light, target, (value, theirs, their_cosine), brightest)
     bound += slopes_of(context, light, u, value)
+    scale = magnified(context, light, target, ours.pdf[known])
+    bound += slopes_of_image(context, light, u, value, scale)
     # Where a spot or projector does not reach, no shadow ray explains that Mitsuba's does.
     of_shadow = (ours.pdf[known] > 0.0) | (kind_of(context, light) not in (SPOT, PROJECTOR))
     error = np.abs(theirs - value).max(axis=1)
@@ -179,6 +188,8 @@ def _compare(
     radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
     radius += of_stand_ins(context, "sag")
     settled = arbiter.explained(wrong, radius[wrong], like_theirs)
+    allowed = 2.0 * bound[wrong]
+    settled |= is_beside(context.of(wrong), light, u, theirs[wrong], allowed, scale[wrong])
     right = error <= bound
     left = wrong[~settled]
     lit = left[value[left].any(axis=1) & theirs[left].any(axis=1)]

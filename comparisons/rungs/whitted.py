@@ -157,8 +157,8 @@ def _moves(
 
 
 SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
-"""Emissive shapes that are lights, unless a map makes a sphere an ellipsoid, for which a mesh stands
-in.  Other emissive shapes, and those in groups, are visible but light nothing in Whitted ray
+"""Emissive shapes that are lights, unless a map makes a sphere an ellipsoid: a mesh stands in for
+it.  Other emissive shapes, and those in groups, are visible but light nothing in Whitted ray
 tracing."""
 
 

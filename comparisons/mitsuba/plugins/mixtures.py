@@ -1,10 +1,11 @@
-"""Blends and masks whose components can be evaluated one by one, and that handle perfect mirrors.
+"""Blends, masks and two-sided materials whose components can be evaluated one by one, and that
+handle perfect mirrors.
 
 Errors of Mitsuba 3.9.1 that these correct: a blend adds the probability of a mirrored direction and
 the other material's density there, so that a mirror with weight w reflects
 (w + (1 - w) f) / (w + (1 - w) p) of its light, with f the other material's BSDF times cosine in the
-mirrored direction and p its pdf there; a mask takes the wrong component if one is selected.
-Everything else here is Mitsuba's.
+mirrored direction and p its pdf there; masks and two-sided materials take the wrong component if
+one is selected.  Everything else here is Mitsuba's.
 """
 
 from typing import Any
@@ -125,5 +126,31 @@ def register(mi: Any) -> None:
         def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.nested.eval(context, si, wo, active)
 
+    class MixtureSides(base_class(mi)):  # type: ignore[misc]
+        """Mitsuba's own `twosided` with the right single components.
+
+        Seen from behind, Mitsuba numbers the components less the front's: of the front's last one
+        remains -1, which selects all (`TwoSidedBRDF::sample`).
+        """
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            front, back = properties["front"], properties["back"]
+            # Mitsuba makes one object of equal materials, and numbers its components alike.
+            self.front_count = 0 if front is back else front.component_count()
+            self.wrap(mi.load_dict({"type": "twosided", "0_front": front, "1_back": back}))
+
+        def sample(
+            self, context: Any, si: Any, sample1: Any, sample2: Any, active: Any = True
+        ) -> tuple[Any, Any]:
+            drawn, value = self.nested.sample(context, si, sample1, sample2, active)
+            if context.component < self.front_count:
+                value = dr.select(si.wi.z > 0.0, value, 0.0)
+            return drawn, value
+
+        def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.nested.eval(context, si, wo, active)
+
     mi.register_bsdf("mixture_blend", MixtureBlend)
     mi.register_bsdf("mixture_mask", MixtureMask)
+    mi.register_bsdf("mixture_sides", MixtureSides)

@@ -74,10 +74,13 @@ def _bases(material: Wrapper, context: TranslationContext) -> list[Material]:
 
 @translate_material.register
 def _(material: TwoSided, context: TranslationContext) -> dict[str, Any]:
-    bsdf = {"type": "twosided", "0_front": _named(material.base, context)}
-    if material.back is not None:
-        bsdf["1_back"] = _named(material.back, context)
-    return bsdf
+    front = _named(material.base, context)
+    if material.back is None:
+        return {"type": "twosided", "0_front": front}
+    back = _named(material.back, context)
+    if has_delta(material, context) and not context.native:
+        return {"type": "mixture_sides", "front": front, "back": back}
+    return {"type": "twosided", "0_front": front, "1_back": back}
 
 
 def _tilt(material: Bump | NormalMap) -> dict[str, Any]:

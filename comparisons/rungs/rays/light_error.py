@@ -1,15 +1,17 @@
 """The error bound of f cos L of one light, for the rung of direct light."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from comparisons.geometry.float32 import UNIT_ROUNDOFF
 from comparisons.mitsuba.accuracy import accuracy
+from comparisons.rungs.rays.arbiter import BoolArray
 from comparisons.rungs.rays.bounds import slide
 from comparisons.rungs.rays.light_context import LightContext, described, kind_of
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.slopes import is_steep, moved, slopes, turned
+from comparisons.rungs.rays.slopes import NEAR, is_steep, moved, slopes, turned
 from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import AREA, DIRECTIONAL, ENVIRONMENT, SPOT, EnvironmentMap, Spot
 from reference_rt.materials import Emissive
@@ -32,8 +34,10 @@ TURNS = 4.0
 refracted light by 1 / (1 + eta) of it or more: a quarter, for indices up to 3."""
 
 U_STEP = 2.0**-20
-"""Step in (u, v) for the slope of textured lights: float32's error for a light ten times as far
-away as it is large."""
+"""Step in (u, v) for the slope of textured lights: float32's error for a light TIMES as far away as
+it is large."""
+
+TIMES = 10.0
 
 
 def bounds(
@@ -139,16 +143,16 @@ def slopes_of(
     value: FloatArray,
 ) -> FloatArray:
     """(n,): how much f cos L changes within float32's bound because of highlights and textures:
-    measured with our tracer along moved rays, and at moved points of textured lights.
+    measured with our tracer along moved rays.
 
     A mesh that stands in for a shape has other normals, and other tangents, on which some materials
     depend: as much changes along a ray that is turned by TURNS times the angle about the point.
     """
 
-    def value_of(other: Rays, at: tuple[float, float]) -> Callable[[], FloatArray]:
-        return lambda: query.direct_light(context.tables, other.o, other.d, light, at).contribution
+    def value_of(other: Rays) -> FloatArray:
+        return query.direct_light(context.tables, other.o, other.d, light, u).contribution
 
-    queries: list[tuple[Rays, tuple[float, float]]] = []
+    others: list[Callable[[], FloatArray]] = []
     rays, hits = context.rays, context.hits
     bent = np.zeros(len(value))
     if is_steep(context.scene):
@@ -158,19 +162,78 @@ def slopes_of(
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
         angle += np.where(np.isfinite(context.theirs.height), radius / _feature(context), 0.0)
         apart = of_stand_ins(context, "sag") + of_stand_ins(context, "slip")
-        queries += [(other, u) for other in moved(rays, radius + apart)]
+        others = [partial(value_of, other) for other in moved(rays, radius + apart)]
         if angle.any():
             for other in turned(rays, hits.p, TURNS * angle):
                 there = query.intersect(context.tables, other.o, other.d)
                 same = np.linalg.norm(there.p - hits.p, axis=1) <= radius
-                change = np.abs(value_of(other, u)() - value).max(axis=1)
+                change = np.abs(value_of(other) - value).max(axis=1)
                 bent = np.maximum(bent, np.where(same, 2.0 * change, 0.0))
-    if _has_image(context, light):
-        for step in (-U_STEP, U_STEP):
-            queries += [(rays, (u[0] + step, u[1])), (rays, (u[0], u[1] + step))]
-
-    others = [value_of(*query_) for query_ in queries]
     return bent + slopes(value, others, float(value.max(initial=0.0)))
+
+
+def magnified(context: LightContext, light: int, target: FloatArray, pdf: FloatArray) -> FloatArray:
+    """(n,): float32's error of (u, v) on a textured light, in units of U_STEP, at least 1; 0 where
+    its radiance does not vary.
+
+    It is the error of a point across the ray, over the light's size and its cosine:
+    1 / pdf = area cosine / distance² is the solid angle;  target, pdf: see `query.DirectLight`.
+    """
+    if not _has_image(context, light):
+        return np.zeros(len(pdf))
+    if kind_of(context, light) != AREA:
+        return np.ones(len(pdf))
+    w = target - context.hits.p
+    there = query.intersect(context.tables, target - NEAR * w, w)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cosine = np.abs(np.sum(there.n * w, axis=1)) / np.linalg.norm(w, axis=1)
+        size = np.nan_to_num(np.sqrt(pdf / cosine) / TIMES, posinf=1.0)
+    return np.asarray(np.maximum(size, 1.0))
+
+
+def slopes_of_image(
+    context: LightContext,
+    light: int,
+    u: tuple[float, float],
+    value: FloatArray,
+    scale: FloatArray,
+) -> FloatArray:
+    """(n,): how much `value` changes within the errors `scale` (n,) of (u, v): see `magnified`."""
+    if not scale.any():
+        return np.zeros(len(value))
+    others = [partial(_value_at, context, light, at) for at in _beside(u, 1.0)]
+    return scale * slopes(value, others, float(value.max(initial=0.0)))
+
+
+def is_beside(
+    context: LightContext,
+    light: int,
+    u: tuple[float, float],
+    wanted: FloatArray,
+    allowed: FloatArray,
+    scale: FloatArray,
+) -> BoolArray:
+    """(n,): whether the light has Mitsuba's value, `wanted` (n, 3), next to u, up to `allowed`
+    (n,): at the edge of a texel."""
+    found = np.zeros(len(wanted), bool)
+    if not scale.any():
+        return found
+    for at in _beside(u, float(scale.max())):
+        error = np.abs(_value_at(context, light, at) - wanted).max(axis=1)
+        found |= (error <= allowed) & (scale > 0.0)
+    return found
+
+
+def _beside(u: tuple[float, float], scale: float) -> list[tuple[float, float]]:
+    """The four (u, v) that are `scale` U_STEP away."""
+    step = scale * U_STEP
+    return [(u[0] + x, u[1] + y) for x, y in ((step, 0), (-step, 0), (0, step), (0, -step))]
+
+
+def _value_at(context: LightContext, light: int, u: tuple[float, float]) -> FloatArray:
+    rays = context.rays
+    found = query.direct_light(context.tables, rays.o, rays.d, light, u)
+    return np.asarray(found.contribution)
 
 
 def _has_image(context: LightContext, light: int) -> bool:

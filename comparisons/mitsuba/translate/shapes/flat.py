@@ -39,8 +39,9 @@ def _(shape: Plane, site: Site) -> list[Plugin]:
     uvs = transform.apply_points(inverse, positions)[:, :2]
     soup = Soup(positions, uvs=uvs, faces=_web(len(radii)))
     extent = Extent(middle, float(radii[-1] * np.cos(np.pi / SIDES)))
+    heights = heights_of(soup.positions[soup.faces])
     mesh = soup.mesh(with_mesh_light(site).parts)
-    return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv, extent=extent)]
+    return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv, extent=extent, heights=heights)]
 
 
 def _web(rings: int) -> IntArray:
