@@ -10,12 +10,13 @@ import numpy as np
 from comparisons.geometry.frame import OURS, Frame
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.csg import SLIGHT, SolidCounterpart
-from comparisons.mitsuba.hits import MitsubaHits, assign_nearer, misses, read
+from comparisons.mitsuba.hits import BoolArray, MitsubaHits, assign_nearer, misses, read
 from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.plugins.parameters import is_wide
 from comparisons.mitsuba.scene import first_hits
-from comparisons.mitsuba.stand_ins import Extent, MitsubaShape, StandIn
+from comparisons.mitsuba.stand_ins import MitsubaShape, StandIn
 from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.query import Intersections
 
 
 class InstancedGroup(NamedTuple):
@@ -103,15 +104,20 @@ class Counterpart:
                 found += operand.mi_shapes.values()
         return found
 
-    def extents(self) -> dict[int, Extent]:
-        """The extents of meshes that stand in for infinite planes, by the index of the shape."""
-        return {
-            p.shape: Extent(
-                self.frame.out(p.plugin.extent.middle), p.plugin.extent.radius / self.frame.scale
-            )
-            for p in self.mi_shapes.values()
-            if p.plugin.extent
-        }
+    def has_planes(self) -> bool:
+        """Whether finite meshes stand in for infinite planes."""
+        return any(mi_shape.plugin.extent for mi_shape in self.all_mi_shapes())
+
+    def beyond_planes(self, ours: Intersections) -> BoolArray:
+        """(n,): whether our hit is on a shape with an infinite plane, beyond the finite mesh that
+        stands in for it."""
+        found = np.zeros(len(ours.t), bool)
+        for mi_shape in self.all_mi_shapes():
+            extent = mi_shape.plugin.extent
+            if extent is not None:
+                away = np.linalg.norm(ours.p - self.frame.out(extent.middle), axis=1)
+                found |= (ours.shape == mi_shape.shape) & (away > extent.radius / self.frame.scale)
+        return found
 
     def stand_ins(self) -> dict[int, list[StandIn]]:
         """The errors of meshes that stand in for curved surfaces, by the index of the shape, in

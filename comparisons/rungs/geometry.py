@@ -203,7 +203,7 @@ def _traced(
     beyond the finite mesh that stands in for it."""
     ours, theirs = query.intersect(tables, rays.o, rays.d), trace(counterpart, rays.o, rays.d)
     ratios = comparer.ratios(rays, ours, theirs)
-    beyond = _beyond(counterpart, ours)
+    beyond = counterpart.beyond_planes(ours)
     # Mitsuba's scalar variants take a ray in a plane through its own origin to hit it there; a ray
     # of ours begins beyond t = 0.
     ratios[beyond | ((theirs.shape >= 0) & (theirs.t == 0.0))] = 0.0
@@ -215,14 +215,6 @@ def _traced(
     radius = sizes.frame.delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
     radius += np.maximum(sag[ours.shape], sag[theirs.shape])
     return TracedRays(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
-
-
-def _beyond(counterpart: Counterpart, ours: Intersections) -> BoolArray:
-    beyond = np.zeros(len(ours.t), bool)
-    for shape, extent in counterpart.extents().items():
-        far = np.linalg.norm(ours.p - extent.middle, axis=1) > extent.radius
-        beyond |= (ours.shape == shape) & far
-    return beyond
 
 
 def _explained(

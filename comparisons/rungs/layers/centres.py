@@ -64,9 +64,7 @@ def centres(
     ours, theirs = query.intersect(tables, *rays), trace(counterpart, *rays)
     comparer = Comparer(sizes)
     resolved = (comparer.ratios(rays, ours, theirs) <= SLACK).all(axis=1)
-    for shape, extent in counterpart.extents().items():
-        beyond = np.linalg.norm(ours.p - extent.middle, axis=1) > extent.radius
-        resolved &= ~((ours.shape == shape) & beyond)
+    resolved &= ~counterpart.beyond_planes(ours)
     flat = {name: layer.reshape(len(x), -1) for name, layer in layers.items()}
     errors = {
         name: _errors(comparer, rays, ours, theirs, name, values)

@@ -78,7 +78,7 @@ def layers(
             found = centres(small, tables, counterpart, sizes, first)
             numbers |= _numbers(found)
         many = {name: x for name, x in pictures.items() if name in MEANS}
-        if "position" in many and counterpart.extents():
+        if "position" in many and counterpart.has_planes():
             del many["position"]
             numbers["position"] = "not compared: Mitsuba's infinite planes end"
         if many:
