@@ -30,6 +30,8 @@ incidence over the cosine.  The step of a walk, and the distance of crossings th
 this cap."""
 
 
+TINY = np.finfo(np.float64).tiny
+
 SLIGHT = 0.125
 """Fraction of float32's bound, one rounding: how far apart coincident faces may be."""
 
@@ -212,7 +214,11 @@ class SolidCounterpart:
             _, crossings = operand.walk(o[rows], d[rows])
             for crossing in crossings:
                 mine = rows[crossing.rays]
-                near = np.abs(crossing.at.t - t[mine]) <= crossing.slack
+                # A step of a walk caps one over the cosine, which is not wanted here.
+                cosine = np.abs(np.sum(crossing.at.n * d[mine], axis=1))
+                cosine /= np.linalg.norm(d[mine], axis=1)
+                more = np.maximum(1.0 / (STEEPEST * np.maximum(cosine, TINY)), 1.0)
+                near = np.abs(crossing.at.t - t[mine]) <= crossing.slack * more
                 found[mine] |= near & (crossing.at.primitive == primitive[mine])
         return found
 

@@ -6,7 +6,13 @@ import math
 import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.plugins.exact_coat import CELLS, fresnel, rough_coat, smooth_reflectance
+from comparisons.mitsuba.plugins.exact_coat import (
+    CELLS,
+    accepted,
+    fresnel,
+    rough_coat,
+    smooth_reflectance,
+)
 
 COSINES = (0.2, 0.5, 0.75, 1.0)
 """Cosines of the directions at which `base_error` compares Mitsuba with the exact integral."""
@@ -26,7 +32,7 @@ def base_error(eta: float, distribution: str = "", alpha: float = 0.0) -> tuple[
     bsdf = mi.load_dict(
         {
             "type": "roughplastic" if rough else "plastic",
-            "int_ior": eta,
+            "int_ior": accepted(eta) if rough else eta,
             "ext_ior": 1.0,
             "diffuse_reflectance": {"type": "rgb", "value": [1.0, 1.0, 1.0]},
             **rough,

@@ -22,8 +22,8 @@ from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import ENVIRONMENT
-from reference_rt.materials import most_branches
+from reference_rt.lights import ENVIRONMENT, EnvironmentMap
+from reference_rt.materials import Emissive, most_branches
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Box, Disk, Mesh, Rectangle, Sphere, Triangle
@@ -33,6 +33,10 @@ PIXELS = 128 * 128
 
 MOST_LIGHTS = 256
 """Most lights: each needs a shadow ray at every surface, and more would take minutes."""
+
+CUT_OFF = 1e-18
+"""Absolute error, as a fraction of the brightest light: Mitsuba cuts microfacet densities below
+1e-20 off, which matters where a picture has nothing brighter."""
 
 MOST_OUTLIERS = (200, 32)
 """Most pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 ray trees for each
@@ -74,6 +78,7 @@ def whitted(
     bound = TOLERANCE * np.maximum(size, np.percentile(lit, 99.0) if len(lit) else 0.0)
     tables_off = max((accuracy(scene, name) for name in scene.materials), default=0.0)
     bound += tables_off * size
+    bound += CUT_OFF * _brightest(scene)
     error = np.abs(theirs - ours).max(axis=1)
     sizes = ShapeSizes(scene, counterpart.frame)
     if is_steep(scene):
@@ -154,6 +159,19 @@ def _moves(
             turn += max(s.twist for s in stand_ins)
         found.append((found[0][0] + sag, angle + BENT * turn))
     return found
+
+
+def _brightest(scene: Scene) -> float:
+    """The largest number of radiance, irradiance or intensity of any light, 1 for images."""
+    lamps = [m for m in scene.materials.values() if isinstance(m, Emissive)]
+    found = [0.0]
+    for light in (*scene.lights, *lamps):
+        scale = getattr(light, "scale", 1.0)
+        for name in ("radiance", "irradiance", "intensity"):
+            value = getattr(light, name, 0.0)
+            found.append(scale * (1.0 if isinstance(value, str) else float(np.max(value))))
+        found.append(scale * float(isinstance(light, EnvironmentMap)))
+    return max(found)
 
 
 SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)

@@ -144,7 +144,12 @@ def _number(part: dict[str, Any], draw: Draw) -> float:
     if low is None and high is None:
         return draw.between(-1.0, 1.0)
     if low is not None and high is not None:
-        return draw.between(low, high) if high <= 1000.0 else draw.log(0.1, 10.0)
+        open_ends = part.get("exclusiveMinimum"), part.get("exclusiveMaximum")
+        while (
+            x := draw.between(low, high) if high <= 1000.0 else draw.log(0.1, 10.0)
+        ) in open_ends:
+            pass  # rounded to a bound that does not belong to the range
+        return x
     if low == 0:
         return draw.log(0.3, 2.0)
     return draw.between(-1.0 if low is None else low, 1.0 if high is None else high)

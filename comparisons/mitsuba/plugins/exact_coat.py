@@ -56,6 +56,12 @@ def smooth_reflectance(eta: float) -> float:
     return 1.0 - (1.0 - outside) / (eta * eta)
 
 
+def accepted(eta: float) -> float:
+    """The index, or one next to 1, which Mitsuba's rough plastic refuses: a coat of index 1
+    reflects none of the light, one of this index 2.5e-11."""
+    return 1.00001 if eta == 1.0 else eta
+
+
 class RoughCoat:
     """T at CELLS + 1 cosines, and R, of a rough coat with index `eta`, by quadrature in float64."""
 

@@ -18,14 +18,14 @@ _SMALLEST = float(np.finfo(np.float32).tiny)
 
 class FixedPoint(NamedTuple):
     """A primitive that is represented by its point p, with unit normal n and an area: (3,), (3,),
-    1; shape is Mitsuba's object, primitive the index of a mesh's triangle, else -1.  The emitter
+    1; shape is Mitsuba's object;  of_mesh: whether it is one of a mesh's triangles.  The emitter
     determines which side shines."""
 
     p: Any
     n: Any
     area: Any
     shape: Any
-    primitive: int = -1
+    of_mesh: bool = False
 
     def seen_from(self, mi: Any, dr: Any, p: Any) -> tuple[Any, Any]:
         """The point, and the solid angle that it represents: area cos / distance²."""
@@ -42,7 +42,7 @@ class SphereLight(NamedTuple):
     center: Any
     radius: Any
     shape: Any
-    primitive: int = -1
+    of_mesh: bool = False
 
     def seen_from(self, mi: Any, dr: Any, p: Any) -> tuple[Any, Any]:
         """The point at the mean cosine of the subtended cone, and the cone's solid angle.
@@ -73,7 +73,7 @@ class BoxPoint(NamedTuple):
     towards it would hit another face, near an edge within the tolerance of the right distance."""
 
     face: FixedPoint
-    primitive: int = -1
+    of_mesh: bool = False
 
     @property
     def shape(self) -> Any:
@@ -127,7 +127,7 @@ def _points_of(mi: Any, shape: Any, is_box: bool) -> list[LightPoint]:
     b = 0.5 * math.sqrt(0.5)
     points = corners[:, 0] * (1.0 - 2.0 * b) + (corners[:, 1] + corners[:, 2]) * b
     sized = np.flatnonzero(np.linalg.norm(areas, axis=1) > 0.0).tolist()
-    return [_fixed(mi, shape, points[k], areas[k])._replace(primitive=k) for k in sized]
+    return [_fixed(mi, shape, points[k], areas[k])._replace(of_mesh=True) for k in sized]
 
 
 def _to_world(mi: Any, shape: Any) -> FloatArray:

@@ -205,13 +205,12 @@ def register(mi: Any) -> None:
                     continue  # a mesh may have hundreds of lights, of which half face away
                 found = scene.ray_intersect(ray, active)
                 # The ray sees the light if it hits it at the right distance.  The ray starts off
-                # its line, so the tolerance is taken along the light's normal.
-                away = dr.dot(target - ray.o, ray.d)
-                missing = away * (1.0 - mi.math.ShadowEpsilon) - found.t
+                # its line, so the tolerance is taken along the light's normal.  Another triangle of
+                # a mesh may hide this one within Mitsuba's shadow epsilon.
+                slack = 0.0 if light.of_mesh else mi.math.ShadowEpsilon
+                missing = dr.dot(target - ray.o, ray.d) * (1.0 - slack) - found.t
                 near = missing * dr.abs(dr.dot(ray.d, found.n)) <= 2.0 * height
                 visible = active & found.is_valid() & near & self.is_shape(found, light.shape)
-                if light.primitive >= 0:  # another triangle may be just as near in front of it
-                    visible &= found.prim_index == light.primitive
                 radiance = scene.emitted(found, visible)
                 total += dr.select(visible, value * radiance * solid_angle, 0.0)
                 dr.eval(total)

@@ -4,6 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 import reference_rt as rt
+from comparisons.mitsuba.plugins.exact_coat import accepted
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.textures import TranslationContext, colour, number, rgb
 
@@ -121,6 +122,9 @@ def _coated(
         **_indices(material),
         **rough,
     }
+    eta = material.interior_ior / material.exterior_ior
+    if rough and eta == 1.0:
+        nested |= {"int_ior": accepted(eta), "ext_ior": 1.0}
     if context.native:
         return nested
     if rough:
@@ -130,7 +134,7 @@ def _coated(
         "nested": nested,
         "reflectance": base,
         "nonlinear": material.nonlinear,
-        "eta": material.interior_ior / material.exterior_ior,
+        "eta": eta,
         **rough,
     }
 

@@ -56,6 +56,8 @@ MATERIALS: tuple[Material, ...] = (
     ),
     rt.RoughPlastic(**COLOURS, alpha=0.15),
     rt.RoughPlastic(**COLOURS, alpha=0.4, distribution="beckmann", nonlinear=True),
+    rt.RoughPlastic(**COLOURS, interior_ior=1.33, exterior_ior=1.33),  # Mitsuba refuses it
+    rt.Plastic(**COLOURS, interior_ior=1.33, exterior_ior=1.33),
     rt.Principled(base_colour=(0.8, 0.5, 0.2)),
     rt.Principled(base_colour=(0.8, 0.5, 0.2), metallic=1.0, roughness=0.3, anisotropic=0.7),
     rt.Principled(base_colour=(0.8, 0.5, 0.2), metallic=0.4, roughness=0.6, spec_tint=0.7),

@@ -14,7 +14,8 @@ from comparisons.rungs import direct, whitted
 from reference_rt import Scene
 from reference_rt.cameras.film import Film
 from reference_rt.integrators import Whitted
-from reference_rt.materials import AnyMaterial, Blend, Mask
+from reference_rt.lights import Constant
+from reference_rt.materials import AnyMaterial, Blend, Mask, TwoSided
 from reference_rt.scene.build import build_tables
 
 MATERIALS = (
@@ -65,6 +66,35 @@ def test_what_lies_behind_is_seen_through_it(scene: Scene, name: str, wrapper: s
         film=Film(width=7, height=6),
         integrator=Whitted(max_depth=3),
         materials={**reachable(scene, name, "pane", "grey"), "outer": outer},
+        shapes=shapes.shapes,
+    )
+    with scalar():
+        found = whitted(seen, build_tables(seen), load(seen))
+    assert found.status == "agree", found.reason
+
+
+OPAQUE = ("silver", "gold", "grey", "floor", "brushed", "cast", "coat", "dull", "dents", "tiles")
+
+
+@pytest.mark.parametrize("back", OPAQUE)
+@pytest.mark.parametrize("front", ["silver", "floor", "dull", "mirrors"])
+def test_the_back_of_two_sides(scene: Scene, front: str, back: str) -> None:
+    """Mitsuba numbers the components of both sides one after the other, but the front's last one
+    selects all of the back's."""
+    shapes = Scene.parse(
+        SHAPES.replace("axis: [1, 2, 0], degrees: 9", "axis: [1, 2, 0], degrees: 170")
+    )
+    mirrors = Blend(first="silver", second="gold", weight=0.4)
+    seen = scene.changed(
+        camera=shapes.camera,
+        film=Film(width=7, height=6),
+        integrator=Whitted(max_depth=3),
+        lights=[Constant(radiance=(0.3, 0.5, 0.4))],
+        materials={
+            **reachable(scene, *{front, back, "silver", "gold", "grey"} - {"mirrors"}),
+            "mirrors": mirrors,
+            "outer": TwoSided(base=front, back=back),
+        },
         shapes=shapes.shapes,
     )
     with scalar():
@@ -144,3 +174,52 @@ def test_lamps_of_every_shape(lamp: str, how: str) -> None:
         found = whitted(scene, scene.tables, load(scene))
     assert found.status == "agree", found.reason
     assert found.numbers["explained"] == 0
+
+
+LOW = """
+camera: {{type: perspective, eye: [0, -4, 5], target: [0, 0.5, 0], up: [0, 0, 1], fov: 50}}
+film: {{width: 24, height: 20}}
+integrator: {{type: whitted}}
+materials: {{lamp: {{type: emissive, radiance: 2}}}}
+shapes:
+  - {{type: rectangle, transform: [{{scale: 5}}]}}
+  - {{{}, material: lamp, transform: [{{scale: 0.02}}, {{rotate: {{axis: [1, 0, 0], degrees: 60}}}},
+     {{translate: [0.3, 3, {}]}}]}}
+lights: [{{type: point, position: [1, -3, 4], intensity: 3}}]
+"""
+
+
+@pytest.mark.parametrize("height", [0.03, 0.1, 0.3])
+@pytest.mark.parametrize("lamp", ["sphere", "disk", "rectangle", "box", "triangle"])
+def test_lamps_low_above_the_ground(lamp: str, height: float) -> None:
+    """Shadow rays at grazing angles start a tenth of a pixel away from their surface."""
+    scene = Scene.parse(LOW.format(LAMPS[lamp], height))
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene))
+    assert found.status == "agree", found.reason
+    assert found.numbers["explained"] <= 3
+
+
+LAYERS = """
+camera: {type: perspective, eye: [0, -6, 3], target: [0, 0, 0], up: [0, 0, 1]}
+film: {width: 24, height: 20}
+integrator: {type: whitted}
+materials: {lamp: {type: emissive, radiance: 2}}
+shapes:
+  - {type: rectangle, transform: [{scale: 5}, {translate: [0, 0, -2]}]}
+  - type: mesh
+    material: lamp
+    vertices: [[-1, 0, 1], [1, 0, 1], [0, 1, 1],
+               [-1, 0, 1.001], [1, 0, 1.001], [0, 1, 1.001],
+               [1, 0, 1.5], [1, 1, 1.5], [2, 0, 1.5]]
+    faces: [[0, 2, 1], [3, 5, 4], [6, 7, 8]]
+"""
+
+
+def test_triangles_of_a_lamp_that_hide_others_of_it() -> None:
+    """By less than Mitsuba's shadow epsilon, a thousandth of the distance."""
+    scene = Scene.parse(LAYERS)
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene))
+    assert found.status == "agree", found.reason
+    assert found.numbers["explained"] <= 3
