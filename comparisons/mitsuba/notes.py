@@ -5,7 +5,11 @@ from typing import Any
 
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.plastic_error import base_error
-from comparisons.mitsuba.translate.integrators import counts_lights_often, squares_opacity
+from comparisons.mitsuba.translate.integrators import (
+    counts_lights_often,
+    drops_light,
+    squares_opacity,
+)
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.mitsuba.translate.wrappers import has_delta, is_wrong_in_mitsuba
 from reference_rt.integrators import Direct
@@ -35,8 +39,24 @@ def notes_of(scene: Scene) -> list[str]:
                 f"'{name}': a relative error of {off:.2g} of its light is allowed for (tables, "
                 "float32: comparisons.mitsuba.accuracy)"
             )
-    found += [note_of_samples(scene), note_of_masks(scene)]
+    found += notes_of_integrator(scene)
     return list(dict.fromkeys(note for note in found if note))
+
+
+def notes_of_integrator(scene: Scene) -> list[str]:
+    """The notes on errors of Mitsuba's integrators."""
+    found = (note_of_samples(scene), note_of_masks(scene), note_of_passing(scene))
+    return [note for note in found if note]
+
+
+def note_of_passing(scene: Scene) -> str:
+    """The note on Mitsuba's error that `drops_light` describes; empty without it."""
+    if not drops_light(scene):
+        return ""
+    return (
+        "without an environment Mitsuba's path tracer drops the light of lamps that let light pass "
+        "straight through: its scene has a black environment"
+    )
 
 
 def note_of_masks(scene: Scene) -> str:

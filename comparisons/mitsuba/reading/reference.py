@@ -9,13 +9,18 @@ from typing import Any
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.lit_scene import LitScene
-from comparisons.mitsuba.notes import note_of_masks, note_of_samples
+from comparisons.mitsuba.notes import notes_of_integrator
 from comparisons.mitsuba.reading import read_supported
 from comparisons.mitsuba.reading.exact_materials import inexact, make_exact
 from comparisons.mitsuba.reading.parse import Parsed, parse_file
 from comparisons.mitsuba.reading.sensors import CLIP
 from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.integrators import counts_lights_often, squares_opacity
+from comparisons.mitsuba.translate.integrators import (
+    BLACK,
+    counts_lights_often,
+    drops_light,
+    squares_opacity,
+)
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
 
@@ -59,6 +64,8 @@ def own_scene(scene: Scene) -> Any:
         index = _first(state, mi.ObjectType.Integrator)
         assert index is not None
         state.nodes[index].props.set_plugin_name("path_of_solids")
+    if drops_light(scene):
+        _with_black_environment(mi, state)
     make_exact(parsed, scene)
     config = mi.parser.ParserConfig(mi.variant())
     config.merge_equivalent = config.merge_meshes = False
@@ -84,7 +91,7 @@ def changes_to(scene: Scene) -> list[str]:
     parsed, found = _parsed(scene)
     state = parsed.state
     sensor = _first(state, mitsuba().ObjectType.Sensor)
-    found += [note for note in (note_of_samples(scene), note_of_masks(scene)) if note]
+    found += notes_of_integrator(scene)
     found += dict.fromkeys(note for _, note in inexact(scene))
     if sensor is not None and _open_clipping(state.nodes[sensor].props):
         found.append("its camera's clipping planes are those of Mitsuba's default: ours has none")
@@ -140,6 +147,15 @@ def _child(mi: Any, state: Any, parent: int, kind: Any, plugin: str) -> int:
     index = len(state.nodes) - 1
     state.nodes[parent].props[f"added_{plugin}"] = mi.Properties.ResolvedReference(index)
     return index
+
+
+def _with_black_environment(mi: Any, state: Any) -> None:
+    node = mi.parser.SceneNode()
+    node.type, node.props = mi.ObjectType.Emitter, mi.Properties(BLACK["type"])
+    node.props["radiance"] = 0.0
+    node.props["sampling_weight"] = BLACK["sampling_weight"]
+    state.nodes.append(node)
+    state.nodes[0].props["added_black"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
 
 
 def _resize(film: Any, scene: Scene) -> None:

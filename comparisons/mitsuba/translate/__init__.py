@@ -23,7 +23,9 @@ from comparisons.mitsuba.translate.cameras import translate_camera
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.film import translate_film, translate_sampler
 from comparisons.mitsuba.translate.integrators import (
+    BLACK,
     counts_lights_often,
+    drops_light,
     of_solids,
     squares_opacity,
     translate_integrator,
@@ -137,6 +139,8 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
         emitter = translate_light(light, context)
         if emitter is not None:
             plain[light_id(i)] = emitter
+    if drops_light(scene) and not native:
+        plain["black"] = BLACK
     return result
 
 

@@ -5,8 +5,8 @@ from typing import Any
 
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
-from reference_rt.lights import Directional, Point, Projector, Spot
-from reference_rt.materials import Mask
+from reference_rt.lights import Constant, Directional, EnvironmentMap, Point, Projector, Spot
+from reference_rt.materials import Emissive, Mask, ThinDielectric
 from reference_rt.scene.model import SceneModel
 
 
@@ -51,6 +51,25 @@ def squares_opacity(scene: SceneModel) -> bool:
     its integrator `direct` give half of it (Mitsuba 3.9.1)."""
     masks = [m for m in scene.materials.values() if isinstance(m, Mask)]
     return isinstance(scene.integrator, Path) and any(m.opacity not in (0.0, 1.0) for m in masks)
+
+
+BLACK: dict[str, Any] = {
+    "type": "constant",
+    "radiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]},
+    "sampling_weight": 0.0,
+}
+"""An environment without light, which is never sampled."""
+
+
+def drops_light(scene: SceneModel) -> bool:
+    """Whether Mitsuba's integrator `path` would be wrong for a scene: where there is no environment
+    it returns black for a path that only passes straight through surfaces, and so drops the
+    emission of a lamp that lets light pass so.  A thin pane that shines shows 8 % of its radiance,
+    with BLACK all of it, as with `volpath` (Mitsuba 3.9.1)."""
+    environments = any(isinstance(x, Constant | EnvironmentMap) for x in scene.lights)
+    kinds = {type(material) for material in scene.materials.values()}
+    passing = not kinds.isdisjoint((ThinDielectric, Mask))
+    return isinstance(scene.integrator, Path) and not environments and passing and Emissive in kinds
 
 
 def of_solids(integrator: Path | Direct) -> dict[str, Any]:
