@@ -10,13 +10,15 @@ from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF, round32
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import ambient_of
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.light_context import LightContext
+from comparisons.rungs.rays.light_error import changes_of_lamps
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from reference_rt.core.arrays import FloatArray
@@ -37,6 +39,10 @@ MOST_LIGHTS = 256
 CUT_OFF = 1e-18
 """Absolute error, as a fraction of the brightest light: Mitsuba cuts microfacet densities below
 1e-20 off, which matters where a picture has nothing brighter."""
+
+AT_LEAST = 64.0 * UNIT_ROUNDOFF
+"""Relative error of a ray's throughput: the product of some eight factors of each of eight levels.
+Rays with less than a least contribution are not followed."""
 
 MOST_OUTLIERS = (200, 32)
 """Most pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 ray trees for each
@@ -101,9 +107,19 @@ def whitted(
     settled = _explained(
         some,
         ((ours[outliers], ours_along), (theirs[outliers], theirs_along)),
-        _moves(tables, sizes, some, counterpart),
+        _moves(tables, sizes, some, counterpart, integrator.max_depth),
         bound[outliers],
     )
+    for factor in (1.0 - AT_LEAST, 1.0 + AT_LEAST):  # a ray with just the least contribution
+        least = factor * integrator.min_contribution
+        other = integrator.model_copy(update={"min_contribution": least}).setup()
+        again = query.radiance_without_noise(tables, other, some.o, some.d)
+        settled |= np.abs(again - theirs[outliers]).max(axis=1) <= bound[outliers]
+    hits, hits_theirs = query.intersect(tables, *some), trace(counterpart, *some)
+    context = LightContext(scene, tables, counterpart, some, hits, hits_theirs, sizes)
+    low, high = changes_of_lamps(context)
+    off, allowed = theirs[outliers] - ours[outliers], bound[outliers][:, None]
+    settled |= ((off >= low - allowed) & (off <= high + allowed)).all(axis=1)
     unexplained = outliers[~settled]
     right = error <= bound
     ratio = np.divide(error, bound, out=np.zeros_like(error), where=bound > 0.0)[right]
@@ -146,18 +162,19 @@ for others, one seen in the other, by twice as much."""
 
 
 def _moves(
-    tables: SceneTables, sizes: ShapeSizes, rays: Rays, counterpart: Counterpart
+    tables: SceneTables, sizes: ShapeSizes, rays: Rays, counterpart: Counterpart, depth: int
 ) -> list[tuple[FloatArray, float]]:
-    """How far the arbiter moves and turns rays: by float32's bound, by Mitsuba's ray epsilon, and
-    by the errors of meshes that stand in for shapes."""
+    """How far the arbiter moves and turns rays: by float32's bound, by Mitsuba's ray epsilon, once
+    and at each of `depth` surfaces, and by the errors of meshes that stand in for shapes."""
     angle = ROUNDINGS * UNIT_ROUNDOFF
-    found = [(radius, angle) for radius in _radii(tables, sizes, rays)]
+    rounding, epsilon = _radii(tables, sizes, rays)
+    found = [(rounding, angle), (epsilon, angle), (depth * epsilon, angle)]
     stand_ins = [s for some in counterpart.stand_ins().values() for s in some]
     if stand_ins:
         sag, turn = (max(getattr(s, name) for s in stand_ins) for name in ("sag", "turn"))
         if tables.materials.oriented is not None:
             turn += max(s.twist for s in stand_ins)
-        found.append((found[0][0] + sag, angle + BENT * turn))
+        found.append((rounding + sag, angle + BENT * turn))
     return found
 
 

@@ -224,6 +224,30 @@ def is_beside(
     return found
 
 
+def changes_of_lamps(context: LightContext) -> tuple[FloatArray, FloatArray]:
+    """The least and the greatest change, (n, 3) each, of the light that Whitted's ray tracing takes
+    from the middles of textured lamps, within float32's error of (u, v)."""
+    low, high = np.zeros((2, len(context.hits.t), 3))
+    choice = context.tables.lights.choice
+    if choice is None or len(context.hits.t) == 0:
+        return low, high
+    for light in np.flatnonzero((choice.kind == AREA) & (choice.probability > 0.0)).tolist():
+        rays = context.rays
+        ours = query.direct_light(context.tables, rays.o, rays.d, light, MIDDLE)
+        scale = magnified(context, light, ours.target, ours.pdf)
+        if not scale.any():
+            break  # no lamp has a texture
+        values = np.stack([_value_at(context, light, at) for at in _beside(MIDDLE, scale.max())])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            changes = np.nan_to_num((values - ours.contribution) / ours.pdf[:, None])
+        low += np.minimum(changes.min(axis=0), 0.0)
+        high += np.maximum(changes.max(axis=0), 0.0)
+    return low, high
+
+
+MIDDLE = (0.5, 0.5)
+
+
 def _beside(u: tuple[float, float], scale: float) -> list[tuple[float, float]]:
     """The four (u, v) that are `scale` U_STEP away."""
     step = scale * U_STEP
