@@ -237,7 +237,8 @@ def changes_of_lamps(context: LightContext) -> tuple[FloatArray, FloatArray]:
         scale = magnified(context, light, ours.target, ours.pdf)
         if not scale.any():
             break  # no lamp has a texture
-        values = np.stack([_value_at(context, light, at) for at in _beside(MIDDLE, scale.max())])
+        around = _beside(MIDDLE, float(scale.max()), AROUND)
+        values = np.stack([_value_at(context, light, at) for at in around])
         with np.errstate(divide="ignore", invalid="ignore"):
             changes = np.nan_to_num((values - ours.contribution) / ours.pdf[:, None])
         low += np.minimum(changes.min(axis=0), 0.0)
@@ -247,11 +248,14 @@ def changes_of_lamps(context: LightContext) -> tuple[FloatArray, FloatArray]:
 
 MIDDLE = (0.5, 0.5)
 
+AROUND = 16
+"""Points around MIDDLE: the texture of a disk goes round its middle."""
 
-def _beside(u: tuple[float, float], scale: float) -> list[tuple[float, float]]:
-    """The four (u, v) that are `scale` U_STEP away."""
-    step = scale * U_STEP
-    return [(u[0] + x, u[1] + y) for x, y in ((step, 0), (-step, 0), (0, step), (0, -step))]
+
+def _beside(u: tuple[float, float], scale: float, count: int = 4) -> list[tuple[float, float]]:
+    """The (u, v) that are `scale` U_STEP away, in `count` directions."""
+    step, turns = scale * U_STEP, 2.0 * np.pi * np.arange(count) / count
+    return [(u[0] + step * np.cos(a), u[1] + step * np.sin(a)) for a in turns]
 
 
 def _value_at(context: LightContext, light: int, u: tuple[float, float]) -> FloatArray:
