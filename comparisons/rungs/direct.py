@@ -12,15 +12,9 @@ from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.bounds import slide
+from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_image
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of
-from comparisons.rungs.rays.light_error import (
-    bounds,
-    is_beside,
-    magnified,
-    of_stand_ins,
-    slopes_of,
-    slopes_of_image,
-)
+from comparisons.rungs.rays.light_error import bounds, of_stand_ins, slopes_of
 from comparisons.rungs.rays.mitsuba_light import is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import Rays, described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray

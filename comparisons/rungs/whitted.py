@@ -8,7 +8,7 @@ import numpy as np
 
 from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF, round32
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.accuracy import accuracy
+from comparisons.mitsuba.accuracy import accuracy, coat_error
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
@@ -17,15 +17,16 @@ from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import ambient_of
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.lamp_images import changes_of_lamps
 from comparisons.rungs.rays.light_context import LightContext
-from comparisons.rungs.rays.light_error import changes_of_lamps
+from comparisons.rungs.rays.light_error import cut_off
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import ENVIRONMENT, EnvironmentMap
-from reference_rt.materials import Emissive, most_branches
+from reference_rt.lights import ENVIRONMENT
+from reference_rt.materials import most_branches
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Box, Disk, Mesh, Rectangle, Sphere, Triangle
@@ -35,10 +36,6 @@ PIXELS = 128 * 128
 
 MOST_LIGHTS = 256
 """Most lights: each needs a shadow ray at every surface, and more would take minutes."""
-
-CUT_OFF = 1e-18
-"""Absolute error, as a fraction of the brightest light: Mitsuba cuts microfacet densities below
-1e-20 off, which matters where a picture has nothing brighter."""
 
 AT_LEAST = 64.0 * UNIT_ROUNDOFF
 """Relative error of a ray's throughput: the product of some eight factors of each of eight levels.
@@ -81,10 +78,12 @@ def whitted(
     theirs = theirs_at(rays)
     size = np.maximum(np.abs(ours), np.abs(theirs)).max(axis=1)
     lit = size[np.isfinite(size) & (size > 0.0)]
-    bound = TOLERANCE * np.maximum(size, np.percentile(lit, 99.0) if len(lit) else 0.0)
+    bright = np.percentile(lit, 99.0) if len(lit) else 0.0
+    bound = TOLERANCE * np.maximum(size, bright)
+    bound += bright * max((coat_error(scene, name) for name in scene.materials), default=0.0)
     tables_off = max((accuracy(scene, name) for name in scene.materials), default=0.0)
     bound += tables_off * size
-    bound += CUT_OFF * _brightest(scene)
+    bound += cut_off(scene)
     error = np.abs(theirs - ours).max(axis=1)
     sizes = ShapeSizes(scene, counterpart.frame)
     if is_steep(scene):
@@ -176,19 +175,6 @@ def _moves(
             turn += max(s.twist for s in stand_ins)
         found.append((rounding + sag, angle + BENT * turn))
     return found
-
-
-def _brightest(scene: Scene) -> float:
-    """The largest number of radiance, irradiance or intensity of any light, 1 for images."""
-    lamps = [m for m in scene.materials.values() if isinstance(m, Emissive)]
-    found = [0.0]
-    for light in (*scene.lights, *lamps):
-        scale = getattr(light, "scale", 1.0)
-        for name in ("radiance", "irradiance", "intensity"):
-            value = getattr(light, name, 0.0)
-            found.append(scale * (1.0 if isinstance(value, str) else float(np.max(value))))
-        found.append(scale * float(isinstance(light, EnvironmentMap)))
-    return max(found)
 
 
 SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)

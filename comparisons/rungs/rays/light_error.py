@@ -6,24 +6,20 @@ from functools import partial
 import numpy as np
 
 from comparisons.geometry.float32 import UNIT_ROUNDOFF
-from comparisons.mitsuba.accuracy import accuracy
-from comparisons.rungs.rays.arbiter import BoolArray
+from comparisons.mitsuba.accuracy import PASSED, accuracy, coat_error
 from comparisons.rungs.rays.bounds import slide
 from comparisons.rungs.rays.light_context import LightContext, described, kind_of
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.slopes import NEAR, is_steep, moved, slopes, turned
+from comparisons.rungs.rays.slopes import is_steep, moved, slopes, turned
 from reference_rt.core.arrays import FloatArray
-from reference_rt.lights import AREA, DIRECTIONAL, ENVIRONMENT, SPOT, EnvironmentMap, Spot
+from reference_rt.lights import DIRECTIONAL, ENVIRONMENT, SPOT, EnvironmentMap, Spot
 from reference_rt.materials import Emissive
 from reference_rt.rendering import query
+from reference_rt.rendering.scene import Scene
 
 FAINTEST = 1e-12
 """Absolute error, as a fraction of the brightest hit of any light: far above where float32
 underflows, and where Mitsuba cuts off microfacet densities (1e-20)."""
-
-REFRACTED = 4.0 * UNIT_ROUNDOFF
-"""Absolute error of refracted light, as a fraction of the brightest refracted hit: where F is
-nearly 1, 1 - F keeps the rounding of F, some 4 u (measured: 15 % of a value of 5e-8)."""
 
 ROUNDED = 8.0 * UNIT_ROUNDOFF
 """Absolute error of the squared sine at a microfacet: its normal, the product with a direction, and
@@ -32,12 +28,6 @@ the square are rounded some eight times."""
 TURNS = 4.0
 """A ray that is turned by an angle turns the half vector of a highlight by half of it, and that of
 refracted light by 1 / (1 + eta) of it or more: a quarter, for indices up to 3."""
-
-U_STEP = 2.0**-20
-"""Step in (u, v) for the slope of textured lights: float32's error for a light TIMES as far away as
-it is large."""
-
-TIMES = 10.0
 
 
 def bounds(
@@ -69,10 +59,16 @@ def bounds(
         theirs_full = np.nan_to_num(theirs.max(axis=1) / np.abs(their_cosine))
     turn = 2.0 * e / _feature(context) + of_stand_ins(context, "turn")
     relative = turn + 4.0 * e / distance + 16.0 * UNIT_ROUNDOFF
-    relative += _tables_of(context)
-    bound = np.maximum(ours_full, theirs_full) * relative + FAINTEST * brightest
+    relative += _of_leaves(context, accuracy)
+    bound = (
+        np.maximum(ours_full, theirs_full) * relative
+        + FAINTEST * brightest
+        + cut_off(context.scene)
+    )
     through = cosine * np.sum(rays.d * hits.ns, axis=1) > 0.0
-    bound += np.where(through, REFRACTED * value[through].max(initial=0.0), 0.0)
+    coat = _of_leaves(context, coat_error)
+    for passing, share in ((through, PASSED), (coat > 0.0, coat)):
+        bound += np.where(passing, share * value[passing].max(initial=0.0), 0.0)
     bound += np.where(through, np.maximum(value, theirs).max(axis=1), 0.0) * _of_critical(
         context, rays.d, w, hits.ns
     )
@@ -87,13 +83,29 @@ def _feature(context: LightContext) -> FloatArray:
     return np.minimum(context.sizes.feature_of(context.hits), context.theirs.height)
 
 
-def _tables_of(context: LightContext) -> FloatArray:
-    """(n,): relative errors of tabulated materials, see `comparisons.mitsuba.accuracy`."""
-    scene = context.scene
-    leaf = context.sizes.leaf_of(context.hits)
-    names = [of.material for of in context.sizes.leaves]
-    by_leaf = np.array([accuracy(scene, name) for name in names] + [0.0])
-    return np.asarray(by_leaf[leaf])
+def cut_off(scene: Scene) -> float:
+    """The absolute error of light: Mitsuba cuts off microfacet densities below 1e-20, which matters
+    where rays meet nothing brighter.
+
+    A hundred times 1e-20 of the largest radiance, irradiance or intensity of any light, which is 1
+    for images.
+    """
+    lamps = [m for m in scene.materials.values() if isinstance(m, Emissive)]
+    found = [0.0]
+    for light in (*scene.lights, *lamps):
+        scale = getattr(light, "scale", 1.0)
+        for name in ("radiance", "irradiance", "intensity"):
+            value = getattr(light, name, 0.0)
+            found.append(scale * (1.0 if isinstance(value, str) else float(np.max(value))))
+        found.append(scale * float(isinstance(light, EnvironmentMap)))
+    return 1e-18 * max(found)
+
+
+def _of_leaves(context: LightContext, error: Callable[[Scene, str], float]) -> FloatArray:
+    """(n,): an error of the hit materials, see `comparisons.mitsuba.accuracy`."""
+    scene, names = context.scene, [of.material for of in context.sizes.leaves]
+    by_leaf = np.array([error(scene, name) if name else 0.0 for name in names] + [0.0])
+    return np.asarray(by_leaf[context.sizes.leaf_of(context.hits)])
 
 
 def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatArray) -> FloatArray:
@@ -170,107 +182,6 @@ def slopes_of(
                 change = np.abs(value_of(other) - value).max(axis=1)
                 bent = np.maximum(bent, np.where(same, 2.0 * change, 0.0))
     return bent + slopes(value, others, float(value.max(initial=0.0)))
-
-
-def magnified(context: LightContext, light: int, target: FloatArray, pdf: FloatArray) -> FloatArray:
-    """(n,): float32's error of (u, v) on a textured light, in units of U_STEP, at least 1; 0 where
-    its radiance does not vary.
-
-    It is the error of a point across the ray, over the light's size and its cosine:
-    1 / pdf = area cosine / distance² is the solid angle;  target, pdf: see `query.DirectLight`.
-    """
-    if not _has_image(context, light):
-        return np.zeros(len(pdf))
-    if kind_of(context, light) != AREA:
-        return np.ones(len(pdf))
-    w = target - context.hits.p
-    there = query.intersect(context.tables, target - NEAR * w, w)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cosine = np.abs(np.sum(there.n * w, axis=1)) / np.linalg.norm(w, axis=1)
-        size = np.nan_to_num(np.sqrt(pdf / cosine) / TIMES, posinf=1.0)
-    return np.asarray(np.maximum(size, 1.0))
-
-
-def slopes_of_image(
-    context: LightContext,
-    light: int,
-    u: tuple[float, float],
-    value: FloatArray,
-    scale: FloatArray,
-) -> FloatArray:
-    """(n,): how much `value` changes within the errors `scale` (n,) of (u, v): see `magnified`."""
-    if not scale.any():
-        return np.zeros(len(value))
-    others = [partial(_value_at, context, light, at) for at in _beside(u, 1.0)]
-    return scale * slopes(value, others, float(value.max(initial=0.0)))
-
-
-def is_beside(
-    context: LightContext,
-    light: int,
-    u: tuple[float, float],
-    wanted: FloatArray,
-    allowed: FloatArray,
-    scale: FloatArray,
-) -> BoolArray:
-    """(n,): whether the light has Mitsuba's value, `wanted` (n, 3), next to u, up to `allowed`
-    (n,): at the edge of a texel."""
-    found = np.zeros(len(wanted), bool)
-    if not scale.any():
-        return found
-    for at in _beside(u, float(scale.max())):
-        error = np.abs(_value_at(context, light, at) - wanted).max(axis=1)
-        found |= (error <= allowed) & (scale > 0.0)
-    return found
-
-
-def changes_of_lamps(context: LightContext) -> tuple[FloatArray, FloatArray]:
-    """The least and the greatest change, (n, 3) each, of the light that Whitted's ray tracing takes
-    from the middles of textured lamps, within float32's error of (u, v)."""
-    low, high = np.zeros((2, len(context.hits.t), 3))
-    choice = context.tables.lights.choice
-    if choice is None or len(context.hits.t) == 0:
-        return low, high
-    for light in np.flatnonzero((choice.kind == AREA) & (choice.probability > 0.0)).tolist():
-        rays = context.rays
-        ours = query.direct_light(context.tables, rays.o, rays.d, light, MIDDLE)
-        scale = magnified(context, light, ours.target, ours.pdf)
-        if not scale.any():
-            break  # no lamp has a texture
-        around = _beside(MIDDLE, float(scale.max()), AROUND)
-        values = np.stack([_value_at(context, light, at) for at in around])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            changes = np.nan_to_num((values - ours.contribution) / ours.pdf[:, None])
-        low += np.minimum(changes.min(axis=0), 0.0)
-        high += np.maximum(changes.max(axis=0), 0.0)
-    return low, high
-
-
-MIDDLE = (0.5, 0.5)
-
-AROUND = 16
-"""Points around MIDDLE: the texture of a disk goes round its middle."""
-
-
-def _beside(u: tuple[float, float], scale: float, count: int = 4) -> list[tuple[float, float]]:
-    """The (u, v) that are `scale` U_STEP away, in `count` directions."""
-    step, turns = scale * U_STEP, 2.0 * np.pi * np.arange(count) / count
-    return [(u[0] + step * np.cos(a), u[1] + step * np.sin(a)) for a in turns]
-
-
-def _value_at(context: LightContext, light: int, u: tuple[float, float]) -> FloatArray:
-    rays = context.rays
-    found = query.direct_light(context.tables, rays.o, rays.d, light, u)
-    return np.asarray(found.contribution)
-
-
-def _has_image(context: LightContext, light: int) -> bool:
-    """Whether a texture makes the radiance of a light vary over it, or with the direction."""
-    kind, scene = kind_of(context, light), context.scene
-    if kind == ENVIRONMENT:
-        return any(isinstance(described, EnvironmentMap) for described in scene.lights)
-    emissive = (m for m in scene.materials.values() if isinstance(m, Emissive))
-    return kind == AREA and any(isinstance(m.radiance, str) for m in emissive)
 
 
 def of_stand_ins(context: LightContext, field: str) -> FloatArray:
