@@ -14,7 +14,7 @@ from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.integrators import translate_integrator
-from comparisons.mitsuba.translate.lights import ambient_of
+from comparisons.mitsuba.translate.lights import SAMPLED, ambient_of
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
@@ -29,7 +29,7 @@ from reference_rt.lights import ENVIRONMENT
 from reference_rt.materials import most_branches
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
-from reference_rt.shapes import Box, Disk, Mesh, Rectangle, Sphere, Triangle
+from reference_rt.shapes import Box
 
 PIXELS = 128 * 128
 """Most pixels that are compared, evenly strided."""
@@ -175,12 +175,6 @@ def _moves(
             turn += max(s.twist for s in stand_ins)
         found.append((rounding + sag, angle + BENT * turn))
     return found
-
-
-SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
-"""Emissive shapes that are lights, unless a map makes a sphere an ellipsoid: a mesh stands in for
-it.  Other emissive shapes, and those in groups, are visible but light nothing in Whitted ray
-tracing."""
 
 
 def plugin_radiance(

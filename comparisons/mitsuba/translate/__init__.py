@@ -30,7 +30,7 @@ from comparisons.mitsuba.translate.integrators import (
     squares_opacity,
     translate_integrator,
 )
-from comparisons.mitsuba.translate.lights import translate_light
+from comparisons.mitsuba.translate.lights import never_samples, translate_light
 from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
 from comparisons.mitsuba.translate.textures import TranslationContext
@@ -172,6 +172,8 @@ def _add(
         for leaf in member.leaves:
             place = place_of(scene, leaf, copy.outer)
             parts = parts_of(leaf.material, context)
+            if "emitter" in parts and never_samples(scene.integrator, copy, member, leaf, place):
+                parts["emitter"]["sampling_weight"] = 0.0
             site = Site(
                 place=place,
                 parts=parts,
