@@ -11,7 +11,7 @@ from comparisons.mitsuba.translate.integrators import (
     squares_opacity,
 )
 from comparisons.mitsuba.translate.textures import TranslationContext
-from comparisons.mitsuba.translate.wrappers import has_delta, is_wrong_in_mitsuba
+from comparisons.mitsuba.translate.wrappers import has_delta
 from reference_rt.integrators import Direct
 from reference_rt.materials import (
     Blend,
@@ -151,10 +151,11 @@ def _(material: Mask, context: TranslationContext) -> str:
 @note_of.register(Bump)
 @note_of.register(NormalMap)
 def _(material: Bump | NormalMap, context: TranslationContext) -> str:
-    if isinstance(material, Bump) and is_wrong_in_mitsuba(material, context):
+    if isinstance(material, Bump):
         return (
-            "Mitsuba's bump maps are wrong over anisotropic materials, and by rotated images that "
-            "are not square: our plugin is used instead"
+            "Mitsuba's bump maps are wrong over anisotropic materials and by rotated images that "
+            "are not square, and not a number where they are flat and u runs along the z axis: our "
+            "plugin is used instead"
         )
     if material.flip_invalid_normals and material.use_shadowing_function:
         return ""

@@ -25,6 +25,7 @@ from comparisons.results.case import Case, RungResult
 from comparisons.rungs.limited import OF_LIGHT, limited
 from reference_rt.materials import (
     Blend,
+    Bump,
     Mask,
     Phong,
     Plastic,
@@ -185,7 +186,7 @@ def _cause(result: RungResult) -> str:
     return without_numbers(result.reason.partition(";")[0], 80)
 
 
-SLOW = (Blend, Mask, Phong, Plastic, RoughPlastic)
+SLOW = (Blend, Bump, Mask, Phong, Plastic, RoughPlastic)
 """Materials whose counterparts in Mitsuba are our plugins, in Python: some 20 microseconds for each
 evaluation, so that noisy pictures take minutes."""
 

@@ -1,6 +1,6 @@
 """Materials of a user's file for which Mitsuba 3.9.1 is wrong or approximate, replaced in Mitsuba's
 own description of the scene: blends with a perfect mirror, plastics, Beckmann microfacets, and bump
-maps over anisotropic materials or by rotated images.
+maps.
 
 A replacement keeps the element's own parameters, so that our reading of them is checked.
 `comparisons.mitsuba.plugins` proves and corrects each of these errors; `comparisons.mitsuba.notes`
@@ -16,7 +16,6 @@ from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed
 from comparisons.mitsuba.reading.textures import to_uv
 from comparisons.mitsuba.translate.textures import TranslationContext
-from comparisons.mitsuba.translate.wrappers import is_wrong_in_mitsuba
 from reference_rt.materials import (
     Blend,
     Bump,
@@ -42,11 +41,7 @@ def inexact(scene: Scene) -> list[tuple[str, str]]:
     """Mitsuba's plugin, and the note on its error, of each material that Mitsuba has wrong."""
     context = TranslationContext.of(scene)
     materials = [m for m in scene.materials.values() if type(m) in PLUGINS]
-    notes = [
-        (PLUGINS[type(m)], note_of(m, context))
-        for m in materials
-        if not isinstance(m, Bump) or is_wrong_in_mitsuba(m, context)
-    ]
+    notes = [(PLUGINS[type(m)], note_of(m, context)) for m in materials]
     return [(plugin, note) for plugin, note in notes if note]
 
 

@@ -14,7 +14,6 @@ from comparisons.mitsuba.translate.textures import (
     rgb,
     translate_texture,
 )
-from reference_rt.core.image_files import open_image
 from reference_rt.materials import (
     Blend,
     Bump,
@@ -97,47 +96,20 @@ def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
     texture = context.textures[material.height]
     if not isinstance(texture, Bitmap) or texture.filter != "bilinear":
         return base  # no slopes
-    if is_wrong_in_mitsuba(material, context):
-        upright = texture.model_copy(update={"uv": UvMap()})
-        names = ("u_u", "u_v", "u_1", "v_u", "v_v", "v_1")
-        return {
-            "type": "exact_bump",
-            "scale": material.scale,
-            "height": translate_texture(upright, material.height, context, True),
-            "base": base,
-            **dict(zip(names, texture.uv.coefficients().tolist(), strict=True)),
-            **_tilt(material),
-        }
+    if context.native:
+        height = number(material.height, context)
+        own = {"type": "bumpmap", "scale": material.scale, "height": height, "bsdf": base}
+        return {**own, **_tilt(material)}
+    upright = texture.model_copy(update={"uv": UvMap()})
+    names = ("u_u", "u_v", "u_1", "v_u", "v_v", "v_1")
     return {
-        "type": "bumpmap",
+        "type": "exact_bump",
         "scale": material.scale,
-        "height": number(material.height, context),
-        "bsdf": base,
+        "height": translate_texture(upright, material.height, context, True),
+        "base": base,
+        **dict(zip(names, texture.uv.coefficients().tolist(), strict=True)),
         **_tilt(material),
     }
-
-
-def is_wrong_in_mitsuba(material: Bump, context: TranslationContext) -> bool:
-    """Whether Mitsuba's own bump map is wrong: see `comparisons.mitsuba.plugins.exact_bump`."""
-    texture = context.textures[material.height]
-    if not isinstance(texture, Bitmap) or context.native:
-        return False
-    m = texture.uv.coefficients()
-    is_turned = bool(m[1] != 0.0 or m[3] != 0.0)
-    has_grain = any(leaf.oriented for leaf in _leaves(material, context))
-    return has_grain or (is_turned and not _is_square(texture, context))
-
-
-def _is_square(texture: Bitmap, context: TranslationContext) -> bool:
-    image = open_image(context.folder / texture.file)
-    return image.width == image.height
-
-
-def _leaves(material: Material, context: TranslationContext) -> list[Material]:
-    """The BSDF leaves of a material."""
-    if isinstance(material, Wrapper):
-        return [leaf for base in _bases(material, context) for leaf in _leaves(base, context)]
-    return [material]
 
 
 @translate_material.register

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 from counterparts import coarse_meshes, faulty_counterpart
+from PIL import Image
 
 from comparisons.compare.pictures import whitted as whitted_pictures
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba, wrappers
+from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
+from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.rungs import direct, geometry, whitted
 from reference_rt.rendering.scene import Scene
 
@@ -203,10 +205,42 @@ def test_bumps_that_mitsuba_gets_wrong(
     assert "our plugin" in " ".join(notes_of(scene))
 
 
+def with_mitsubas_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Translate materials to Mitsuba's own, as for a file."""
+    of = TranslationContext.of
+    monkeypatch.setattr(TranslationContext, "of", lambda scene, _=False: of(scene, True))
+
+
+FLAT = """
+camera: {type: perspective, eye: [4, 0.5, 1], target: [0, 0, 0], fov: 40}
+film: {width: 24, height: 16}
+textures: {w: {type: bitmap, file: flat.png, encoding: raw}}
+materials:
+  b: {type: bump, base: m, height: w}
+  m: {type: rough_conductor, eta: 1, k: 2, alpha: 0.3}
+shapes: [{type: rectangle, material: b, transform: [{rotate: {axis: [0, 1, 0], degrees: 90}}]}]
+lights: [{type: point, position: [5, 3, 2], intensity: 9}]
+"""
+
+
+def test_flat_bumps_with_u_along_the_z_axis(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whose tangent is 0 / 0 in Mitsuba's own: black, or not a number."""
+    Image.new("L", (4, 4), 128).save(tmp_path / "flat.png")
+    scene = Scene.parse(FLAT, folder=tmp_path)
+    rung = direct(scene, scene.tables, load(scene), 300)
+    assert rung.status == "agree", rung.reason
+    with_mitsubas_own(monkeypatch)
+    own = direct(scene, scene.tables, load(scene), 300)
+    assert own.status == "differ"
+    assert "Mitsuba's [0. 0. 0.]" in own.reason
+
+
 def test_mitsubas_own_bumps_are_wrong_there(
     image_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wrappers, "is_wrong_in_mitsuba", lambda *_: False)
+    with_mitsubas_own(monkeypatch)
     for image, uv, alpha in (
         ("heights.png", "{scale: 3}", "[0.15, 0.5]"),
         ("wide.png", "{scale: [3, 2], rotate: 30}", "0.4"),
