@@ -4,7 +4,7 @@ It is made from the description alone, not from our tables: their expansion of n
 trees is under test too.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from reference_rt.core import transform
@@ -17,7 +17,8 @@ from reference_rt.shapes.shape import Shape, TabulationContext
 
 class Leaf(NamedTuple):
     """A primitive shape: its description;  outer: the map applied after its own transform;  the
-    name of its material;  part: its number in its group or its solid."""
+    name of its material;  part: its number in its solid, or in its group, where the operands of
+    solids count one by one."""
 
     shape: Shape
     outer: Affine
@@ -63,12 +64,7 @@ def place_of(scene: Scene, leaf: Leaf, outer: Affine) -> TabulationContext:
 def copies_of(scene: Scene) -> list[Copy]:
     """Everything that rays can hit.  A nested group expands to its own shapes first, then to those
     of its instances, in order."""
-    groups = {
-        name: tuple(
-            member_of(shape, k) for k, shape in enumerate(shapes) if not isinstance(shape, Instance)
-        )
-        for name, shapes in scene.groups.items()
-    }
+    groups = {name: tuple(_members(shapes)) for name, shapes in scene.groups.items()}
     found: list[Copy] = []
     for i, shape in enumerate(scene.shapes):
         if isinstance(shape, Instance):
@@ -77,6 +73,18 @@ def copies_of(scene: Scene) -> list[Copy]:
         else:
             found.append(Copy(i, -1, "", (member_of(shape, 0),), transform.identity()))
     return found
+
+
+def _members(shapes: Sequence[Shape]) -> Iterator[Member]:
+    """The members of a group."""
+    number = 0
+    for shape in shapes:
+        if isinstance(shape, Instance):
+            number += 1
+        else:
+            member = member_of(shape, number)
+            number += len(member.leaves)
+            yield member
 
 
 def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple[str, Affine]]:
@@ -92,14 +100,14 @@ def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple
 
 
 def member_of(shape: Shape, number: int) -> Member:
-    """The member for a shape that is no instance, with index `number` in its group."""
+    """The member for a shape that is no instance;  number: of its first leaf in its group."""
     if not isinstance(shape, Solid):
         leaf = Leaf(shape, transform.identity(), shape.material, number)
         return Member((leaf,), None)
     leaves: list[Leaf] = []
     tree = _tree(shape, transform.identity(), None, leaves)
     assert isinstance(tree, Tree)
-    return Member(tuple(leaves), tree)
+    return Member(tuple(leaf._replace(part=number + leaf.part) for leaf in leaves), tree)
 
 
 def _tree(shape: Shape, outer: Affine, material: str | None, leaves: list[Leaf]) -> Tree | int:

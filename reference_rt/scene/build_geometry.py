@@ -154,7 +154,8 @@ class _Assembly:
         for k, (_, _, name, turned) in enumerate(operands):
             operand, outer = seen[k]
             try:
-                place = self.part(self.parts[owner][0], k, name, len(self.solids), turned)
+                whole, number = self.parts[owner][:2]
+                place = self.part(whole, number + k, name, len(self.solids), turned)
                 self.paths[place.owner] = self.path_of(owner)
                 boxes.append(self.operand(operand, place._replace(outer=outer)))
             except ValueError as error:
@@ -234,6 +235,7 @@ class _Assembly:
     def _expansion(self, name: str, path: Sequence[str]) -> tuple[IntArray, FloatArray]:
         references: list[TableRows] = []
         trees, maps = [], []
+        more = 0  # operands of solids so far, beyond one for each solid
         for k, shape in enumerate(self.scene.groups[name]):
             try:
                 if isinstance(shape, Instance):
@@ -242,12 +244,14 @@ class _Assembly:
                     maps.append(inner)
                     _check_count(sum(map(len, trees)))
                 else:
-                    owner = self.part(-1, k, shape.material).owner
+                    owner = self.part(-1, k + more, shape.material).owner
                     self.paths[owner] = ("groups", name, k)
                     reference = self.member(shape, owner, None)
                     if not np.isfinite(self.box_of(reference)).all():
                         raise ValueError("it is infinite; expected a shape of a finite size")
                     references.append(reference)
+                    if isinstance(shape, Solid):
+                        more += len(list(csg.operands_of(shape, identity(), None))) - 1
             except ValueError as error:
                 raise self.scene.error(str(error), "groups", name, k) from None
         if references:

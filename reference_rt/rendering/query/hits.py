@@ -39,8 +39,8 @@ class Hits:
     t (n,): inf for a miss;  shape (n,): index in the scene's shapes, -1 for a miss;  primitive
     (n,): number of the triangle in its mesh file, counting triangles that the reader drops (see
     `MeshData`), or of the face of a shape (box: axis, + 3 on the positive side);  part (n,): number
-    of the operand in its solid, or of the shape in its group;  instance (n,): number of the group's
-    copy, -1 outside groups.
+    of the operand in its solid, or of the shape in its group, where the operands of a solid count
+    one by one;  instance (n,): number of the group's copy, -1 outside groups.
     """
 
     t: FloatArray
