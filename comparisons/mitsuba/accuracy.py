@@ -16,7 +16,15 @@ from comparisons.mitsuba.translate.materials import translate_material
 from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
-from reference_rt.materials import Emissive, Material, Plastic, Principled, RoughPlastic, Wrapper
+from reference_rt.materials import (
+    Emissive,
+    Material,
+    Plastic,
+    Principled,
+    PrincipledThin,
+    RoughPlastic,
+    Wrapper,
+)
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures import NO_TEXTURES, At
 
@@ -41,8 +49,11 @@ def _relative(material: Material) -> float:
         # Only the base is tabulated.  White maximises interreflection between base and coat.
         white = {"reflectance": (1.0, 1.0, 1.0), "specular": (0.0, 0.0, 0.0)}
         return min(MOST, MARGIN * table_error(material.model_copy(update=white)))
-    if isinstance(material, Principled) and material.clearcoat != 0.0:
-        return min(MOST, clearcoat_error(material))
+    if isinstance(material, Principled | PrincipledThin):
+        coat = 0.0
+        if isinstance(material, Principled) and material.clearcoat != 0.0:
+            coat = min(MOST, clearcoat_error(material))
+        return coat + tint_error(material) + min(MOST, rest_error(material))
     return 0.0
 
 
@@ -92,6 +103,28 @@ critical angle our tables are up to 1e-2 off for each of two directions (measure
 FAINT = 1e-5
 """Least light of a pair of directions that is compared, as a fraction of the brightest pair's: some
 forty times PASSED."""
+
+
+def rest_error(material: Principled | PrincipledThin) -> float:
+    """The relative error of 1 - x in float32, the share of a lobe next to one with the share x."""
+    shares = (getattr(material, name, 0.0) for name in ("spec_trans", "metallic"))
+    numbers = [x for x in shares if not isinstance(x, str) and x < 1.0]
+    return max((UNIT_ROUNDOFF * x / (1.0 - x) for x in numbers), default=0.0)
+
+
+OURS, THEIRS = (0.2126, 0.7152, 0.0722), (0.212671, 0.715160, 0.072169)
+"""Luminance of linear sRGB: rounded as in Rec. 709, and Mitsuba's `mi.luminance`."""
+
+
+def tint_error(material: Principled | PrincipledThin) -> float:
+    """The relative difference of a base colour's luminance in the two renderers: tinted highlights
+    and sheen are the base colour over its luminance."""
+    if not any(getattr(material, name) for name in ("spec_tint", "sheen_tint")):
+        return 0.0
+    colours = np.eye(3) if isinstance(material.base_colour, str) else [material.base_colour]
+    ours, theirs = (np.array(colours) @ weights for weights in (OURS, THEIRS))
+    lit = ours > 0.0
+    return float(np.abs(theirs[lit] / ours[lit] - 1.0).max(initial=0.0))
 
 
 @functools.lru_cache(maxsize=64)

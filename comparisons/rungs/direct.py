@@ -167,7 +167,9 @@ def _compare(
     """One point of one light at all hits;  brightest: the largest value of all lights' points."""
     rays, hits, tables = context.rays, context.hits, context.tables
     target = _targets(ours)
-    known = np.flatnonzero((hits.shape >= 0) & np.isfinite(target).all(axis=1))
+    known = np.flatnonzero(
+        (hits.shape >= 0) & np.isfinite(target).all(axis=1) & ~_in_plane(context, target)
+    )
     if len(known) == 0:
         none = np.zeros((0, 3))
         return Outcome(0, known, none, none, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
@@ -216,6 +218,14 @@ def _compare(
         ratio=value[lit].sum(axis=1) / theirs[lit].sum(axis=1),
         cosine=np.abs(their_cosine[lit]),
     )
+
+
+def _in_plane(context: LightContext, target: FloatArray) -> arbiter.BoolArray:
+    """(n,): whether the point on the light lies in the plane of the surface that is lit, within
+    float32's error: on the lamp's own triangle, for example.  Which side it lights is not known."""
+    rays, hits, sizes = context.rays, context.hits, context.sizes
+    height = np.abs(np.sum((target - hits.p) * hits.n, axis=1))
+    return np.asarray(height <= sizes.frame.delta(rays.o, hits.p, sizes.reach_of(hits.shape)))
 
 
 def _targets(ours: DirectLight) -> FloatArray:
