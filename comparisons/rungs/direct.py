@@ -8,21 +8,20 @@ import numpy as np
 
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
-from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.bounds import slide
+from comparisons.rungs.rays.coincidence import on_two_surfaces
 from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_image
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of
 from comparisons.rungs.rays.light_error import bounds, of_stand_ins, slopes_of
 from comparisons.rungs.rays.mitsuba_light import is_dark, mitsuba_direct
-from comparisons.rungs.rays.rays import Rays, described, mixed_rays
+from comparisons.rungs.rays.rays import described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import PROJECTOR, SPOT
 from reference_rt.materials import any_smooth
 from reference_rt.rendering import query
-from reference_rt.rendering.query import DirectLight, Intersections
+from reference_rt.rendering.query import DirectLight
 from reference_rt.rendering.scene import Scene
 
 PIXELS = 1024
@@ -77,7 +76,7 @@ def direct(
     sizes = ShapeSizes(scene, counterpart.frame)
     rays = mixed_rays(scene, tables, sizes, pixels, seed, counterpart.sags())
     hits, theirs = query.intersect(tables, rays.o, rays.d), trace(counterpart, rays.o, rays.d)
-    hits.shape[_in_one_place(sizes, rays, hits, theirs)] = -1
+    hits.shape[on_two_surfaces(sizes, rays, hits, theirs)] = -1
     context = LightContext(scene, tables, counterpart, rays, hits, theirs, sizes)
     lights = np.flatnonzero(choice.probability > 0.0)
     count = len(lights)
@@ -125,20 +124,6 @@ def direct(
         f"{numbers['max_error_over_bound']:.2g} times float32's bound; {shadows}"
     )
     return RungResult("direct", "agree", reason, numbers)
-
-
-def _in_one_place(
-    sizes: ShapeSizes, rays: Rays, ours: Intersections, theirs: MitsubaHits
-) -> arbiter.BoolArray:
-    """(n,): whether a ray hits two surfaces in one place, of which each renderer reports another
-    one: they may have different materials, and the rung of geometry judges them."""
-    other = np.zeros(len(rays.o), bool)
-    for name in ("shape", "instance", "part", "primitive"):
-        other |= getattr(ours, name) != getattr(theirs, name)
-    e = slide(sizes, rays.o, rays.d, ours, theirs.sag)
-    with np.errstate(invalid="ignore"):  # misses
-        here = np.abs(theirs.t - ours.t) * np.linalg.norm(rays.d, axis=1) <= e
-    return np.asarray(other & here)
 
 
 def _ratios(outcomes: Sequence[Outcome]) -> dict[str, float]:

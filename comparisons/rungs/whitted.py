@@ -17,6 +17,7 @@ from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import SAMPLED, ambient_of
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.coincidence import on_two_surfaces
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
 from comparisons.rungs.rays.light_context import LightContext
 from comparisons.rungs.rays.light_error import cut_off
@@ -85,7 +86,9 @@ def whitted(
     bound += tables_off * size
     bound += cut_off(scene)
     error = np.abs(theirs - ours).max(axis=1)
+    ours_hits, their_hits = query.intersect(tables, *rays), trace(counterpart, *rays)
     sizes = ShapeSizes(scene, counterpart.frame)
+    error[on_two_surfaces(sizes, rays, ours_hits, their_hits)] = 0.0
     if is_steep(scene):
         over = np.flatnonzero(~(error <= bound))
         few = rays.rows(over)
@@ -114,9 +117,8 @@ def whitted(
         other = integrator.model_copy(update={"min_contribution": least}).setup()
         again = query.radiance_without_noise(tables, other, some.o, some.d)
         settled |= np.abs(again - theirs[outliers]).max(axis=1) <= bound[outliers]
-    hits, hits_theirs = query.intersect(tables, *some), trace(counterpart, *some)
-    context = LightContext(scene, tables, counterpart, some, hits, hits_theirs, sizes)
-    low, high = changes_of_lamps(context)
+    context = LightContext(scene, tables, counterpart, rays, ours_hits, their_hits, sizes)
+    low, high = changes_of_lamps(context.of(outliers))
     off, allowed = theirs[outliers] - ours[outliers], bound[outliers][:, None]
     settled |= ((off >= low - allowed) & (off <= high + allowed)).all(axis=1)
     unexplained = outliers[~settled]

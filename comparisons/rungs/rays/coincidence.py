@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
 from comparisons.rungs.rays.bounds import slide
@@ -111,6 +112,20 @@ def in_one_place(comparer: Comparer, traced: Any, numbers: IntArray) -> BoolArra
     parallel = np.abs(np.sum(ours.n * theirs.n, axis=1)) >= 1.0 - 1e-6
     other = (traced.ratios[numbers, :DISCRETE] > 1.0).any(axis=1)
     return np.asarray(near & parallel & other & (ours.shape >= 0) & (theirs.shape >= 0))
+
+
+def on_two_surfaces(
+    sizes: ShapeSizes, rays: Rays, ours: Intersections, theirs: MitsubaHits
+) -> BoolArray:
+    """(n,): whether a ray hits two surfaces in one place, of which each renderer reports another
+    one: they may have different materials, and the rung of geometry judges them."""
+    other = np.zeros(len(rays.o), bool)
+    for name in KINDS[1:DISCRETE]:
+        other |= getattr(ours, name) != getattr(theirs, name)
+    e = slide(sizes, rays.o, rays.d, ours, theirs.sag)
+    with np.errstate(invalid="ignore"):  # misses
+        here = np.abs(theirs.t - ours.t) * np.linalg.norm(rays.d, axis=1) <= e
+    return np.asarray(other & here)
 
 
 def _as_one_part(
