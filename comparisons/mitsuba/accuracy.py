@@ -17,8 +17,10 @@ from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials import (
+    Bump,
     Emissive,
     Material,
+    NormalMap,
     Plastic,
     Principled,
     PrincipledThin,
@@ -61,6 +63,17 @@ def coat_error(scene: Scene, name: str | None) -> float:
     """The absolute error of light that passes a coat, as a fraction of the brightest such light; 0
     for materials without a coat, and for None."""
     return max(map(_absolute, _leaves(scene, name)), default=0.0)
+
+
+def is_tilted(scene: Scene, name: str | None) -> bool:
+    """Whether material `name` has a bump or normal map on the outside, under wrappers at most."""
+    if name is None:
+        return False
+    material = scene.materials[name]
+    if isinstance(material, Bump | NormalMap):
+        return True
+    fields = material.bases if isinstance(material, Wrapper) else ("base",)
+    return any(is_tilted(scene, getattr(material, field, None)) for field in fields)
 
 
 def _absolute(material: Material) -> float:

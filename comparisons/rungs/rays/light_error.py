@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from comparisons.geometry.float32 import UNIT_ROUNDOFF
-from comparisons.mitsuba.accuracy import PASSED, accuracy, coat_error
+from comparisons.mitsuba.accuracy import PASSED, accuracy, coat_error, is_tilted
 from comparisons.rungs.rays.bounds import slide
 from comparisons.rungs.rays.light_context import LightContext, described, kind_of
 from comparisons.rungs.rays.rays import Rays
@@ -60,11 +60,11 @@ def bounds(
     turn = 2.0 * e / _feature(context) + of_stand_ins(context, "turn")
     relative = turn + 4.0 * e / distance + 16.0 * UNIT_ROUNDOFF
     relative += _of_leaves(context, accuracy)
-    bound = (
-        np.maximum(ours_full, theirs_full) * relative
-        + FAINTEST * brightest
-        + cut_off(context.scene)
-    )
+    full = np.maximum(ours_full, theirs_full)
+    # The cosine to a mapped normal is not that to the shading normal, and may be near 0.
+    tilted = _of_leaves(context, is_tilted) > 0.0
+    full = np.where(tilted, np.maximum(full, brightest), full)
+    bound = full * relative + FAINTEST * brightest + cut_off(context.scene)
     through = cosine * np.sum(rays.d * hits.ns, axis=1) > 0.0
     coat = _of_leaves(context, coat_error)
     for passing, share in ((through, PASSED), (coat > 0.0, coat)):
