@@ -10,7 +10,7 @@ from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.coincidence import on_two_surfaces
+from comparisons.rungs.rays.coincidence import is_doubled, on_two_surfaces
 from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_image
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of
 from comparisons.rungs.rays.light_error import bounds, of_stand_ins, slopes_of
@@ -18,7 +18,7 @@ from comparisons.rungs.rays.mitsuba_light import is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import PROJECTOR, SPOT
+from reference_rt.lights import AREA, PROJECTOR, SPOT
 from reference_rt.materials import any_smooth
 from reference_rt.rendering import query
 from reference_rt.rendering.query import DirectLight
@@ -186,7 +186,10 @@ def _compare(
     radius += of_stand_ins(context, "sag")
     settled = arbiter.explained(wrong, radius[wrong], like_theirs)
     allowed = 2.0 * bound[wrong]
-    settled |= is_beside(context.of(wrong), light, u, theirs[wrong], allowed, scale[wrong])
+    some = context.of(wrong)
+    settled |= is_beside(some, light, u, theirs[wrong], allowed, scale[wrong])
+    if kind_of(context, light) == AREA:
+        settled |= is_doubled(context.sizes, tables, some.hits.p, target[wrong])
     right = error <= bound
     left = wrong[~settled]
     lit = left[value[left].any(axis=1) & theirs[left].any(axis=1)]

@@ -11,8 +11,9 @@ from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
 from comparisons.rungs.rays.bounds import slide
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays
-from reference_rt.core.arrays import IntArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.transform import Translate
+from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
@@ -126,6 +127,19 @@ def on_two_surfaces(
     with np.errstate(invalid="ignore"):  # misses
         here = np.abs(theirs.t - ours.t) * np.linalg.norm(rays.d, axis=1) <= e
     return np.asarray(other & here)
+
+
+def is_doubled(
+    sizes: ShapeSizes, tables: SceneTables, p: FloatArray, target: FloatArray
+) -> BoolArray:
+    """(n,): whether the line from p to `target`, (n, 3) each, crosses two surfaces at the target
+    that float32 cannot tell apart: lamps that are thinner than its error, with a dark back."""
+    w = target - p
+    crossed = query.crossings(tables, p, w)
+    ray = crossed.ray
+    e = slide(sizes, p[ray], w[ray], _as_hits(crossed))
+    near = np.abs(crossed.t - 1.0) * np.linalg.norm(w[ray], axis=1) <= e
+    return np.asarray(np.bincount(ray[near], minlength=len(p)) > 1)
 
 
 def _as_one_part(
