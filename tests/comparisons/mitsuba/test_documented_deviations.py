@@ -10,10 +10,13 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba import translate
+from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.plastic_error import COSINES, base_error
 from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
+from comparisons.mitsuba.scene import picture
+from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.materials import translate_material
 from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.materials import Blend, Diffuse, Mirror, Plastic, RoughPlastic
@@ -173,3 +176,29 @@ def test_notes_of_blends_have_the_law():
     }  # fmt: skip
     (note,) = notes_of(Scene(materials=materials))
     assert "(w + (1 - w) f) / (w + (1 - w) p)" in note
+
+
+PANE = """
+camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 20}
+film: {width: 8, height: 8}
+integrator: {type: path, max_depth: 5}
+materials:
+  glass: {type: thin_dielectric}
+  black: {type: diffuse, reflectance: 0}
+  veil: {type: mask, base: black, opacity: 0}
+  lamp: {type: emissive, radiance: 1, base: BASE}
+shapes: [{type: rectangle, material: lamp}]
+"""
+
+
+@pytest.mark.parametrize("base", ["glass", "veil"])
+def test_lamps_that_let_light_pass_straight_through(base, monkeypatch):
+    """Without an environment Mitsuba's path tracer drops their light; with a black one it does
+    not."""
+    scene = Scene.parse(PANE.replace("BASE", base))
+    assert "black environment" in " ".join(notes_of(scene))
+    with scalar():
+        assert picture(load(scene).mi_scene, 64, 0).mean() == pytest.approx(1.0, abs=1e-6)
+        monkeypatch.setattr(translate, "drops_light", lambda scene: False)
+        own = picture(load(scene).mi_scene, 64, 0).mean()
+    assert own < 0.2

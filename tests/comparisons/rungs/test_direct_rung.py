@@ -1,8 +1,12 @@
 """The rung of direct light finds small faults where it allows for Mitsuba's errors."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 from builders import SCENES
 from counterparts import faulty_counterpart
+from PIL import Image
 
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.translate import load
@@ -51,3 +55,124 @@ def test_light_beyond_the_edge_of_a_spot_is_found() -> None:
         scene = Scene.parse(SPOT)
         found = direct(scene, scene.tables, faulty, 300)
     assert found.status == "differ"
+
+
+TEXELS = """
+camera: {{type: perspective, eye: [0, -6, 3], target: [0, 0, 0], up: [0, 0, 1]}}
+film: {{width: 16, height: 12}}
+textures: {{tiles: {{type: bitmap, file: tiles.png, filter: nearest{}}}}}
+materials: {{lamp: {{type: emissive, radiance: tiles}}}}
+shapes:
+  - {{type: rectangle, transform: [{{scale: 5}}, {{translate: [0, 0, -2]}}]}}
+  - {{{}, material: lamp,
+     transform: [{{rotate: {{axis: [1, 0, 0], degrees: 180}}}}, {{scale: 0.5}}]}}
+"""
+
+LAMPS = {
+    "rectangle": "type: rectangle",
+    "disk": "type: disk",
+    "sphere": "type: sphere",
+    "box": "type: box",
+    "triangle": "type: triangle, v0: [-1, -1, 0], v1: [1, -1, 0], v2: [0, 1, 0]",
+}
+
+
+@pytest.mark.parametrize("lamp", LAMPS)
+def test_edges_of_texels_on_lamps(lamp: str, tmp_path: Path) -> None:
+    """float32 takes either texel; a shift by a tenth of a texel elsewhere is found."""
+    texels = np.random.default_rng(3).integers(20, 255, (8, 8, 3), dtype=np.uint8)
+    Image.fromarray(texels).save(tmp_path / "tiles.png")
+    text, wrong = (TEXELS.format(uv, LAMPS[lamp]) for uv in ("", ", uv: {offset: [0.1, 0.1]}"))
+    scene = Scene.parse(text, folder=tmp_path)
+    with scalar():
+        right = direct(scene, scene.tables, load(scene), 100)
+        faulty = load(Scene.parse(wrong, folder=tmp_path))
+        found = direct(scene, scene.tables, faulty, 100)
+    assert right.status in ("agree", "reference-limited"), right.reason
+    assert found.status == "differ"
+
+
+FAR = """
+camera: {type: perspective, eye: [0, -6, 3], target: [0, 0, 0], up: [0, 0, 1]}
+film: {width: 16, height: 12}
+textures: {noise: {type: bitmap, file: noise.png}}
+materials: {lamp: {type: emissive, radiance: noise}}
+shapes:
+  - {type: rectangle, transform: [{scale: 5}, {translate: [0, 0, -2]}]}
+  - {type: rectangle, material: lamp, transform: [{rotate: {axis: [1, 0, 0], degrees: -89.7}},
+     {scale: 0.3}, {translate: [0, 9, -1.98]}]}
+"""
+
+
+def test_textured_lamps_far_away_at_grazing_angles(tmp_path: Path) -> None:
+    """float32 moves the point on the lamp by some texels."""
+    texels = np.random.default_rng(4).integers(0, 255, (256, 256, 3), dtype=np.uint8)
+    Image.fromarray(texels).save(tmp_path / "noise.png")
+    scene = Scene.parse(FAR, folder=tmp_path)
+    with scalar():
+        found = direct(scene, scene.tables, load(scene), 300)
+    assert found.status in ("agree", "reference-limited"), found.reason
+
+
+IN_ONE_PLACE = {
+    "two planes": """
+  - {type: plane, material: red, transform: [{rotate: {axis: [1, 0.3, 0], degrees: -70}}]}
+  - {type: plane, material: blue, transform: [{scale: [0.7, 0.9, -0.4]},
+     {rotate: {axis: [1, 0.3, 0], degrees: -70}}]}""",
+    "the lamp's own triangles": """
+  - type: mesh
+    material: lamp
+    smooth: true
+    vertices: [[0.97, 0.97, 0.97], [0.98, -0.98, -0.98], [-0.56, 0.56, -0.56], [-0.55, -0.55, 0.55]]
+    faces: [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]""",
+    "a lamp without thickness": """
+  - {type: rectangle, transform: [{scale: 9}, {translate: [0, 0, -2]}]}
+  - type: mesh
+    material: lamp
+    transform: [{rotate: {axis: [1, 2, 0], degrees: 100}}]
+    vertices: [[-1, -1, 0], [1, -1, 0], [0, 1, 0], [0, 0, 1.0e-12]]
+    faces: [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]""",
+}
+
+
+@pytest.mark.parametrize("which", IN_ONE_PLACE)
+def test_surfaces_in_one_place(which: str) -> None:
+    """Of which each renderer may report another one, or another side."""
+    scene = Scene.parse(
+        "camera: {type: perspective, eye: [2, 1, 3], target: [0, 0, 0]}\n"
+        "film: {width: 24, height: 18}\n"
+        "materials: {red: {type: diffuse, reflectance: [0.8, 0.1, 0.1]}, blue: {type: diffuse,\n"
+        "  reflectance: [0.1, 0.1, 0.8]}, base: {type: principled_thin, diff_trans: 0.4},\n"
+        "  lamp: {type: emissive, radiance: 3, base: base}}\n"
+        f"shapes:{IN_ONE_PLACE[which]}\n"
+        "lights: [{type: constant, radiance: 1}]\n"
+    )
+    with scalar():
+        found = direct(scene, scene.tables, load(scene), 200)
+    assert found.status in ("agree", "reference-limited"), found.reason
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        "type: principled_thin, base_colour: [0.83, 0.4, 0.01], spec_tint: 0.9, spec_trans: 0.7",
+        "type: principled_thin, roughness: 0.08, spec_trans: 0.999",
+        "type: principled, metallic: 0.9999, sheen: 0.5, sheen_tint: 1",
+        "type: rough_plastic, interior_ior: 1.18, exterior_ior: 1.33, distribution: beckmann",
+        "type: rough_plastic, interior_ior: 1.33, exterior_ior: 1.33",
+        "type: plastic, interior_ior: 1.1, exterior_ior: 1.4",
+    ],
+)
+def test_materials_that_float32_and_tables_amplify(material: str) -> None:
+    scene = Scene.parse(
+        "camera: {type: perspective, eye: [0.4, 1, 4], target: [0, 0, 0], fov: 50}\n"
+        "film: {width: 24, height: 18}\n"
+        f"materials: {{m: {{{material}}}}}\n"
+        "shapes: [{type: sphere, material: m}, {type: rectangle, material: m,\n"
+        "  transform: [{scale: 3}, {translate: [0, 0, -2]}]}]\n"
+        "lights: [{type: constant, radiance: 1},\n"
+        "  {type: point, position: [1, 3, 4], intensity: 9}]\n"
+    )
+    with scalar():
+        found = direct(scene, scene.tables, load(scene), 300)
+    assert found.status == "agree", found.reason

@@ -223,3 +223,47 @@ def test_triangles_of_a_lamp_that_hide_others_of_it() -> None:
         found = whitted(scene, scene.tables, load(scene))
     assert found.status == "agree", found.reason
     assert found.numbers["explained"] <= 3
+
+
+VEILS = """
+camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 40}
+film: {width: 8, height: 8}
+integrator: {type: whitted}
+materials:
+  black: {type: diffuse, reflectance: 0}
+  veil: {type: mask, base: black, opacity: 0.99}
+  lamp: {type: emissive, radiance: 1000}
+shapes:
+  - {type: rectangle, material: veil, transform: [{scale: 3}]}
+  - {type: rectangle, material: veil, transform: [{scale: 3}, {translate: [0, 0, -0.5]}]}
+  - {type: rectangle, material: lamp, transform: [{scale: 3}, {translate: [0, 0, -1]}]}
+"""
+
+
+def test_rays_with_just_the_least_contribution() -> None:
+    """0.01 times 0.01, which float32 rounds to less: each of such pixels is explained."""
+    scene = Scene.parse(VEILS)
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene))
+        other = load(Scene.parse(VEILS.replace("0.99", "0.98")))
+        wrong = whitted(scene, scene.tables, other)
+    assert found.status in ("agree", "reference-limited"), found.reason
+    assert wrong.status == "differ"
+
+
+def test_two_planes_in_one_place() -> None:
+    """Of which each renderer reports another one, with another material."""
+    scene = Scene.parse("""
+camera: {type: perspective, eye: [2, 1, 3], target: [0, 0, 0]}
+film: {width: 24, height: 18}
+materials: {red: {type: diffuse, reflectance: [0.8, 0.1, 0.1]}, blue: {type: diffuse,
+  reflectance: [0.1, 0.1, 0.8]}}
+shapes:
+  - {type: plane, material: red, transform: [{rotate: {axis: [1, 0.3, 0], degrees: -70}}]}
+  - {type: plane, material: blue, transform: [{scale: [0.7, 0.9, -0.4]},
+     {rotate: {axis: [1, 0.3, 0], degrees: -70}}]}
+lights: [{type: point, position: [1, 3, 4], intensity: 9}]
+""")
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene))
+    assert found.status in ("agree", "reference-limited"), found.reason
