@@ -116,17 +116,20 @@ def in_one_place(comparer: Comparer, traced: Any, numbers: IntArray) -> BoolArra
 
 
 def on_two_surfaces(
-    sizes: ShapeSizes, rays: Rays, ours: Intersections, theirs: MitsubaHits
+    sizes: ShapeSizes, tables: SceneTables, rays: Rays, ours: Intersections, theirs: MitsubaHits
 ) -> BoolArray:
-    """(n,): whether a ray hits two surfaces in one place, of which each renderer reports another
-    one: they may have different materials, and the rung of geometry judges them."""
+    """(n,): whether a ray hits two surfaces of ours in one place, of which each renderer reports
+    another one: they may have different materials, and the rung of geometry judges them."""
     other = np.zeros(len(rays.o), bool)
     for name in KINDS[1:DISCRETE]:
         other |= getattr(ours, name) != getattr(theirs, name)
     e = slide(sizes, rays.o, rays.d, ours, theirs.sag)
     with np.errstate(invalid="ignore"):  # misses
         here = np.abs(theirs.t - ours.t) * np.linalg.norm(rays.d, axis=1) <= e
-    return np.asarray(other & here)
+    rows = np.flatnonzero(other & here)
+    found = np.zeros(len(other), bool)
+    found[rows] = _are_two(sizes, tables, rays.rows(rows), ours.t[rows])
+    return found
 
 
 def is_doubled(
@@ -134,12 +137,16 @@ def is_doubled(
 ) -> BoolArray:
     """(n,): whether the line from p to `target`, (n, 3) each, crosses two surfaces at the target
     that float32 cannot tell apart: lamps that are thinner than its error, with a dark back."""
-    w = target - p
-    crossed = query.crossings(tables, p, w)
+    return _are_two(sizes, tables, Rays(p, target - p), np.ones(len(p)))
+
+
+def _are_two(sizes: ShapeSizes, tables: SceneTables, rays: Rays, t: FloatArray) -> BoolArray:
+    """(n,): whether rays cross two surfaces at t (n,), within float32's error."""
+    crossed = query.crossings(tables, rays.o, rays.d)
     ray = crossed.ray
-    e = slide(sizes, p[ray], w[ray], _as_hits(crossed))
-    near = np.abs(crossed.t - 1.0) * np.linalg.norm(w[ray], axis=1) <= e
-    return np.asarray(np.bincount(ray[near], minlength=len(p)) > 1)
+    e = slide(sizes, rays.o[ray], rays.d[ray], _as_hits(crossed))
+    near = np.abs(crossed.t - t[ray]) * np.linalg.norm(rays.d[ray], axis=1) <= e
+    return np.asarray(np.bincount(ray[near], minlength=len(t)) > 1)
 
 
 def _as_one_part(
