@@ -138,3 +138,11 @@ def test_many_scenes_are_valid_lit_and_of_all_types(files):
     found = coverage(seen)
     assert min(found.types.values()) > 0
     assert found.share > 0.9
+
+
+def test_numbers_are_not_rounded_to_the_ends_of_open_ranges():
+    """Three digits of 179.97 are 180; a range of a thousandth has its ends in half of the draws."""
+    part = {"exclusiveMinimum": 1.0, "exclusiveMaximum": 1.02}
+    draw = Draw(np.random.default_rng(2))
+    found = {fields._number(part, draw) for _ in range(50)}
+    assert found == {1.01}

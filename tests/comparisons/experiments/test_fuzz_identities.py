@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+import yaml
 
 from comparisons.experiments.fuzz import assets
 from comparisons.experiments.fuzz.finding import Finding
@@ -158,3 +159,21 @@ def test_a_normal_that_a_group_turns_wrongly_is_found(scene, monkeypatch):
     found = result("grouped", scene)
     assert isinstance(found, Finding)
     assert found.cause == "normals differ"
+
+
+def test_rays_that_start_far_outside_of_the_scene_are_moved_by_their_own_rounding():
+    """Rays from hits on an infinite plane start there; of two faces back to back either is hit."""
+    data = {
+        "camera": {"type": "perspective", "eye": [4, 3, 6], "target": [0, 0, 0]},
+        "film": {"width": 16, "height": 12},
+        "shapes": [
+            {"type": "plane", "transform": [{"rotate": {"axis": [1, 2, 0], "degrees": 80}}]},
+            {"type": "box"},
+            {"type": "box", "transform": [{"translate": [2, 0, 0]}]},
+        ],
+    }
+    scene = Scene.parse(yaml.safe_dump(data))
+    for seed in range(10):
+        original = Original(scene, np.random.default_rng(seed), 240)
+        for identity in (rounded.moved, rounded.grouped):
+            assert not isinstance(identity(original), Finding)

@@ -1,5 +1,6 @@
 """Identities that hold up to rounding."""
 
+import dataclasses
 import itertools
 from typing import Any
 
@@ -10,6 +11,7 @@ from comparisons.experiments.fuzz.identities.rays import Bench, Original, bench,
 from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.translate.moved import moved as in_frame
 from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
@@ -76,6 +78,7 @@ def _judged(name: str, how: str, at: Bench, hits: Intersections, offset: float) 
     size = ROUNDINGS * UNIT_ROUNDOFF
     # Rays that start on an infinite plane may be far outside of the scene's size.
     shift = size * (np.maximum(at.size, np.abs(at.o).max(axis=1)) + offset)
+    hits = dataclasses.replace(hits, n=_facing(at.hits, hits))
     differs = _differs(at.hits, hits, size)
     wrong = [k for k in np.flatnonzero(differs).tolist() if not _excused(at, hits, k, shift[k])]
     if not wrong:
@@ -94,12 +97,17 @@ def _judged(name: str, how: str, at: Bench, hits: Intersections, offset: float) 
     )
 
 
-def _differs(one: Intersections, other: Intersections, size: float) -> Any:
-    """Where hits differ by more than a few roundings.  Of two faces that lie back to back in one
-    place either may be hit."""
-    t, t2, n, n2 = one.t, other.t, one.n, other.n
+def _facing(one: Intersections, other: Intersections) -> FloatArray:
+    """The normals (n, 3) of `other`, turned where it hit another face that lies back to back with
+    that of `one`: either may be hit."""
     faces = [getattr(one, x) != getattr(other, x) for x in ("shape", "part", "primitive")]
-    n2 = np.where((np.any(faces, axis=0) & (np.sum(n * n2, axis=1) < 0.0))[:, None], -n2, n2)
+    opposite = np.any(faces, axis=0) & (np.sum(one.n * other.n, axis=1) < 0.0)
+    return np.where(opposite[:, None], -other.n, other.n)
+
+
+def _differs(one: Intersections, other: Intersections, size: float) -> Any:
+    """Where hits differ by more than a few roundings."""
+    t, t2, n, n2 = one.t, other.t, one.n, other.n
     with np.errstate(invalid="ignore"):  # both may be infinite
         same_t = (t == t2) | (np.abs(t - t2) <= size * np.abs(t))
     missed = ~np.isfinite(t) & ~np.isfinite(t2)
