@@ -152,9 +152,10 @@ def _compare(
     """One point of one light at all hits;  brightest: the largest value of all lights' points."""
     rays, hits, tables = context.rays, context.hits, context.tables
     target = _targets(ours)
-    known = np.flatnonzero(
-        (hits.shape >= 0) & np.isfinite(target).all(axis=1) & ~_in_plane(context, target)
-    )
+    is_known = (hits.shape >= 0) & np.isfinite(target).all(axis=1)
+    if kind_of(context, light) == AREA:  # the target is a point
+        is_known &= ~_in_plane(context, target)
+    known = np.flatnonzero(is_known)
     if len(known) == 0:
         none = np.zeros((0, 3))
         return Outcome(0, known, none, none, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))

@@ -88,7 +88,7 @@ def whitted(
     error = np.abs(theirs - ours).max(axis=1)
     ours_hits, their_hits = query.intersect(tables, *rays), trace(counterpart, *rays)
     sizes = ShapeSizes(scene, counterpart.frame)
-    error[on_two_surfaces(sizes, tables, rays, ours_hits, their_hits)] = 0.0
+    error[np.isfinite(error) & on_two_surfaces(sizes, tables, rays, ours_hits, their_hits)] = 0.0
     if is_steep(scene):
         over = np.flatnonzero(~(error <= bound))
         few = rays.rows(over)
