@@ -11,8 +11,6 @@ Works in scalar variants and in wide ones, where all rays are traced together.
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.csg import (
@@ -25,6 +23,7 @@ from comparisons.mitsuba.csg import (
 )
 from comparisons.mitsuba.hits import CURVED
 from comparisons.mitsuba.plugins.parameters import is_wide
+from comparisons.mitsuba.plugins.plain_scene import PlainScene
 from reference_rt.core import transform
 from reference_rt.shapes import Plane
 
@@ -32,37 +31,27 @@ NONE = 0xFFFFFFFF
 """The operand of a ray that misses a solid."""
 
 
-class LitScene:
-    """What integrators and rungs of light need of a scene: Mitsuba's `Scene` where there are no
-    solids, else the same methods with the solids in it.
+class LitScene(PlainScene):
+    """What integrators and rungs of light need of a scene with solids.
 
     mi_scene: Mitsuba's scene without the solids, which has the camera and all sampled lights.
     """
 
     def __init__(self, mi_scene: Any, solids: tuple[SolidCounterpart, ...]) -> None:
-        self.mi_scene = mi_scene
+        super().__init__(mitsuba(), mi_scene)
         self._solids = [_Solid(solid) for solid in solids]
 
-    def ray_intersect(self, ray: Any, active: Any = True) -> Any:
-        """The first surface interaction along rays with unit directions."""
-        return self.trace(ray, active)[0]
-
     def ray_test(self, ray: Any, active: Any = True) -> Any:
-        """Whether anything is hit before `ray.maxt`."""
-        blocked = self.mi_scene.ray_test(ray, active)
+        blocked = super().ray_test(ray, active)
         for solid in self._solids:
             rest = active & (blocked ^ True)
             blocked |= solid.first(ray, ray.maxt, rest).operand != NONE
         return blocked
 
     def trace(self, ray: Any, active: Any = True) -> tuple[Any, Any]:
-        """The first surface interaction, and whether it is on a solid: solids that emit are no
-        lights that Mitsuba samples."""
         import drjit as dr
 
-        mi = mitsuba()
-        si = self.mi_scene.ray_intersect(ray, active)
-        of_solid = mi.Mask(False)
+        si, of_solid = super().trace(ray, active)
         for solid in self._solids:
             found = solid.first(ray, dr.minimum(ray.maxt, si.t), active)
             met = found.operand != NONE
@@ -71,29 +60,7 @@ class LitScene:
                 of_solid |= met
         return si, of_solid
 
-    def emitted(self, si: Any, active: Any) -> Any:
-        """The radiance towards `si.wi` of the hit surface, or of the environment for a miss."""
-        mi = mitsuba()
-        emitter = si.emitter(self.mi_scene, active)
-        if emitter is None:  # scalar variants
-            return mi.Color3f(0.0)
-        return emitter.eval(si, active) & active if is_wide(mi) else emitter.eval(si, active)
-
-    def emitters(self) -> list[Any]:
-        """The lights that Mitsuba samples."""
-        return list(self.mi_scene.emitters())
-
-    def shapes(self) -> list[Any]:
-        """All shapes, those of the operands too."""
-        return [shape for mi_scene in self._all_scenes() for shape in mi_scene.shapes()]
-
-    def reach(self) -> float:
-        """The largest coordinate on any shape."""
-        boxes = [mi_scene.bbox() for mi_scene in self._all_scenes()]
-        ends = np.abs([np.array(end, np.float64) for box in boxes for end in (box.min, box.max)])
-        return float(np.max(ends[np.isfinite(ends)], initial=0.0))
-
-    def _all_scenes(self) -> list[Any]:
+    def all_scenes(self) -> list[Any]:
         of_solids = [o.mi_scene for solid in self._solids for o in solid.solid.operands]
         return [self.mi_scene, *of_solids]
 

@@ -36,8 +36,7 @@ def register(mi: Any) -> None:
         def prepare(self) -> None:
             """The distribution of the triangles' areas, once the mesh is known."""
             if self.triangles is None:
-                self.mesh = self.get_shape()
-                values = mi.traverse(self.mesh)
+                values = mi.traverse(self.get_shape())
                 vertices = np.array(values["vertex_positions"], np.float64).reshape(-1, 3)
                 corners = vertices[np.array(values["faces"]).reshape(-1, 3)]
                 sides = corners[:, 1:] - corners[:, :1]
@@ -53,23 +52,25 @@ def register(mi: Any) -> None:
         def sample_direction(self, it: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
             """A point of the mesh, uniform by area; only its front shines."""
             self.prepare()
+            # Not kept: the mesh has the emitter, and a circle through Mitsuba is never freed.
+            mesh = self.get_shape()
             index, rest = self.triangles.sample_reuse(sample.x, active)
             place = mi.warp.square_to_uniform_triangle(mi.Point2f(rest, sample.y))
             weights = (1.0 - place.x - place.y, place.x, place.y)
-            corners = mi.Vector3u(self.mesh.face_indices(index, active))
-            a, b, c = (self.mesh.vertex_position(corner, active) for corner in corners)
+            corners = mi.Vector3u(mesh.face_indices(index, active))
+            a, b, c = (mesh.vertex_position(corner, active) for corner in corners)
             p = a * weights[0] + b * weights[1] + c * weights[2]
             n = dr.normalize(dr.cross(b - a, c - a))
             normal = n
-            if self.mesh.has_vertex_normals():
-                normal = dr.normalize(self.mixed(self.mesh.vertex_normal, corners, weights, active))
+            if mesh.has_vertex_normals():
+                normal = dr.normalize(self.mixed(mesh.vertex_normal, corners, weights, active))
             wide = parameters.is_wide(mi)
             si = dr.zeros(mi.SurfaceInteraction3f) if wide else mi.SurfaceInteraction3f()
             si.p, si.n, si.prim_index = p, n, index
-            si.shape = mi.ShapePtr(self.mesh) if wide else self.mesh
+            si.shape = mi.ShapePtr(mesh) if wide else mesh
             si.uv = place  # Mitsuba's, and ours, where a mesh has none of its own
-            if self.mesh.has_vertex_texcoords():
-                si.uv = self.mixed(self.mesh.vertex_texcoord, corners, weights, active)
+            if mesh.has_vertex_texcoords():
+                si.uv = self.mixed(mesh.vertex_texcoord, corners, weights, active)
             d = p - it.p
             distance2 = dr.squared_norm(d)
             ds = dr.zeros(mi.DirectionSample3f) if wide else mi.DirectionSample3f()

@@ -9,7 +9,11 @@ BSDF, combined with the power heuristic (Veach 1997).  Its mean is that of Mitsu
 `direct`.
 """
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
+
+from comparisons.mitsuba.plugins.plain_scene import PlainScene
 
 _MOST_RAYS = 1 << 20
 """Rays that are traced together: each takes a kilobyte in wide variants."""
@@ -29,7 +33,8 @@ def register(mi: Any) -> None:
     class PathOfSolids(mi.SamplingIntegrator):  # type: ignore[misc]
         """Parameters: max_depth, most edges of a path, -1 for no limit;  rr_depth, edges after
         which Russian roulette may end it;  samples_lights, samples_bsdfs: whether direct light is
-        sampled in this way.  `scene`, the `LitScene`, is set before rendering."""
+        sampled in this way.  `lit`, set before rendering, makes the `LitScene` of Mitsuba's scene;
+        without it there are no solids."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
@@ -37,7 +42,7 @@ def register(mi: Any) -> None:
             self.rr_depth = properties.get("rr_depth", 5)
             self.samples_lights = properties.get("samples_lights", True)
             self.samples_bsdfs = properties.get("samples_bsdfs", True)
-            self.scene: Any = None
+            self.lit: Callable[[Any], PlainScene] = partial(PlainScene, mi)
             self.most_rays = _MOST_RAYS
 
         def sample(
@@ -47,12 +52,13 @@ def register(mi: Any) -> None:
 
             All paths take their next edge together.
             """
+            lit = self.lit(scene)
             ray, active = mi.Ray3f(ray), mi.Mask(active)
             total, throughput, eta = mi.Color3f(0.0), mi.Color3f(1.0), mi.Float(1.0)
             before, bsdf_pdf, valid = dr.zeros(mi.Interaction3f), mi.Float(0.0), None
             depth = 0
             while depth != self.max_depth and dr.any(active):
-                si, of_solid = self.scene.trace(ray, active)
+                si, of_solid = lit.trace(ray, active)
                 # Density 0: the ray is the camera's or of a delta lobe, and has no competitor.
                 light_pdf = mi.Float(0.0)
                 found = mi.DirectionSample3f(scene, si, before)
@@ -61,7 +67,7 @@ def register(mi: Any) -> None:
                     light_pdf = scene.pdf_emitter_direction(before, found, competes)
                     light_pdf = dr.select(competes, light_pdf, 0.0)
                 share = dr.select(bsdf_pdf > 0.0, weight(bsdf_pdf, light_pdf), 1.0)
-                total += throughput * share * self.scene.emitted(si, active)
+                total += throughput * share * lit.emitted(si, active)
                 active &= si.is_valid()
                 valid = active if valid is None else valid
                 depth += 1
@@ -69,7 +75,7 @@ def register(mi: Any) -> None:
                     break
                 bsdf, context = si.bsdf(), mi.BSDFContext()
                 if self.samples_lights:
-                    total += throughput * self.next_event(scene, sampler, si, active)
+                    total += throughput * self.next_event(lit, sampler, si, active)
                 if not self.samples_bsdfs:
                     break
                 drawn, value = bsdf.sample(
@@ -91,8 +97,9 @@ def register(mi: Any) -> None:
                 dr.eval(ray, active, total, throughput, eta, bsdf_pdf, before)
             return total, valid if valid is not None else active, []
 
-        def next_event(self, scene: Any, sampler: Any, si: Any, active: Any) -> Any:
+        def next_event(self, lit: Any, sampler: Any, si: Any, active: Any) -> Any:
             """The direct light of one sampled point on a light."""
+            scene = lit.mi_scene
             bsdf, context = si.bsdf(), mi.BSDFContext()
             if not scene.emitters():
                 return mi.Color3f(0.0)
@@ -113,7 +120,7 @@ def register(mi: Any) -> None:
             shadow = si.spawn_ray_to(drawn.p)
             away = si.spawn_ray(drawn.d)
             shadow = dr.select(distant, away, shadow)
-            return dr.select(self.scene.ray_test(shadow, active), 0.0, light)
+            return dr.select(lit.ray_test(shadow, active), 0.0, light)
 
         def aov_names(self) -> list[str]:
             return []

@@ -17,6 +17,7 @@ from typing import Any
 
 from comparisons.mitsuba.plugins import parameters, phong
 from comparisons.mitsuba.plugins.light_points import light_points
+from comparisons.mitsuba.plugins.plain_scene import PlainScene
 
 _ROUNDINGS = 8.0 * 2.0**-24
 """How far a hit point lies off its surface, over the scene's largest coordinate: the bound
@@ -85,10 +86,17 @@ def register(mi: Any) -> None:
             self.reach = 0.0
             self.scalar = not parameters.is_wide(mi)
 
-        def prepare(self, scene: Any) -> None:
+        def render(self, scene: Any, *args: Any, **kwargs: Any) -> Any:
+            """Mitsuba's own; the scene, which has the integrator, is forgotten at the end."""
+            try:
+                return super().render(scene, *args, **kwargs)
+            finally:
+                self.scene = None
+
+        def prepare(self, scene: PlainScene) -> None:
             """Collect the lights, once per scene."""
-            if self.scene is not scene:
-                self.scene = scene
+            if self.scene is not scene.mi_scene:
+                self.scene = scene.mi_scene
                 self.lights = light_points(mi, scene, self.unlit, self.boxes)
                 delta = mi.EmitterFlags.Delta
                 self.points = [e for e in scene.emitters() if mi.has_flag(e.flags(), delta)]
@@ -99,12 +107,13 @@ def register(mi: Any) -> None:
         def sample(
             self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
         ) -> tuple[Any, Any, list[Any]]:
-            """The radiance along `ray`, whether it hit anything, no further channels; `scene` is a
-            `LitScene`.
+            """The radiance along `ray`, whether it hit anything, no further channels; `scene` is
+            Mitsuba's, or a `LitScene`.
 
             The ray tree is traversed depth first with all rays at once, masked to those that have
             the branch.
             """
+            scene = PlainScene(mi, scene) if isinstance(scene, mi.Scene) else scene
             self.prepare(scene)
             total, valid = mi.Color3f(0.0), None
             stack = [(mi.Ray3f(ray), mi.Color3f(1.0), mi.Mask(active), 0)]

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.notes import notes_of_integrator
 from comparisons.mitsuba.reading import read_supported
 from comparisons.mitsuba.reading.exact_materials import inexact, make_exact
@@ -81,8 +80,6 @@ def own_scene(scene: Scene) -> Any:
         raise ReferenceUnavailableError(f"Mitsuba does not load {parsed.file}: {reason}") from None
     finally:
         mi.set_file_resolver(old)
-    if squares_opacity(scene):
-        found.integrator().scene = LitScene(found, ())
     return found
 
 

@@ -8,6 +8,7 @@ makes a scene `not-comparable`.
 """
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
 from comparisons.mitsuba.csg import Operand, SolidCounterpart
+from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.scene import light_id, shape_id
 from comparisons.mitsuba.stand_ins import MitsubaShape, Plugin
 from comparisons.mitsuba.translate.cameras import translate_camera
@@ -79,10 +81,9 @@ def load(scene: Scene, frame: Frame | None = None) -> Counterpart:
         plain["integrator"] = of_solids(integrator)
     mi_scene = mitsuba().load_dict(plain, optimize=False)
     solids = tuple(found.solids)
-    counterpart = Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame, is_ours)
     if is_ours and isinstance(integrator, Path | Direct):
-        mi_scene.integrator().scene = counterpart.lit
-    return counterpart
+        mi_scene.integrator().lit = partial(LitScene, solids=solids)
+    return Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame, is_ours)
 
 
 MOST_INSTANCES = 32

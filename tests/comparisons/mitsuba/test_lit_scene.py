@@ -1,5 +1,6 @@
 """Light on CSG solids: Mitsuba's hits of the operands, combined while an integrator runs."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -198,7 +199,7 @@ def test_without_solids_the_integrator_is_mitsubas(integrator: str) -> None:
     plain = load(Scene.parse(text.replace("SOLID", ball)))
     with_one = load(Scene.parse(text.replace("SOLID", solid("union", (ball,)))))
     mi_integrator = with_one.mi_scene.integrator()
-    mi_integrator.scene = LitScene(plain.mi_scene, ())
+    mi_integrator.lit = partial(LitScene, solids=())
     theirs = render(plain.mi_scene, 8, 64).pictures
     mi = mitsuba()
     ours = [

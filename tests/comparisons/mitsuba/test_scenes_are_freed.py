@@ -1,0 +1,111 @@
+"""Mitsuba's scenes with our plugins are freed after use: Dr.Jit compiles code for all shapes and
+materials that exist, so that every scene that stays makes all later ones slower."""
+
+import gc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from builders import every_law, every_light
+
+import reference_rt as rt
+from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.mitsuba.reading.reference import own_scene
+from comparisons.mitsuba.scene import picture
+from comparisons.mitsuba.translate import load
+from comparisons.mitsuba.writing import write_xml
+from comparisons.rungs import direct, geometry, whitted
+from reference_rt.rendering.scene import Scene
+
+VIEW = """
+camera: {type: perspective, eye: [0.5, 2.2, 5], target: [0, 0, 0], fov: 40}
+film: {width: 4, height: 3}
+sampler: {type: independent, spp: 1}
+integrator: INTEGRATOR
+materials:
+  grey: {type: diffuse, reflectance: 0.6}
+  glass: {type: dielectric}
+  lamp: {type: emissive, radiance: [8, 7, 6]}
+  leaf: {type: mask, base: grey, opacity: 0.5}
+shapes:
+  - {type: rectangle, material: grey, transform: [{scale: 3}, {translate: [0, 0, -1]}]}
+  - SHAPE
+lights:
+  - {type: point, position: [2, 2, 3], intensity: 6}
+"""
+SOLID = "{type: difference, material: glass, of: [{type: sphere}, {type: sphere, radius: 0.5}]}"
+ELLIPSOID = "{type: sphere, material: lamp, transform: [{scale: [0.5, 0.8, 0.3]}]}"
+LEAF = "{type: rectangle, material: leaf}"
+BALL = "{type: sphere, material: glass}"
+
+
+def view(shape: str, integrator: str = "{type: path, max_depth: 3}") -> Callable[[Path], Scene]:
+    return lambda folder: Scene.parse(
+        VIEW.replace("SHAPE", shape).replace("INTEGRATOR", integrator)
+    )
+
+
+SCENES: dict[str, Callable[[Path], Scene]] = {
+    "every material": lambda folder: Scene.load(every_law(folder)),
+    "every light": lambda folder: Scene.load(every_light(folder)),
+    "a solid": view(SOLID),
+    "direct light on a solid": view(SOLID, "{type: direct}"),
+    "Whitted's light on a solid": view(SOLID, "{type: whitted}"),
+    "a mask": view(LEAF),
+    "a lamp of triangles": view(ELLIPSOID),
+    "Whitted's light": view(BALL, "{type: whitted}"),
+}
+
+
+def objects(mi: Any) -> int:
+    """The objects of Mitsuba that Python knows: a scene has none that do not belong to plugins."""
+    gc.collect()
+    return sum(isinstance(one, mi.Object) for one in gc.get_objects())
+
+
+def use(scene: Scene, counterpart: Counterpart) -> None:
+    for rung in (geometry, direct, whitted):
+        rung(scene, scene.tables, counterpart, 20)
+    if not counterpart.no_pictures_reason and not isinstance(scene.integrator, rt.Whitted):
+        picture(counterpart.mi_scene, 1, 0)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_counterparts(name: str, tmp_path: Path) -> None:
+    scene = SCENES[name](tmp_path)
+    mitsuba()
+    with scalar() as mi:
+        before = objects(mi)
+        use(scene, load(scene))
+        assert objects(mi) == before
+
+
+@pytest.mark.parametrize("name", ["a solid", "a mask", "a lamp of triangles"])
+def test_counterparts_in_the_fast_variant(name: str, tmp_path: Path) -> None:
+    scene = SCENES[name](tmp_path)
+    mi = mitsuba()
+    before = objects(mi)
+    use(scene, load(scene))
+    assert objects(mi) == before
+
+
+def test_files_of_users(tmp_path: Path) -> None:
+    """As the reference of a comparison, which has our integrator for masks."""
+    write_xml(SCENES["a mask"](tmp_path), tmp_path / "scene.xml")
+    scene = Scene.load(tmp_path / "scene.xml")
+    mi = mitsuba()
+    before = objects(mi)
+    picture(own_scene(scene), 1, 0)
+    assert objects(mi) == before
+
+
+def test_what_stays_is_seen() -> None:
+    mitsuba()
+    with scalar() as mi:
+        before = objects(mi)
+        found = load(view(LEAF)(Path()))
+        found.mi_scene.integrator().kept = found.mi_scene
+        del found
+        assert objects(mi) > before
