@@ -130,6 +130,19 @@ def invert(m: Affine) -> Affine:
     return np.column_stack([inverse, -inverse @ m[:, 3]])
 
 
+_SIMILAR = 32e-16
+"""Relative: each entry of the product of three columns rounds at most 8 times, and so do those of
+maps that are composed of a few rotations."""
+
+
+def is_similarity(linear: npt.NDArray[np.float64]) -> bool:
+    """Whether a linear map A (3, 3) scales all lengths alike, to rounding: A^T A = s² 1."""
+    linear = linear / np.abs(linear).max()  # squares of extreme scales overflow
+    products = linear.T @ linear
+    square = float(np.trace(products)) / 3.0
+    return bool(np.abs(products - square * np.eye(3)).max() <= _SIMILAR * square)
+
+
 def flips_orientation(m: Affine) -> bool:
     """Whether the map flips orientation: right-handed becomes left-handed."""
     return bool(np.linalg.slogdet(m[:, :3])[0] < 0.0)  # determinants of extreme scales overflow

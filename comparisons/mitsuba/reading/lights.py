@@ -14,9 +14,9 @@ from comparisons.mitsuba.reading.sensors import angle
 from comparisons.mitsuba.reading.sunsky import read_sunsky
 from comparisons.mitsuba.reading.textures import colour_or_texture, projected
 from comparisons.mitsuba.reading.written import as_transform
-from comparisons.mitsuba.similar import is_similarity
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.image_files import open_image
+from reference_rt.core.transform import is_similarity
 from reference_rt.lights import (
     AnyLight,
     Constant,

@@ -11,9 +11,8 @@ from comparisons.mitsuba.reading.materials import material_name
 from comparisons.mitsuba.reading.meshes import Surface, finished, mesh, placed
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.written import as_transform
-from comparisons.mitsuba.similar import is_similarity
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine
+from reference_rt.core.transform import Affine, is_similarity
 from reference_rt.materials import Emissive
 from reference_rt.shapes import Box, Cylinder, Disk, Quadric, Rectangle, Shape, Sphere
 from reference_rt.shapes.instances import Instance

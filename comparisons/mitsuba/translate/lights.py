@@ -9,8 +9,8 @@ import numpy as np
 from comparisons.geometry.flatten import Copy, Leaf, Member
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.shapes.plugins import is_similarity
 from comparisons.mitsuba.translate.textures import TranslationContext, projected, rgb
+from reference_rt.core.transform import is_similarity
 from reference_rt.integrators import Direct
 from reference_rt.lights import (
     Ambient,

@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.flatten import Copy, copies_of, place_of
-from comparisons.mitsuba.similar import is_similarity
 from comparisons.mitsuba.stand_ins import Plugin
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
+from comparisons.mitsuba.translate.shapes.plugins import is_round
 from comparisons.mitsuba.translate.wrappers import is_textured
 from comparisons.mitsuba.writing.element import Element, Reference, Rgb, Vector, matrix_step
 from comparisons.mitsuba.writing.files import ATTRIBUTE, ply
 from comparisons.mitsuba.writing.surfaces import OURS, Surfaces
 from comparisons.mitsuba.writing.views import transform_steps
 from reference_rt.core import transform
-from reference_rt.core.arrays import FloatArray
 from reference_rt.materials import Emissive
 from reference_rt.shapes import Box, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
 from reference_rt.shapes.instances import Instance
@@ -67,7 +66,7 @@ class Shapes:
         textured = is_textured(shape.material, self.surfaces.context)
         linear = transform.affine(shape.transform)[:, :3]
         match shape:
-            case Sphere() if is_similarity(linear) and np.linalg.det(linear) > 0.0:
+            case Sphere() if transform.is_similarity(linear) and np.linalg.det(linear) > 0.0:
                 values = {
                     "center": Vector(*shape.center),
                     "radius": float(shape.radius),
@@ -80,7 +79,7 @@ class Shapes:
                 found = Element("shape", "disk", values)
             case Box() if not textured:
                 found = Element("shape", "cube", values)
-            case Cylinder(capped=False) if _is_round(linear):
+            case Cylinder(capped=False) if is_round(linear):
                 values = {
                     "p0": Vector(0.0, 0.0, shape.z_min),
                     "p1": Vector(0.0, 0.0, shape.z_max),
@@ -252,13 +251,6 @@ def _of_dict(value: dict[str, Any]) -> Element:
 
 def _stem(file: str) -> str:
     return file.replace("\\", "/").rpartition("/")[2].rpartition(".")[0] or "mesh"
-
-
-def _is_round(linear: FloatArray) -> bool:
-    """Whether a map takes circular cylinders along z to circular cylinders, of any height."""
-    x, y, z = linear.T
-    z = z * np.linalg.norm(x) / np.linalg.norm(z)
-    return is_similarity(np.column_stack([x, y, z]))
 
 
 __all__ = ["Shapes"]

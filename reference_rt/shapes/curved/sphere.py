@@ -52,12 +52,11 @@ class Sphere(Shape):
                 to_local=np.eye(3).reshape(1, 9),
                 **owners(context),
             )
+        if not transform.is_similarity(m[:, :3]):
+            return ellipsoid(context, m, self.center, self.radius)
         size = np.abs(m[:, :3]).max()  # a factor of its own: squares of extreme scales overflow
         linear = m[:, :3] / size
         factor = math.sqrt(float(np.trace(linear.T @ linear)) / 3.0)
-        # A similarity has A^T A = s² 1; each entry of the product rounds at most 8 times.
-        if np.max(np.abs(linear.T @ linear - factor**2 * np.eye(3))) > 8e-16 * 4 * factor**2:
-            return ellipsoid(context, m, self.center, self.radius)
         return Spheres(
             center=transform.apply_points(m, np.array([self.center])),
             radius=np.array([self.radius * factor * size]),

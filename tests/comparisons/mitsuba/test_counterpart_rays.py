@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from counterparts import coarse_meshes
 
+from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.translate import load
 from comparisons.results.case import RungResult
 from comparisons.rungs import geometry
@@ -49,6 +51,16 @@ SCENES = {
     ),
 }
 
+ROUND = {
+    "sphere": "{type: sphere, TURN}",
+    "ellipsoid": "{type: sphere, TURN, material: lamp}",
+    "disk": "{type: disk, TURN}",
+    "cylinder": "{type: cylinder, TURN}",
+    "open cylinder": "{type: cylinder, capped: false, TURN, material: lamp}",
+    "cone": "{type: cone, TURN}",
+    "solid": "{type: union, TURN, of: [{type: sphere}, {type: cylinder, radius: 0.3}]}",
+}
+
 GROUPS = """
 groups:
   pair: [{type: sphere, radius: 0.5}, {type: box, transform: [{scale: 0.3}, {translate: [0, 1, 0]}]}]
@@ -57,6 +69,19 @@ shapes:
   - {type: instance, group: two, transform: [{scale: [1, -1.4, 1]}]}
   - {type: instance, group: pair, transform: [{translate: [-2, 0, 0]}]}
 """  # noqa: E501
+
+
+@pytest.mark.parametrize("shear", [1e-15, 2e-15, 3e-15, 3.3e-15, 5e-15, 7e-15, 1e-14, 1e-12, 1e-8])
+@pytest.mark.parametrize("name", ROUND)
+def test_maps_that_are_nearly_similarities(name: str, shear: float) -> None:
+    """Both sides decide alike which maps keep a sphere round."""
+    matrix = f"transform: [{{matrix: [[2, {shear!r}, 0, 1], [0, 2, 0, 0], [0, 0, 2, 0]]}}]"
+    shape = ROUND[name].replace("TURN", matrix)
+    lamp = "materials: {lamp: {type: emissive, radiance: 1}}"
+    scene = Scene.parse(f"{VIEW}{lamp}\nshapes:\n  - {shape}\n")
+    with scalar(), coarse_meshes(48, 24):
+        found = geometry(scene, build_tables(scene), load(scene), 100)
+    assert found.status == "agree", found.reason
 
 
 def text_of(shape: str) -> str:

@@ -21,6 +21,7 @@ from reference_rt.core.transform import (
     flattens,
     identity,
     invert,
+    is_similarity,
     look_at,
     rotate,
     scale,
@@ -193,3 +194,13 @@ def test_one_map_and_many_are_singular_alike():
         regular = np.isfinite(m).all() and (norms > 0.0).all()
         assert flat == (not regular or np.linalg.cond(linear / norms[:, None]) > 2.0**52)
     assert 30 < found.sum() < 570
+
+
+@pytest.mark.parametrize("size", [1e-200, 1.0, 3e150])
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_similarities(size, mirrored):
+    turn = compose(rotate((1, 2, 3), 40.0), rotate((0, 1, -1), 77.0))[:, :3]
+    turn = size * turn @ np.diag([1.0, 1.0, mirrored])
+    assert is_similarity(turn)
+    for wrong in np.eye(9).reshape(9, 3, 3):
+        assert not is_similarity(turn + 1e-14 * size * wrong)

@@ -19,13 +19,12 @@ from comparisons.mitsuba.translate.shapes.plugins import (
     Site,
     curved_instance,
     in_float32,
-    is_similarity,
     to_world,
     with_mesh_light,
 )
 from comparisons.mitsuba.translate.shapes.stand_ins import Implicit, Patch, stand_in
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine, apply_points
+from reference_rt.core.transform import Affine, apply_points, is_similarity
 from reference_rt.shapes import Box, Disk, Rectangle, Sphere
 
 CELLS = (384, 192)

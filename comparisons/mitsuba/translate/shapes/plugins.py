@@ -8,7 +8,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.stand_ins import Plugin, ShapeGroup
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine
+from reference_rt.core.transform import Affine, is_similarity
 from reference_rt.shapes.shape import TabulationContext
 
 
@@ -98,9 +98,8 @@ def in_float32(radius: float) -> float:
     return 0.0 if mitsuba().variant().startswith("scalar") else float(radius)
 
 
-def is_similarity(linear: FloatArray) -> bool:
-    """Whether a map (3, 3) is a similarity, to within the rounding of its entries."""
-    scaled = linear / np.abs(linear).max()
-    gram = scaled.T @ scaled
-    factor = np.trace(gram) / 3.0
-    return bool(np.abs(gram - factor * np.eye(3)).max() <= 64.0 * 2.0**-53 * factor)
+def is_round(linear: FloatArray) -> bool:
+    """Whether a map (3, 3) takes circular cylinders along z to circular ones, of any height."""
+    x, y, z = linear.T
+    z = z * np.linalg.norm(x) / np.linalg.norm(z)
+    return is_similarity(np.column_stack([x, y, z]))

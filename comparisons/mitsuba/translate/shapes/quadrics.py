@@ -16,7 +16,7 @@ from comparisons.mitsuba.translate.shapes.plugins import (
     Site,
     curved_instance,
     in_float32,
-    is_similarity,
+    is_round,
     to_world,
     with_mesh_light,
 )
@@ -48,12 +48,12 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
     r, height = shape.radius, shape.z_max - shape.z_min
     unit = _followed(m, np.array([r, r, height]), shape.z_min)
     least = np.linalg.svd(m[:, :2], compute_uv=False)[-1] * r
-    is_round = _is_round(unit[:, :3])
+    is_circular = is_round(unit[:, :3])
     is_thin = least * THIN < site.reach and in_float32(least) > 0.0
-    if is_thin or ("emitter" in site.parts and not is_round):  # Mitsuba's instances do not emit
+    if is_thin or ("emitter" in site.parts and not is_circular):  # Mitsuba's instances do not emit
         patch, surface = side_surface(shape, site.textured)
         side = stand_in(shape, [patch], surface, None, site)
-    elif is_round:
+    elif is_circular:
         place = to_world(unit[:, :3], unit[:, 3])
         plugin = {"type": "cylinder", "to_world": place, **site.parts}
         side = Plugin(plugin, uv=same_uv, curved=in_float32(least))
@@ -64,13 +64,6 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
         found.append(_disk(m, r, shape.z_min, BOTTOM, r, site))
         found.append(_disk(m, r, shape.z_max, TOP, r, site))
     return found
-
-
-def _is_round(linear: FloatArray) -> bool:
-    """Whether a map takes circular cylinders along z to circular cylinders, of any height."""
-    x, y, z = linear.T
-    z = z * np.linalg.norm(x) / np.linalg.norm(z)
-    return is_similarity(np.column_stack([x, y, z]))
 
 
 def _followed(m: transform.Affine, scale: FloatArray, z: float) -> transform.Affine:
