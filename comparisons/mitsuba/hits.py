@@ -36,6 +36,12 @@ class MitsubaHits(Intersections):
     stands_in: BoolArray
     height: FloatArray
 
+    @property
+    def at_origin(self) -> BoolArray:
+        """(n,): hits of rays in a plane through their own origins, at t = 0, which Mitsuba's scalar
+        variants report; a ray of ours begins beyond t = 0."""
+        return np.asarray((self.shape >= 0) & (self.t == 0.0))
+
 
 CURVED = 4.0
 """Error bound of t, in units of u D² / r, where Mitsuba solves a quadratic in float32 for a surface

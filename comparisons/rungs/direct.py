@@ -76,7 +76,7 @@ def direct(
     sizes = ShapeSizes(scene, counterpart.frame)
     rays = mixed_rays(scene, tables, sizes, pixels, seed, counterpart.sags())
     hits, theirs = query.intersect(tables, rays.o, rays.d), trace(counterpart, rays.o, rays.d)
-    hits.shape[on_two_surfaces(sizes, tables, rays, hits, theirs)] = -1
+    hits.shape[theirs.at_origin | on_two_surfaces(sizes, tables, rays, hits, theirs)] = -1
     context = LightContext(scene, tables, counterpart, rays, hits, theirs, sizes)
     lights = np.flatnonzero(choice.probability > 0.0)
     count = len(lights)

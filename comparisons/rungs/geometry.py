@@ -80,7 +80,8 @@ def geometry(
     # What the arbiter explained may lie in one place too.
     apart = wrong[settled][~in_one_place(comparer, traced, wrong[settled])]
     mismatches = mismatches[np.argsort(is_aimed[mismatches], kind="stable")]
-    verdict = judged(Referee(sizes), rays, traced.ours, traced.theirs, mismatches)
+    verdict = judged(Referee(sizes, TOGETHER), rays, traced.ours, traced.theirs, mismatches)
+    mismatches = mismatches[~np.isin(mismatches, verdict.both)]
     explained = apart
     shadows = any_hits(tables, counterpart, sizes, rays, traced.ours, seed)
     right = traced.ratios[(traced.ratios <= 1.0).all(axis=1)]
@@ -128,6 +129,10 @@ def geometry(
         reason = f"{shadows.wrong} of {shadows.rays} shadow rays are wrong; {shadows.first}"
     return RungResult("geometry", status, reason, numbers)
 
+
+TOGETHER = 2.0**-40
+"""See `Referee`: a thousand times the rounding of tables, and a thousandth of the tolerance of our
+t, `rays.judgement.SHARE`."""
 
 LISTED = 20
 """Most rays that are listed of those that Mitsuba gets wrong."""
@@ -204,9 +209,7 @@ def _traced(
     ours, theirs = query.intersect(tables, rays.o, rays.d), trace(counterpart, rays.o, rays.d)
     ratios = comparer.ratios(rays, ours, theirs)
     beyond = counterpart.beyond_planes(ours)
-    # Mitsuba's scalar variants take a ray in a plane through its own origin to hit it there; a ray
-    # of ours begins beyond t = 0.
-    ratios[beyond | ((theirs.shape >= 0) & (theirs.t == 0.0))] = 0.0
+    ratios[beyond | theirs.at_origin] = 0.0
     sizes = comparer.sizes
     reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))
     sag = np.zeros(len(sizes.reach) + 1)

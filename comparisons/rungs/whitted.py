@@ -20,7 +20,7 @@ from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.coincidence import on_two_surfaces
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
 from comparisons.rungs.rays.light_context import LightContext
-from comparisons.rungs.rays.light_error import cut_off
+from comparisons.rungs.rays.light_error import cut_off, of_direct_light
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from reference_rt.core.arrays import FloatArray
@@ -118,8 +118,10 @@ def whitted(
         again = query.radiance_without_noise(tables, other, some.o, some.d)
         settled |= np.abs(again - theirs[outliers]).max(axis=1) <= bound[outliers]
     context = LightContext(scene, tables, counterpart, rays, ours_hits, their_hits, sizes)
-    low, high = changes_of_lamps(context.of(outliers))
-    off, allowed = theirs[outliers] - ours[outliers], bound[outliers][:, None]
+    context = context.of(outliers)
+    low, high = changes_of_lamps(context)
+    off = theirs[outliers] - ours[outliers]
+    allowed = (bound[outliers] + of_direct_light(context))[:, None]
     settled |= ((off >= low - allowed) & (off <= high + allowed)).all(axis=1)
     unexplained = outliers[~settled]
     right = error <= bound

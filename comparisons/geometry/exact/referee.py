@@ -10,6 +10,7 @@ from comparisons.geometry.exact import KINDS
 from comparisons.geometry.exact.crossings import Crossings, IntArray
 from comparisons.geometry.exact.dyadic import (
     CERTAIN,
+    FRACTION,
     NEVER,
     SLACK,
     BoolArray,
@@ -28,6 +29,14 @@ candidates: more than a thousand times the rounding."""
 
 Identity = tuple[int, int, int, int]
 """(shape, instance, part, primitive)."""
+
+
+def identity_of(hits: Intersections, k: int) -> Identity:
+    """That of hit k."""
+    shape, instance, part, primitive = (
+        int(getattr(hits, n)[k]) for n in ("shape", "instance", "part", "primitive")
+    )
+    return shape, instance, part, primitive
 
 
 class Crossing(NamedTuple):
@@ -52,18 +61,22 @@ class Truth:
 
     def agrees(self, hits: Intersections, k: int, slack: float) -> bool:
         """Whether hit k is one of these surfaces, with t within `slack`."""
-        if hits.shape[k] < 0:
+        found = identity_of(hits, k)
+        if found[0] < 0:
             return not self.identities
-        found = tuple(int(getattr(hits, n)[k]) for n in ("shape", "instance", "part", "primitive"))
         t = float(nearest(np.array([self.t], dtype=object))[0])
         return found in self.identities and abs(float(hits.t[k]) - t) <= slack
 
 
 class Referee:
-    """Finds exact first hits in one scene, from its description alone."""
+    """Finds exact first hits in one scene, from its description alone.
 
-    def __init__(self, sizes: ShapeSizes) -> None:
-        self.sizes = sizes
+    together: operands of a solid are hit in one place if their crossings are closer than this
+    fraction of the scene's size.  Where faces coincide, their rounded tables do not.
+    """
+
+    def __init__(self, sizes: ShapeSizes, together: float = 0.0) -> None:
+        self.sizes, self._together = sizes, together
         self.margin = MARGIN * float(np.abs([sizes.lower, sizes.upper]).max())
         boxes = [_box(copy, sizes.leaves_of(copy)) for copy in sizes.copies]
         self.lower, self.upper = (np.array(side) for side in zip(*boxes, strict=True))
@@ -72,15 +85,22 @@ class Referee:
         """The exact first hit of each ray (n, 3)."""
         truths = [Truth(int(NEVER), []) for _ in o]
         reach = np.abs(o).max(axis=1, keepdims=True) * MARGIN + self.margin
+        slack = self._together * reach[:, 0] / MARGIN / np.linalg.norm(d, axis=1)
         for number, copy in enumerate(self.sizes.copies):
             near = _meets_box(o, d, self.lower[number] - reach, self.upper[number] + reach)
             rays = np.flatnonzero(near)
             if len(rays):
-                self._add(copy, rays, o[rays], d[rays], truths)
+                self._add(copy, rays, o[rays], d[rays], slack[rays], truths)
         return truths
 
     def _add(
-        self, copy: Copy, rays: IntArray, o: FloatArray, d: FloatArray, truths: list[Truth]
+        self,
+        copy: Copy,
+        rays: IntArray,
+        o: FloatArray,
+        d: FloatArray,
+        slack: FloatArray,
+        truths: list[Truth],
     ) -> None:
         exact_o, exact_d = Dyadic.of(o), Dyadic.of(d)
         if copy.instance >= 0:
@@ -102,7 +122,7 @@ class Referee:
                     for leaf, (lists, _) in zip(member.leaves, per_leaf, strict=True)
                 ]  # fmt: skip
                 touching = any(bool(flags[k]) for _, flags in per_leaf)
-                _merge(truths[ray], _first(member, found), touching)
+                _merge(truths[ray], _first(member, found, fixed(slack[k])), touching)
 
 
 def _box(copy: Copy, leaves: list[LeafSizes]) -> tuple[FloatArray, FloatArray]:
@@ -170,8 +190,8 @@ def _near_triangles(vertices: FloatArray, o: FloatArray, d: FloatArray) -> IntAr
     return np.flatnonzero((volumes >= -slack).all(axis=0) | (volumes <= slack).all(axis=0))
 
 
-def _first(member: Member, found: list[list[Crossing]]) -> tuple[int, list[Identity]]:
-    """t and the surfaces of the first hit beyond t = 0."""
+def _first(member: Member, found: list[list[Crossing]], slack: int) -> tuple[int, list[Identity]]:
+    """t and the surfaces of the first hit beyond t = 0; of a solid, all within `slack` of it."""
     if member.tree is None:
         ahead = [c for c in found[0] if c.t > 0]
         if not ahead:
@@ -190,7 +210,8 @@ def _first(member: Member, found: list[list[Crossing]]) -> tuple[int, list[Ident
             group.append(crossing.identity)
             position += 1
         if evaluated(member.tree, states) != inside:
-            return t, group
+            here = [c.identity for _, _, c in events if abs(c.t - t) <= slack]
+            return t, here if slack else group
     return int(NEVER), []
 
 
@@ -227,6 +248,11 @@ def _merge(truth: Truth, first: tuple[int, list[Identity]], touching: bool) -> N
         truth.identities += identities
     elif t < truth.t:
         truth.t, truth.identities = t, identities
+
+
+def fixed(value: float) -> int:
+    """A float as a fixed-point number."""
+    return int(value * 2.0**64) << (FRACTION - 64)
 
 
 def _tied(a: int, b: int) -> bool:

@@ -69,10 +69,13 @@ def _on_two_faces(
     scene: Scene, comparer: Comparer, rays: Rays, ours: Intersections, theirs: MitsubaHits
 ) -> BoolArray:
     """Which rays cross the face that Mitsuba reports at the same t as another face of the same
-    shape, which we report: as where a mesh has a triangle twice."""
+    shape, which we report: as where a mesh has a triangle twice, or two shapes of an instanced
+    group lie in one plane."""
     found = np.zeros(len(ours.t), bool)
-    same = (ours.shape >= 0) & (ours.shape == theirs.shape) & (ours.instance == theirs.instance)
-    rows = np.flatnonzero(same & (ours.part == theirs.part) & (ours.primitive != theirs.primitive))
+    other_face = np.zeros(len(found), bool)
+    for name in ("instance", "part", "primitive"):
+        other_face |= getattr(ours, name) != getattr(theirs, name)
+    rows = np.flatnonzero(other_face & (ours.shape >= 0) & (ours.shape == theirs.shape))
     if len(rows) == 0:
         return found
     some, mine, other = rays.rows(rows), rows_of(ours, rows), rows_of(theirs, rows)

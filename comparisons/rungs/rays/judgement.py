@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.exact.referee import Referee
+from comparisons.geometry.exact.referee import Referee, identity_of
 from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -25,12 +25,14 @@ which surface was hit.  A thousandth of it is the tolerance of our t (`_slack`).
 class Judgement(NamedTuple):
     """Indices of the rays on which the tracers disagree, by whose hit is wrong.
 
-    ours: our hit is wrong;  mitsuba: only Mitsuba's is;  undecided: both surfaces and t are right
-    (the difference is elsewhere), the ray touches an edge exactly, or it is beyond MOST_JUDGED.
+    ours: our hit is wrong;  mitsuba: only Mitsuba's is;  both: neither is, the two surfaces are in
+    one place;  undecided: both hits are of the right surface, and the difference is elsewhere, or
+    the ray touches an edge exactly, or it is beyond MOST_JUDGED.
     """
 
     ours: IntArray
     mitsuba: IntArray
+    both: IntArray
     undecided: IntArray
 
 
@@ -44,10 +46,12 @@ def judged(
     for k, truth in zip(some.tolist(), truths, strict=True):
         right = truth.agrees(ours, k, _slack(rays, ours, k))
         also = truth.agrees(theirs, k, 1e3 * _slack(rays, theirs, k))
-        verdicts.append("undecided" if right and also else "mitsuba" if right else
+        apart = identity_of(ours, k) != identity_of(theirs, k)
+        verdicts.append(("both" if apart else "undecided") if right and also else
+                        "mitsuba" if right else
                         "undecided" if truth.touching else "ours")  # fmt: skip
     named = np.array(verdicts + ["undecided"] * (len(mismatches) - len(some)), dtype="U9")
-    return Judgement(*(mismatches[named == name] for name in ("ours", "mitsuba", "undecided")))
+    return Judgement(*(mismatches[named == name] for name in Judgement._fields))
 
 
 def _slack(rays: Rays, hits: Intersections, k: int) -> float:

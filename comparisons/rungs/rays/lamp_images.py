@@ -6,6 +6,7 @@ import numpy as np
 
 from comparisons.rungs.rays.arbiter import BoolArray
 from comparisons.rungs.rays.light_context import LightContext, kind_of
+from comparisons.rungs.rays.light_error import MIDDLE
 from comparisons.rungs.rays.slopes import NEAR, slopes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import AREA, ENVIRONMENT, EnvironmentMap
@@ -92,8 +93,6 @@ def changes_of_lamps(context: LightContext) -> tuple[FloatArray, FloatArray]:
         high += np.maximum(changes.max(axis=0), 0.0)
     return low, high
 
-
-MIDDLE = (0.5, 0.5)
 
 AROUND = 16
 """Points around MIDDLE: the texture of a disk goes round its middle."""

@@ -176,3 +176,36 @@ def test_materials_that_float32_and_tables_amplify(material: str) -> None:
     with scalar():
         found = direct(scene, scene.tables, load(scene), 300)
     assert found.status == "agree", found.reason
+
+
+IN_ITS_PLANE = """
+camera: {type: orthographic, eye: [1.6, 0.1, -5], target: [0, 0, 0], width: 5}
+film: {width: 12, height: 12}
+shapes:
+  - SHAPE
+  - {type: plane, transform: [{rotate: {axis: [1, 0, 0], degrees: -90}}, {translate: [0, -2.6, 0]}]}
+lights:
+  - {type: point, position: [3.9, 0.2, -2.3], intensity: 48}
+  - {type: constant, radiance: 0.4}
+"""
+LEVEL = {
+    "polygon": "{type: polygon, rings: [[[1.6, -0.9], [1.4, -0.2], [1.3, -1], [1.7, -0.7]]], AT}",
+    "rectangle": "{type: rectangle, AT}",
+    "triangle": "{type: triangle, v0: [0, 0, 0], v1: [1, 0, 0], v2: [0, 1, 0], AT}",
+    "disk": "{type: disk, AT}",
+    "box": "{type: box, AT}",
+    "cylinder": "{type: cylinder, AT}",
+    "mesh": "{type: mesh, vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces: [[0, 1, 2]], AT}",
+}
+
+
+@pytest.mark.parametrize("name", LEVEL)
+def test_rays_in_the_plane_in_which_they_begin(name: str) -> None:
+    """Mitsuba's scalar variants let them hit that plane; ours goes on to what lies beyond."""
+    shape = LEVEL[name].replace("AT", "transform: [{translate: [0, 0, 0.291]}]")
+    scene = Scene.parse(IN_ITS_PLANE.replace("SHAPE", shape))
+    with scalar():
+        counterpart = load(scene)
+        for seed in range(3):
+            found = direct(scene, scene.tables, counterpart, 60, seed)
+            assert found.status == "agree", found.reason

@@ -8,6 +8,7 @@ import pytest
 
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.sizes import ShapeSizes
+from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.translate import load
 from comparisons.rungs import geometry
@@ -175,3 +176,44 @@ shapes:
 """)
     found = geometry(scene, scene.tables, load(scene), 300, seed)
     assert found.status in ("agree", "reference-limited"), found.reason
+
+
+FACES = """
+camera: {type: perspective, eye: [1, 2, 6], target: [0, 0, 0], fov: 40}
+film: {width: 24, height: 18}
+groups:
+  small: [{type: rectangle, transform: [{scale: 0.6}]}]
+  two:
+    - {type: rectangle, transform: [{scale: -0.6}]}
+    - {type: rectangle, transform: [{rotate: {axis: [1, 0, 0], degrees: 180}}, {translate: [0.2, 0.1, 0]}]}
+  nested:
+    - {type: instance, group: small, transform: [{translate: [0.3, 0, 0]}]}
+    - {type: instance, group: small, transform: [{scale: [1.5, 1, 1]}]}
+shapes:
+"""  # noqa: E501
+ALIKE = {
+    "two shapes": "{type: rectangle, TURN}\n"
+    "  - {type: box, transform: [{translate: [0, 0, 1]}, STEPS]}",
+    "two shapes of a group": "{type: instance, group: two, TURN}",
+    "two instances in a group": "{type: instance, group: nested, TURN}",
+    "two instances": "{type: instance, group: small, TURN}\n"
+    "  - {type: instance, group: small, transform: [{scale: [2, 0.5, 1]}, STEPS]}",
+    "two triangles": "{type: mesh, vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]],"
+    " faces: [[0, 1, 2], [0, 1, 3]], TURN}",
+    "two operands": "{type: union, of: [{type: box}, {type: box, transform:"
+    " [{scale: [0.5, 0.7, 1]}]}], TURN}",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", ALIKE)
+def test_faces_in_one_place(name: str, seed: int) -> None:
+    """Each renderer reports either."""
+    rng = np.random.default_rng(seed)
+    steps = f"{{rotate: {{axis: {rng.normal(size=3).round(2).tolist()}, degrees: {30 + seed}}}}}"
+    steps += f", {{translate: {rng.uniform(-0.5, 0.5, 3).round(2).tolist()}}}"
+    shapes = ALIKE[name].replace("TURN", "transform: [STEPS]").replace("STEPS", steps)
+    scene = Scene.parse(f"{FACES}  - {shapes}\n")
+    with scalar():
+        found = geometry(scene, scene.tables, load(scene), 300, seed)
+    assert found.status == "agree", found.reason
