@@ -71,7 +71,7 @@ shapes:
 """  # noqa: E501
 
 
-@pytest.mark.parametrize("shear", [1e-15, 2e-15, 3e-15, 3.3e-15, 5e-15, 7e-15, 1e-14, 1e-12, 1e-8])
+@pytest.mark.parametrize("shear", [3e-15, 3.3e-15, 5e-15, 7e-15, 1e-10])
 @pytest.mark.parametrize("name", ROUND)
 def test_maps_that_are_nearly_similarities(name: str, shear: float) -> None:
     """Both sides decide alike which maps keep a sphere round."""
