@@ -5,7 +5,6 @@ pictures, repeated, correlated or odd replicates, 8-bit quantisation and clamped
 """
 
 import math
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy.typing as npt
 from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.metrics import nonfinite_pixels, white_level
 from comparisons.statistics.odd_replicate import odd_replicate
+from comparisons.statistics.repeated import may_be_flat, may_be_the_same, same_pairs
 from comparisons.statistics.shared_noise import common_noise, correlated_pair
 
 DIM = 1e-3
@@ -163,9 +163,17 @@ def _replicates(which: list[int], total: int) -> str:
     return f"replicate{'s' if len(which) > 1 else ''} {shown} of {total}"
 
 
+def _lit(picture: FloatArray) -> int:
+    return int(np.count_nonzero(picture.any(axis=-1)))
+
+
+def _not_as_most(picture: FloatArray) -> int:
+    return int(np.count_nonzero((picture != np.median(picture, axis=(0, 1))).any(axis=-1)))
+
+
 def _black(a: FloatArray, b: FloatArray) -> str | None:
     black = [k for k, picture in enumerate(a) if not picture.any()]
-    if not black or not b.any():
+    if not black or not b.any() or may_be_flat(a, b, _lit):
         return None
     mean = f"{b.mean():.3g} W/sr/m² on average"
     return f"the candidate is black throughout ({_replicates(black, len(a))}); expected {mean}"
@@ -176,6 +184,8 @@ def _constant(a: FloatArray, b: FloatArray) -> str | None:
     pixels = a.shape[1] * a.shape[2]
     if not flat or pixels == 1 or any((picture == picture[0, 0]).all() for picture in b):
         return None
+    if may_be_flat(a, b, _not_as_most):
+        return None
     colour = ", ".join(f"{v:.3g}" for v in a[flat[0], 0, 0])
     return (
         f"every pixel of the candidate is ({colour}) ({_replicates(flat, len(a))}); expected a "
@@ -183,17 +193,15 @@ def _constant(a: FloatArray, b: FloatArray) -> str | None:
     )
 
 
-def _same_pairs(x: FloatArray) -> list[tuple[int, int]]:
-    return [(i, j) for i, j in combinations(range(len(x)), 2) if np.array_equal(x[i], x[j])]
-
-
 def _repeated(a: FloatArray, b: FloatArray) -> str | None:
     """Replicates that are identical, although the other side's differ: there is noise."""
-    same = {"candidate": _same_pairs(a), "reference": _same_pairs(b)}
+    same = {"candidate": same_pairs(a), "reference": same_pairs(b)}
     if same["candidate"] and len(b) > 1 and same["reference"]:
         return None  # there is no noise, or so little that both repeat themselves
-    for name, x in (("candidate", a), ("reference", b)):
-        if same[name] and not (name == "reference" and len(a) == 1):
+    for name, x, other in (("candidate", a, b), ("reference", b, a)):
+        if name == "reference" and len(a) == 1:
+            continue
+        if same[name] and not may_be_the_same(x, other):
             which = sorted({k for pair in same[name] for k in pair})
             return (
                 f"{_replicates(which, len(x))} of the {name} are the same bit for bit; expected "

@@ -124,6 +124,28 @@ def test_replicates_that_are_the_same() -> None:
     assert input_rung(same, picture()).status == "invalid"
 
 
+@pytest.mark.parametrize("background", [0.0, 1.0])
+@pytest.mark.parametrize("pixels", [1, 2, 4, 8, 64, 512])
+def test_pictures_with_few_noisy_pixels(pixels: int, background: float) -> None:
+    """Of which each has two values, half of the time: pictures are flat, black or the same again
+    by chance."""
+    rng = np.random.default_rng(pixels)
+
+    def pictures() -> FloatArray:
+        flat = np.full((16, 32, 32, 3), background)
+        noise = rng.integers(2, size=(16, pixels, 1))
+        flat.reshape(16, -1, 3)[:, 7 : 7 + pixels] += noise
+        return flat
+
+    for _ in range(50):
+        candidate, reference = pictures(), pictures()
+        assert input_rung(candidate, reference).status == "agree"
+    for wrong in (candidate[2], np.full_like(candidate[2], background)):
+        candidate[6] = wrong
+        seen = input_rung(candidate, reference).status == "invalid"
+        assert seen == (pixels >= 64)
+
+
 @pytest.mark.parametrize("share", [0.3, 0.5])
 def test_noise_in_common(share: float) -> None:
     own = noisy(0, 16)
