@@ -8,7 +8,7 @@ import numpy as np
 
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
-from comparisons.mitsuba.hits import MitsubaHits
+from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.rungs.layers.seen import Seen
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.bounds import slide
@@ -26,7 +26,12 @@ SLACK = 2.0
 rounded to float32; that moves a hit by at most as much again."""
 
 MOVES = 12
-"""Rays next to each ray, whose colours by Mitsuba span what float32 may make of a texture."""
+"""Directions in which rays next to each ray lie, whose colours by Mitsuba span what float32 may
+make of a texture."""
+
+STEPS = 4
+"""Rays in each direction.  Where a ray grazes a surface far away they may be texels apart: then the
+colours between two of them are not known better than by their difference."""
 
 COLOUR = 1e-5
 """Tolerance of a colour that does not vary: float32 texels and their interpolation make some
@@ -141,19 +146,25 @@ def _of_colours(
     some = rays.rows(far)
     delta = sizes.frame.delta(some.o, theirs.p[far], reach)
     radius = 2.0 * (delta + apart[theirs.shape[far]])
-    around = [
-        seen.colours(trace(counterpart, some.o + radius[:, None] * move, some.d), of_vertices=True)
-        for move in arbiter.directions(MOVES)
-    ]
-    ratio[far] = _outside(np.stack(around), values[far])
+    middle = seen.colours(rows_of(theirs, far), of_vertices=True)
+    around = np.empty((MOVES, STEPS + 1, *middle.shape))
+    around[:, 0] = middle
+    for k, move in enumerate(arbiter.directions(MOVES)):
+        for step in range(1, STEPS + 1):
+            o = some.o + (step / STEPS * radius)[:, None] * move
+            around[k, step] = seen.colours(trace(counterpart, o, some.d), of_vertices=True)
+    between = np.abs(np.diff(around, axis=1)).max(axis=(0, 1))
+    ratio[far] = _outside(around, values[far], between)
     return SLACK * ratio
 
 
-def _outside(colours: FloatArray, values: FloatArray) -> FloatArray:
-    """(n,): how far values (n, 3) are outside the range of colours ([k,] n, 3), over the
-    tolerance."""
+def _outside(
+    colours: FloatArray, values: FloatArray, slack: FloatArray | float = 0.0
+) -> FloatArray:
+    """(n,): how far values (n, 3) are outside the range of colours (..., n, 3), and further than
+    `slack`, over the tolerance."""
     each = colours.reshape(-1, *values.shape)
-    low, high = each.min(axis=0), each.max(axis=0)
+    low, high = each.min(axis=0) - slack, each.max(axis=0) + slack
     bound = COLOUR * np.maximum(np.abs(low), np.abs(high)).max(axis=1, keepdims=True)
     off = np.maximum(np.maximum(low - values, values - high), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):

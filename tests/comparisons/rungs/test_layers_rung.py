@@ -1,12 +1,14 @@
 """The rung of layers: right layers agree, and every fault of a layer is found."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from builders import SCENES
 
+from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.translate import load
 from comparisons.rungs import layers
 from comparisons.rungs.layers import means, rung, variance
@@ -205,3 +207,37 @@ def test_variance_of_heavy_tails(seed: int, factor: float) -> None:
     found = variance.compare_spread(pictures, estimates)
     assert found.differs(upper=False) == (factor != 1.0)
     assert found.differs(upper=True) == (factor < 1.0)
+
+
+HORIZON = """
+camera: {type: perspective, eye: [0.3, HEIGHT, 4], target: [0.1, 0, 0], up: [0.2, 1, 0.1], fov: 50}
+film: {width: 32, height: 24}
+integrator: {type: ray_cast}
+textures: {t: TEXTURE}
+materials: {m: {type: diffuse, reflectance: t}}
+shapes:
+  - {type: plane, material: m, transform: [{rotate: {axis: [1, 0.01, 0.02], degrees: -89}}]}
+  - {type: rectangle, material: m, transform: [{scale: 40},
+     {rotate: {axis: [1, 0, 0], degrees: -90}}, {translate: [0, 0.1, 0]}]}
+"""
+GROUND = {
+    "bilinear": "{type: bitmap, file: colours.png, uv: {offset: [0, 0]}}",
+    "nearest": "{type: bitmap, file: colours.png, filter: nearest, uv: {offset: [0, 0]}}",
+    "checker": "{type: checker, first: 0.2, second: 0.7, uv: {scale: 3, offset: [0, 0]}}",
+}
+
+
+@pytest.mark.parametrize("height", [0.2, 1.0, 3.0])
+@pytest.mark.parametrize("name", GROUND)
+def test_textures_up_to_the_horizon(name: str, height: float, image_folder: Path) -> None:
+    """Where float32's error of the point that a grazing ray hits is many texels."""
+    text = HORIZON.replace("TEXTURE", GROUND[name]).replace("HEIGHT", str(height))
+    scene = Scene.parse(text, folder=image_folder)
+    moved = Scene.parse(text.replace("offset: [0, 0]", "offset: [0.01, 0]"), folder=image_folder)
+    with scalar():
+        counterpart = load(scene)
+        films = (scene.film, scene.film)
+        found = layers(scene, scene.tables, counterpart, films)
+        wrong = layers(scene, moved.tables, counterpart, films)
+    assert found.status in ("agree", "reference-limited"), found.reason
+    assert wrong.status == "differ"
