@@ -23,24 +23,31 @@ def same_pairs(x: FloatArray) -> list[tuple[int, int]]:
 
 
 def may_be_the_same(x: FloatArray, other: FloatArray) -> bool:
-    """Whether identical pairs of the replicates x may be chance;  other: those of the other side,
-    which tell if all of x are the same."""
-    pairs = len(x) * (len(x) - 1) / 2
-    return _is_chance(pairs, _differing(x), _differing(other) if len(other) > 1 else [])
+    """Whether identical pairs of the replicates x may be chance;  other: the other side's
+    replicates, whose noise counts where all of x are the same."""
+    repeated = {j for _, j in same_pairs(x)}
+    return _is_chance(len(repeated), _differing(x), _differing(other) if len(other) > 1 else [])
 
 
 def may_be_flat(x: FloatArray, other: FloatArray, deviating: Callable[[FloatArray], int]) -> bool:
     """Whether pictures of x without a deviating pixel may be chance;  deviating: the number of
     pixels of one picture (h, w, 3)."""
+    counts = [deviating(picture) for picture in x]
     others = [deviating(picture) for picture in other] if len(other) > 1 else []
-    return _is_chance(len(x), [deviating(picture) for picture in x], others)
+    return _is_chance(counts.count(0), counts, others)
 
 
-def _is_chance(trials: float, counts: list[int], others: list[int]) -> bool:
-    """Of numbers of pixels on one side, or if they are all 0 on the other; if these are not known,
-    nothing is chance."""
-    some = [n for n in counts if n] or [n for n in others if n]
-    return bool(some) and trials * math.exp(-float(np.mean(some))) > CHANCE
+def _is_chance(times: int, counts: list[int], others: list[int]) -> bool:
+    """Whether a number of pixels may be 0 so many times among `counts`.
+
+    Its mean is that of `counts`, or if they are all 0 that of `others`; if that is not known
+    either, nothing is chance.  By the union bound over which ones are 0.
+    """
+    known = counts if any(counts) else others
+    if not any(known):
+        return False
+    ways = math.log(math.comb(len(counts), times))
+    return ways - times * float(np.mean(known)) > math.log(CHANCE)
 
 
 def _differing(x: FloatArray) -> list[int]:

@@ -32,7 +32,7 @@ Identity = tuple[int, int, int, int]
 
 
 def identity_of(hits: Intersections, k: int) -> Identity:
-    """That of hit k."""
+    """Which surface hit k is on."""
     shape, instance, part, primitive = (
         int(getattr(hits, n)[k]) for n in ("shape", "instance", "part", "primitive")
     )

@@ -1,4 +1,4 @@
-"""What our integrators need of a scene, for a scene of Mitsuba as it is."""
+"""Ray queries, lights and size of a Mitsuba scene, as our integrators and rungs call them."""
 
 from typing import Any
 

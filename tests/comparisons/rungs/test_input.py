@@ -144,6 +144,9 @@ def test_pictures_with_few_noisy_pixels(pixels: int, background: float) -> None:
         candidate[6] = wrong
         seen = input_rung(candidate, reference).status == "invalid"
         assert seen == (pixels >= 64)
+        everywhere = np.repeat(wrong[None], 16, axis=0)
+        seen = input_rung(everywhere, reference).status == "invalid"
+        assert seen if pixels >= 8 else (not seen or pixels > 1)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5])
