@@ -3,15 +3,15 @@
 Needs `distributed`, and `dask-jobqueue` for a batch system (the extra `cluster`).
 """
 
+import asyncio
 import importlib
 import math
 import time
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import CancelledError, Future, InvalidStateError
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
-from weakref import WeakSet
 
 import yaml
 
@@ -24,8 +24,11 @@ _PATIENCE = 60.0
 """Seconds to wait for a scheduler and its first worker.  A batch system may let jobs wait for days:
 for these there is no limit."""
 
-_COUNTED = 5.0
-"""Seconds between two counts of the workers, which come and go."""
+_ASKED = 5.0
+"""Seconds after which the scheduler is asked for its workers, which come and go."""
+
+_POLL = 0.1
+"""Seconds between two looks for a scheduler and its first worker."""
 
 _BATCH_SYSTEMS = {
     "slurm": "SLURMCluster",
@@ -39,7 +42,14 @@ _BATCH_SYSTEMS = {
 
 
 class Cluster:
-    """`workers.Workers`: the workers of a Dask scheduler, of any number of threads each."""
+    """`workers.Workers`: the workers of a Dask scheduler, of any number of threads each.
+
+    Every future ends, whatever becomes of the scheduler: the client tells of most that a scheduler
+    took along, but not of those that it submitted while the scheduler was ending, nor of any if the
+    scheduler ended in an orderly way (found under load: they never ended).  So the scheduler is
+    asked now and then, and where it does not answer or is another one, all futures are given up
+    here and a new client connects.
+    """
 
     def __init__(self, scheduler: str = "", file: Path | None = None) -> None:
         """scheduler: its address, such as tcp://host:8786;  file: in its place, a description of a
@@ -48,9 +58,10 @@ class Cluster:
         self._cluster = None if file is None else batch_cluster(file)
         self._distributed = _module("distributed")
         self._client: Any = None
-        self._executor: Any = None
-        self._counted, self._threads = 0.0, 1
-        self._scheduler_id, self._futures = "", WeakSet[Future[Any]]()
+        self._scheduler_id, self._asked, self._threads = "", 0.0, 1
+        self._is_connected = self._is_stopped = False
+        self._running: dict[Future[Any], Any] = {}
+        """Futures that have not ended, and those of Dask from which they get their results."""
         try:
             self._connect()
         except BaseException:
@@ -59,86 +70,127 @@ class Cluster:
 
     @property
     def threads(self) -> int:
-        now = time.monotonic()
-        if now - self._counted > _COUNTED:
-            self._counted = now
-            with suppress(Exception):  # the scheduler may be gone for a moment
-                self._threads = max(1, sum(self._client.nthreads().values()))
-                self._give_up_lost()
+        if self._is_connected and time.monotonic() - self._asked > _ASKED:
+            try:
+                found, threads = self._ask()
+            except Exception:  # its connection has failed in one of many ways
+                found = ""
+            if found == self._scheduler_id:
+                self._threads, self._asked = max(1, threads), time.monotonic()
+            else:
+                self._disconnect()
         return self._threads
 
-    def _give_up_lost(self) -> None:
-        """Cancel what was submitted to a scheduler that has been replaced by a new one at its
-        address.  The client tells of most such futures, but not of those that it submitted while
-        the old one was ending (found under load: they never ended)."""
-        # A lambda: sent by value, so that the scheduler need not have this package.
-        found = self._client.run_on_scheduler(lambda dask_scheduler: str(dask_scheduler.id))
-        if self._scheduler_id not in ("", found):
-            for future in list(self._futures):
-                future.cancel()
-        self._scheduler_id = found
-
     def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[T]":
-        found: Future[T]
-        try:
-            found = self._executor.submit(function, *arguments)
-        except Exception:  # the client has given up a scheduler that has gone
+        found: Future[T] = Future()
+        if not self._is_connected or self._client.status != "running":
             self._connect()
-            found = self._executor.submit(function, *arguments)
-        self._futures.add(found)
+        if self._is_connected:
+            try:
+                # Not pure: a function that is submitted again must be run again.
+                given = self._client.submit(function, *arguments, pure=False)
+            except Exception:
+                if self._client.status == "running":
+                    raise
+                _end(found, CancelledError("the client has closed itself"))
+                return found
+            self._running[found] = given
+            found.add_done_callback(self._ended)
+            self._client.loop.add_callback(_pass_on, given, found)
+        if self._is_stopped:  # perhaps meanwhile, by another thread
+            self._give_up()
+            _end(found, CancelledError("stopped"))
         return found
 
     def recovers(self, error: BaseException) -> bool:
         """A function whose worker died, whose scheduler has gone, or which that gave up, is run
         again, by others."""
-        lost = (
-            CancelledError,
-            OSError,
-            self._distributed.KilledWorker,
-            self._distributed.comm.CommClosedError,
-            self._distributed.client.FutureCancelledError,
-        )
-        if not isinstance(error, lost):
-            return False
-        if self._client.status != "running":
-            self._connect()
-        return True
+        distributed = self._distributed
+        cancelled = CancelledError, asyncio.CancelledError, distributed.client.FutureCancelledError
+        lost = distributed.KilledWorker, distributed.comm.CommClosedError, OSError
+        return isinstance(error, cancelled + lost)
 
     def stop(self) -> None:
-        with suppress(Exception):
-            self._executor.shutdown(wait=False, cancel_futures=True)
+        self._is_stopped = True
+        self._give_up()
 
     def close(self) -> None:
+        self.stop()
+        self._disconnect()
         with suppress(Exception):
-            self._executor.shutdown(wait=False, cancel_futures=True)
-        for one in (self._client, self._cluster):
-            with suppress(Exception):
-                if one is not None:
-                    one.close()
+            if self._cluster is not None:
+                self._cluster.close()
+
+    def _give_up(self) -> None:
+        for found in list(self._running):
+            _end(found, CancelledError("given up"))
+
+    def _ended(self, found: "Future[Any]") -> None:
+        """A future has its result, or was given up: then nobody needs that of Dask."""
+        given = self._running.pop(found, None)
+        if given is not None and not given.done():
+            with suppress(Exception):  # its client may be closed
+                given.client.loop.add_callback(given.cancel)
+
+    def _ask(self) -> tuple[str, int]:
+        """The identity of the client's scheduler, and the threads of its workers."""
+        # The first call returns what it remembers if there is no answer, the second one raises.
+        found = self._client.scheduler_info(n_workers=0)["id"]
+        return found, sum(self._client.nthreads().values())
 
     def _connect(self) -> None:
-        """A new client, once there is a scheduler and a worker."""
-        patience = _PATIENCE if self._cluster is None else math.inf
-        end = time.monotonic() + patience
-        if self._client is not None:
-            with suppress(Exception):
-                self._client.close(timeout=1)
+        """A new client, once there is a scheduler and a worker.  Returns without one if `stop` is
+        called meanwhile.  Raises WorkersError."""
+        self._disconnect()
+        end = time.monotonic() + (_PATIENCE if self._cluster is None else math.inf)
         target = self._cluster if self._cluster is not None else self._address
-        while True:
+        reason = "no worker"
+        while not self._is_stopped:
             try:
-                client = self._distributed.Client(target, timeout=5, set_as_default=False)
-                left = None if patience == math.inf else max(1.0, end - time.monotonic())
-                client.wait_for_workers(1, timeout=left)
-                break
-            except (OSError, TimeoutError, ValueError) as error:
-                if isinstance(error, ValueError) or time.monotonic() > end:
-                    raise WorkersError(
-                        f"{self._address or 'the batch system'}: no scheduler with a worker in "
-                        f"{_PATIENCE:.0f} s; expected `dask scheduler` and `dask worker` there"
-                    ) from None
-        self._client = client
-        # Not pure: a function that is submitted again must be run again.
-        self._executor = client.get_executor(pure=False)
+                if self._client is None or self._client.status != "running":
+                    self._client = self._distributed.Client(target, timeout=5, set_as_default=False)
+                self._scheduler_id, threads = self._ask()
+                if threads > 0:
+                    self._threads, self._asked = threads, time.monotonic()
+                    self._is_connected = True
+                    return
+            except Exception as error:  # connections fail in many ways
+                self._disconnect()
+                reason = " ".join(str(error).split())
+                if isinstance(error, ValueError):  # not an address
+                    end = -math.inf
+            if time.monotonic() > end:
+                raise WorkersError(
+                    f"{self._address or 'the batch system'}: no scheduler with a worker in "
+                    f"{_PATIENCE:.0f} s ({reason}); expected `dask scheduler` and `dask worker` "
+                    "there"
+                )
+            time.sleep(_POLL)
+
+    def _disconnect(self) -> None:
+        """Close the client: a new one connects where a client's own attempts may have ended."""
+        self._is_connected = False
+        self._give_up()
+        with suppress(Exception):
+            if self._client is not None:
+                self._client.close(timeout=1)
+        self._client = None
+
+
+async def _pass_on(given: Any, found: "Future[Any]") -> None:
+    """In the client's thread: end a future as that of Dask ends."""
+    try:
+        result = await given
+    except BaseException as error:
+        _end(found, error)
+    else:
+        with suppress(InvalidStateError):  # it was given up meanwhile
+            found.set_result(result)
+
+
+def _end(found: "Future[Any]", error: BaseException) -> None:
+    with suppress(InvalidStateError):  # it has ended already
+        found.set_exception(error)
 
 
 def batch_cluster(file: Path) -> Any:

@@ -4,7 +4,7 @@ import os
 import signal
 import sys
 import time
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
 
 import pytest
 from machines import Machines
@@ -83,33 +83,88 @@ def test_a_scheduler_that_restarts(machines, box):
     assert len(times) > 40
 
 
-def test_what_a_scheduler_took_along_is_given_up(machines, monkeypatch):
-    """Of a unit that was submitted while it was ending, the client never says anything."""
-    monkeypatch.setattr("reference_rt.util.cluster._COUNTED", 0.0)
+@pytest.fixture
+def cluster(machines, monkeypatch):
+    """Which asks its scheduler all the time."""
+    monkeypatch.setattr("reference_rt.util.cluster._ASKED", 0.0)
     machines.start_worker()
-    cluster = Cluster(machines.address)
-    try:
-        assert cluster.threads == 1
-        lost = Future()
-        cluster._futures.add(lost)
-        assert cluster.threads == 1
-        assert not lost.cancelled()
+    found = Cluster(machines.address)
+    yield found
+    found.close()
+
+
+def ends(future, look=lambda: None):
+    """Whether a future ends in a minute, as the loop of a render sees it."""
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        if wait([future], 0.1).done:
+            return True
+        look()
+    return False
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("is_forgotten", [False, True])
+def test_what_a_scheduler_took_along_ends(machines, cluster, number, is_forgotten):
+    """However it ends; of a unit that was submitted meanwhile the client never says anything."""
+    lost = cluster.submit(time.sleep, 1000.0)
+    assert not wait([lost], 0.5).done
+    if is_forgotten:
+        cluster._client.futures.clear()
+    machines.scheduler.send_signal(number)
+    machines.scheduler.wait()
+    machines.workers[0].kill()
+    machines.start_scheduler()
+    machines.start_worker()
+    assert ends(lost, lambda: cluster.threads)
+    assert cluster.recovers(lost.exception())
+    assert cluster.submit(abs, -3).result(60.0) == 3
+    assert cluster.threads == 1
+
+
+@pytest.mark.parametrize("is_alive", [True, False])
+@pytest.mark.parametrize("is_forgotten", [False, True])
+@pytest.mark.parametrize("how", ["stop", "close"])
+def test_all_ends_with_stop(machines, cluster, is_alive, is_forgotten, how):
+    """What runs, what waits for a worker, and what is submitted later, so that Ctrl-C ends too."""
+    futures = [cluster.submit(time.sleep, 1000.0) for _ in range(3)]
+    assert not wait(futures, 0.5).done
+    if is_forgotten:
+        cluster._client.futures.clear()
+    if not is_alive:
         machines.scheduler.kill()
-        machines.scheduler.wait()
-        machines.workers[0].kill()
-        machines.start_scheduler()
-        machines.start_worker()
-        end = time.monotonic() + 60.0
-        while not lost.cancelled() and time.monotonic() < end:
-            assert cluster.threads >= 1
-            time.sleep(0.1)
-        assert lost.cancelled()
-        with pytest.raises(CancelledError) as caught:
-            lost.result()
-        assert cluster.recovers(caught.value)
-        assert cluster.submit(abs, -3).result(60.0) == 3
-    finally:
-        cluster.close()
+    getattr(cluster, how)()
+    assert not wait([*futures, cluster.submit(abs, -3)], 10.0).not_done
+    assert {type(future.exception()) for future in futures} == {CancelledError}
+
+
+@pytest.mark.parametrize("give_up", ["stop", "cancel"])
+def test_what_is_given_up_leaves_its_worker(cluster, machines, give_up):
+    """What had not begun never runs."""
+    first = cluster.submit(time.sleep, 2.0)
+    begun = machines.folder / "begun"
+    second = cluster.submit(os.mkdir, str(begun))
+    if give_up == "stop":
+        cluster.stop()
+    else:
+        assert second.cancel()
+        first.result(60.0)
+    other = Cluster(machines.address)
+    assert other.submit(abs, -3).result(60.0) == 3
+    other.close()
+    assert not begun.exists()
+
+
+def test_stopped_while_it_waits_for_a_scheduler(machines, cluster):
+    """Of a batch system, which may let it wait for days."""
+    machines.scheduler.kill()
+    machines.scheduler.wait()
+    with ThreadPoolExecutor(1) as pool:
+        given = pool.submit(lambda: (cluster._disconnect(), cluster.submit(abs, -3))[1])
+        assert not wait([given], 2.0).done
+        cluster.stop()
+        assert ends(given)
+        assert ends(given.result())
 
 
 def test_no_scheduler(box, monkeypatch):
