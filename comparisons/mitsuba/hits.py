@@ -27,7 +27,9 @@ class MitsubaHits(Intersections):
     shape, beyond float32's common bound;  stands_in (n,): whether the hit is on a mesh that stands
     in for a curved surface, and has the geometric normal of a flat triangle;  height (n,): the
     length of the hit triangle, in scene units, over which its normal and uv change, where a flat
-    shape is a mesh in Mitsuba, of which our surface knows nothing; else infinite.
+    shape is a mesh in Mitsuba, of which our surface knows nothing; else infinite;  aspect (n,): the
+    longest side of the hit triangle over its height, on a mesh that stands in for a curved surface;
+    else 0.
     """
 
     has_uv: BoolArray
@@ -35,6 +37,7 @@ class MitsubaHits(Intersections):
     turn: FloatArray
     stands_in: BoolArray
     height: FloatArray
+    aspect: FloatArray
 
     @property
     def at_origin(self) -> BoolArray:
@@ -77,6 +80,8 @@ def read(hits: RawHits, mi_shapes: Sequence[MitsubaShape], o: FloatArray) -> Mit
         found.stands_in[rows] = plugin.faceted
         if plugin.heights is not None:
             found.height[rows] = plugin.heights[hits.prim[rows]]
+        if plugin.aspects is not None:
+            found.aspect[rows] = plugin.aspects[hits.prim[rows]]
         if plugin.stand_in is not None:
             found.sag[rows], found.turn[rows] = plugin.stand_in.sag, plugin.stand_in.turn
             found.stands_in[rows] = True
@@ -104,6 +109,7 @@ def misses(n: int) -> MitsubaHits:
         turn=np.zeros(n),
         stands_in=np.zeros(n, bool),
         height=np.full(n, np.inf),
+        aspect=np.zeros(n),
     )
 
 

@@ -49,8 +49,9 @@ class Plugin(NamedTuple):
     whose quadratic Mitsuba solves in float32 (see `hits.CURVED`), else 0;  faceted: whether its
     triangles are so small that float32 turns their geometric normals, so that shading normals are
     compared;  heights: the smallest height of each triangle of a flat shape that we do not
-    triangulate, over its longest side in uv if that is less than 1;  uv_of_mesh: whether the
-    vertices of a mesh that stands in have our uv, which between them are interpolated.
+    triangulate, over its longest side in uv if that is less than 1;  aspects: the longest side of
+    each triangle of a mesh that stands in, over its height on it;  uv_of_mesh: whether the vertices
+    of such a mesh have our uv, which between them are interpolated.
     """
 
     value: Any
@@ -63,6 +64,7 @@ class Plugin(NamedTuple):
     curved: float = 0.0
     faceted: bool = False
     heights: FloatArray | None = None
+    aspects: FloatArray | None = None
     uv_of_mesh: bool = False
 
     @property

@@ -119,7 +119,7 @@ def whitted(
         settled |= np.abs(again - theirs[outliers]).max(axis=1) <= bound[outliers]
     context = LightContext(scene, tables, counterpart, rays, ours_hits, their_hits, sizes)
     context = context.of(outliers)
-    low, high = changes_of_lamps(context)
+    low, high = changes_of_lamps(context, setup)
     off = theirs[outliers] - ours[outliers]
     allowed = (bound[outliers] + of_direct_light(context))[:, None]
     settled |= ((off >= low - allowed) & (off <= high + allowed)).all(axis=1)

@@ -33,7 +33,6 @@ _OPERATIONS = {
     "gradient": "slopes",
     "holds": "which lights",
     "intersect": "crossings",
-    "middle": "light of the middle",
     "most": "most layers",
     "nearest_of_block": "hits of blocks",
     "nearest_of_type": "hits",
@@ -43,6 +42,7 @@ _OPERATIONS = {
     "pdf": "light densities",
     "prepare": "weights and frames",
     "sample": "samples",
+    "sample_fixed": "light of fixed points",
     "surface": "surface points",
     "uv": "texture coordinates",
 }

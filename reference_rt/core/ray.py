@@ -118,8 +118,18 @@ def ray_from(point: SurfacePoint, w: Vec3) -> Ray:
     return Ray(leave(point, w), w, math.inf)
 
 
+_SHORT = 2.0**-44
+"""How far before its target a segment ends, over the coordinates of its ends.  A surface through
+the target, such as the ceiling on which a lamp lies, is met up to 4 * 2^-52 of these before it,
+over the ray's cosine (measured on every shape under turned maps: 2.4 * 2^-52).  Without this a
+quarter of the segments end there by rounding; with it only those within a degree of the surface."""
+
+
 @kernel
 def segment_to(point: SurfacePoint, target: Vec3) -> Ray:
-    """The open segment from `point` to `target`; `target` itself must be off any surface."""
+    """The open segment from `point` to `target`, without a surface on which `target` lies."""
     o = leave(point, target - point.p)
-    return Ray(o, target - o, 1.0)
+    w = target - o
+    size = max_abs(w)
+    short = _SHORT * (max_abs(o) + max_abs(target))
+    return Ray(o, w, 1.0 - short / size if short < size else 0.0)

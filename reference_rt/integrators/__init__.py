@@ -56,4 +56,4 @@ radiances = _radiances.function
 """radiances(setup, scene, samplers, n, scratch): estimates of the radiance along the first n of
 `scratch.rays`, into `scratch.totals`."""
 
-__all__ = ["AnyIntegrator", "Direct", "Path", "RayCast", "Whitted", "radiances"]
+__all__ = ["AnyIntegrator", "Direct", "Path", "RayCast", "Whitted", "WhittedSetup", "radiances"]

@@ -42,12 +42,16 @@ class Whitted(Description):
     """Rays whose weight in the pixel is below this fraction are not traced, from 0 to below 1."""
 
     def setup(self) -> "WhittedSetup":
-        return WhittedSetup(self.max_depth, self.min_contribution)
+        return WhittedSetup(self.max_depth, self.min_contribution, 0.5, 0.5)
 
 
 class WhittedSetup(NamedTuple):
+    """u0, u1: the point of every area light that represents it, its middle at 0.5 and 0.5."""
+
     max_depth: int
     min_contribution: float
+    u0: float
+    u1: float
 
 
 @kernel
@@ -90,7 +94,7 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
         ambient = any_material.ambient(scene.materials, shading) * any_light.ambient(scene.lights)
         total = total + weight * ambient
         if any_material.is_smooth(scene.materials, point.material):
-            total = total + weight * _direct_light(scene, scene.lights.choice, shading)
+            total = total + weight * _direct_light(whitted, scene, scene.lights.choice, shading)
         if depth == whitted.max_depth:
             continue
         for k in range(any_material.branch_count(scene.materials, point.material)):
@@ -109,16 +113,18 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
 
 
 @kernel
-def _direct_light(scene: SceneTables, choice: LightSampler | None, shading: Shading) -> Vec3:
-    """Direct light of every point, spot and directional light, and of the middle of every area
+def _direct_light(
+    whitted: WhittedSetup, scene: SceneTables, choice: LightSampler | None, shading: Shading
+) -> Vec3:
+    """Direct light of every point, spot and directional light, and of one point of every area
     light."""
     total = Vec3(0.0, 0.0, 0.0)
     if choice is None:
         return total
-    shapes = shapes_of(scene)
+    shapes, p, u0, u1 = shapes_of(scene), shading.point.p, whitted.u0, whitted.u1
     for k in range(len(choice.kind)):
         if choice.kind[k] != ENVIRONMENT and choice.probability[k] > 0.0:
-            light = any_light.middle(scene.lights, k, shapes, scene.textures, shading.point.p)
+            light = any_light.sample_fixed(scene.lights, k, shapes, scene.textures, p, u0, u1)
             sample = direct_from(scene, shading, light)
             if sample.light.pdf > 0.0:
                 total = total + sample.contribution * (1.0 / sample.light.pdf)

@@ -36,9 +36,9 @@ from reference_rt.lights.dispatch import (
     emitted,
     environment_pdf,
     is_area,
-    middle,
     pick,
     pick_probability,
+    sample_fixed,
     sample_one,
 )
 from reference_rt.lights.emitters import directional, point, projector, spot
@@ -115,9 +115,9 @@ __all__ = [
     "emitted",
     "environment_pdf",
     "is_area",
-    "middle",
     "pick",
     "pick_probability",
+    "sample_fixed",
     "sample_one",
     "shadow_ray",
 ]

@@ -144,34 +144,49 @@ def _sample(
 
 
 @kernel
-def middle(
-    lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3
+def sample_fixed(
+    lights: Lights,
+    k: int,
+    shapes: Shapes,
+    textures: Textures | None,
+    p: Vec3,
+    u0: float,
+    u1: float,
 ) -> LightSample:
-    """The same without random numbers: an area light is replaced by one point."""
-    return _middle_of_one(lights.choice, lights, k, shapes, textures, p)
+    """The same without random numbers: an area light is replaced by the one point at (u0, u1)."""
+    return _fixed_of_one(lights.choice, lights, k, shapes, textures, p, u0, u1)
 
 
 @kernel
-def _middle_of_one(
+def _fixed_of_one(
     entries: LightSampler | None,
     lights: Lights,
     k: int,
     shapes: Shapes,
     textures: Textures | None,
     p: Vec3,
+    u0: float,
+    u1: float,
 ) -> LightSample:
     if entries is None:
         return NO_LIGHT
     kind, i = entries.kind[k], entries.row[k]
-    found: LightSample = _middle(emitters(lights), kind, i, shapes, textures, p)
+    found: LightSample = _sample_fixed(emitters(lights), kind, i, shapes, textures, p, u0, u1)
     return found
 
 
-@by_code("middle")
-def _middle(
-    lights: Lights, kind: int, i: int, shapes: Shapes, textures: Textures | None, p: Vec3
+@by_code("sample_fixed")
+def _sample_fixed(
+    lights: Lights,
+    kind: int,
+    i: int,
+    shapes: Shapes,
+    textures: Textures | None,
+    p: Vec3,
+    u0: float,
+    u1: float,
 ) -> LightSample:
-    return _sample(lights, kind, i, shapes, textures, p, 0.5, 0.5)
+    return _sample(lights, kind, i, shapes, textures, p, u0, u1)
 
 
 @kernel

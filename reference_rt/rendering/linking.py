@@ -115,9 +115,8 @@ def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
     if tables.materials.oriented is not None:
         wanted |= {"tangents"}
     if tables.lights.areas is not None:
-        wanted |= {"whitted": {"middle", "sample"}, "ray_cast": set(), "first_hits": set()}.get(
-            integrator, {"sample", "pdf"}
-        )
+        others = {"whitted": {"sample_fixed", "sample"}, "ray_cast": set(), "first_hits": set()}
+        wanted |= others.get(integrator, {"sample", "pdf"})
     return linked_shapes(linker, geometry.shapes, wanted)
 
 
@@ -229,7 +228,7 @@ def linked_lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLigh
     wanted = {
         "path": {"_background", "_environment_density", "_emitted", "_area_density", "_sample"},
         "direct": {"_background", "_environment_density", "_emitted", "_area_density", "_sample"},
-        "whitted": {"_background", "_emitted", "_middle", "_sample"},
+        "whitted": {"_background", "_emitted", "_sample_fixed", "_sample"},
     }.get(integrator, set())
     emitters = linker.link(
         light_tables.by_code.operations,

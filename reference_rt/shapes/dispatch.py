@@ -86,11 +86,12 @@ def sample(
     return NO_LIGHT_POINT
 
 
-@by_code("middle")
-def middle(shapes: Shapes, kind: int, i: int, area: float, p: Vec3) -> LightPoint:
-    """The one point of a primitive that represents all of it: `sample` at u0 = u1 = 0.5, but of a
-    rectangle its centre, wherever it is seen from."""
-    return sample(shapes, kind, i, area, p, 0.5, 0.5)
+@by_code("sample_by_area")
+def sample_fixed(
+    shapes: Shapes, kind: int, i: int, area: float, p: Vec3, u0: float, u1: float
+) -> LightPoint:
+    """`sample`, but of a rectangle the same point wherever it is seen from."""
+    return sample(shapes, kind, i, area, p, u0, u1)
 
 
 @by_code("pdf")

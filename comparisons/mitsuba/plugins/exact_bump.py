@@ -5,7 +5,8 @@ derivative (src/bsdfs/bumpmap.cpp), which anisotropic materials show.  Where the
 local normal is (0, 0, 1): if u runs along the z axis too, the tangent is 0 / 0, and so is all light
 but that of diffuse materials.  And where a texture's coordinates are rotated, it rotates the
 gradient before it multiplies by the image's width and height (src/textures/bitmap.cpp), which is
-wrong unless these are the same.
+wrong unless these are the same.  It turns the tilted normal to the side of the geometric one, which
+is the wrong side where a mesh's triangle is wound against the normals of its vertices: black.
 
 The law is Blinn's (1978): the normal of the surface whose points are raised by the height, of which
 the derivatives of the position are dp/du + n dh/du and dp/dv + n dh/dv.
@@ -63,7 +64,8 @@ def register(mi: Any) -> None:
             dp_du = si.dp_du + normal * (dh_du - dr.dot(normal, si.dp_du))
             dp_dv = si.dp_dv + normal * (dh_dv - dr.dot(normal, si.dp_dv))
             n = dr.normalize(dr.cross(dp_du, dp_dv))
-            n = dr.select(dr.dot(n, si.n) < 0.0, -n, n)
+            wrong_side = dr.dot(n, si.n) * dr.dot(normal, si.n) < 0.0
+            n = dr.select(wrong_side, -n, n)
             local = si.to_local(n)
             if self.flips:
                 local = facing(local, si.wi)

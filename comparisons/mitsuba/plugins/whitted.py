@@ -203,7 +203,9 @@ def register(mi: Any) -> None:
                 value = bsdf.eval(context, si, si.to_local(ds.d), active)
                 ray = leave(mi, si, ds.d, height)
                 if mi.has_flag(light.flags(), mi.EmitterFlags.DeltaPosition):
-                    ray.maxt = ds.dist
+                    # It ends before a surface on which the light lies: as far as it may have moved
+                    # along at its start.
+                    ray.maxt = dr.maximum(dr.dot(ds.p - ray.o, ray.d) - 10.0 * height, 0.0)
                 visible = without(active, scene.ray_test(ray, active))
                 total += dr.select(visible, value * radiance, 0.0)
             for light in self.lights:

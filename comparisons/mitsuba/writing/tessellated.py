@@ -11,17 +11,17 @@ from comparisons.mitsuba.translate.shapes.caps import cap_faces
 from comparisons.mitsuba.translate.shapes.flat import polygon_soup
 from comparisons.mitsuba.translate.shapes.meshes import Soup
 from comparisons.mitsuba.translate.shapes.native import box_of_triangles, sphere_surface
+from comparisons.mitsuba.translate.shapes.patches import Box as Limits
+from comparisons.mitsuba.translate.shapes.patches import (
+    Implicit,
+    Patch,
+    meshed,
+)
 from comparisons.mitsuba.translate.shapes.quadrics import (
     quadric_surface,
     side_surface,
 )
-from comparisons.mitsuba.translate.shapes.stand_ins import Box as Limits
-from comparisons.mitsuba.translate.shapes.stand_ins import (
-    Implicit,
-    Patch,
-    measured_error,
-    meshed,
-)
+from comparisons.mitsuba.translate.shapes.stand_in_errors import measured_error
 from comparisons.mitsuba.translate.shapes.tori import torus_surface
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray

@@ -9,6 +9,7 @@ from comparisons.rungs.rays.light_context import LightContext, kind_of
 from comparisons.rungs.rays.light_error import MIDDLE
 from comparisons.rungs.rays.slopes import NEAR, slopes
 from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators import WhittedSetup
 from reference_rt.lights import AREA, ENVIRONMENT, EnvironmentMap
 from reference_rt.materials import Emissive
 from reference_rt.rendering import query
@@ -72,23 +73,31 @@ def is_beside(
     return found
 
 
-def changes_of_lamps(context: LightContext) -> tuple[FloatArray, FloatArray]:
+def changes_of_lamps(context: LightContext, setup: WhittedSetup) -> tuple[FloatArray, FloatArray]:
     """The least and the greatest change, (n, 3) each, of the light that Whitted's ray tracing takes
-    from the middles of textured lamps, within float32's error of (u, v)."""
+    from the middles of textured lamps, directly and in mirrors, within float32's error of (u, v).
+
+    Each lamp is moved alone, with all others off, so that the changes of several add up.
+    """
     low, high = np.zeros((2, len(context.hits.t), 3))
-    choice = context.tables.lights.choice
-    if choice is None or len(context.hits.t) == 0:
+    tables, rays = context.tables, context.rays
+    choice = tables.lights.choice
+    if choice is None or len(rays.o) == 0:
         return low, high
     for light in np.flatnonzero((choice.kind == AREA) & (choice.probability > 0.0)).tolist():
-        rays = context.rays
-        ours = query.direct_light(context.tables, rays.o, rays.d, light, MIDDLE)
+        ours = query.direct_light(tables, rays.o, rays.d, light, MIDDLE)
         scale = magnified(context, light, ours.target, ours.pdf)
         if not scale.any():
             break  # no lamp has a texture
-        around = _beside(MIDDLE, float(scale.max()), AROUND)
-        values = np.stack([_value_at(context, light, at) for at in around])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            changes = np.nan_to_num((values - ours.contribution) / ours.pdf[:, None])
+        alone = np.where(np.arange(len(choice.kind)) == light, choice.probability, 0.0)
+        lights = tables.lights._replace(choice=choice._replace(probability=alone))
+        around = [
+            query.radiance_without_noise(
+                tables._replace(lights=lights), setup._replace(u0=u0, u1=u1), rays.o, rays.d
+            )
+            for u0, u1 in [MIDDLE, *_beside(MIDDLE, float(scale.max()), AROUND)]
+        ]
+        changes = np.stack(around[1:]) - around[0]
         low += np.minimum(changes.min(axis=0), 0.0)
         high += np.maximum(changes.max(axis=0), 0.0)
     return low, high

@@ -44,7 +44,8 @@ def bounds(
 
     Relative to f L, with e the slide of the shaded point and r the light's distance: the normal
     turns by 2 e over the shape's feature size, the direction by e / r; the inverse square changes
-    by 2 e / r; and the products round some 16 times.
+    by 2 e / r; and the products round some 16 times.  Along a mesh that stands in for a shape the
+    point slides further, but the normal turns no more.
     """
     value, theirs, their_cosine = values
     rays, hits = context.rays, context.hits
@@ -61,7 +62,7 @@ def bounds(
         ours_full = np.nan_to_num(value.max(axis=1) / np.abs(cosine))
         theirs_full = np.nan_to_num(theirs.max(axis=1) / np.abs(their_cosine))
     turn = 2.0 * e / _feature(context) + of_stand_ins(context, "turn")
-    relative = turn + 4.0 * e / distance + 16.0 * UNIT_ROUNDOFF
+    relative = turn + 4.0 * (e + _along(context)) / distance + 16.0 * UNIT_ROUNDOFF
     relative += _of_leaves(context, accuracy)
     full = np.maximum(ours_full, theirs_full)
     # The cosine to a mapped normal is not that to the shading normal, and may be near 0.
@@ -198,7 +199,7 @@ def slopes_of(
             angle += of_stand_ins(context, "twist")
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
         angle += np.where(np.isfinite(context.theirs.height), radius / _feature(context), 0.0)
-        apart = of_stand_ins(context, "sag") + of_stand_ins(context, "slip")
+        apart = of_stand_ins(context, "sag") + of_stand_ins(context, "slip") + _along(context)
         others = [partial(value_of, other) for other in moved(rays, radius + apart)]
         if angle.any():
             for other in turned(rays, hits.p, TURNS * angle):
@@ -207,6 +208,14 @@ def slopes_of(
                 change = np.abs(value_of(other) - value).max(axis=1)
                 bent = np.maximum(bent, np.where(same, 2.0 * change, 0.0))
     return bent + slopes(value, others, float(value.max(initial=0.0)))
+
+
+def _along(context: LightContext) -> FloatArray:
+    """(n,): how far float32 moves a point along a mesh that stands in for a shape; 0 on other
+    shapes, whose slivers `ShapeSizes` knows."""
+    rays, hits, sizes = context.rays, context.hits, context.sizes
+    radius = sizes.frame.delta(rays.o, hits.p, sizes.reach_of(hits.shape))
+    return radius * context.theirs.aspect
 
 
 def of_stand_ins(context: LightContext, field: str) -> FloatArray:

@@ -36,9 +36,11 @@ def sample(
 
 
 @kernel
-def middle(areas: Areas, i: int, shapes: Shapes, textures: Textures | None, p: Vec3) -> LightSample:
-    """The one point that represents the light where nothing is random."""
-    q = any_shape.middle(shapes, areas.kind[i], areas.row[i], areas.area[i], p)
+def sample_fixed(
+    areas: Areas, i: int, shapes: Shapes, textures: Textures | None, p: Vec3, u0: float, u1: float
+) -> LightSample:
+    """The point that represents the light where nothing is random."""
+    q = any_shape.sample_fixed(shapes, areas.kind[i], areas.row[i], areas.area[i], p, u0, u1)
     return _from_point(areas, i, shapes, textures, p, q)
 
 

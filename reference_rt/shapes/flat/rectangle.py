@@ -199,12 +199,6 @@ def sample_by_area(
 
 
 @kernel
-def middle(rectangles: Rectangles, i: int, area: float, p: Vec3) -> LightPoint:
-    """Its middle as a light for `p`, with the density of sampling by area."""
-    return sample_by_area(rectangles, i, area, p, 0.5, 0.5)
-
-
-@kernel
 def pdf(rectangles: Rectangles, i: int, area: float, p: Vec3, q: SurfacePoint) -> float:
     """The density of `sample` per solid angle, at the point `q` of the rectangle."""
     seen = _as_seen_from(rectangles, i, p)

@@ -25,6 +25,8 @@ SHAPES = {
     " lower: [-1, -1, 0], upper: [1, 1, 1], capped: false}",
     "saddle": "{type: quadric, material: m, coefficients: [1, -1, 0, 0, 0, 0, 0, 0, -1, 0],"
     " lower: [-1, -1, -1], upper: [1, 1, 1], capped: false}",
+    "pipe": "{type: quadric, material: m, coefficients: [1.7, 1.2, 0, 0, 0, 0, 0, 0, 0, -0.6],"
+    " lower: [-1, -0.8, -0.6], upper: [1, 0.9, 0.7], capped: true}",
     "tilted": "{type: quadric, material: m, coefficients: [1, 1, 2, 0.3, 0.5, 0.2, 0.1, 0, 0, -1],"
     " lower: [-0.8, -0.9, -1], upper: [1, 0.7, 0.6], capped: true}",
 }
@@ -32,6 +34,7 @@ MAPS = {
     "as it is": "[]",
     "turned": "[{rotate: {axis: [1, 2, 3], degrees: 70}}]",
     "mirrored": "[{scale: [1, -0.8, 1.2]}, {rotate: {axis: [1, 0, 1], degrees: 50}}]",
+    "sheared": "[{matrix: [[0.9, 0.4, 0.1, 0], [0, 1, -0.3, -0.2], [0.3, 0.35, 0.8, 0]]}]",
 }
 
 
@@ -114,7 +117,7 @@ def test_tangents_that_jump_have_no_counterpart(name: str) -> None:
 
 
 @pytest.mark.parametrize("material", ANISOTROPIC)
-@pytest.mark.parametrize("placed", ["turned", "mirrored"])
+@pytest.mark.parametrize("placed", ["turned", "mirrored", "sheared"])
 @pytest.mark.parametrize("name", [name for name in SHAPES if name not in IRREGULAR])
 def test_anisotropic_materials_on_them_are_compared(name: str, placed: str, material: str) -> None:
     """Mitsuba's tangents are constant on each triangle of a mesh."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from comparisons.mitsuba.translate.shapes.cutting import cut_away
 from comparisons.mitsuba.translate.shapes.meshes import Soup
-from comparisons.mitsuba.translate.shapes.stand_ins import Box
+from comparisons.mitsuba.translate.shapes.patches import Box
 from reference_rt.core.arrays import FloatArray
 
 

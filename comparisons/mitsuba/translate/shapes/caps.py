@@ -7,7 +7,7 @@ import numpy as np
 from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.translate.shapes.cutting import cut_away
 from comparisons.mitsuba.translate.shapes.meshes import Soup
-from comparisons.mitsuba.translate.shapes.stand_ins import Box
+from comparisons.mitsuba.translate.shapes.patches import Box
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 

@@ -15,6 +15,7 @@ from comparisons.mitsuba.hits import CURVED
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import Soup
+from comparisons.mitsuba.translate.shapes.patches import Implicit, Patch
 from comparisons.mitsuba.translate.shapes.plugins import (
     Site,
     curved_instance,
@@ -22,7 +23,7 @@ from comparisons.mitsuba.translate.shapes.plugins import (
     to_world,
     with_mesh_light,
 )
-from comparisons.mitsuba.translate.shapes.stand_ins import Implicit, Patch, stand_in
+from comparisons.mitsuba.translate.shapes.stand_ins import stand_in
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine, apply_points, is_similarity
 from reference_rt.shapes import Box, Disk, Rectangle, Sphere

@@ -12,6 +12,7 @@ from comparisons.mitsuba.translate.shapes.canonical import patches_of
 from comparisons.mitsuba.translate.shapes.caps import cap_faces, heights_over_uv, region
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import Soup, placed
+from comparisons.mitsuba.translate.shapes.patches import Box, Implicit, Patch
 from comparisons.mitsuba.translate.shapes.plugins import (
     Site,
     curved_instance,
@@ -20,7 +21,7 @@ from comparisons.mitsuba.translate.shapes.plugins import (
     to_world,
     with_mesh_light,
 )
-from comparisons.mitsuba.translate.shapes.stand_ins import Box, Implicit, Patch, stand_in
+from comparisons.mitsuba.translate.shapes.stand_ins import stand_in
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes import Cone, Cylinder, Quadric

@@ -4,8 +4,9 @@ import numpy as np
 
 from comparisons.mitsuba.stand_ins import Plugin
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
+from comparisons.mitsuba.translate.shapes.patches import Implicit, Patch
 from comparisons.mitsuba.translate.shapes.plugins import Site
-from comparisons.mitsuba.translate.shapes.stand_ins import Implicit, Patch, stand_in
+from comparisons.mitsuba.translate.shapes.stand_ins import stand_in
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes import Torus
 

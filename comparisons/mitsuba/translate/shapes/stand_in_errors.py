@@ -1,0 +1,137 @@
+"""How far meshes that stand in for curved surfaces are off: in distance, normals, texture
+coordinates and tangents."""
+
+import numpy as np
+
+from comparisons.geometry.float32 import round32
+from comparisons.geometry.sizes import heights_of
+from comparisons.mitsuba.translate.shapes.meshes import Soup
+from comparisons.mitsuba.translate.shapes.patches import Box, Implicit, Patch
+from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray
+
+MEASURED = 50_000
+"""Most triangles that are measured, evenly strided: on a smooth surface neighbours have nearly the
+same error."""
+
+WEIGHTS = np.array([[1, 1, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], np.float64)
+WEIGHTS /= WEIGHTS.sum(axis=1, keepdims=True)
+"""Barycentrics at which a triangle is compared with its surface: its centre and the middles of its
+sides."""
+
+
+def measured_error(soup: Soup, surface: Implicit, m: transform.Affine) -> tuple[float, float]:
+    """The largest distance and the largest angle, in radians, between a mesh and its surface.
+
+    The distance is f over its gradient in the scene, exact but for terms of second order.
+    """
+    inverse = transform.invert(m)[:, :3]
+    faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
+    assert soup.normals is not None
+    corners, normals = soup.positions[faces], soup.normals[faces]
+    sag = turn = 0.0
+    for weights in WEIGHTS:
+        q = weights @ corners
+        n = weights @ normals @ inverse
+        gradient = surface.gradient(q) @ inverse
+        steepness = np.linalg.norm(gradient, axis=1)
+        known = steepness > 0.0
+        distance = np.abs(surface.value(q))[known] / steepness[known]
+        cross = np.linalg.norm(np.cross(n, gradient), axis=1)[known]
+        angle = np.arctan2(cross, np.sum(n * gradient, axis=1)[known])
+        sag, turn = max(sag, distance.max(initial=0.0)), max(turn, angle.max(initial=0.0))
+    return float(sag), float(turn)
+
+
+def measured_slip(soup: Soup, patch: Patch, box: Box | None) -> float:
+    """The largest distance, in the shape's own coordinates, between a point of the mesh and the one
+    of the surface that has its interpolated uv: of a patch with these uv, or of a surface around
+    the z axis of a box."""
+    assert soup.uvs is not None
+    faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
+    largest = 0.0
+    for weights in WEIGHTS:
+        q = weights @ soup.positions[faces]
+        u, v = (weights @ soup.uvs[faces]).T
+        if box is None:
+            off = np.linalg.norm(patch.point(u, v) - q, axis=1)
+        else:
+            half = 0.5 * (box[1] - box[0])
+            x, y = ((q - 0.5 * (box[0] + box[1])) / half)[:, :2].T
+            turn = np.abs(np.arctan2(y, x) / (2.0 * np.pi) - u) % 1.0
+            turn = np.minimum(turn, 1.0 - turn)
+            off = 2.0 * np.pi * turn * np.hypot(x, y) * half[:2].max()
+        largest = max(largest, float(off.max(initial=0.0)))
+    return largest
+
+
+RARE = 1e-3
+"""Share of a mesh's area whose tangents may be further off than `measured_twist`: those next to a
+pole, where all directions meet."""
+
+MOST_TWIST = 0.05
+"""Largest twist of a mesh, in radians; the fuzzer's coarse ones have up to 0.016.  Where the angle
+around the axis does not change along a line of constant z, tangents have any direction on a
+mesh."""
+
+
+def measured_twist(
+    soup: Soup, patch: Patch, surface: Implicit, box: Box | None, m: transform.Affine
+) -> float:
+    """The angle in the scene, in radians, between the derivatives of the position by u of mesh and
+    surface: Mitsuba takes that of a mesh as constant on each triangle.
+
+    It is measured behind the map m, for vertices in float32.  On the mesh of a cylinder, for
+    example, the derivative is a chord, which is off along the normal alone; a shear turns that
+    error into the surface, and the triangles are so long that rounding turns the chord by 1e-4.
+    The surface's is that of a patch with these uv, or for one around the z axis of a box that along
+    the surface in the plane of constant z, the way in which the angle grows.
+    """
+    assert soup.uvs is not None
+    assert soup.normals is not None
+    inverse = transform.invert(m)[:, :3]
+    faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
+    corners, uv = soup.positions[faces], round32(soup.uvs)[faces]
+    mapped = round32(transform.apply_points(m, soup.positions))[faces]
+    a, b = mapped[:, 1] - mapped[:, 0], mapped[:, 2] - mapped[:, 0]
+    (du1, dv1), (du2, dv2) = (uv[:, k].T - uv[:, 0].T for k in (1, 2))
+    of_mesh = (dv2[:, None] * a - dv1[:, None] * b) * np.sign(du1 * dv2 - dv1 * du2)[:, None]
+    angles = []
+    for weights in WEIGHTS:
+        q = weights @ corners
+        if box is None:
+            u, v = (weights @ uv).T
+            exact = patch.point(u + TANGENT_STEP, v) - patch.point(u - TANGENT_STEP, v)
+        else:
+            gradient = surface.gradient(q)
+            exact = np.column_stack([-gradient[:, 1], gradient[:, 0], np.zeros(len(q))])
+            half = 0.5 * (box[1] - box[0])
+            x, y = ((q - 0.5 * (box[0] + box[1])) / half)[:, :2].T
+            grows = x * exact[:, 1] / half[1] - y * exact[:, 0] / half[0] >= 0.0
+            exact *= np.where(grows, 1.0, -1.0)[:, None]
+        n = weights @ soup.normals[faces] @ inverse
+        n /= np.linalg.norm(n, axis=1)[:, None]
+        tangents = (of_mesh, exact @ m[:, :3].T)
+        one, other = (t - n * np.sum(t * n, axis=1)[:, None] for t in tangents)
+        cross = np.linalg.norm(np.cross(one, other), axis=1)
+        angles.append(np.arctan2(cross, np.sum(one * other, axis=1)))
+    angle = np.max(angles, axis=0)
+    order = np.argsort(-angle)
+    area = np.cumsum(np.linalg.norm(np.cross(a, b), axis=1)[order])
+    return float(angle[order][np.searchsorted(area, RARE * area[-1])])
+
+
+def aspects(soup: Soup, m: transform.Affine) -> FloatArray:
+    """(faces,): the longest side of each triangle, mapped by m, over its height on it.
+
+    Float32's error of the barycentric coordinates moves a point along the surface by its common
+    error times this: by hundreds of times on the long triangles of a cylinder.
+    """
+    corners = transform.apply_points(m, soup.positions)[soup.faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    heights = heights_of(corners)
+    return np.asarray(np.divide(longest, heights, out=np.zeros_like(heights), where=heights > 0.0))
+
+
+TANGENT_STEP = 1e-5
+"""Step in u for the derivative of a patch's position: it is off by a tenth of the step squared."""
