@@ -103,8 +103,8 @@ def changes_of_lamps(context: LightContext, setup: WhittedSetup) -> tuple[FloatA
     return low, high
 
 
-AROUND = 16
-"""Points around MIDDLE: the texture of a disk goes round its middle."""
+AROUND = 128
+"""Points around MIDDLE: the texture of a disk goes round its middle, with all its rows."""
 
 
 def _beside(u: tuple[float, float], scale: float, count: int = 4) -> list[tuple[float, float]]:

@@ -73,8 +73,14 @@ shapes:
   - {{type: rectangle, material: mirror,
      transform: [{{scale: 6}}, {{rotate: {{axis: [1, 0, 0], degrees: 80}}}},
        {{translate: [0, 5, 0]}}]}}
+  - {{type: plane, material: coat,
+     transform: [{{rotate: {{axis: [0, 1, 0.2], degrees: 75}}}}, {{translate: [-3, 0, 0]}}]}}
   - {{{lamp}, material: lamp,
      transform: [{{rotate: {{axis: [1, 0.2, 0], degrees: 170}}}}, {{scale: 0.5}}]}}
+  - {{{lamp}, material: lamp,
+     transform: [{{rotate: {{axis: [1, 0.4, 0], degrees: 150}}}}, {{translate: [2, 1, 1]}}]}}
+  - {{{lamp}, material: lamp,
+     transform: [{{rotate: {{axis: [1, -0.3, 0.5], degrees: 160}}}}, {{translate: [-1, 2, 1]}}]}}
 """
 LAMPS = {
     "rectangle": "type: rectangle",
