@@ -21,10 +21,13 @@ where Mitsuba's normal maps reflect no ambient light."""
 
 SKIES = ("sky.exr", "low_sky.exr")
 
+FINE = "fine.ply"
+"""A ball of 5,120 triangles: few faults of a hierarchy show in small ones."""
+
 FILES: dict[str, tuple[str, ...]] = {
     "bitmap": IMAGES,
     "environment_map": SKIES,
-    "mesh": MESHES,
+    "mesh": (*MESHES, FINE),
     "instance": (COPIES,),
 }
 """Names of files by the type whose `file` they can be."""
@@ -33,6 +36,7 @@ FILES: dict[str, tuple[str, ...]] = {
 @cache
 def write(folder: Path) -> Path:
     """Write the files into a folder unless they are there; returns the folder."""
+    import trimesh
     from PIL import Image
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -58,6 +62,10 @@ def write(folder: Path) -> Path:
         if not (folder / name).exists():
             with replacing(folder / name) as temporary:
                 temporary.write_bytes(sound_files()[name])
+    if not (folder / FINE).exists():
+        with replacing(folder / FINE) as temporary:
+            ball = trimesh.creation.icosphere(subdivisions=4)
+            temporary.write_bytes(ball.export(file_type="ply"))
     return folder
 
 
