@@ -61,7 +61,8 @@ FAULTS = (
     SourceFault(
         "shadow rays begin 1 % late", "soft_shadows", "core/ray.py",
         "    o = leave(point, target - point.p)\n    w = target - o\n",
-        "    o = leave(point, target - point.p)\n    w = (target - o) * 0.99\n    o = o + w / 99.0\n",
+        "    o = leave(point, target - point.p)\n"
+        "    w = (target - o) * 0.99\n    o = target - w\n",
     ),
     SourceFault(
         "no offset from surfaces", BOX, "core/ray.py",
