@@ -5,9 +5,12 @@ is up to 0.31 % off (`approximate_g1` over `exact_g1`); the BSDF contains G1 of 
 is up to 0.63 % off.  This plugin wraps Mitsuba's rough conductor or dielectric, and multiplies its
 BSDF by exact over approximate G1 for both directions; everything else is Mitsuba's.
 
-The nested material must sample normals from the whole distribution ("sample_visible" false): the
-density of visible normals contains G1 itself, so that Mitsuba's samples and its pdf would differ by
-as much.
+The nested material must sample visible normals ("sample_visible" true, its default).  Mitsuba draws
+them exactly, but their density contains G1 of wi: it is multiplied by the same ratio, which is then
+missing in the weight, BSDF over density.  The other way to sample is wrong for dielectrics: normals
+are drawn from a rougher distribution, of which the weight knows nothing (src/bsdfs/
+roughdielectric.cpp).  At alpha = 0.4 the light through a surface is 0.2 % off, and the second
+moment of its cosine 0.7 %.
 """
 
 import math
@@ -67,11 +70,15 @@ def register(mi: Any) -> None:
             self, context: Any, si: Any, sample1: Any, sample2: Any, active: Any = True
         ) -> tuple[Any, Any]:
             drawn, value = self.nested.sample(context, si, sample1, sample2, active)
-            factor = self.correction(si, si.wi, active) * self.correction(si, drawn.wo, active)
-            return drawn, value * factor
+            drawn.pdf = drawn.pdf * self.correction(si, si.wi, active)
+            return drawn, value * self.correction(si, drawn.wo, active)
 
         def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
             factor = self.correction(si, si.wi, active) * self.correction(si, wo, active)
             return self.nested.eval(context, si, wo, active) * factor
+
+        def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            density = self.nested.pdf(context, si, wo, active)
+            return density * self.correction(si, si.wi, active)
 
     mi.register_bsdf("exact_beckmann", ExactBeckmann)

@@ -63,6 +63,22 @@ def make_exact(parsed: Parsed, scene: Scene) -> None:
             _wrap(parsed.state, index, "exact_beckmann", _alphas(props))
 
 
+def sample_visible(parsed: Parsed) -> list[str]:
+    """Have all rough dielectrics sample visible normals: Mitsuba's other way is wrong (see
+    `plugins.exact_beckmann`).  Returns a note if any did not."""
+    every = [node.props for node in parsed.state.nodes]
+    glasses = [props for props in every if props.plugin_name() == "roughdielectric"]
+    wrong = [props for props in glasses if not props.get("sample_visible", True)]
+    for props in wrong:
+        props["sample_visible"] = True
+    if not wrong:
+        return []
+    return [
+        "rough dielectrics sample visible normals: without, Mitsuba draws normals from a rougher "
+        "distribution, which its weights leave out"
+    ]
+
+
 def _bump(state: Any, index: int, node: Node) -> None:
     """Replace a bump map.  Its image is looked up in its own coordinates: a copy of it without
     `to_uv`, which the plugin applies itself, and to the slopes rightly."""
@@ -116,9 +132,10 @@ def _wrap(state: Any, index: int, plugin: str, values: dict[str, Any]) -> None:
     mi = mitsuba()
     nested = mi.parser.SceneNode()
     nested.type, nested.props = state.nodes[index].type, mi.Properties(state.nodes[index].props)
-    is_rough = nested.props.plugin_name() != "plastic"
-    if is_rough and _distribution(nested.props) == "beckmann":
-        nested.props["sample_visible"] = False  # `plugins.exact_beckmann` says why
+    if plugin == "exact_beckmann":
+        nested.props["sample_visible"] = True  # the plugin says why
+    elif nested.props.plugin_name() != "plastic" and _distribution(nested.props) == "beckmann":
+        nested.props["sample_visible"] = False  # the density of visible normals has Mitsuba's G1
     state.nodes.append(nested)
     outer = mi.Properties(plugin)
     outer.set_id(state.nodes[index].props.id())
@@ -128,4 +145,4 @@ def _wrap(state: Any, index: int, plugin: str, values: dict[str, Any]) -> None:
     state.nodes[index].props = outer
 
 
-__all__ = ["inexact", "make_exact"]
+__all__ = ["inexact", "make_exact", "sample_visible"]

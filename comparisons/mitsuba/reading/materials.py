@@ -106,7 +106,8 @@ def _rough_conductor(reading: Reading, node: Node) -> Material:
 
 def _roughness(reading: Reading, node: Node) -> dict[str, Any]:
     distribution = node.choice("distribution", "beckmann", ("beckmann", "ggx"))
-    node.ignore("sample_visible")  # how it is sampled does not change the picture
+    # How it is sampled does not change the picture; but see `exact_materials.sample_visible`.
+    node.ignore("sample_visible")
     if node.has("alpha_u") or node.has("alpha_v"):
         if not (node.has("alpha_u") and node.has("alpha_v")) or node.has("alpha"):
             raise node.error("expected 'alpha', or 'alpha_u' and 'alpha_v'")

@@ -10,7 +10,7 @@ from typing import Any
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.notes import notes_of_integrator
 from comparisons.mitsuba.reading import read_supported
-from comparisons.mitsuba.reading.exact_materials import inexact, make_exact
+from comparisons.mitsuba.reading.exact_materials import inexact, make_exact, sample_visible
 from comparisons.mitsuba.reading.parse import Parsed, parse_file
 from comparisons.mitsuba.reading.sensors import CLIP
 from comparisons.mitsuba.translate.errors import UntranslatableError
@@ -65,6 +65,7 @@ def own_scene(scene: Scene) -> Any:
         state.nodes[index].props.set_plugin_name("path_of_solids")
     if drops_light(scene):
         _with_black_environment(mi, state)
+    sample_visible(parsed)
     make_exact(parsed, scene)
     config = mi.parser.ParserConfig(mi.variant())
     config.merge_equivalent = config.merge_meshes = False
@@ -90,6 +91,7 @@ def changes_to(scene: Scene) -> list[str]:
     sensor = _first(state, mitsuba().ObjectType.Sensor)
     found += notes_of_integrator(scene)
     found += dict.fromkeys(note for _, note in inexact(scene))
+    found += sample_visible(parsed)
     if sensor is not None and _open_clipping(state.nodes[sensor].props):
         found.append("its camera's clipping planes are those of Mitsuba's default: ours has none")
     return found

@@ -88,8 +88,7 @@ def _rough(
     bsdf = {"type": plugin, "distribution": material.distribution, **alphas, **values}
     if material.distribution == "ggx" or context.native:
         return bsdf
-    # The plugin says why visible normals are not sampled.
-    return {"type": "exact_beckmann", "nested": {**bsdf, "sample_visible": False}, **alphas}
+    return {"type": "exact_beckmann", "nested": bsdf, **alphas}
 
 
 @translate_material.register

@@ -15,7 +15,7 @@ from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.plastic_error import COSINES, base_error
 from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
-from comparisons.mitsuba.scene import picture
+from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.materials import translate_material
 from comparisons.mitsuba.translate.textures import TranslationContext
@@ -119,6 +119,38 @@ def test_documented_smooth_coats():
     off = [abs(base_error(float(index))[0]) for index in np.linspace(1.02, 2.0, 25)]
     assert max(off) < 0.00135
     assert base_error(2.4)[0] == pytest.approx(0.028, abs=5e-4)
+
+
+@pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
+@pytest.mark.parametrize("cosine", [0.9, 0.4, -0.7, -0.9])
+def test_weights_of_rough_dielectrics(distribution, cosine):
+    """Samples weigh BSDF over density, also those of our plugin; not where Mitsuba does not sample
+    visible normals."""
+    import drjit as dr
+
+    mi, n, alpha = mitsuba(), 4096, 0.4
+    plain = {"type": "roughdielectric", "distribution": distribution, "alpha": alpha}
+    exact = {"type": "exact_beckmann", "nested": plain, "alpha_u": alpha, "alpha_v": alpha}
+    u = np.random.default_rng(1).random((3, n))
+    errors = []
+    for described in (plain, exact, {**plain, "sample_visible": False}):
+        bsdf, context = mi.load_dict(described), mi.BSDFContext()
+
+        def weigh(u0, u1, u2, bsdf=bsdf, context=context):
+            si = dr.zeros(mi.SurfaceInteraction3f)
+            si.t, si.wi = 1.0, mi.Vector3f(float(np.sqrt(1.0 - cosine**2)), 0.0, cosine)
+            drawn, weight = bsdf.sample(context, si, u0, mi.Point2f(u1, u2))
+            value = bsdf.eval(context, si, drawn.wo)
+            return weight.x * drawn.pdf, value.x, weight.x * bsdf.pdf(context, si, drawn.wo)
+
+        told, value, again = (np.ravel(x) for x in for_rays(weigh, *u))
+        used = told > 1e-3 * told.max()
+        told, value, again = told[used], value[used], again[used]
+        assert np.abs(again / told - 1.0).max() < 1e-4
+        errors.append(np.abs(told / value - 1.0).max())
+    assert errors[0] < 1e-4  # float32, of half vectors next to the critical angle
+    assert errors[1] < 1e-4
+    assert errors[2] > 0.01
 
 
 def test_documented_masking():

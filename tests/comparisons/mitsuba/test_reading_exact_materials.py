@@ -58,6 +58,7 @@ def bump_texture(steps: str = "") -> str:
     )
 
 
+ALL_NORMALS = '<boolean name="sample_visible" value="false"/>'
 MATERIALS = {
     "mirror first": of("blendbsdf", number("weight", 0.6), MIRROR, WHITE),
     "mirror second": of("blendbsdf", number("weight", 0.6), WHITE, MIRROR),
@@ -77,6 +78,11 @@ MATERIALS = {
         "roughplastic", '<boolean name="sample_visible" value="true"/>', number("int_ior", 2)
     ),
     "rough glass": of("roughdielectric", number("alpha", 0.3)),
+    "rough glass by all normals": of("roughdielectric", number("alpha", 0.4), ALL_NORMALS),
+    "rough glass of GGX by all normals": of(
+        "roughdielectric", GGX, number("alpha", 0.4), ALL_NORMALS
+    ),
+    "conductor by all normals": of("roughconductor", number("alpha", 0.4), ALL_NORMALS),
     "two-sided": of("twosided", of("roughplastic", number("alpha", 0.3), REFLECTANCE)),
     "bump over brushed metal": of("bumpmap", bump_texture(), BRUSHED, number("scale", 0.4)),
     "bump by a rotated image": of("bumpmap", bump_texture("<rotate z='1' angle='30'/>"), WHITE),
