@@ -146,10 +146,10 @@ def test_weights_of_rough_dielectrics(distribution, cosine):
         told, value, again = (np.ravel(x) for x in for_rays(weigh, *u))
         used = told > 1e-3 * told.max()
         told, value, again = told[used], value[used], again[used]
-        assert np.abs(again / told - 1.0).max() < 1e-4
-        errors.append(np.abs(told / value - 1.0).max())
-    assert errors[0] < 1e-4  # float32, of half vectors next to the critical angle
-    assert errors[1] < 1e-4
+        assert np.quantile(np.abs(again / told - 1.0), 0.99) < 1e-5
+        errors.append(np.quantile(np.abs(told / value - 1.0), 0.99))
+    # Next to the critical angle float32 loses digits, which one sample in a hundred shows.
+    assert max(errors[:2]) < 1e-5
     assert errors[2] > 0.01
 
 
