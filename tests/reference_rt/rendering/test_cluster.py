@@ -141,7 +141,7 @@ def test_all_ends_with_stop(machines, cluster, is_alive, is_forgotten, how):
 @pytest.mark.parametrize("give_up", ["stop", "cancel"])
 def test_what_is_given_up_leaves_its_worker(cluster, machines, give_up):
     """What had not begun never runs."""
-    first = cluster.submit(time.sleep, 2.0)
+    first = cluster.submit(time.sleep, 5.0)
     begun = machines.folder / "begun"
     second = cluster.submit(os.mkdir, str(begun))
     if give_up == "stop":
