@@ -44,11 +44,10 @@ _BATCH_SYSTEMS = {
 class Cluster:
     """`workers.Workers`: the workers of a Dask scheduler, of any number of threads each.
 
-    Every future ends, whatever becomes of the scheduler: the client tells of most that a scheduler
-    took along, but not of those that it submitted while the scheduler was ending, nor of any if the
-    scheduler ended in an orderly way (found under load: they never ended).  So the scheduler is
-    asked now and then, and where it does not answer or is another one, all futures are given up
-    here and a new client connects.
+    Every future ends, whatever becomes of the scheduler.  Dask's client ends most futures of a
+    scheduler that has gone, but not those that were submitted while it was ending: a render waited
+    for them for ever.  So the scheduler is asked now and then.  If it does not answer, or is another
+    one, all futures are given up here, and a new client connects.
     """
 
     def __init__(self, scheduler: str = "", file: Path | None = None) -> None:
