@@ -153,8 +153,8 @@ def sample_fixed(
     u0: float,
     u1: float,
 ) -> LightSample:
-    """`sample_one` where nothing is random: every area light is its one point at (u0, u1), which for
-    a rectangle is the same wherever it is seen from."""
+    """`sample_one` where nothing is random: every area light is its one point at (u0, u1), which
+    for a rectangle is the same wherever it is seen from."""
     return _fixed_of_one(lights.choice, lights, k, shapes, textures, p, u0, u1)
 
 

@@ -46,8 +46,8 @@ class Cluster:
 
     Every future ends, whatever becomes of the scheduler.  Dask's client ends most futures of a
     scheduler that has gone, but not those that were submitted while it was ending: a render waited
-    for them for ever.  So the scheduler is asked now and then.  If it does not answer, or is another
-    one, all futures are given up here, and a new client connects.
+    for them for ever.  So the scheduler is asked now and then.  If it does not answer, or is
+    another one, all futures are given up here, and a new client connects.
     """
 
     def __init__(self, scheduler: str = "", file: Path | None = None) -> None:
