@@ -7,10 +7,11 @@ import asyncio
 import importlib
 import math
 import time
-from collections.abc import Callable
-from concurrent.futures import CancelledError, Future, InvalidStateError
+from collections.abc import Callable, Coroutine
+from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from pathlib import Path
+from threading import Thread
 from typing import Any, TypeVar
 
 import yaml
@@ -21,14 +22,18 @@ from reference_rt.util.files import read_text
 T = TypeVar("T")
 
 _PATIENCE = 60.0
-"""Seconds to wait for a scheduler and its first worker.  A batch system may let jobs wait for days:
-for these there is no limit."""
+"""Seconds to wait for a scheduler and its first worker, and for an answer.  A batch system may let
+jobs wait for days: for their first worker there is no limit."""
+
+_TRY = 5.0
+"""Seconds after which an attempt to connect ends.  Dask's own limit leaves out its handshake: there
+it waits for ever for a program that accepts connections and says nothing."""
 
 _ASKED = 5.0
-"""Seconds after which the scheduler is asked for its workers, which come and go."""
+"""Seconds between two questions to the scheduler about its workers, which come and go."""
 
 _POLL = 0.1
-"""Seconds between two looks for a scheduler and its first worker."""
+"""Seconds between two attempts to connect."""
 
 _BATCH_SYSTEMS = {
     "slurm": "SLURMCluster",
@@ -47,7 +52,9 @@ class Cluster:
     Every future ends, whatever becomes of the scheduler.  Dask's client ends most futures of a
     scheduler that has gone, but not those that were submitted while it was ending: a render waited
     for them for ever.  So the scheduler is asked now and then.  If it does not answer, or is
-    another one, all futures are given up here, and a new client connects.
+    another one, what was submitted is given up here, and what follows gets a new client.
+
+    All clients run in one thread: one that cannot connect would leave a thread of its own behind.
     """
 
     def __init__(self, scheduler: str = "", file: Path | None = None) -> None:
@@ -57,49 +64,26 @@ class Cluster:
         self._cluster = None if file is None else batch_cluster(file)
         self._distributed = _module("distributed")
         self._client: Any = None
-        self._scheduler_id, self._asked, self._threads = "", 0.0, 1
-        self._is_connected = self._is_stopped = False
-        self._running: dict[Future[Any], Any] = {}
-        """Futures that have not ended, and those of Dask from which they get their results."""
+        self._watch: asyncio.Task[None] | None = None
+        """Asks the scheduler; there is one as long as client, scheduler and workers are there."""
+        self._connecting = asyncio.Lock()
+        self._threads, self._is_stopped = 1, False
+        self._running: set[Future[Any]] = set()
+        self._submitted: set[asyncio.Task[Any]] = set()
+        """Of those that run, the ones that wait for Dask's client."""
+        self._thread = _LoopThread()
         try:
-            self._connect()
+            self._begin(self._connected()).result()
         except BaseException:
             self.close()
             raise
 
     @property
     def threads(self) -> int:
-        if self._is_connected and time.monotonic() - self._asked > _ASKED:
-            try:
-                found, threads = self._ask()
-            except Exception:  # its connection has failed in one of many ways
-                found = ""
-            if found == self._scheduler_id:
-                self._threads, self._asked = max(1, threads), time.monotonic()
-            else:
-                self._disconnect()
         return self._threads
 
     def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[T]":
-        found: Future[T] = Future()
-        if not self._is_connected or self._client.status != "running":
-            self._connect()
-        if self._is_connected:
-            try:
-                # Not pure: a function that is submitted again must be run again.
-                given = self._client.submit(function, *arguments, pure=False)
-            except Exception:
-                if self._client.status == "running":
-                    raise
-                _end(found, CancelledError("the client has closed itself"))
-                return found
-            self._running[found] = given
-            found.add_done_callback(self._ended)
-            self._client.loop.add_callback(_pass_on, given, found)
-        if self._is_stopped:  # perhaps meanwhile, by another thread
-            self._give_up()
-            _end(found, CancelledError("stopped"))
-        return found
+        return self._begin(self._run(function, arguments))
 
     def recovers(self, error: BaseException) -> bool:
         """A function whose worker died, whose scheduler has gone, or which that gave up, is run
@@ -111,85 +95,151 @@ class Cluster:
 
     def stop(self) -> None:
         self._is_stopped = True
-        self._give_up()
+        for found in list(self._running):
+            found.cancel()
 
     def close(self) -> None:
         self.stop()
-        self._disconnect()
+        self._thread.end(self._disconnect())
         with suppress(Exception):
             if self._cluster is not None:
                 self._cluster.close()
 
-    def _give_up(self) -> None:
-        for found in list(self._running):
-            _end(found, CancelledError("given up"))
+    def _begin(self, run: Coroutine[Any, Any, T]) -> "Future[T]":
+        """Run a coroutine in the thread of the clients, until it ends or is cancelled."""
+        if self._is_stopped:
+            run.close()
+            ended: Future[T] = Future()
+            ended.set_exception(CancelledError("stopped"))
+            return ended
+        found = asyncio.run_coroutine_threadsafe(run, self._thread.loop)
+        self._running.add(found)
+        found.add_done_callback(self._running.discard)
+        if self._is_stopped:  # meanwhile, by another thread
+            found.cancel()
+        return found
 
-    def _ended(self, found: "Future[Any]") -> None:
-        """A future has its result, or was given up: then nobody needs that of Dask."""
-        given = self._running.pop(found, None)
-        if given is not None and not given.done():
-            with suppress(Exception):  # its client may be closed
-                given.client.loop.add_callback(given.cancel)
+    # ---- in the thread of the clients -----------------------------------------------------------
 
-    def _ask(self) -> tuple[str, int]:
+    async def _run(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> T:
+        """The result of a function, from a worker."""
+        client = await self._connected()
+        # Not pure: a function that is submitted again must be run again.
+        given = client.submit(function, *arguments, pure=False)
+        task = asyncio.current_task()
+        assert task is not None
+        self._submitted.add(task)
+        try:
+            result: T = await given
+            return result
+        finally:
+            self._submitted.discard(task)
+            given.release()  # what has not begun never runs
+
+    async def _connected(self) -> Any:
+        """A client whose scheduler has workers.  Raises WorkersError."""
+        async with self._connecting:
+            end = time.monotonic() + (_PATIENCE if self._cluster is None else math.inf)
+            reason = "no worker"
+            while self._watch is None or self._client.status != "running":
+                try:
+                    await asyncio.wait_for(self._connect(), _TRY)
+                except Exception as error:  # connections fail in many ways
+                    await self._disconnect()
+                    reason = " ".join(str(error).split()) or "no answer"
+                    if isinstance(error, ValueError):  # not an address
+                        end = -math.inf
+                if self._watch is None:
+                    if time.monotonic() > end:
+                        raise WorkersError(
+                            f"{self._address or 'the batch system'}: no scheduler with a worker in "
+                            f"{_PATIENCE:.0f} s ({reason}); expected `dask scheduler` and "
+                            "`dask worker` there"
+                        )
+                    await asyncio.sleep(_POLL)
+            return self._client
+
+    async def _connect(self) -> None:
+        """Connect to the scheduler, and ask it for its workers."""
+        if self._client is None or self._client.status != "running":
+            await self._disconnect()
+            address, cluster = self._address, self._cluster
+            self._client = self._distributed.Client(
+                address if cluster is None else cluster.scheduler_address,
+                security=getattr(cluster, "security", None),
+                timeout=_TRY,
+                asynchronous=True,
+                set_as_default=False,
+            )
+            await self._client
+        scheduler, threads = await self._ask()
+        if threads > 0:
+            self._threads = threads
+            self._watch = asyncio.create_task(self._ask_for_ever(scheduler))
+
+    async def _ask(self) -> tuple[str, int]:
         """The identity of the client's scheduler, and the threads of its workers."""
-        # The first call returns what it remembers if there is no answer, the second one raises.
-        found = self._client.scheduler_info(n_workers=0)["id"]
-        return found, sum(self._client.nthreads().values())
+        known = await self._client.scheduler.identity(n_workers=0)
+        return known["id"], sum((await self._client.nthreads()).values())
 
-    def _connect(self) -> None:
-        """A new client, once there is a scheduler and a worker.  Returns without one if `stop` is
-        called meanwhile.  Raises WorkersError."""
-        self._disconnect()
-        end = time.monotonic() + (_PATIENCE if self._cluster is None else math.inf)
-        target = self._cluster if self._cluster is not None else self._address
-        reason = "no worker"
-        while not self._is_stopped:
+    async def _ask_for_ever(self, scheduler: str) -> None:
+        """Ask for the threads, until the scheduler is another one or does not answer."""
+        found = scheduler
+        while found == scheduler:
+            await asyncio.sleep(_ASKED)
             try:
-                if self._client is None or self._client.status != "running":
-                    self._client = self._distributed.Client(target, timeout=5, set_as_default=False)
-                self._scheduler_id, threads = self._ask()
-                if threads > 0:
-                    self._threads, self._asked = threads, time.monotonic()
-                    self._is_connected = True
-                    return
-            except Exception as error:  # connections fail in many ways
-                self._disconnect()
-                reason = " ".join(str(error).split())
-                if isinstance(error, ValueError):  # not an address
-                    end = -math.inf
-            if time.monotonic() > end:
-                raise WorkersError(
-                    f"{self._address or 'the batch system'}: no scheduler with a worker in "
-                    f"{_PATIENCE:.0f} s ({reason}); expected `dask scheduler` and `dask worker` "
-                    "there"
-                )
-            time.sleep(_POLL)
-
-    def _disconnect(self) -> None:
-        """Close the client: a new one connects where a client's own attempts may have ended."""
-        self._is_connected = False
+                found, threads = await asyncio.wait_for(self._ask(), _PATIENCE)
+                self._threads = max(1, threads)
+            except Exception:  # its connection has failed in one of many ways
+                found = ""
         self._give_up()
-        with suppress(Exception):
-            if self._client is not None:
-                self._client.close(timeout=1)
-        self._client = None
+
+    def _give_up(self) -> None:
+        """Nothing is expected of the scheduler any more."""
+        if self._watch is not None and self._watch is not asyncio.current_task():
+            self._watch.cancel()
+        self._watch = None
+        for task in self._submitted:
+            task.cancel()
+
+    async def _disconnect(self) -> None:
+        """Close the client: a new one connects where a client's own attempts may have ended."""
+        self._give_up()
+        client, self._client = self._client, None
+        if client is not None:
+            with suppress(Exception):
+                await asyncio.wait_for(client.close(), 1.0)
 
 
-async def _pass_on(given: Any, found: "Future[Any]") -> None:
-    """In the client's thread: end a future as that of Dask ends."""
-    try:
-        result = await given
-    except BaseException as error:
-        _end(found, error)
-    else:
-        with suppress(InvalidStateError):  # it was given up meanwhile
-            found.set_result(result)
+class _LoopThread(Thread):
+    """An event loop in a thread of its own."""
 
+    def __init__(self) -> None:
+        super().__init__(name="cluster", daemon=True)
+        self._begun: Future[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = Future()
+        self.start()
+        self.loop, self._end = self._begun.result()
 
-def _end(found: "Future[Any]", error: BaseException) -> None:
-    with suppress(InvalidStateError):  # it has ended already
-        found.set_exception(error)
+    def run(self) -> None:
+        asyncio.run(self._wait())
+
+    async def _wait(self) -> None:
+        end = asyncio.Event()
+        self._begun.set_result((asyncio.get_running_loop(), end))
+        await end.wait()
+
+    def end(self, last: Coroutine[Any, Any, None]) -> None:
+        """End the loop and all that runs in it, after a last coroutine."""
+        if not self.is_alive():
+            last.close()
+            return
+
+        async def run() -> None:
+            await last
+            self._end.set()
+
+        asyncio.run_coroutine_threadsafe(run(), self.loop)
+        self.join()
 
 
 def batch_cluster(file: Path) -> Any:

@@ -1,5 +1,6 @@
 """A Dask scheduler and workers as processes, as on several machines."""
 
+import gc
 import os
 import socket
 import subprocess
@@ -44,6 +45,9 @@ class Machines:
         self.workers.append(self._start("dask_worker", self.address, *command))
 
     def end(self):
+        """In a test's teardown, where warnings are ignored: Dask's clients leave sockets to the
+        garbage collector, which otherwise warns of them in whatever test it runs."""
         for process in self.processes:
             process.kill()
             process.wait()
+        gc.collect()

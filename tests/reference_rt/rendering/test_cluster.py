@@ -2,9 +2,11 @@
 
 import os
 import signal
+import socket
 import sys
+import threading
 import time
-from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
+from concurrent.futures import CancelledError, wait
 
 import pytest
 from machines import Machines
@@ -86,21 +88,20 @@ def test_a_scheduler_that_restarts(machines, box):
 @pytest.fixture
 def cluster(machines, monkeypatch):
     """Which asks its scheduler all the time."""
-    monkeypatch.setattr("reference_rt.util.cluster._ASKED", 0.0)
+    monkeypatch.setattr("reference_rt.util.cluster._ASKED", 0.05)
     machines.start_worker()
     found = Cluster(machines.address)
     yield found
     found.close()
 
 
-def ends(future, look=lambda: None):
-    """Whether a future ends in a minute, as the loop of a render sees it."""
-    end = time.monotonic() + 60.0
-    while time.monotonic() < end:
-        if wait([future], 0.1).done:
-            return True
-        look()
-    return False
+def error_of(future):
+    """Of a future that ends in a minute, as the loop of a render sees it."""
+    assert wait([future], 60.0).done
+    try:
+        return future.exception()
+    except CancelledError as error:
+        return error
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
@@ -116,8 +117,7 @@ def test_what_a_scheduler_took_along_ends(machines, cluster, number, is_forgotte
     machines.workers[0].kill()
     machines.start_scheduler()
     machines.start_worker()
-    assert ends(lost, lambda: cluster.threads)
-    assert cluster.recovers(lost.exception())
+    assert cluster.recovers(error_of(lost))
     assert cluster.submit(abs, -3).result(60.0) == 3
     assert cluster.threads == 1
 
@@ -134,8 +134,9 @@ def test_all_ends_with_stop(machines, cluster, is_alive, is_forgotten, how):
     if not is_alive:
         machines.scheduler.kill()
     getattr(cluster, how)()
-    assert not wait([*futures, cluster.submit(abs, -3)], 10.0).not_done
-    assert {type(future.exception()) for future in futures} == {CancelledError}
+    futures.append(cluster.submit(abs, -3))
+    assert not wait(futures, 10.0).not_done
+    assert {type(error_of(future)) for future in futures} == {CancelledError}
 
 
 @pytest.mark.parametrize("give_up", ["stop", "cancel"])
@@ -159,16 +160,68 @@ def test_stopped_while_it_waits_for_a_scheduler(machines, cluster):
     """Of a batch system, which may let it wait for days."""
     machines.scheduler.kill()
     machines.scheduler.wait()
-    with ThreadPoolExecutor(1) as pool:
-        given = pool.submit(lambda: (cluster._disconnect(), cluster.submit(abs, -3))[1])
-        assert not wait([given], 2.0).done
-        cluster.stop()
-        assert ends(given)
-        assert ends(given.result())
+    while cluster._watch is not None:  # it has not seen that yet
+        time.sleep(0.05)
+    given = cluster.submit(abs, -3)
+    assert not wait([given], 2.0).done
+    cluster.stop()
+    assert isinstance(error_of(given), CancelledError)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no SIGSTOP")
+def test_a_scheduler_that_does_not_answer(machines, cluster, monkeypatch):
+    """Nor does it end, as if its machine were too busy."""
+    monkeypatch.setattr("reference_rt.util.cluster._PATIENCE", 3.0)
+    monkeypatch.setattr("reference_rt.util.cluster._TRY", 1.0)
+    lost = cluster.submit(time.sleep, 20.0)
+    assert not wait([lost], 0.5).done
+    machines.scheduler.send_signal(signal.SIGSTOP)
+    assert cluster.recovers(error_of(lost))
+    assert isinstance(error_of(cluster.submit(abs, -3)), WorkersError)
+    machines.scheduler.send_signal(signal.SIGCONT)
+    assert cluster.submit(abs, -3).result(60.0) == 3
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [None, b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", bytes(64)],
+    ids=["nothing", "", "http", "zeros"],
+)
+def test_not_a_scheduler(answer, monkeypatch):
+    """A program that says nothing, closes the connection, or speaks of something else.  Attempts
+    leave no threads behind: there may be many, of a batch system that lets jobs wait."""
+    monkeypatch.setattr("reference_rt.util.cluster._PATIENCE", 2.0)
+    monkeypatch.setattr("reference_rt.util.cluster._TRY", 0.5)
+    listening, open_ones = socket.create_server(("127.0.0.1", 0)), []
+
+    def serve():
+        try:
+            while True:
+                connection, _ = listening.accept()
+                open_ones.append(connection)
+                if answer is not None:
+                    connection.sendall(answer)
+                    connection.close()
+        except OSError:  # the test has ended
+            pass
+
+    before = set(threading.enumerate())
+    server = threading.Thread(target=serve)
+    server.start()
+    with pytest.raises(WorkersError, match="no scheduler with a worker"):
+        Cluster(f"tcp://127.0.0.1:{listening.getsockname()[1]}")
+    listening.shutdown(socket.SHUT_RDWR)
+    listening.close()
+    server.join()
+    for connection in open_ones:
+        connection.close()
+    assert open_ones
+    assert set(threading.enumerate()) <= before
 
 
 def test_no_scheduler(box, monkeypatch):
     monkeypatch.setattr("reference_rt.util.cluster._PATIENCE", 1.0)
+    monkeypatch.setattr("reference_rt.util.cluster._TRY", 1.0)
     with pytest.raises(WorkersError, match="no scheduler with a worker"):
         rendered(box, "tcp://127.0.0.1:1")
 
