@@ -76,8 +76,9 @@ def choose() -> Backend:
     """Find the best variant that works, without loading Mitsuba into this process.
 
     The environment variable REFERENCE_RT_MITSUBA_VARIANT forces a variant.  Libraries are tried in
-    the order of `llvm_libraries.candidates`.  Raises ReferenceUnavailableError: Mitsuba is not
-    installed, or the forced variant does not run.
+    the order of `llvm_libraries.candidates`; in a process that has imported Dr.Jit, only the one
+    that it loaded then.  Raises ReferenceUnavailableError: Mitsuba is not installed, or the forced
+    variant does not run.
     """
     version = _version()
     forced = os.environ.get(FORCE)
@@ -88,17 +89,29 @@ def choose() -> Backend:
         return Backend(forced, version, f"forced by {FORCE}", None)
     variant = forced or LLVM
     tried = []
-    for path in llvm_libraries.candidates()[:_MOST_PROOFS]:
-        problem = _remembered_proof(version, variant, path)
+    for path in _libraries():
+        problem = (
+            prove(variant, None) if path is None else _remembered_proof(version, variant, path)
+        )
+        name = path or "the LLVM that Dr.Jit had loaded"
         if problem is None:
             why = f"forced by {FORCE}" if forced else "the fastest variant that works here"
-            return Backend(variant, version, f"{why}, with {path}", path)
-        tried.append(f"{path} {problem}")
+            return Backend(variant, version, f"{why}, with {name}", path)
+        tried.append(f"{name} {problem}")
     found = "; ".join(tried) or "no libLLVM was found"
     advice = f"to get llvm: {llvm_libraries.ADVICE}"
     if forced:
         raise ReferenceUnavailableError(f"{FORCE}={forced}: {found}; {advice}")
     return Backend(SCALAR, version, f"{found}; {advice}", None)
+
+
+def _libraries() -> list[str | None]:
+    """The libraries to try.  Dr.Jit loads its LLVM when it is imported.  If the user's code has done
+    that already, that library stays; None is the one that Dr.Jit's own search finds, here and in a
+    child process."""
+    if "drjit" in sys.modules:
+        return [os.environ.get(LIBRARY) or None]
+    return [*llvm_libraries.candidates()[:_MOST_PROOFS]]
 
 
 @functools.cache
@@ -107,9 +120,9 @@ def backend() -> Backend:
     return choose()
 
 
-@functools.cache
-def mitsuba() -> Any:
-    """The module `mitsuba`, its variant set and our plugins registered.
+def imported() -> Any:
+    """The module `mitsuba` in any variant or none, with the LLVM of `backend`.  Nothing else may
+    import Mitsuba first: Dr.Jit keeps the LLVM that it finds when it is imported.
 
     Raises ReferenceUnavailableError.
     """
@@ -119,9 +132,21 @@ def mitsuba() -> Any:
             os.environ[LIBRARY] = chosen.llvm_path
             llvm_libraries.load_needed(chosen.llvm_path)
         import mitsuba as mi
+    except (ImportError, RuntimeError, OSError) as error:
+        raise ReferenceUnavailableError(f"Mitsuba does not start: {error}") from None
+    return mi
 
+
+@functools.cache
+def mitsuba() -> Any:
+    """The module `mitsuba`, its variant set and our plugins registered.
+
+    Raises ReferenceUnavailableError.
+    """
+    mi, chosen = imported(), backend()
+    try:
         mi.set_variant(chosen.variant)
-    except (ImportError, AttributeError, RuntimeError, OSError) as error:
+    except (ImportError, AttributeError, RuntimeError) as error:
         raise ReferenceUnavailableError(f"Mitsuba does not start: {error}") from None
     # In scalar variants every loaded plugin logs a warning ("terrible performance"), which
     # `Backend.reason` states already.
@@ -260,6 +285,7 @@ __all__ = [
     "backend",
     "cache_folder",
     "choose",
+    "imported",
     "mitsuba",
     "prove",
     "scalar",

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.mitsuba.reading.parse import Parsed
+from comparisons.mitsuba.reading.parse import Parsed, module
 from comparisons.mitsuba.reading.written import LookAt, Step, Written
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine, invert
@@ -55,10 +55,8 @@ class Node:
 
     @property
     def _place(self) -> str:
-        import mitsuba as mi
-
         state = self._parsed.state
-        return str(mi.parser.file_location(state, state.nodes[self.index]))
+        return str(module().parser.file_location(state, state.nodes[self.index]))
 
     def error(self, message: str) -> SceneError:
         """An error about this element, with file, line, column and plugin."""

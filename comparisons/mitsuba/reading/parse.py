@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from comparisons.mitsuba.backend import imported
 from comparisons.mitsuba.reading.written import Transforms, transforms_of
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError
 from reference_rt.util.files import read_input
@@ -57,27 +58,22 @@ class Parsed(NamedTuple):
 
 
 def module() -> Any:
-    """The module `mitsuba` with any variant.  Raises ReferenceUnavailableError.
-
-    Reading a scene needs no fast variant, so that no LLVM is looked for.
-    """
+    """The module `mitsuba` with any variant.  Raises ReferenceUnavailableError."""
     try:
-        import mitsuba as mi
-
-        if mi.variant() is None:
-            mi.set_variant(VARIANT)
-            mi.set_log_level(mi.LogLevel.Error)
-    except (ImportError, RuntimeError, OSError) as error:
+        mi = imported()
+    except ReferenceUnavailableError as error:
         raise ReferenceUnavailableError(
-            f"reading Mitsuba's scenes needs Mitsuba, which does not start ({error}); expected: "
-            "pip install 'reference-rt[compare]'"
+            f"reading Mitsuba's scenes needs Mitsuba: {error}"
         ) from None
+    if mi.variant() is None:
+        mi.set_variant(VARIANT)
+        mi.set_log_level(mi.LogLevel.Error)
     return mi
 
 
 @contextmanager
 def scalar() -> Iterator[Any]:
-    """The module in the variant VARIANT, without a search for LLVM."""
+    """The module in the variant VARIANT."""
     mi = module()
     old = mi.variant()
     with warnings.catch_warnings():

@@ -1,9 +1,11 @@
 """Which variant of Mitsuba works is found out in child processes, and reported."""
 
+import ast
 import os
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -16,6 +18,8 @@ def _own_memory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("REFERENCE_RT_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv(backend.FORCE, raising=False)
     monkeypatch.delenv(backend.LIBRARY, raising=False)
+    # As in a new process: other tests of this one have loaded an LLVM.
+    monkeypatch.delitem(sys.modules, "drjit", raising=False)
 
 
 @pytest.fixture
@@ -123,3 +127,89 @@ def test_importing_the_comparisons_does_not_import_mitsuba() -> None:
     modules = "comparisons.mitsuba.backend, comparisons.mitsuba.translate, comparisons.rungs"
     code = f"import sys, {modules}; sys.exit('mitsuba' in sys.modules or 'drjit' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+FIRST = {
+    "nothing": "pass",
+    "the module": "backend.mitsuba()",
+    "the scalar variant": "backend.scalar().__enter__()",
+    "a file": "Scene.load(file)",
+    "a file without what is not supported": "Scene.load(file, allow_missing=True)",
+    "a file and its values": "Scene.load(file, defaults={'radius': '2'})",
+    "a dictionary": "Scene.from_mitsuba({'type': 'scene', 'ball': {'type': 'sphere'}})",
+    "an error in a file": "suppress(SceneError).__enter__(); Scene.load(file + '.none')",
+    "writing": "write_xml(Scene(), Path(file).with_name('out.xml'))",
+}
+"""What a process may do first with Mitsuba, in Python."""
+
+_LOADED = """
+import sys
+from contextlib import suppress
+from pathlib import Path
+from types import ModuleType
+from comparisons.mitsuba import backend
+from comparisons.mitsuba.writing import write_xml
+from reference_rt import Scene
+from reference_rt.util.errors import SceneError
+file = sys.argv[1]
+try:
+    {first}
+except SceneError:
+    pass
+backend.mitsuba()
+lines = Path("/proc/self/maps").read_text().splitlines()
+print(backend.backend().llvm_path)
+print(*{{line.split()[-1] for line in lines if "libLLVM" in line}})
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize("first", FIRST)
+def test_dr_jit_has_the_proven_llvm_whatever_comes_first(first: str, tmp_path: Path) -> None:
+    """Dr.Jit loads an LLVM when it is imported.  Where a scene of Mitsuba's was read first, that was
+    whichever the system has, an old one that aborts in some kernels."""
+    file = tmp_path / "scene.xml"
+    file.write_text(
+        "<scene version='3.0.0'><default name='radius' value='1'/>"
+        "<shape type='sphere'><float name='radius' value='$radius'/></shape></scene>"
+    )
+    code = _LOADED.format(first=FIRST[first])
+    run = subprocess.run(
+        [sys.executable, "-c", code, str(file)], check=True, capture_output=True, text=True
+    )
+    proven, loaded = run.stdout.splitlines()[-2:]
+    if proven == "None":
+        pytest.skip("no LLVM works here")
+    assert loaded == str(Path(proven).resolve())
+
+
+def test_only_the_backend_imports_mitsuba() -> None:
+    """For the same reason."""
+    package = Path(backend.__file__).parents[1]
+    importing = {
+        str(file.relative_to(package))
+        for file in package.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Import)
+        and any(n.name.split(".")[0] == "mitsuba" for n in node.names)
+    }
+    start = str(Path("experiments", "convergence", "start_worker.py"))  # it measures the import
+    assert importing == {str(Path("mitsuba", "backend.py")), start}
+
+
+def test_an_llvm_that_is_loaded_already_is_the_one_that_is_proven(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where the user's code has imported Dr.Jit: another library would be named, not used."""
+    tried = []
+    monkeypatch.setattr(backend, "prove", lambda variant, path: tried.append(path))
+    monkeypatch.setattr(backend.llvm_libraries, "candidates", lambda: ["libLLVM.so.99.1"])
+    monkeypatch.setitem(sys.modules, "drjit", ModuleType("drjit"))
+    chosen = backend.choose()
+    assert (chosen.variant, chosen.llvm_path, tried) == (backend.LLVM, None, [None])
+    assert "Dr.Jit had loaded" in chosen.reason
+    monkeypatch.setenv(backend.LIBRARY, "libLLVM.so.98.1")
+    assert backend.choose().llvm_path == "libLLVM.so.98.1"
+    monkeypatch.delitem(sys.modules, "drjit")
+    monkeypatch.delenv(backend.LIBRARY)
+    assert backend.choose().llvm_path == "libLLVM.so.99.1"

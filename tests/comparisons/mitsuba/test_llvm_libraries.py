@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 import tomllib
 from pathlib import Path
 
@@ -22,6 +23,8 @@ def _nothing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("REFERENCE_RT_CACHE", str(tmp_path / "cache"))
     for name in (backend.FORCE, libraries.LIBRARY, "CONDA_PREFIX"):
         monkeypatch.delenv(name, raising=False)
+    # As in a new process: other tests of this one have loaded an LLVM.
+    monkeypatch.delitem(sys.modules, "drjit", raising=False)
 
 
 @pytest.fixture
