@@ -106,9 +106,11 @@ def choose() -> Backend:
 
 
 def _libraries() -> list[str | None]:
-    """The libraries to try.  Dr.Jit loads its LLVM when it is imported.  If the user's code has done
-    that already, that library stays; None is the one that Dr.Jit's own search finds, here and in a
-    child process."""
+    """The libraries to try.
+
+    Dr.Jit loads its LLVM when it is imported, and keeps it.  If the user's code has imported it,
+    only that LLVM counts: None stands for what Dr.Jit's own search finds, here and in a child.
+    """
     if "drjit" in sys.modules:
         return [os.environ.get(LIBRARY) or None]
     return [*llvm_libraries.candidates()[:_MOST_PROOFS]]

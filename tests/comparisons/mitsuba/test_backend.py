@@ -166,8 +166,8 @@ print(*{{line.split()[-1] for line in lines if "libLLVM" in line}})
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("first", FIRST)
 def test_dr_jit_has_the_proven_llvm_whatever_comes_first(first: str, tmp_path: Path) -> None:
-    """Dr.Jit loads an LLVM when it is imported.  Where a scene of Mitsuba's was read first, that was
-    whichever the system has, an old one that aborts in some kernels."""
+    """Dr.Jit loads an LLVM when it is imported.  Where a scene of Mitsuba's was read first, that
+    was whichever the system has, such as an old one that aborts in some kernels."""
     file = tmp_path / "scene.xml"
     file.write_text(
         "<scene version='3.0.0'><default name='radius' value='1'/>"
