@@ -129,7 +129,7 @@ def _bsdf_sample(
     p = shading.point.p
     if hit.kind < 0:
         arriving: Vec3 = any_light.background(lights, ray.d)
-        light_pdf = any_light.environment_pdf(lights, p, normal, ray.d)
+        light_pdf = any_light.environment_pdf(lights, p, normal, arriving)
     else:
         there = surface(scene, ray, hit)
         here = place(scene, there.material, ray, hit)

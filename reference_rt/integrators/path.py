@@ -172,10 +172,10 @@ def radiances(
 def _environment_emission(path: PathSetup, scene: SceneTables, state: State, ray: Ray) -> Vec3:
     """Emission of the environment along a ray that hits nothing: throughput L_e, MIS-weighted."""
     lights, weight = scene.lights, 1.0
-    if state.bsdf_pdf > 0.0:
-        light_pdf = any_light.environment_pdf(lights, state.previous, state.normal, ray.d)
-        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
     emitted: Vec3 = any_light.background(lights, ray.d)
+    if state.bsdf_pdf > 0.0:
+        light_pdf = any_light.environment_pdf(lights, state.previous, state.normal, emitted)
+        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
     return state.throughput * emitted * weight
 
 

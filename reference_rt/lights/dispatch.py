@@ -38,7 +38,7 @@ def _background(lights: Lights, d: Vec3) -> Vec3:
 
 
 @by_code("environment_density", code=str(ENVIRONMENT))
-def _environment_density(lights: Lights, d: Vec3) -> float:
+def _environment_density(lights: Lights, arriving: Vec3) -> float:
     return 0.0
 
 
@@ -210,9 +210,9 @@ def area_pdf(lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint) 
 
 
 @kernel
-def environment_pdf(lights: Lights, p: Vec3, n: Vec3, d: Vec3) -> float:
-    """The same for a direction `d` to the environment."""
-    density: float = _environment_density(emitters(lights), d)
+def environment_pdf(lights: Lights, p: Vec3, n: Vec3, arriving: Vec3) -> float:
+    """The same for a direction to the environment, by the radiance of its `background`."""
+    density: float = _environment_density(emitters(lights), arriving)
     if density == 0.0:
         return 0.0
     return density * pick_probability(lights, p, n, count(lights) - 1)

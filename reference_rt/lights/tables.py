@@ -80,8 +80,8 @@ class _Surroundings:
 
     @staticmethod
     @kernel
-    def environment_density(environment: Any, d: Vec3) -> float:
-        found: float = _density_of(environment, d)
+    def environment_density(environment: Any, arriving: Vec3) -> float:
+        found: float = _density_of(environment, arriving)
         return found
 
     @staticmethod

@@ -1,10 +1,11 @@
-"""Sampling of tabulated densities by inversion: running sums (unnormalised CDFs) and bisection."""
+"""Sampling of tabulated densities by inversion: running sums (unnormalised CDFs) and bisection,
+with guide tables where a table is large."""
 
 import math
 
 import numpy as np
 
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IdArray
 from reference_rt.jit.kernel import kernel
 
 
@@ -40,10 +41,36 @@ def blended(sums: FloatArray, k: int, s: float, i: int) -> float:
     return float(sums[k, i] * (1.0 - s) + sums[k + 1, i] * s)
 
 
+def guide(sums: FloatArray) -> IdArray:
+    """Where to begin a search in running sums (m, n + 1), as `bracket` reads it: (m, n // 4 + 2)
+    cells, at equal steps of each row's total (Chen and Asau 1974, the method of guide tables)."""
+    steps = sums.shape[1] // 4 + 1
+    found = np.empty((len(sums), steps + 1), np.int32)
+    for row, cells in zip(sums, found, strict=True):
+        cells[:] = np.searchsorted(row, np.linspace(0.0, row[-1], steps + 1), side="right") - 1
+    return np.minimum(found, np.int32(sums.shape[1] - 2))
+
+
 @kernel
-def blended_cell_of(sums: FloatArray, k: int, s: float, x: float) -> int:
-    """As `cell_of`, for the `blended` rows of sums (m, n + 1)."""
-    low, high = 0, sums.shape[1] - 1
+def bracket(guides: IdArray, k: int, u: float) -> tuple[int, int]:
+    """The first cell that holds the share u of row k or of row k + 1, or any of their means, and
+    the one after the last, but for rounding."""
+    steps = guides.shape[1] - 1
+    j = min(int(u * steps), steps - 1)
+    low = min(guides[k, j], guides[k + 1, j])
+    high = max(guides[k, j + 1], guides[k + 1, j + 1])
+    return int(low), int(high) + 1
+
+
+@kernel
+def blended_cell_of(sums: FloatArray, k: int, s: float, x: float, low: int, high: int) -> int:
+    """As `cell_of`, for the `blended` rows of sums (m, n + 1), where the cell is expected from low
+    to high - 1: by bisection there, and everywhere if it is not."""
+    end = sums.shape[1] - 1
+    if blended(sums, k, s, low) > x:
+        low = 0
+    if blended(sums, k, s, high) <= x:
+        high = end
     while high - low > 1:
         middle = (low + high) // 2
         if blended(sums, k, s, middle) <= x:

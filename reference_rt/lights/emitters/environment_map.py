@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IdArray
 from reference_rt.core.model import Description, Positive
 from reference_rt.core.transform import Transform, affine
 from reference_rt.core.vec3 import Vec3, dot, luminance, triple
@@ -15,7 +15,9 @@ from reference_rt.lights.light import NO_LIGHT, LightSample
 from reference_rt.sampling.distribution import (
     blended,
     blended_cell_of,
+    bracket,
     cell_of,
+    guide,
     linear,
     running_sums,
 )
@@ -70,8 +72,9 @@ def orthogonal(steps: Transform) -> FloatArray:
 class EnvironmentMaps(NamedTuple):
     """One map.  texels (h, w, 3): radiance, row 0 on top; to_map (1, 9): the world's directions in
     the map's coordinates; row_sums (h, w + 1): running sums of each row's luminance across its
-    cells, in radiance; height_sums (h,): those of whole cell rows, in radiance times solid angle;
-    total (1,): their last, the integral of the luminance over all directions.
+    cells, in radiance; guides (h, n): where to search in these, see `guide`; height_sums (h,):
+    running sums of whole cell rows, in radiance times solid angle; total (1,): their last, the
+    integral of the luminance over all directions.
 
     Radiance is bilinear between texels: across, texel x stands at azimuth 2 pi (x + 1/2) / w and
     the first follows the last; upright, texel y stands at polar angle pi y / (h - 1), so that the
@@ -81,6 +84,7 @@ class EnvironmentMaps(NamedTuple):
     texels: FloatArray
     to_map: FloatArray
     row_sums: FloatArray
+    guides: IdArray
     height_sums: FloatArray
     total: FloatArray
 
@@ -102,6 +106,7 @@ def tabulate(texels: FloatArray, to_world: FloatArray) -> EnvironmentMaps:
         texels=np.ascontiguousarray(texels),
         to_map=to_world.T.reshape(1, 9).copy(),
         row_sums=row_sums,
+        guides=guide(row_sums),
         height_sums=height_sums,
         total=height_sums[-1:].copy(),
     )
@@ -149,9 +154,10 @@ def texel(table: EnvironmentMaps, y: int, x: int) -> Vec3:
 
 
 @kernel
-def pdf(table: EnvironmentMaps, d: Vec3) -> float:
-    """The density of `sample` per solid angle: the luminance, over its integral."""
-    return float(luminance(radiance(table, d)) / table.total[0])
+def pdf(table: EnvironmentMaps, arriving: Vec3) -> float:
+    """The density of `sample` per solid angle in a direction of this radiance: its luminance, over
+    the integral of the luminance."""
+    return float(luminance(arriving) / table.total[0])
 
 
 @kernel
@@ -163,15 +169,17 @@ def sample(table: EnvironmentMaps, u0: float, u1: float) -> LightSample:
     y = cell_of(table.height_sums, mass)
     t = _down_in_cells(table, y, mass - table.height_sums[y])
     mass = u1 * blended(table.row_sums, y, t, width)
-    x = blended_cell_of(table.row_sums, y, t, mass)
+    low, high = bracket(table.guides, y, u1)
+    x = blended_cell_of(table.row_sums, y, t, mass, low, high)
     before = blended(table.row_sums, y, t, x)
     cell = blended(table.row_sums, y, t, x + 1) - before
     if cell <= 0.0:
         return NO_LIGHT
     beside = (x + 1) % width
-    a = luminance(texel(table, y, x)) * (1.0 - t) + luminance(texel(table, y + 1, x)) * t
-    b = luminance(texel(table, y, beside)) * (1.0 - t) + luminance(texel(table, y + 1, beside)) * t
-    s = linear((mass - before) / cell, a, b)
+    left = texel(table, y, x) * (1.0 - t) + texel(table, y + 1, x) * t
+    right = texel(table, y, beside) * (1.0 - t) + texel(table, y + 1, beside) * t
+    s = linear((mass - before) / cell, luminance(left), luminance(right))
+    arriving = left * (1.0 - s) + right * s
     turns = (x + 0.5 + s) / width
     cosine, sine = on_circle(turns - math.floor(turns))
     theta = math.pi * (y + t) / (height - 1)
@@ -181,8 +189,7 @@ def sample(table: EnvironmentMaps, u0: float, u1: float) -> LightSample:
         + triple(table.to_map, 0, 1) * math.cos(theta)
         - triple(table.to_map, 0, 2) * (out * cosine)
     )
-    arriving = radiance(table, wi)
-    return LightSample(wi, arriving, luminance(arriving) / table.total[0], wi, math.inf, False)
+    return LightSample(wi, arriving, pdf(table, arriving), wi, math.inf, False)
 
 
 @kernel
@@ -190,13 +197,20 @@ def _down_in_cells(table: EnvironmentMaps, y: int, mass: float) -> float:
     """The place t in cell row y, from 0 to 1, at which the integral over polar angles is `mass`: by
     Newton's iteration, kept inside the bounds found so far.
 
-    It ends with a step of 2^-32 of a cell, the spacing of the numbers that samplers draw.
+    It begins with the place if luminance times sin(theta) were linear, and ends with an error of
+    2^-32 of a cell, the spacing of the numbers that samplers draw.  The density is a product of two
+    functions that are concave and not negative, so that a step d from t leaves an error of at most
+    d² / min(t, 1 - t).
     """
     height, width = table.texels.shape[0], table.texels.shape[1]
     step = math.pi / (height - 1)
     a = table.row_sums[y, width] * (2.0 * math.pi / width)
     b = table.row_sums[y + 1, width] * (2.0 * math.pi / width)
-    low, high, t = 0.0, 1.0, 0.5
+    cell = table.height_sums[y + 1] - table.height_sums[y]
+    if cell <= 0.0:
+        return 0.5
+    low, high = 0.0, 1.0
+    t = linear(mass / cell, a * math.sin(y * step), b * math.sin((y + 1) * step))
     for _ in range(64):  # as many as halvings alone could take, and more
         excess = polar_integral(a, b, y * step, step, t * step) - mass
         if excess > 0.0:
@@ -209,7 +223,8 @@ def _down_in_cells(table: EnvironmentMaps, y: int, mass: float) -> float:
             newton = t - excess / slope
             if low < newton < high:
                 following = newton
-        if abs(following - t) <= 2.0**-32:
+        moved = following - t
+        if moved * moved <= 2.0**-32 * min(t, 1.0 - t) or abs(moved) <= 2.0**-32:
             return following
         t = following
     return t

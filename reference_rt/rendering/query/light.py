@@ -130,7 +130,8 @@ def pdf_kernel(
         if not valid:
             continue
         if found.codes[i, 0] < 0:
-            out[i] = any_light.environment_pdf(lights, ray.o, row(n, i), normalize(ray.d))
+            arriving = any_light.background(lights, normalize(ray.d))
+            out[i] = any_light.environment_pdf(lights, ray.o, row(n, i), arriving)
             continue
         q = surface(geometry, ray, hit_of(found, i))
         out[i] = any_light.area_pdf(lights, shapes, ray.o, row(n, i), q)
