@@ -11,7 +11,7 @@ from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.results.case import Images
 from comparisons.rungs.layers.seen import Seen
-from comparisons.rungs.rays.camera import camera_rays
+from comparisons.rungs.rays.camera import camera_rays, ends
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.whitted import plugin_radiance
 from reference_rt.core.arrays import FloatArray
@@ -40,7 +40,7 @@ def mitsuba_cast(
     film = scene.film
     y, x = np.mgrid[0 : film.height, 0 : film.width]
     o, d = camera_rays(scene, x.ravel() + 0.5, y.ravel() + 0.5)
-    hits = trace(counterpart, o, d)
+    hits = trace(counterpart, o, d, t_max=ends(scene, d))
     notes = [f"the pictures show the layer '{ours.shown}' in display values, not radiance"]
     uv = np.where(hits.has_uv[:, None], hits.uv, ours.layers["uv"].reshape(-1, 2))
     if ours.shown == "uv" and not hits.has_uv[hits.shape >= 0].all():
@@ -75,10 +75,10 @@ def mitsuba_whitted(scene: Scene, tables: SceneTables, counterpart: Counterpart)
     rays = Rays(*camera_rays(scene, (x.ravel() + 0.5) / n, (y.ravel() + 0.5) / n))
     # Few large pieces: Dr.Jit traces the plugin anew for each.
     radiance = plugin_radiance(scene, tables, counterpart, scene.integrator)
-    pieces = [
-        radiance(Rays(rays.o[k : k + AT_ONCE], rays.d[k : k + AT_ONCE]))
-        for k in range(0, len(rays.o), AT_ONCE)
-    ]
+    t_max, pieces = ends(scene, rays.d), []
+    for k in range(0, len(rays.o), AT_ONCE):
+        piece = slice(k, k + AT_ONCE)
+        pieces.append(radiance(Rays(rays.o[piece], rays.d[piece]), t_max[piece]))
     samples = np.concatenate(pieces).reshape(height, n, width, n, 3)
     return np.asarray(samples.mean(axis=(1, 3)))
 

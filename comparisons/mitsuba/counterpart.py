@@ -10,7 +10,7 @@ import numpy as np
 from comparisons.geometry.frame import OURS, Frame
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.csg import SLIGHT, SolidCounterpart
-from comparisons.mitsuba.hits import BoolArray, MitsubaHits, assign_nearer, misses, read
+from comparisons.mitsuba.hits import BoolArray, MitsubaHits, assign, assign_nearer, misses, read
 from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.plugins.parameters import is_wide
 from comparisons.mitsuba.scene import first_hits
@@ -138,20 +138,30 @@ class Counterpart:
 
 
 def trace(
-    counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: float = SLIGHT
+    counterpart: Counterpart,
+    o: FloatArray,
+    d: FloatArray,
+    tolerance: float = SLIGHT,
+    t_max: FloatArray | float = np.inf,
 ) -> MitsubaHits:
-    """Mitsuba's first hits, in the same form as `reference_rt.query.intersect` returns ours.
+    """Mitsuba's first hits before t_max (n,), in the same form as `reference_rt.query.intersect`
+    returns ours.
 
     Mitsuba gets the rays in the counterpart's frame, rounded to float32.  `tolerance`: see
     `SolidCounterpart.trace`.
     """
     if counterpart.frame.is_ours:
-        return _trace(counterpart, o, d, tolerance)
-    found = _trace(counterpart, counterpart.frame.into(o), d, tolerance)
-    scale = counterpart.frame.scale
-    met = found.shape >= 0
-    found.p[met] = counterpart.frame.out(found.p[met])
-    return replace(found, t=found.t / scale, sag=found.sag / scale, height=found.height / scale)
+        found = _trace(counterpart, o, d, tolerance)
+    else:
+        found = _trace(counterpart, counterpart.frame.into(o), d, tolerance)
+        scale = counterpart.frame.scale
+        met = found.shape >= 0
+        found.p[met] = counterpart.frame.out(found.p[met])
+        t, sag, height = found.t / scale, found.sag / scale, found.height / scale
+        found = replace(found, t=t, sag=sag, height=height)
+    beyond = np.flatnonzero(np.isfinite(found.t) & (found.t >= t_max))
+    assign(found, beyond, misses(len(beyond)))
+    return found
 
 
 def _trace(counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: float) -> MitsubaHits:

@@ -183,8 +183,8 @@ def _moves(
 
 def plugin_radiance(
     scene: Scene, tables: SceneTables, counterpart: Counterpart, integrator: Whitted
-) -> Callable[[Rays], FloatArray]:
-    """Mitsuba's Whitted ray tracing: rays -> radiance (n, 3)."""
+) -> Callable[..., FloatArray]:
+    """Mitsuba's Whitted ray tracing: `Rays`, and where they end if they do -> radiance (n, 3)."""
     mi = mitsuba()
     unlit = [
         name
@@ -207,13 +207,20 @@ def plugin_radiance(
 
     shared = mi.load_dict(described) if mi.variant().startswith("scalar") else None
 
-    def radiance(o: Any, d: Any) -> tuple[Any, ...]:
+    def radiance(o: Any, d: Any, end: Any) -> tuple[Any, ...]:
         # Wide variants load it for each call: Dr.Jit makes the lights' data as wide as the first
         # call's rays.  Scalar variants call this for each ray.
         plugin = mi.load_dict(described) if shared is None else shared
-        return (plugin.sample(counterpart.lit, None, mi.Ray3f(mi.Point3f(o), d))[0],)
+        ray = mi.Ray3f(mi.Point3f(o), d)
+        ray.maxt = end
+        return (plugin.sample(counterpart.lit, None, ray)[0],)
 
-    return lambda rays: for_rays(radiance, counterpart.frame.into(rays.o), rays.d)[0]
+    def of(rays: Rays, ends: FloatArray | None = None) -> FloatArray:
+        t_max = np.full(len(rays.o), np.inf) if ends is None else ends * counterpart.frame.scale
+        found: FloatArray = for_rays(radiance, counterpart.frame.into(rays.o), rays.d, t_max)[0]
+        return found
+
+    return of
 
 
 Radiance = Callable[[FloatArray, FloatArray], FloatArray]

@@ -1,12 +1,15 @@
 """What all cameras share: position and orientation; and `no_lens`, for most of them."""
 
-from typing import Any, Self
+import math
+from typing import Annotated, Any, NamedTuple, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Description, Direction, Vector
+from reference_rt.core.model import Description, Direction, Positive, Vector
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import Vec3, length
 from reference_rt.jit.kernel import kernel
 from reference_rt.sampling import Sample
 
@@ -24,10 +27,24 @@ class Camera(Description):
     up: Direction = (0.0, 1.0, 0.0)
     """The direction that points up in the picture: world coordinates, of any length, not parallel
     to the line of view."""
+    near: Annotated[float, Field(ge=0)] = 0.0
+    """The near clipping plane: its distance from the eye along the direction of view, in scene
+    units.  Nothing in front of it is seen, and distances in the picture count from it."""
+    far: Positive | None = None
+    """The far clipping plane, likewise: nothing behind it is seen but the environment.  Default:
+    none."""
 
     @model_validator(mode="after")
     def _check_orientation(self) -> Self:
         transform.look_at(self.eye, self.target, self.up)
+        return self
+
+    @model_validator(mode="after")
+    def _check_planes(self) -> Self:
+        if self.far is not None and not self.near < self.far:
+            raise ValueError(
+                f"'far' is {self.far:g} and 'near' {self.near:g}; expected 'near' before 'far'"
+            )
         return self
 
     @property
@@ -35,9 +52,30 @@ class Camera(Description):
         """(3, 3), orthonormal: the textbook's u, v, w as rows: right, up and backward."""
         return transform.look_at(self.eye, self.target, self.up)[:, :3].T
 
+    @property
+    def clip(self) -> "Clip":
+        """The clipping planes."""
+        return Clip(self.near, (math.inf if self.far is None else self.far) - self.near)
+
     def setup(self, width: int, height: int) -> Any:
         """The NamedTuple that `camera_ray` takes, for a picture of width x height pixels."""
         raise NotImplementedError
+
+
+class Clip(NamedTuple):
+    """near: the distance of the near clipping plane from the eye along the direction of view;
+    depth: that from the near to the far one, infinite without one."""
+
+    near: float
+    depth: float
+
+
+@kernel
+def clipped_ray(clip: Clip, o: Vec3, s: Vec3) -> Ray:
+    """The ray from the near to the far clipping plane, along the line from `o`, at the eye's depth,
+    to o + s, at distance 1 along the direction of view."""
+    size = length(s)
+    return Ray(o + s * clip.near, s * (1.0 / size), clip.depth * size)
 
 
 @kernel

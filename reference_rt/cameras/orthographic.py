@@ -1,11 +1,10 @@
 """Orthographic camera: parallel rays that start on the view rectangle."""
 
-import math
 from typing import Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
-from reference_rt.cameras.camera import Camera
+from reference_rt.cameras.camera import Camera, Clip
 from reference_rt.cameras.view_rectangle import Edges, Rectangle, by_width, place, vec3
 from reference_rt.core.model import Positive
 from reference_rt.core.ray import Ray
@@ -39,19 +38,23 @@ class Orthographic(Camera):
     def setup(self, width: int, height: int) -> "OrthographicView":
         basis = self.basis
         corner, right, down = place(self.rectangle(width, height), basis, 0.0)
-        return OrthographicView(Vec3(*self.eye) + corner, right, down, vec3(-basis[2]))
+        start = Vec3(*self.eye) + corner
+        return OrthographicView(start, right, down, vec3(-basis[2]), self.clip)
 
 
 class OrthographicView(NamedTuple):
-    """The top left corner of the view rectangle, its top and left edges, the unit direction."""
+    """The top left corner of the view rectangle, its top and left edges, the unit direction, the
+    clipping planes."""
 
     corner: Vec3
     right: Vec3
     down: Vec3
     forward: Vec3
+    clip: Clip
 
 
 @kernel
 def camera_ray(view: OrthographicView, x: float, y: float, lens: tuple[float, float]) -> Ray:
     """The ray from (x, y) of the rectangle, forward (T2: u_s = l + (r - l)(i + 1/2) / n_x)."""
-    return Ray(view.corner + view.right * x + view.down * y, view.forward, math.inf)
+    start = view.corner + view.right * x + view.down * y
+    return Ray(start + view.forward * view.clip.near, view.forward, view.clip.depth)

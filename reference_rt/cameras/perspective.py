@@ -1,11 +1,11 @@
 """Perspective camera: all rays start at the eye and pass a view rectangle in front of it."""
 
-import math
 from typing import Literal, NamedTuple
 
+from reference_rt.cameras.camera import Clip, clipped_ray
 from reference_rt.cameras.view_rectangle import CentralCamera, place
 from reference_rt.core.ray import Ray
-from reference_rt.core.vec3 import Vec3, normalize
+from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 
 
@@ -16,21 +16,22 @@ class Perspective(CentralCamera):
 
     def setup(self, width: int, height: int) -> "PerspectiveView":
         return PerspectiveView(
-            Vec3(*self.eye), *place(self.rectangle(width, height), self.basis, 1.0)
+            Vec3(*self.eye), *place(self.rectangle(width, height), self.basis, 1.0), self.clip
         )
 
 
 class PerspectiveView(NamedTuple):
-    """eye: the origin of all rays;  corner: the direction, of any length, to the picture's top left
-    corner;  right, down: its change across the picture, and down."""
+    """eye: the origin of all rays, if nothing is clipped;  corner: the picture's top left corner at
+    distance 1, from the eye;  right, down: its change across the picture, and down."""
 
     eye: Vec3
     corner: Vec3
     right: Vec3
     down: Vec3
+    clip: Clip
 
 
 @kernel
 def camera_ray(view: PerspectiveView, x: float, y: float, lens: tuple[float, float]) -> Ray:
     """d = s - e through (x, y) of the rectangle (T3), made unit."""
-    return Ray(view.eye, normalize(view.corner + view.right * x + view.down * y), math.inf)
+    return clipped_ray(view.clip, view.eye, view.corner + view.right * x + view.down * y)

@@ -38,4 +38,4 @@ class Pinhole(Camera):
         film = by_width(self.film_width / self.film_distance, width, height)
         corner, right, down = place(film, self.basis, -1.0)
         # d = e - s: on from the film's point s through the hole.
-        return PerspectiveView(Vec3(*self.eye), -corner, -right, -down)
+        return PerspectiveView(Vec3(*self.eye), -corner, -right, -down, self.clip)

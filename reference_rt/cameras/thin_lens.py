@@ -5,10 +5,11 @@ from typing import Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
+from reference_rt.cameras.camera import Clip, clipped_ray
 from reference_rt.cameras.view_rectangle import STEEPEST, CentralCamera, place, vec3
 from reference_rt.core.model import Positive
 from reference_rt.core.ray import Ray
-from reference_rt.core.vec3 import Vec3, normalize
+from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.sampling import LENS, Sample, draw_pair
 from reference_rt.sampling.warp import concentric_disk
@@ -52,12 +53,14 @@ class ThinLens(CentralCamera):
             vec3(v),
             self.aperture_radius,
             self.aperture_radius / self.focus,
+            self.clip,
         )
 
 
 class ThinLensView(NamedTuple):
     """eye, corner, right, down: as in `PerspectiveView`, at distance 1;  u, v: unit axes of the
-    lens;  radius: its radius;  slope: radius / focus distance."""
+    lens;  radius: its radius;  slope: radius / focus distance;
+    clip: the clipping planes."""
 
     eye: Vec3
     corner: Vec3
@@ -67,6 +70,7 @@ class ThinLensView(NamedTuple):
     v: Vec3
     radius: float
     slope: float
+    clip: Clip
 
 
 @kernel
@@ -86,4 +90,4 @@ def camera_ray(view: ThinLensView, x: float, y: float, lens: tuple[float, float]
     a, b = concentric_disk(lens[0], lens[1])
     q = view.u * a + view.v * b
     s = view.corner + view.right * x + view.down * y
-    return Ray(view.eye + q * view.radius, normalize(s - q * view.slope), math.inf)
+    return clipped_ray(view.clip, view.eye + q * view.radius, s - q * view.slope)

@@ -1,5 +1,6 @@
 """Ray casting: the first hit of the ray through each pixel's centre, as colour and other AOVs."""
 
+import math
 from typing import ClassVar, Literal, NamedTuple
 
 from reference_rt.accel.geometry import closest_hit, colour, coordinates, owner
@@ -49,7 +50,7 @@ def cast(scene: SceneTables, ray: Ray) -> Cast:
     nothing = Vec3(0.0, 0.0, 0.0)
     hit = closest_hit(scene.geometry, ray)
     if hit.kind < 0:
-        return Cast(nothing, hit.t, nothing, -1, 0.0, 0.0)
+        return Cast(nothing, math.inf, nothing, -1, 0.0, 0.0)
     point = surface(scene, ray, hit)
     whose, where = owner(scene.geometry, hit), coordinates(scene.geometry, ray, hit)
     at = texture_place(scene.textures, scene.geometry, ray, hit)

@@ -76,13 +76,14 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
     stack = local_floats(10 * (waiting * whitted.max_depth + 2))
     kept = local_floats(any_material.scratch_floats(scene.materials))
     _push(stack, 0, ray, Vec3(1.0, 1.0, 1.0), 0)
-    top = 1
+    top, end = 1, ray.t_max
     total = Vec3(0.0, 0.0, 0.0)
     while top > 0:
         top -= 1
         k = 10 * top
-        ray = Ray(_vector(stack, k), _vector(stack, k + 3), math.inf)
         weight, depth = _vector(stack, k + 6), int(stack[k + 9])
+        t_max = end if depth == 0 else math.inf
+        ray = Ray(_vector(stack, k), _vector(stack, k + 3), t_max)
         hit = closest_hit(scene.geometry, ray)
         if hit.kind < 0:
             background = any_light.background(scene.lights, ray.d)

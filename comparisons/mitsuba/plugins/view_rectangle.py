@@ -16,7 +16,8 @@ def register(mi: Any) -> None:
     class ViewRectangle(mi.Sensor):  # type: ignore[misc]
         """Parameters: to_world, a rigid map whose columns are left, up, forward and the eye, as of
         Mitsuba's cameras; left, right, bottom and top, the edges of the view rectangle at distance
-        1; aperture_radius, 0 for none; focus_distance, to the plane in focus."""
+        1; aperture_radius, 0 for none; focus_distance, to the plane in focus; near_clip and
+        far_clip, the clipping planes."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
@@ -30,6 +31,7 @@ def register(mi: Any) -> None:
             self.across, self.up = across.tolist(), up.tolist()
             self.radius = properties.get("aperture_radius", 0.0)
             self.focus = properties.get("focus_distance", 1.0)
+            self.near, self.far = properties["near_clip"], properties["far_clip"]
 
         def sample_ray(
             self,
@@ -40,6 +42,8 @@ def register(mi: Any) -> None:
             active: Any = True,
         ) -> tuple[Any, Any]:
             """A ray through a point of the film, from (0, 0), the upper left corner, to (1, 1)."""
+            import drjit as dr
+
             d = mi.Vector3f(self.corner) + mi.Vector3f(self.along) * position_sample.x
             d += mi.Vector3f(self.down) * position_sample.y
             o = mi.Point3f(self.eye)
@@ -47,8 +51,10 @@ def register(mi: Any) -> None:
                 lens = self.radius * mi.warp.square_to_uniform_disk_concentric(aperture_sample)
                 # Their x is to the left.
                 shift = mi.Vector3f(self.up) * lens.y - mi.Vector3f(self.across) * lens.x
-                o, d = o + shift, d * self.focus - shift
-            ray = mi.Ray3f(o, normalized(d), time, mi.Color0f())
+                o, d = o + shift, d - shift / self.focus
+            # d ends at distance 1 along the direction of view.
+            ray = mi.Ray3f(o + d * self.near, dr.normalize(d), time, mi.Color0f())
+            ray.maxt = (self.far - self.near) * dr.norm(d)
             return ray, mi.Color3f(1.0)
 
         def sample_ray_differential(
@@ -71,10 +77,5 @@ def register(mi: Any) -> None:
 
         def to_string(self) -> str:
             return "ViewRectangle[]"
-
-    def normalized(d: Any) -> Any:
-        import drjit as dr
-
-        return dr.normalize(d)
 
     mi.register_sensor("view_rectangle", ViewRectangle)

@@ -47,11 +47,7 @@ def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator,
                 found = _direct(node)
             case "depth":
                 found = RayCast(show="distance")
-                reading.note(
-                    node,
-                    "Mitsuba counts the distance from the near clipping plane and 0 for no hit, "
-                    "ours from the eye and infinity",
-                )
+                reading.note(node, "Mitsuba has 0 where nothing is hit, ours infinity")
             case "whitted":
                 found = _whitted(reading, node)
             case "moment":

@@ -1,5 +1,5 @@
 """The user's own file as the reference of a comparison: loaded by Mitsuba, and untouched but for
-the film's size and filter, the samples, clipping planes, what makes Mitsuba's own picture wrong
+the film's size and filter, the samples, what makes Mitsuba's own picture wrong
 (`changes_to`), and what `Scene.load` was asked to leave out.  So our reading of the file is
 checked, too."""
 
@@ -12,7 +12,6 @@ from comparisons.mitsuba.notes import notes_of_integrator
 from comparisons.mitsuba.reading import read_supported
 from comparisons.mitsuba.reading.exact_materials import inexact, make_exact, sample_visible
 from comparisons.mitsuba.reading.parse import Parsed, parse_file
-from comparisons.mitsuba.reading.sensors import CLIP
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.integrators import (
     BLACK,
@@ -45,7 +44,6 @@ def own_scene(scene: Scene) -> Any:
     sensor = _first(state, mi.ObjectType.Sensor)
     if sensor is None:
         raise UntranslatableError("of a file that has none", "camera")
-    _open_clipping(state.nodes[sensor].props)
     film = _child(mi, state, sensor, mi.ObjectType.Film, "hdrfilm")
     _resize(state.nodes[film].props, scene)
     values = {"pixel_format": "rgb", "component_format": "float32", "file_format": "openexr"}
@@ -87,13 +85,9 @@ def own_scene(scene: Scene) -> Any:
 def changes_to(scene: Scene) -> list[str]:
     """What `own_scene` changes in the file beyond the film and the samples, for the report."""
     parsed, found = _parsed(scene)
-    state = parsed.state
-    sensor = _first(state, mitsuba().ObjectType.Sensor)
     found += notes_of_integrator(scene)
     found += dict.fromkeys(note for _, note in inexact(scene))
     found += sample_visible(parsed)
-    if sensor is not None and _open_clipping(state.nodes[sensor].props):
-        found.append("its camera's clipping planes are those of Mitsuba's default: ours has none")
     return found
 
 
@@ -107,18 +101,6 @@ def _parsed(scene: Scene) -> tuple[Parsed, list[str]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # they were issued when the scene was loaded
         return parsed, read_supported(parsed, Scene)[1]
-
-
-def _open_clipping(sensor: Any) -> bool:
-    """Move clipping planes that cut more than Mitsuba's default ones to these; whether any does."""
-    planes = {key: float(sensor.get(key, default)) for key, default in CLIP.items()}
-    near, far = planes["near_clip"] > CLIP["near_clip"], planes["far_clip"] < CLIP["far_clip"]
-    if far and sensor.plugin_name() == "thinlens" and "focus_distance" not in sensor:
-        sensor["focus_distance"] = planes["far_clip"]
-    for key, cuts in (("near_clip", near), ("far_clip", far)):
-        if cuts:
-            sensor[key] = CLIP[key]
-    return near or far
 
 
 def _first(state: Any, kind: Any) -> int | None:

@@ -59,7 +59,13 @@ def read_sensor(reading: Reading, node: Node | None) -> View:
 
 
 def _camera_without_element(frame: Frame) -> AnyCamera:
-    return Perspective(eye=(0, 0, 0), target=(0, 0, 1), **_focal(50.0))
+    return Perspective(
+        eye=(0, 0, 0),
+        target=(0, 0, 1),
+        **_focal(50.0),
+        near=CLIP["near_clip"],
+        far=CLIP["far_clip"],
+    )
 
 
 # ---- cameras ------------------------------------------------------------------------------------
@@ -88,16 +94,16 @@ def _place(reading: Reading, node: Node, rigid: bool = True) -> tuple[dict[str, 
     return {"eye": eye, "target": eye + distance * unit[:, 2], "up": unit[:, 1]}, m
 
 
-def _clip(reading: Reading, node: Node) -> float:
-    """Ours have no clipping planes.  The far one."""
-    values = {key: node.number(key, default) for key, default in CLIP.items()}
-    if values != CLIP and (values["near_clip"] > NEAR or values["far_clip"] < FAR):
-        reading.note(
-            node,
-            f"near_clip {values['near_clip']:g} and far_clip {values['far_clip']:g} are left out: "
-            "our cameras see what is nearer or farther, too",
+def _planes(node: Node) -> tuple[dict[str, float], float]:
+    """near and far, without those that cut nothing; and Mitsuba's far plane."""
+    near, far = (node.number(key, default) for key, default in CLIP.items())
+    if not 0.0 < near < far:
+        raise node.error(
+            f"near_clip is {near:g} and far_clip {far:g}; expected near_clip above 0 and below "
+            "far_clip"
         )
-    return values["far_clip"]
+    found = {"near": near} if near > NEAR else {}
+    return found | ({"far": far} if far < FAR else {}), far
 
 
 _AXES = ("x", "y", "diagonal", "smaller", "larger")
@@ -143,7 +149,7 @@ def _focal(length: float) -> dict[str, Any]:
 
 def _perspective(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     place, _ = _place(reading, node)
-    _clip(reading, node)
+    place |= _planes(node)[0]
     node.ignore("focus_distance")  # Mitsuba reads it for every projective camera
     values, half = angle(node, frame)
     shift = tuple(node.number(f"principal_point_offset_{axis}", 0.0) for axis in "xy")
@@ -154,7 +160,8 @@ def _perspective(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
 
 def _thin_lens(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     place, _ = _place(reading, node)
-    far = _clip(reading, node)
+    planes, far = _planes(node)
+    place |= planes
     values, half = angle(node, frame)
     if frame.is_cropped:
         values = {"view": frame.window(half)}
@@ -168,7 +175,7 @@ def _thin_lens(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
 
 def _orthographic(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     place, m = _place(reading, node, rigid=False)
-    _clip(reading, node)
+    place |= _planes(node)[0]
     node.ignore("focus_distance")
     right, up, _ = np.linalg.norm(m[:, :3], axis=0).tolist()
     look, scale = node.looks()
@@ -183,6 +190,7 @@ def _orthographic(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
 def _view_rectangle(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     """Of our plugin, in files that we have written."""
     place, _ = _place(reading, node)
+    place |= _planes(node)[0]
     l, r, b, t = (node.number(name, 0.0) for name in ("left", "right", "bottom", "top"))
     radius, focus = node.number("aperture_radius", 0.0), node.number("focus_distance", 1.0)
     if radius == 0.0:

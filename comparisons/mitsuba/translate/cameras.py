@@ -15,12 +15,17 @@ from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.core.arrays import FloatArray
 
 NEAR, FAR = 1e-10, 1e10
-"""Clipping planes, which our cameras do not have.  These equal 0 and infinity for scenes from 1e-3
+"""Clipping planes where ours has none.  These equal 0 and infinity for scenes from 1e-3
 to 1e8 across, and directions are as exact as with Mitsuba's defaults 1e-2 and 1e4 (measured: 1.5e-7
 at 45 degrees for both)."""
 
 UNIT_ROUNDOFF = 2.0**-24
 """u of float32: the tolerance for square pixels and for a centred axis."""
+
+
+def clipping(camera: Camera) -> dict[str, float]:
+    """The clipping planes of a camera."""
+    return {"near_clip": camera.near or NEAR, "far_clip": camera.far or FAR}
 
 
 @singledispatch
@@ -95,8 +100,7 @@ def _rectangle(camera: CentralCamera, film: Film) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.view_rectangle`."""
     edges = camera.rectangle(film.width, film.height)
     named = zip(("left", "right", "bottom", "top"), edges, strict=True)
-    place = _place(camera)["to_world"]
-    return {"type": "view_rectangle", "to_world": place, **dict(named)}
+    return {"type": "view_rectangle", **dict(named), **_place(camera)}
 
 
 def _spanning(half: float) -> dict[str, Any]:
@@ -122,4 +126,4 @@ def _place(
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([-right * u, up * v, -w, np.add(camera.eye, shift)])
     to_world = mitsuba().ScalarTransform4d(matrix)
-    return {"to_world": to_world, "near_clip": NEAR, "far_clip": FAR}
+    return {"to_world": to_world, **clipping(camera)}

@@ -8,6 +8,7 @@ import numpy as np
 from comparisons.geometry.frame import Frame, frame_for
 from comparisons.geometry.sizes import ShapeSizes
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
+from reference_rt.cameras.camera import Camera
 from reference_rt.core.transform import Scale, Translate
 from reference_rt.lights import Point, Projector, Spot
 from reference_rt.materials import Bump
@@ -33,7 +34,9 @@ def moved(scene: Scene, frame: Frame) -> Scene:
     camera = scene.camera
     there = {"eye": _point(camera.eye, frame), "target": _point(camera.target, frame)}
     return scene.changed(
-        camera=camera.model_copy(update=there | lengths_of(camera, frame.scale)),
+        camera=camera.model_copy(
+            update=there | planes_of(camera, frame.scale) | lengths_of(camera, frame.scale)
+        ),
         shapes=shapes,
         lights=tuple(_light(light, frame) for light in scene.lights),
         materials={
@@ -47,6 +50,11 @@ def moved(scene: Scene, frame: Frame) -> Scene:
 
 def _point(p: Any, frame: Frame) -> tuple[float, ...]:
     return tuple(frame.into(np.array([p], dtype=np.float64))[0].tolist())
+
+
+def planes_of(camera: Camera, scale: float) -> dict[str, Any]:
+    """A camera's clipping planes, scaled."""
+    return {"near": camera.near * scale, "far": camera.far and camera.far * scale}
 
 
 @singledispatch

@@ -8,7 +8,7 @@ import numpy as np
 
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.reading.written import LookAt, Step
-from comparisons.mitsuba.translate.cameras import FAR, NEAR, translate_camera
+from comparisons.mitsuba.translate.cameras import clipping, translate_camera
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.film import translate_film
 from comparisons.mitsuba.translate.integrators import translate_integrator
@@ -46,7 +46,7 @@ def sensor(scene: Scene, surfaces: Surfaces) -> Element:
     """The camera, with film and sampler.  Raises UntranslatableError."""
     camera = scene.camera
     look = LookAt(camera.eye, camera.target, camera.up)
-    clip = {"near_clip": NEAR, "far_clip": FAR}
+    clip = clipping(camera)
     is_plain = isinstance(camera, Perspective | ThinLens) and camera.view is None
     if is_plain:
         assert isinstance(camera, Perspective | ThinLens)

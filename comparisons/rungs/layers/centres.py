@@ -12,7 +12,7 @@ from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.rungs.layers.seen import Seen
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.bounds import slide
-from comparisons.rungs.rays.camera import camera_rays
+from comparisons.rungs.rays.camera import camera_rays, ends
 from comparisons.rungs.rays.comparer import KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray
@@ -67,7 +67,9 @@ def centres(
     y, x = np.mgrid[0 : film.height, 0 : film.width]
     x, y = x.ravel() + 0.5, y.ravel() + 0.5
     rays = Rays(*camera_rays(scene, x, y))
-    ours, theirs = query.intersect(tables, *rays), trace(counterpart, *rays)
+    t_max = ends(scene, rays.d)
+    ours = query.intersect(tables, *rays, t_max=t_max)
+    theirs = trace(counterpart, *rays, t_max=t_max)
     comparer = Comparer(sizes)
     resolved = (comparer.ratios(rays, ours, theirs) <= SLACK).all(axis=1)
     resolved &= ~counterpart.beyond_planes(ours)

@@ -17,6 +17,7 @@ import numpy as np
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.rungs.layers.seen import FilmPoints, Seen, sensor_rays
+from comparisons.rungs.rays.camera import ends
 from reference_rt.cameras.filters import Filter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
@@ -76,7 +77,7 @@ def expected(
         middle = np.column_stack([each % width, each // width]) + 0.5
         film = (middle + offset.reshape(-1, 2)) / (width, height)
         o, d = sensor_rays(counterpart, film, rng.uniform(size=(len(each), 2)))
-        hits = trace(counterpart, o, d)
+        hits = trace(counterpart, o, d, t_max=ends(scene, d))
         for name in names:
             value = seen.colours(hits) if name == "albedo" else getattr(hits, FIELDS[name])
             weighted = value.reshape(len(pixels), samples, 3) * weight[..., None]

@@ -10,6 +10,7 @@ from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import for_rays
+from comparisons.mitsuba.translate.cameras import FAR, NEAR
 from reference_rt.cameras import LENS_CENTRE, ThinLens
 from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray
@@ -44,6 +45,11 @@ def camera_rays(
     return scene.camera_rays(np.column_stack([x, y]) - 0.5, lens=lens)
 
 
+def ends(scene: Scene, d: FloatArray) -> FloatArray:
+    """Where our camera's rays with unit directions d (n, 3) end: at the far plane, (n,)."""
+    return np.asarray(scene.camera.clip.depth / (d @ -scene.camera.basis[2]))
+
+
 LENS_SAMPLES = (LENS_CENTRE, (0.9, 0.6), (0.2, 0.3), (0.55, 0.99), (0.4, 0.02))
 """Lens samples of the compared rays: the centre, and one in each triangle of the map from square to
 disk."""
@@ -51,8 +57,9 @@ disk."""
 
 def sensor_rays(
     mi_scene: Any, x: FloatArray, y: FloatArray, lens: Sequence[float]
-) -> tuple[FloatArray, FloatArray]:
-    """The same rays from Mitsuba's sensor; their origins lie on the near plane."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Origins, directions and ends (n, 3) of the same rays from Mitsuba's sensor, whose origins lie
+    on the near plane and whose ends on the far one."""
     mi = mitsuba()
     sensor = mi_scene.sensors()[0]
     width, height = (int(s) for s in sensor.film().crop_size())
@@ -61,26 +68,26 @@ def sensor_rays(
 
     def ray(u: Any, v: Any) -> tuple[Any, ...]:
         found, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(u, v), aperture)
-        return found.o, found.d
+        return found.o, found.d, found.d * found.maxt
 
-    o, d = for_rays(ray, x / width, y / height)
-    return o, d
+    o, d, along = for_rays(ray, x / width, y / height)
+    return o, d, o + along
 
 
 def compare_camera(scene: Scene, counterpart: Counterpart, most: int) -> CameraComparison:
-    """Compare ray directions, and the distances of Mitsuba's origins from our rays, at pixel
-    centres; for a lens through several of its points.
+    """Compare ray directions, the distances of Mitsuba's origins from our rays, and the clipping
+    planes, at pixel centres; for a lens through several of its points.
 
     Bounds: a direction is rounded in matrices whose entries reach the tangent of the largest angle
     to the axis, an origin in one whose entries reach the eye's coordinates and half the picture's
-    width.
+    width, a plane's distance like both.
     """
     camera, film = scene.camera, scene.film
     x, y = pixel_centres(film, most)
     samples = LENS_SAMPLES if isinstance(camera, ThinLens) else (LENS_CENTRE,)
     o, d = _stacked(camera_rays(scene, x, y, lens) for lens in samples)
-    their_o, their_d = _stacked(sensor_rays(counterpart, x, y, lens) for lens in samples)
-    their_o = counterpart.frame.out(their_o)
+    their_o, their_d, their_end = _stacked(sensor_rays(counterpart, x, y, lens) for lens in samples)
+    their_o, their_end = counterpart.frame.out(their_o), counterpart.frame.out(their_end)
     forward = -camera.basis[2]
     # Before normalisation a direction is 1 along the axis and tan(angle) across: its rounding
     # errors are as large as in the picture's farthest corner, 1 / cos there, and are then scaled by
@@ -104,6 +111,12 @@ def compare_camera(scene: Scene, counterpart: Counterpart, most: int) -> CameraC
         "max_camera_origin_error": float(off_line.max()),
     }
     wrong = (direction > direction_bound) | (off_line > origin_bound)
+    scale = counterpart.frame.scale
+    planes = camera.near or NEAR / scale, camera.far or FAR / scale
+    for plane, their_point in zip(planes, (their_o, their_end), strict=True):
+        depth = (their_point - eye) @ forward
+        rounding = origin_bound + plane * direction_bound / (d @ forward)
+        wrong |= np.abs(depth - plane) > rounding
     if not wrong.any():
         return CameraComparison(numbers, "")
     k = int(np.argmax(wrong))
@@ -116,6 +129,5 @@ def compare_camera(scene: Scene, counterpart: Counterpart, most: int) -> CameraC
     return CameraComparison(numbers, problem)
 
 
-def _stacked(rays: Iterable[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    o, d = zip(*rays, strict=True)
-    return np.concatenate(o), np.concatenate(d)
+def _stacked(rays: Iterable[tuple[FloatArray, ...]]) -> tuple[FloatArray, ...]:
+    return tuple(np.concatenate(column) for column in zip(*rays, strict=True))

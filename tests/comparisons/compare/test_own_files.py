@@ -226,10 +226,14 @@ def test_light_samples_that_mitsuba_adds_up_are_foretold(tmp_path, samples):
 
 
 @pytest.mark.filterwarnings("ignore:.*its moments are left out")
-def test_clipping_planes_are_opened_on_both_sides(tmp_path):
+def test_clipping_planes_are_those_of_the_file(tmp_path):
+    """And a file without has Mitsuba's: what is farther than 10,000 is cut."""
     extra = '<float name="near_clip" value="4.3"/><float name="far_clip" value="5"/>'
-    with pytest.warns(SceneWarning, match="are left out"):
-        scene = placed(tmp_path, FILM, "perspective", extra)
+    scene = placed(tmp_path, FILM, "perspective", extra)
+    assert (scene.camera.near, scene.camera.far) == (4.3, 5.0)
     case = compared(scene)
     assert case.verdict == "agree", case.reason
-    assert any("clipping planes" in note for note in case.notes)
+    (tmp_path / "plain").mkdir()
+    plain = placed(tmp_path / "plain", FILM, "perspective", "")
+    assert (plain.camera.near, plain.camera.far) == (0.01, 10_000.0)
+    assert compared(scene.changed(camera=plain.camera)).verdict == "differ"

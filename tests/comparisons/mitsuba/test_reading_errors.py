@@ -218,11 +218,18 @@ def test_objects_of_mitsuba_are_refused():
 
 
 def test_notes_are_warnings(tmp_path):
-    clip = WHOLE.replace(
-        '<float name="fov"', '<float name="near_clip" value="1"/><float name="fov"'
-    )
-    with pytest.warns(SceneWarning, match="near_clip 1 "):
-        read(tmp_path, clip)
+    two = WHOLE.replace("</scene>", '<sensor type="perspective"/></scene>')
+    with pytest.warns(SceneWarning, match="is the first of 2 sensors"):
+        read(tmp_path, two)
+
+
+@pytest.mark.parametrize("planes", [(1, 1), (2, 1), (0, 1), (-1, 5)])
+def test_clipping_planes_in_another_order_are_refused(tmp_path, planes):
+    """As by Mitsuba."""
+    values = zip(("near_clip", "far_clip"), planes, strict=True)
+    text = "".join(f'<float name="{name}" value="{value}"/>' for name, value in values)
+    with pytest.raises(SceneError, match="expected near_clip above 0 and below far_clip"):
+        read(tmp_path, WHOLE.replace('<float name="fov"', f'{text}<float name="fov"'))
 
 
 DAMAGE: list[Any] = [

@@ -67,9 +67,12 @@ def seen_by(camera: AnyCamera, size: tuple[int, int] = WIDE) -> Scene:
     return Scene(camera=camera, film=Film(width=size[0], height=size[1]), shapes=(Sphere(),))
 
 
+@pytest.mark.parametrize("planes", [{}, {"near": 0.3, "far": 9.0}], ids=["", "clipped"])
 @pytest.mark.parametrize(("camera", "size"), CASES)
-def test_cameras_send_the_same_rays(variant: str, camera: AnyCamera, size: tuple[int, int]) -> None:
-    scene = seen_by(camera, size)
+def test_cameras_send_the_same_rays(
+    variant: str, camera: AnyCamera, size: tuple[int, int], planes: dict[str, float]
+) -> None:
+    scene = seen_by(camera.model_copy(update=planes), size)
     found = compare_camera(scene, load(scene), 200)
     assert found.problem == ""
     # Measured over random cameras in both variants: 0.35.
@@ -110,16 +113,29 @@ def test_another_camera_is_distinguished(camera: AnyCamera, other: AnyCamera) ->
     assert "Mitsuba's from" in problem
 
 
+@pytest.mark.parametrize("plane", ["near", "far"])
+@pytest.mark.parametrize("camera", [PLAIN, FRONTAL, BOX, LENS, Orthographic(**TILTED)])
+def test_other_clipping_planes_are_distinguished(camera: AnyCamera, plane: str) -> None:
+    ours = camera.model_copy(update={"near": 0.3, "far": 9.0})
+    for other in (0.9999 * getattr(ours, plane), 1.0001 * getattr(ours, plane)):
+        theirs = load(seen_by(ours.model_copy(update={plane: other})))
+        assert compare_camera(seen_by(ours), theirs, 200).problem.startswith("the camera: ")
+    without = load(seen_by(ours.model_copy(update={plane: getattr(camera, plane)})))
+    assert compare_camera(seen_by(ours), without, 200).problem.startswith("the camera: ")
+    with_one = load(seen_by(camera.model_copy(update={plane: getattr(ours, plane)})))
+    assert compare_camera(seen_by(camera), with_one, 200).problem.startswith("the camera: ")
+
+
 def test_the_middle_of_the_lens_would_hide_its_size() -> None:
     """Why several points of a lens are compared."""
     x, y = np.array([3.0, 30.0]), np.array([20.0, 5.0])
     larger = load(seen_by(LENS.model_copy(update={"aperture_radius": 0.3})))
     _, ours = camera_rays(seen_by(LENS), x, y)
-    _, middle = sensor_rays(larger, x, y, LENS_SAMPLES[0])
+    _, middle, _ = sensor_rays(larger, x, y, LENS_SAMPLES[0])
     assert np.abs(middle - ours).max() < 1e-6
     for lens in LENS_SAMPLES[1:]:
         _, ours = camera_rays(seen_by(LENS), x, y, lens)
-        _, theirs = sensor_rays(larger, x, y, lens)
+        _, theirs, _ = sensor_rays(larger, x, y, lens)
         assert np.abs(theirs - ours).max() > 1e-3
 
 
