@@ -8,6 +8,7 @@ from comparisons.mitsuba.plastic_error import base_error
 from comparisons.mitsuba.translate.integrators import (
     counts_lights_often,
     drops_light,
+    misplaces,
     squares_opacity,
 )
 from comparisons.mitsuba.translate.textures import TranslationContext
@@ -45,7 +46,10 @@ def notes_of(scene: Scene) -> list[str]:
 
 def notes_of_integrator(scene: Scene) -> list[str]:
     """The notes on errors of Mitsuba's integrators."""
-    found = (note_of_samples(scene), note_of_masks(scene), note_of_passing(scene))
+    found = (
+        *(note_of_samples(scene), note_of_masks(scene), note_of_passing(scene)),
+        note_of_hiding(scene),
+    )
     return [note for note in found if note]
 
 
@@ -66,6 +70,16 @@ def note_of_masks(scene: Scene) -> str:
     return (
         "Mitsuba's path tracer multiplies samples of lights by the opacity of a mask twice; our "
         "own, which runs in Mitsuba, takes its place"
+    )
+
+
+def note_of_hiding(scene: Scene) -> str:
+    """The note on Mitsuba's error that `misplaces` describes; empty without it."""
+    if not misplaces(scene):
+        return ""
+    return (
+        "Mitsuba misplaces what lies behind hidden lamps unless it is a mesh; our own integrator, "
+        "which runs in Mitsuba, takes the place of its own"
     )
 
 

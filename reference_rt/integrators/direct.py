@@ -17,6 +17,7 @@ from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
 from reference_rt.integrators.direct_light import direct, light_selection_normal, power_heuristic
+from reference_rt.integrators.hidden_lamps import behind_lamps
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import place, shade
 from reference_rt.jit.kernel import kernel, local_floats
@@ -38,6 +39,9 @@ class Direct(Description):
     directions is missing."""
     bsdf_samples: _Count = 1
     """Directions that are sampled from the material for each camera ray, from 0 to 1024."""
+    hide_emitters: bool = False
+    """Whether lamps are not seen directly, and the background is black: camera rays pass through
+    surfaces that emit.  Their light, mirrors that show them, and `layers` do not change."""
 
     @model_validator(mode="after")
     def _any(self) -> Self:
@@ -51,20 +55,25 @@ class Direct(Description):
         return self.bsdf_samples > 0
 
     def setup(self) -> "DirectSetup":
-        return DirectSetup(self.light_samples, self.bsdf_samples)
+        return DirectSetup(self.light_samples, self.bsdf_samples, self.hide_emitters)
 
 
 class DirectSetup(NamedTuple):
     light_samples: int
     bsdf_samples: int
+    hides_lamps: bool
 
 
 @kernel
 def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> Vec3:
     """An unbiased estimate of the radiance along `ray`, by paths of at most two edges."""
     lights = scene.lights
+    if setup.hides_lamps:
+        ray = behind_lamps(scene, ray)
     hit = closest_hit(scene.geometry, ray)
     if hit.kind < 0:
+        if setup.hides_lamps:
+            return Vec3(0.0, 0.0, 0.0)
         behind: Vec3 = any_light.background(lights, ray.d)
         return behind
     kept = local_floats(any_material.scratch_floats(scene.materials))

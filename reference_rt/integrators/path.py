@@ -37,6 +37,7 @@ from reference_rt.integrators.direct_light import (
     power_heuristic,
     unshadowed,
 )
+from reference_rt.integrators.hidden_lamps import pass_lamps
 from reference_rt.integrators.path_state import State, put_state, start, state_of
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of
 from reference_rt.integrators.scratch import Scratch
@@ -76,6 +77,9 @@ class Path(Description):
     """How direct light is sampled: `lights` samples lights, `bsdf` samples materials, `both`
     combines them by multiple importance sampling.  The mean is the same.  Light that only one
     strategy can sample is always sampled by that one."""
+    hide_emitters: bool = False
+    """Whether lamps are not seen directly, and the background is black: camera rays pass through
+    surfaces that emit.  Their light, mirrors that show them, and `layers` do not change."""
 
     @property
     def follows_scattered(self) -> bool:
@@ -84,17 +88,19 @@ class Path(Description):
 
     def setup(self) -> "PathSetup":
         limit = UNLIMITED if self.max_depth is None else min(self.max_depth, UNLIMITED)
-        return PathSetup(limit, self.rr_depth, _STRATEGIES.get(self.sampling))
+        strategy = _STRATEGIES.get(self.sampling)
+        return PathSetup(limit, self.rr_depth, strategy, self.hide_emitters)
 
 
 class PathSetup(NamedTuple):
     """strategy: the only sampling strategy for direct light, `_LIGHT_SAMPLING` or `_BSDF_SAMPLING`;
     None for both with multiple importance sampling, which compiles to no branch;  `_BOTH` for both
-    in kernels that do not depend on it."""
+    in kernels that do not depend on it;  hides_lamps: see `Path.hide_emitters`."""
 
     max_depth: int
     rr_depth: int
     strategy: int | None
+    hides_lamps: bool
 
     def linked(self) -> "PathSetup":
         """The same for linked kernels: of one type for all strategies."""
@@ -128,6 +134,8 @@ def radiances(
     The other paths of a block do not change a path's bits.
     """
     rays, shadows, hits = scratch.rays, scratch.shadows, scratch.hits
+    if path.hides_lamps:
+        pass_lamps(scene, rays, hits, n)
     for j in range(n):
         put_state(scene, scratch, j, j, start(ray_of(rays, j)))
         put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
@@ -142,7 +150,8 @@ def radiances(
             ray = ray_of(rays, j)
             hit = hit_of(scene.geometry, ray, hits, j)
             if hit.kind < 0:
-                add_vector(scratch.totals, 0, k, _environment_emission(path, scene, state, ray))
+                if depth > 0 or not path.hides_lamps:
+                    add_vector(scratch.totals, 0, k, _environment_emission(path, scene, state, ray))
                 continue
             shading = shade(scene, ray, hit, scratch.kept)
             if any_light.is_area(scene.lights, shading.point):

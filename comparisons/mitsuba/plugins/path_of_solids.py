@@ -1,12 +1,12 @@
-"""Path tracing and direct illumination of scenes with CSG solids, and path tracing of those with
-masks: `{"type": "path_of_solids"}`.
+"""Path tracing and direct illumination of scenes with CSG solids or hidden lamps, and path tracing
+of those with masks: `{"type": "path_of_solids"}`.
 
-Mitsuba's own integrators trace Mitsuba's scene, in which there are no solids, and `path` is wrong
-for masks (`comparisons.mitsuba.translate.integrators.squares_opacity`).  This one traces a
-`LitScene`, and takes all else from Mitsuba: the camera, the film, random numbers, BSDFs and
-emitters.  The estimator is the textbook's: at each surface one sample of a light and one of the
-BSDF, combined with the power heuristic (Veach 1997).  Its mean is that of Mitsuba's `path` and
-`direct`.
+Mitsuba's own integrators trace Mitsuba's scene, in which there are no solids, and are wrong for
+masks and behind hidden lamps (`squares_opacity` and `misplaces` in
+`comparisons.mitsuba.translate.integrators`).  This one traces a `LitScene`, and takes all else from
+Mitsuba: the camera, the film, random numbers, BSDFs and emitters.  The estimator is the textbook's:
+at each surface one sample of a light and one of the BSDF, combined with the power heuristic (Veach
+1997).  Its mean is that of Mitsuba's `path` and `direct`.
 """
 
 from collections.abc import Callable
@@ -33,7 +33,8 @@ def register(mi: Any) -> None:
     class PathOfSolids(mi.SamplingIntegrator):  # type: ignore[misc]
         """Parameters: max_depth, most edges of a path, -1 for no limit;  rr_depth, edges after
         which Russian roulette may end it;  samples_lights, samples_bsdfs: whether direct light is
-        sampled in this way.  `lit`, set before rendering, makes the `LitScene` of Mitsuba's scene;
+        sampled in this way;  hide_emitters: whether camera rays pass through area lights, before
+        a black background.  `lit`, set before rendering, makes the `LitScene` of Mitsuba's scene;
         without it there are no solids."""
 
         def __init__(self, properties: Any) -> None:
@@ -42,6 +43,7 @@ def register(mi: Any) -> None:
             self.rr_depth = properties.get("rr_depth", 5)
             self.samples_lights = properties.get("samples_lights", True)
             self.samples_bsdfs = properties.get("samples_bsdfs", True)
+            self.hides = properties.get("hide_emitters", False)
             self.lit: Callable[[Any], PlainScene] = partial(PlainScene, mi)
             self.most_rays = _MOST_RAYS
 
@@ -57,6 +59,8 @@ def register(mi: Any) -> None:
             total, throughput, eta = mi.Color3f(0.0), mi.Color3f(1.0), mi.Float(1.0)
             before, bsdf_pdf, valid = dr.zeros(mi.Interaction3f), mi.Float(0.0), None
             depth = 0
+            if self.hides:
+                ray = self.behind_lamps(lit, ray, active)
             while depth != self.max_depth and dr.any(active):
                 si, of_solid = lit.trace(ray, active)
                 # Density 0: the ray is the camera's or of a delta lobe, and has no competitor.
@@ -67,7 +71,8 @@ def register(mi: Any) -> None:
                     light_pdf = scene.pdf_emitter_direction(before, found, competes)
                     light_pdf = dr.select(competes, light_pdf, 0.0)
                 share = dr.select(bsdf_pdf > 0.0, weight(bsdf_pdf, light_pdf), 1.0)
-                total += throughput * share * lit.emitted(si, active)
+                if depth > 0 or not self.hides:
+                    total += throughput * share * lit.emitted(si, active)
                 active &= si.is_valid()
                 valid = active if valid is None else valid
                 depth += 1
@@ -96,6 +101,17 @@ def register(mi: Any) -> None:
                 sampler.schedule_state()
                 dr.eval(ray, active, total, throughput, eta, bsdf_pdf, before)
             return total, valid if valid is not None else active, []
+
+        def behind_lamps(self, lit: Any, ray: Any, active: Any) -> Any:
+            """The rest of each ray behind the area lights that it meets first."""
+            while dr.any(active):
+                si, _ = lit.trace(ray, active)
+                active &= si.is_valid() & si.shape.is_emitter()
+                onward = si.spawn_ray(ray.d)
+                onward.maxt = ray.maxt - si.t
+                ray = dr.select(active, onward, ray)
+                dr.eval(ray, active)
+            return ray
 
         def next_event(self, lit: Any, sampler: Any, si: Any, active: Any) -> Any:
             """The direct light of one sampled point on a light."""

@@ -28,11 +28,7 @@ def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator,
     """An integrator, and the layers of the film that it asks for.  Raises SceneError."""
     if node is None:
         return Path(), ()
-    if node.flag("hide_emitters"):
-        raise node.error(
-            "'hide_emitters' is not supported, since Mitsuba 3.9.1 misplaces what lies behind "
-            "hidden lamps; expected false"
-        )
+    hides = node.flag("hide_emitters")
     node.ignore("timeout", "block_size", "samples_per_pass")  # of how it runs
     layers: tuple[str, ...] = ()
     with node.checking():
@@ -57,6 +53,8 @@ def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator,
                 found, layers = _aov(reading, node)
             case _:
                 raise node.unsupported("expected one of: path, direct, volpath, depth, aov, moment")
+    if hides and isinstance(found, Path | Direct):
+        found = found.model_copy(update={"hide_emitters": True})
     node.finish()
     return found, layers
 

@@ -17,7 +17,7 @@ from comparisons.mitsuba.translate.integrators import (
     BLACK,
     counts_lights_often,
     drops_light,
-    squares_opacity,
+    in_place_of,
 )
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
@@ -57,10 +57,10 @@ def own_scene(scene: Scene) -> Any:
     _without_moments(mi, state)
     if counts_lights_often(scene):
         _with_one_sample(mi, state)
-    if squares_opacity(scene):
+    if (ours := in_place_of(scene)) is not None:
         index = _first(state, mi.ObjectType.Integrator)
         assert index is not None
-        state.nodes[index].props.set_plugin_name("path_of_solids")
+        state.nodes[index].props = _properties(mi, ours)
     if drops_light(scene):
         _with_black_environment(mi, state)
     sample_visible(parsed)
@@ -101,6 +101,15 @@ def _parsed(scene: Scene) -> tuple[Parsed, list[str]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # they were issued when the scene was loaded
         return parsed, read_supported(parsed, Scene)[1]
+
+
+def _properties(mi: Any, described: dict[str, Any]) -> Any:
+    """A plugin's dictionary as Mitsuba's properties."""
+    found = mi.Properties(described["type"])
+    for name, value in described.items():
+        if name != "type":
+            found[name] = value
+    return found
 
 
 def _first(state: Any, kind: Any) -> int | None:

@@ -28,8 +28,7 @@ from comparisons.mitsuba.translate.integrators import (
     BLACK,
     counts_lights_often,
     drops_light,
-    of_solids,
-    squares_opacity,
+    in_place_of,
     translate_integrator,
 )
 from comparisons.mitsuba.translate.lights import never_samples, translate_light
@@ -42,7 +41,6 @@ from comparisons.mitsuba.translate.wrappers import (
     is_textured,
     parts_of,
 )
-from reference_rt.integrators import Direct, Path
 from reference_rt.rendering.scene import Scene
 
 # Without this Embree drops rays that hit a shared edge (Mitsuba issue 1149).
@@ -75,15 +73,14 @@ def load(scene: Scene, frame: Frame | None = None) -> Counterpart:
     found = _translated(moved(scene, frame))
     instanced_group = _instanced_group(found)
     plain = {**_groups(found.mi_shapes), **found.plain}
-    integrator = scene.integrator
-    is_ours = bool(found.solids) or squares_opacity(scene)
-    if is_ours and isinstance(integrator, Path | Direct):
-        plain["integrator"] = of_solids(integrator)
-    mi_scene = mitsuba().load_dict(plain, optimize=False)
     solids = tuple(found.solids)
-    if is_ours and isinstance(integrator, Path | Direct):
+    ours = in_place_of(scene, bool(solids))
+    if ours is not None:
+        plain["integrator"] = ours
+    mi_scene = mitsuba().load_dict(plain, optimize=False)
+    if ours is not None:
         mi_scene.integrator().lit = partial(LitScene, solids=solids)
-    return Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame, is_ours)
+    return Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame, ours is not None)
 
 
 MOST_INSTANCES = 32

@@ -23,13 +23,36 @@ def translate_integrator(integrator: Any) -> dict[str, Any] | None:
 def _(integrator: Path) -> dict[str, Any]:
     """The sampling strategy of ours does not change the mean."""
     depth = -1 if integrator.max_depth is None else integrator.max_depth
-    return {"type": "path", "max_depth": depth, "rr_depth": integrator.rr_depth}
+    found = {"type": "path", "max_depth": depth, "rr_depth": integrator.rr_depth}
+    return found | _hiding(integrator)
 
 
 @translate_integrator.register
 def _(integrator: Direct) -> dict[str, Any]:
     lights, bsdfs = integrator.light_samples, integrator.bsdf_samples
-    return {"type": "direct", "emitter_samples": lights, "bsdf_samples": bsdfs}
+    found = {"type": "direct", "emitter_samples": lights, "bsdf_samples": bsdfs}
+    return found | _hiding(integrator)
+
+
+def _hiding(integrator: Path | Direct) -> dict[str, Any]:
+    return {"hide_emitters": True} if integrator.hide_emitters else {}
+
+
+def misplaces(scene: SceneModel) -> bool:
+    """Whether Mitsuba's integrators would be wrong for a scene: what they see behind a hidden lamp
+    is placed by the new ray's distance from the old ray's origin, unless it is a mesh (Mitsuba
+    3.9.1, `SamplingIntegrator::skip_area_emitters`)."""
+    return isinstance(scene.integrator, Path | Direct) and scene.integrator.hide_emitters
+
+
+def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] | None:
+    """Our integrator, which runs in Mitsuba, for a scene for which Mitsuba's own is wrong, or that
+    has solids; None for all others."""
+    integrator = scene.integrator
+    if not isinstance(integrator, Path | Direct):
+        return None
+    wrong = squares_opacity(scene) or misplaces(scene)
+    return of_solids(integrator) if has_solids or wrong else None
 
 
 def counts_lights_often(scene: SceneModel) -> bool:
@@ -74,7 +97,7 @@ def drops_light(scene: SceneModel) -> bool:
 
 def of_solids(integrator: Path | Direct) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.path_of_solids` in place of Mitsuba's integrator, for
-    scenes with solids, and with masks."""
+    scenes with solids, with masks, and with hidden lamps."""
     if isinstance(integrator, Path):
         return {**(translate_integrator(integrator) or {}), "type": "path_of_solids"}
     return {
@@ -82,6 +105,7 @@ def of_solids(integrator: Path | Direct) -> dict[str, Any]:
         "max_depth": 2,
         "samples_lights": integrator.light_samples > 0,
         "samples_bsdfs": integrator.bsdf_samples > 0,
+        **_hiding(integrator),
     }
 
 
