@@ -64,6 +64,8 @@ class Assembly:
         )
         if "sampling" in found and self.draw.chance(0.8):
             found["sampling"] = "both"
+        if self.draw.chance(0.8):  # else Mitsuba's own integrator is hardly compared
+            found.pop("hide_emitters", None)
         return found
 
     def _film(self, integrator: str) -> Data:

@@ -104,13 +104,14 @@ def register(mi: Any) -> None:
 
         def behind_lamps(self, lit: Any, ray: Any, active: Any) -> Any:
             """The rest of each ray behind the area lights that it meets first."""
-            while dr.any(active):
-                si, _ = lit.trace(ray, active)
-                active &= si.is_valid() & si.shape.is_emitter()
+            going = mi.Mask(active)
+            while dr.any(going):
+                si, _ = lit.trace(ray, going)
+                going &= si.is_valid() & si.shape.is_emitter()
                 onward = si.spawn_ray(ray.d)
                 onward.maxt = ray.maxt - si.t
-                ray = dr.select(active, onward, ray)
-                dr.eval(ray, active)
+                ray = dr.select(going, onward, ray)
+                dr.eval(ray, going)
             return ray
 
         def next_event(self, lit: Any, sampler: Any, si: Any, active: Any) -> Any:

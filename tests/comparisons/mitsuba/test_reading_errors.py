@@ -119,9 +119,6 @@ REFUSED = {
     '<float name="temperature" value="3000"/></spectrum></emitter>': "rgb variants cannot use it",
     '<integrator type="ptracer"/>': "integrator 'ptracer': is not supported",
     '<integrator type="path"/><integrator type="path"/>': "second integrator",
-    '<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>': (
-        "'hide_emitters' is not supported"
-    ),
     '<integrator type="path"><integer name="max_depth" value="-2"/></integrator>': "-1 (no end)",
     '<integrator type="volpath"/>' + shape('<bsdf type="null"/>'): "shadow rays",
     '<sensor type="batch"/>': "sensor 'batch': is not supported",
