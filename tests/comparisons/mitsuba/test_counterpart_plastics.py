@@ -137,7 +137,8 @@ FILE = """<scene version="3.0.0">
   <integrator type="path"><integer name="max_depth" value="3"/></integrator>
   <sensor type="perspective"><transform name="to_world">
     <lookat origin="0, 3, 3" target="0, 0, 0" up="0, 1, 0"/></transform></sensor>
-  <shape type="ply"><string name="filename" value="square.ply"/><bsdf type="twosided">BSDF</bsdf></shape>
+  <shape type="ply"><string name="filename" value="square.ply"/>
+    <bsdf type="twosided">BSDF</bsdf></shape>
   <emitter type="constant"/>
 </scene>
 """
