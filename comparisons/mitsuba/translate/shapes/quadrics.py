@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 
 from comparisons.geometry.sizes import heights_of
+from comparisons.mitsuba.coordinates import of_cone, of_quadric
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
-from comparisons.mitsuba.tangents import of_cone, of_quadric
 from comparisons.mitsuba.translate.shapes.around import around_z
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
 from comparisons.mitsuba.translate.shapes.caps import cap_faces, heights_over_uv, region

@@ -5,7 +5,7 @@ import numpy as np
 
 from comparisons.geometry.float32 import round32
 from comparisons.geometry.sizes import heights_of
-from comparisons.mitsuba.tangents import Coordinates, derivatives_at
+from comparisons.mitsuba.coordinates import Coordinates, derivatives_at
 from comparisons.mitsuba.translate.shapes.meshes import Soup
 from comparisons.mitsuba.translate.shapes.patches import Box, Implicit, Patch
 from reference_rt.core import transform

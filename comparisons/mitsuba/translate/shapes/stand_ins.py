@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.mitsuba.coordinates import Coordinates
 from comparisons.mitsuba.stand_ins import Plugin, StandIn
-from comparisons.mitsuba.tangents import Coordinates
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.shapes.meshes import (
     MOST_INSTANCES,
@@ -58,10 +58,10 @@ def stand_in(
     texture."""
     own = transform.affine(shape.transform)
     most = 2.0 * sum(patch.cells[0] * patch.cells[1] for patch in patches) * _fineness.get() ** 2
-    exact = _has_exact_tangents(site, most)
+    exact = _has_exact_coordinates(site, most)
     fineness = _fineness.get()
     if exact:
-        # Not instances, in which the plugin for tangents does not know the place of the surface.
+        # Not instances, in which the plugin does not know the place of the surface.
         fineness *= min(1.0, (MOST_TRIANGLES / (site.copies * most)) ** 0.5)
     key: tuple[Any, ...] = ("stand-in", id(shape), fineness)
     if key not in site.shared:
@@ -80,7 +80,7 @@ def stand_in(
         key = (*key, "slip")
         if key not in site.shared:
             site.shared[key] = measured_slip(soup, patches[0], box)
-        found = found._replace(slip=site.shared[key])
+        found = found._replace(slip=site.shared[key], shift=0.0 if exact else site.shared[key])
     m = transform.compose(own, site.place.outer)
     if site.oriented and soup.uvs is not None:
         twist = measured_twist(soup, of, surface, m, exact)
@@ -93,7 +93,7 @@ def stand_in(
         found = found._replace(twist=twist)
     site = with_mesh_light(site, normals=True, stands_in=True)
     if exact:
-        parts = {**site.parts, "bsdf": _with_tangents(site.parts["bsdf"], of, m)}
+        parts = {**site.parts, "bsdf": _with_coordinates(site.parts["bsdf"], of, m)}
         site = site._replace(parts=parts, copies=1)
     # The maps after the shape's own stretch distances, and turn angles, at most by these factors.
     stretch, of_all = (np.linalg.svd(x[:, :3], compute_uv=False) for x in (site.place.outer, m))
@@ -101,6 +101,7 @@ def stand_in(
         sag=float(found.sag * stretch[0]),
         turn=float(found.turn * stretch[0] / stretch[-1]),
         slip=float(found.slip * of_all[0]),
+        shift=float(found.shift * of_all[0]),
     )
     mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
     plugin = placed(soup, key, m, mirrored, site)
@@ -112,21 +113,21 @@ def stand_in(
     )
 
 
-def _has_exact_tangents(site: Site, triangles: float) -> bool:
-    """Whether a mesh of so many triangles has the surface's own tangents: if its material depends
-    on them, unless there are so many copies that they are instances, or Mitsuba's own materials are
-    asked for."""
-    if not site.oriented or site.native:
+def _has_exact_coordinates(site: Site, triangles: float) -> bool:
+    """Whether a mesh of so many triangles has the surface's own uv and tangents: if its material
+    depends on them, unless there are so many copies that they are instances, or Mitsuba's own
+    materials are asked for."""
+    if not site.textured or site.native:
         return False
     few = site.copies <= MOST_INSTANCES or site.copies * triangles <= MOST_TRIANGLES
     return few or "emitter" in site.parts
 
 
-def _with_tangents(bsdf: dict[str, Any], of: Coordinates, m: transform.Affine) -> dict[str, Any]:
-    """A BSDF inside the plugin `comparisons.mitsuba.plugins.exact_tangents`, on a surface under the
-    map m."""
+def _with_coordinates(bsdf: dict[str, Any], of: Coordinates, m: transform.Affine) -> dict[str, Any]:
+    """A BSDF inside the plugin `comparisons.mitsuba.plugins.exact_coordinates`, on a surface under
+    the map m."""
     linear, inverse = m[:, :3], np.linalg.inv(m[:, :3])
-    found = {"type": "exact_tangents", "nested": bsdf, **of.numbers()}
+    found = {"type": "exact_coordinates", "nested": bsdf, **of.numbers()}
     for letter, matrix in (("m", linear), ("i", inverse)):
         found |= {f"{letter}_{j}{k}": float(matrix[j, k]) for j in range(3) for k in range(3)}
     place = transform.apply_points(m, np.array([of.origin]))[0]

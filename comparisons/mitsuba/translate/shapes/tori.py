@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from comparisons.mitsuba.coordinates import Round
 from comparisons.mitsuba.stand_ins import Plugin
-from comparisons.mitsuba.tangents import Round
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.patches import Implicit, Patch
 from comparisons.mitsuba.translate.shapes.plugins import Site
@@ -18,7 +18,7 @@ CELLS = (768, 384)
 @translate_shape.register
 def _(shape: Torus, site: Site) -> list[Plugin]:
     patches, surface = torus_surface(shape)
-    of = Round((0.0, 0.0, 0.0), shape.major_radius, 2.0 * np.pi)
+    of = Round((0.0, 0.0, 0.0), shape.major_radius)
     return [stand_in(shape, patches, surface, None, site, of)]
 
 

@@ -1,8 +1,10 @@
-"""The derivatives of the position by u and v on curved surfaces for which meshes stand in.
+"""The coordinates u and v of curved surfaces for which meshes stand in, and the derivatives of the
+position by them.
 
-Mitsuba takes them as constant on each triangle of a mesh.  These are exact, and those of nearby
-points off the surface.  They are written for numbers of NumPy and of Dr.Jit alike: the plugin
-`comparisons.mitsuba.plugins.exact_tangents` uses them, and its error is measured with them.
+On a mesh Mitsuba interpolates uv between vertices, and takes the derivatives as constant on each
+triangle.  These here are exact, and defined for points off the surface, too.  They are written for
+numbers of NumPy and of Dr.Jit alike: the plugin `comparisons.mitsuba.plugins.exact_coordinates`
+uses them, and its error is measured with them.
 """
 
 import math
@@ -15,32 +17,52 @@ from reference_rt.core.arrays import FloatArray
 
 Triple = tuple[Any, Any, Any]
 
+FULL = 2.0 * math.pi
+
+
+class Maths(NamedTuple):
+    """Functions of the numbers in use."""
+
+    sqrt: Callable[[Any], Any]
+    atan2: Callable[[Any, Any], Any]
+    select: Callable[[Any, Any, Any], Any]
+
+    def turns(self, y: Any, x: Any) -> Any:
+        """The angle of (x, y), from 0 to 1."""
+        found = self.atan2(y, x) / FULL
+        return self.select(found < 0.0, found + 1.0, found)
+
+
+NUMPY = Maths(np.sqrt, np.arctan2, np.where)
+
 
 class Round(NamedTuple):
     """A torus around the z axis, or a sphere.  origin (3,): its middle;  major: the radius of the
-    circle in the middle of the tube, 0 for a sphere;  turn: the angle by which a v of 1 turns, in
-    radians: upwards from the outside, or downwards if it is negative."""
+    circle in the middle of the tube, 0 for a sphere, whose v goes down from pole to pole."""
 
     origin: tuple[float, float, float]
     major: float
-    turn: float
+    is_sphere: bool = False
 
     def numbers(self) -> dict[str, float]:
         """The parameters of the plugin."""
-        return {"major": self.major, "turn": self.turn}
+        return {"major": self.major, "is_sphere": float(self.is_sphere)}
 
-    def derivatives(self, p: Triple, sqrt: Callable[[Any], Any]) -> tuple[Triple, Triple]:
-        """dp/du and dp/dv at p, which is seen from the origin; infinite, or not a number, where
-        there are none."""
+    def uv(self, p: Triple, maths: Maths) -> tuple[Any, Any]:
+        """u and v at p, which is seen from the origin."""
         x, y, z = p
-        rho = sqrt(x * x + y * y)
-        up = self.turn / rho
-        full = 2.0 * math.pi
-        return (-full * y, full * x, 0.0 * x), (
-            -up * z * x,
-            -up * z * y,
-            self.turn * (rho - self.major),
-        )
+        rho = maths.sqrt(x * x + y * y)
+        if self.is_sphere:
+            return maths.turns(y, x), maths.atan2(rho, z) / math.pi
+        return maths.turns(y, x), maths.turns(z, rho - self.major)
+
+    def derivatives(self, p: Triple, maths: Maths) -> tuple[Triple, Triple]:
+        """dp/du and dp/dv at p; infinite, or not a number, where there are none."""
+        x, y, z = p
+        rho = maths.sqrt(x * x + y * y)
+        turn = -math.pi if self.is_sphere else FULL
+        up = turn / rho
+        return (-FULL * y, FULL * x, 0.0 * x), (-up * z * x, -up * z * y, turn * (rho - self.major))
 
 
 class Level(NamedTuple):
@@ -61,7 +83,12 @@ class Level(NamedTuple):
         every = {"half": self.half, "slope": self.slopes, "gradient": self.gradient}
         return {f"{name}_{k}": x for name, values in every.items() for k, x in enumerate(values)}
 
-    def derivatives(self, p: Triple, sqrt: Callable[[Any], Any]) -> tuple[Triple, Triple]:
+    def uv(self, p: Triple, maths: Maths) -> tuple[Any, Any]:
+        """As `Round.uv`."""
+        (x, y, z), (wide, deep, high) = p, self.half
+        return maths.turns(y / deep, x / wide), 0.5 * (z / high + 1.0)
+
+    def derivatives(self, p: Triple, maths: Maths) -> tuple[Triple, Triple]:
         """As `Round.derivatives`.
 
         Along dp/du neither f nor v changes, along dp/dv neither f nor u.  With a and b for the
@@ -77,7 +104,7 @@ class Level(NamedTuple):
         across, along = x / wide, y / deep
         ax, ay = -along / wide, across / deep  # a, times 2 pi rho²
         volume = ay * fx - ax * fy
-        u = 2.0 * math.pi * (across * across + along * along) / volume
+        u = FULL * (across * across + along * along) / volume
         v = 2.0 * high / volume
         return (-u * fy, u * fx, 0.0 * u), (-v * fz * ay, v * fz * ax, v * (fx * ay - fy * ax))
 
@@ -118,5 +145,5 @@ def derivatives_at(of: Coordinates, p: FloatArray) -> tuple[FloatArray, FloatArr
     """dp/du and dp/dv (n, 3) at points (n, 3), in the shape's own coordinates."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         x, y, z = (p - of.origin).T
-        du, dv = of.derivatives((x, y, z), np.sqrt)
+        du, dv = of.derivatives((x, y, z), NUMPY)
     return np.column_stack(du), np.column_stack(dv)
