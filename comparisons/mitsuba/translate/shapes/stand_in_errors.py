@@ -66,10 +66,9 @@ def measured_slip(soup: Soup, patch: Patch, box: Box | None) -> float:
     return largest
 
 
-INNER = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]], np.float64)
-INNER /= INNER.sum(axis=1, keepdims=True)
-"""Barycentrics at which exact tangents are compared: not on a triangle's sides, since a grid of
-triangles may have them on the very line along which tangents jump."""
+INNER = np.array([np.roll([0.57721, 0.11803, 0.30476], k) for k in range(3)])
+"""Barycentrics at which exact tangents are compared.  They are no simple fractions: on a regular
+grid of triangles such points lie in rows, perhaps on the very line along which tangents jump."""
 
 RARE = 1e-3
 """Share of a mesh's area whose tangents may be further off than `measured_twist`: those next to a
