@@ -195,6 +195,16 @@ def copies_of(shape: str, count: int) -> str:
     return "\n  - ".join(places) + f"\ngroups: {{g: [{one(shape)}]}}"
 
 
+@pytest.mark.parametrize("name", ["plane", "lying pipe", "double cone"])
+def test_textures_where_uv_are_not_linear_on_a_triangle(name: str, image_folder: Path) -> None:
+    """Between the vertices of these large or long triangles Mitsuba's uv are up to half the shape's
+    size off; the material sees the surface's own."""
+    scene = scene_of(image_folder, one(name))
+    im = scene.materials["grey"].model_copy(update={"reflectance": "im"})
+    both = scene.materials["outer"].model_copy(update={"base": "im"})
+    agrees(scene.changed(materials={**scene.materials, "im": im, "outer": both}))
+
+
 @pytest.mark.parametrize("name", ["torus", "frustum", "saddle"])
 def test_copies_of_a_group(name: str, image_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Meshes, not instances, in which the place of a surface is not known: with fewer triangles
