@@ -46,7 +46,7 @@ def register(mi: Any) -> None:
             unused = (0.0, 0.0, 0.0)  # the origin is in `o`
             self.of: Any
             if "major" in properties:
-                self.of = Round(unused, *read("major"), properties["is_sphere"] > 0.0)
+                self.of = Round(unused, read("major")[0], properties["is_sphere"] > 0.0)
             else:
                 sizes = {"half": 3, "slope": 9, "gradient": 3}
                 self.of = Level(

@@ -19,6 +19,7 @@ from comparisons.mitsuba.translate.shapes import meshes, stand_ins
 from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import direct, whitted
 from reference_rt.core.arrays import FloatArray
+from reference_rt.lights import Point
 from reference_rt.materials import Bump
 from reference_rt.rendering.scene import Scene
 
@@ -167,7 +168,8 @@ def test_in_a_moved_frame(step: str, image_folder: Path) -> None:
                 "target": tuple(middle),
             }
         )
-        (point, sun) = scene.lights
+        point, sun = scene.lights
+        assert isinstance(point, Point)
         lamp = point.model_copy(
             update={
                 "position": tuple(scale * np.array(point.position) + middle),
