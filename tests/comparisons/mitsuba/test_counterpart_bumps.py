@@ -197,6 +197,15 @@ def copies_of(shape: str, count: int) -> str:
     return "\n  - ".join(places) + f"\ngroups: {{g: [{one(shape)}]}}"
 
 
+@pytest.mark.parametrize("placed", MAPS)
+def test_an_ellipsoid_that_shines(placed: str, image_folder: Path) -> None:
+    """Which is a mesh in Mitsuba, as its instances do not emit."""
+    shape = (
+        f"{{type: sphere, material: outer, transform: [{{scale: [1, 0.8, 0.6]}}, {MAPS[placed]}]}}"
+    )
+    agrees(scene_of(image_folder, shape, "brushed metal", "lamp"), fineness=0.7)
+
+
 @pytest.mark.parametrize("name", ["plane", "lying pipe", "double cone"])
 def test_textures_where_uv_are_not_linear_on_a_triangle(name: str, image_folder: Path) -> None:
     """Between the vertices of these large or long triangles Mitsuba's uv are up to half the shape's
