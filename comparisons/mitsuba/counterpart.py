@@ -127,7 +127,9 @@ class Counterpart:
             if mi_shape.plugin.stand_in is not None:
                 one = mi_shape.plugin.stand_in
                 scale = self.frame.scale
-                one = one._replace(sag=one.sag / scale, slip=one.slip / scale)
+                one = one._replace(
+                    sag=one.sag / scale, slip=one.slip / scale, shift=one.shift / scale
+                )
                 found.setdefault(mi_shape.shape, []).append(one)
         return found
 

@@ -27,6 +27,7 @@ from reference_rt.materials import (
 )
 from reference_rt.materials.microfacet.ggx_and_smith import MIN_ALPHA
 from reference_rt.rendering.scene import Scene
+from reference_rt.textures import VertexColours
 
 
 def notes_of(scene: Scene) -> list[str]:
@@ -117,7 +118,7 @@ def _(material: Plastic, context: TranslationContext) -> str:
     eta = material.interior_ior / material.exterior_ior
     return (
         f"Mitsuba's fit of a coat's internal reflectance, which makes the base {_off(eta)} at a "
-        f"relative index of {eta:.4g}, is replaced by the integral"
+        f"relative index of {eta:.4g}, is replaced by the integral{_of_vertices(material, context)}"
     )
 
 
@@ -129,7 +130,17 @@ def _(material: RoughPlastic, context: TranslationContext) -> str:
         "Mitsuba's tables of a rough coat's transmittance and internal reflectance, which make the "
         f"base {_off(eta, material.distribution, alpha)} at alpha {alpha:g} "
         f"({material.distribution}) and a relative index of {eta:.4g}, are replaced by finer ones"
+        f"{_of_vertices(material, context)}"
     )
+
+
+def _of_vertices(material: Plastic | RoughPlastic, context: TranslationContext) -> str:
+    """What else a note on a plastic says if it has colours of vertices."""
+    names = (material.reflectance, material.specular)
+    textures = [context.textures[name] for name in names if isinstance(name, str)]
+    if not any(isinstance(texture, VertexColours) for texture in textures):
+        return ""
+    return "; Mitsuba's own refuses colours of vertices, which our plugin looks up in its place"
 
 
 def _off(eta: float, distribution: str = "", alpha: float = 0.0) -> str:

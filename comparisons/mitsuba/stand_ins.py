@@ -18,9 +18,10 @@ class StandIn(NamedTuple):
     name: of the shape;  triangles: their number;  sag: the largest distance between mesh and
     surface, in scene units;  turn: the largest angle between their normals, in radians;  ratio: the
     sag of a mesh with half as many triangles along each side, over this one's;  slip: the largest
-    distance, in scene units, by which a texture is shifted, as uv are interpolated;  twist: the
-    angle between their tangents, in radians, that is exceeded on a thousandth of the area,
-    where the material depends on them, else 0.
+    distance, in scene units, by which uv are shifted, as the mesh interpolates them;  shift: the
+    same of what the material sees, whose uv may be exact;  twist: the angle between the material's
+    tangents, in radians, that is exceeded on a thousandth of the area, where it depends on them,
+    else 0.
     """
 
     name: str
@@ -29,6 +30,7 @@ class StandIn(NamedTuple):
     turn: float
     ratio: float
     slip: float = 0.0
+    shift: float = 0.0
     twist: float = 0.0
 
 

@@ -20,7 +20,10 @@ from comparisons.experiments.fuzz.generate import parse
 from comparisons.experiments.fuzz.identities import IDENTITIES, Original
 from comparisons.experiments.fuzz.plain import without_textures
 from comparisons.experiments.fuzz.types import types_in
+from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba.translate.shapes.stand_ins import coarser
+from comparisons.mitsuba.translate.textures import TranslationContext
+from comparisons.mitsuba.translate.wrappers import is_textured
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.limited import OF_LIGHT, limited
 from reference_rt.materials import (
@@ -34,6 +37,7 @@ from reference_rt.materials import (
     RoughPlastic,
 )
 from reference_rt.rendering.scene import Scene
+from reference_rt.shapes import Cone, Quadric, Torus
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError, SceneWarning
 
 FAILED = ("differ", "invalid")
@@ -197,7 +201,16 @@ def is_slow(scene: Scene) -> bool:
         isinstance(m, RoughConductor | RoughDielectric) and m.distribution == "beckmann"
         for m in scene.materials.values()
     )
-    return beckmann or any(isinstance(m, SLOW) for m in scene.materials.values())
+    context = TranslationContext.of(scene)
+    leaves = (
+        leaf for copy in copies_of(scene) for member in copy.members for leaf in member.leaves
+    )
+    # Their meshes have uv and tangents by a plugin, too.
+    textured = any(
+        isinstance(leaf.shape, Cone | Quadric | Torus) and is_textured(leaf.material, context)
+        for leaf in leaves
+    )
+    return textured or beckmann or any(isinstance(m, SLOW) for m in scene.materials.values())
 
 
 def _statistics(scene: Scene, found: Checked, effort: Effort) -> Finding | None:

@@ -13,6 +13,7 @@ from comparisons.mitsuba.plugins import (
     exact_beckmann,
     exact_bump,
     exact_coat,
+    exact_coordinates,
     mesh_area,
     mixtures,
     path_of_solids,
@@ -25,7 +26,7 @@ from comparisons.mitsuba.plugins import (
 def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
     plugins = (
-        *(exact_beckmann, exact_bump, exact_coat, mixtures, phong),
+        *(exact_beckmann, exact_bump, exact_coat, exact_coordinates, mixtures, phong),
         *(mesh_area, path_of_solids, view_rectangle, whitted),
     )
     for plugin in plugins:

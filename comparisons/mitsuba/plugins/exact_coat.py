@@ -6,6 +6,11 @@ up to 2; of rough plastic as the mean over 64 cosines from 0 to 1, both ends inc
 about R / 64 below the integral; and T by linear interpolation between these 64 cosines.  Here both
 are integrals in float64: `comparisons.mitsuba.plastic_error` measures the error of Mitsuba's base.
 The specular reflection is Mitsuba's, with the exact masking of `exact_beckmann`.
+
+Mitsuba's plastics choose between coat and base by the means of their colours.  Colours of vertices
+have no mean in Mitsuba (3.9.1 raises an error), so the nested material has SUBSTITUTE in their
+place, and this plugin evaluates those of the vertices.  Only the probability of the choice depends
+on the substitute, and it is the same in `sample` and `pdf`.
 """
 
 import functools
@@ -22,6 +27,13 @@ from reference_rt.core.arrays import FloatArray
 CELLS = 512
 """Cells of T's table, evenly spaced in the square root of the cosine: linear interpolation is exact
 to 1e-5."""
+
+COLOURS = ("diffuse_reflectance", "specular_reflectance")
+"""Mitsuba's names of a plastic's colours."""
+
+SUBSTITUTE = 0.5
+"""The colours of a nested material in the place of those of vertices: any number above 0 will do,
+and at most 1, as Mitsuba takes it for a reflectance."""
 
 
 _legendre = functools.cache(special.roots_legendre)
@@ -145,12 +157,15 @@ def register(mi: Any) -> None:
 
     class ExactCoat(base_class(mi)):  # type: ignore[misc]
         """Parameters: nested, Mitsuba's own material; its reflectance, nonlinear, eta; distribution
-        and alpha if it is rough."""
+        and alpha if it is rough; specular, if that of the nested material is SUBSTITUTE."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
             self.wrap(properties["nested"])
             self.base = parameters.colour(mi, properties.get_texture("reflectance", 0.5))
+            self.specular: parameters.Parameter | None = None
+            if "specular" in properties:
+                self.specular = parameters.colour(mi, properties.get_texture("specular", 1.0))
             self.nonlinear = properties["nonlinear"]
             self.eta = float(properties["eta"])
             self.distribution = properties.get("distribution", "")
@@ -163,6 +178,12 @@ def register(mi: Any) -> None:
                 )
             else:
                 self.r = smooth_reflectance(self.eta)
+
+        def coloured(self, value: Any, si: Any, active: Any) -> Any:
+            """Light that the nested material's coat reflects, with the coat's own colour."""
+            if self.specular is None:
+                return value
+            return value * self.specular(si, active) / SUBSTITUTE
 
         def passing(self, cosine: Any) -> Any:
             """T at a cosine above 0."""
@@ -193,7 +214,7 @@ def register(mi: Any) -> None:
             perfect = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
             smooth = self.eval(context, si, drawn.wo, active) / dr.maximum(drawn.pdf, 1e-30)
             smooth = dr.select(drawn.pdf > 0.0, smooth, mi.Color3f(0.0))
-            return drawn, dr.select(perfect, value, smooth)
+            return drawn, dr.select(perfect, self.coloured(value, si, active), smooth)
 
         def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
             total = mi.Color3f(0.0)
@@ -201,7 +222,7 @@ def register(mi: Any) -> None:
                 glossy = mi.BSDFContext(context.mode)
                 glossy.type_mask = context.type_mask
                 glossy.component = 0
-                total += self.nested.eval(glossy, si, wo, active)
+                total += self.coloured(self.nested.eval(glossy, si, wo, active), si, active)
                 if self.distribution == "beckmann":
                     for v in (si.wi, wo):
                         total *= exact_beckmann.correction(mi, self.alpha, self.alpha, v)

@@ -11,6 +11,7 @@ from typing import Any
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.notes import note_of
+from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE
 from comparisons.mitsuba.reading.colours import index_of_refraction
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed
@@ -56,7 +57,10 @@ def make_exact(parsed: Parsed, scene: Scene) -> None:
         if node.plugin == "blendbsdf":
             props.set_plugin_name("mixture_blend")
         elif node.plugin in ("plastic", "roughplastic"):
-            _wrap(parsed.state, index, "exact_coat", _coat(node, props))
+            attributes = _attributes(parsed, props)
+            _wrap(parsed.state, index, "exact_coat", _coat(node, props, attributes))
+            for name in attributes:
+                parsed.state.nodes[-1].props[name] = SUBSTITUTE
         elif node.plugin == "bumpmap":
             _bump(parsed.state, index, node)
         elif _distribution(props) == "beckmann":
@@ -113,7 +117,19 @@ def _alphas(props: Any) -> dict[str, Any]:
     return {key: props.get(key, props.get("alpha", 0.1)) for key in ("alpha_u", "alpha_v")}
 
 
-def _coat(node: Node, props: Any) -> dict[str, Any]:
+def _attributes(parsed: Parsed, props: Any) -> list[str]:
+    """The colours of a plastic that are attributes of meshes: of these Mitsuba has no mean, without
+    which it refuses the file (see `plugins.exact_coat`)."""
+    references = {name: props[name] for name in COLOURS if name in props}
+    return [
+        name
+        for name, value in references.items()
+        if type(value).__name__ == "ResolvedReference"
+        and Node(parsed, value.index()).plugin == "mesh_attribute"
+    ]
+
+
+def _coat(node: Node, props: Any, attributes: list[str]) -> dict[str, Any]:
     inside = index_of_refraction(node, "int_ior", "polypropylene")
     values = {
         "eta": inside / index_of_refraction(node, "ext_ior", "air"),
@@ -121,6 +137,8 @@ def _coat(node: Node, props: Any) -> dict[str, Any]:
     }
     if "diffuse_reflectance" in props:
         values["reflectance"] = props["diffuse_reflectance"]
+    if "specular_reflectance" in attributes:
+        values["specular"] = props["specular_reflectance"]
     if node.plugin == "roughplastic":
         alpha = props.get("alpha", props.get("alpha_u", 0.1))
         values |= {"distribution": _distribution(props), "alpha": alpha}

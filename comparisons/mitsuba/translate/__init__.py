@@ -34,6 +34,7 @@ from comparisons.mitsuba.translate.integrators import (
 from comparisons.mitsuba.translate.lights import never_samples, translate_light
 from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
+from comparisons.mitsuba.translate.shapes.meshes import MOST_INSTANCES
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.mitsuba.translate.wrappers import (
     coloured_parts_of,
@@ -81,10 +82,6 @@ def load(scene: Scene, frame: Frame | None = None) -> Counterpart:
     if ours is not None:
         mi_scene.integrator().lit = partial(LitScene, solids=solids)
     return Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame, ours is not None)
-
-
-MOST_INSTANCES = 32
-"""Most instances in a scene of Mitsuba's fast variants: see `InstancedGroup`."""
 
 
 def _instanced_group(found: _Translated) -> InstancedGroup | None:
@@ -182,6 +179,7 @@ def _add(
                 copies=count,
                 shared=shared,
                 reach=reach,
+                native=context.native,
             )
             plugins = translate_shape(leaf.shape, site)
             if site.textured and not all(plugin.has_our_uv for plugin in plugins):

@@ -4,7 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 import reference_rt as rt
-from comparisons.mitsuba.plugins.exact_coat import accepted
+from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE, accepted
 from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.textures import TranslationContext, colour, number, rgb
 
@@ -110,8 +110,9 @@ def _coated(
 ) -> dict[str, Any]:
     """Mitsuba's own material, wrapped in `exact_coat`, which corrects its tables."""
     base, specular = (colour(of, context) for of in (material.reflectance, material.specular))
-    if "mesh_attribute" in (base["type"], specular["type"]):
-        # Mitsuba's plastics need the mean of their colours, which only its other textures have.
+    of_vertices = [part["type"] == "mesh_attribute" for part in (base, specular)]
+    if any(of_vertices) and context.native:
+        # Mitsuba's own need the mean of their colours, which it lacks for those of vertices.
         raise UntranslatableError(f"{type(material).__name__} with vertex colours", "material")
     nested = {
         "type": plugin,
@@ -128,14 +129,13 @@ def _coated(
         return nested
     if rough:
         nested["sample_visible"] = rough["distribution"] == "ggx"
-    return {
-        "type": "exact_coat",
-        "nested": nested,
-        "reflectance": base,
-        "nonlinear": material.nonlinear,
-        "eta": eta,
-        **rough,
-    }
+    exact = {"type": "exact_coat", "reflectance": base, "nonlinear": material.nonlinear, "eta": eta}
+    for name, replaced in zip(COLOURS, of_vertices, strict=True):
+        if replaced:
+            nested[name] = rgb((SUBSTITUTE,) * 3)
+    if of_vertices[1]:
+        exact["specular"] = specular
+    return {**exact, "nested": nested, **rough}
 
 
 @translate_material.register

@@ -199,7 +199,7 @@ def slopes_of(
             angle += of_stand_ins(context, "twist")
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
         angle += np.where(np.isfinite(context.theirs.height), radius / _feature(context), 0.0)
-        apart = of_stand_ins(context, "sag") + of_stand_ins(context, "slip") + _along(context)
+        apart = of_stand_ins(context, "sag") + of_stand_ins(context, "shift") + _along(context)
         others = [partial(value_of, other) for other in moved(rays, radius + apart)]
         if angle.any():
             for other in turned(rays, hits.p, TURNS * angle):

@@ -11,7 +11,7 @@ from PIL import Image
 from comparisons.compare.pictures import whitted as whitted_pictures
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
+from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.rungs import direct, geometry, whitted
 from reference_rt.rendering.scene import Scene
@@ -248,26 +248,3 @@ def test_mitsubas_own_bumps_are_wrong_there(
         text = BUMPS.replace("FILE", image).replace("UV", uv).replace("ALPHA", alpha)
         scene = Scene.parse(text.replace("OPTIONS", ""), folder=image_folder)
         assert direct(scene, scene.tables, load(scene), 300).status == "differ"
-
-
-@pytest.mark.parametrize(
-    "shape",
-    [
-        "type: torus",
-        "type: cone, top_radius: 0.8",
-        "type: quadric, coefficients: [1, 1, 1, 0, 0, 0, 0, 0, 0, -1],"
-        " lower: [-1, -1, -1], upper: [1, 1, 1]",
-    ],
-)
-@pytest.mark.parametrize("alpha", ["0.4", "[0.15, 0.5]"])
-def test_bumps_on_stand_in_meshes_are_not_compared(
-    shape: str, alpha: str, image_folder: Path
-) -> None:
-    text = (
-        "materials: {b: {type: bump, base: m, height: w}, t: {type: two_sided, base: b},"
-        f" m: {{type: rough_conductor, eta: 1, k: 2, alpha: {alpha}}}}}\n"
-        "textures: {w: {type: bitmap, file: heights.png}}\n"
-        f"shapes: [{{{shape}, material: t}}]"
-    )
-    with pytest.raises(UntranslatableError, match="under a bump map"):
-        to_mitsuba(Scene.parse(text, folder=image_folder))

@@ -99,8 +99,6 @@ REQUIRED = {
 """Other fields that a material must have, by type."""
 
 REFUSED = {
-    ("plastic", "vertex_colours"),
-    ("rough_plastic", "vertex_colours"),
     ("normal_map", "vertex_colours"),
     ("normal_map", "checker"),
 }

@@ -7,7 +7,6 @@ from builders import SCENES
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.scene import first_hits
 from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import direct, layers
 from reference_rt.rendering import query
@@ -104,29 +103,18 @@ def lit(name: str, placed: str, material: str, integrator: str) -> Scene:
     return Scene.parse(LIT.format(shape=shape, material=material, integrator=integrator))
 
 
-IRREGULAR = ("saddle", "tilted")
-"""Lines of constant z run towards the axis somewhere, where their tangents jump."""
-
-
-@pytest.mark.parametrize("name", IRREGULAR)
-def test_tangents_that_jump_have_no_counterpart(name: str) -> None:
-    with scalar(), coarser(0.35):
-        load(lit(name, "turned", "{type: diffuse, reflectance: texels}", "{type: path}"))
-        with pytest.raises(UntranslatableError, match="constant z"):
-            load(lit(name, "turned", ANISOTROPIC["metal"], "{type: path}"))
-
-
 @pytest.mark.parametrize("material", ANISOTROPIC)
 @pytest.mark.parametrize("placed", ["turned", "mirrored", "sheared"])
-@pytest.mark.parametrize("name", [name for name in SHAPES if name not in IRREGULAR])
+@pytest.mark.parametrize("name", SHAPES)
 def test_anisotropic_materials_on_them_are_compared(name: str, placed: str, material: str) -> None:
-    """Mitsuba's tangents are constant on each triangle of a mesh."""
+    """Lines of constant z run towards the axis somewhere on the saddle and on what is tilted: there
+    the tangents jump."""
     scene = lit(name, placed, ANISOTROPIC[material], "{type: path}")
     with scalar(), coarser(0.35):
         counterpart = load(scene)
         twists = [s.twist for found in counterpart.stand_ins().values() for s in found]
         found = direct(scene, scene.tables, counterpart, 200)
-    assert all(twist > 0.0 for twist in twists)
+    assert max(twists, default=0.0) < 1e-3  # Mitsuba's own are 1e-3 to 3 off on these meshes
     assert found.status == "agree", found.reason
 
 

@@ -23,6 +23,9 @@ MOST_TRIANGLES = 4_000_000
 which it traces less exactly: in groups it ignores the flag for watertight intersections (of 100,000
 rays at edges 7,226 passed between triangles; without a group, 15)."""
 
+MOST_INSTANCES = 32
+"""Most instances in a scene of Mitsuba's fast variants: see `counterpart.InstancedGroup`."""
+
 
 class Soup:
     """A mesh: positions (v, 3) of its vertices, and of each vertex, or None, unit normals (v, 3),

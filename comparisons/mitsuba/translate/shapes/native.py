@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.float32 import UNIT_ROUNDOFF
+from comparisons.mitsuba.coordinates import Round
 from comparisons.mitsuba.hits import CURVED
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
@@ -63,7 +64,8 @@ def _(shape: Sphere, site: Site) -> list[Plugin]:
 def _ellipsoid(shape: Sphere, site: Site) -> Plugin:
     """A thin ellipsoid as a mesh: float32 is more exact for its corners than for its quadratic."""
     patches, surface = sphere_surface(shape)
-    return stand_in(shape, patches, surface, None, site)
+    of = Round(shape.center, 0.0, is_sphere=True)
+    return stand_in(shape, patches, surface, None, site, of)
 
 
 def sphere_surface(shape: Sphere) -> tuple[list[Patch], Implicit]:

@@ -13,6 +13,11 @@ from reference_rt.core.arrays import FloatArray, IntArray
 Box = tuple[FloatArray, FloatArray]
 
 
+FEWEST = 4
+"""Fewest cells along the side of a patch, unless it asks for less itself: hits slide along
+triangles that are long and thin (see `quadrics.SIDE`)."""
+
+
 class Patch(NamedTuple):
     """A parametric patch of a surface, with u, v in [0, 1].
 
@@ -38,7 +43,7 @@ def meshed(patches: Sequence[Patch], surface: Implicit, box: Box | None, finenes
     positions, normals, uvs, faces = [], [], [], []
     count = 0
     for patch in patches:
-        cells = tuple(max(1, round(n * fineness)) if n > 1 else 1 for n in patch.cells)
+        cells = tuple(max(min(n, FEWEST), round(n * fineness)) for n in patch.cells)
         u, v = np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in cells), indexing="ij")
         grid = patch.point(u, v)
         n = _grid_normals(surface.gradient(grid))

@@ -20,7 +20,7 @@ class Site(NamedTuple):
     textured: whether the material depends on uv or tangents;  oriented: on tangents;  material: its
     name;  copies: the number of copies of the leaf;  shared: data shared by the leaves of one
     scene, by key (a group, the triangles of a file);  reach: about the largest coordinate of the
-    scene.
+    scene;  native: whether Mitsuba's own materials are used.
     """
 
     place: TabulationContext
@@ -32,6 +32,7 @@ class Site(NamedTuple):
     copies: int
     shared: dict[Any, Any]
     reach: float
+    native: bool = False
 
     @property
     def mirrored(self) -> bool:

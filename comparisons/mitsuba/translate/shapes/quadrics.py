@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from comparisons.geometry.sizes import heights_of
+from comparisons.mitsuba.coordinates import of_cone, of_quadric
 from comparisons.mitsuba.stand_ins import Plugin, same_uv
 from comparisons.mitsuba.translate.shapes.around import around_z
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
@@ -53,7 +54,8 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
     is_thin = least * THIN < site.reach and in_float32(least) > 0.0
     if is_thin or ("emitter" in site.parts and not is_circular):  # Mitsuba's instances do not emit
         patch, surface = side_surface(shape, site.textured)
-        side = stand_in(shape, [patch], surface, None, site)
+        of = of_cone(r, 0.0, shape.z_min, height)
+        side = stand_in(shape, [patch], surface, None, site, of)
     elif is_circular:
         place = to_world(unit[:, :3], unit[:, 3])
         plugin = {"type": "cylinder", "to_world": place, **site.parts}
@@ -113,7 +115,8 @@ def _disk_of_triangles(
 def _(shape: Cone, site: Site) -> list[Plugin]:
     bottom, top, height = shape.radius, shape.top_radius, shape.height
     patch, surface = side_surface(shape, site.textured)
-    found = [stand_in(shape, [patch], surface, None, site)]
+    of = of_cone(bottom, (top - bottom) / height, 0.0, height)
+    found = [stand_in(shape, [patch], surface, None, site, of)]
     if shape.capped:
         m, reach = shape.map_in(site.place), max(bottom, top)
         found.append(_disk(m, bottom, 0.0, BOTTOM, reach, site))
@@ -165,7 +168,8 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
     patches, surface, box = quadric_surface(shape)
     found = []
     if patches:
-        found.append(stand_in(shape, patches, surface, box, site, partial(around_z, box=box)))
+        of = of_quadric(*_matrix(shape), *box)
+        found.append(stand_in(shape, patches, surface, box, site, of, partial(around_z, box=box)))
     if shape.capped:
         key = ("caps", id(shape))
         if key not in site.shared:
@@ -182,9 +186,8 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
 
 def quadric_surface(shape: Quadric) -> tuple[list[Patch], Implicit, Box]:
     """The surface in its own coordinates, and the box that it is clipped to."""
-    a, b, c, d, e, f, g, h, i, j = shape.coefficients
-    matrix = np.array([[a, d / 2, f / 2], [d / 2, b, e / 2], [f / 2, e / 2, c]])
-    linear = np.array([g, h, i])
+    matrix, linear = _matrix(shape)
+    j = shape.coefficients[9]
     box = np.array(shape.lower), np.array(shape.upper)
 
     def value(p: FloatArray) -> FloatArray:
@@ -192,6 +195,13 @@ def quadric_surface(shape: Quadric) -> tuple[list[Patch], Implicit, Box]:
 
     surface = Implicit(value, lambda p: np.asarray(2.0 * p @ matrix + linear))
     return patches_of(matrix, linear, j, box), surface, box
+
+
+def _matrix(shape: Quadric) -> tuple[FloatArray, FloatArray]:
+    """M and l of f = x^T M x + l x + c."""
+    a, b, c, d, e, f, g, h, i, _ = shape.coefficients
+    matrix = np.array([[a, d / 2, f / 2], [d / 2, b, e / 2], [f / 2, e / 2, c]])
+    return matrix, np.array([g, h, i])
 
 
 def disk_soup(z: float, radius: float, face: int, reach: float) -> Soup:

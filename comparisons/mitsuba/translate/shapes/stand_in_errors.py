@@ -5,6 +5,7 @@ import numpy as np
 
 from comparisons.geometry.float32 import round32
 from comparisons.geometry.sizes import heights_of
+from comparisons.mitsuba.coordinates import Coordinates, derivatives_at
 from comparisons.mitsuba.translate.shapes.meshes import Soup
 from comparisons.mitsuba.translate.shapes.patches import Box, Implicit, Patch
 from reference_rt.core import transform
@@ -65,56 +66,56 @@ def measured_slip(soup: Soup, patch: Patch, box: Box | None) -> float:
     return largest
 
 
+INNER = np.array([np.roll([0.57721, 0.11803, 0.30476], k) for k in range(3)])
+"""Barycentrics at which exact tangents are compared.  They are no simple fractions: on a regular
+grid of triangles such points lie in rows, perhaps on the very line along which tangents jump."""
+
 RARE = 1e-3
 """Share of a mesh's area whose tangents may be further off than `measured_twist`: those next to a
 pole, where all directions meet."""
 
 MOST_TWIST = 0.05
-"""Largest twist of a mesh, in radians; the fuzzer's coarse ones have up to 0.016.  Where the angle
-around the axis does not change along a line of constant z, tangents have any direction on a
-mesh."""
+"""Largest twist of a mesh with Mitsuba's tangents, in radians; the fuzzer's coarse ones have up to
+0.016.  Where the angle around the axis does not change along a line of constant z, tangents have
+any direction on a mesh."""
 
 
 def measured_twist(
-    soup: Soup, patch: Patch, surface: Implicit, box: Box | None, m: transform.Affine
+    soup: Soup, of: Coordinates, surface: Implicit, m: transform.Affine, exact: bool
 ) -> float:
     """The angle in the scene, in radians, between the derivatives of the position by u of mesh and
-    surface: Mitsuba takes that of a mesh as constant on each triangle.
+    surface.
 
-    It is measured behind the map m, for vertices in float32.  On the mesh of a cylinder, for
-    example, the derivative is a chord, which is off along the normal alone; a shear turns that
-    error into the surface, and the triangles are so long that rounding turns the chord by 1e-4.
-    The surface's is that of a patch with these uv, or for one around the z axis of a box that along
-    the surface in the plane of constant z, the way in which the angle grows.
+    exact: the mesh's are those of `of` at its points, which lie off the surface.  Otherwise they
+    are Mitsuba's own, constant on each triangle.  On the mesh of a cylinder, for example, the
+    derivative is then a chord, which is off along the normal alone.  A shear turns that error into
+    the surface, and the triangles are so long that rounding turns the chord by 1e-4.  So angles
+    are measured behind the map m, for vertices in float32.
     """
     assert soup.uvs is not None
     assert soup.normals is not None
-    inverse = transform.invert(m)[:, :3]
+    linear, inverse = m[:, :3], transform.invert(m)
     faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
-    corners, uv = soup.positions[faces], round32(soup.uvs)[faces]
+    uv = round32(soup.uvs)[faces]
     mapped = round32(transform.apply_points(m, soup.positions))[faces]
     a, b = mapped[:, 1] - mapped[:, 0], mapped[:, 2] - mapped[:, 0]
     (du1, dv1), (du2, dv2) = (uv[:, k].T - uv[:, 0].T for k in (1, 2))
-    of_mesh = (dv2[:, None] * a - dv1[:, None] * b) * np.sign(du1 * dv2 - dv1 * du2)[:, None]
+    of_triangle = (dv2[:, None] * a - dv1[:, None] * b) * np.sign(du1 * dv2 - dv1 * du2)[:, None]
     angles = []
-    for weights in WEIGHTS:
-        q = weights @ corners
-        if box is None:
-            u, v = (weights @ uv).T
-            exact = patch.point(u + TANGENT_STEP, v) - patch.point(u - TANGENT_STEP, v)
-        else:
-            gradient = surface.gradient(q)
-            exact = np.column_stack([-gradient[:, 1], gradient[:, 0], np.zeros(len(q))])
-            half = 0.5 * (box[1] - box[0])
-            x, y = ((q - 0.5 * (box[0] + box[1])) / half)[:, :2].T
-            grows = x * exact[:, 1] / half[1] - y * exact[:, 0] / half[0] >= 0.0
-            exact *= np.where(grows, 1.0, -1.0)[:, None]
-        n = weights @ soup.normals[faces] @ inverse
+    for weights in INNER if exact else WEIGHTS:
+        q = transform.apply_points(inverse, weights @ mapped)
+        gradient = surface.gradient(q)
+        steepness = np.sum(gradient * gradient, axis=1)
+        step = np.divide(
+            surface.value(q), steepness, out=np.zeros_like(steepness), where=steepness > 0.0
+        )
+        right = derivatives_at(of, q - step[:, None] * gradient)[0] @ linear.T
+        of_mesh = derivatives_at(of, q)[0] @ linear.T if exact else of_triangle
+        n = weights @ soup.normals[faces] @ inverse[:, :3]
         n /= np.linalg.norm(n, axis=1)[:, None]
-        tangents = (of_mesh, exact @ m[:, :3].T)
-        one, other = (t - n * np.sum(t * n, axis=1)[:, None] for t in tangents)
+        one, other = (t - n * np.sum(t * n, axis=1)[:, None] for t in (of_mesh, right))
         cross = np.linalg.norm(np.cross(one, other), axis=1)
-        angles.append(np.arctan2(cross, np.sum(one * other, axis=1)))
+        angles.append(np.nan_to_num(np.arctan2(cross, np.sum(one * other, axis=1)), nan=np.pi))
     angle = np.max(angles, axis=0)
     order = np.argsort(-angle)
     area = np.cumsum(np.linalg.norm(np.cross(a, b), axis=1)[order])
@@ -131,7 +132,3 @@ def aspects(soup: Soup, m: transform.Affine) -> FloatArray:
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     heights = heights_of(corners)
     return np.asarray(np.divide(longest, heights, out=np.zeros_like(heights), where=heights > 0.0))
-
-
-TANGENT_STEP = 1e-5
-"""Step in u for the derivative of a patch's position: it is off by a tenth of the step squared."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from comparisons.mitsuba.coordinates import Round
 from comparisons.mitsuba.stand_ins import Plugin
 from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.patches import Implicit, Patch
@@ -17,7 +18,8 @@ CELLS = (768, 384)
 @translate_shape.register
 def _(shape: Torus, site: Site) -> list[Plugin]:
     patches, surface = torus_surface(shape)
-    return [stand_in(shape, patches, surface, None, site)]
+    of = Round((0.0, 0.0, 0.0), shape.major_radius)
+    return [stand_in(shape, patches, surface, None, site, of)]
 
 
 def torus_surface(shape: Torus) -> tuple[list[Patch], Implicit]:
