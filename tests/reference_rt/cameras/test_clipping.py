@@ -1,11 +1,47 @@
-"""Clipping planes: pictures of what lies between them, by every camera and integrator."""
+"""Clipping planes: rays that end there, and pictures of what lies between them, by every camera and
+integrator."""
+
+import math
 
 import numpy as np
 import pytest
-from camera_checks import CAMERAS
+from builders import U
+from camera_checks import CAMERAS, LENSES, POINTS
 
 import reference_rt as rt
+from reference_rt.cameras import camera_ray
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
+from reference_rt.util.errors import SceneError
+
+
+@pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
+def test_rays_go_from_the_near_to_the_far_clipping_plane(camera):
+    """Along the lines of the same camera without planes."""
+    near, far = 0.75, 12.5
+    plain = camera.setup(8, 6)
+    view = camera.model_copy(update={"near": near, "far": far}).setup(8, 6)
+    eye, forward = np.array(camera.eye), -camera.basis[2]
+    for lens in LENSES:
+        for x, y in POINTS:
+            ray, line = camera_ray(view, x, y, lens), camera_ray(plain, x, y, lens)
+            start, end = np.array(ray.o), np.array(ray.o) + ray.t_max * np.array(ray.d)
+            assert ray.d == line.d
+            # A depth has the rounding of coordinates up to 20.
+            assert (start - eye) @ forward == pytest.approx(near, abs=20 * 8 * U)
+            assert (end - eye) @ forward == pytest.approx(far, abs=20 * 8 * U)
+            along = start - np.array(line.o)
+            assert np.abs(np.cross(along, ray.d)).max() < 20 * 8 * U
+    without_end = camera.model_copy(update={"near": near}).setup(8, 6)
+    assert camera_ray(without_end, 0.2, 0.3, LENSES[1]).t_max == math.inf
+
+
+@pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
+def test_planes_in_another_order_are_refused(camera):
+    with pytest.raises(SceneError, match="expected 'near' before 'far'"):
+        type(camera).model_validate(camera.model_dump() | {"near": 2.0, "far": 2.0})
+    with pytest.raises(SceneError):
+        type(camera).model_validate(camera.model_dump() | {"near": -1.0})
+
 
 LAYERS = ("albedo", "normal", "position", "depth", "id", "variance")
 
