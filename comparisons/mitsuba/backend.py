@@ -118,8 +118,18 @@ def _libraries() -> list[str | None]:
 
 @functools.cache
 def backend() -> Backend:
-    """`choose`, once per process."""
-    return choose()
+    """`choose`, once per process; whoever imports Mitsuba from now on gets that library.
+
+    Raises ReferenceUnavailableError, also for a library whose own ones are missing.
+    """
+    chosen = choose()
+    if chosen.llvm_path is not None:
+        os.environ[LIBRARY] = chosen.llvm_path
+        try:
+            llvm_libraries.load_needed(chosen.llvm_path)
+        except OSError as error:
+            raise ReferenceUnavailableError(f"{chosen.llvm_path}: {error}") from None
+    return chosen
 
 
 def imported() -> Any:
@@ -128,11 +138,8 @@ def imported() -> Any:
 
     Raises ReferenceUnavailableError.
     """
-    chosen = backend()
+    backend()
     try:
-        if chosen.llvm_path is not None:
-            os.environ[LIBRARY] = chosen.llvm_path
-            llvm_libraries.load_needed(chosen.llvm_path)
         import mitsuba as mi
     except (ImportError, RuntimeError, OSError) as error:
         raise ReferenceUnavailableError(f"Mitsuba does not start: {error}") from None

@@ -6,7 +6,6 @@ import itertools
 import re
 from pathlib import Path
 
-import drjit as dr
 import numpy as np
 import pytest
 
@@ -35,6 +34,8 @@ def directions(cosines, azimuth=0.0):
 
 def base_of(material, native, wi, wo):
     """Values (n,) of the base of a plastic, as Mitsuba has it or as its twin does."""
+    import drjit as dr
+
     mi = mitsuba()
     scene = Scene(materials={"m": material})
     context = TranslationContext.of(scene, native=native)
@@ -174,6 +175,8 @@ OTHERS = {
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_documented_blends(share, other):
     """Mitsuba's own blend: what a mirror with this share has of its light."""
+    import drjit as dr
+
     mi = mitsuba()
     bsdf = mi.load_dict(
         {
