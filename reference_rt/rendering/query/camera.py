@@ -43,8 +43,9 @@ def camera_rays(
     pixels (..., 2): column and row, counted from the top left; None: all, (height, width);  offsets
     (..., 2): from the pixel's centre, in pixels to the right and down, within [-1/2, 1/2] for
     points of the pixel itself;  lens (..., 2): the numbers in [0, 1) that select the point of a
-    thin lens, (1/2, 1/2) for its middle; other cameras ignore them.  All broadcast.  Raises
-    ValueError.
+    thin lens, (1/2, 1/2) for its middle; other cameras ignore them.  All broadcast.  Origins are on
+    the camera's near clipping plane, if it has one; the far one, where the rays end, is
+    `scene.camera.far`.  Raises ValueError.
     """
     width, height = scene.film.width, scene.film.height
     if pixels is None:
