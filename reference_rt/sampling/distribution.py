@@ -45,10 +45,11 @@ def guide(sums: FloatArray) -> IdArray:
     """Where to begin a search in running sums (m, n + 1), as `bracket` reads it: (m, n // 4 + 2)
     cells, at equal steps of each row's total (Chen and Asau 1974, the method of guide tables)."""
     steps = sums.shape[1] // 4 + 1
-    found = np.empty((len(sums), steps + 1), np.int32)
+    found, last = np.empty((len(sums), steps + 1), np.int32), sums.shape[1] - 2
     for row, cells in zip(sums, found, strict=True):
-        cells[:] = np.searchsorted(row, np.linspace(0.0, row[-1], steps + 1), side="right") - 1
-    return np.minimum(found, np.int32(sums.shape[1] - 2))
+        after = np.searchsorted(row, np.linspace(0.0, row[-1], steps + 1), side="right")
+        cells[:] = np.minimum(after - 1, last)
+    return found
 
 
 @kernel

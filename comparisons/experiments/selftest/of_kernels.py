@@ -95,8 +95,8 @@ FAULTS = (
     ),
     SourceFault(
         "pdf of the sky 5 % small", "environment", "lights/emitters/environment_map.py",
-        "float(luminance(radiance(table, d)) / table.total[0])",
-        "float(luminance(radiance(table, d)) / table.total[0] * 0.95)",
+        "float(luminance(arriving) / table.total[0])",
+        "float(luminance(arriving) / table.total[0] * 0.95)",
     ),
     SourceFault(
         "probability of a light forgotten", "many_lights", "integrators/path.py",
