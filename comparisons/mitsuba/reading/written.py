@@ -142,7 +142,7 @@ class _Reader:
                 one = numbers.pop("value")
                 x, y, z = one * 3 if len(one) == 1 else one
             else:
-                x, y, z = ((*numbers.pop(axis, [default]),)[0] for axis in "xyz")
+                (x,), (y,), (z,) = (numbers.pop(axis, [default]) for axis in "xyz")
             return x, y, z
 
         match tag:

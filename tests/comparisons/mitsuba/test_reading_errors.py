@@ -3,6 +3,7 @@
 import random
 import re
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -274,6 +275,31 @@ def read_damaged(tmp_path: Path, seed: int) -> bool:
 def test_damaged_files_never_crash(tmp_path):
     found = [read_damaged(tmp_path, seed) for seed in range(400)]
     assert 5 < sum(found) < 380
+
+
+STEPS = (
+    '<translate x="1" y="2" z="3"/>',
+    '<translate value="1, 2, 3"/>',
+    '<scale x="1" y="2" z="3"/>',
+    '<scale value="2"/>',
+    '<rotate x="1" y="0" z="0" angle="30"/>',
+    '<rotate value="0, 0, 1" angle="30"/>',
+    '<matrix value="1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/>',
+    '<lookat origin="0, 0, 1" target="0, 0, 0" up="0, 1, 0"/>',
+)
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_steps_of_transforms_with_another_number_of_numbers(tmp_path, step):
+    """None, two, or a word, in each attribute: read as Mitsuba reads it, or an error."""
+    for attribute in re.findall(r'\w+="[^"]*"', step):
+        for value in ("", " ", "1 2", "1,2,3,4,5", "one"):
+            damaged = step.replace(attribute, f'{attribute.partition("=")[0]}="{value}"')
+            shape = f'<shape type="sphere"><transform name="to_world">{damaged}</transform></shape>'
+            text = WHOLE.replace("</scene>", f"{shape}</scene>")
+            with warnings.catch_warnings(), suppress(SceneError):
+                warnings.simplefilter("ignore", SceneWarning)
+                read(tmp_path, text)
 
 
 @pytest.mark.slow
