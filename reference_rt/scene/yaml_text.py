@@ -30,8 +30,11 @@ MOST_REPEATED = 1 << 22
 any number.  This many is 100,000 shapes of 40 values each, every one an alias, and takes about
 0.4 GB once it is checked.  Values that are written out are bounded by the file's size."""
 
-MOST_NESTED = 1000
-"""Nesting depth of lists and mappings: Python's recursion limit, which bounds JSON too."""
+MOST_NESTED = 500
+"""Nesting depth of lists and mappings.  Half of libyaml's own limit (since 0.2.6) and of Python's
+recursion limit, which bounds JSON: every parser reads this depth, and the error is the same."""
+
+_TOO_DEEP = f"nested too deeply; expected at most {MOST_NESTED} levels"
 
 _NUMBER = re.compile(
     r"[-+]?(?:(?P<float>(?:[0-9][0-9_]*\.[0-9_]*|\.[0-9][0-9_]*)(?:[eE][-+]?[0-9]+)?"
@@ -127,7 +130,7 @@ class _Reader:
         if event.tag not in (None, "!", expected):
             raise _unknown_tag(event)
         if len(self.open) >= MOST_NESTED:
-            raise _malformed(f"nested too deeply; expected at most {MOST_NESTED} levels", event)
+            raise _malformed(_TOO_DEEP, event)
         self.open.append(_Open(content, event, self.read))
         self.read += 1
         self.anchors.pop(event.anchor, None)  # undefined until its end
@@ -235,7 +238,9 @@ class Events:
         except yaml.MarkedYAMLError as error:
             line = None if error.problem_mark is None else error.problem_mark.line + 1
             problem = " ".join(str(error.problem or error.context).split())
-            if problem.startswith(("but ", "did not ")) and error.context:
+            if "nesting depth" in problem:  # libyaml since 0.2.6, which reads ahead of its events
+                problem = _TOO_DEEP
+            elif problem.startswith(("but ", "did not ")) and error.context:
                 problem = f"{error.context}, {problem}"
             raise MalformedError(problem, line) from None
         except yaml.reader.ReaderError as error:
@@ -303,7 +308,7 @@ def load_any(text: str) -> Any:
     if text.lstrip().startswith("{"):
         # Errors in either are reported by the YAML reader, with their line.  It cannot read all of
         # JSON: it lacks surrogate pairs and control characters.
-        with suppress(ValueError):
+        with suppress(ValueError, RecursionError):
             return json.loads(text, object_pairs_hook=_distinct)
     return load(text)
 

@@ -4,6 +4,7 @@ import math
 import warnings
 
 import pytest
+import yaml
 from builders import EVERY_LAW, EVERY_LIGHT, EVERY_SHAPE, SCENES
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -256,12 +257,21 @@ def test_aliases_are_counted_by_what_they_stand_for(monkeypatch):
             yaml_text.load(text)
 
 
-def test_nesting_is_bounded():
+@pytest.mark.parametrize("parser", [yaml_text.Parser, yaml.BaseLoader])
+def test_nesting_is_bounded(parser, monkeypatch):
+    monkeypatch.setattr(yaml_text, "Parser", parser)
     deep = yaml_text.MOST_NESTED
-    assert yaml_text.load("[" * deep + "]" * deep)
-    for text in ("[" * (deep + 1) + "]" * (deep + 1), "{a: " * (deep + 1), "- " * (deep + 1)):
-        with pytest.raises(yaml_text.MalformedError, match="nested too deeply"):
-            yaml_text.load(text)
+    too_deep = deep + 1, deep * 100
+    # JSON's limit is Python's.
+    for begin, end, bad in (
+        *(("[", "]", too_deep), ("{a: ", "}", too_deep), ("- ", "", too_deep)),
+        ('{"a":', "}", too_deep[1:]),
+    ):
+        assert yaml_text.load_any(begin * deep + "1" + end * deep)
+        for n in bad:
+            with pytest.raises(yaml_text.MalformedError, match="nested too deeply") as raised:
+                yaml_text.load_any(begin * n + "1" + end * n)
+            assert raised.value.line == 1
 
 
 @pytest.fixture(autouse=True)
