@@ -1,12 +1,12 @@
 """The rung of Whitted ray tracing: the radiance of pixel centres, without noise."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF, round32
+from comparisons.geometry.float32 import UNIT_ROUNDOFF, round32
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.accuracy import accuracy, coat_error
 from comparisons.mitsuba.backend import mitsuba
@@ -21,6 +21,11 @@ from comparisons.rungs.rays.coincidence import on_two_surfaces
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
 from comparisons.rungs.rays.light_context import LightContext
 from comparisons.rungs.rays.light_error import cut_off, of_direct_light
+from comparisons.rungs.rays.neighbours import (
+    NeighbourContext,
+    explained_by_neighbours,
+    rounding_of,
+)
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from reference_rt.core.arrays import FloatArray
@@ -41,10 +46,6 @@ MOST_LIGHTS = 256
 AT_LEAST = 64.0 * UNIT_ROUNDOFF
 """Relative error of a ray's throughput: the product of some eight factors of each of eight levels.
 Rays with less than a least contribution are not followed."""
-
-MOST_OUTLIERS = (200, 32)
-"""Most pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 ray trees for each
-radius, 30 ms in scalar variants of Mitsuba.  The rest count as differing."""
 
 TOLERANCE = 1e-5
 """Relative to a pixel, or to the picture's white (the 99th percentile of lit pixels) if that is
@@ -94,22 +95,22 @@ def whitted(
         few = rays.rows(over)
         others = [
             partial(query.radiance_without_noise, tables, setup, other.o, other.d)
-            for other in moved(few, _radii(tables, sizes, few)[0])
+            for other in moved(few, rounding_of(tables, sizes, few))
         ]
         bound[over] += slopes(ours[over], others, float(lit.max(initial=0.0)))
     outliers = np.flatnonzero(~(error <= bound))
 
-    def ours_along(o: FloatArray, d: FloatArray) -> FloatArray:
+    def ours_along(o: FloatArray, d: FloatArray, tables: SceneTables = tables) -> FloatArray:
         return query.radiance_without_noise(tables, setup, o, d)
 
     def theirs_along(o: FloatArray, d: FloatArray) -> FloatArray:
         return theirs_at(Rays(counterpart.frame.rounded(o), round32(d)))
 
     some = rays.rows(outliers)
-    settled = _explained(
+    settled = explained_by_neighbours(
+        NeighbourContext(scene, tables, counterpart, sizes, integrator.max_depth),
         some,
         ((ours[outliers], ours_along), (theirs[outliers], theirs_along)),
-        _moves(tables, sizes, some, counterpart, integrator.max_depth),
         bound[outliers],
     )
     for factor in (1.0 - AT_LEAST, 1.0 + AT_LEAST):  # a ray with just the least contribution
@@ -152,35 +153,6 @@ def whitted(
     return RungResult("whitted", "agree", reason, numbers)
 
 
-def _radii(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> tuple[FloatArray, FloatArray]:
-    """How far the arbiter moves rays: float32's bound, then Mitsuba's ray epsilon."""
-    p = query.intersect(tables, rays.o, rays.d).p
-    reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
-    return sizes.frame.delta(rays.o, p, reach), sizes.frame.epsilon(p)
-
-
-BENT = 4.0
-"""A normal that is off by an angle turns a mirrored ray by twice that; two surfaces that stand in
-for others, one seen in the other, by twice as much."""
-
-
-def _moves(
-    tables: SceneTables, sizes: ShapeSizes, rays: Rays, counterpart: Counterpart, depth: int
-) -> list[tuple[FloatArray, float]]:
-    """How far the arbiter moves and turns rays: by float32's bound, by Mitsuba's ray epsilon, once
-    and at each of `depth` surfaces, and by the errors of meshes that stand in for shapes."""
-    angle = ROUNDINGS * UNIT_ROUNDOFF
-    rounding, epsilon = _radii(tables, sizes, rays)
-    found = [(rounding, angle), (epsilon, angle), (depth * epsilon, angle)]
-    stand_ins = [s for some in counterpart.stand_ins().values() for s in some]
-    if stand_ins:
-        sag, turn = (max(getattr(s, name) for s in stand_ins) for name in ("sag", "turn"))
-        if tables.materials.oriented is not None:
-            turn += max(s.twist for s in stand_ins)
-        found.append((rounding + sag, angle + BENT * turn))
-    return found
-
-
 def plugin_radiance(
     scene: Scene, tables: SceneTables, counterpart: Counterpart, integrator: Whitted
 ) -> Callable[..., FloatArray]:
@@ -221,34 +193,3 @@ def plugin_radiance(
         return found
 
     return of
-
-
-Radiance = Callable[[FloatArray, FloatArray], FloatArray]
-"""(origins, unit directions) -> radiance, all (n, 3)."""
-
-
-def _explained(
-    rays: Rays,
-    sides: tuple[tuple[FloatArray, Radiance], tuple[FloatArray, Radiance]],
-    moves: Sequence[tuple[FloatArray, float]],
-    bound: FloatArray,
-) -> arbiter.BoolArray:
-    """Which of the outliers (m,) have a neighbouring ray along which one renderer has the other's
-    value.
-
-    `sides` are ours and Mitsuba's: the value along each ray, and the function that computes it.
-    Where Mitsuba's own value changes that much within its rounding, it is not resolved.
-    """
-    settled = np.zeros(len(bound), bool)
-    for radius, angle in moves:
-        for k in (0, 1):
-            radiance, wanted = sides[k][1], sides[1 - k][0]
-            rows = np.flatnonzero(~settled)[: MOST_OUTLIERS[k]]
-            if len(rows) == 0:
-                return settled
-            low, high = arbiter.values_around(
-                rays.o[rows], rays.d[rows], radius[rows], angle, radiance
-            )
-            slack, wanted = bound[rows][:, None], wanted[rows]
-            settled[rows] = ((wanted >= low - slack) & (wanted <= high + slack)).all(axis=1)
-    return settled

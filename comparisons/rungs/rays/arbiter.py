@@ -76,27 +76,3 @@ def explained(
             found[open_] = agree.reshape(len(open_), -1).any(axis=1)
             done += len(some)
     return found
-
-
-def values_around(
-    o: FloatArray,
-    d: FloatArray,
-    radius: FloatArray,
-    turn: float,
-    value: Callable[[FloatArray, FloatArray], FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    """The least and the greatest `value(origins, directions)`, (m, 3) each, next to m rays.
-
-    Origins move by up to `radius` (m,); unit directions stay, or turn by `turn` radians, on the
-    opposite side of the sphere.  All moves of all rays are evaluated in one call.
-    """
-    moves = directions(NEIGHBOURS)
-    ways = np.roll(moves, NEIGHBOURS // 2, axis=0)
-    still = np.zeros((1, 3))
-    move = np.concatenate([still, *(factor * moves for factor in RADII for _ in (0, 1))])
-    way = np.concatenate([still, *(size * ways for _ in RADII for size in (0.0, turn))])
-    origins = o[:, None] + move * radius[:, None, None]
-    turned = d[:, None] + way
-    turned /= np.linalg.norm(turned, axis=2, keepdims=True)
-    found = value(origins.reshape(-1, 3), turned.reshape(-1, 3)).reshape(len(o), -1, 3)
-    return found.min(axis=1), found.max(axis=1)
