@@ -19,6 +19,7 @@ from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.reading.reference import changes_to, file_of, own_scene
 from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, load
+from comparisons.mitsuba.translate.integrators import in_place_of
 from comparisons.mitsuba.translate.vertices import with_float32_vertices
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
@@ -130,7 +131,9 @@ def _gather(
         rung = RungResult("geometry", "not-comparable", str(error))
         if own is None:
             return Evidence(scene.name, (rung,), None, seconds, left_out=left_out)
-        counterpart, only = Counterpart(own, {}), ("statistics", "images")
+        is_ours = in_place_of(judged_by) is not None
+        counterpart = Counterpart(own, {}, has_our_integrator=is_ours)
+        only = ("statistics", "images")
     seconds["reference"] = {"load": time.perf_counter() - clock}
 
     notes = [*counterpart.notes(), *notes_of(scene)]

@@ -5,12 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons.mitsuba.backend import mitsuba
+import comparisons.compare.compare
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, compare_scene
+from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.plugins.parameters import is_wide
 from comparisons.mitsuba.reading.reference import changes_to, own_scene
 from comparisons.mitsuba.scene import picture
-from comparisons.mitsuba.translate import load, to_mitsuba
+from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
@@ -135,3 +139,23 @@ def test_the_users_own_file_gets_our_integrator_and_the_report_says_so(
     hidden = Scene.load(path)
     assert any("misplaces what lies behind hidden lamps" in text for text in changes_to(hidden))
     assert agrees(by_ours(hidden), by_mitsuba(own_scene(hidden)))
+
+
+def test_without_an_llvm_such_pictures_are_not_comparable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a translation and without: our integrator would trace ray by ray for hours."""
+    path = tmp_path / "hidden.xml"
+    path.write_text(OWN.format(integrator="path"), encoding="utf-8")
+    budget = Budget(spp=4, replicates=2, pixels=16, light_pixels=16)
+
+    def refused(_: Scene) -> Counterpart:
+        raise UntranslatableError("of a test", "scene")
+
+    for load_ in (load, refused):
+        monkeypatch.setattr(comparisons.compare.compare, "load", load_)
+        with scalar():
+            case = compare_scene(Subject(Scene.load(path)), budget, lambda _: None)
+        found = {rung.name: rung for rung in case.rungs}
+        assert found["statistics"].status == "not-comparable"
+        assert "scalar variant" in found["statistics"].reason
