@@ -88,7 +88,7 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
             case,
             scene=request.name,
             again=request.again,
-            notes=(*dict.fromkeys(warned), *case.notes, described(request.budget)),
+            notes=(*warned, *case.notes, described(request.budget)),
         )
         write_case(request.folder, case, request.key, time.perf_counter() - start)
 

@@ -1,0 +1,73 @@
+"""Warnings about scenes, as commands report them."""
+
+import warnings
+
+import pytest
+from typer.testing import CliRunner
+
+from reference_rt.cli.guarded import MOST_ALIKE, scene_warnings
+from reference_rt.cli.main import app
+from reference_rt.util.errors import SceneWarning
+
+FLAT = "scene.yaml:{}: shapes[{}]: mesh part{}.ply: {} of 1,260 triangles have no area"
+
+
+def told(*texts: str) -> list[str]:
+    found: list[str] = []
+    with scene_warnings(found.append):
+        for text in texts:
+            warnings.warn(SceneWarning(text), stacklevel=1)
+    return found
+
+
+def test_warnings_of_one_kind_are_counted():
+    many = [FLAT.format(k + 9, k, k, 3 + k % 5) for k in range(400)]
+    other = "scene.yaml: camera: the picture is black"
+    assert told(*many[:200], other, *many[200:]) == [
+        *many[:MOST_ALIKE],
+        other,
+        f"{many[-1]} ({400 - MOST_ALIKE - 1} more warnings of this kind are left out)",
+    ]
+
+
+@pytest.mark.parametrize("count", range(MOST_ALIKE + 2))
+def test_few_warnings_are_all_reported(count):
+    some = [FLAT.format(k, k, k, k) for k in range(count)]
+    assert told(*some) == some
+
+
+def test_the_same_warning_is_reported_once():
+    assert told(*["scene.yaml: the same"] * 10) == ["scene.yaml: the same"]
+
+
+def test_other_warnings_are_pythons():
+    with pytest.warns(UserWarning, match="another"), scene_warnings(pytest.fail):
+        warnings.warn("another", UserWarning, stacklevel=1)
+
+
+def test_they_are_reported_before_an_error():
+    found: list[str] = []
+
+    def fail() -> None:
+        with scene_warnings(found.append):
+            for k in range(10):
+                warnings.warn(SceneWarning(FLAT.format(k, k, k, k)), stacklevel=1)
+            raise ValueError("wrong")
+
+    with pytest.raises(ValueError, match="wrong"):
+        fail()
+    assert len(found) == MOST_ALIKE + 1
+
+
+def test_a_scene_of_many_damaged_meshes(tmp_path):
+    mesh = (
+        "  - {type: mesh, vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]],"
+        " faces: [[0, 1, 2], [0, 1, 3]]}\n"
+    )
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("film: {width: 4, height: 4}\nshapes:\n" + 50 * mesh)
+    result = CliRunner().invoke(app, ["render", str(scene), "-o", str(tmp_path / "out.exr")])
+    assert result.exit_code == 0, result.output
+    lines = [line for line in result.stderr.splitlines() if "have no area" in line]
+    assert len(lines) == MOST_ALIKE + 1
+    assert lines[-1].endswith("(46 more warnings of this kind are left out)")
