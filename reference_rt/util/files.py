@@ -34,6 +34,10 @@ _KINDS = (
 )
 
 
+_LFS = b"version https://git-lfs.github.com/spec/"
+"""What a repository cloned without Git LFS has in place of a large file begins with this."""
+
+
 def open_input(path: Path) -> BinaryIO:
     """Opens a regular file for reading.  Raises OSError, whose `strerror` says what is wrong.
 
@@ -53,10 +57,18 @@ def open_input(path: Path) -> BinaryIO:
         if not stat.S_ISREG(mode):
             kind = next((kind for is_one, kind in _KINDS if is_one(mode)), "is something else")
             raise OSError(errno.EINVAL, f"{kind}, not a regular file", str(path))
-        return os.fdopen(number, "rb")
+        file = os.fdopen(number, "rb")
     except BaseException:
         os.close(number)
         raise
+    try:
+        if file.peek(len(_LFS)).startswith(_LFS):
+            reason = "is a Git LFS pointer; run `git lfs pull` to get the file itself"
+            raise OSError(errno.EINVAL, reason, str(path))
+    except BaseException:
+        file.close()
+        raise
+    return file
 
 
 def read_input(path: Path, most: int = MOST_BYTES) -> bytes:

@@ -97,6 +97,14 @@ def make_enormous(path: Path) -> None:
         file.truncate(1 << 42)  # it takes no place on the disk
 
 
+def leave_a_pointer(path: Path) -> None:
+    """What a repository cloned without Git LFS has in place of a large file."""
+    digest = "f789764840e53deb1a07d2fa1953124d6bc29b9f8d1308e97dd2d07c59d598bd"
+    path.write_text(
+        f"version https://git-lfs.github.com/spec/v1\noid sha256:{digest}\nsize 184302\n"
+    )
+
+
 KINDS = {
     "missing": lambda path: None,
     "empty": lambda path: path.touch(),
@@ -109,6 +117,7 @@ KINDS = {
     "a circle": lambda path: path.symlink_to(path),
     "a broken link": lambda path: path.symlink_to(path.parent / "nowhere"),
     "enormous": make_enormous,
+    "a pointer": leave_a_pointer,
     "rubbish": lambda path: path.write_bytes(bytes(range(256)) * 8),
     "not for reading": lambda path: path.symlink_to("/proc/self/mem"),
 }
@@ -142,6 +151,8 @@ def test_every_reader_of_everything(tmp_path, name, kind):
     assert caught.value.exit_code in (2, 3, 4)
     if kind == "a pipe":
         assert "is a pipe, not a regular file" in said
+    if kind == "a pointer":
+        assert "is a Git LFS pointer; run `git lfs pull`" in said
     if kind == "enormous" and name in ("scene.yaml", "scene.json", "suite.yaml", "told.json"):
         assert f"has more than {MOST_TEXT} bytes" in said
     if kind == "enormous" and name.startswith("mesh"):
