@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from comparisons.mitsuba.reading.colours import index_of_refraction, metal
-from comparisons.mitsuba.reading.context import Reading, unused
+from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.principled import phong, principled, principled_thin
 from comparisons.mitsuba.reading.textures import colour_or_texture, number_or_texture, texture_name
@@ -45,7 +45,7 @@ def material_name(reading: Reading, node: Node) -> str:
         with node.checking():
             material = _READERS[node.plugin](reading, node)
         node.finish()
-        name = unused(node.name, node.plugin, reading.materials)
+        name = reading.unused(node.name, node.plugin, reading.materials)
         reading.materials[name] = material
         reading.names[key] = name
     return reading.names[key]
@@ -54,7 +54,7 @@ def material_name(reading: Reading, node: Node) -> str:
 def black(reading: Reading) -> str:
     """The name of a material that scatters nothing."""
     if "black" not in reading.names:
-        name = unused(BLACK, BLACK, reading.materials)
+        name = reading.unused(BLACK, BLACK, reading.materials)
         reading.materials[name] = Diffuse(reflectance=(0.0, 0.0, 0.0))
         reading.names["black"] = name
     return reading.names["black"]

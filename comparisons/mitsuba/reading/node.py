@@ -229,12 +229,11 @@ class Node:
     def written(self, key: str = "to_world") -> Written | None:
         """The steps of a transform as the file has them; None for a dictionary, and for what is not
         known."""
-        found = _PLACE.match(self._place)
-        if found is None:
+        files, node = self._parsed.state.files, self._parsed.state.nodes[self.index]
+        if not files:
             return None
-        # Mitsuba counts columns from 1, of the name after "<".
-        place = int(found["line"]), int(found["col"]) - 2
-        return self._parsed.transforms(found["file"].strip('"')).get(place, {}).get(key)
+        # By the offset: `file_location` reads the file up to there, every time.
+        return self._parsed.transforms(str(files[node.file_index])).get(node.offset, {}).get(key)
 
     def looks(self) -> tuple[LookAt | None, tuple[float, ...]]:
         """The <lookat> of to_world, and the scale before it, (1, 1, 1) for none; None for any other

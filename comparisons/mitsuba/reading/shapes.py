@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.mitsuba.reading.context import Reading, unused
+from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.lights import emission
 from comparisons.mitsuba.reading.materials import material_name
 from comparisons.mitsuba.reading.meshes import Surface, finished, mesh, placed
@@ -60,7 +60,7 @@ def _material(reading: Reading, node: Node, in_group: bool) -> str | None:
     # Without a BSDF a lamp is black (src/render/shape.cpp).
     key = ("emissive", emitter.index, base)
     if key not in reading.names:
-        name = unused(emitter.name, "lamp", reading.materials)
+        name = reading.unused(emitter.name, "lamp", reading.materials)
         reading.materials[name] = Emissive(radiance=emission(reading, emitter), base=base)
         reading.names[key] = name
     return reading.names[key]
@@ -78,7 +78,7 @@ def group_name(reading: Reading, node: Node) -> str:
         if not members:
             raise node.error("has no shapes; expected one or more")
         node.finish()
-        name = unused(node.name, "group", reading.groups)
+        name = reading.unused(node.name, "group", reading.groups)
         reading.groups[name] = tuple(members)
         reading.names[key] = name
     return reading.names[key]

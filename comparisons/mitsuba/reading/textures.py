@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.mitsuba.reading.colours import SPECTRA, Rgb, colour, constant, luminance
-from comparisons.mitsuba.reading.context import Reading, unused
+from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.written import FLIP as FLIP_STEPS
 from comparisons.mitsuba.reading.written import Step, Written
@@ -83,7 +83,7 @@ def texture_name(reading: Reading, node: Node, as_number: bool, is_projected: bo
     if key not in reading.names:
         with node.checking():
             texture = _texture(reading, node, as_number, is_projected)
-        name = unused(node.name, node.plugin, reading.textures)
+        name = reading.unused(node.name, node.plugin, reading.textures)
         reading.textures[name] = texture
         if isinstance(texture, VertexColours):
             reading.attributes[name] = node.text("name", "")

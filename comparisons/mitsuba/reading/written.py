@@ -4,6 +4,7 @@ Mitsuba's parser multiplies them.  Our scenes keep the author's numbers where th
 that what is converted stays legible, and what we have written is read to the same bits.
 """
 
+import codecs
 import re
 import xml.parsers.expat
 from collections.abc import Callable, Mapping
@@ -53,22 +54,37 @@ scene files say so in these steps."""
 
 Written = tuple["Step | LookAt", ...]
 
-Transforms = Mapping[tuple[int, int], Mapping[str, Written]]
-"""The transforms of a file's elements by line and column, and by name."""
+Transforms = Mapping[int, Mapping[str, Written]]
+"""The transforms of a file's elements by the offset of the element's name in the file as UTF-8, as
+Mitsuba's parser counts, and by their own name."""
 
 
 def transforms_of(path: Path, defaults: Mapping[str, str]) -> Transforms:
     """The transforms of a file;  defaults: values for its <default> elements.  Empty for a file
     that is no XML, and without those that are written in any other way."""
     reader = _Reader(dict(defaults))
-    parser = xml.parsers.expat.ParserCreate()
-    reader.place = lambda: (parser.CurrentLineNumber, parser.CurrentColumnNumber)
+    parser = xml.parsers.expat.ParserCreate("utf-8")
+    reader.place = lambda: parser.CurrentByteIndex + 1  # after "<"
     parser.StartElementHandler, parser.EndElementHandler = reader.start, reader.end
     try:
-        parser.Parse(path.read_bytes(), True)
+        parser.Parse(_as_utf8(path.read_bytes()), True)
     except (OSError, ValueError, xml.parsers.expat.ExpatError):
         return {}
     return reader.found
+
+
+_LATIN = re.compile(rb"<\?xml[^>]*encoding\s*=\s*[\"'](iso-8859-1|latin1)[\"']", re.IGNORECASE)
+
+
+def _as_utf8(content: bytes) -> bytes:
+    """A file as Mitsuba's parser converts it, with its byte order mark.  Raises ValueError."""
+    for mark, encoding in (
+        (codecs.BOM_UTF16_LE, "utf-16-le"),
+        (codecs.BOM_UTF16_BE, "utf-16-be"),
+    ):
+        if content.startswith(mark):
+            return content.decode(encoding).encode()
+    return content.decode("latin-1").encode() if _LATIN.match(content) else content
 
 
 def as_transform(steps: Written | None, m: Affine) -> tuple[dict[str, Any], ...]:
@@ -104,12 +120,12 @@ class _Reader:
 
     def __init__(self, values: dict[str, str]) -> None:
         self.values = values
-        self.found: dict[tuple[int, int], dict[str, Written]] = {}
-        self.elements: list[tuple[int, int]] = []
+        self.found: dict[int, dict[str, Written]] = {}
+        self.elements: list[int] = []
         self.name: str | None = None  # of the transform that is being read
         self.steps: list[Step | LookAt] = []
         self.is_known = True
-        self.place: Callable[[], tuple[int, int]] = lambda: (0, 0)
+        self.place: Callable[[], int] = lambda: 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         if self.name is not None:
